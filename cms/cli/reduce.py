@@ -40,6 +40,14 @@ def reduce_and_write(job: "Job", path: Path, solver: str | None = None, memory: 
     return reduced
 
 
+def with_workers(job: "Job", workers: str) -> "Job":
+    """Return a job whose substructures are eliminated by these workers."""
+    from fe_models.foundation.tasks.workers import checked_workers
+
+    reduction = job.reduction.model_copy(update={"workers": checked_workers(workers)})
+    return job.model_copy(update={"reduction": reduction})
+
+
 def print_times(clock: "Stages") -> None:
     """Print the time of each stage."""
     rows = [(name, f"{seconds:.2f}") for name, seconds in clock.seconds.items()]
@@ -123,7 +131,8 @@ def reduce_command(
     """Reduce finite element bodies to modal files.
 
     Without -o the modal file stands beside the job file: rod.toml gives rod.h5. Several jobs, or --workers: each is a
-    task, what is done is kept in a journal (reduce.journal), and the same command goes on from there.
+    task, what is done is kept in a journal (reduce.journal), and the same command goes on from there. One job with the
+    mode set multilevel: its substructures are the tasks.
 
     Example: cms reduce rod.toml -o rod.h5
 
@@ -133,13 +142,15 @@ def reduce_command(
     from cms.fleets.inputs import inputs_of
     from cms.jobs.job import read_job
 
-    if memory is not None and (len(jobs) > 1 or workers is not None):
+    job = jobs[0]
+    read = read_job(job) if len(jobs) == 1 else None
+    if read is not None and read.reduction.set == "multilevel" and workers is not None and journal is None:
+        read, workers = with_workers(read, workers), None
+    if memory is not None and (read is None or workers is not None):
         raise JobError('--memory: belongs to one job; several have memory = "8GB" in their tables [reduction]')
-    if len(jobs) > 1 or workers is not None:
+    if read is None or workers is not None:
         reduce_and_write_fleet(Fleet(jobs, output, workers, journal, solver))
         return
-    job = jobs[0]
-    read = read_job(job)
     inputs = inputs_of(job, read)
     path = output_path(output, job.with_suffix(".h5"), JobError, overwrite_of=inputs)
     reduce_and_write(read, path, solver, memory)

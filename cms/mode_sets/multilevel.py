@@ -1,6 +1,7 @@
 """Craig-Bampton for large bodies and many modes: its modes by multilevel substructures (AMLS)."""
 
 from contextlib import nullcontext
+from multiprocessing import current_process
 
 import numpy as np
 
@@ -12,10 +13,10 @@ from cms.families.vibration_modes import no_modes
 from cms.mode_set import ModeSet
 from cms.mode_sets.blocks import constraint_block, inertia_relief_block, mode_set, vibration_block
 from cms.mode_sets.selection import checked_modes, require_interfaces
-from cms.multilevel.modes import Interior, MultilevelResult, multilevel_modes
 from cms.solvers.eigen import EigenResult
 from cms.solvers.factorization import Factorization
 from cms.solvers.mode_count import ModeCount, mode_count
+from cms.substructures.modes import Interior, MultilevelResult, multilevel_modes
 from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.body.submatrix import principal_block
 from fe_models.foundation.tasks.workers import Workers, tasks_of
@@ -34,8 +35,8 @@ def multilevel(
 ) -> ModeSet:
     """Craig-Bampton whose fixed-interface modes come from multilevel substructures: [Psi_C, (Psi_H,) modes] [1]_.
 
-    Constraint modes are exact, by the same tree, which stands for the factorisation of the body from then on. Frequencies
-    are never below the true ones; an estimate of the error of each stands in `data["frequency error"]`, NaN for static
+    Constraint modes are exact, by the same tree, which stands for the factorisation of the body from then on.
+    Frequencies are never below the true ones; an estimate of the error of each stands in `data["frequency error"]`, NaN for static
     columns.
 
     Parameters
@@ -81,10 +82,10 @@ def multilevel(
             )
         results: list[MultilevelResult] = []
 
-        def find(asked: ModeCount) -> EigenResult:
-            if asked.n == 0 or not len(body.i):
+        def find(n_modes: ModeCount) -> EigenResult:
+            if n_modes.n == 0 or not len(body.i):
                 return no_modes(body.n_dof)
-            results.append(_modes_of(families, asked, tolerance, cutoff_factor, workers))
+            results.append(_modes_of(families, n_modes, tolerance, cutoff_factor, workers))
             return results[-1].modes
 
         modes = checked_modes("multilevel", "fixed-interface", find, body, wanted)
@@ -113,15 +114,18 @@ def _modes_of(
     i = body.i
     K, M = principal_block(body.K, i), principal_block(body.M, i)
     interior = Interior(K, M, body.dofs[i, 0], body.nodes, body.dofs[i, 1] == MULTIPLIER)
+    if current_process().daemon:  # a task of a fleet or sweep: it may start no processes
+        workers = None
     with nullcontext() if workers is None else tasks_of(workers) as tasks:
         try:
             found = multilevel_modes(
-                interior, wanted, tolerance=tolerance, cutoff_factor=cutoff_factor, tasks=tasks, rows=(body.n_dof, i)
-            )
+                interior, wanted, tolerance=tolerance, cutoff_factor=cutoff_factor, tasks=tasks,
+                rows=(body.n_dof, i), solver=families.solver,
+            )  # fmt: skip
         except FactorizationError:
             families.fixed  # noqa: B018 - says where the mechanism is
             raise
-    families.adopt(FixedInterfaceBody(body, i, body.b, K, M, Factorization(found.tree)))
+    families.adopt(FixedInterfaceBody(body, i, body.b, K, M, Factorization(found.tree, families.solver)))
     return found
 
 

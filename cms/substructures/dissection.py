@@ -37,7 +37,6 @@ class Dissection:
             first[parent] = min(first[parent], first[t])
         return first
 
-
     def in_order(self, A: sp.csc_array) -> sp.csc_array:
         """Return a matrix in the order of elimination, (n, n)."""
         rank = np.empty(len(self.order), dtype=A.indices.dtype)
@@ -58,13 +57,13 @@ def node_graph(K: sp.csc_array, M: sp.csc_array, nodes: IntArray) -> tuple[sp.cs
     """
     _, node = np.unique(nodes, return_inverse=True)
     n_nodes = int(node.max()) + 1
-    graph = None
+    graph = sp.csr_array((n_nodes, n_nodes), dtype=np.int8)
     for A in (K, M):
         ones = np.ones(A.nnz, dtype=np.int8)
         columns = np.repeat(node, np.diff(A.indptr))
         part = sp.csr_array(sp.coo_array((ones, (node[A.indices], columns)), shape=(n_nodes, n_nodes)))
         part.data[:] = 1
-        graph = part if graph is None else graph + part
+        graph = sp.csr_array(graph + part)
     graph.setdiag(0)
     graph.eliminate_zeros()
     return sp.csr_array(graph), node

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
-from cms.multilevel.dissection import Dissection
-from cms.multilevel.elimination import Part, Reduced, Remainder, Substructure, eliminate_part
+from cms.substructures.dissection import Dissection
+from cms.substructures.elimination import Part, Reduced, Remainder, Substructure, eliminate_part
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.tasks.task_map import Progress, TaskMap
 from fe_models.foundation.threads import bounded_threads, n_threads
@@ -23,8 +23,7 @@ PARTS = 16  #: tasks are no larger than the body over so many for each processor
 class SubstructureTree:
     """A body as a tree of substructures, each with its factor, constraint modes and own modes.
 
-    It is a factorisation of K as well, to `cms.solvers` (`fe_models.foundation`): rows of what it takes and gives are in
-    the order of the body.
+    It is a `Factor` of K as well: `solve` takes and gives rows in the order of the body.
     """
 
     def __init__(self, dissection: Dissection, substructures: list[Substructure], n_multipliers: int) -> None:
@@ -134,7 +133,6 @@ class SubstructureTree:
                 b[:, columns] = u
 
         _by_columns(b.shape[1], part)
-        return X
 
 
 def substructure_tree(
@@ -169,8 +167,8 @@ def substructure_tree(
     FactorizationError
         If K is not positive definite (but for multipliers).
     """
-    lower = [sp.csc_array(sp.tril(A, format="csc")) for A in (K, M)]
-    body = _Body(dissection, *lower, omega2, multipliers)
+    lower_K, lower_M = (sp.csc_array(sp.tril(A, format="csc")) for A in (K, M))
+    body = _Body(dissection, lower_K, lower_M, omega2, multipliers)
     runs, is_top = body.runs()
     parts = [body.part(run) for run in runs]
     reduced: list[Reduced]

@@ -8,7 +8,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from cms.errors import FactorizationError
-from cms.multilevel.dense import (
+from cms.substructures.dense import (
     add_product,
     add_rank_2k,
     cholesky,
@@ -200,7 +200,7 @@ def _root_with_multipliers(
 
 
 def own_modes(K: Array, M: Array, L: Array, bound: float) -> tuple[Array, Array]:
-    """(3) Return omega² up to a bound, ascending, and modes, M-orthonormal, by the lower triangles; K and M may be lost.
+    """(3) Return omega² up to a bound, ascending, and modes, M-orthonormal, by lower triangles; K and M may be lost.
 
     M may be semidefinite: A = L⁻¹ M L⁻ᵀ has theta = 1 / omega², and 0 for what has no mass.
     """

@@ -3,10 +3,10 @@
 import numpy as np
 import scipy.sparse as sp
 
-from cms.multilevel.dissection import Dissection
 from cms.solvers.eigen import eigenmodes
+from cms.substructures.dissection import Dissection
 from fe_models.body.submatrix import principal_block
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["guessed_omega2"]
 
@@ -49,5 +49,5 @@ def guessed_omega2(dissection: Dissection, K: sp.csc_array, M: sp.csc_array, cou
     return float(values[order][np.argmax(reached)] if reached.any() else values.max())
 
 
-def _lowest(K: sp.csc_array, M: sp.csc_array, dofs: Array, n_modes: int) -> Array:
+def _lowest(K: sp.csc_array, M: sp.csc_array, dofs: IntArray, n_modes: int) -> Array:
     return np.array(eigenmodes(principal_block(K, dofs), principal_block(M, dofs), n_modes, tolerance=1e-2).omega2)

@@ -6,6 +6,7 @@ import scipy.sparse as sp
 
 from cms.solvers.eigen import eigenmodes
 from cms.solvers.factorization import Inertia
+from cms.solvers.registry import solver_of
 from fe_models.foundation.arrays import Array
 
 __all__ = ["reduced_modes"]
@@ -22,6 +23,7 @@ class Diagonal:
     def __init__(self, d: Array) -> None:
         self.d, self.n = d, len(d)
         self.inertia = Inertia(0, 0, len(d))
+        self.solver = solver_of()
 
     def solve(self, b: Array) -> Array:
         """Return d⁻¹ b, (n, k)."""

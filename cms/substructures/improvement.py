@@ -4,9 +4,9 @@ import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 
-from cms.multilevel.tree import SubstructureTree
 from cms.solvers.sparse_product import SymmetricProduct
 from cms.solvers.tall import inner
+from cms.substructures.tree import SubstructureTree
 from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["COLUMNS", "GROUP", "SLICE", "ApproximateModes"]

@@ -6,18 +6,19 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from cms.errors import EigenError
-from cms.multilevel.dissection import Dissection, dissect, node_graph
-from cms.multilevel.frequency_guess import guessed_omega2
-from cms.multilevel.improvement import COLUMNS, SLICE, ApproximateModes
-from cms.multilevel.reduced_modes import reduced_modes
-from cms.multilevel.tree import SubstructureTree, substructure_tree
+from cms.errors import EigenError, ModeSetError
 from cms.solvers.eigen import EigenResult, counting_shift
 from cms.solvers.factorization import factorize
 from cms.solvers.mode_count import ModeCount
 from cms.solvers.orientation import orientation
 from cms.solvers.shift_inverted import Wanted
+from cms.substructures.dissection import Dissection, dissect, node_graph
+from cms.substructures.frequency_guess import guessed_omega2
+from cms.substructures.improvement import COLUMNS, SLICE, ApproximateModes
+from cms.substructures.reduced_modes import reduced_modes
+from cms.substructures.tree import SubstructureTree, substructure_tree
 from fe_models.foundation.arrays import Array, IntArray, frozen
+from fe_models.foundation.solver import Solver
 from fe_models.foundation.tasks.task_map import TaskMap
 from fe_models.foundation.threads import one_blas_thread
 
@@ -27,7 +28,8 @@ log = logging.getLogger(__name__)
 
 LEAF = 300  #: dofs of a part: larger ones cost more arithmetic, smaller ones more calls
 GUARDS, GUARD_SHARE = 12, 0.08  #: modes beyond the wanted ones that take part: a number, and a share of these
-MOST_STEPS = 5  #: of inverse iteration
+MOST_STEPS = 8  #: of inverse iteration
+SHARE = 8  #: interior dofs for each wanted mode, at least
 MARGIN = 1.1  #: of a cutoff: reduced frequencies lie above the true ones
 
 
@@ -78,6 +80,7 @@ def multilevel_modes(
     cutoff_factor: float = 3.0,
     tasks: TaskMap | None = None,
     rows: tuple[int, IntArray] | None = None,
+    solver: Solver | None = None,
 ) -> MultilevelResult:
     """Lowest vibration modes by automated multilevel substructuring.
 
@@ -86,8 +89,8 @@ def multilevel_modes(
     (3) every substructure is reduced to its own modes up to the bound, and eliminated from those above it
     (4) the reduced pencil: its lowest modes, expanded down the tree
     (5) steps of inverse iteration by the tree, until the error that is left is below the tolerance
-    (6) the error that is left: |r|²_K / (2 omega² (1 - omega² / omega_next²)), r = x - omega² K⁻¹ M x, omega_next that of
-        the first mode that does not take part
+    (6) the error that is left: |r|²_K / (2 omega² (1 - omega² / omega_next²)), r = x - omega² K⁻¹ M x, omega_next
+        that of the first mode that does not take part
 
     Frequencies are those of a Rayleigh-Ritz basis: never below the true ones.
 
@@ -105,11 +108,15 @@ def multilevel_modes(
         Where subtrees are eliminated; None: in threads of this process.
     rows
         Over how many dofs the modes are told, and which of these are the interior; None: over the interior.
+    solver
+        What factorises for the proof; None: the fastest one that is installed.
 
     Raises
     ------
     EigenError
         If the substructures have fewer modes than are wanted, or the inertia counts others.
+    ModeSetError
+        If a large part of all modes is wanted.
     FactorizationError
         If the stiffness is singular.
     """
@@ -120,6 +127,11 @@ def multilevel_modes(
     if wanted.cutoff is not None:  # (2)
         highest = (2 * np.pi * wanted.cutoff) ** 2
     else:
+        if SHARE * int(wanted.n or 0) > n > LEAF:
+            raise ModeSetError(
+                f"multilevel: {wanted.words} of {n} interior dofs; expected at most 1 in {SHARE} of them; "
+                "take craig-bampton"
+            )
         highest = guessed_omega2(dissection, interior.K, interior.M, int(wanted.n or 0))
     bound = cutoff_factor**2 * highest
     tree = substructure_tree(dissection, K, M, bound, multipliers=multipliers, tasks=tasks)  # (3)
@@ -132,8 +144,8 @@ def multilevel_modes(
     if wanted.cutoff is None:
         if count > len(own):
             raise EigenError(
-                f"multilevel: {wanted.words}, but the substructures have {len(own)} modes up to {cutoff_factor:g} times "
-                "the estimated frequency; choose a larger cutoff_factor, or fewer modes"
+                f"multilevel: {wanted.words}, but the substructures have {len(own)} modes up to {cutoff_factor:g} "
+                "times the estimated frequency; choose a larger cutoff_factor, or fewer modes"
             )
         reduced, Z = reduced_modes(own, tree.mass(), p)
     elif p > len(reduced):
@@ -152,13 +164,14 @@ def multilevel_modes(
             "cutoff_factor (%g)", worst.sum(), k, tolerance, n_steps, np.argmax(worst) + 1, errors.max(), cutoff_factor,
         )  # fmt: skip
     if wanted.verify:
-        _require_all(interior, modes.omega2, k, wanted)
+        _require_all(interior, modes.omega2, k, wanted, solver)
     omega2 = np.array(modes.omega2[:k])
     n_rows, of_interior = rows or (n, np.arange(n))
     Phi = np.zeros((n_rows, k))
     modes.into(Phi, of_interior[dissection.order])
     modes.blocks.clear()
-    turn(Phi, omega2)
+    if k:
+        turn(Phi, omega2)
     method = (
         f"multilevel substructures: {dissection.n} in a tree, {len(own)} modes up to {cutoff_factor:g} times the "
         f"highest wanted frequency, {n_steps} steps of inverse iteration"
@@ -178,8 +191,9 @@ def turn(Phi: Array, omega2: Array) -> None:
 
 def _improved(modes: ApproximateModes, count: int, tolerance: float) -> tuple[Array, int]:
     """(5), (6) Improve modes until the error that is left in the wanted ones is below the tolerance."""
-    errors = np.zeros(0)
-    for n_steps in range(1, MOST_STEPS + 1):
+    errors, n_steps = np.zeros(0), 0
+    while n_steps < (MOST_STEPS if count else 0):
+        n_steps += 1
         modes.improve()
         apart = 1 - modes.omega2[:count] / modes.omega2[-1]
         squared = modes.measured(count) ** 2
@@ -194,11 +208,11 @@ def _most_below(own: Array, omega2: float) -> int:
     return min(len(own), int(2 * (own <= omega2).sum()) + GUARDS + 20)
 
 
-def _require_all(interior: Interior, omega2: Array, k: int, wanted: ModeCount) -> None:
+def _require_all(interior: Interior, omega2: Array, k: int, wanted: ModeCount, solver: Solver | None) -> None:
     """Count the modes below a gap after the wanted ones by Sylvester's law of inertia."""
     last, sigma = counting_shift(omega2[: k + GUARDS], k, Wanted.of(wanted), 0.0)
     A = sp.csc_array(interior.K - sigma * interior.M)
-    with factorize(A, definite=False) as factorization:
+    with factorize(A, definite=False, solver=solver) as factorization:
         inertia = factorization.inertia
     n_below = inertia.n_negative - int(interior.is_multiplier.sum())
     if inertia.n_zero or n_below != last:

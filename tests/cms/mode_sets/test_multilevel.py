@@ -1,0 +1,187 @@
+import logging
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import cms
+from cms.errors import BodyError, ModeSetError
+from cms.solvers.mode_count import ModeCount
+from tests.bodies import bar
+from tests.cms.substructures.shells import between, panel
+
+N = 24
+
+
+@pytest.fixture(scope="module")
+def shell():
+    return panel()
+
+
+@pytest.fixture(scope="module")
+def direct(shell):
+    """All modes far beyond the wanted ones, by block Lanczos."""
+    return cms.craig_bampton_ir(shell, n_modes=2 * N)
+
+
+@pytest.fixture(scope="module")
+def modes(shell):
+    return cms.multilevel(shell, n_modes=ModeCount(N, verify=True), inertia_relief=True)
+
+
+def relative_errors(modes, direct):
+    found = modes.frequencies[np.isfinite(modes.frequencies)]
+    return found / direct.frequencies[np.isfinite(direct.frequencies)][: len(found)] - 1
+
+
+def test_frequencies_lie_above_the_true_ones_and_within_the_tolerance(modes, direct):
+    errors = relative_errors(modes, direct)
+    assert len(errors) == N
+    assert errors.min() > -1e-8  # of the direct solver
+    assert 1e-8 < errors.max() < 1e-3
+    assert modes.options["verified"] == "True"
+    assert modes.options["above tolerance"] == "none"
+
+
+def test_the_estimated_error_is_no_less_than_the_true_one(modes, direct):
+    estimated = modes.data["frequency error"]
+    assert np.isnan(estimated[:-N]).all()
+    assert (estimated[-N:] >= relative_errors(modes, direct) - 1e-9).all()
+    assert estimated[-N:].max() < 100 * relative_errors(modes, direct).max()
+
+
+def test_static_columns_are_those_of_craig_bampton(shell, modes, direct):
+    n_static = len(modes.labels) - N
+    assert modes.labels[:n_static] == direct.labels[:n_static]
+    assert_allclose(modes.columns[:, :n_static], direct.columns[:, :n_static], rtol=0, atol=1e-9)
+    force = shell.K @ modes.columns[:, :12]
+    assert_allclose(force[shell.i], 0, rtol=0, atol=1e-9 * np.abs(force).max())
+
+
+def test_modes_are_orthonormal_and_vanish_on_the_boundary(shell, modes):
+    Phi = modes.columns[:, -N:]
+    assert (Phi[shell.b] == 0).all()
+    assert_allclose(Phi.T @ (shell.M @ Phi), np.eye(N), rtol=0, atol=1e-10)
+    omega2 = (2 * np.pi * modes.frequencies[-N:]) ** 2
+    assert_allclose(Phi.T @ (shell.K @ Phi), np.diag(omega2), rtol=0, atol=1e-8 * omega2.max())
+
+
+def test_a_tighter_tolerance_takes_more_steps_and_is_met(shell, direct):
+    modes = cms.multilevel(shell, n_modes=N, tolerance=1e-6)
+    assert "1 steps" not in modes.options["eigensolver"]
+    assert np.abs(relative_errors(modes, direct)).max() < 1e-6
+
+
+def test_what_stays_above_the_tolerance_is_told(shell, caplog):
+    with caplog.at_level(logging.WARNING):
+        modes = cms.multilevel(shell, n_modes=N, tolerance=1e-10, cutoff_factor=1.2)
+    above = modes.data["frequency error"][-N:] > 1e-10
+    if not above.any():
+        pytest.fail("choose a case that does not converge")
+    assert modes.options["above tolerance"].split(", ") == [str(k + 1) for k in np.flatnonzero(above)]
+    assert f"{above.sum()} of {N} frequencies" in caplog.text
+
+
+def test_a_cutoff_finds_all_modes_below_it(shell, direct):
+    frequencies = direct.frequencies[np.isfinite(direct.frequencies)]
+    cutoff = (frequencies[N - 1] + frequencies[N]) / 2
+    modes = cms.multilevel(shell, n_modes=ModeCount(cutoff=cutoff, verify=True))
+    assert len(relative_errors(modes, direct)) == N
+    assert np.abs(relative_errors(modes, direct)).max() < 1e-3
+
+
+def test_a_body_that_is_one_leaf_is_solved_exactly():
+    body = cms.couple(bar(nx=3, kind="hexahedron"))
+    modes, direct = cms.multilevel(body, n_modes=5), cms.craig_bampton(body, n_modes=5)
+    assert modes.options["substructures"].startswith("1 in 1 levels")
+    assert_allclose(relative_errors(modes, direct), 0, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["rigid", "distributing"])
+def test_solids_with_both_kinds_of_interfaces(kind):
+    body = between(kind)
+    modes, direct = cms.multilevel(body, n_modes=ModeCount(8, verify=True)), cms.craig_bampton(body, n_modes=12)
+    errors = relative_errors(modes, direct)
+    assert errors.min() > -1e-8
+    assert errors.max() < 1e-3
+    scale = np.abs(direct.columns[:, :12]).max()
+    assert_allclose(modes.columns[:, :12], direct.columns[:, :12], rtol=0, atol=1e-9 * scale)
+
+
+def test_other_sets_of_the_same_families_use_the_tree(shell, monkeypatch, direct):
+    with cms.Families(shell) as families:
+        cms.multilevel(families, n_modes=2)
+        monkeypatch.setattr("cms.families.fixed_interface.factorize", None)
+        other = cms.craig_bampton(families, n_modes=6)
+        assert "tree of" in families.fixed.factorization.description
+    frequencies = direct.frequencies[np.isfinite(direct.frequencies)]
+    assert_allclose(other.frequencies[-6:], frequencies[:6], rtol=1e-8)
+
+
+def test_the_reduced_body_is_that_of_craig_bampton(shell, modes, tmp_path):
+    """Rigid moments are exact, the modal ones obey tr S_kl = M; free frequencies are close."""
+    one = cms.reduce(shell, modes, geometric=False)
+    two = cms.reduce(shell, cms.craig_bampton_ir(shell, n_modes=N), geometric=False)
+    assert_allclose(one.moments.m, two.moments.m, rtol=1e-12)
+    assert_allclose(one.moments.R, two.moments.R, rtol=0, atol=1e-9 * np.abs(two.moments.R).max())
+    rotary = 0.05  # inertia, which is no part of the moments
+    assert_allclose(np.einsum("aakl->kl", one.moments.S_kl), one.M, rtol=0, atol=rotary)
+    ratio = one.free_frequencies[:20] / two.free_frequencies[:20]
+    assert np.abs(ratio - 1).max() < 1e-3
+    cms.write(one, tmp_path / "panel.h5")
+    assert cms.read(tmp_path / "panel.h5").provenance == one.provenance
+
+
+def test_no_modes_at_all_are_constraint_modes(shell):
+    assert cms.multilevel(shell, n_modes=0).labels == cms.guyan(shell).labels
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"n_modes": 10**6}, "interior dofs; choose"),
+        ({"n_modes": 3, "tolerance": 0.0}, "tolerance = 0; expected 1e-10 to 0.1"),
+        ({"n_modes": 3, "cutoff_factor": 1.0}, "cutoff_factor = 1; expected 1.2 to 100"),
+        ({"n_modes": ModeCount(cutoff=1e-3)}, "lies below the first fixed-interface mode"),
+    ],
+)
+def test_bad_options_are_refused(shell, options, words):
+    with pytest.raises(ModeSetError, match=words):
+        cms.multilevel(shell, **options)
+
+
+def test_a_large_part_of_all_modes_is_refused(shell):
+    with pytest.raises(ModeSetError, match="expected at most 1 in 8 of them; take craig-bampton"):
+        cms.multilevel(shell, n_modes=len(shell.i) // 7)
+
+
+def test_more_modes_than_the_substructures_keep_are_refused(shell, monkeypatch):
+    monkeypatch.setattr("cms.substructures.modes.guessed_omega2", lambda *_: 1e4)
+    with pytest.raises(cms.CmsError, match="choose a larger cutoff_factor"):
+        cms.multilevel(shell, n_modes=N)
+
+
+def test_interfaces_that_do_not_hold_the_body_are_refused():
+    from fe_models.body.fe_body import Interface
+
+    free = bar(nx=4, kind="hexahedron")
+    corner = Interface("corner", "nodes", np.array([0]), free.nodes[0], dofs=np.flatnonzero(free.dofs[:, 0] == 0)[:3])
+    from dataclasses import replace
+
+    body = cms.couple(replace(free, interfaces=(corner,)))
+    with pytest.raises(ModeSetError, match="leave a rigid-body motion free"):
+        cms.multilevel(body, n_modes=3)
+
+
+def test_a_mechanism_is_told_by_its_nodes():
+    from dataclasses import replace
+
+    import scipy.sparse as sp
+
+    body = between("rigid")
+    K = body.K.tolil()
+    loose = body.i[-1]
+    K[loose, :] = 0
+    K[:, loose] = 0
+    with pytest.raises(BodyError, match="with all interfaces held"):
+        cms.multilevel(replace(body, K=sp.csc_array(K.tocsc())), n_modes=3)
