@@ -36,8 +36,8 @@ def multilevel(
     """Craig-Bampton whose fixed-interface modes come from multilevel substructures: [Psi_C, (Psi_H,) modes] [1]_.
 
     Constraint modes are exact, by the same tree, which stands for the factorisation of the body from then on.
-    Frequencies are never below the true ones; an estimate of the error of each stands in `data["frequency error"]`, NaN for static
-    columns.
+    Frequencies are never below the true ones; an estimate of the error of each stands in `data["frequency error"]`, NaN
+    for static columns.
 
     Parameters
     ----------
