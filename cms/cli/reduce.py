@@ -137,11 +137,30 @@ def reduce_command(
     Example: cms reduce rod.toml -o rod.h5
 
     Example: cms reduce jobs/*.toml --workers 4
+
+    Example: mpirun -n 4 cms reduce rod.toml --solver petsc
     """
+    from cms.cli.ranks import on_ranks, one_job_of_ranks
     from cms.errors import JobError
     from cms.fleets.inputs import inputs_of
     from cms.jobs.job import read_job
+    from fe_models.foundation.ranks.ranks import started_ranks
 
+    if started_ranks() > 1:
+
+        def question() -> list[Path | str]:
+            asked = read_job(jobs[0])
+            chosen = solver or asked.reduction.solver
+            one_job_of_ranks(jobs, workers, chosen)
+            return [f"solver {chosen}", *inputs_of(jobs[0], asked)]
+
+        def work() -> None:
+            asked = read_job(jobs[0])
+            made = output_path(output, jobs[0].with_suffix(".h5"), JobError, overwrite_of=inputs_of(jobs[0], asked))
+            reduce_and_write(asked, made, solver, memory)
+
+        on_ranks(question, work)
+        return
     job = jobs[0]
     read = read_job(job) if len(jobs) == 1 else None
     if read is not None and read.reduction.set == "multilevel" and workers is not None and journal is None:

@@ -13,6 +13,7 @@ from cms.solvers.inverse import Inverse
 from cms.solvers.mode_count import ModeCount, mode_count
 from cms.solvers.mode_search import DenseSearch, KrylovSearch
 from cms.solvers.orientation import orientation
+from cms.solvers.petsc.search import SlepcSearch
 from cms.solvers.shift_inverted import Modes, ShiftInverted, Wanted
 from cms.solvers.tall import combine
 from fe_models.foundation.arrays import Array, frozen
@@ -29,6 +30,8 @@ ZERO = 1e-13  #: the same part, below which omega² is rounding of K: a rigid-bo
 TIGHTEST, LOOSEST = 1e-13, 0.1  #: tolerances that rounding allows, and that say anything
 MISMATCH = 1e-3  #: defect of K x = omega² M x that only a factorisation of another matrix explains
 MOST_PROOFS = 3
+#: solver -> its own search for modes, where that is not block Lanczos on rank 0
+SEARCHES: dict[str, type[SlepcSearch]] = {"slepc": SlepcSearch}
 GAP = 1e-4  #: relative gap between two omega² in which modes can be counted
 
 
@@ -119,7 +122,9 @@ def eigenmodes(
         if factorization.n != n:
             raise EigenError(f"eigenmodes: factorization: expected order {n}, got {factorization.n}")
         operator = ShiftInverted(M, shift, factorization, tolerance, progress)
-        search = (DenseSearch if is_dense else KrylovSearch)(operator, wanted)
+        is_own = not is_dense and isinstance(factorization, Factorization)
+        kind = SEARCHES.get(factorization.solver.name, KrylovSearch) if is_own else KrylovSearch
+        search = (DenseSearch if is_dense else kind)(operator, wanted)
         modes = search.modes(wanted)
         if asked.verify:
             modes = _proven_modes(K, M, search, modes, wanted)
@@ -148,7 +153,7 @@ def frequency_scale(K: sp.csc_array, M: sp.csc_array) -> float:
 
 
 def _proven_modes(
-    K: sp.csc_array, M: sp.csc_array, search: KrylovSearch | DenseSearch, modes: Modes, wanted: Wanted
+    K: sp.csc_array, M: sp.csc_array, search: KrylovSearch | DenseSearch | SlepcSearch, modes: Modes, wanted: Wanted
 ) -> Modes:
     """Return the modes once their number agrees with the inertia; look for more as long as it is larger."""
     operator = search.operator

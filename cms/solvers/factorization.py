@@ -50,6 +50,11 @@ class Factorization:
         self.solver = solver  #: which made it, for further matrices of the same body
 
     @property
+    def factor(self) -> Factor:
+        """What the solver made."""
+        return self._factor
+
+    @property
     def n(self) -> int:
         """Order of the matrix."""
         return self._factor.n

@@ -4,9 +4,13 @@ Another one is a line of `SOLVERS`: its name, what makes a factor (`MakeFactor` 
 `fe_models.foundation.solver`), and what says in words what is missing here, "" where nothing is.
 """
 
+from functools import partial
+
 from cms.errors import FactorizationError
 from cms.solvers.cholesky import cholesky_or_superlu
 from cms.solvers.pardiso import PardisoFactor, missing_pardiso
+from cms.solvers.petsc.factor import PetscFactor
+from cms.solvers.petsc.libraries import missing_petsc
 from cms.solvers.superlu import SuperLuFactor
 from fe_models.foundation.solver import Solver
 from fe_models.foundation.words import nearest, quoted
@@ -19,6 +23,9 @@ SOLVERS = {
         Solver("pardiso", PardisoFactor, missing_pardiso),
         Solver("cholesky", cholesky_or_superlu),
         Solver("superlu", SuperLuFactor),
+        Solver("petsc", PetscFactor, missing_petsc),
+        Solver("slepc", PetscFactor, missing_petsc),
+        Solver("petsc-disk", partial(PetscFactor, on_disk=True), missing_petsc),
     )
 }
 DEFAULTS = ("pardiso", "cholesky")  #: the first that is installed, where none is asked for

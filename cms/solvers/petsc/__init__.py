@@ -1,0 +1,1 @@
+"""Factorisation and modes by PETSc, SLEPc and MUMPS, alone or on many ranks."""

@@ -1,0 +1,176 @@
+"""MUMPS through PETSc: the matrix, its factor and the columns in solution spread over all ranks.
+
+(1) rank 0 sends every rank its rows of the upper triangle, as many entries each
+(2) all ranks factorise together; the sequence is chosen by METIS on rank 0
+(3) columns: rows of them to all ranks, a solve of many right-hand sides at once, rows back
+"""
+
+from itertools import count
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from cms.errors import FactorizationError
+from cms.solvers.petsc.libraries import petsc
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.ranks.mpi import all_ranks
+from fe_models.foundation.ranks.ranks import Ranks
+from fe_models.foundation.ranks.rows import Rows, collected, even_rows, own_rows, upper_rows
+
+__all__ = ["PetscFactor"]
+
+CHUNK = 64  #: columns per solve; the workspace of MUMPS grows with them
+ROOM = (20, 60, 200)  #: percent of work space beyond the estimate (ICNTL(14)), tried in turn
+METIS = 5  #: ICNTL(7)
+TOO_SMALL = (-8, -9, -11, -14, -15, -17, -20)  #: INFOG(1): work space that the next entry of ROOM gives
+NOT_FACTORIZED = {
+    -5: "not enough memory for the analysis",
+    -7: "not enough memory for the analysis",
+    -10: "a pivot is zero",
+    -13: "not enough memory for the factor",
+    -19: "not enough memory for the factor",
+    -40: "a pivot is zero or negative",
+    -90: "the factor could not be stored",
+}
+numbers = count()
+
+
+class PetscFactor:
+    """Cholesky or L D Lᵀ factor of a symmetric matrix on all ranks, until `close`."""
+
+    def __init__(self, lower: sp.csc_array, *, definite: bool, on_disk: bool = False) -> None:
+        """Factorise the matrix with this lower triangle, (n, n), every diagonal entry stored, sorted row indices.
+
+        on_disk: the factor is kept in files of each rank, in the folder that MUMPS_OOC_TMPDIR names (/tmp).
+        """
+        self.n = lower.shape[0]
+        self.is_open = True
+        self.ranks = all_ranks()
+        self.key = f"factor {next(numbers)}"
+        self.rows = even_rows(lower.indptr, self.ranks.size)
+        self.ranks.store[self.key] = lower
+        found = self.ranks.everywhere(factorize_here, self.key, self.rows, definite, on_disk)
+        self.record, self.records = found[0], found
+        error = self.record["INFOG(1)"]
+        n_negative = self.record["negative"]
+        if error < 0 or (definite and n_negative):
+            self.close()
+            words = NOT_FACTORIZED.get(error, f"error {error}") if error < 0 else f"{n_negative} pivots are negative"
+            raise FactorizationError(f"MUMPS: {words}; n = {self.n}, {lower.nnz} entries")
+        self.n_negative, self.n_perturbed = n_negative, self.record["null"]
+        self.n_positive = self.n - n_negative - self.n_perturbed
+        #: MB of MUMPS on every rank, and entries of the factor there
+        self.memory = [each["MB"] for each in found]
+        self.entries = [each["entries"] for each in found]
+        self.n_factor_entries = sum(self.entries)
+        kind = "L Lᵀ" if definite else "L D Lᵀ"
+        kind += ", factor on disk" if on_disk else ""
+        of = "1 rank" if self.ranks.size == 1 else f"{self.ranks.size} ranks"
+        version = ".".join(str(k) for k in petsc().Sys.getVersion())
+        self.description = f"MUMPS {self.record['version']} (PETSc {version}; {kind}; no refinement; {of})"
+
+    def solve(self, b: Array) -> Array:
+        """Return A⁻¹ b for b (n, k), any order; the result is in Fortran order."""
+        x = np.empty(b.shape, order="F")
+        for first in range(0, b.shape[1], CHUNK):
+            columns = slice(first, min(first + CHUNK, b.shape[1]))
+            self.ranks.store["columns"] = b[:, columns]
+            x[:, columns] = self.ranks.everywhere(solve_here, self.key, self.rows)[0]
+        return x
+
+    def close(self) -> None:
+        """Free the factor on all ranks."""
+        if self.is_open:
+            self.is_open = False
+            self.ranks.everywhere(free_here, self.key)
+
+
+def communicator(ranks: Ranks) -> Any:
+    """Return PETSc's communicator of these ranks."""
+    PETSc = petsc()
+    return PETSc.COMM_SELF if ranks.size == 1 else PETSc.COMM_WORLD
+
+
+def factorize_here(ranks: Ranks, key: str, rows: Rows, definite: bool, on_disk: bool) -> dict[str, Any]:
+    """Steps (1) and (2), on every rank; return what MUMPS tells."""
+    PETSc = petsc()
+    comm = communicator(ranks)
+    indptr, indices, data = upper_rows(ranks, rows, ranks.store.pop(key, None))
+    n_own = rows.count(ranks.rank)
+    A = PETSc.Mat().createSBAIJ(((n_own, rows.n), (n_own, rows.n)), 1, csr=(indptr, indices, data), comm=comm)
+    del indptr, indices, data
+    A.assemble()
+    A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    if definite:
+        A.setOption(PETSc.Mat.Option.SPD, True)
+    for room in ROOM:
+        ksp = PETSc.KSP().create(comm)
+        ksp.setOperators(A)
+        ksp.setType(PETSc.KSP.Type.PREONLY)
+        pc = ksp.getPC()
+        pc.setType(PETSc.PC.Type.CHOLESKY)
+        pc.setFactorSolverType("mumps")
+        pc.setFactorSetUpSolverType()
+        F = pc.getFactorMatrix()
+        F.setMumpsIcntl(7, METIS)
+        F.setMumpsIcntl(14, room)
+        F.setMumpsIcntl(22, int(on_disk))
+        if not definite:
+            F.setMumpsIcntl(13, 1)  # the signs of all pivots are counted, those of the last front too
+            F.setMumpsIcntl(24, 1)  # and those within rounding of zero
+        try:
+            ksp.setUp()
+        except PETSc.Error:  # all ranks have it; INFOG says what it was
+            pass
+        error = F.getMumpsInfog(1)
+        if error not in TOO_SMALL:
+            break
+        ksp.destroy()
+    ranks.store[key] = (ksp, F, A)
+    return {
+        "INFOG(1)": error,
+        "negative": F.getMumpsInfog(12) if error >= 0 else 0,
+        "null": 0 if definite or error < 0 else F.getMumpsInfog(28),
+        "entries": entries(F.getMumpsInfo(27)) if error >= 0 else 0,
+        "MB": F.getMumpsInfo(22) if error >= 0 else 0,
+        "flops": F.getMumpsRinfo(3) if error >= 0 else 0.0,
+        "version": "5",
+    }
+
+
+def entries(value: int) -> int:
+    """Return a number of MUMPS, negative ones of which are in millions."""
+    return -value * 10**6 if value < 0 else value
+
+
+def solve_here(ranks: Ranks, key: str, rows: Rows) -> Array | None:
+    """Step (3), on every rank; the solutions on rank 0."""
+    own = own_rows(ranks, rows, ranks.store.pop("columns", None))
+    return collected(ranks, rows, solved_rows(ranks, key, rows, own))
+
+
+def solved_rows(ranks: Ranks, key: str, rows: Rows, own: Array) -> Array:
+    """Return this rank's rows of the solutions, by its rows of the right-hand sides, (n_own, k)."""
+    PETSc = petsc()
+    comm = communicator(ranks)
+    _, F, _ = ranks.store[key]
+    n_own, k = own.shape
+    size = ((n_own, rows.n), (PETSc.DECIDE, k))
+    B = PETSc.Mat().createDense(size, array=np.asfortranarray(own), comm=comm)
+    X = PETSc.Mat().createDense(size, comm=comm)
+    X.setUp()
+    for each in (B, X):
+        each.assemble()
+    F.matSolve(B, X)
+    x = np.array(X.getDenseArray(), order="F")
+    B.destroy()
+    X.destroy()
+    return x
+
+
+def free_here(ranks: Ranks, key: str) -> None:
+    """Free the factor on this rank."""
+    for each in ranks.store.pop(key, ()) if isinstance(ranks.store.get(key), tuple) else ():
+        each.destroy()
+    ranks.store.pop(key, None)

@@ -1,0 +1,96 @@
+"""Ranks under MPI (mpi4py): rank 0 sends the name of a function, all call it, and all say how it ended."""
+
+import os
+import sys
+import time
+from collections.abc import Callable
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
+
+from fe_models.foundation.errors import ReportedError
+from fe_models.foundation.ranks.ranks import OneRank, RankError, Ranks, started_ranks
+
+__all__ = ["MpiRanks", "all_ranks"]
+
+NAP = 5e-4  #: seconds between looks whether all ranks are there
+FAILED = 2  #: exit code of all ranks where one of them failed
+
+
+class MpiRanks:
+    """The processes that `mpirun -n N` started, as `Ranks`."""
+
+    def __init__(self) -> None:
+        if find_spec("mpi4py") is None:
+            raise RankError(
+                f"{started_ranks()} ranks: need mpi4py, which is not installed; benchmarks/install_petsc.sh builds it "
+                "beside Debian's Open MPI, or start one process without mpirun"
+            )
+        self.MPI = import_module("mpi4py.MPI")
+        self.comm = self.MPI.COMM_WORLD
+        self.rank, self.size = self.comm.rank, self.comm.size
+        self.store: dict[str, Any] = {}
+        self._is_over = False
+
+    def everywhere(self, function: Callable[..., Any], *arguments: Any) -> list[Any]:
+        """Call function(ranks, *arguments) on all ranks at once; return their answers in the order of ranks."""
+        self._wake()
+        self.comm.bcast((function, arguments), root=0)
+        return self._call(function, arguments)
+
+    def serve(self) -> None:
+        """Do what rank 0 asks for until it has ended."""
+        while True:
+            self._wake()
+            asked = self.comm.bcast(None, root=0)
+            if asked is None:
+                return
+            self._call(*asked)
+
+    def end(self) -> None:
+        """Let the other ranks end."""
+        if not self._is_over:
+            self._is_over = True
+            self._wake()
+            self.comm.bcast(None, root=0)
+
+    def _wake(self) -> None:
+        """Wait for rank 0 asleep: MPI's own waiting takes a processor, which the threads of rank 0 then lack."""
+        waiting = self.comm.Ibarrier()
+        while not waiting.Test():
+            time.sleep(NAP)
+
+    def abort(self, words: str) -> None:
+        """Say once what happened, and end all ranks."""
+        print(f"error: rank {self.rank} of {self.size}: {words}; all ranks end, no file is written", file=sys.stderr)
+        sys.stderr.flush()
+        self.comm.Abort(FAILED)
+        os._exit(FAILED)
+
+    def _call(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> list[Any]:
+        """Call it here; an error that not all ranks have leaves the others in the middle of their work: all end."""
+        answer: Any = None
+        error: ReportedError | None = None
+        try:
+            answer = function(self, *arguments)
+        except ReportedError as told:  # the same everywhere: functions agree on what they report
+            error = told
+        except BaseException as fault:
+            self.abort(f"{type(fault).__name__}: {fault}")
+        answers = self.comm.gather((answer, error), root=0)
+        if answers is None:
+            return []
+        for _, each in answers:
+            if each is not None:
+                raise each
+        return [found for found, _ in answers]
+
+
+_ranks: list[Ranks] = []
+
+
+def all_ranks() -> Ranks:
+    """Return the ranks of this run: of MPI where its launcher started several processes, else this one alone."""
+    if not _ranks:
+        _ranks.append(MpiRanks() if started_ranks() > 1 else OneRank())
+    return _ranks[0]
