@@ -13,8 +13,8 @@ from cms.solvers.inverse import Inverse
 from cms.solvers.mode_count import ModeCount, mode_count
 from cms.solvers.mode_search import DenseSearch, KrylovSearch
 from cms.solvers.orientation import orientation
-from cms.solvers.petsc.search import SlepcSearch
 from cms.solvers.shift_inverted import Modes, ShiftInverted, Wanted
+from cms.solvers.slepc_search import SlepcSearch
 from cms.solvers.tall import combine
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.solver import Solver
