@@ -62,7 +62,8 @@ class MpiRanks:
 
     def abort(self, words: str) -> None:
         """Say once what happened, and end all ranks."""
-        print(f"error: rank {self.rank} of {self.size}: {words}; all ranks end, no file is written", file=sys.stderr)
+        # no command line hears of it any more: the next call ends this process
+        sys.stderr.write(f"error: rank {self.rank} of {self.size}: {words}; all ranks end, no file is written\n")
         sys.stderr.flush()
         self.comm.Abort(FAILED)
         os._exit(FAILED)
