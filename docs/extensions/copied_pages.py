@@ -49,7 +49,7 @@ def put(text: str, target: Path) -> None:
 def links_in_place(app: Sphinx, docname: str, content: list[str]) -> None:
     """Point links of copied pages, written from the top of the checkout, to the pages of the site."""
     if docname.startswith("project/"):
-        content[0] = re.sub(r"\]\(docs/", "](../", content[0])
+        content[0] = re.sub(r"\]\((\.\./)?docs/", "](../", content[0])
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
