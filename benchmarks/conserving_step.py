@@ -67,7 +67,7 @@ def watched() -> dict[str, System]:
     return {
         "no event": system,
         "an event that never happens": replace(system, events=(Event("never", angle, level=1e9, stop=True),)),
-        "an event that happens at times": replace(system, events=(Event("often", angle, level=0.5, record=True),)),
+        "an event that happens at times": replace(system, events=(Event("often", angle, level=-1.0, record=True),)),
     }
 
 
@@ -79,16 +79,16 @@ def figures(short: bool) -> dict[str, float]:
         system = made()
         times = times_of_a_step({name: (system, method) for name, method in SCHEMES.items()}, n_steps, n_turns)
         for name in SCHEMES:
-            found[f"{name}, {title}, a step [us]"] = times[name][0] * 1e6
+            found[f"{name}, {title}, a step [µs]"] = times[name][0] * 1e6
             if name != GIVEN:
                 found[f"{name} by {GIVEN}, {title}"] = times[name][0] / times[GIVEN][0]
     for every in (1, EVERY):
         runs = {name: (system, SCHEMES[GIVEN]) for name, system in watched().items()}
         times = times_of_a_step(runs, n_steps, n_turns, every)
         first, *others = times
-        found[f"linkage, output every {every}, {first}, a step [us]"] = times[first][0] * 1e6
+        found[f"linkage, output every {every}, {first}, a step [µs]"] = times[first][0] * 1e6
         for name in others:
-            found[f"linkage, output every {every}, {name}, by {first}"] = times[name][0] / times[first][0]
+            found[f"linkage, output every {every}, {name} by {first}"] = times[name][0] / times[first][0]
     return found
 
 
