@@ -25,6 +25,8 @@ MPIRUN = ["mpirun", "--allow-run-as-root", "--oversubscribe", "--bind-to", "none
 ENVIRONMENT = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 REDUCE = [sys.executable, "-m", "cms.cli", "reduce"]
 CLOSE = 1e-8
+#: mode sets that take other columns than those of the factor: functions, a file, a tree of substructures
+OTHERWISE = ("assumed-modes", "user-basis", "multilevel")
 
 
 def on_ranks(n, *command):
@@ -41,8 +43,10 @@ def test_every_mode_set_is_that_of_one_process(n):
     assert set(found) == set(cms.MODE_SETS)
     for name, row in found.items():
         assert max(row[key] for key in ("frequencies", "angle", "invariants", "response")) < CLOSE, (name, row)
-        assert not row["solver"] or "MUMPS" in row["solver"], name
-        assert ("ranks" in row["solver"]) == (n > 1 and row["solver"] != ""), name
+        if name in OTHERWISE:
+            continue
+        assert "MUMPS" in row["solver"], name
+        assert ("ranks" in row["solver"]) == (n > 1), name
 
 
 @pytest.fixture
