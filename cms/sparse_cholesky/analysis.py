@@ -145,7 +145,7 @@ def quotient(lower: sp.csc_array) -> "tuple[IntArray, IntArray, IntArray, IntArr
     gi, gj = group[i], group[j]
     is_between = gi != gj
     gi, gj = gi[is_between], gj[is_between]
-    graph = sp.csr_array((np.ones(len(gi), np.int8), (gi, gj)), shape=(n_v, n_v))
+    graph = sp.csr_array((np.ones(len(gi), bool), (gi, gj)), shape=(n_v, n_v))  # small integers would overflow to 0
     graph = graph + graph.T
     return graph.indptr.astype(np.int64), graph.indices, weight, group
 

@@ -48,11 +48,21 @@ def scattered(seed, n):
     return sp.csc_array(A + sp.diags_array(np.abs(A).sum(axis=0) + 1.0))
 
 
+def block_chain(n, width):
+    """Blocks of dofs, each with all entries that it can have with the next one."""
+    rng = np.random.default_rng(5)
+    line = sp.diags_array([np.ones(n), np.ones(n - 1), np.ones(n - 1)], offsets=[0, 1, -1])
+    A = sp.kron(line, np.ones((width, width)), format="csc")
+    A.data *= rng.random(A.nnz)
+    return sp.csc_array(A + A.T + 6 * width * sp.eye_array(n * width))
+
+
 MATRICES = {
     "cube": lambda: grid(9),
     "cube of nodes": lambda: grid(6, dofs=3),
     "solid": clamped_bar,
     "scattered": lambda: scattered(1, 600),
+    "256 entries between two vertices": lambda: block_chain(6, 16),
     "diagonal": lambda: sp.csc_array(sp.diags_array(np.arange(1.0, 200.0))),
     "dense": lambda: sp.csc_array(np.eye(40) * 41 - np.ones((40, 40))),
     "one": lambda: sp.csc_array([[4.0]]),
