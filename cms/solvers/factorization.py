@@ -10,7 +10,7 @@ from cms.solvers.registry import solver_of
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.solver import Factor, Solver
 
-__all__ = ["EmptyFactor", "Factorization", "Inertia", "factorize"]
+__all__ = ["EmptyFactor", "Factorization", "Inertia", "factorize", "require_regular"]
 
 SINGULAR = 1e-3  #: relative residual after two solves; a regular matrix of condition 1e12 leaves 1e-4
 
@@ -142,7 +142,7 @@ def factorize(A: sp.csc_array, *, definite: bool = True, solver: str | Solver | 
     except FactorizationError as error:
         hint = "; it is singular or not positive definite" if definite else "; it is singular"
         raise FactorizationError(f"factorize: {error}{hint}") from error
-    _require_regular(A, factorization)
+    require_regular(A, factorization)
     return factorization
 
 
@@ -179,7 +179,7 @@ def _require_positive_diagonal(lower: sp.csc_array) -> None:
         )
 
 
-def _require_regular(A: sp.csc_array, factorization: Factorization) -> None:
+def require_regular(A: sp.csc_array, factorization: Factorization) -> None:
     """Solve twice from a random column: the result leans to the softest direction, whose residual shows singularity.
 
     An exactly singular matrix often passes the pivots, because rounding leaves them near 1e-16 instead of zero. Its

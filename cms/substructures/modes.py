@@ -8,9 +8,10 @@ import scipy.sparse as sp
 
 from cms.errors import EigenError, ModeSetError
 from cms.solvers.eigen import EigenResult, counting_shift
-from cms.solvers.factorization import factorize
+from cms.solvers.factorization import Factorization, factorize, require_regular
 from cms.solvers.mode_count import ModeCount
 from cms.solvers.orientation import orientation
+from cms.solvers.registry import solver_of
 from cms.solvers.shift_inverted import Wanted
 from cms.substructures.dissection import Dissection, dissect, node_graph
 from cms.substructures.frequency_guess import guessed_omega2
@@ -99,7 +100,8 @@ def multilevel_modes(
     interior
         With a definite stiffness but for multipliers.
     wanted
-        A number of modes, or all up to a cutoff; proven to be all by the inertia of a factorisation, or not.
+        A number of modes, or all up to a cutoff; proven to be all by the inertia of a factorisation, or not. Without
+        the proof a mode that lies nearer below a cutoff than the tolerance may be left out: its frequency is too high.
     tolerance
         Largest relative error of a frequency. What stays above it after some steps is told, not raised.
     cutoff_factor
@@ -135,6 +137,7 @@ def multilevel_modes(
         highest = guessed_omega2(dissection, interior.K, interior.M, int(wanted.n or 0))
     bound = cutoff_factor**2 * highest
     tree = substructure_tree(dissection, K, M, bound, multipliers=multipliers, tasks=tasks)  # (3)
+    require_regular(interior.K, Factorization(tree, solver_of(solver)))  # pivots of rounding are positive too
     own = tree.omega2
     count = wanted.n if wanted.n is not None else 0
     if wanted.cutoff is not None:
@@ -155,8 +158,13 @@ def multilevel_modes(
     modes = ApproximateModes(tree, K, M, reduced, blocks)
     del Z, reduced
     with one_blas_thread():
-        errors, n_steps = _improved(modes, count, tolerance)  # (5), (6)
-    k = count if wanted.n is not None else int((modes.omega2[:count] <= highest).sum())
+        errors, n_steps = _improved(modes, count, tolerance, highest if wanted.cutoff is not None else 0.0)  # (5), (6)
+    k = count if wanted.n is not None else int((modes.omega2 <= highest).sum())
+    if wanted.n is None and k == p < len(own):
+        raise EigenError(
+            f"multilevel: {wanted.words}: all {p} modes that take part came to lie below it, so that others may be "
+            "missing; choose a larger cutoff_factor"
+        )
     errors = errors[:k]
     if (worst := errors > tolerance).any():
         log.warning(
@@ -189,12 +197,16 @@ def turn(Phi: Array, omega2: Array) -> None:
         Phi[first : first + SLICE] = Phi[first : first + SLICE] @ Z
 
 
-def _improved(modes: ApproximateModes, count: int, tolerance: float) -> tuple[Array, int]:
-    """(5), (6) Improve modes until the error that is left in the wanted ones is below the tolerance."""
+def _improved(modes: ApproximateModes, count: int, tolerance: float, highest: float) -> tuple[Array, int]:
+    """(5), (6) Improve modes until the error that is left in the wanted ones is below the tolerance.
+
+    The wanted ones: at least `count`, and all that came to lie below omega² = `highest`.
+    """
     errors, n_steps = np.zeros(0), 0
     while n_steps < (MOST_STEPS if count else 0):
         n_steps += 1
         modes.improve()
+        count = max(count, int((modes.omega2 <= highest).sum()))
         apart = 1 - modes.omega2[:count] / modes.omega2[-1]
         squared = modes.measured(count) ** 2
         errors = squared / (2 * np.maximum(apart, np.finfo(float).eps))

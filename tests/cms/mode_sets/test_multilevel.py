@@ -2,11 +2,13 @@ import logging
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from numpy.testing import assert_allclose
 
 import cms
-from cms.errors import BodyError, ModeSetError
+from cms.errors import BodyError, FactorizationError, ModeSetError
 from cms.solvers.mode_count import ModeCount
+from cms.substructures.modes import Interior, multilevel_modes
 from tests.bodies import bar
 from tests.cms.substructures.shells import between, panel
 
@@ -88,6 +90,19 @@ def test_a_cutoff_finds_all_modes_below_it(shell, direct):
     modes = cms.multilevel(shell, n_modes=ModeCount(cutoff=cutoff, verify=True))
     assert len(relative_errors(modes, direct)) == N
     assert np.abs(relative_errors(modes, direct)).max() < 1e-3
+
+
+def test_modes_that_come_below_a_cutoff_late_are_not_left_out(shell, direct, monkeypatch):
+    frequencies = direct.frequencies[np.isfinite(direct.frequencies)]
+    cutoff = (frequencies[N - 1] + frequencies[N]) / 2
+    monkeypatch.setattr("cms.substructures.modes.MARGIN", frequencies[N - 4] / cutoff)
+    modes = cms.multilevel(shell, n_modes=ModeCount(cutoff=cutoff))
+    assert len(relative_errors(modes, direct)) == N
+    assert modes.data["frequency error"][-N:].max() < 1e-3
+    monkeypatch.setattr("cms.substructures.modes.GUARDS", 1)
+    monkeypatch.setattr("cms.substructures.modes.GUARD_SHARE", 0.0)
+    with pytest.raises(cms.CmsError, match=r"came to lie below it.*choose a larger cutoff_factor"):
+        cms.multilevel(shell, n_modes=ModeCount(cutoff=cutoff))
 
 
 def test_a_body_that_is_one_leaf_is_solved_exactly():
@@ -173,10 +188,19 @@ def test_interfaces_that_do_not_hold_the_body_are_refused():
         cms.multilevel(body, n_modes=3)
 
 
+def test_a_part_that_nothing_holds_is_refused_although_its_pivots_are_positive():
+    """Rounding leaves the last pivots of a free part at some 1e-16 of the others, of either sign."""
+    body, free = between("rigid"), bar(nx=8, ny=2, nz=2)
+    K, M = (sp.block_diag([A[body.i][:, body.i], B], format="csc") for A, B in ((body.K, free.K), (body.M, free.M)))
+    nodes = np.concatenate([body.dofs[body.i, 0], len(body.nodes) + free.dofs[:, 0]])
+    points = np.concatenate([body.nodes, free.nodes + 10.0])
+    interior = Interior(sp.csc_array(K), sp.csc_array(M), nodes, points, np.zeros(len(nodes), bool))
+    with pytest.raises(FactorizationError, match="the matrix is singular: a solution leaves"):
+        multilevel_modes(interior, ModeCount(8))
+
+
 def test_a_mechanism_is_told_by_its_nodes():
     from dataclasses import replace
-
-    import scipy.sparse as sp
 
     body = between("rigid")
     K = body.K.tolil()
