@@ -27,7 +27,7 @@ Solver = Annotated[
     str | None,
     typer.Option(
         "--solver",
-        help="What factorises: pardiso, superlu, ... (docs/cluster_mpi.md); default: of the job, or the fastest.",
+        help="What factorises: pardiso, cholesky, superlu (docs/memory.md), petsc (docs/cluster_mpi.md), ....",
     ),
 ]
 
