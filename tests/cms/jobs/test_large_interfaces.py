@@ -54,7 +54,7 @@ def job(tmp_path, monkeypatch):
 def test_the_cost_of_all_constraint_modes_is_told_once_before_the_work(job, monkeypatch, caplog):
     told = []
     fix = families.fix_interfaces
-    monkeypatch.setattr(families, "fix_interfaces", lambda *given: told.append(caplog.text) or fix(*given))
+    monkeypatch.setattr(families, "fix_interfaces", lambda *given, **names: told.append(caplog.text) or fix(*given, **names))
     with caplog.at_level(logging.WARNING):
         reduce_job(job("geometric_stiffness = false\n"))
     assert len(told) == 1
@@ -73,7 +73,7 @@ def test_who_reduces_the_interface_is_told_nothing(job, caplog):
 
 def test_geometric_stiffness_without_room_is_refused_before_the_work(job, monkeypatch):
     monkeypatch.setattr(room_for_stiffness, "machine_memory", lambda: 1e6)
-    monkeypatch.setattr(families, "fix_interfaces", lambda *_: pytest.fail("worked before it looked"))
+    monkeypatch.setattr(families, "fix_interfaces", lambda *_, **__: pytest.fail("worked before it looked"))
     with pytest.raises(BodyError, match=r"over about 53 modes.*interface_modes = 20 in \[reduction\]"):
         reduce_job(job("geometric_stiffness = true\n"))
 
