@@ -8,6 +8,7 @@ __all__ = [
     "CompareError",
     "EigenError",
     "ExportError",
+    "FactorRoomError",
     "FactorizationError",
     "ForeignBodyError",
     "JobError",
@@ -24,7 +25,11 @@ class ModeSetError(CmsError, ValueError):
 
 
 class FactorizationError(CmsError, RuntimeError):
-    """A sparse matrix could not be factorised: singular, indefinite or too large."""
+    """A sparse matrix could not be factorised: singular or indefinite."""
+
+
+class FactorRoomError(CmsError, RuntimeError):
+    """Memory or disk have no room for a factor; this says nothing about the matrix."""
 
 
 class ForeignBodyError(CmsError, ValueError):

@@ -28,7 +28,7 @@ GUESSED_MODES = 50  #: where a cutoff or "auto" says how many, for the forecast 
 #: mode sets with a column for each boundary dof
 OF_INTERFACES = (
     "craig-bampton", "craig-bampton-ir", "guyan", "herting", "benfield-hruda", "rubin", "macneal", "craig-chang",
-    "dual-craig-bampton", "attachment", "unrestrained-attachment",
+    "dual-craig-bampton", "attachment", "unrestrained-attachment", "multilevel",
 )  # fmt: skip
 
 
@@ -79,6 +79,10 @@ def reduce_job(
     if budget is not None and (asked := solver or job.reduction.solver) not in (None, "cholesky"):
         raise MemoryBudgetError(
             f"memory = {allowed}: belongs to solver cholesky, whose memory is known before; got solver {asked!r}"
+        )
+    if budget is not None and job.reduction.set == "multilevel":
+        raise MemoryBudgetError(
+            f"memory = {allowed}: the tree of the set multilevel is not held to it; take craig-bampton, or no memory"
         )
     coupled = job_body(job, stages, on_report=on_report)
     if job.reduction.geometric_stiffness or job.reduction.quadratic_modes:

@@ -13,6 +13,7 @@ from cms.solvers.inverse import Inverse
 from cms.solvers.mode_count import ModeCount, mode_count
 from cms.solvers.mode_search import DenseSearch, KrylovSearch
 from cms.solvers.orientation import orientation
+from cms.solvers.petsc.factor import PetscFactor
 from cms.solvers.shift_inverted import Modes, ShiftInverted, Wanted
 from cms.solvers.slepc_search import SlepcSearch
 from cms.solvers.tall import combine
@@ -122,8 +123,8 @@ def eigenmodes(
         if factorization.n != n:
             raise EigenError(f"eigenmodes: factorization: expected order {n}, got {factorization.n}")
         operator = ShiftInverted(M, shift, factorization, tolerance, progress)
-        is_own = not is_dense and isinstance(factorization, Factorization)
-        kind = SEARCHES.get(factorization.solver.name, KrylovSearch) if is_own else KrylovSearch
+        is_on_ranks = isinstance(factorization, Factorization) and isinstance(factorization.factor, PetscFactor)
+        kind = SEARCHES.get(factorization.solver.name, KrylovSearch) if is_on_ranks else KrylovSearch
         search = (DenseSearch if is_dense else kind)(operator, wanted)
         modes = search.modes(wanted)
         if asked.verify:

@@ -125,8 +125,10 @@ def factorize(A: sp.csc_array, *, definite: bool = True, solver: str | Solver | 
     Raises
     ------
     FactorizationError
-        If A is not square or not finite, singular, not definite although `definite`, or too large for the memory, or if
-        the solver is unknown or not installed.
+        If A is not square or not finite, singular, not definite although `definite`, or if the solver is unknown or not
+        installed.
+    FactorRoomError
+        If memory or disk have no room for the factor.
     """
     chosen = solver_of(solver)
     A = sp.csc_array(A)

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 
-from cms.errors import FactorizationError
+from cms.errors import FactorizationError, FactorRoomError
 from fe_models.foundation.arrays import Array
 
 __all__ = ["PardisoFactor", "missing_pardiso", "mkl_runtime"]
@@ -36,6 +36,7 @@ NOT_FACTORIZED = {
     -8: "the matrix is too large for 32-bit indices",
     -10: "the factor could not be stored",
 }
+NO_ROOM = (-2, -10)
 
 
 @cache
@@ -97,7 +98,7 @@ class PardisoFactor:
             where = int(self._iparm[29])
             self.close()
             at = f" (equation {where} of {self.n})" if error == -4 and where > 0 else ""
-            raise FactorizationError(
+            raise (FactorRoomError if error in NO_ROOM else FactorizationError)(
                 f"PARDISO: {NOT_FACTORIZED.get(error, f'error {error}')}{at}; n = {self.n}, {len(self._a)} entries"
             )
         self.n_negative = 0 if definite else int(self._iparm[22])

@@ -5,7 +5,7 @@ import scipy
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from cms.errors import FactorizationError
+from cms.errors import FactorizationError, FactorRoomError
 from cms.sparse_cholesky.analysis import dissection_order
 from fe_models.foundation.arrays import Array
 
@@ -32,7 +32,9 @@ class SuperLuFactor:
                 diag_pivot_thresh=0.0 if definite else 1e-3,
                 options={"SymmetricMode": True},
             )
-        except (RuntimeError, MemoryError) as error:  # "Factor is exactly singular"
+        except MemoryError as error:
+            raise FactorRoomError(f"SuperLU: not enough memory; n = {self.n}, {lower.nnz} entries") from error
+        except RuntimeError as error:  # "Factor is exactly singular"
             raise FactorizationError(f"SuperLU: {error}; n = {self.n}, {lower.nnz} entries") from error
         self.is_open = True
         pivots = self._lu.U.diagonal()

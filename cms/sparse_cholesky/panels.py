@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from cms.errors import FactorizationError
+from cms.errors import FactorRoomError
 from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["Panels", "PanelsInFile", "PanelsInMemory"]
@@ -58,7 +58,7 @@ class PanelsInFile:
 
         Raises
         ------
-        FactorizationError
+        FactorRoomError
             If the folder does not exist, cannot be written, or has too little room.
         """
         self._shapes = [(int(w), int(u)) for w, u in zip(width, below, strict=True)]
@@ -71,10 +71,10 @@ class PanelsInFile:
             status = os.statvfs(where) if hasattr(os, "statvfs") else None
             self._file = tempfile.TemporaryFile(dir=where, buffering=0)
         except OSError as error:
-            raise FactorizationError(f"no file for the factor in {where}: {error.strerror}; choose a folder") from error
+            raise FactorRoomError(f"no file for the factor in {where}: {error.strerror}; choose a folder") from error
         if status is not None and status.f_bavail * status.f_frsize < needed:
             self._file.close()
-            raise FactorizationError(
+            raise FactorRoomError(
                 f"the factor takes {needed / 1e9:.3g} GB of disk, {where} has "
                 f"{status.f_bavail * status.f_frsize / 1e9:.3g} GB; choose another folder by TMPDIR"
             )
@@ -87,7 +87,7 @@ class PanelsInFile:
                 while len(left):
                     left = left[self._file.write(left) :]
         except OSError as error:
-            raise FactorizationError(f"the factor could not be written to disk: {error.strerror}") from error
+            raise FactorRoomError(f"the factor could not be written to disk: {error.strerror}") from error
 
     def each(self, *, backwards: bool = False) -> Iterator[tuple[int, Panel]]:
         """Read the panels one by one into the same memory."""
@@ -100,7 +100,7 @@ class PanelsInFile:
             while len(left):
                 got = self._file.readinto(left)
                 if not got:
-                    raise FactorizationError("the factor on disk is shorter than what was written; is the disk full?")
+                    raise FactorRoomError("the factor on disk is shorter than what was written; is the disk full?")
                 left = left[got:]
             yield (
                 f,

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from cms.errors import FactorizationError
+from cms.errors import FactorizationError, FactorRoomError
 from cms.solvers.petsc.libraries import petsc
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.ranks.mpi import all_ranks
@@ -33,6 +33,7 @@ NOT_FACTORIZED = {
     -40: "a pivot is zero or negative",
     -90: "the factor could not be stored",
 }
+NO_ROOM = (-5, -7, -13, -19, -90)
 numbers = count()
 
 
@@ -57,18 +58,19 @@ class PetscFactor:
         if error < 0 or (definite and n_negative):
             self.close()
             words = NOT_FACTORIZED.get(error, f"error {error}") if error < 0 else f"{n_negative} pivots are negative"
-            raise FactorizationError(f"MUMPS: {words}; n = {self.n}, {lower.nnz} entries")
+            kind = FactorRoomError if error in NO_ROOM else FactorizationError
+            raise kind(f"MUMPS: {words}; n = {self.n}, {lower.nnz} entries")
         self.n_negative, self.n_perturbed = n_negative, self.record["null"]
         self.n_positive = self.n - n_negative - self.n_perturbed
         #: MB of MUMPS on every rank, and entries of the factor there
         self.memory = [each["MB"] for each in found]
         self.entries = [each["entries"] for each in found]
         self.n_factor_entries = sum(self.entries)
-        kind = "L Lᵀ" if definite else "L D Lᵀ"
-        kind += ", factor on disk" if on_disk else ""
+        form = "L Lᵀ" if definite else "L D Lᵀ"
+        form += ", factor on disk" if on_disk else ""
         of = "1 rank" if self.ranks.size == 1 else f"{self.ranks.size} ranks"
         version = ".".join(str(k) for k in petsc().Sys.getVersion())
-        self.description = f"MUMPS {self.record['version']} (PETSc {version}; {kind}; no refinement; {of})"
+        self.description = f"MUMPS {self.record['version']} (PETSc {version}; {form}; no refinement; {of})"
 
     def solve(self, b: Array) -> Array:
         """Return A⁻¹ b for b (n, k), any order; the result is in Fortran order."""

@@ -117,6 +117,7 @@ def test_a_job_takes_a_budget_and_gives_the_same_body(tmp_path):
         ("", ["--memory", "60MB"], "memory = 60 MB: this needs"),
         ("", ["--memory", "8GB", "--solver", "superlu"], "belongs to solver cholesky"),
         ("", ["--memory", "8GB", "--workers", "2"], "--memory: belongs to one job"),
+        ('set = "multilevel"', ["--memory", "8GB", "--workers", "2"], "the tree of the set multilevel is not"),
     ],
 )
 def test_the_command_refuses_budgets_that_do_not_do_and_writes_nothing(tmp_path, line, arguments, words):

@@ -8,7 +8,9 @@ from numpy.testing import assert_allclose
 import cms
 from cms.errors import BodyError, FactorizationError, ModeSetError
 from cms.solvers.mode_count import ModeCount
+from cms.solvers.superlu import SuperLuFactor
 from cms.substructures.modes import Interior, multilevel_modes
+from fe_models.foundation.solver import Solver
 from tests.bodies import bar
 from tests.cms.substructures.shells import between, panel
 
@@ -123,8 +125,9 @@ def test_solids_with_both_kinds_of_interfaces(kind):
     assert_allclose(modes.columns[:, :12], direct.columns[:, :12], rtol=0, atol=1e-9 * scale)
 
 
-def test_other_sets_of_the_same_families_use_the_tree(shell, monkeypatch, direct):
-    with cms.Families(shell) as families:
+@pytest.mark.parametrize("solver", [None, Solver("slepc", SuperLuFactor)])  # whose own search needs its own factor
+def test_other_sets_of_the_same_families_use_the_tree(shell, monkeypatch, direct, solver):
+    with cms.Families(shell, solver=solver) as families:
         cms.multilevel(families, n_modes=2)
         monkeypatch.setattr("cms.families.fixed_interface.factorize", None)
         other = cms.craig_bampton(families, n_modes=6)

@@ -11,7 +11,9 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from numpy.testing import assert_allclose, assert_array_equal
 
-from cms.errors import FactorizationError
+import cms
+from cms.errors import FactorizationError, FactorRoomError
+from cms.families.fixed_interface import fix_interfaces
 from cms.solvers.cholesky import SMALL, cholesky_or_superlu
 from cms.solvers.factorization import factorize, lower_triangle
 from cms.sparse_cholesky import analysis
@@ -150,8 +152,15 @@ def test_large_definite_matrices_are_ours_others_those_of_superlu():
 
 
 def test_a_folder_that_is_not_there_is_refused(tmp_path):
-    with pytest.raises(FactorizationError, match=r"no file for the factor in .*nowhere"):
+    with pytest.raises(FactorRoomError, match=r"no file for the factor in .*nowhere"):
         CholeskyFactor(lower_triangle(grid(4)), on_disk=True, folder=tmp_path / "nowhere")
+
+
+def test_a_disk_without_room_is_not_taken_for_a_mechanism_of_the_body(monkeypatch):
+    monkeypatch.setattr("cms.sparse_cholesky.panels.tempfile.gettempdir", lambda: "/nowhere")
+    on_disk = Solver("cholesky", lambda lower, *, definite: CholeskyFactor(lower, definite=definite, on_disk=True))
+    with pytest.raises(FactorRoomError, match=r"^no file for the factor in .*nowhere"):
+        fix_interfaces(cms.couple(bar(nx=3)), solver=on_disk)
 
 
 KILLED = """
