@@ -54,7 +54,9 @@ def job(tmp_path, monkeypatch):
 def test_the_cost_of_all_constraint_modes_is_told_once_before_the_work(job, monkeypatch, caplog):
     told = []
     fix = families.fix_interfaces
-    monkeypatch.setattr(families, "fix_interfaces", lambda *given, **names: told.append(caplog.text) or fix(*given, **names))
+    monkeypatch.setattr(
+        families, "fix_interfaces", lambda *given, **names: told.append(caplog.text) or fix(*given, **names)
+    )
     with caplog.at_level(logging.WARNING):
         reduce_job(job("geometric_stiffness = false\n"))
     assert len(told) == 1
