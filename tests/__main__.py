@@ -33,7 +33,7 @@ SPREAD = ("-n", str(min(n_processors, MOST_WORKERS)), "--dist", "loadfile")
 
 LINT = ("lint", "ruff", "check", ".")
 TYPES = ("types", "mypy")
-KERNELS = ("kernels", "floatframe.cli.compile_kernels", "relative")  # each worker would compile them otherwise
+KERNELS = ("kernels", "floatframe.cli.compile_kernels", "relative", "schemes")  # else by each worker
 TESTS = ("tests", "pytest", "-q", *SPREAD, "-m", "not long and not external", "tests")
 LONG = ("long tests", "pytest", "-q", "--durations=0", "-m", "long and not external", "tests")
 RELATIVE = (

@@ -223,8 +223,8 @@ def resume(
         integrator = kind(**{part.name: run[part.name] for part in fields(kind)})
         if run.get("digest") != system_digest(system, integrator):
             raise ResultsError(
-                f"{output}: the interrupted run was of another system than {system.name!r}, or it has changed since; "
-                "resume it with the files it was begun with, or run it anew"
+                f"{output}: the interrupted run was of another system than {system.name!r}, or that or this program "
+                "has changed since; resume it with the files and the version it was begun with, or run it anew"
             )
         if record is None:
             raise ResultsError(f"{output}: the interrupted run has no restart record; run it anew")

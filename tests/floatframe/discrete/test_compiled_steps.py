@@ -1,25 +1,33 @@
 """Compiled steps are those of the readable Python version, step by step."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from fe_models.body.load_cases import ReducedLoadCase
 from floatframe import (
+    GROUND,
+    BodyLoad,
     EnergyDecaying,
     EnergyMomentum,
     Gravity,
     JointForce,
     Marker,
     PointForce,
+    SphericalJoint,
     SpringDamper,
+    System,
     Variational,
 )
 from floatframe.compiling.system import compiled_system
 from floatframe.discrete.bodies import placed_bodies, state_of
 from floatframe.discrete.constraints import Span
 from floatframe.discrete.system import discrete_system
-from floatframe.functions.time_functions import cycloidal_spin_up
+from floatframe.functions.time_functions import cycloidal_spin_up, harmonic
 from floatframe.functions.time_functions import table as table_function
+from floatframe.joints.rows import POINT
 from floatframe.kernels.work import new_work
 from tests.floatframe.integrators.test_conserving import floating_pair
 from tests.floatframe.point_masses import random_point_masses, stiffened_body, stiffness
@@ -48,6 +56,22 @@ def bent():
     return loaded("universal", stiffened_body(random_point_masses(3, 3), stiffness(3, omega=6.0), size=0.2))
 
 
+def held():
+    """Return the pair on the ground, with loads that follow functions of time, a table, and a spring of no length."""
+    plain = stiffened_body(random_point_masses(3, 3), stiffness(3, omega=6.0), size=0.2)
+    f = np.array([0.3, -0.2, 0.1])
+    case = ReducedLoadCase("push", "force", f, np.array([0.1, 0.2, -0.1]), np.array([0.3, -0.1, 0.2]))
+    table = table_function([-4.0, -1.0, 1.0, 4.0], [-2.0, -0.3, 0.2, 1.0])
+    pair = floating_pair("revolute", [
+        BodyLoad("wind", "soft", "push", harmonic(1.0, 9.0)),
+        PointForce("pulse", Marker("soft", "end_b"), (0.1, 0.2, -0.1), (0.05, -0.1, 0.1), amplitude=harmonic(2.0, 7.0)),
+        SpringDamper("hard", Marker(GROUND, position=(2, 1, 0)), Marker("block"), characteristic=table),
+        SpringDamper("centre", Marker(GROUND), Marker("soft", "end_b"), 2.0, free_length=0.0),
+    ], replace(plain, load_cases=(case,)))  # fmt: skip
+    pin = SphericalJoint("pin", GROUND, Marker("block", position=(0.3, 0.1, 0.0)))
+    return System(pair.bodies, [pin, *pair.joints], pair.forces)
+
+
 SYSTEMS = {
     "revolute": lambda: loaded("revolute"),
     "driven": lambda: loaded("revolute", motions={"angle": cycloidal_spin_up(4.0, 0.3)}),
@@ -55,16 +79,31 @@ SYSTEMS = {
     "screw": lambda: loaded("screw"),
     "distance": lambda: loaded("distance"),
     "universal, stiffened": bent,
+    "held": held,
 }
+RUB = [JointForce("rub", "joint", "distance", friction=0.05, friction_coefficient=0.3, friction_speed=0.2)]
 
 
 @pytest.mark.parametrize("kind", SYSTEMS)
 @pytest.mark.parametrize("name", SCHEMES)
 def test_compiled_steps_are_those_of_the_python_version(kind, name):
-    """Eight steps, each from where the compiled one before ended: state, multipliers and work."""
-    system, method, h = SYSTEMS[kind](), SCHEMES[name], 0.04
+    assert_steps_are_those_of_python(SYSTEMS[kind](), SCHEMES[name], name)
+
+
+@pytest.mark.parametrize("name", ["momentum", "decaying"])
+def test_friction_by_the_normal_force_is_that_of_the_python_version(name):
+    assert_steps_are_those_of_python(floating_pair("prismatic", RUB), SCHEMES[name], name)
+
+
+def assert_steps_are_those_of_python(system, method, name):
+    """Eight steps, each from where the compiled one before ended: state, multipliers and work.
+
+    The multipliers of a point are forces in ground axes there, in axes of a body here: their sizes are the same.
+    """
+    h = 0.04
     ds = discrete_system(system, name)
-    carry, work, f = method.start(system, 0.0), new_work(compiled_system(system).model), np.zeros(ds.n_held)
+    model = compiled_system(system).model
+    carry, work, f = method.start(system, 0.0), new_work(model), np.zeros(ds.n_held)
     for k in range(8):
         placed = placed_bodies(ds.bodies, ds.model, carry.state)
         expected = method.one_step(ds, placed, Span(k * h, (k + 1) * h, (k + 0.5) * h), f)
@@ -76,3 +115,7 @@ def test_compiled_steps_are_those_of_the_python_version(kind, name):
             assert_allclose(getattr(carry.state, field), getattr(state, field), rtol=0, atol=1e-11)
         assert_allclose(carry.work - before, expected.work, rtol=0, atol=1e-11)
         f = expected.f
+        points = model.rows.kind[[k for c in ds.connections for k in c.held]] == POINT
+        sizes = [np.linalg.norm(each[points].reshape(-1, 3), axis=1) for each in (carry.a, f)]
+        assert_allclose(sizes[0], sizes[1], rtol=1e-7, atol=1e-7)
+        assert_allclose(carry.a[~points], f[~points], rtol=1e-7, atol=1e-7)

@@ -260,6 +260,7 @@ def test_energy_of_the_variational_scheme_stays_in_a_band():
 
 def test_resumed_run_is_the_uninterrupted_one_bit_for_bit(tmp_path, monkeypatch):
     monkeypatch.setattr(integration, "SEGMENT_SECONDS", 0.0)
+    monkeypatch.setattr(integration, "RESTART_STEPS", 200)
     whole = integrate(spinning(), EnergyMomentum(), 2.5, 0.01, output_every=50)
 
     def stop(progress):
@@ -267,6 +268,7 @@ def test_resumed_run_is_the_uninterrupted_one_bit_for_bit(tmp_path, monkeypatch)
 
     with pytest.raises(test_restart.StopHereError):
         integrate(spinning(), EnergyMomentum(), 2.5, 0.01, output_every=50, output=tmp_path / "run.h5", progress=stop)
+    assert test_restart.steps_on_record(tmp_path / "run.h5") == 200
     test_restart.assert_same(resume(spinning(), tmp_path / "run.h5"), whole)
 
 

@@ -26,6 +26,7 @@ from floatframe import (
     RigidBody,
     SpringDamper,
     System,
+    Variational,
     integrate,
     joint_coordinate,
     resume,
@@ -141,6 +142,7 @@ def driven_back_and_forth():
 
 def test_resumed_run_with_events_is_the_uninterrupted_one_bit_for_bit(tmp_path, monkeypatch):
     monkeypatch.setattr(integration, "SEGMENT_SECONDS", 0.0)
+    monkeypatch.setattr(integration, "RESTART_STEPS", 200)
     method = GeneralizedAlpha(0.8, error_tolerance=1e-5)
     whole = integrate(driven_back_and_forth(), method, 3.0, 0.01)
 
@@ -150,6 +152,7 @@ def test_resumed_run_with_events_is_the_uninterrupted_one_bit_for_bit(tmp_path, 
 
     with pytest.raises(test_restart.StopHereError):
         integrate(driven_back_and_forth(), method, 3.0, 0.01, output=tmp_path / "run.h5", progress=stop)
+    assert test_restart.steps_on_record(tmp_path / "run.h5") == 200
     again = resume(driven_back_and_forth(), tmp_path / "run.h5")
     test_restart.assert_same(again, whole)
     assert len(whole.head.summary["events"]) > 3
@@ -234,7 +237,8 @@ def test_what_a_latch_holds_does_not_happen_again():
     assert_allclose(joint_coordinate(system, motion, "hinge", "angle").value[late], 1.2, rtol=0, atol=1e-9)
 
 
-def test_blocks_of_steps_change_neither_the_motion_nor_its_events(monkeypatch):
+@pytest.mark.parametrize("method", [GeneralizedAlpha(), EnergyMomentum(), Variational()])
+def test_blocks_of_steps_change_neither_the_motion_nor_its_events(method, monkeypatch):
     """A double pendulum that is pushed and let go at each passage, with records between."""
     push = PointForce("push", Marker("lower"), (30.0, 0, 10.0))
     events = [
@@ -244,14 +248,15 @@ def test_blocks_of_steps_change_neither_the_motion_nor_its_events(monkeypatch):
     ]
     system = double_pendulum(*events, forces=[push])
     motions = []
-    for size in (1, 32):
+    for size in (1, 32, 400):
         monkeypatch.setattr(event_steps, "BLOCK", size)
-        motions.append(integrate(system, GeneralizedAlpha(), 1.0, 0.005, output_every=7))
-    step_by_step, in_blocks = motions
-    assert len(in_blocks.head.summary["events"]) > 3
-    assert step_by_step.head.summary["events"] == in_blocks.head.summary["events"]
-    for name in ("t", "position", "u", "w"):
-        assert_array_equal(step_by_step.source.read(name), in_blocks.source.read(name))
+        motions.append(integrate(system, method, 1.0, 0.005, output_every=7))
+    step_by_step, *in_blocks = motions
+    assert len(step_by_step.head.summary["events"]) > 3
+    for motion in in_blocks:
+        assert step_by_step.head.summary["events"] == motion.head.summary["events"]
+        for name in ("t", "position", "u", "w"):
+            assert_array_equal(step_by_step.source.read(name), motion.source.read(name))
 
 
 def test_a_record_and_a_stop_at_one_level_happen_once_each():
@@ -266,6 +271,7 @@ def test_an_event_goes_on_after_a_resumption(tmp_path, monkeypatch):
     push = PointForce("push", Marker("block"), (6.0, 0, 0))
     events = [Event("go", at=0.15, switch_on=("push",)), Event("mark", at=0.35, record=True)]
     system = System([RigidBody("block", 2.0, np.eye(3))], (), [push], events=events)
+    monkeypatch.setattr(integration, "RESTART_STEPS", 200)
     whole = integrate(system, trapezoidal(), 0.5, 1e-3)
     monkeypatch.setattr(integration, "SEGMENT_SECONDS", 0.0)
 
@@ -279,6 +285,7 @@ def test_an_event_goes_on_after_a_resumption(tmp_path, monkeypatch):
     path = tmp_path / "out.h5"
     with pytest.raises(KilledError):
         integrate(system, trapezoidal(), 0.5, 1e-3, output=path, progress=kill)
+    assert test_restart.steps_on_record(path) == 200
     again = resume(system, path)
     assert_array_equal(again.t, whole.t)
     assert_array_equal(again.source.read("position"), whole.source.read("position"))

@@ -29,6 +29,7 @@ from floatframe import (
 from floatframe.functions.time_functions import cycloidal_spin_up
 from floatframe.kernels.entry import prepare
 from floatframe.mechanisms import slider_crank
+from floatframe.results.writer import last_restart
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 from tests.root import ROOT
 
@@ -59,6 +60,12 @@ def interrupted(path, at, system=None):
         integrate(system or swing(), GeneralizedAlpha(0.8), T_END, H, output=path, output_every=7, progress=on_progress)
 
 
+def steps_on_record(path):
+    """Return after how many steps the run to these results, which was interrupted, will go on."""
+    _, record = last_restart(path.with_name(path.name + ".segments"))
+    return int(record["n_done"])
+
+
 @pytest.fixture(autouse=True)
 def many_segments(monkeypatch):
     monkeypatch.setattr(integration, "SEGMENT_SECONDS", 0.0)
@@ -78,6 +85,7 @@ def assert_same(one, other):
 @pytest.mark.parametrize("at", [0.1, 0.2, 0.75, 1.6])
 def test_resumed_run_is_the_uninterrupted_one_bit_for_bit(tmp_path, whole, at):
     interrupted(tmp_path / "run.h5", at)
+    assert steps_on_record(tmp_path / "run.h5") >= 400
     left = read_results(tmp_path / "run.h5")
     assert not left.is_complete
     assert 0 < len(left.t) < len(whole.t)
