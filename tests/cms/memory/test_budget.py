@@ -15,6 +15,7 @@ from cms.memory.budget import Peak, ReductionShape, peak_of, solver_within
 from cms.memory.size import memory_bytes
 from cms.solvers.factorization import factorize, lower_triangle
 from cms.sparse_cholesky.analysis import analyse
+from cms.sparse_cholesky.factor import CholeskyFactor
 from tests.bodies import bar
 from tests.cms.sparse_cholesky.test_factor import grid
 
@@ -84,6 +85,20 @@ def test_what_fits_neither_way_is_refused_with_what_would_help(peaks):
     ):
         factorize(grid(16), solver=solver_within(6e7, shape))
     assert not issubclass(MemoryBudgetError, FactorizationError)  # which bodies would take for a mechanism
+
+
+def test_each_stage_holds_the_factor_as_it_is_stored_and_its_columns():
+    """Panels as the factorisation made them; n dofs, 8 modes in blocks of 8, 20 columns."""
+    A = lower_triangle(grid(10))
+    fronts, n = analyse(A), 10**3
+    made = CholeskyFactor(A, fronts=fronts)
+    panels = [sum(part.nbytes for part in panel) for _, panel in made._panels.each()]
+    shape = ReductionShape(n_dof=n, n_columns=20, n_modes=8, held=3e8)
+    for on_disk, factor in ((False, sum(panels)), (True, max(panels))):
+        peak = peak_of(shape, fronts, A.nnz, 1e8, on_disk=on_disk)
+        assert peak.factorisation == pytest.approx(1e8 + 44 * A.nnz + 8 * fronts.n_working + factor, rel=1e-12)
+        assert peak.modes == pytest.approx(1e8 + factor + 8 * n * (4 * 8 + 8 * 8 + 20), rel=1e-12)
+        assert peak.reduction == pytest.approx(3e8 + 8 * 6.2 * n * 20, rel=1e-12)
 
 
 def test_the_largest_stage_is_the_peak():
