@@ -308,9 +308,9 @@ def test_cases_share_one_factorisation_and_one_search_for_modes(folder, monkeypa
     counts = {"fix_interfaces": 0, "fixed_interface_modes": 0}
     for name in counts:
 
-        def counted(*given, of=getattr(module, name), name=name):
+        def counted(*given, of=getattr(module, name), name=name, **names):
             counts[name] += 1
-            return of(*given)
+            return of(*given, **names)
 
         monkeypatch.setattr(module, name, counted)
     cases = ff.grid(
