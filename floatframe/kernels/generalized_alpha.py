@@ -31,6 +31,7 @@ __all__ = [
 
 DONE, DIVERGED, SINGULAR_BODY, SINGULAR_CONNECTION, INACCURATE, STOPPED = 0, 1, 2, 3, 4, 5
 SLOW = 0.2  # ratio of corrections above which the factors are made anew
+MANY = 4  # iterations of a step after which the next one starts with new factors
 FAST = 0.1  # corrections that shrink this fast end a step where the next one is expected to be small enough:
 SAFE = 0.5  # this much of the one that is allowed
 ROUNDOFF = 2e-15  # of a position
@@ -90,7 +91,8 @@ def turn_body(state, memory, i):
 def take_age(solver, n_iterations):
     """Count a step with the present factors; new ones are due where it took longer than the mean of all of them.
 
-    The mean counts what the factors cost: to go on would raise it, and new ones come back to it.
+    Factors are best renewed when a step with them costs more than the steps since, their own making included, did in the
+    mean: to go on would raise the mean, and what is made anew comes back to it.
     """
     solver.n_steps += 1
     solver.n_spent += n_iterations
@@ -150,7 +152,7 @@ def update(model, work, memory, by_rate, by_acceleration, c_k):
 
 @inner
 def is_enough(norm, last, allowed):
-    """Whether a correction is small enough, or the next one will be: they shrink by the ratio of the last two."""
+    """Whether a correction is small enough, or the next one will be: corrections shrink by the ratio of the last two."""
     return norm <= allowed or (last < math.inf and norm <= FAST * last and norm * norm <= SAFE * last * allowed)
 
 

@@ -12,10 +12,10 @@ from floatframe.kernels.generalized_alpha import (
     DIVERGED,
     DONE,
     INACCURATE,
+    MANY,
     SLOW,
     copy,
     correction_of_states,
-    is_enough,
     is_resized,
     keep_iterate,
     load_state,
@@ -35,7 +35,8 @@ from floatframe.relative.kernels.weights import sizes_of_step, squared_size, wei
 __all__ = ["SINGULAR", "advance_tree", "correct", "renew", "write_tree_row"]
 
 SINGULAR = 6  #: status: the Newton matrix is
-MANY = 4  # iterations of a step after which the next one starts with new factors
+FAST = 0.1  # corrections that shrink this fast end a step where the next one is expected to be small enough:
+SAFE = 0.5  # this much of the one that is allowed
 EXACT_STEPS = 4  # steps that take exact matrices after those that are kept have failed
 MOST_PATIENCE = 31  # steps that make their own factors before older ones are tried again
 
@@ -239,8 +240,10 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
             if not math.isfinite(of_states):
                 work.solver.is_due = 1
                 return DIVERGED, math.inf, -1.0
-        is_small = is_enough(norm, last, allowed) if is_open else norm <= allowed
-        is_small = is_small or (norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2)
+        is_enough = norm <= allowed or (
+            is_open and last < math.inf and norm <= FAST * last and norm * norm <= SAFE * last * allowed
+        )
+        is_small = is_enough or (norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2)
         if is_small and (of_states <= 1.0 or (of_states <= 1e3 and of_states > 0.5 * last_of_states and iteration > 2)):
             if iteration >= MANY:
                 work.solver.is_due = 1
