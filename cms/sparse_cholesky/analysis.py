@@ -76,10 +76,10 @@ def analyse(lower: sp.csc_array) -> Fronts:
     (2) nested dissection of the vertices
     (3) elimination tree, in postorder; columns of the factor with nearly the same rows are one front
     """
-    from cms.sparse_cholesky import kernels
+    from cms.sparse_cholesky import dissection_kernels, kernels
 
     start, neighbours, weight, group = quotient(lower)  # (1)
-    order = kernels.dissection(start, neighbours, weight, LEAF)  # (2)
+    order = dissection_kernels.dissection(start, neighbours, weight, LEAF)  # (2)
     start, neighbours = renumbered(start, neighbours, order)
     parent = kernels.elimination_tree(start, neighbours)  # (3)
     post = kernels.postorder(parent)
@@ -105,10 +105,10 @@ def analyse(lower: sp.csc_array) -> Fronts:
 
 def dissection_order(lower: sp.csc_array) -> IntArray:
     """Return an order of elimination by nested dissection, (n,): the row that comes k-th."""
-    from cms.sparse_cholesky import kernels
+    from cms.sparse_cholesky import dissection_kernels
 
     start, neighbours, weight, group = quotient(lower)
-    order = kernels.dissection(start, neighbours, weight, LEAF)
+    order = dissection_kernels.dissection(start, neighbours, weight, LEAF)
     return np.argsort(inverse(order)[group], kind="stable")
 
 
