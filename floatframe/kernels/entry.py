@@ -11,7 +11,7 @@ from numba import types
 
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.kernels.compiler.choice import is_lean, words
-from floatframe.kernels.compiler.compilation import entry
+from floatframe.kernels.compiler.compilation import kept_entry
 from floatframe.kernels.compiler.sources import source_digest
 from floatframe.kernels.compiler.structure import converter, kept_table_of, table_of
 from floatframe.kernels.connections.connection import constraint_rates
@@ -121,10 +121,7 @@ def make_entry(digest):
                     return SINGULAR_CONNECTION, 0, 0, connection, 0.0
         return DONE, 0, 0, -1, 0.0
 
-    try:
-        return entry(run)
-    except RuntimeError:  # nowhere to keep the cache: compiled anew in each process
-        return entry(run, cache=False)
+    return kept_entry(run)
 
 
 run = make_entry(source_digest(__name__, "lean" if is_lean else "plain"))

@@ -5,7 +5,7 @@ from numba import types
 from floatframe.discrete.kernels.records import Discrete, StepWork
 from floatframe.discrete.kernels.steps import advance
 from floatframe.kernels.compiler.choice import is_lean
-from floatframe.kernels.compiler.compilation import entry
+from floatframe.kernels.compiler.compilation import kept_entry
 from floatframe.kernels.compiler.sources import source_digest
 from floatframe.kernels.compiler.structure import converter, kept_table_of, table_of
 from floatframe.kernels.entry import Order, Outcome
@@ -34,10 +34,7 @@ def make_entry(digest):
         )  # fmt: skip
         return status, n_steps, n_rows, -1, step.excess
 
-    try:
-        return entry(run)
-    except RuntimeError:  # nowhere to keep the cache: compiled anew in each process
-        return entry(run, cache=False)
+    return kept_entry(run)
 
 
 run = make_entry(source_digest(__name__, "lean" if is_lean else "plain"))

@@ -8,7 +8,7 @@ from numba import types
 
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.kernels.compiler.choice import is_lean
-from floatframe.kernels.compiler.compilation import entry
+from floatframe.kernels.compiler.compilation import kept_entry
 from floatframe.kernels.compiler.sources import source_digest
 from floatframe.kernels.compiler.structure import converter, kept_table_of, table_of
 from floatframe.kernels.diagnostics import power
@@ -94,10 +94,7 @@ def make_entry(digest):
             assemble(model, work, tree, tangent, c_d, c_k)
         return DONE, 0, 0, -1, 0.0
 
-    try:
-        return entry(run)
-    except RuntimeError:  # nowhere to keep the cache: compiled anew in each process
-        return entry(run, cache=False)
+    return kept_entry(run)
 
 
 run = make_entry(source_digest(__name__, "lean" if is_lean else "plain"))

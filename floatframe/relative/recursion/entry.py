@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from fe_models.foundation.arrays import IntArray
 from floatframe.kernels.compiler.choice import is_lean
-from floatframe.kernels.compiler.compilation import entry
+from floatframe.kernels.compiler.compilation import kept_entry
 from floatframe.kernels.compiler.sources import source_digest
 from floatframe.kernels.compiler.structure import converter, table_of
 from floatframe.kernels.model import Model
@@ -79,10 +79,7 @@ def make_entry(digest):
                         solve_columns(nodes, work, dense.columns)
         return -1
 
-    try:
-        return entry(run)
-    except RuntimeError:  # nowhere to keep the cache: compiled anew in each process
-        return entry(run, cache=False)
+    return kept_entry(run)
 
 
 run = make_entry(source_digest(__name__, "lean" if is_lean else "plain"))
