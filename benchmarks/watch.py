@@ -11,7 +11,6 @@ import platform
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -206,13 +205,6 @@ def page(now: Results, last: Results | None) -> str:
 def texts() -> list[Path]:
     """Return the texts that may quote figures."""
     return [ROOT / "README.md", FOLDER / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-
-
-def quotations() -> Iterator[tuple[Path, re.Match]]:
-    """Yield each quoted figure with its text."""
-    for path in texts():
-        for match in QUOTED.finditer(path.read_text()):
-            yield path, match
 
 
 def as_quoted(value: float, like: str) -> str:

@@ -70,7 +70,7 @@ class PetscFactor:
         form += ", factor on disk" if on_disk else ""
         of = "1 rank" if self.ranks.size == 1 else f"{self.ranks.size} ranks"
         version = ".".join(str(k) for k in petsc().Sys.getVersion())
-        self.description = f"MUMPS {self.record['version']} (PETSc {version}; {form}; no refinement; {of})"
+        self.description = f"MUMPS (PETSc {version}; {form}; no refinement; {of})"
 
     def solve(self, b: Array) -> Array:
         """Return A⁻¹ b for b (n, k), any order; the result is in Fortran order."""
@@ -137,7 +137,6 @@ def factorize_here(ranks: Ranks, key: str, rows: Rows, definite: bool, on_disk: 
         "entries": entries(F.getMumpsInfo(27)) if error >= 0 else 0,
         "MB": F.getMumpsInfo(22) if error >= 0 else 0,
         "flops": F.getMumpsRinfo(3) if error >= 0 else 0.0,
-        "version": "5",
     }
 
 
