@@ -137,7 +137,7 @@ def amalgamate(parent, count, weight, few, share):
 
 @jit
 def append_rows(rows, at, found, lo, hi, last, seen, f):
-    """Append what front f has not seen of found[lo:hi] from row `last` on; returns rows, maybe longer, and their end."""
+    """Append what front f has not seen of found[lo:hi] from row `last` on; return rows (maybe longer) and their end."""
     for k in range(lo, hi):
         i = found[k]
         if i >= last and seen[i] != f:
