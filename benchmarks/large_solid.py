@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 OUT = Path(__file__).parent / "out"
-SIZES = {"0.1": 3.0, "0.5": 1.62, "1.0": 1.24}  # million dofs -> element size [mm]
+SIZES = {"0.1": 3.0, "0.25": 2.05, "0.5": 1.62, "1.0": 1.24}  # million dofs -> element size [mm]
 N_MODES = 50
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from cms.errors import ModeSetError
 from fe_models.foundation.arrays import Array, frozen, require_finite
+from fe_models.foundation.tall.on_disk import row_slices
 
 __all__ = ["ModeSet"]
 
@@ -40,7 +41,8 @@ class ModeSet:
                 f"mode set {self.name!r}: {n_columns} columns need as many labels and frequencies, got "
                 f"{len(self.labels)} and {self.frequencies.shape}"
             )
-        require_finite(f"mode set {self.name!r}", self.columns)
+        for rows in row_slices(len(self.columns), self.columns):
+            require_finite(f"mode set {self.name!r}", self.columns[rows])
 
     @property
     def is_static(self) -> np.ndarray:

@@ -30,12 +30,14 @@ from cms.reduced_body.nodal_sums import NodalSums
 from cms.reduced_body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.second_order.geometric_reduction import stiffness_of_states
 from cms.second_order.quadratic_modes import quadratic_modes
-from cms.second_order.room_for_stiffness import left_out_words, require_room_for_stiffness
+from cms.second_order.room_for_stiffness import chosen_words, left_out_words, require_room_for_stiffness
 from cms.second_order.unit_states import UnitStates, has_geometric_stiffness, require_geometric_stiffness, states_of
+from cms.solvers.tall import inner
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.kept_nodes import keep_nodes
 from fe_models.body.load_cases import LoadCase, ReducedLoadCase
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.tall.on_disk import release, zeros_like
 
 __all__ = ["assembled", "reduce"]
 
@@ -103,7 +105,7 @@ def reduce(
     left_out = ""
     if geometric or quadratic:
         require_geometric_stiffness(body)
-        require_room_for_stiffness(body, modes.columns.shape[1])
+        require_room_for_stiffness(body, modes.columns.shape[1], None if states is None else states.names)
     elif geometric is None:
         geometric = has_geometric_stiffness(body)
         left_out = left_out_words(body, modes.columns.shape[1]) if geometric else ""
@@ -128,10 +130,11 @@ def reduce(
     kept = kept_nodes(keeping)
     axes, origin = condition.frame.axes, condition.frame.origin
     moments = reduced_moments(body, finished.Phi, condition.frame)
+    told = left_out if states is None else chosen_words(body, states.names)
     reduced = assembled(keeping, modes, finished, condition, kept=kept, moments=moments, damping=damping)
     return replace(
         reduced,
-        provenance={**reduced.provenance, **({"geometric stiffness": left_out} if left_out else {})},
+        provenance={**reduced.provenance, **({"geometric stiffness": told} if told else {})},
         recovery=recovery_of_model(source, finished.Phi, condition, reduced, recovery),
         stress=nodal_stress_modes(body, finished.Phi, kept, axes) if stress else None,
         point_stress=point_stress_modes(body, finished.Phi, origin, axes) if stress else None,
@@ -193,11 +196,12 @@ def assembled(
 
 def kept_translations(body: FEBody, Phi: Array, nodes: IntArray, axes: Array) -> Array:
     """Return the translations of the shapes at some nodes in axes of B, (n, 3, n_q), some shapes at a time."""
-    kept = np.empty((len(nodes), 3, Phi.shape[1]))
+    kept = zeros_like(Phi, (len(nodes), 3, Phi.shape[1]))
     for first in range(0, Phi.shape[1], SHAPES_AT_ONCE):
         some = slice(first, first + SHAPES_AT_ONCE)
         # exact zeros of aligned axes stay exact
         kept[:, :, some] = np.einsum("ba,nbk->nak", axes, body.translations(Phi[:, some])[nodes])
+        release(kept)
     return kept
 
 
@@ -255,7 +259,7 @@ def reduced_nodal_sums(body: FEBody, Phi: Array, frame: BodyFrame) -> NodalSums 
         return None
     c = (body.nodes - frame.origin) @ frame.axes
     try:
-        U = weighted_rigid_modes(body, frame.origin).T @ Phi
+        U = inner(weighted_rigid_modes(body, frame.origin), Phi)
     except BodyError:  # nodes on one line, or without translations: no Buckens frame can be had
         return None
     return NodalSums(

@@ -164,7 +164,7 @@ def largest_loads(reduced: ReducedBody) -> tuple[LargestLoad, ...]:
             q = np.asarray(interface.Psi)[j] / stiffness
             turn = max((float(np.linalg.norm(each @ q)) for each in turns), default=0.0)
             buckling = np.inf
-            if reduced.geometric is not None and np.any(K_geo := np.asarray(reduced.geometric.interfaces[i][j])):
+            if reduced.geometric is not None and np.any(K_geo := reduced.geometric.of_interface(i)[j]):
                 buckling = min(critical_factors(reduced, K_geo))
             by_turn, by_load = (LINEAR.rotation / turn if turn else np.inf), LINEAR.load * buckling
             linear = min(by_turn, by_load)

@@ -35,7 +35,7 @@ Memory = Annotated[
     str | None,
     typer.Option(
         "--memory",
-        help="Most memory the process may take, such as 8GB: above it the factor goes to disk (docs/memory.md).",
+        help="Most memory the process may take, such as 8GB: above it factor and columns go to disk (docs/memory.md).",
     ),
 ]
 

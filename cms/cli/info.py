@@ -118,9 +118,10 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
 
 def stiffening_words(record: Any) -> str:
     """Say what stiffens the body, or why nothing does."""
+    is_told = "geometric stiffness" in record["provenance"]
     if record["geometric_stiffness"]:
-        return "spin, accelerations, interface loads"
-    return "none: left out for its size, see below" if "geometric stiffness" in record["provenance"] else "none"
+        return f"spin, accelerations, {'loads at some interfaces, see below' if is_told else 'interface loads'}"
+    return "none: left out for its size, see below" if is_told else "none"
 
 
 def numbering_rows(record: Any) -> list[tuple[str, str]]:

@@ -132,7 +132,7 @@ def node_terms(body: ReducedBody, nodes: NodeList, row: int) -> dict[str, Taylor
     }
     at = [name for name, where in nodes.of_interface.items() if where == row]
     if body.geometric is not None and at:
-        K = body.geometric.interfaces[[each.name for each in body.interfaces].index(at[0])]
+        K = body.geometric.of_interface([each.name for each in body.interfaces].index(at[0]))
         terms["phi"], terms["psi"] = replace(terms["phi"], m1=-K[:3]), replace(terms["psi"], m1=-K[3:])
     return terms
 

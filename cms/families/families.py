@@ -32,6 +32,7 @@ from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.components import MOTION_COMPONENTS
 from fe_models.foundation.solver import Solver
+from fe_models.foundation.tall.on_disk import release
 
 __all__ = ["Families"]
 
@@ -52,7 +53,9 @@ class Families:
     follow by the condensed stiffness S of h.
     """
 
-    def __init__(self, body: FEBody, *, announce: bool = True, solver: str | Solver | None = None) -> None:
+    def __init__(
+        self, body: FEBody, *, announce: bool = True, solver: str | Solver | None = None, to_disk: bool = False
+    ) -> None:
         """Prepare the families of a coupled body; nothing is computed yet.
 
         Parameters
@@ -63,6 +66,8 @@ class Families:
             Whether a warning says, before the work, what interfaces with very many dofs cost and what is cheaper.
         solver
             What factorises, one of `cms.solvers.registry.SOLVERS` by name; by default the fastest installed.
+        to_disk
+            Whether the constraint modes, and large arrays that are made of them, lie on disk.
 
         Raises
         ------
@@ -74,7 +79,7 @@ class Families:
         body.require_coupled()
         self.body = body
         self.solver = solver_of(solver)
-        self._announces = announce
+        self._announces, self._to_disk = announce, to_disk
         self._stack = ExitStack()
         self._is_open = True
         self._modes: dict[bytes, list[_Found]] = {}
@@ -144,12 +149,13 @@ class Families:
     @cached_property
     def Psi_C(self) -> Array:
         """Constraint modes of the held dofs, (n_dof, n_h)."""
-        return constraint_modes(self.fixed)
+        return constraint_modes(self.fixed, to_disk=self._to_disk)
 
     @cached_property
     def S(self) -> Array:
         """Stiffness condensed to the held dofs, Psi_Cᵀ K Psi_C, (n_h, n_h) [N/m]."""
         S = self.body.K[:, self.h].T @ self.Psi_C
+        release(self.Psi_C)
         return (S + S.T) / 2
 
     @cached_property

@@ -10,8 +10,9 @@ from cms.solvers.factorization import EmptyFactor, Factorization, factorize
 from cms.solvers.registry import solver_of
 from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.body.nearby import nearby_order
-from fe_models.body.submatrix import principal_block
+from fe_models.body.submatrix import PrincipalBlock, principal_block
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.ranks.ranks import started_ranks
 from fe_models.foundation.solver import Solver
 from fe_models.foundation.words import node_list
 
@@ -27,8 +28,6 @@ class FixedInterfaceBody:
     body: FEBody
     i: IntArray  #: interior dofs: all others, in an order in which neighbours are near, (n_i,)
     b: IntArray  #: held dofs: the boundary dofs in the order of `body.b`, then extra ones, (n_b,)
-    K_ii: sp.csc_array  #: (n_i, n_i) [N/m]
-    M_ii: sp.csc_array  #: (n_i, n_i) [kg]
     factorization: Factorization  #: of K_ii
 
     def __enter__(self) -> "FixedInterfaceBody":
@@ -36,6 +35,16 @@ class FixedInterfaceBody:
 
     def __exit__(self, *_: object) -> None:
         self.factorization.close()
+
+    @property
+    def K_ii(self) -> sp.csc_array:
+        """Interior stiffness, (n_i, n_i) [N/m], cut out anew: a large body does not hold it beside K."""
+        return principal_block(self.body.K, self.i)
+
+    @property
+    def M_ii(self) -> sp.csc_array:
+        """Interior mass, (n_i, n_i) [kg], cut out anew."""
+        return principal_block(self.body.M, self.i)
 
     @property
     def n_multipliers(self) -> int:
@@ -69,16 +78,16 @@ def fix_interfaces(
     if len(b) == 0:
         raise ModeSetError(f"body {body.name!r} has no interface; give it at least one, or take free modes")
     i = nearby_order(body.K, body.dofs, i)
-    K_ii = principal_block(body.K, i)
-    M_ii = principal_block(body.M, i)
     if not len(i):
-        return FixedInterfaceBody(body, i, b, K_ii, M_ii, Factorization(EmptyFactor(), chosen))
+        return FixedInterfaceBody(body, i, b, Factorization(EmptyFactor(), chosen))
+    K_ii = PrincipalBlock(body.K, i)
     is_definite = not (body.dofs[:, 1] == MULTIPLIER).any()
     try:
-        factorization = factorize(K_ii, definite=is_definite, solver=chosen)
+        # of many ranks the one that has the whole body holds as little beside it as it can
+        factorization = factorize(K_ii if started_ranks() > 1 else K_ii.cut(), definite=is_definite, solver=chosen)
     except FactorizationError as error:
-        raise BodyError(_mechanism_message(body, i, K_ii, M_ii, chosen)) from error
-    return FixedInterfaceBody(body, i, b, K_ii, M_ii, factorization)
+        raise BodyError(_mechanism_message(body, i, K_ii.cut(), principal_block(body.M, i), chosen)) from error
+    return FixedInterfaceBody(body, i, b, factorization)
 
 
 def _mechanism_message(body: FEBody, i: IntArray, K_ii: sp.csc_array, M_ii: sp.csc_array, solver: Solver) -> str:

@@ -9,6 +9,7 @@ from cms.solvers.tall import combine
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.tall.on_disk import on_disk, release
 
 __all__ = [
     "attachment_modes",
@@ -26,10 +27,11 @@ STILL = 1e-24  #: the same of the energy of a response to inertia loads, where b
 BLOCK = 60  #: right-hand sides solved at once; wider blocks gain nothing measurable and cost memory
 
 
-def constraint_modes(fixed: FixedInterfaceBody) -> Array:
+def constraint_modes(fixed: FixedInterfaceBody, *, to_disk: bool = False) -> Array:
     """Constraint modes Psi_C: unit displacement of one boundary dof, the other boundary dofs held.
 
-    Interior part -K_II⁻¹ K_IB; columns in the order of the held dofs `fixed.b`.
+    Interior part -K_II⁻¹ K_IB; columns in the order of the held dofs `fixed.b`; `BLOCK` are solved at once, and lie on
+    disk (`fe_models.foundation.tall.on_disk`) where that is asked for.
 
     Returns
     -------
@@ -37,12 +39,13 @@ def constraint_modes(fixed: FixedInterfaceBody) -> Array:
         (n_dof, n_b), translations per translation [-] or per rotation [m].
     """
     body, i, b = fixed.body, fixed.i, fixed.b
-    Psi_C = np.zeros((body.n_dof, len(b)))
+    Psi_C = on_disk((body.n_dof, len(b))) if to_disk else np.zeros((body.n_dof, len(b)))
     Psi_C[b, np.arange(len(b))] = 1.0
     K_b = body.K[:, b]
     for first in range(0, len(b), BLOCK):
         columns = slice(first, min(first + BLOCK, len(b)))
         Psi_C[i, columns] = fixed.factorization.solve(-K_b[:, columns].toarray()[i])
+        release(Psi_C)
     return Psi_C
 
 

@@ -146,7 +146,7 @@ def geometric_at(
         )
         return None
     rows = np.array([interface.members[0] for interface in interfaces], dtype=np.int64)
-    return replace(body.geometric, interfaces=body.geometric.interfaces[rows]).transformed(Z)
+    return replace(body.geometric, interfaces=body.geometric.interfaces[rows], is_loaded=()).transformed(Z)
 
 
 def free_frequencies(where: str, reduced: ReducedBody) -> Array:

@@ -1,6 +1,8 @@
 """The whole line of a reduction job: mesh or matrices, interfaces, mode set, reduced body."""
 
+import logging
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -8,7 +10,7 @@ from cms.errors import MemoryBudgetError
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import Job, read_job
 from cms.jobs.parts_of_job import frame_of, moving_frame_of
-from cms.memory.budget import ReductionShape, solver_within
+from cms.memory.budget import ReductionShape, columns_within, solver_within
 from cms.memory.size import memory_bytes, resident_bytes
 from cms.reduced_body.reduced_body import ReducedBody
 from cms.solvers.registry import solver_of
@@ -22,6 +24,8 @@ if TYPE_CHECKING:
     from cms.second_order.unit_states import UnitStates
 
 __all__ = ["reduce_job"]
+
+log = logging.getLogger(__name__)
 
 GUESSED_MODES = 50  #: where a cutoff or "auto" says how many, for the forecast of memory
 
@@ -68,8 +72,6 @@ def reduce_job(
     >>> cms.write(body, "rod.h5")                                                  # doctest: +SKIP
     """
     from cms.families.families import Families
-    from cms.second_order.room_for_stiffness import require_room_for_stiffness
-    from cms.second_order.unit_states import require_geometric_stiffness
 
     job = job if isinstance(job, Job) else read_job(Path(job))
     stages = stages or Stages()
@@ -85,17 +87,41 @@ def reduce_job(
             f"memory = {allowed}: the tree of the set multilevel is not held to it; take craig-bampton, or no memory"
         )
     coupled = job_body(job, stages, on_report=on_report)
-    if job.reduction.geometric_stiffness or job.reduction.quadratic_modes:
-        require_geometric_stiffness(coupled)  # before the long work
-        require_room_for_stiffness(coupled, expected_columns(job, coupled))
+    announce_stiffness(job, coupled)
+    to_disk = False
     if budget is not None:
-        chosen = solver_within(budget, shape_of(job, coupled))
+        shape = columns_within(budget, shape_of(job, coupled))
+        chosen, to_disk = solver_within(budget, shape), shape.to_disk
     if job.recovery:
         with Families(
-            coupled, announce=not reduces_interfaces(job), solver=chosen
+            coupled, announce=not reduces_interfaces(job), solver=chosen, to_disk=to_disk
         ) as families:  # the static part of recovery rows needs the factorisation
             return reduced(job, families, stages, *modes_and_states(job, families, stages))
-    return reduced(job, coupled, stages, *with_own_factorisation(job, coupled, chosen, stages))
+    return reduced(job, coupled, stages, *with_own_factorisation(job, coupled, chosen, stages, to_disk))
+
+
+def announce_stiffness(job: Job, body: FEBody) -> None:
+    """Say before the long work what the geometric stiffness costs, or that it will be left out; refuse it without room.
+
+    Raises
+    ------
+    BodyError
+        If it is asked for, and the elements do not know it, an interface is unknown, or the machine has no room.
+    """
+    from cms.second_order import room_for_stiffness as room
+    from cms.second_order.unit_states import has_geometric_stiffness, loaded_interfaces, require_geometric_stiffness
+
+    asked, n_modes = job.reduction.geometric_stiffness, expected_columns(job, body)
+    if asked in (None, False) and not job.reduction.quadratic_modes:
+        if asked is None and has_geometric_stiffness(body) and (words := room.left_out_words(body, n_modes)):
+            log.warning("body %r: %s", body.name, words)
+        return
+    require_geometric_stiffness(body)
+    if isinstance(asked, list):
+        loaded_interfaces(body, asked)
+    room.require_room_for_stiffness(body, n_modes, asked)
+    if words := room.stiffness_words(body, n_modes, asked):
+        log.warning("body %r: %s", body.name, words)
 
 
 def shape_of(job: Job, body: FEBody) -> ReductionShape:
@@ -111,27 +137,37 @@ def reduced(
     from cms.families.sharing import body_of
     from cms.jobs.tables.recovery_section import requests_of
     from cms.reduction import reduce
+    from cms.second_order.room_for_stiffness import left_out_words, makes_stiffness
+    from cms.second_order.unit_states import has_geometric_stiffness
 
+    is_made = states is not None or makes_stiffness(
+        job.reduction.geometric_stiffness, body_of(source), len(modes.labels)
+    )
     with stages("reduce"):
-        return reduce(
+        made = reduce(
             source,
             modes,
             frame=frame_of(job, held=body_of(source).is_held),
             damping=None if job.damping is None else job.damping.damping,
             stress=job.reduction.stress is not False,
             quadratic=bool(job.reduction.quadratic_modes),
-            geometric=job.reduction.geometric_stiffness if states is None else states,
+            geometric=is_made if states is None else states,
             recovery=requests_of(job.recovery),
         )
+    left_out = ""
+    if not is_made and job.reduction.geometric_stiffness is None and has_geometric_stiffness(body_of(source)):
+        left_out = left_out_words(body_of(source), len(modes.labels))
+    return replace(made, provenance={**made.provenance, "geometric stiffness": left_out}) if left_out else made
 
 
 def with_own_factorisation(
-    job: Job, coupled: FEBody, solver: Solver, stages: Stages
+    job: Job, coupled: FEBody, solver: Solver, stages: Stages, to_disk: bool
 ) -> "tuple[ModeSet, UnitStates | None]":
     """Make what needs the factorisation, which is freed before the reduction: that needs the memory."""
     from cms.families.families import Families
 
-    with Families(coupled, announce=not reduces_interfaces(job), solver=solver) as families:
+    announce = not reduces_interfaces(job)
+    with Families(coupled, announce=announce, solver=solver, to_disk=to_disk) as families:
         return modes_and_states(job, families, stages)
 
 
@@ -151,7 +187,13 @@ def modes_and_states(job: Job, families: "Families", stages: Stages) -> "tuple[M
     if not wanted and not job.reduction.quadratic_modes:
         return modes, None
     with stages("static states"):
-        return modes, unit_states(families, frame=moving_frame_of(job), spread=job.reduction.spread_loads is not False)
+        asked = job.reduction.geometric_stiffness
+        return modes, unit_states(
+            families,
+            frame=moving_frame_of(job),
+            spread=job.reduction.spread_loads is not False,
+            interfaces=asked if isinstance(asked, list) else None,
+        )
 
 
 def reduces_interfaces(job: Job) -> bool:

@@ -286,8 +286,10 @@ class ReductionSection(Table):
     origin: Vector3 | None = Field(None, description="the origin of the body frame in mesh coordinates, [x, y, z]")
     axes: Matrix3 | None = Field(None, description="the axes of the body frame, [x axis, y axis, z axis]")
     stress: bool | None = Field(None, description="true or false: whether to keep the stress of the modes")
-    geometric_stiffness: bool | None = Field(
-        None, description="true or false: whether to add the geometric stiffness; default: where the elements are known"
+    geometric_stiffness: bool | list[Name] | None = Field(
+        None,
+        description="true or false: whether to add the geometric stiffness; a list: with the loads of these interfaces "
+        "and of the frame alone; default: where the elements are known",
     )
     spread_loads: bool | None = Field(
         None, description="true or false: whether the geometric stiffness can be carried to a Buckens frame"

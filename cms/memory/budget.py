@@ -4,15 +4,21 @@ The peak is the largest of three stages. n: dofs, c: columns of the mode set, m:
 h: what the process holds when the stage begins.
 
 (1) factorisation: h + permuted matrix + fronts (`Fronts.n_working`) + factor, if that is in memory
-(2) vibration and static modes: h + factor, or its largest panel + 8 n (4 m + 8 b + c) bytes; basis: 3 m + 6 b columns
+(2) vibration and static modes: h + factor, or its largest panel + 8 n columns of
+    (4 m + 8 b + k) while modes are searched; basis: 3 m + 6 b columns
+    (k + c + m) while the set is put together of the k = c - m static columns and the modes
 (3) finish, moments and stress, the factor freed: what the coupled body held + 6.2 arrays of (n, c)
 
-The numbers 3 m + 6 b and 6.2 are measured (docs/memory.md); all else follows from shapes.
+Where (3) does not fit, the columns lie on disk (`fe_models.foundation.tall`). Then of (2) k and c go, and (3) is
+
+(3') what the coupled body held + 54 matrices (c, c) + products of 400 MB
+
+The numbers 3 m + 6 b, 6.2, 54 and 400 MB are measured (docs/memory.md); all else follows from shapes.
 """
 
 import logging
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -24,12 +30,15 @@ from cms.sparse_cholesky.analysis import Fronts, analyse
 from cms.sparse_cholesky.factor import CholeskyFactor
 from fe_models.foundation.solver import Factor, Solver
 
-__all__ = ["Peak", "ReductionShape", "peak_of", "solver_within"]
+__all__ = ["Peak", "ReductionShape", "columns_within", "peak_of", "solver_within"]
 
 log = logging.getLogger(__name__)
 
 PERMUTED = 44.0  #: bytes an entry of the lower triangle while it is brought into the new order
 TALL = 6.2  #: arrays of all columns that are held in the third stage
+SQUARES = 54.0  #: matrices over all columns that are held where those lie on disk: Gram matrices, moments, invariants
+SLICES = 4e8  #: bytes of slices and products that are held then
+ON_DISK = 6.0  #: arrays of all columns that lie on disk at most
 
 
 @dataclass(frozen=True)
@@ -40,6 +49,7 @@ class ReductionShape:
     n_columns: int  #: of the mode set
     n_modes: int  #: vibration modes among them
     held: float  #: by the process with the coupled body [bytes]
+    to_disk: bool = False  #: whether the columns lie on disk
 
 
 @dataclass(frozen=True)
@@ -75,12 +85,35 @@ def peak_of(shape: ReductionShape, fronts: Fronts, n_entries: int, held: float, 
     w, u = fronts.width, fronts.below
     factor = 8.0 * (int((w * (w + u)).max(initial=0)) if on_disk else fronts.n_stored)
     block = 16 if shape.n_modes >= 32 else 8
-    columns = 4 * shape.n_modes + 8 * block + shape.n_columns
+    n_static = 0 if shape.to_disk else shape.n_columns - shape.n_modes
+    columns = max(4 * shape.n_modes + 8 * block + n_static, 2 * (n_static + shape.n_modes))
     return Peak(
         held + PERMUTED * n_entries + 8.0 * fronts.n_working + factor,
         held + factor + 8.0 * shape.n_dof * columns,
-        shape.held + 8.0 * TALL * shape.n_dof * shape.n_columns,
+        reduction_peak(shape),
     )
+
+
+def reduction_peak(shape: ReductionShape) -> float:
+    """Return the peak of the third stage [bytes]."""
+    if shape.to_disk:
+        return shape.held + 8.0 * SQUARES * shape.n_columns**2 + SLICES
+    return shape.held + 8.0 * TALL * shape.n_dof * shape.n_columns
+
+
+def columns_within(budget: float, shape: ReductionShape) -> ReductionShape:
+    """Return the shape with its columns on disk where they do not fit, but fit better there; say so."""
+    stored = replace(shape, to_disk=True)
+    if reduction_peak(shape) <= budget or reduction_peak(stored) >= reduction_peak(shape):
+        return shape
+    log.warning(
+        "memory: %d columns of %d dofs need %s, more than %s; they lie on disk: %s, and up to %s on disk in %s. Fewer "
+        "of them need neither: interface_modes = 20 in [reduction] for interfaces of many nodes",
+        shape.n_columns, shape.n_dof, gigabytes(reduction_peak(shape)), gigabytes(budget),
+        gigabytes(reduction_peak(stored)), gigabytes(8.0 * ON_DISK * shape.n_dof * shape.n_columns),
+        tempfile.gettempdir(),
+    )  # fmt: skip
+    return stored
 
 
 def solver_within(budget: float, shape: ReductionShape) -> Solver:

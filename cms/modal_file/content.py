@@ -166,10 +166,11 @@ def numbering_values(numbering: Numbering) -> dict[str, Any]:
 def geometric_values(geometric: GeometricStiffness) -> dict[str, Any]:
     """Return the values of the geometric stiffness by path; those of the interfaces stand with them."""
     values: dict[str, Any] = {f"/geometric/{name}": getattr(geometric, name) for name in OF_FRAME}
-    values |= {f"/interfaces/{k}/K_geometric": K for k, K in enumerate(geometric.interfaces)}
+    values |= {f"/interfaces/{k}/K_geometric": K for k, K in zip(geometric.loaded, geometric.interfaces, strict=True)}
     if geometric.turned is not None:
         values |= {f"{TURNED}/{name}": getattr(geometric.turned, name) for name in OF_FRAME}
-        values |= {f"/interfaces/{k}/K_turned": K for k, K in enumerate(geometric.turned.interfaces)}
+        of_interfaces = zip(geometric.loaded, geometric.turned.interfaces, strict=True)
+        values |= {f"/interfaces/{k}/K_turned": K for k, K in of_interfaces}
     if geometric.spread is not None:
         values |= {f"{SPREAD}/{name}": getattr(geometric.spread, name) for name in ("K", "turned", "turned_rigid")}
     return values
@@ -306,21 +307,30 @@ def nodal_sums_of(contents: Contents) -> NodalSums:
 
 
 def geometric_of(contents: Contents) -> GeometricStiffness:
-    """Return the geometric stiffness; that of the interfaces stands with them."""
+    """Return the geometric stiffness; that of the loaded interfaces stands with them."""
+    known = contents.content.datasets
+    is_loaded = [f"{path}/K_geometric" in known for path in contents.numbered("/interfaces")]
+    if contents.content.version < 6:
+        is_loaded = [True for _ in is_loaded]
     n = contents.array("/geometric/spin").shape[-1]
     turned = spread = None
     if contents.has(TURNED):
-        turned = TurnedLoads(**loads_of(contents, TURNED, "K_turned", (3, n)))
+        turned = TurnedLoads(**loads_of(contents, TURNED, "K_turned", (3, n), is_loaded))
     if contents.has(SPREAD):
         shapes = {"K": (6, n, n), "turned": (6, 3, n), "turned_rigid": (6, 3, 3)}
         spread = SpreadLoads(**{name: shaped(contents, f"{SPREAD}/{name}", shape) for name, shape in shapes.items()})
-    return GeometricStiffness(**loads_of(contents, "/geometric", "K_geometric", (n, n)), turned=turned, spread=spread)
+    of_loads = loads_of(contents, "/geometric", "K_geometric", (n, n), is_loaded)
+    return GeometricStiffness(**of_loads, turned=turned, spread=spread, is_loaded=tuple(is_loaded))
 
 
-def loads_of(contents: Contents, group: str, of_interface: str, shape: tuple[int, int]) -> dict[str, np.ndarray]:
+def loads_of(
+    contents: Contents, group: str, of_interface: str, shape: tuple[int, int], is_loaded: list[bool]
+) -> dict[str, np.ndarray]:
     """Return the matrices of all unit loads by kind."""
     of_interfaces = [
-        shaped(contents, f"{path}/{of_interface}", (6, *shape)) for path in contents.numbered("/interfaces")
+        shaped(contents, f"{path}/{of_interface}", (6, *shape))
+        for path, is_own in zip(contents.numbered("/interfaces"), is_loaded, strict=True)
+        if is_own
     ]
     loads = contents.arrays(group, *OF_FRAME)
     return loads | {"interfaces": np.stack(of_interfaces) if of_interfaces else np.zeros((0, 6, *shape))}

@@ -13,7 +13,7 @@ from fe_models.foundation.units import Units, unit_system
 
 __all__ = ["FORMAT", "VERSION", "convert_units", "digest", "read", "write"]
 
-VERSION = 5  #: of the format; a reader refuses greater ones, and reads all that are less
+VERSION = 6  #: of the format; a reader refuses greater ones, and reads all that are less
 KIND = Kind(FORMAT, VERSION, ModalFileError, "`cms reduce` or `cms.write`")
 
 
@@ -31,9 +31,12 @@ def write(reduced: ReducedBody, path: str | os.PathLike[str]) -> None:
 def version_of(reduced: ReducedBody) -> int:
     """Return the least version that says what the body is, so that older readers take all bodies they can.
 
-    5: nodes or elements have numbers of the user, there are sets, points with rotations, or recovery matrices; 4: how
-    loads turn with the body is known, or inertia terms are missing; 3: the body is held; 2: others.
+    6: loads at some interfaces were left out of the geometric stiffness; 5: nodes or elements have numbers of the user,
+    there are sets, points with rotations, or recovery matrices; 4: how loads turn with the body is known, or inertia
+    terms are missing; 3: the body is held; 2: others.
     """
+    if reduced.geometric is not None and not all(reduced.geometric.is_loaded):
+        return 6
     if not reduced.numbering.is_empty or reduced.kept is not None or reduced.recovery:
         return 5
     if reduced.moments.missing or (reduced.geometric is not None and reduced.geometric.turned is not None):

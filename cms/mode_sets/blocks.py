@@ -12,6 +12,7 @@ from cms.solvers.eigen import EigenResult
 from cms.solvers.mode_count import ModeCount
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.tall.on_disk import beside
 
 __all__ = [
     "Block",
@@ -96,7 +97,7 @@ def mode_set(
         recorded["cutoff"] = repr(float(wanted.cutoff))
     return ModeSet(
         name,
-        np.hstack([block.columns for block in blocks]) if len(blocks) > 1 else blocks[0].columns,
+        beside(*[block.columns for block in blocks]) if len(blocks) > 1 else blocks[0].columns,
         tuple(label for block in blocks for label in block.labels),
         np.concatenate([block.frequencies for block in blocks]),
         {**recorded, **(options or {})},

@@ -15,6 +15,7 @@ from cms.solvers.sparse_product import SymmetricProduct
 from cms.solvers.tall import combine
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.tall.on_disk import in_memory, release
 
 __all__ = ["with_characteristic_modes"]
 
@@ -91,6 +92,7 @@ def with_characteristic_modes(
         groups += [f"interface {name} rigid"] * n_r + [f"interface {name} modes"] * n_z
         options[f"interface modes {name}"] = f"{n_r} rigid and {n_z} deforming, of {len(part.columns)} constraint modes"
         data[f"interface modes {name}"] = frequencies
+    release(modes.columns)
     n_new = len(labels) - len(kept)
     # the vibration modes stay last, as in the sets themselves
     frequencies = np.concatenate([modes.frequencies[kept], np.full(n_new, np.nan)])
@@ -158,7 +160,7 @@ def _characteristic(body: FEBody, Psi_C: Array, part: _Part, wanted: ModeCount) 
     # K Psi_C is zero inside, and Psi_C the identity on its own dofs and zero on the others
     rows = sp.csr_array(body.K[:, part.dofs].T)
     blocks = range(0, len(part.dofs), COLUMNS_AT_ONCE)
-    K_c = np.hstack([rows @ Psi_C[:, first : first + COLUMNS_AT_ONCE] for first in blocks])
+    K_c = np.hstack([rows @ in_memory(Psi_C[:, first : first + COLUMNS_AT_ONCE]) for first in blocks])
     K_c = (K_c + K_c.T) / 2
     M_c = gram_in_blocks(Psi_C, SymmetricProduct(body.M))
     n, n_r = part.R.shape

@@ -20,9 +20,10 @@ from cms.reduced_basis.independent import (
 from cms.reduced_basis.rigid_content import elastic_directions, orthonormal_motions
 from cms.reduced_body.source_columns import SourceColumns, source_columns
 from cms.solvers.orientation import orientation
-from cms.solvers.tall import combined, inner, subtract
+from cms.solvers.tall import combined, inner, squares, subtract
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.tall.on_disk import copied, row_slices
 
 __all__ = ["FinishedBasis", "finish"]
 
@@ -133,7 +134,7 @@ def elastic_pencil(
         free_omega2 = free_elastic(Q, elastic, condition, omega2_1)
     except np.linalg.LinAlgError as error:
         raise ModeSetError(f"{where}: its columns are too ill-conditioned: {error}") from error
-    X = Q.X if Q.is_formed else Q.X.copy()  # (2)
+    X = Q.X if Q.is_formed else copied(Q.X)  # (2)
     subtract(X, condition.Psi_R, condition.rigid_part(Q.X))
     X_M = gram_in_blocks(X, products.M)
     G_M = within(X_M, Q.Z)
@@ -153,9 +154,11 @@ def turn_in_place(Phi: Array, turn: Array) -> None:
     """Make Phi turn of Phi; where the turn changes only the sign of a mode, no other is touched."""
     is_mixed = np.count_nonzero(turn, axis=0) > 1
     mixed = np.flatnonzero(is_mixed | (np.count_nonzero(turn, axis=1) > 1))
-    turned = Phi[:, mixed] @ turn[np.ix_(mixed, mixed)]
-    Phi *= np.diag(turn)
-    Phi[:, mixed] = turned
+    signs, turn_mixed = np.diag(turn), turn[np.ix_(mixed, mixed)]
+    for rows in row_slices(len(Phi), Phi):
+        turned = Phi[rows, mixed] @ turn_mixed
+        Phi[rows] *= signs
+        Phi[rows, mixed] = turned
 
 
 def first_elastic(where: str, V: Array, G_K: Array, G_M: Array, condition: FrameCondition) -> float:
@@ -187,7 +190,7 @@ def diagonal_within(G: Array, Z: Array) -> Array:
 
 def rounding_of_energy(body: FEBody, u: Array) -> Array:
     """Size of the rounding in the strain energy of each column: eps times the sum of |K_kk| u_k², (k,)."""
-    return np.finfo(float).eps * np.einsum("n,nk,nk->k", np.abs(body.K.diagonal()), u, u)
+    return np.finfo(float).eps * squares(np.abs(body.K.diagonal()), u)
 
 
 def elastic_eigenvectors(G_K: Array, G_M: Array, omega2_1: float) -> tuple[Array, Array]:

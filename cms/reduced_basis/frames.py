@@ -15,6 +15,7 @@ from cms.errors import BodyError
 from cms.families.rigid_modes import geometric_rigid_modes
 from cms.reduced_basis.node_weights import node_weights, weighted_rigid_modes
 from cms.reduced_body.reduced_body import BodyFrame
+from cms.solvers.tall import inner
 from fe_models.body.fe_body import FEBody
 from fe_models.body.numbering import Numbering
 from fe_models.foundation.arrays import Array, IntArray
@@ -125,7 +126,7 @@ def frame_condition(body: FEBody, frame: Frame | HeldFrame) -> FrameCondition:
         factor = cholesky_of_inertia(body.name, Psi_R.T @ M_Psi_R)
         return FrameCondition(
             placed("tisserand", frame, center),
-            lambda columns: la.cho_solve(factor, M_Psi_R.T @ columns),
+            lambda columns: la.cho_solve(factor, inner(M_Psi_R, columns)),
             Psi_R,
             M_Psi_R,
             M_Psi_R,
@@ -138,7 +139,7 @@ def frame_condition(body: FEBody, frame: Frame | HeldFrame) -> FrameCondition:
         norm = la.lu_factor(W_Psi_R.T @ Psi_R)
         return FrameCondition(
             placed("buckens", frame, middle),
-            lambda columns: la.lu_solve(norm, W_Psi_R.T @ columns),
+            lambda columns: la.lu_solve(norm, inner(W_Psi_R, columns)),
             Psi_R,
             M_Psi_R,
             W_Psi_R,

@@ -15,7 +15,7 @@ import scipy.linalg as la
 from scipy.linalg.lapack import dpstrf
 
 from cms.solvers.sparse_product import SymmetricProduct
-from cms.solvers.tall import combine, inner
+from cms.solvers.tall import combine, inner, squares
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray
 
@@ -266,4 +266,4 @@ def _orthonormalized(products: Products, new: Columns, omega2: float) -> Columns
 def _rounding_noise(X: Array, body: FEBody, omega2: float) -> Array:
     """W-length of independent rounding errors eps |x_k| in every column, (k,)."""
     diagonal = np.abs(body.K.diagonal()) + omega2 * body.M.diagonal()
-    return np.finfo(float).eps * np.sqrt(np.einsum("n,nk,nk->k", diagonal, X, X))
+    return np.finfo(float).eps * np.sqrt(squares(diagonal, X))

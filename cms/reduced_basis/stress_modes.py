@@ -5,11 +5,13 @@ import numpy as np
 from cms.reduced_body.stress import PointStress
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.tall.on_disk import is_on_disk, release, zeros_like
 
 __all__ = ["nodal_stress_modes", "point_stress_modes", "turned_stress"]
 
 FEWEST = 16  #: columns at a time, however large the body
 BYTES_AT_ONCE = 512e6  #: of stress, which is known at all nodes before it is cut to the kept ones
+BYTES_FROM_DISK = 64e6  #: the same where columns lie on disk: with the columns themselves it is five times as much
 
 
 def nodal_stress_modes(body: FEBody, Phi: Array, nodes: IntArray, axes: Array) -> Array | None:
@@ -29,14 +31,16 @@ def nodal_stress_modes(body: FEBody, Phi: Array, nodes: IntArray, axes: Array) -
     model = body.element_model
     if model is None or not model.has_nodal_stress:
         return None
-    modes = np.zeros((len(nodes), 6, Phi.shape[1]))
-    width = max(FEWEST, int(BYTES_AT_ONCE / (48 * len(body.nodes))))  # wide: the geometry is worked out once for all
+    modes = zeros_like(Phi, (len(nodes), 6, Phi.shape[1]))
+    room = BYTES_FROM_DISK if is_on_disk(Phi) else BYTES_AT_ONCE
+    width = max(FEWEST, int(room / (48 * len(body.nodes))))  # wide: the geometry is worked out once for all
     for begin in range(0, Phi.shape[1], width):
         columns = slice(begin, begin + width)
         everywhere = model.nodal_stress(body.mesh_displacement(Phi[:, columns]), nodes=nodes)
         on_mesh = nodes < len(everywhere)
-        modes[on_mesh, :, columns] = everywhere[nodes[on_mesh]]
-    return turned_stress(modes, axes)
+        modes[on_mesh, :, columns] = turned_stress(everywhere[nodes[on_mesh]], axes)
+        release(modes)
+    return modes
 
 
 def point_stress_modes(body: FEBody, Phi: Array, origin: Array, axes: Array) -> PointStress | None:

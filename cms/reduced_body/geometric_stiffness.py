@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +30,7 @@ class TurnedLoads:
     translation: Array  #: (3, 3, n_q) [sqrt(kg) per q]
     rotation: Array  #: (3, 3, n_q) [sqrt(kg) m per q]
     spin: Array  #: (6, 3, n_q) [sqrt(kg) m per q]
-    interfaces: Array  #: (n_interfaces, 6, 3, n_q) [1/sqrt(kg) and 1/(sqrt(kg) m) per q]
+    interfaces: Array  #: (n_loaded, 6, 3, n_q) [1/sqrt(kg) and 1/(sqrt(kg) m) per q]
 
     def __post_init__(self) -> None:
         n, n_interfaces = np.asarray(self.translation).shape[-1], len(np.asarray(self.interfaces))
@@ -76,19 +77,25 @@ class GeometricStiffness:
     rotation: Array  #: K_r,a, unit load -rho e_a × c: angular acceleration, (3, n_q, n_q) [1 per q²]
     #: K_ab, unit load -rho/2 [e_a × (e_b × c) + e_b × (e_a × c)], (a, b) as `SPIN_PAIRS`, (6, n_q, n_q) [1 per q²]
     spin: Array
-    #: unit force (3) and moment (3) at each interface of `ReducedBody.interfaces`, axes of B,
-    #: (n_interfaces, 6, n_q, n_q) [1/(kg m) and 1/(kg m²) per q²]
+    #: unit force (3) and moment (3) at each loaded interface, axes of B, (n_loaded, 6, n_q, n_q)
+    #: [1/(kg m) and 1/(kg m²) per q²]
     interfaces: Array
     #: with which the matrices go to other frames; None: not on record, then a rotation is taken to turn the loads
     turned: TurnedLoads | None = None
     spread: SpreadLoads | None = None  #: with which they go to a Buckens frame; None: left out, or not on record
+    #: for each of `ReducedBody.interfaces` whether its loads are among `interfaces`: the others were left out, and do
+    #: not stiffen the body; empty: all are
+    is_loaded: tuple[bool, ...] = ()
 
     def __post_init__(self) -> None:
-        n, n_interfaces = np.asarray(self.translation).shape[-1], len(np.asarray(self.interfaces))
-        for name, first in numbers_of_loads(n_interfaces).items():
+        n, n_loaded = np.asarray(self.translation).shape[-1], len(np.asarray(self.interfaces))
+        object.__setattr__(self, "is_loaded", tuple(bool(each) for each in self.is_loaded) or (True,) * n_loaded)
+        if sum(self.is_loaded) != n_loaded:
+            raise BodyError(f"geometric stiffness: {sum(self.is_loaded)} loaded interfaces, but matrices of {n_loaded}")
+        for name, first in numbers_of_loads(n_loaded).items():
             put_array(self, f"geometric stiffness: {name}", name, (*first, n, n), is_symmetric=True)
         if self.turned is not None:
-            require_shape("turned loads: interfaces", self.turned.interfaces, (n_interfaces, 6, 3, n))
+            require_shape("turned loads: interfaces", self.turned.interfaces, (n_loaded, 6, 3, n))
         if self.spread is not None:
             require_shape("spread loads: K", self.spread.K, (6, n, n))
             if self.turned is None:
@@ -101,8 +108,19 @@ class GeometricStiffness:
 
     @property
     def n_interfaces(self) -> int:
-        """Number of interfaces."""
-        return len(self.interfaces)
+        """Number of interfaces, loaded or not."""
+        return len(self.is_loaded)
+
+    @property
+    def loaded(self) -> IntArray:
+        """The interfaces whose loads are among `interfaces`, in their order, (n_loaded,)."""
+        return np.flatnonzero(self.is_loaded)
+
+    def of_interface(self, k: int) -> Array:
+        """Return the matrices of interface k, (6, n_q, n_q); zero, without memory, where its loads were left out."""
+        if not self.is_loaded[k]:
+            return np.broadcast_to(np.zeros(()), (6, self.n_q, self.n_q))
+        return np.asarray(self.interfaces[sum(self.is_loaded[:k])])
 
     def transformed(self, Z: Array) -> "GeometricStiffness":
         """Return the matrices over other modes, Zᵀ K_j Z, for shapes Phi Z, Z: (n_q, n_new)."""
@@ -120,7 +138,7 @@ class GeometricStiffness:
             turned = replace(turned, **{name: rows(getattr(turned, name)) for name in UNIT_LOADS})
         if spread is not None:
             spread = replace(spread, K=squares(spread.K), turned=rows(spread.turned))
-        of_loads = {name: squares(getattr(self, name)) for name in UNIT_LOADS}
+        of_loads: dict[str, Any] = {name: squares(getattr(self, name)) for name in UNIT_LOADS}
         return replace(self, **of_loads, turned=turned, spread=spread)
 
     def in_units(self, old: Units, new: Units) -> "GeometricStiffness":
@@ -136,13 +154,13 @@ class GeometricStiffness:
         if spread is not None:
             by = force * np.array([1.0, 1, 1, length, length, length])[:, None, None]
             spread = SpreadLoads(spread.K * by, spread.turned * by * q, spread.turned_rigid * by * q**2)
-        of_loads = {name: getattr(self, name) * by for name, by in by_load.items()}
+        of_loads: dict[str, Any] = {name: getattr(self, name) * by for name, by in by_load.items()}
         return replace(self, **of_loads, turned=turned, spread=spread)
 
 
-def numbers_of_loads(n_interfaces: int) -> dict[str, tuple[int, ...]]:
+def numbers_of_loads(n_loaded: int) -> dict[str, tuple[int, ...]]:
     """Return how many unit loads of each kind there are."""
-    return {"translation": (3,), "rotation": (3,), "spin": (6,), "interfaces": (n_interfaces, 6)}
+    return {"translation": (3,), "rotation": (3,), "spin": (6,), "interfaces": (n_loaded, 6)}
 
 
 def put_array(record: object, where: str, name: str, shape: tuple[int, ...], *, is_symmetric: bool = False) -> None:
@@ -154,7 +172,7 @@ def put_array(record: object, where: str, name: str, shape: tuple[int, ...], *, 
 
 
 def stiffness_of_loads(
-    K: Array, turned: Array | None, turned_rigid: Array | None, *, n_interfaces: int
+    K: Array, turned: Array | None, turned_rigid: Array | None, *, is_loaded: tuple[bool, ...]
 ) -> GeometricStiffness:
     """Return the matrices of all unit loads in a row as a record.
 
@@ -162,24 +180,28 @@ def stiffness_of_loads(
     ----------
     K, turned
         Over two modes, (k, n_q, n_q), and over a rotation and a mode, (k, 3, n_q): 3 translations, 3 rotations, 6
-        products of angular velocities, 6 for each interface, 6 spread over the nodes where `turned_rigid` is given.
+        products of angular velocities, 6 for each loaded interface, 6 spread over the nodes where `turned_rigid` is
+        given.
     turned_rigid
         As that of `SpreadLoads`.
+    is_loaded
+        As that of `GeometricStiffness`.
     """
-    spread = None
+    spread, n_loaded = None, sum(is_loaded)
     if turned is not None and turned_rigid is not None:
         spread = SpreadLoads(K[-6:], turned[-6:], turned_rigid)
     return GeometricStiffness(
-        **by_kind(K, n_interfaces),
-        turned=None if turned is None else TurnedLoads(**by_kind(turned, n_interfaces)),
+        **by_kind(K, n_loaded),
+        turned=None if turned is None else TurnedLoads(**by_kind(turned, n_loaded)),
         spread=spread,
+        is_loaded=is_loaded,
     )
 
 
-def by_kind(K: Array, n_interfaces: int) -> dict[str, Array]:
-    """Return the matrices of the first 12 + 6 n_interfaces loads by kind."""
-    translation, rotation, spin, interfaces, _ = np.split(K, [3, 6, 12, 12 + 6 * n_interfaces])
-    interfaces = interfaces.reshape(n_interfaces, 6, *K.shape[1:])
+def by_kind(K: Array, n_loaded: int) -> dict[str, Array]:
+    """Return the matrices of the first 12 + 6 n_loaded loads by kind."""
+    translation, rotation, spin, interfaces, _ = np.split(K, [3, 6, 12, 12 + 6 * n_loaded])
+    interfaces = interfaces.reshape(n_loaded, 6, *K.shape[1:])
     return dict(zip(UNIT_LOADS, (translation, rotation, spin, interfaces), strict=True))
 
 

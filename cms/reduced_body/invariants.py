@@ -102,9 +102,11 @@ class Moments:
     def C5(self) -> Array:
         """5C_kl = ∫ (phi_k·phi_l 1 - phi_l phi_kᵀ), (n_q, n_q, 3, 3) [kg]; half its antisymmetric part is 4C."""
         self.require("5C")
-        S = self.S_kl
-        dot = np.einsum("aakl->kl", S)
-        return frozen(dot[:, :, None, None] * np.eye(3) - np.einsum("ablk->klab", S))
+        S, C5 = self.S_kl, np.empty((self.n_q, self.n_q, 3, 3))
+        for a in range(3):
+            for b in range(3):
+                C5[:, :, a, b] = self.M - S[a, b].T if a == b else -S[a, b].T
+        return frozen(C5)
 
     @cached_property
     def M(self) -> Array:
@@ -200,15 +202,23 @@ def moments_from_gram(gram: Array, *, is_exact: bool = True, missing: tuple[str,
         As in `Moments`.
     """
     n = (gram.shape[0] - 4) // 3
-    gram = (gram + gram.T) / 2  # symmetric by definition; the product that made it rounds the halves apart
-    blocks = [slice(4 + a * n, 4 + (a + 1) * n) for a in range(3)]
+
+    def part(rows: slice, columns: slice) -> Array:
+        # symmetric by definition; the product that made it rounds the halves apart
+        return np.asarray((gram[rows, columns] + gram[columns, rows].T) / 2)
+
+    one, c, blocks = slice(0, 1), slice(1, 4), [slice(4 + a * n, 4 + (a + 1) * n) for a in range(3)]
+    S_kl = np.empty((3, 3, n, n))
+    for a in range(3):
+        for b in range(3):
+            S_kl[a, b] = part(blocks[a], blocks[b])
     return Moments(
         m=float(gram[0, 0]),
-        S=gram[0, 1:4],
-        R=gram[1:4, 1:4],
-        C1=np.stack([gram[0, block] for block in blocks]),
-        P=np.stack([gram[1:4, block] for block in blocks], axis=1),
-        S_kl=np.stack([np.stack([gram[rows, columns] for columns in blocks]) for rows in blocks]),
+        S=part(one, c)[0],
+        R=part(c, c),
+        C1=np.stack([part(one, block)[0] for block in blocks]),
+        P=np.stack([part(c, block) for block in blocks], axis=1),
+        S_kl=S_kl,
         is_exact=is_exact,
         missing=missing,
     )

@@ -17,12 +17,19 @@ from fe_models.body.load_cases import ReducedLoadCase
 from fe_models.body.numbering import NONE, Numbering
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int, require_finite, require_shape
 from fe_models.foundation.copies import FrozenMapping, frozen_copies
+from fe_models.foundation.tall.on_disk import row_slices
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["BodyFrame", "ReducedBody", "ReducedInterface"]
 
 ORTHONORMAL = 1e-6  #: defect of axes that is taken for digits of another program
+
+
+def require_finite_rows(where: str, array: Array) -> None:
+    """Raise `BodyError` unless all numbers are finite, a slice of rows of an array on disk at a time."""
+    for rows in row_slices(len(array), array):
+        require_finite(where, array[rows])
 
 
 def require_orthonormal(where: str, axes: Array) -> None:
@@ -131,13 +138,13 @@ class ReducedBody:
         put = object.__setattr__
         for name in ("M", "K", "D", "energy_shares", "free_frequencies", "nodes", "Phi"):
             put(self, name, frozen(getattr(self, name)))
-            require_finite(f"{where}: {name}", getattr(self, name))
+            require_finite_rows(f"{where}: {name}", getattr(self, name))
         for name in ("node_ids", "surface"):
             put(self, name, frozen_int(getattr(self, name)))
         if self.stress is not None:
             put(self, "stress", frozen(self.stress))
             require_shape(f"{where}: stress", self.stress, (len(self.nodes), 6, self.n_q))
-            require_finite(f"{where}: stress", self.stress)
+            require_finite_rows(f"{where}: stress", self.stress)
         if self.quadratic is not None:
             put(self, "quadratic", frozen(self.quadratic))
             require_shape(f"{where}: quadratic", self.quadratic, (len(self.nodes), 3, self.n_q, self.n_q))

@@ -20,7 +20,7 @@ import numpy as np
 
 from cms.errors import BodyError
 from cms.reduced_body.geometric_stiffness import SPIN_PAIRS, GeometricStiffness, TurnedLoads, stiffness_of_loads
-from cms.reduced_body.reduced_body import BodyFrame, ReducedBody
+from cms.reduced_body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.second_order.unit_loads import unit_mass_loads
 from fe_models.body.mass_loads import MassLoads
 from fe_models.foundation.arrays import Array
@@ -37,7 +37,7 @@ class Loads:
     """k loads of a reduced body, in axes of its frame and about its origin."""
 
     mass: MassLoads
-    wrenches: Array  #: force and moment at every interface, (k, n_interfaces, 6)
+    wrenches: Array  #: force and moment at every loaded interface, (k, n_loaded, 6)
     spread: Array  #: amounts of the loads spread over the nodes, (k, 6); (k, 0) for a body without
 
 
@@ -45,8 +45,16 @@ def require_convertible(reduced: ReducedBody, frame: BodyFrame) -> None:
     """Raise `BodyError` where the reaction of the new frame is no combination of unit loads on record."""
     if reduced.geometric is None or frame.kind == "tisserand":
         return
+    names = [interface.name for interface in reduced.interfaces]
     if frame.kind == "nodal" and frame.at and is_node(reduced, frame.at):
-        return
+        if reduced.geometric.is_loaded[names.index(frame.at)]:
+            return
+        raise BodyError(
+            f"reduced body {reduced.name!r}: the loads at interface {frame.at!r} were left out of its geometric "
+            "stiffness, and a nodal frame there puts its reaction on it; reduce the body anew with that interface "
+            "among geometric_stiffness = [...], or leave the geometric stiffness out (cms frame "
+            "--no-geometric-stiffness)"
+        )
     if frame.kind == "buckens" and reduced.geometric.spread is not None:
         return
     why = "whose reaction is no load at one node"
@@ -92,7 +100,7 @@ def converted_geometric_stiffness(
         on_modes = of_balanced(old.turned, loads, None if old.spread is None else old.spread.turned)
     else:
         warn_of_old_shells(reduced)
-        Psi = np.array([interface.Psi for interface in reduced.interfaces]).reshape(-1, 6, reduced.n_q)
+        Psi = np.array([interface.Psi for interface in loaded_of(reduced)]).reshape(-1, 6, reduced.n_q)
         on_modes = turned_work(loads, moments.C1, moments.P, Psi)
     C_theta = C[3:]
     K = K - np.einsum("ak,jal->jkl", C_theta, on_modes) - np.einsum("jak,al->jkl", on_modes, C_theta)  # (4)
@@ -103,13 +111,19 @@ def converted_geometric_stiffness(
         if frame.kind == "tisserand":
             zero[:6] = 0.0
         if frame.kind == "buckens":
-            zero[12 + 6 * len(reduced.interfaces) :] = 0.0
+            zero[12 + 6 * len(old.interfaces) :] = 0.0
     return stiffness_of_loads(
         K,
         None if old.turned is None else on_modes,
         None if old.spread is None else changed_rigid(reduced, old.spread.turned_rigid, p, R),
-        n_interfaces=len(reduced.interfaces),
+        is_loaded=old.is_loaded,
     )
+
+
+def loaded_of(reduced: ReducedBody) -> list[ReducedInterface]:
+    """Return the interfaces whose loads are among the unit loads."""
+    assert reduced.geometric is not None
+    return [reduced.interfaces[k] for k in reduced.geometric.loaded]
 
 
 def warn_of_old_shells(reduced: ReducedBody) -> None:
@@ -124,7 +138,7 @@ def warn_of_old_shells(reduced: ReducedBody) -> None:
 def new_unit_loads(reduced: ReducedBody, p: Array, R: Array) -> Loads:
     """Return step (1): loads of the new axes about the new origin: per mass, unit wrenches, spread over the nodes."""
     assert reduced.geometric is not None
-    n, n_spread = len(reduced.interfaces), 0 if reduced.geometric.spread is None else 6
+    n, n_spread = len(reduced.geometric.interfaces), 0 if reduced.geometric.spread is None else 6
     k = 12 + 6 * n + n_spread
     mass, none = unit_mass_loads(BodyFrame("", p, R)), MassLoads.none(k - 12)
     wrenches, spread = np.zeros((k, n, 6)), np.zeros((k, n_spread))
@@ -154,10 +168,10 @@ def with_reaction(reduced: ReducedBody, loads: Loads, frame: BodyFrame) -> Loads
     if frame.kind == "buckens":
         amounts = np.linalg.solve(spread_resultants(reduced).T, np.hstack([force, torque]).T).T
         return replace(loads, spread=loads.spread - amounts)
-    index = [interface.name for interface in reduced.interfaces].index(frame.at)
+    index = [interface.name for interface in loaded_of(reduced)].index(frame.at)
     wrenches = np.array(loads.wrenches)
     wrenches[:, index, :3] -= force
-    wrenches[:, index, 3:] -= torque - np.cross(reduced.interfaces[index].position, force)
+    wrenches[:, index, 3:] -= torque - np.cross(loaded_of(reduced)[index].position, force)
     return replace(loads, wrenches=wrenches)
 
 
@@ -167,7 +181,7 @@ def resultants(reduced: ReducedBody, loads: Loads) -> tuple[Array, Array]:
     force = moments.m * b + A @ moments.S
     V = np.einsum("jab,bc->jac", A, moments.R) + b[:, :, None] * moments.S  # ∫ f cᵀ
     torque = axial(V)
-    for i, interface in enumerate(reduced.interfaces):
+    for i, interface in enumerate(loaded_of(reduced)):
         force = force + loads.wrenches[:, i, :3]
         torque = torque + loads.wrenches[:, i, 3:] + np.cross(interface.position, loads.wrenches[:, i, :3])
     if loads.spread.size:
@@ -219,7 +233,7 @@ def turned_work(loads: Loads, C1: Array, P: Array, Psi: Array) -> Array:
     C1, P
         ∫ phi_a,k (3, n) and ∫ c_a phi_b,k (3, 3, n) of the shapes.
     Psi
-        Motion of the interfaces, (n_interfaces, 6, n).
+        Motion of the loaded interfaces, (n_loaded, 6, n).
     """
     turn = np.stack([np.cross(e, np.eye(3)).T for e in np.eye(3)])  # e_a~
     work = np.einsum("xab,jbc,cak->jxk", turn, loads.mass.A, P, optimize=True)
@@ -233,8 +247,9 @@ def rotation_moments(reduced: ReducedBody) -> tuple[Array, Array, Array]:
     e = np.stack([np.cross(axis, np.eye(3)).T for axis in np.eye(3)])  # e_k × c = e[k] c
     C1 = np.einsum("kab,b->ak", e, reduced.moments.S)
     P = np.einsum("kbc,ac->abk", e, reduced.moments.R)
-    Psi = np.zeros((len(reduced.interfaces), 6, 3))
-    for i, interface in enumerate(reduced.interfaces):
+    interfaces = loaded_of(reduced)
+    Psi = np.zeros((len(interfaces), 6, 3))
+    for i, interface in enumerate(interfaces):
         Psi[i, :3] = np.einsum("kab,b->ak", e, interface.position)
         Psi[i, 3:] = np.eye(3) if interface.has_rotation else 0.0
     return C1, P, Psi

@@ -22,6 +22,7 @@ from cms.second_order.unit_states import UnitStates, states_of
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.mass_loads import MassLoads
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.tall.on_disk import beside
 
 __all__ = ["elastic_part", "reduced_geometric_stiffness", "stiffness_of_states"]
 
@@ -55,17 +56,18 @@ def stiffness_of_states(body: FEBody, Phi: Array, states: UnitStates) -> Geometr
     """
     frame = states.condition.frame
     rotations = geometric_rigid_modes(body, origin=frame.origin)[:, 3:] @ frame.axes
-    columns = np.hstack([rotations, Phi])
+    columns = beside(rotations, Phi)
     K = np.zeros((states.mass.k, columns.shape[1], columns.shape[1]))
     for first in range(0, len(states.loaded), LOADS_AT_ONCE):
         some = slice(first, first + LOADS_AT_ONCE)
         loads = states.loaded[some]
         mass = MassLoads(states.mass.A[loads], states.mass.b[loads])
         K[loads] = elastic_part(body, states.u[:, some], mass, columns)
-    K -= mean_part(body, states.on_dofs, columns, frame.axes)
+    is_loaded = states.is_loaded or (True,) * len(body.interfaces)
+    K -= mean_part(body, states.on_dofs, columns, frame.axes, is_loaded)
     turned = (K[:, :3, 3:] + K[:, 3:, :3].transpose(0, 2, 1)) / 2
     rigid = None if states.spread is None else turned_rigid_work(body, states.spread, frame)
-    return stiffness_of_loads(K[:, 3:, 3:], turned, rigid, n_interfaces=len(body.interfaces))
+    return stiffness_of_loads(K[:, 3:, 3:], turned, rigid, is_loaded=is_loaded)
 
 
 def elastic_part(body: FEBody, u: Array, mass: MassLoads, Phi: Array) -> Array:
@@ -86,15 +88,17 @@ def elastic_part(body: FEBody, u: Array, mass: MassLoads, Phi: Array) -> Array:
     return K + link_work(T, dofs, body.dofs, on_followers, Phi)
 
 
-def mean_part(body: FEBody, on_dofs: Array, Phi: Array, axes: Array) -> Array:
+def mean_part(body: FEBody, on_dofs: Array, Phi: Array, axes: Array, is_loaded: tuple[bool, ...]) -> Array:
     """Return step (5): work of the loads on the second order of the interfaces' own motion, (k, n, n).
 
     A distributing interface hands what acts on its reference node to its members. The other ones that are no node of
-    the body are read off several members, or by a lever: that counts for their own unit loads, 12 + 6 i + c.
+    the body are read off several members, or by a lever: that counts for their own unit loads, 12 + 6 i + c, i among
+    the loaded ones.
     """
     work = distributing_part(body, on_dofs, Phi)
     turn = np.kron(np.eye(2), axes)
-    for number, interface in enumerate(body.interfaces):
+    loaded = [interface for interface, is_own in zip(body.interfaces, is_loaded, strict=True) if is_own]
+    for number, interface in enumerate(loaded):
         own = slice(12 + 6 * number, 18 + 6 * number)
         motion, _, turns = reference_motion(body, interface)
         if interface.kind == "distributing":

@@ -2,30 +2,51 @@
 
 A matrix over all modes belongs to each unit load: 12 of the frame, 6 spread over the nodes, and 6 of each interface; an
 interface of kind "nodes" has these 6 too, of the mean motion of its nodes, however many nodes it has. With forty
-interfaces and two thousand modes that is 9 GB, which nobody asked for.
+interfaces and two thousand modes that is 9 GB, which nobody asked for. Fewer modes make it small (interface reduction),
+or the loads of chosen interfaces alone; loads at the others then do not stiffen the body.
 """
 
 import os
+from collections.abc import Sequence
 
 from cms.errors import BodyError
+from cms.families.interface_cost import PROPOSED, duration, few_columns, operations_per_second
 from cms.second_order.unit_states import has_geometric_stiffness
 from fe_models.body.fe_body import FEBody
 
-__all__ = ["UNASKED", "left_out_words", "makes_stiffness", "require_room_for_stiffness", "stiffness_bytes"]
+__all__ = [
+    "UNASKED", "chosen_words", "left_out_words", "makes_stiffness", "require_room_for_stiffness", "stiffness_bytes",
+    "stiffness_words",
+]  # fmt: skip
 
 UNASKED = 2e9  #: bytes of geometric stiffness up to which it is made without being asked for
 HELD = 4.0  #: times its size: what is held at once while it is made
+SPARSE = 10.0  #: times as long as one of a dense product an operation of a sparse one takes
+NAMED = 5  #: interfaces that a note names
+
+Asked = bool | Sequence[str] | None  #: whether it is made, or the interfaces whose loads it has
 
 
-def stiffness_bytes(body: FEBody, n_modes: int) -> float:
+def n_loads(body: FEBody, asked: Asked = None) -> int:
+    """Return the number of unit loads."""
+    return 18 + 6 * (len(body.interfaces) if asked is None or isinstance(asked, bool) else len(set(asked)))
+
+
+def stiffness_bytes(body: FEBody, n_modes: int, asked: Asked = None) -> float:
     """Return the size of the geometric stiffness of a body over so many modes [bytes]."""
-    return 8.0 * (18 + 6 * len(body.interfaces)) * n_modes**2
+    return 8.0 * n_loads(body, asked) * n_modes**2
 
 
-def makes_stiffness(asked: bool | None, body: FEBody, n_modes: int) -> bool:
+def stiffness_seconds(body: FEBody, n_modes: int, asked: Asked = None) -> float:
+    """Estimate the time of one processor for it [s]: Phiᵀ (S Phi) with a sparse S over the nodes for each load."""
+    each = float(body.n_dof) * n_modes**2 + SPARSE * (2 * body.K.nnz / 9) * 3 * n_modes
+    return n_loads(body, asked) * each / operations_per_second()
+
+
+def makes_stiffness(asked: Asked, body: FEBody, n_modes: int) -> bool:
     """Return whether the geometric stiffness is made: as asked, else where the elements know it and it is not large."""
     if asked is not None:
-        return asked
+        return asked is not False
     return has_geometric_stiffness(body) and not left_out_words(body, n_modes)
 
 
@@ -35,21 +56,64 @@ def left_out_words(body: FEBody, n_modes: int) -> str:
     if size <= UNASKED:
         return ""
     return (
-        f"geometric stiffness left out: {18 + 6 * len(body.interfaces)} unit loads over {n_modes} modes would be "
-        f"{size / 1e9:.2g} GB. Fewer modes bring it back (interface_modes in [reduction]); geometric_stiffness = true "
-        "makes it all the same, false leaves it out without this note"
+        f"geometric stiffness left out: {n_loads(body)} unit loads over {n_modes} modes would be {size / 1e9:.2g} GB. "
+        f"{remedies(body, n_modes)}; geometric_stiffness = true makes it all the same, false leaves it out without "
+        "this note"
     )
 
 
-def require_room_for_stiffness(body: FEBody, n_modes: int) -> None:
+def stiffness_words(body: FEBody, n_modes: int, asked: Asked) -> str:
+    """Say before the work what a geometric stiffness that was asked for costs; nothing where it is small."""
+    size = stiffness_bytes(body, n_modes, asked)
+    if size <= UNASKED:
+        return ""
+    time = duration(stiffness_seconds(body, n_modes, asked))
+    return (
+        f"geometric stiffness of {n_loads(body, asked)} unit loads over about {n_modes} modes: {size / 1e9:.2g} GB in "
+        f"the file, {HELD * size / 1e9:.2g} GB while it is made, about {time} of processor time. "
+        f"{remedies(body, n_modes)}"
+    )
+
+
+def chosen_words(body: FEBody, asked: Asked) -> str:
+    """Say at which interfaces loads do not stiffen the body, as a job has chosen some; nothing where all do."""
+    if asked is None or isinstance(asked, bool):
+        return ""
+    others = [interface.name for interface in body.interfaces if interface.name not in asked]
+    if not others:
+        return ""
+    more = f" and {len(others) - NAMED} more" if len(others) > NAMED else ""
+    return (
+        f"loads at interfaces {', '.join(others[:NAMED])}{more} do not stiffen the body: geometric_stiffness names "
+        f"{', '.join(asked) if asked else 'none'}"
+    )
+
+
+def remedies(body: FEBody, n_modes: int) -> str:
+    """Say what makes the geometric stiffness small, with the lines to write."""
+    few = few_columns(body, PROPOSED) + max(0, n_modes - len(body.b))
+    reduced = ""
+    if few < n_modes:
+        reduced = (
+            f"interface_modes = {PROPOSED} in [reduction] leaves about {few} modes and "
+            f"{stiffness_bytes(body, few) / 1e9:.2g} GB; "
+        )
+    first = body.interfaces[0].name if body.interfaces else ""
+    return (
+        f"{reduced}geometric_stiffness = [{first!r}] has the loads of the frame and of the interfaces it names alone, "
+        f"{stiffness_bytes(body, n_modes, [first]) / 1e9:.2g} GB and about "
+        f"{duration(stiffness_seconds(body, n_modes, [first]))} for one".replace("'", '"')
+    )
+
+
+def require_room_for_stiffness(body: FEBody, n_modes: int, asked: Asked = None) -> None:
     """Raise `BodyError` if the geometric stiffness over so many modes does not fit into the memory of this machine."""
-    size, memory = stiffness_bytes(body, n_modes), machine_memory()
+    size, memory = stiffness_bytes(body, n_modes, asked), machine_memory()
     if HELD * size > memory:
         raise BodyError(
-            f"body {body.name!r}: geometric stiffness of {18 + 6 * len(body.interfaces)} unit loads over about "
+            f"body {body.name!r}: geometric stiffness of {n_loads(body, asked)} unit loads over about "
             f"{n_modes} modes: {size / 1e9:.3g} GB, and {HELD * size / 1e9:.3g} GB while it is made; this machine has "
-            f"{memory / 1e9:.3g} GB. Take fewer modes (interface_modes = 20 in [reduction] for interfaces of kind "
-            "nodes), or leave it out (geometric_stiffness = false)"
+            f"{memory / 1e9:.3g} GB. {remedies(body, n_modes)}; geometric_stiffness = false leaves it out"
         )
 
 

@@ -2,7 +2,7 @@
 
 Per mass, about the origin of the frame B and along its axes: -e_a of the acceleration of its origin, -e_a × c of the
 angular acceleration, -½ [e_a × (e_b × c) + e_b × (e_a × c)] of the products of angular velocities; then a unit force
-and a unit moment at every interface; last, where they are wanted, six loads spread over the nodes
+and a unit moment at every interface, or at chosen ones; last, where they are wanted, six loads spread over the nodes
 (`cms.second_order.spread_loads`). All are balanced by the same support, W Psi_R of the condition of the frame.
 """
 
@@ -33,11 +33,21 @@ class UnitLoads:
     is_zero: np.ndarray  #: whether nothing is left of the load, (k,) bool
 
 
-def unit_loads(body: FEBody, frame: BodyFrame, spread: Array | None = None) -> UnitLoads:
-    """Return the 12 loads per mass, then six loads for each interface, then those given over the dofs, (n_dof, 6)."""
+def unit_loads(
+    body: FEBody, frame: BodyFrame, spread: Array | None = None, is_loaded: tuple[bool, ...] = ()
+) -> UnitLoads:
+    """Return the 12 loads per mass, then six for each loaded interface, then those given over the dofs, (n_dof, 6).
+
+    Without `is_loaded` all interfaces are.
+    """
     mass = unit_mass_loads(frame)
     turn = np.kron(np.eye(2), frame.axes)
-    columns = [reference_motion(body, interface)[0].T @ turn for interface in body.interfaces]
+    chosen = is_loaded or (True,) * len(body.interfaces)
+    columns = [
+        reference_motion(body, interface)[0].T @ turn
+        for interface, is_chosen in zip(body.interfaces, chosen, strict=True)
+        if is_chosen
+    ]
     on_dofs = np.hstack([np.zeros((body.n_dof, 12)), *columns, *([] if spread is None else [spread])])
     none = MassLoads.none(on_dofs.shape[1] - 12)
     return together(body, MassLoads(np.concatenate([mass.A, none.A]), np.concatenate([mass.b, none.b])), on_dofs)

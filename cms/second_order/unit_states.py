@@ -1,5 +1,6 @@
 """Static states of the unit loads of a body: what its geometric stiffness needs of the factorisation (theory.md §7)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +16,12 @@ from cms.solvers.tall import combine
 from fe_models.body.fe_body import FEBody
 from fe_models.body.mass_loads import MassLoads
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["UnitStates", "has_geometric_stiffness", "require_geometric_stiffness", "states_of", "unit_states"]
+__all__ = [
+    "UnitStates", "has_geometric_stiffness", "loaded_interfaces", "require_geometric_stiffness", "states_of",
+    "unit_states",
+]  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,9 +35,22 @@ class UnitStates:
     loaded: IntArray  #: which of the k loads leave something, (n_loaded,)
     u: Array  #: their responses, up to a rigid motion, (n_dof, n_loaded)
     spread: Array | None = None  #: the last six loads before they were balanced, (n_dof, 6); None: left out
+    is_loaded: tuple[bool, ...] = ()  #: for each interface whether its loads are among them; empty: all are
+
+    @property
+    def names(self) -> list[str]:
+        """Interfaces whose loads are among them."""
+        chosen = self.is_loaded or (True,) * len(self.body.interfaces)
+        return [each.name for each, is_chosen in zip(self.body.interfaces, chosen, strict=True) if is_chosen]
 
 
-def unit_states(body: FEBody | Families, *, frame: Frame | None = None, spread: bool = True) -> UnitStates:
+def unit_states(
+    body: FEBody | Families,
+    *,
+    frame: Frame | None = None,
+    spread: bool = True,
+    interfaces: Sequence[str] | None = None,
+) -> UnitStates:
     """Return the static states of the unit loads of a body in a frame, for `reduce(..., geometric=states)`.
 
     Made while the factorisation of the mode set is there, they let it be freed before the reduction, which then needs
@@ -47,26 +65,49 @@ def unit_states(body: FEBody | Families, *, frame: Frame | None = None, spread: 
     spread
         Whether the six loads spread over the nodes are among them, without which the geometric stiffness cannot be
         carried to a Buckens frame.
+    interfaces
+        Names of those whose loads are among them, for a body with very many: loads at the others then do not stiffen
+        it, wherever they come from; None: all.
 
     Raises
     ------
     BodyError
-        If the body has no element model that knows its geometric stiffness, or the frame cannot be attached.
+        If the body has no element model that knows its geometric stiffness, or the frame cannot be attached, or an
+        interface is unknown.
     """
     require_geometric_stiffness(body_of(body))
-    return states_of(body, frame_condition(body_of(body), frame or TisserandFrame()), spread=spread)
+    condition = frame_condition(body_of(body), frame or TisserandFrame())
+    return states_of(body, condition, spread=spread, interfaces=interfaces)
 
 
-def states_of(source: FEBody | Families, condition: FrameCondition, *, spread: bool = True) -> UnitStates:
+def states_of(
+    source: FEBody | Families,
+    condition: FrameCondition,
+    *,
+    spread: bool = True,
+    interfaces: Sequence[str] | None = None,
+) -> UnitStates:
     """Return the static states for a frame made ready."""
     body = body_of(source)
     require_geometric_stiffness(body)
+    is_loaded = loaded_interfaces(body, interfaces)
     forces = spread_forces(body, condition.frame) if spread else None
     with families_of(source) as families:
-        loads = balanced(body, unit_loads(body, condition.frame, forces), condition)
+        loads = balanced(body, unit_loads(body, condition.frame, forces, is_loaded), condition)
         loaded = np.flatnonzero(~loads.is_zero)
         u = static_states(families, loads.F[:, loaded])
-    return UnitStates(body, condition, loads.mass, loads.on_dofs, loaded, u, forces)
+    return UnitStates(body, condition, loads.mass, loads.on_dofs, loaded, u, forces, is_loaded)
+
+
+def loaded_interfaces(body: FEBody, names: Sequence[str] | None) -> tuple[bool, ...]:
+    """Return for each interface whether it is among these names, all for None; `BodyError` for an unknown one."""
+    known = [interface.name for interface in body.interfaces]
+    for name in names or ():
+        if name not in known:
+            raise BodyError(
+                f"body {body.name!r}: geometric stiffness: no interface {quoted(name)}{nearest(name, known)}"
+            )
+    return tuple(names is None or name in names for name in known)
 
 
 def has_geometric_stiffness(body: FEBody) -> bool:

@@ -6,12 +6,12 @@ largest eigenvalues theta = 1 / (omega² - sigma) are the modes nearest above th
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.linalg as la
 
-from cms.solvers.sparse_product import SymmetricProduct
-from cms.solvers.tall import combine, inner, ordered, subtract
+from cms.solvers.tall_space import TallProduct, TallSpace
 from fe_models.foundation.arrays import Array
 
 __all__ = ["BlockLanczos", "RitzPairs"]
@@ -49,27 +49,28 @@ class BlockLanczos:
     """
 
     def __init__(
-        self, solve: Callable[[Array], Array], M: SymmetricProduct, n: int, *, block: int, capacity: int
+        self, solve: Callable[[Any], Any], M: TallProduct, space: TallSpace, *, block: int, capacity: int
     ) -> None:
-        self.solve, self.M, self.n, self.block = solve, M, n, block
+        """Begin with a random block; solve and M map columns of the space to such."""
+        self.solve, self.M, self.space, self.n, self.block = solve, M, space, space.n, block
         self.n_solves = 0
         self.m = 0  # columns of V that T knows
-        self._rows = np.empty((min(capacity, n) + block, n))  # V.T: rows are the basis vectors
-        self._T = np.zeros((len(self._rows), len(self._rows)))
+        self._basis = space.basis(min(capacity, self.n) + block)
+        self._T = np.zeros((self._basis.capacity, self._basis.capacity))
         self._random = np.random.default_rng(0)
         self._M_next = self._start()  # M V_{j+1}; V_{j+1} itself follows V in the rows
         self._R = np.zeros((self._M_next.shape[1], 0))  # coupling of the next block to all of V
         self._coupled = 0  # first column of V it is coupled to
 
     @property
-    def V(self) -> Array:
+    def V(self) -> Any:
         """The basis, (n, m)."""
-        return self._rows[: self.m].T
+        return self._basis.columns(0, self.m)
 
     @property
-    def V_and_next(self) -> Array:
+    def V_and_next(self) -> Any:
         """The basis and the block that comes next, (n, m + b)."""
-        return self._rows[: self.m + self._M_next.shape[1]].T
+        return self._basis.columns(0, self.m + self._M_next.shape[1])
 
     @property
     def is_exhausted(self) -> bool:
@@ -79,16 +80,16 @@ class BlockLanczos:
     @property
     def capacity(self) -> int:
         """Columns V can hold before a restart."""
-        return len(self._rows) - self.block
+        return self._basis.capacity - self.block
 
     def grow(self, capacity: int) -> None:
         """Make room for more columns."""
         size = min(capacity, self.n) + self.block
-        if size > len(self._rows):
-            rows, T = np.empty((size, self.n)), np.zeros((size, size))
-            used = self.V_and_next.shape[1]
-            rows[:used], T[: self.m, : self.m] = self._rows[:used], self._T[: self.m, : self.m]
-            self._rows, self._T = rows, T
+        if size > self._basis.capacity:
+            T = np.zeros((size, size))
+            T[: self.m, : self.m] = self._T[: self.m, : self.m]
+            self._basis.grow(size, self.V_and_next.shape[1])
+            self._T = T
 
     def advance(self) -> None:
         """Add the next block to the basis."""
@@ -97,9 +98,9 @@ class BlockLanczos:
         block = slice(first, last)
         self.m = last
         W = self._apply(M_new)  # (1)
-        A = inner(M_new, W)  # (2)
+        A = self.space.inner(M_new, W)  # (2)
         near = np.concatenate([self._R[:, self._coupled :].T, A])
-        subtract(W, self.V[:, self._coupled :], near)
+        self.space.subtract(W, self._basis.columns(self._coupled, self.m), near)
         C, R, M_next = self._append(W, np.linalg.norm(near, axis=0).max())  # (3), (4)
         C[self._coupled :] += near  # (5)
         self._T[:last, block] = C
@@ -124,34 +125,31 @@ class BlockLanczos:
 
     def restart(self, ritz: RitzPairs, keep: int) -> None:
         """Keep the span of the leading Ritz vectors only; the next block stays."""
-        S = np.ascontiguousarray(ritz.S[:, :keep].T)
-        for first in range(0, self.n, 65536):  # in place, in slices: no second basis in memory
-            part = slice(first, first + 65536)
-            self._rows[:keep, part] = S @ self._rows[: self.m, part]
-        self._rows[keep : keep + len(self._R)] = self._rows[self.m : self.m + len(self._R)]
+        S = ritz.S[:, :keep]
+        self._basis.turn(self.m, S)
+        self._basis.put(keep, self._basis.columns(self.m, self.m + len(self._R)))
         self._T[: self.m, : self.m] = 0.0
         self._T[np.arange(keep), np.arange(keep)] = ritz.theta[:keep]
-        self._R = self._R @ S.T
+        self._R = self._R @ S
         self._coupled = 0
         self.m = keep
 
-    def _apply(self, M_x: Array) -> Array:
+    def _apply(self, M_x: Any) -> Any:
         self.n_solves += M_x.shape[1]
-        return ordered(self.solve(M_x), "F")
+        return self.solve(M_x)
 
-    def _start(self) -> Array:
+    def _start(self) -> Any:
         """Append an M-orthonormal random block in the range of the operator, orthogonal to V; return M times it."""
         width = min(self.block, self.n - self.m)
-        random = self._random.standard_normal((width, self.n)).T
-        _, _, M_W = self._append(self._apply(self.M @ random), 0.0)
+        _, _, M_W = self._append(self._apply(self.M @ self.space.random(self._random, width)), 0.0)
         return M_W
 
-    def _append(self, W: Array, length: float) -> tuple[Array, Array, Array]:
+    def _append(self, W: Any, length: float) -> tuple[Array, Array, Any]:
         """Split W = V C + V_next R, V_next in the rows after V; return C, R, M V_next (steps 3 and 4). W is lost.
 
         `length` is that of what was taken off W before: a remainder is rounding by its measure.
         """
-        V = self.V
+        V, inner, combine = self.V, self.space.inner, self.space.combine
         C_sum = np.zeros((self.m, W.shape[1]))
         R_sum = np.eye(W.shape[1])
         M_W = self.M @ W
@@ -159,7 +157,7 @@ class BlockLanczos:
             C = inner(V, M_W)
             gram = _symmetric(inner(W, M_W))
             longest = np.sqrt(max(np.diag(gram).max(initial=0.0), 0.0))
-            subtract(W, V, C)
+            self.space.subtract(W, V, C)
             C_sum += C @ R_sum
             gram -= C.T @ C  # of W - V C, as long as little cancels
             taken = np.abs(C).max(initial=0.0)
@@ -182,7 +180,7 @@ class BlockLanczos:
                     R_sum = U @ R_sum
                 break
             M_W = self.M @ W
-        self._rows[self.m : self.m + W.shape[1]] = W.T
+        self._basis.put(self.m, W)
         return C_sum, R_sum, M_W
 
 

@@ -8,15 +8,17 @@ import numpy as np
 import scipy.sparse as sp
 
 from cms.errors import EigenError
-from cms.solvers.factorization import Factorization, factorize
+from cms.solvers.factorization import Factorization, Matrix, factorize, matrix_of
 from cms.solvers.inverse import Inverse
 from cms.solvers.mode_count import ModeCount, mode_count
 from cms.solvers.mode_search import DenseSearch, KrylovSearch
 from cms.solvers.orientation import orientation
 from cms.solvers.petsc.factor import PetscFactor
+from cms.solvers.rank_space import RankSpace
 from cms.solvers.shift_inverted import Modes, ShiftInverted, Wanted
 from cms.solvers.slepc_search import SlepcSearch
 from cms.solvers.tall import combine
+from fe_models.body.submatrix import PrincipalBlock
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.solver import Solver
 from fe_models.foundation.threads import one_blas_thread
@@ -54,8 +56,8 @@ class EigenResult:
 
 
 def eigenmodes(
-    K: sp.csc_array,
-    M: sp.csc_array,
+    K: Matrix,
+    M: Matrix,
     n_modes: int | ModeCount,
     *,
     factorization: Inverse | None = None,
@@ -77,7 +79,8 @@ def eigenmodes(
     K
         Stiffness, (n, n); semidefinite (a free body), and indefinite only by Lagrange multipliers.
     M
-        Mass, (n, n), semidefinite: massless dofs and multipliers have none.
+        Mass, (n, n), semidefinite: massless dofs and multipliers have none. Of K and M given as `PrincipalBlock` the
+        entries are not held during the search.
     n_modes
         Number of modes, or a `ModeCount`: all modes up to a frequency [Hz]; proof that none was missed.
     factorization
@@ -101,7 +104,8 @@ def eigenmodes(
     FactorizationError
         If K - shift M is singular.
     """
-    K, M = sp.csc_array(K), sp.csc_array(M)
+    if not isinstance(K, PrincipalBlock) or not isinstance(M, PrincipalBlock):
+        K, M = matrix_of(K), matrix_of(M)
     n = K.shape[0]
     if K.shape != (n, n) or M.shape != (n, n):
         raise EigenError(f"eigenmodes: expected K and M of one square shape, got {K.shape} and {M.shape}")
@@ -119,22 +123,33 @@ def eigenmodes(
     with ExitStack() as stack:
         stack.enter_context(one_blas_thread())
         if factorization is None:
-            factorization = stack.enter_context(_factorize_shifted(K, M, shift, solver))
+            factorization = stack.enter_context(_factorize_shifted(matrix_of(K), matrix_of(M), shift, solver))
         if factorization.n != n:
             raise EigenError(f"eigenmodes: factorization: expected order {n}, got {factorization.n}")
-        operator = ShiftInverted(M, shift, factorization, tolerance, progress)
-        is_on_ranks = isinstance(factorization, Factorization) and isinstance(factorization.factor, PetscFactor)
-        kind = SEARCHES.get(factorization.solver.name, KrylovSearch) if is_on_ranks else KrylovSearch
-        search = (DenseSearch if is_dense else kind)(operator, wanted)
+        kind: type[DenseSearch | KrylovSearch | SlepcSearch] = KrylovSearch
+        space: RankSpace | None = None
+        if is_dense:
+            kind = DenseSearch
+        elif isinstance(factorization, Factorization) and isinstance(factorization.factor, PetscFactor):
+            kind = SEARCHES.get(factorization.solver.name, KrylovSearch)
+            if kind is KrylovSearch and factorization.factor.ranks.size > 1:
+                space = RankSpace(factorization.factor)
+                stack.callback(space.close)
+        operator = ShiftInverted(matrix_of(M), shift, factorization, tolerance, progress, space)
+        search = kind(operator, wanted)
         modes = search.modes(wanted)
         if asked.verify:
-            modes = _proven_modes(K, M, search, modes, wanted)
+            modes = _proven_modes(matrix_of(K), matrix_of(M), search, modes, wanted)
         k = wanted.count if wanted.omega2 is None else int((modes.omega2[: modes.n_wanted] <= wanted.omega2).sum())
         residuals, method = modes.residuals, search.description
         n_solves, solver = operator.n_solves, factorization.description
         omega2 = _zero_rigid(modes.omega2, zero=max(ZERO * scale, 1e-9 * abs(shift)))
-        Phi = modes.expand()
-        del search, modes  # the basis
+        columns, whole = modes.expand(), modes.space.whole
+        del search, modes, operator  # the basis, before this process takes the modes
+        if space is not None:
+            space.close()
+        Phi = whole(columns)
+        del columns  # before the space is closed: ranks forget what has no name then
     Phi = combine(Phi, orientation(Phi, omega2)[:, :k], order="C")
     omega2 = omega2[:k]
     _require_match(K, M, Phi, omega2, shift, tolerance)
@@ -144,7 +159,7 @@ def eigenmodes(
     )
 
 
-def frequency_scale(K: sp.csc_array, M: sp.csc_array) -> float:
+def frequency_scale(K: Matrix, M: Matrix) -> float:
     """Median of K_kk / M_kk [1/s²], which is near the highest omega² of the mesh."""
     stiffness, mass = K.diagonal(), M.diagonal()
     has_both = (stiffness > 0) & (mass > 0)
@@ -213,7 +228,7 @@ def _zero_rigid(omega2: Array, *, zero: float) -> Array:
     return np.where(omega2 <= zero, 0.0, omega2)
 
 
-def _require_match(K: sp.csc_array, M: sp.csc_array, Phi: Array, omega2: Array, shift: float, tolerance: float) -> None:
+def _require_match(K: Matrix, M: Matrix, Phi: Array, omega2: Array, shift: float, tolerance: float) -> None:
     """Check K x = omega² M x on one random combination: the iteration itself sees K only through its factorisation."""
     if not len(omega2):
         return

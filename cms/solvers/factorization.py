@@ -1,18 +1,28 @@
 """Factorise a large symmetric matrix once, solve for many columns."""
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
 
 from cms.errors import FactorizationError
 from cms.solvers.registry import solver_of
+from fe_models.body.submatrix import PrincipalBlock
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.solver import Factor, Solver
 
-__all__ = ["EmptyFactor", "Factorization", "Inertia", "factorize", "require_regular"]
+__all__ = ["EmptyFactor", "Factorization", "Inertia", "Matrix", "factorize", "matrix_of", "require_regular"]
 
 SINGULAR = 1e-3  #: relative residual after two solves; a regular matrix of condition 1e12 leaves 1e-4
+
+#: a sparse matrix, or a part of one, which is cut out where its entries are needed and not held in between
+Matrix: TypeAlias = sp.csc_array | PrincipalBlock
+
+
+def matrix_of(A: Matrix) -> sp.csc_array:
+    """Return a matrix that was given, or cut it out."""
+    return A.cut() if isinstance(A, PrincipalBlock) else sp.csc_array(A)
 
 
 @dataclass(frozen=True)
@@ -106,7 +116,7 @@ class Factorization:
         self.close()
 
 
-def factorize(A: sp.csc_array, *, definite: bool = True, solver: str | Solver | None = None) -> Factorization:
+def factorize(A: Matrix, *, definite: bool = True, solver: str | Solver | None = None) -> Factorization:
     """Factorise a symmetric sparse matrix.
 
     (1) lower triangle, every diagonal entry stored
@@ -116,7 +126,7 @@ def factorize(A: sp.csc_array, *, definite: bool = True, solver: str | Solver | 
     Parameters
     ----------
     A
-        Symmetric, (n, n); only its lower triangle is read.
+        Symmetric, (n, n); only its lower triangle is read. A `PrincipalBlock` is not held while the solver works.
     definite
         Whether A must be positive definite (Cholesky); False: any symmetric regular matrix.
     solver
@@ -131,12 +141,7 @@ def factorize(A: sp.csc_array, *, definite: bool = True, solver: str | Solver | 
         If memory or disk have no room for the factor.
     """
     chosen = solver_of(solver)
-    A = sp.csc_array(A)
-    if A.shape[0] != A.shape[1] or A.shape[0] == 0:
-        raise FactorizationError(f"factorize: expected a square matrix with at least one row, got {A.shape}")
-    if not np.isfinite(A.data).all():
-        raise FactorizationError("factorize: the matrix holds NaN or infinite entries")
-    lower = lower_triangle(A)
+    lower = checked_lower(matrix_of(A))
     if definite:
         _require_positive_diagonal(lower)
     try:
@@ -146,6 +151,15 @@ def factorize(A: sp.csc_array, *, definite: bool = True, solver: str | Solver | 
         raise FactorizationError(f"factorize: {error}{hint}") from error
     require_regular(A, factorization)
     return factorization
+
+
+def checked_lower(A: sp.csc_array) -> sp.csc_array:
+    """Return the lower triangle of a matrix that can be factorised."""
+    if A.shape[0] != A.shape[1] or A.shape[0] == 0:
+        raise FactorizationError(f"factorize: expected a square matrix with at least one row, got {A.shape}")
+    if not np.isfinite(A.data).all():
+        raise FactorizationError("factorize: the matrix holds NaN or infinite entries")
+    return lower_triangle(A)
 
 
 def lower_triangle(A: sp.csc_array) -> sp.csc_array:
@@ -181,7 +195,7 @@ def _require_positive_diagonal(lower: sp.csc_array) -> None:
         )
 
 
-def require_regular(A: sp.csc_array, factorization: Factorization) -> None:
+def require_regular(A: Matrix, factorization: Factorization) -> None:
     """Solve twice from a random column: the result leans to the softest direction, whose residual shows singularity.
 
     An exactly singular matrix often passes the pivots, because rounding leaves them near 1e-16 instead of zero. Its

@@ -6,7 +6,6 @@ import scipy.linalg as la
 from cms.errors import EigenError
 from cms.solvers.block_lanczos import BlockLanczos, RitzPairs
 from cms.solvers.shift_inverted import Modes, ShiftInverted, Wanted, measured_residual, refined_modes
-from cms.solvers.tall import combine
 from fe_models.foundation.arrays import Array
 
 __all__ = ["DenseSearch", "KrylovSearch"]
@@ -33,9 +32,9 @@ class KrylovSearch:
         block = WIDE if guess >= MANY else BLOCK
         self.description = f"block Lanczos, block {block}"
         self._lanczos = BlockLanczos(
-            operator.solve, operator.M_product, operator.n, block=block, capacity=basis_size(guess, block)
+            operator.solve, operator.M_product, operator.space, block=block, capacity=basis_size(guess, block)
         )
-        self._is_clean = bool((operator.M.diagonal() > 0).all())  # else rounding in massless dofs is taken out by S
+        self._is_clean = operator.has_mass_everywhere  # else rounding in massless dofs is taken out by S
 
     def modes(self, wanted: Wanted, at_least: int = 0) -> Modes:
         """Return the wanted modes, or `at_least` so many, improved; their true residuals are below the tolerance."""
@@ -48,7 +47,7 @@ class KrylovSearch:
                 self._is_clean = defect <= max(VISIBLE, 100 * residual)
             if not self._is_clean:
                 n_kept = leading_count(ritz.theta, k, k + GUARDS)
-                X = combine(self._lanczos.V, ritz.S[:, :n_kept])
+                X = operator.space.combine(self._lanczos.V, ritz.S[:, :n_kept])
                 modes = refined_modes(operator, X, ritz.theta[:n_kept], k)
                 residual = modes.residuals.max(initial=0.0)
             if residual <= operator.tolerance:
@@ -126,6 +125,7 @@ def improved_modes(lanczos: BlockLanczos, ritz: RitzPairs, k: int, shift: float)
         ritz.residuals[:k],
         lanczos.V_and_next,
         np.concatenate([ritz.S[:, :p] @ Z, g @ Z]),
+        lanczos.space,
     )
 
 
@@ -140,7 +140,7 @@ class DenseSearch:
 
     def __init__(self, operator: ShiftInverted, wanted: Wanted) -> None:
         self.operator = operator
-        d, U = la.eigh(operator.M.toarray())
+        d, U = la.eigh(operator.M_product @ np.eye(operator.n))
         if d[0] < -1e-10 * d[-1]:
             raise EigenError("eigenmodes: M has a negative eigenvalue; expected a mass matrix")
         has_mass = d > MASSLESS * d[-1]

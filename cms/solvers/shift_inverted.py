@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.linalg as la
@@ -10,8 +11,7 @@ import scipy.sparse as sp
 from cms.errors import EigenError
 from cms.solvers.inverse import Inverse
 from cms.solvers.mode_count import ModeCount
-from cms.solvers.sparse_product import SymmetricProduct
-from cms.solvers.tall import combine, inner
+from cms.solvers.tall_space import ArraySpace, TallSpace
 from fe_models.foundation.arrays import Array
 
 __all__ = ["Modes", "ShiftInverted", "Wanted", "measured_residual", "refined_modes"]
@@ -37,7 +37,7 @@ class Wanted:
 
 
 class ShiftInverted:
-    """The operator S with its tolerance; counts the columns it solves for."""
+    """The operator S with its tolerance, of columns of one space; counts those it solves for."""
 
     def __init__(
         self,
@@ -46,16 +46,21 @@ class ShiftInverted:
         factorization: Inverse,
         tolerance: float,
         progress: Callable[[int, int], None] | None = None,
+        space: TallSpace | None = None,
     ) -> None:
-        self.M, self.M_product, self.shift, self.tolerance = M, SymmetricProduct(M), shift, tolerance
+        self.shift, self.tolerance = shift, tolerance
+        self.has_mass_everywhere = bool((M.diagonal() > 0).all())
         self.n = M.shape[0]
+        self.space: TallSpace = space or ArraySpace(self.n)
+        self.M_product = self.space.product(M)
         self.n_solves = 0
         self.factorization, self._progress = factorization, progress
+        self._solve = self.space.solver(factorization)
 
-    def solve(self, b: Array) -> Array:
+    def solve(self, b: Any) -> Any:
         """Return (K - sigma M)⁻¹ b, (n, k)."""
         self.n_solves += b.shape[1]
-        return self.factorization.solve(b)
+        return self._solve(b)
 
     def report(self, found: int, wanted: int) -> None:
         """Tell the caller how far the search is."""
@@ -70,32 +75,33 @@ class Modes:
     omega2: Array  #: ascending, (n_wanted + n_guards,)
     n_wanted: int
     residuals: Array  #: of the wanted ones before the last improvement, (n_wanted,)
-    Y: Array  #: (n, p)
+    Y: Any  #: columns of the space, (n, p)
     Z: Array  #: coefficients, M-orthonormal Phi = Y Z, (p, n_wanted + n_guards)
+    space: TallSpace
 
-    def expand(self) -> Array:
-        """Return the M-orthonormal modes Phi, (n, n_wanted + n_guards)."""
-        return combine(self.Y, self.Z)
+    def expand(self) -> Any:
+        """Return the M-orthonormal modes Phi, columns of the space, (n, n_wanted + n_guards)."""
+        return self.space.combine(self.Y, self.Z)
 
 
-def refined_modes(operator: ShiftInverted, X: Array, theta: Array, n_wanted: int) -> Modes:
+def refined_modes(operator: ShiftInverted, X: Any, theta: Array, n_wanted: int) -> Modes:
     """Modes from M-orthonormal Ritz vectors X, (n, p), by one inverse iteration and Rayleigh-Ritz.
 
     (1) Y = S X / theta; residuals |Y - X|_M
     (2) Yᵀ (K - sigma M) Y = Yᵀ M X / theta = H,  Yᵀ M Y = G;  H z = (omega² - sigma) G z
     """
-    M_X = operator.M_product @ X
+    space, M = operator.space, operator.M_product
+    M_X = M @ X
     Y = operator.solve(M_X)
-    Y /= theta
-    M_X /= theta
-    H = inner(Y, M_X)
+    space.scale(Y, 1 / theta)
+    H = space.inner(Y, M_X) / theta
     del M_X
-    X -= Y
-    residuals = np.sqrt(np.maximum(np.einsum("nk,nk->k", X, operator.M_product @ X), 0.0))[:n_wanted]
+    space.subtract(X, Y, np.eye(len(theta)))
+    residuals = np.sqrt(np.maximum(np.diag(space.inner(X, M @ X)), 0.0))[:n_wanted]
     del X
-    G = inner(Y, operator.M_product @ Y)
+    G = space.inner(Y, M @ Y)
     mu, Z = la.eigh((H + H.T) / 2, (G + G.T) / 2)
-    return Modes(mu + operator.shift, n_wanted, residuals, Y, Z)
+    return Modes(mu + operator.shift, n_wanted, residuals, Y, Z, space)
 
 
 def measured_residual(operator: ShiftInverted, modes: Modes) -> tuple[float, float]:
@@ -113,8 +119,11 @@ def measured_residual(operator: ShiftInverted, modes: Modes) -> tuple[float, flo
     k = modes.n_wanted
     Z, above_shift = modes.Z[:, :k], modes.omega2[:k] - operator.shift
     signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(k, SAMPLES))
-    r = combine(modes.Y, Z @ signs)
-    size = np.linalg.norm(r)
-    r -= operator.solve(operator.M_product @ combine(modes.Y, Z @ (above_shift[:, None] * signs)))
-    squared = np.einsum("nk,nk->", r, operator.M_product @ r)
-    return float(np.sqrt(max(squared, 0.0) / SAMPLES)), float(np.linalg.norm(r) / size) if size else 0.0
+    space, M = operator.space, operator.M_product
+    r = space.combine(modes.Y, Z @ signs)
+    size = np.sqrt(np.trace(space.inner(r, r)))
+    S_x = operator.solve(M @ space.combine(modes.Y, Z @ (above_shift[:, None] * signs)))
+    space.subtract(r, S_x, np.eye(SAMPLES))
+    squared = np.trace(space.inner(r, M @ r))
+    left = np.sqrt(np.trace(space.inner(r, r)))
+    return float(np.sqrt(max(squared, 0.0) / SAMPLES)), float(left / size) if size else 0.0

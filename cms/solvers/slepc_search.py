@@ -9,9 +9,10 @@ from cms.solvers.factorization import Factorization, lower_triangle
 from cms.solvers.petsc.factor import PetscFactor, communicator
 from cms.solvers.petsc.libraries import petsc, slepc
 from cms.solvers.shift_inverted import Modes, ShiftInverted, Wanted
+from cms.solvers.sparse_product import SymmetricProduct
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.ranks.ranks import Ranks
-from fe_models.foundation.ranks.rows import Rows, collected, upper_rows
+from fe_models.foundation.ranks.rows import Rows, collected, spread
 
 __all__ = ["SlepcSearch"]
 
@@ -28,11 +29,12 @@ class SlepcSearch:
         assert isinstance(operator.factorization, Factorization)
         factor = operator.factorization.factor
         assert isinstance(factor, PetscFactor)
+        assert isinstance(operator.M_product, SymmetricProduct)
         self.operator, self.factor = operator, factor
         version = ".".join(str(k) for k in slepc().Sys.getVersion())
         self.description = f"Krylov-Schur (SLEPc {version})"
         self.key = f"mass {next(numbers)}"
-        factor.ranks.store[self.key] = lower_triangle(operator.M)
+        factor.ranks.store[self.key] = lower_triangle(operator.M_product.A)
         factor.ranks.everywhere(spread_mass, self.key, factor.rows)
 
     def modes(self, wanted: Wanted, at_least: int = 0) -> Modes:
@@ -55,14 +57,15 @@ class SlepcSearch:
         if len(omega2) < k:
             raise EigenError(f"eigenmodes: SLEPc found {len(omega2)} of {k} modes to {tolerance:.1e}")
         operator.report(k, wanted.count or 0)
-        return Modes(omega2, k, errors[:k], Phi, np.eye(len(omega2)))
+        return Modes(omega2, k, errors[:k], Phi, np.eye(len(omega2)), operator.space)
 
 
 def spread_mass(ranks: Ranks, key: str, rows: Rows) -> None:
     """Keep this rank's rows of the upper triangle of M."""
     PETSc = petsc()
     n_own = rows.count(ranks.rank)
-    csr = upper_rows(ranks, rows, ranks.store.pop(key, None))
+    lower = ranks.store.pop(key, None)  # columns of the lower triangle are rows of the upper one
+    csr = spread(ranks, rows, None if lower is None else (lower.indptr, lower.indices, lower.data))
     M = PETSc.Mat().createSBAIJ(((n_own, rows.n), (n_own, rows.n)), 1, csr=csr, comm=communicator(ranks))
     M.assemble()
     M.setOption(PETSc.Mat.Option.SYMMETRIC, True)

@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from cms.solvers.tall import ordered
 from fe_models.body.submatrix import scalar_part
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.tall.on_disk import in_memory
 from fe_models.foundation.threads import n_threads
 
 __all__ = ["SymmetricProduct"]
@@ -28,8 +29,8 @@ class SymmetricProduct:
         (A x)_lead = (S ⊗ 1₃) x_lead + B_lead x_rest,   (A x)_rest = Bᵀ x
     """
 
-    def __init__(self, A: sp.csc_array) -> None:
-        self._A = A
+    def __init__(self, A: sp.csc_array, *, columns: int = COLUMNS) -> None:
+        self.A, self._columns = A, columns
         S = scalar_part(A) if A.nnz > SMALL else sp.csr_array((0, 0))
         self._n_lead = 3 * S.shape[0] if 6 * S.shape[0] > A.shape[0] else 0
         rows = S if self._n_lead else sp.csr_array((A.data, A.indices, A.indptr), shape=A.shape)
@@ -40,12 +41,13 @@ class SymmetricProduct:
         self._pool = ThreadPoolExecutor(n_parts) if n_parts > 1 else None
 
     def __matmul__(self, x: Array) -> Array:
-        """Return A x in the order of x, (n, k)."""
+        """Return A x in the order of x, (n, k), in memory."""
+        x = in_memory(x)
         order: Literal["C", "F"] = "F" if x.flags.f_contiguous else "C"
         result = np.empty(x.shape)
-        for first in range(0, x.shape[1], COLUMNS):
-            block = np.ascontiguousarray(ordered(x[:, first : first + COLUMNS], "C"))
-            target = result[:, first : first + COLUMNS]
+        for first in range(0, x.shape[1], self._columns):
+            block = np.ascontiguousarray(ordered(x[:, first : first + self._columns], "C"))
+            target = result[:, first : first + self._columns]
             if self._n_lead:
                 self._multiply(block[: self._n_lead], target[: self._n_lead], 3)
                 self._add_rest(block, target)
@@ -75,7 +77,7 @@ class SymmetricProduct:
     @cached_property
     def _rest(self) -> tuple[sp.csr_array, tuple[Array, sp.csr_array]]:
         """Bᵀ, and the rows of B_lead that are not empty with their numbers."""
-        B = sp.csc_array(self._A[:, self._n_lead :])
+        B = sp.csc_array(self.A[:, self._n_lead :])
         rows = np.unique(B.indices)
         rows = rows[rows < self._n_lead]
         return sp.csr_array(B.T), (rows, sp.csr_array(B)[rows])

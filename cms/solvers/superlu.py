@@ -1,17 +1,25 @@
 """SuperLU through SciPy: the factorisation that runs everywhere."""
 
+import logging
+
 import numpy as np
 import scipy
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from cms.errors import FactorizationError, FactorRoomError
-from cms.sparse_cholesky.analysis import dissection_order
+from cms.sparse_cholesky.analysis import Fronts, analyse, dissection_order
 from fe_models.foundation.arrays import Array
 
 __all__ = ["SuperLuFactor"]
 
 SMALL = 3000  #: rows below which minimum degree is good enough, and done before compiled loops are loaded
+MANY = 50_000  #: rows from which it is looked how long it takes
+LONG = 30.0  #: seconds from which that is said before the work
+OPERATIONS = 4e9  #: a second (4.6e9 to 4.8e9 measured, tet10 rod of 58 788 rows and grid of 32 768, one processor)
+BYTES = 48.0  #: of memory an entry of the triangular factor while L and U are made (docs/memory.md)
+
+log = logging.getLogger(__name__)
 
 
 class SuperLuFactor:
@@ -20,6 +28,8 @@ class SuperLuFactor:
     def __init__(self, lower: sp.csc_array, *, definite: bool) -> None:
         """Factorise the matrix with this lower triangle, (n, n), every diagonal entry stored, sorted row indices."""
         self.n = lower.shape[0]
+        if self.n >= MANY:
+            announce(analyse(lower), definite=definite)
         A = sp.csc_matrix(lower + sp.tril(lower, k=-1, format="csc").T)
         is_small = self.n < SMALL
         self._order = None if is_small else dissection_order(lower)
@@ -70,3 +80,19 @@ class SuperLuFactor:
         self.is_open = False
         if hasattr(self, "_lu"):
             del self._lu
+
+
+def announce(fronts: Fronts, *, definite: bool) -> None:
+    """Say before the work what SuperLU takes of time and memory, and what takes less; nothing where it is little."""
+    seconds = 2 * fronts.operations / OPERATIONS
+    if seconds < LONG:
+        return
+    better = 'solver = "pardiso" (x86-64: pip install pypardiso)'
+    if definite:
+        better += ' or solver = "cholesky" (everywhere)'
+    else:
+        better += ', or rigid interfaces in the place of distributing ones, which solver = "cholesky" factorises'
+    log.warning(
+        "SuperLU: %d rows: about %.2g minutes of one processor and %.2g GB for the factorisation; %s takes a fraction "
+        "of both", len(fronts.order), seconds / 60, BYTES * fronts.n_entries / 1e9, better,
+    )  # fmt: skip

@@ -1,10 +1,11 @@
 """Products of tall arrays, (n, k) with n much larger than k, by slices of rows in threads.
 
 NumPy's own BLAS threads wait for their next task on the processor, which the sparse solver working in turns with them
-then lacks; ours sleep. The slices are summed in their order, so that results repeat bit for bit.
+then lacks; ours sleep. The slices are summed in their order, so that results repeat bit for bit. Arrays on disk
+(`fe_models.foundation.tall.on_disk`) are worked on in smaller slices.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from itertools import pairwise
@@ -13,12 +14,13 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.tall.on_disk import is_on_disk, row_slices, zeros_like
 from fe_models.foundation.threads import n_threads
 
 if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
 
-__all__ = ["combine", "combined", "inner", "ordered", "subtract"]
+__all__ = ["combine", "combined", "inner", "ordered", "squares", "subtract"]
 
 SMALL = 20_000  #: rows below which threads cost more than they bring
 SLICE = 8192  #: rows at a time; what is made of them on the way stays in the cache
@@ -26,20 +28,30 @@ SLICE = 8192  #: rows at a time; what is made of them on the way stays in the ca
 
 def inner(X: Array, Y: Array) -> Array:
     """Return Xᵀ Y, (k, l)."""
-    parts = _by_rows(len(X), lambda rows: X[rows].T @ Y[rows])
-    return np.sum(parts, axis=0)
+
+    def multiply(rows: slice) -> Array:
+        return _sum(X[some].T @ Y[some] for some in row_slices(rows, X, Y))
+
+    return np.sum(_by_rows(len(X), multiply), axis=0)
+
+
+def squares(d: Array, X: Array) -> Array:
+    """Return Σ_n d_n X_nk² of every column, (k,)."""
+    return _sum(np.einsum("n,nk,nk->k", d[some], X[some], X[some]) for some in row_slices(len(X), X))
 
 
 def combine(X: Array, C: Array, *, order: Literal["C", "F"] | None = None) -> Array:
     """Return X C, (n, l), in the order of X or the one given."""
     order = order or _order(X)
-    result = np.empty((len(X), C.shape[1]), order=order)
+    shape = (len(X), C.shape[1])
+    result = zeros_like(X, shape) if order == "C" else np.empty(shape, order=order)
 
     def multiply(rows: slice) -> None:
-        if order == "C":
-            np.matmul(X[rows], C, out=result[rows])
-        else:
-            np.matmul(C.T, X[rows].T, out=result[rows].T)
+        for some in row_slices(rows, X, result):
+            if order == "C":
+                np.matmul(X[some], C, out=result[some])
+            else:
+                np.matmul(C.T, X[some].T, out=result[some].T)
 
     _by_rows(len(X), multiply)
     return result
@@ -52,17 +64,15 @@ def combined(X: Array, C: Array) -> Array:
         return combine(X, C)
 
     def update(rows: slice) -> None:
-        for first in range(rows.start, rows.stop, SLICE):
-            part = slice(first, min(first + SLICE, rows.stop))
+        for part in _slices(rows, X):
             X[part, :m] = X[part] @ C
 
     _by_rows(len(X), update)
     if m == k or not X.flags.c_contiguous:
         return X[:, :m]
     whole = X.reshape(-1)  # rows close up, so that what is left lies in one piece, as sparse products want it
-    for first in range(0, len(X), SLICE):
-        last = min(first + SLICE, len(X))
-        whole[first * m : last * m] = X[first:last, :m].ravel()
+    for part in _slices(slice(0, len(X)), X):
+        whole[part.start * m : part.stop * m] = X[part, :m].ravel()
     return whole[: len(X) * m].reshape(-1, m)
 
 
@@ -71,8 +81,7 @@ def subtract(Y: Array, X: Array, C: Array) -> None:
     order = _order(Y)
 
     def update(rows: slice) -> None:
-        for first in range(rows.start, rows.stop, SLICE):
-            part = slice(first, min(first + SLICE, rows.stop))
+        for part in _slices(rows, X, Y):
             if order == "C":
                 Y[part] -= X[part] @ C
             else:
@@ -88,8 +97,7 @@ def ordered(X: Array, order: Literal["C", "F"]) -> Array:
     result = np.empty(X.shape, order=order)
 
     def copy(rows: slice) -> None:
-        for first in range(rows.start, rows.stop, SLICE):
-            part = slice(first, min(first + SLICE, rows.stop))
+        for part in _slices(rows, X):
             result[part] = X[part]
 
     _by_rows(len(X), copy)
@@ -99,6 +107,23 @@ def ordered(X: Array, order: Literal["C", "F"]) -> Array:
 def _order(X: Array) -> Literal["C", "F"]:
     """Return the order in which X lies, or nearly lies (a part of its rows or columns)."""
     return "C" if X.strides[1] <= X.strides[0] else "F"
+
+
+def _slices(rows: slice, *arrays: Array) -> Iterator[slice]:
+    """Yield slices that the cache holds, or, of arrays on disk, those after which their memory is given back."""
+    if any(is_on_disk(X) for X in arrays):
+        yield from row_slices(rows, *arrays)
+        return
+    for first in range(rows.start, rows.stop, SLICE):
+        yield slice(first, min(first + SLICE, rows.stop))
+
+
+def _sum(parts: Iterator[Array]) -> Array:
+    """Return the sum of parts, which are not held together."""
+    total = next(parts)
+    for part in parts:
+        total += part
+    return total
 
 
 def _by_rows(n: int, work: Callable[[slice], Array | None]) -> list:

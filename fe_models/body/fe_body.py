@@ -21,6 +21,7 @@ from fe_models.foundation.arrays import (
     symmetric_csc,
 )
 from fe_models.foundation.errors import BodyError
+from fe_models.foundation.tall.on_disk import in_memory, is_on_disk, release, row_slices, zeros_like
 from fe_models.foundation.units import Units, unit_system
 from fe_models.foundation.words import nearest, quoted
 
@@ -339,13 +340,23 @@ class FEBody:
 
     def mesh_displacement(self, u: Array) -> Array:
         """Return displacement columns over the dofs of the mesh, (n_mesh_dof, k), of columns u, (n_dof, k)."""
-        return u if self.recovery is None else self.recovery.matrix @ u
+        if self.recovery is None:
+            return u
+        if not is_on_disk(u) or not u.flags.c_contiguous:  # some columns of an array on disk are few
+            return self.recovery.matrix @ in_memory(u)
+        T = sp.csr_array(self.recovery.matrix)
+        result = zeros_like(u, (T.shape[0], u.shape[1]))
+        for rows in row_slices(T.shape[0], result):
+            result[rows] = T[rows] @ u
+            release(u)
+        return result
 
     def translations(self, u: Array) -> Array:
         """Return translations at all nodes, (n_nodes, 3, k), of displacement columns u, (n_dof, k) [m].
 
         Nodes without translational dofs (a distributing reference node has them) stay at zero.
         """
+        u = in_memory(u)
         field_ = np.zeros((len(self.nodes), 3, u.shape[1]))
         if self.recovery is not None:
             put_translations(field_, self.recovery.dofs, self.recovery.matrix @ u)

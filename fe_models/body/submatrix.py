@@ -2,17 +2,45 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.threads import n_threads
 
-__all__ = ["principal_block", "scalar_part"]
+__all__ = ["PrincipalBlock", "principal_block", "scalar_part"]
 
 SMALL = 200_000  #: stored entries below which compiled loops cost more than they bring
+
+
+@dataclass(frozen=True, eq=False)
+class PrincipalBlock:
+    """A[index][:, index], (n, n), of which products and the diagonal are had without cutting it out."""
+
+    A: sp.csc_array
+    index: IntArray  #: in any order, each once, (n,)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return len(self.index), len(self.index)
+
+    def diagonal(self) -> Array:
+        """Return the diagonal, (n,)."""
+        return np.asarray(self.A.diagonal()[self.index])
+
+    def __matmul__(self, x: Array) -> Array:
+        """Return the product with one column (n,) or many (n, k)."""
+        whole = np.zeros((self.A.shape[0], *x.shape[1:]))
+        whole[self.index] = x
+        return np.asarray((self.A @ whole)[self.index])
+
+    def cut(self) -> sp.csc_array:
+        """Return the matrix."""
+        return principal_block(self.A, self.index)
 
 
 def principal_block(A: sp.csc_array, index: IntArray) -> sp.csc_array:

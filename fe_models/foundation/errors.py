@@ -7,7 +7,7 @@ built-in kind that a caller would expect. What is raised on the ground about bod
 
 from typing import Any
 
-__all__ = ["BodyError", "CmsError", "FeModelsError", "ModalFileError", "ReportedError", "UnitsError"]
+__all__ = ["BodyError", "CmsError", "FeModelsError", "ModalFileError", "ReportedError", "StorageError", "UnitsError"]
 
 
 class ReportedError(Exception):
@@ -39,6 +39,10 @@ class BodyError(FeModelsError, CmsError, ValueError):
 
 class UnitsError(FeModelsError, CmsError, ValueError):
     """An unknown unit system, or units that do not fit together."""
+
+
+class StorageError(FeModelsError, CmsError, RuntimeError):
+    """Arrays that should go to disk find no room there."""
 
 
 class ModalFileError(CmsError, ValueError):

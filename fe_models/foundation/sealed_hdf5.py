@@ -24,11 +24,15 @@ from fe_models.foundation.hdf5_file import (
     digest_of_lines,
     opened,
     own_items,
+    write_sealed_file,
 )
-from fe_models.foundation.paths import replace_file
+from fe_models.foundation.paths import is_stream, part_of, replace_file
 from fe_models.foundation.seal import SEAL_SIZE, Kind, altered, check_seal, newer, reason, seal_of
+from fe_models.foundation.tall.on_disk import release
 
 __all__ = ["Attribute", "Content", "Dataset", "read_sealed", "write_sealed"]
+
+LARGE = 1 << 26  #: bytes of numbers from which a file is not made in memory first
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,14 +63,18 @@ def write_sealed(content: Content, path: str | os.PathLike[str]) -> None:
         If the file cannot be written (no folder, no permission, disk full); an old file of that name is unchanged.
     """
     path = Path(path)
+    kind = Kind(content.format, content.version, ModalFileError, "")
     try:
+        if size_of(content) >= LARGE and not is_stream(path):  # a large image would be memory for nothing
+            whole = path.resolve()  # through a link, so that the link stays one
+            write_sealed_file(whole, kind, lambda file: fill(file, content), part=part_of(whole))
+            return
         image = hdf5_image(content)
+        seal = seal_of(image, kind)
+        with image.getbuffer() as data:
+            replace_file(path, seal, data[SEAL_SIZE:])
     except ValueError as error:  # a text that no file can hold
         raise ModalFileError(str(error)) from error
-    seal = seal_of(image, Kind(content.format, content.version, ModalFileError, ""))
-    try:
-        with image.getbuffer() as data:  # in place: a copy of a large file would be memory for nothing
-            replace_file(path, seal, data[SEAL_SIZE:])
     except OSError as error:
         old = "; the file that was there is unchanged" if path.is_file() else "; nothing was written"
         raise ModalFileError(f"{path}: cannot be written: {reason(error)}{old}") from error
@@ -96,17 +104,28 @@ def hdf5_image(content: Content) -> io.BytesIO:
     """Return the HDF5 file in memory, with room for the seal: the 1.8 layout is read by every tool."""
     import h5py
 
-    attributes = {name: dict(group) for name, group in content.attributes.items()}
-    attributes["/"] = {"format": content.format, "version": content.version, **attributes.get("/", {})}
     image = io.BytesIO()
     with h5py.File(image, "w", userblock_size=SEAL_SIZE, libver=("v108", "v108")) as file:
-        manifest = Manifest(file)
-        for path, dataset in content.datasets.items():
-            manifest.dataset(path, dataset.values, {"unit": dataset.unit, "description": dataset.description})
-        for path, group in attributes.items():
-            manifest.attributes(path, group)
-        manifest.close()
+        fill(file, content)
     return image
+
+
+def fill(file: Any, content: Content) -> None:
+    """Write the content into an open `h5py.File`; what lies on disk is given back after it was read."""
+    attributes = {name: dict(group) for name, group in content.attributes.items()}
+    attributes["/"] = {"format": content.format, "version": content.version, **attributes.get("/", {})}
+    manifest = Manifest(file)
+    for path, dataset in content.datasets.items():
+        manifest.dataset(path, dataset.values, {"unit": dataset.unit, "description": dataset.description})
+        release(dataset.values)
+    for path, group in attributes.items():
+        manifest.attributes(path, group)
+    manifest.close()
+
+
+def size_of(content: Content) -> int:
+    """Return the size of the numbers of a content [bytes]."""
+    return sum(each.values.nbytes for each in content.datasets.values() if isinstance(each.values, np.ndarray))
 
 
 def walk(file: Any, path: Path, kind: Kind) -> tuple[dict[str, Dataset], dict[str, dict[str, Attribute]]]:

@@ -60,7 +60,8 @@ class MakeFactor(Protocol):
         Parameters
         ----------
         lower
-            Lower triangle, (n, n), every diagonal entry stored, sorted row indices.
+            Lower triangle, (n, n), every diagonal entry stored, sorted row indices; it is the solver's, which may empty
+            it.
         definite
             Whether the matrix must be positive definite; False: any symmetric regular one.
         """

@@ -15,6 +15,7 @@ from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.mass_loads import MassLoads
 from fe_models.foundation.arrays import Array, IntArray, frozen_int
 from fe_models.foundation.errors import BodyError
+from fe_models.foundation.tall.on_disk import in_memory, row_slices
 from fe_models.foundation.threads import n_threads
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
@@ -226,11 +227,12 @@ def scalar_mass_gram(M_s: sp.csr_array, nodes: Array, u: Array) -> Array:
     with ThreadPoolExecutor(n_parts) as pool:
         for begin in range(0, k, width):  # sparse products in threads; the dense ones have threads of their own
             end = min(begin + width, k)
-            block = np.ascontiguousarray(columns[:, begin:end])
+            block = np.ascontiguousarray(in_memory(columns[:, begin:end]))
             product = np.concatenate(list(pool.map(lambda part, block=block: part @ block, parts)))
             own = slice(4 + begin, 4 + end)
             gram[:4, own] = linear.T @ product
-            gram[4 : 4 + end, own] = columns[:, :end].T @ product
+            for rows in row_slices(n_nodes, columns):
+                gram[4 : 4 + end, own] += columns[rows, :end].T @ product[rows]
             gram[own, : 4 + begin] = gram[: 4 + begin, own].T  # symmetric by definition: the other half is not formed
             gram[own, own] = (gram[own, own] + gram[own, own].T) / 2
     return gram

@@ -2,7 +2,8 @@
 
 K_geo(sigma)_kl = ∫ sigma_ab Σ_c phi_k,c,a phi_l,c,b is linear in the stress. The products of gradients of a pair of
 columns do not depend on the state, so they are formed once at every point; a matrix product with the stress of all
-states does the sum over points. No sparse matrix is assembled.
+states does the sum over points. With very many columns those products are the larger part: then a sparse matrix is
+assembled for each state (`fe_models.solids.geometric_matrix`).
 """
 
 from collections.abc import Mapping
@@ -16,6 +17,7 @@ from fe_models.foundation.threads import n_threads, one_blas_thread
 from fe_models.material import AnyMaterial
 from fe_models.meshes.mesh import Mesh
 from fe_models.solids.elements import ShapeTable, reference_element
+from fe_models.solids.geometric_matrix import MANY_COLUMNS, scalar_geometric_matrices, sparse_geometric_stiffness
 from fe_models.solids.incompatible import KIND, brick_chunks, brick_operators, brick_stiffness, gradient_stress
 
 __all__ = ["internal_forces", "projected_geometric_stiffness"]
@@ -49,9 +51,20 @@ def projected_geometric_stiffness(
         Of the stiffness, of `fe_models.solids.elements.INTEGRATIONS`.
     """
     n_nodes, n = len(mesh.nodes), Phi.shape[1]
+    tensors = np.array([material.stiffness for material in materials])
+    if n >= MANY_COLUMNS:
+        tables = {
+            kind: geometric_table(kind, integration)
+            for kind in mesh.cells
+            if kind in of_cell and not (incompatible and kind == KIND)
+        }
+        matrices = scalar_geometric_matrices(mesh, tensors, of_cell, tables, u)
+        K = sparse_geometric_stiffness(matrices, u.shape[1], Phi)
+        if incompatible and len(mesh.cells.get(KIND, ())):
+            K += _of_bricks(mesh.nodes, mesh.cells[KIND], tensors[of_cell[KIND]], u, Phi)
+        return K
     states = np.ascontiguousarray(u).reshape(n_nodes, 3, -1)
     columns = np.ascontiguousarray(Phi).reshape(n_nodes, 3, -1)
-    tensors = np.array([material.stiffness for material in materials])
     pairs = np.zeros((states.shape[2], n * (n + 1) // 2))
     n_parts = n_threads()
     with one_blas_thread(), ThreadPoolExecutor(n_parts) as pool:

@@ -5,7 +5,7 @@ from numba import njit
 
 from fe_models.solids.assembly_kernels import jacobian
 
-__all__ = ["add_internal_forces", "stress_and_products"]
+__all__ = ["add_internal_forces", "stress_and_products", "write_scalar_matrices"]
 
 jit = njit(cache=True, nogil=True, error_model="numpy")
 jit_fast = njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
@@ -96,6 +96,34 @@ def stress_and_products(nodes, cells, of_cell, tensors, dN, w, u, phi, sigma, pr
             write_stress(H, C, w[q] * det, sigma[e, q])
             add_gradient(phi, cells[e], dN[q], Q, det, G)
             write_products(G, products[e, q])
+
+
+@jit
+def write_scalar_matrices(nodes, cells, of_cell, tensors, dN, w, u, matrices):
+    """Add ∫ grad N_aᵀ sigma grad N_b of the stress of one state u, (n_nodes, 3, 1), to (n_cells, n_a, n_a)."""
+    n_a = cells.shape[1]
+    x, g = np.empty((n_a, 3)), np.empty((n_a, 3))
+    J, Q = np.empty((3, 3)), np.empty((3, 3))
+    H, sigma = np.empty((3, 3, 1)), np.empty((6, 1))
+    for e in range(cells.shape[0]):
+        C = tensors[of_cell[e]]
+        for a in range(n_a):
+            for i in range(3):
+                x[a, i] = nodes[cells[e, a], i]
+        for q in range(w.size):
+            det = jacobian(x, dN[q], J, Q)
+            add_gradient(u, cells[e], dN[q], Q, det, H)
+            write_stress(H, C, w[q] * det, sigma)
+            xx, yy, zz, yz, xz, xy = sigma[0, 0], sigma[1, 0], sigma[2, 0], sigma[3, 0], sigma[4, 0], sigma[5, 0]
+            for a in range(n_a):
+                for j in range(3):
+                    g[a, j] = (dN[q, a, 0] * Q[0, j] + dN[q, a, 1] * Q[1, j] + dN[q, a, 2] * Q[2, j]) / det
+            for a in range(n_a):
+                t0 = xx * g[a, 0] + xy * g[a, 1] + xz * g[a, 2]
+                t1 = xy * g[a, 0] + yy * g[a, 1] + yz * g[a, 2]
+                t2 = xz * g[a, 0] + yz * g[a, 1] + zz * g[a, 2]
+                for b in range(n_a):
+                    matrices[e, a, b] += t0 * g[b, 0] + t1 * g[b, 1] + t2 * g[b, 2]
 
 
 @jit

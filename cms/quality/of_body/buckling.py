@@ -38,7 +38,7 @@ def critical_loads(reduced: ReducedBody) -> tuple[CriticalLoad, ...]:
     -------
     tuple of CriticalLoad
         Angular velocities about the axes of B, accelerations and angular accelerations that cause stress, then forces
-        and moments at the interfaces; none without geometric stiffness.
+        and moments at the interfaces whose loads are known; none without geometric stiffness.
     """
     geometric, u = reduced.geometric, reduced.units
     if geometric is None:
@@ -52,7 +52,7 @@ def critical_loads(reduced: ReducedBody) -> tuple[CriticalLoad, ...]:
         ("acceleration", geometric.translation, f"{u.length_symbol}/{u.time_symbol}²"),
         ("angular acceleration", geometric.rotation, f"rad/{u.time_symbol}²"),
     ]
-    for interface, K in zip(reduced.interfaces, geometric.interfaces, strict=True):
+    for interface, K in zip((reduced.interfaces[k] for k in geometric.loaded), geometric.interfaces, strict=True):
         parts.append((f"force at {interface.name}", K[:3], u.force_symbol))
         parts.append((f"moment at {interface.name}", K[3:], f"{u.force_symbol} {u.length_symbol}"))
     for name, matrices, unit in parts:

@@ -77,9 +77,10 @@ def held_mass(reference: FullReference, basis: FreeBasis) -> HeldMass:
 def full_held_mass(reference: FullReference, b: Array) -> Array:
     """Return b_Iᵀ M_II⁻¹ b_I over the interior dofs that have mass, (6,)."""
     fixed = reference.families.fixed
-    diagonal = fixed.M_ii.diagonal()
+    M_ii = fixed.M_ii
+    diagonal = M_ii.diagonal()
     massive = np.flatnonzero(diagonal > 0)
-    M_ii, loads = fixed.M_ii[massive][:, massive], b[fixed.i[massive]]
+    M_ii, loads = M_ii[massive][:, massive], b[fixed.i[massive]]
     precondition = sla.LinearOperator(M_ii.shape, matvec=lambda x: x / diagonal[massive])
     total = np.zeros(loads.shape[1])
     for k in range(loads.shape[1]):

@@ -16,7 +16,8 @@ from cms.solvers.petsc.libraries import petsc
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.ranks.mpi import all_ranks
 from fe_models.foundation.ranks.ranks import Ranks
-from fe_models.foundation.ranks.rows import Rows, collected, even_rows, own_rows, upper_rows
+from fe_models.foundation.ranks.rows import Rows, collected, even_rows, own_rows, spread
+from fe_models.foundation.ranks.trim import give_back
 
 __all__ = ["PetscFactor"]
 
@@ -43,6 +44,8 @@ class PetscFactor:
     def __init__(self, lower: sp.csc_array, *, definite: bool, on_disk: bool = False) -> None:
         """Factorise the matrix with this lower triangle, (n, n), every diagonal entry stored, sorted row indices.
 
+        Its entries go to the ranks: `lower` is empty afterwards, so that rank 0 does not hold them twice.
+
         on_disk: the factor is kept in files of each rank, in the folder that MUMPS_OOC_TMPDIR names (/tmp).
         """
         self.n = lower.shape[0]
@@ -50,7 +53,9 @@ class PetscFactor:
         self.ranks = all_ranks()
         self.key = f"factor {next(numbers)}"
         self.rows = even_rows(lower.indptr, self.ranks.size)
-        self.ranks.store[self.key] = lower
+        n_entries = lower.nnz
+        self.ranks.store[self.key] = (lower.indptr, lower.indices, lower.data)
+        lower.indptr, lower.indices, lower.data = emptied(self.n)
         found = self.ranks.everywhere(factorize_here, self.key, self.rows, definite, on_disk)
         self.record, self.records = found[0], found
         error = self.record["INFOG(1)"]
@@ -59,7 +64,7 @@ class PetscFactor:
             self.close()
             words = NOT_FACTORIZED.get(error, f"error {error}") if error < 0 else f"{n_negative} pivots are negative"
             kind = FactorRoomError if error in NO_ROOM else FactorizationError
-            raise kind(f"MUMPS: {words}; n = {self.n}, {lower.nnz} entries")
+            raise kind(f"MUMPS: {words}; n = {self.n}, {n_entries} entries")
         self.n_negative, self.n_perturbed = n_negative, self.record["null"]
         self.n_positive = self.n - n_negative - self.n_perturbed
         #: MB of MUMPS on every rank, and entries of the factor there
@@ -88,6 +93,11 @@ class PetscFactor:
             self.ranks.everywhere(free_here, self.key)
 
 
+def emptied(n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return indptr, indices, data of a matrix of n columns without entries."""
+    return np.zeros(n + 1, np.int32), np.zeros(0, np.int32), np.zeros(0)
+
+
 def communicator(ranks: Ranks) -> Any:
     """Return PETSc's communicator of these ranks."""
     PETSc = petsc()
@@ -98,12 +108,13 @@ def factorize_here(ranks: Ranks, key: str, rows: Rows, definite: bool, on_disk: 
     """Steps (1) and (2), on every rank; return what MUMPS tells."""
     PETSc = petsc()
     comm = communicator(ranks)
-    indptr, indices, data = upper_rows(ranks, rows, ranks.store.pop(key, None))
+    indptr, indices, data = spread(ranks, rows, ranks.store.pop(key, None))
     n_own = rows.count(ranks.rank)
     A = PETSc.Mat().createSBAIJ(((n_own, rows.n), (n_own, rows.n)), 1, csr=(indptr, indices, data), comm=comm)
     del indptr, indices, data
     A.assemble()
     A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    give_back()
     if definite:
         A.setOption(PETSc.Mat.Option.SPD, True)
     for room in ROOM:
@@ -130,6 +141,7 @@ def factorize_here(ranks: Ranks, key: str, rows: Rows, definite: bool, on_disk: 
             break
         ksp.destroy()
     ranks.store[key] = (ksp, F, A)
+    give_back()
     return {
         "INFOG(1)": error,
         "negative": F.getMumpsInfog(12) if error >= 0 else 0,
@@ -148,7 +160,9 @@ def entries(value: int) -> int:
 def solve_here(ranks: Ranks, key: str, rows: Rows) -> Array | None:
     """Step (3), on every rank; the solutions on rank 0."""
     own = own_rows(ranks, rows, ranks.store.pop("columns", None))
-    return collected(ranks, rows, solved_rows(ranks, key, rows, own))
+    x = collected(ranks, rows, solved_rows(ranks, key, rows, own))
+    give_back()
+    return x
 
 
 def solved_rows(ranks: Ranks, key: str, rows: Rows, own: Array) -> Array:
@@ -175,3 +189,4 @@ def free_here(ranks: Ranks, key: str) -> None:
     for each in ranks.store.pop(key, ()) if isinstance(ranks.store.get(key), tuple) else ():
         each.destroy()
     ranks.store.pop(key, None)
+    give_back()

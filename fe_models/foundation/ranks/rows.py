@@ -4,12 +4,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.ranks.ranks import Ranks
 
-__all__ = ["Rows", "collected", "even_rows", "own_rows", "spread", "upper_rows"]
+__all__ = ["Rows", "collected", "even_rows", "own_rows", "spread"]
 
 PIECE = 2**24  #: numbers in a message; MPI counts bytes in 32 bits
 
@@ -71,11 +70,6 @@ def collected(ranks: Ranks, rows: Rows, own: Array) -> Array | None:
     return x
 
 
-def upper_rows(ranks: Ranks, rows: Rows, lower: sp.csc_array | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return indptr, indices, data of this rank's rows of the upper triangle: columns of the lower one on rank 0."""
-    return spread(ranks, rows, None if lower is None else (lower.indptr, lower.indices, lower.data))
-
-
 def spread(
     ranks: Ranks, rows: Rows, arrays: tuple[np.ndarray, np.ndarray, np.ndarray] | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -90,7 +84,10 @@ def spread(
             send(ranks, data[entries], other)
         stop = rows.of(0).stop
         entries = slice(0, int(indptr[stop]))
-        return np.asarray(indptr[: stop + 1], np.int32), np.asarray(indices[entries], np.int32), data[entries]
+        if ranks.size == 1:
+            return np.asarray(indptr, np.int32), np.asarray(indices, np.int32), data
+        # copies: parts of the arrays would hold all of them
+        return indptr[: stop + 1].astype(np.int32), indices[entries].astype(np.int32), data[entries].copy()
     own_indptr = receive(ranks, rows.count(ranks.rank) + 1, np.int64)
     nnz = int(own_indptr[-1])
     return own_indptr.astype(np.int32), receive(ranks, nnz, np.int32), receive(ranks, nnz, np.float64)

@@ -60,7 +60,7 @@ def run_here(reduced, n_steps, t_end, *loads, **placed):
     omega = placed.pop("omega", np.zeros(3))
     body = ff.FlexibleBody("bar", reduced, position=-origin, velocity=-np.cross(omega, origin), omega_B=omega, **placed)
     system = ff.System([body], [], loads, units=reduced.units)
-    return ff.integrate(system, ff.GeneralizedAlpha(0.9), t_end=t_end, h=t_end / n_steps).body("bar")
+    return ff.integrate(system, ff.GeneralizedAlpha(0.9, tolerance=1e-12), t_end=t_end, h=t_end / n_steps).body("bar")
 
 
 def rotation(p):

@@ -1,6 +1,7 @@
 """Jobs with interfaces of very many dofs: what they cost is said before the work, and what does not fit is refused."""
 
 import logging
+import re
 
 import meshio
 import numpy as np
@@ -109,3 +110,35 @@ def test_columns_are_counted_before_they_are_made(job):
     assert expected_columns(job(), Body) == 53
     assert expected_columns(job("interface_modes = 20\n"), Body) == 34
     assert expected_columns(job('set = "normal"\n'), Body) == 2
+
+
+def test_what_a_large_geometric_stiffness_costs_is_told_before_the_work(job, monkeypatch, caplog):
+    monkeypatch.setattr(room_for_stiffness, "UNASKED", 8.0 * 24 * 40**2)
+    told = []
+    fix = families.fix_interfaces
+    monkeypatch.setattr(
+        families, "fix_interfaces", lambda *given, **names: told.append(caplog.text) or fix(*given, **names)
+    )
+    monkeypatch.setattr(interface_cost, "MANY", 10_000)
+    left_out = r"left out: 30 unit loads over 53 modes would be .*interface_modes = 20 in \[reduction\] leaves about 34"
+    for lines, words in (
+        ("", left_out),
+        ("geometric_stiffness = true\n", r"of 30 unit loads over about 53 modes: .* GB in the file, .* processor time"),
+        ('geometric_stiffness = ["other"]\n', r"of 24 unit loads over about 53 modes"),
+    ):
+        caplog.clear()
+        with caplog.at_level(logging.WARNING):
+            reduce_job(job(lines))
+        assert re.search(words, told[-1])
+        assert caplog.text == told[-1]  # and once
+
+
+def test_a_job_names_the_interfaces_whose_loads_stiffen(job, capsys):
+    body = reduce_job(job('geometric_stiffness = ["other"]\n'))
+    assert body.geometric.is_loaded == (False, True)
+    print_body(body)
+    told = " ".join(capsys.readouterr().out.split())
+    assert "loads at some interfaces, see below" in told
+    assert "oads at interfaces end do not stiffen the body: geometric_stiffness names other" in told
+    with pytest.raises(BodyError, match="geometric stiffness: no interface 'othre'; did you mean 'other'"):
+        reduce_job(job('geometric_stiffness = ["othre"]\n'))

@@ -1,21 +1,26 @@
 """Budgets of memory: sizes in words, the forecast, and jobs that are held to one."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.sparse.linalg import splu
 from typer.testing import CliRunner
 
 import cms
+import cms.jobs.reduce_job as reduce_job_module
 from cms.cli.app import app
 from cms.errors import FactorizationError, MemoryBudgetError
 from cms.memory import budget
-from cms.memory.budget import Peak, ReductionShape, peak_of, solver_within
+from cms.memory.budget import Peak, ReductionShape, columns_within, peak_of, reduction_peak, solver_within
 from cms.memory.size import memory_bytes
+from cms.solvers import superlu
 from cms.solvers.factorization import factorize, lower_triangle
 from cms.sparse_cholesky.analysis import analyse
 from cms.sparse_cholesky.factor import CholeskyFactor
+from fe_models.foundation.tall.on_disk import is_on_disk
 from tests.bodies import bar
 from tests.cms.sparse_cholesky.test_factor import grid
 
@@ -97,8 +102,39 @@ def test_each_stage_holds_the_factor_as_it_is_stored_and_its_columns():
     for on_disk, factor in ((False, sum(panels)), (True, max(panels))):
         peak = peak_of(shape, fronts, A.nnz, 1e8, on_disk=on_disk)
         assert peak.factorisation == pytest.approx(1e8 + 44 * A.nnz + 8 * fronts.n_working + factor, rel=1e-12)
-        assert peak.modes == pytest.approx(1e8 + factor + 8 * n * (4 * 8 + 8 * 8 + 20), rel=1e-12)
+        assert peak.modes == pytest.approx(1e8 + factor + 8 * n * (4 * 8 + 8 * 8 + 12), rel=1e-12)
         assert peak.reduction == pytest.approx(3e8 + 8 * 6.2 * n * 20, rel=1e-12)
+
+
+def test_columns_go_to_disk_where_they_do_not_fit_and_take_less_there(caplog):
+    """1000 columns of 50 000 dofs: 0.4 GB an array; a few of them take more on disk than in memory."""
+    shape = ReductionShape(n_dof=50_000, n_columns=1000, n_modes=20, held=1e8)
+    inside, outside = reduction_peak(shape), reduction_peak(replace(shape, to_disk=True))
+    assert inside == pytest.approx(1e8 + 6.2 * 4e8, rel=1e-12)
+    assert outside == pytest.approx(1e8 + 54 * 8e6 + 4e8, rel=1e-12)
+    assert columns_within(inside, shape) is shape
+    assert not caplog.records
+    stored = columns_within(0.999 * inside, shape)
+    assert stored.to_disk
+    assert "need 2.58 GB, more than 2.58 GB; they lie on disk: 932 MB" in caplog.text
+    assert "interface_modes = 20 in [reduction]" in caplog.text
+    fronts = analyse(lower_triangle(grid(6)))
+    in_core, on_disk = (peak_of(each, fronts, 1, 1e8, on_disk=False) for each in (shape, stored))
+    assert in_core.modes - on_disk.modes == pytest.approx(8 * 50_000 * (2 * 1000 - 4 * 20 - 8 * 8), rel=1e-12)
+    assert not columns_within(1e6, replace(shape, n_columns=30)).to_disk
+
+
+def test_a_job_with_columns_on_disk_gives_the_same_body(tmp_path, monkeypatch):
+    monkeypatch.setattr("fe_models.foundation.tall.on_disk.LARGE", 0)
+    job = write_job(tmp_path, 'memory = "20GB"')
+    kept = cms.reduce_job(job)
+    assert not is_on_disk(kept.Phi)
+    monkeypatch.setattr(reduce_job_module, "columns_within", lambda _, shape: replace(shape, to_disk=True))
+    stored = cms.reduce_job(job)
+    assert is_on_disk(stored.Phi)
+    for name in ("K", "Phi", "free_frequencies"):
+        expected = getattr(kept, name)
+        assert_allclose(getattr(stored, name), expected, rtol=0, atol=1e-10 * np.abs(expected).max())
 
 
 def test_the_largest_stage_is_the_peak():
@@ -142,3 +178,22 @@ def test_the_command_refuses_budgets_that_do_not_do_and_writes_nothing(tmp_path,
     assert result.exit_code == 2, result.output
     assert re.search(re.escape(words), " ".join(result.output.split()))
     assert sorted(tmp_path.iterdir()) == before
+
+
+def test_what_superlu_takes_is_told_before_the_work(monkeypatch, caplog):
+    told = []
+    A = lower_triangle(grid(8))
+    monkeypatch.setattr(superlu, "splu", lambda *given, **options: told.append(caplog.text) or splu(*given, **options))
+    superlu.SuperLuFactor(A, definite=True)
+    monkeypatch.setattr(superlu, "MANY", 100)
+    superlu.SuperLuFactor(A, definite=True)
+    assert told == ["", ""]  # few rows, or little work
+    monkeypatch.setattr(superlu, "LONG", 0.0)
+    superlu.SuperLuFactor(A, definite=True)
+    fronts = analyse(A)
+    words = f"SuperLU: 512 rows: about {2 * fronts.operations / 4e9 / 60:.2g} minutes"
+    assert words in told[-1]
+    assert 'or solver = "cholesky" (everywhere) takes a fraction' in told[-1]
+    caplog.clear()
+    superlu.SuperLuFactor(A, definite=False)
+    assert "rigid interfaces in the place of distributing ones" in told[-1]

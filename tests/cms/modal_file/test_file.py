@@ -305,12 +305,24 @@ def test_other_files_are_refused_with_words(tmp_path, path):
         read(tmp_path)
 
 
+def test_a_large_file_that_is_not_made_in_memory_first_says_the_same(body, tmp_path, monkeypatch):
+    write(body, tmp_path / "small.h5")
+    monkeypatch.setattr("fe_models.foundation.sealed_hdf5.LARGE", 0)
+    (tmp_path / "link.h5").symlink_to(tmp_path / "large.h5")
+    write(body, tmp_path / "link.h5")
+    assert (tmp_path / "link.h5").is_symlink()
+    assert (tmp_path / "large.h5").read_bytes() == (tmp_path / "small.h5").read_bytes()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["large.h5", "link.h5", "small.h5"]
+    with pytest.raises(ModalFileError, match=r"cannot be written: .*nothing was written"):
+        write(body, tmp_path / "nowhere" / "body.h5")
+
+
 def test_a_newer_version_is_refused_by_its_number(body, tmp_path, monkeypatch):
-    monkeypatch.setattr(modal_file, "version_of", lambda reduced: 6)
+    monkeypatch.setattr(modal_file, "version_of", lambda reduced: modal_file.VERSION + 1)
     write(body, tmp_path / "new.h5")
     monkeypatch.undo()
     for file in (tmp_path / "new.h5", repacked(tmp_path / "new.h5")):
-        with pytest.raises(ModalFileError, match="format version 6, this program reads versions up to 5"):
+        with pytest.raises(ModalFileError, match="format version 7, this program reads versions up to 6"):
             read(file)
     (tmp_path / "new.h5").write_bytes(b"floatframe modal-file 12\nbytes 9\nof a kind that does not exist yet")
     with pytest.raises(ModalFileError, match="format version 12"):

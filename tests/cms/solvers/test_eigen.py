@@ -18,7 +18,9 @@ from cms.solvers.mode_search import improved_modes
 from cms.solvers.pardiso import mkl_runtime
 from cms.solvers.shift_inverted import ShiftInverted, measured_residual
 from cms.solvers.sparse_product import SymmetricProduct
+from cms.solvers.tall_space import ArraySpace
 from fe_models.body.couplings import couple
+from fe_models.body.submatrix import PrincipalBlock
 from tests.bodies import STEEL, bar, beam
 
 ROUNDOFF = 1e-12
@@ -203,7 +205,7 @@ def test_restarts_keep_the_modes(monkeypatch):
 
 def test_a_restart_changes_no_leading_ritz_pair():
     K, M, _ = lattice(40, 40)
-    lanczos = BlockLanczos(factorize(K).solve, SymmetricProduct(M), K.shape[0], block=4, capacity=60)
+    lanczos = BlockLanczos(factorize(K).solve, SymmetricProduct(M), ArraySpace(K.shape[0]), block=4, capacity=60)
     for _ in range(12):
         lanczos.advance()
     before = lanczos.ritz()
@@ -215,6 +217,17 @@ def test_a_restart_changes_no_leading_ritz_pair():
     S_V = factorize(K).solve(M @ lanczos.V)
     true = np.linalg.norm(S_V - lanczos.V * after.theta, axis=0) / after.theta
     assert_allclose(after.residuals, true, rtol=1e-6, atol=1e-11)
+
+
+def test_a_part_of_a_body_has_the_modes_of_the_matrix_cut_out():
+    K, M, _ = lattice(20, 20)
+    index = np.random.default_rng(0).permutation(400)[:350]
+    K_part, M_part = PrincipalBlock(K, index), PrincipalBlock(M, index)
+    cut, part = (
+        eigenmodes(A, B, 9, factorization=factorize(A)) for A, B in ((K_part.cut(), M_part.cut()), (K_part, M_part))
+    )
+    assert_array_equal(part.Phi, cut.Phi)
+    assert_array_equal(part.omega2, cut.omega2)
 
 
 def test_multipliers_constrain_the_modes():
@@ -356,7 +369,7 @@ def advanced():
     K, M, _ = lattice(23, 21, 4)
     M = sp.csc_array(M * 2.0 + sp.diags_array(np.linspace(0, 1, M.shape[0])))
     operator = ShiftInverted(M, 0.0, factorize(K), TOLERANCE)
-    lanczos = BlockLanczos(operator.solve, operator.M_product, operator.n, block=4, capacity=60)
+    lanczos = BlockLanczos(operator.solve, operator.M_product, operator.space, block=4, capacity=60)
     for _ in range(7):
         lanczos.advance()
     return K, M, operator, lanczos

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
-from fe_models.body.submatrix import principal_block, scalar_part
+from fe_models.body.submatrix import PrincipalBlock, principal_block, scalar_part
 
 
 @pytest.mark.parametrize("index", [[0, 1, 2], [1, 4, 5, 9], [9], list(range(10)), [0, 9]])
@@ -31,6 +31,19 @@ def test_a_principal_block_in_any_order_is_sorted_and_what_indexing_gives(monkey
     block = principal_block(A, index)
     assert_array_equal(block.toarray(), A.toarray()[np.ix_(index, index)])
     assert (np.concatenate([np.diff(part) for part in np.split(block.indices, block.indptr[1:-1])]) > 0).all()
+
+
+def test_products_with_a_principal_block_need_no_copy_of_it():
+    generator = np.random.default_rng(3)
+    A = sp.csc_array(sp.random_array((30, 30), density=0.3, rng=generator))
+    index = generator.permutation(30)[:17]
+    block, x = PrincipalBlock(A, index), generator.standard_normal((17, 2))
+    whole = A.toarray()[np.ix_(index, index)]
+    assert block.shape == (17, 17)
+    assert_array_equal(block.cut().toarray(), whole)
+    assert_array_equal(block.diagonal(), np.diag(whole))
+    assert_allclose(block @ x, whole @ x, rtol=0, atol=1e-14)
+    assert_allclose(block @ x[:, 0], whole @ x[:, 0], rtol=0, atol=1e-14)
 
 
 def test_the_scalar_part_of_a_mass_ends_where_the_components_differ():

@@ -293,3 +293,20 @@ def test_the_points_of_the_geometric_stiffness_suffice_for_linear_stress():
     for kind in SOLID_TYPES:
         table = geometric_table(kind)
         assert_allclose(table.weights.sum(), reference_element(kind).mass.weights.sum(), rtol=1e-12)
+
+
+@pytest.mark.parametrize("kind", SOLID_TYPES)
+@pytest.mark.parametrize("incompatible", [False, True])
+def test_many_columns_give_the_matrices_of_few(kind, incompatible, monkeypatch):
+    """A sparse matrix for each state against products of gradients at every point; cells of two materials."""
+    mesh = distorted(box_mesh(2, 1, 1, 1.0, 0.7, 0.6, kind), 0.05)
+    materials = {"left half": STEEL, "right half": ALUMINIUM}
+    model = solid_body(mesh, materials, name="block", units=SI, incompatible_modes=incompatible).element_model
+    rng = np.random.default_rng(2)
+    u, Phi = rng.standard_normal((3 * len(mesh.nodes), 3)), rng.standard_normal((3 * len(mesh.nodes), 7))
+    few = model.geometric_stiffness(u, MassLoads.none(3), Phi)
+    monkeypatch.setattr("fe_models.solids.geometric.MANY_COLUMNS", 7)
+    monkeypatch.setattr("fe_models.solids.geometric_matrix.PRODUCT_BYTES", 1.0)  # 16 columns at a time
+    many = model.geometric_stiffness(u, MassLoads.none(3), np.hstack([Phi, Phi, Phi]))
+    assert_allclose(many[:, 7:14, 14:], few, rtol=0, atol=ROUNDOFF * np.abs(few).max())
+    assert_allclose(many, many.transpose(0, 2, 1), rtol=0, atol=0)

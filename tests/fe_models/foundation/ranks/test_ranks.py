@@ -1,6 +1,3 @@
-import threading
-from queue import Queue
-
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -9,52 +6,7 @@ from numpy.testing import assert_array_equal
 from fe_models.foundation.ranks.ranks import OneRank, RankError, require_agreement, started_ranks
 from fe_models.foundation.ranks.rows import PIECE, collected, even_rows, own_rows, spread
 from fe_models.foundation.tasks.installation import installation
-
-
-class FakeComm:
-    """What ranks ask of mpi4py, among threads of one process."""
-
-    def __init__(self, rank, queues):
-        self.rank, self.queues = rank, queues
-
-    def Send(self, x, dest):
-        self.queues[self.rank, dest].put(np.array(x))
-
-    def Recv(self, x, source):
-        x[:] = self.queues[source, self.rank].get(timeout=20)
-
-    def bcast(self, value, root):
-        n = int(len(self.queues) ** 0.5)
-        if self.rank == root:
-            for other in range(n):
-                if other != root:
-                    self.queues[root, other].put(value)
-            return value
-        return self.queues[root, self.rank].get(timeout=20)
-
-
-class FakeRanks(OneRank):
-    """One of several ranks, each a thread."""
-
-    def __init__(self, rank, size, queues):
-        super().__init__()
-        self.rank, self.size, self.comm = rank, size, FakeComm(rank, queues)
-
-
-def on_threads(size, work):
-    """Return what work(ranks) gives on each of so many ranks."""
-    queues = {(a, b): Queue() for a in range(size) for b in range(size)}
-    answers = [None] * size
-
-    def run(rank):
-        answers[rank] = work(FakeRanks(rank, size, queues))
-
-    threads = [threading.Thread(target=run, args=(rank,)) for rank in range(size)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join(timeout=30)
-    return answers
+from tests.thread_ranks import on_threads
 
 
 def doubled(ranks, value):

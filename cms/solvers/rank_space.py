@@ -1,0 +1,247 @@
+"""The tall columns of an iteration as rows on all ranks: rank 0 holds names of them, and small matrices.
+
+Rank 0 runs the iteration and decides; what it asks of columns, all ranks do with their rows at once. Rows are those of
+the factor, so that solves take them where they are, and nothing as long as the body passes through rank 0.
+"""
+
+import weakref
+from collections.abc import Callable
+from itertools import count
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+
+from cms.solvers.factorization import Factorization
+from cms.solvers.inverse import Inverse
+from cms.solvers.petsc.factor import CHUNK, PetscFactor, solved_rows
+from cms.solvers.tall import combine, inner, subtract
+from cms.solvers.tall_space import ArrayBasis, ArraySpace
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.ranks.product import RowsProduct
+from fe_models.foundation.ranks.ranks import Ranks
+from fe_models.foundation.ranks.rows import Rows, collected, own_rows, spread
+from fe_models.foundation.ranks.trim import give_back
+
+__all__ = ["RankColumns", "RankSpace"]
+
+numbers = count()
+
+
+class Part(NamedTuple):
+    """Columns of what every rank keeps its rows of under a key."""
+
+    key: str
+    first: int
+    last: int
+
+
+class RankColumns:
+    """Columns whose rows lie on all ranks, (n, k); with the last name of them they go."""
+
+    def __init__(self, space: "RankSpace", part: Part, source: object = None) -> None:
+        """Name columns; source: what owns them, where they are part of another's."""
+        self.part, self.shape, self.source = part, (space.n, part.last - part.first), source
+        if source is None:
+            weakref.finalize(self, space.dropped.append, part.key).atexit = False
+
+
+class RankBasis:
+    """Columns that grow in number, rows of them on all ranks."""
+
+    def __init__(self, space: "RankSpace", capacity: int) -> None:
+        self.space, self.capacity, self.key = space, capacity, new_key()
+        space.ask(None, basis_here, self.key, space.rows, capacity)
+        weakref.finalize(self, space.dropped.append, self.key).atexit = False
+
+    def columns(self, first: int, last: int) -> RankColumns:
+        """Return some of them, (n, last - first)."""
+        return RankColumns(self.space, Part(self.key, first, last), self)
+
+    def put(self, first: int, X: RankColumns) -> None:
+        """Write columns, from this one on."""
+        self.space.ask(None, put_here, self.key, first, X.part)
+
+    def turn(self, m: int, C: Array) -> None:
+        """Replace the first k columns by V C of the first m."""
+        self.space.ask(None, turn_here, self.key, m, C)
+
+    def grow(self, capacity: int, m: int) -> None:
+        """Make room for more; the first m columns stay."""
+        self.space.ask(None, grow_here, self.key, capacity, m)
+        self.capacity = capacity
+
+
+class RankProduct:
+    """The product with a matrix whose rows lie on all ranks."""
+
+    def __init__(self, space: "RankSpace", A: sp.csc_array) -> None:
+        self.space, self.key = space, new_key()
+        space.ranks.store[self.key] = A
+        space.ask(None, product_here, self.key, space.rows)
+        weakref.finalize(self, space.dropped.append, self.key).atexit = False
+
+    def __matmul__(self, x: RankColumns) -> RankColumns:
+        """Return A x, (n, k)."""
+        return self.space.made(x.shape[1], multiplied_here, self.key, x.part)
+
+
+class RankSpace:
+    """Columns are names of rows on all ranks, of which rank 0 has no more than its own, until `close`."""
+
+    def __init__(self, factor: PetscFactor) -> None:
+        """Lay out columns as the factor has its rows."""
+        self.factor, self.ranks, self.rows, self.n = factor, factor.ranks, factor.rows, factor.n
+        self.dropped: list[str] = []  #: keys that nobody names any more; told with the next question
+
+    def ask(self, key: str | None, function: Callable[..., Any], *arguments: Any) -> list[Any]:
+        """Call function(ranks, *arguments) on all ranks; each keeps what it returns under the key, or tells it."""
+        dropped = [self.dropped.pop() for _ in range(len(self.dropped))]
+        return self.ranks.everywhere(kept_here, dropped, key, function, *arguments)
+
+    def made(self, k: int, function: Callable[..., Any], *arguments: Any) -> RankColumns:
+        """Return new columns, (n, k), the rows of which a function returns on each rank."""
+        key = new_key()
+        self.ask(key, function, *arguments)
+        return RankColumns(self, Part(key, 0, k))
+
+    def close(self) -> None:
+        """Free what is not named any more, on all ranks."""
+        self.ask(None, give_back_here)
+
+    def random(self, generator: np.random.Generator, k: int) -> RankColumns:
+        """Return columns of normally distributed numbers, those of one process, (n, k)."""
+        self.ranks.store["columns"] = generator.standard_normal((k, self.n)).T
+        return self.made(k, given_here, self.rows)
+
+    def inner(self, X: RankColumns, Y: RankColumns) -> Array:
+        """Return Xᵀ Y, (k, l), summed in the order of ranks."""
+        return np.asarray(np.sum(self.ask(None, inner_here, X.part, Y.part), axis=0))
+
+    def combine(self, X: RankColumns, C: Array) -> RankColumns:
+        """Return X C, (n, l)."""
+        return self.made(C.shape[1], combine_here, X.part, C)
+
+    def subtract(self, Y: RankColumns, X: RankColumns, C: Array) -> None:
+        """Take X C from Y in place."""
+        self.ask(None, subtract_here, Y.part, X.part, C)
+
+    def scale(self, X: RankColumns, factors: Array) -> None:
+        """Multiply every column by its factor, (k,), in place."""
+        self.ask(None, scale_here, X.part, factors)
+
+    def basis(self, capacity: int) -> RankBasis:
+        """Return room for so many columns."""
+        return RankBasis(self, capacity)
+
+    def whole(self, X: RankColumns) -> Array:
+        """Return columns as an array of rank 0, (n, k)."""
+        return self.ask(None, collected_here, self.rows, X.part)[0]
+
+    def product(self, A: sp.csc_array) -> RankProduct:
+        """Spread the rows of a symmetric matrix, (n, n), and return the product with it."""
+        return RankProduct(self, A)
+
+    def solver(self, factorization: Inverse) -> Callable[[RankColumns], RankColumns]:
+        """Return what solves for columns by the factor whose rows are those of this space."""
+        assert isinstance(factorization, Factorization)
+        assert factorization.factor is self.factor
+        return lambda b: self.made(b.shape[1], solved_here, self.factor.key, self.rows, b.part)
+
+
+def new_key() -> str:
+    """Return a key that no rank has used."""
+    return f"columns {next(numbers)}"
+
+
+def kept_here(ranks: Ranks, dropped: list[str], key: str | None, function: Callable[..., Any], *arguments: Any) -> Any:
+    """Forget what nobody names; call the function and keep what it returns, or return it."""
+    for each in dropped:
+        ranks.store.pop(each, None)
+    answer = function(ranks, *arguments)
+    if key is None:
+        return answer
+    ranks.store[key] = answer
+    return None
+
+
+def own(ranks: Ranks, part: Part) -> Array:
+    """Return this rank's rows of some columns, (n_own, k), a view."""
+    kept = ranks.store[part.key]
+    return kept.columns(part.first, part.last) if isinstance(kept, ArrayBasis) else kept[:, part.first : part.last]
+
+
+def give_back_here(ranks: Ranks) -> None:
+    """Return memory of what was forgotten."""
+    give_back()
+
+
+def given_here(ranks: Ranks, rows: Rows) -> Array:
+    """Return this rank's rows of columns that rank 0 has."""
+    return own_rows(ranks, rows, ranks.store.pop("columns", None))
+
+
+def collected_here(ranks: Ranks, rows: Rows, X: Part) -> Array | None:
+    """Return the columns on rank 0."""
+    return collected(ranks, rows, own(ranks, X))
+
+
+def inner_here(ranks: Ranks, X: Part, Y: Part) -> Array:
+    """Return the part of Xᵀ Y of these rows."""
+    return inner(own(ranks, X), own(ranks, Y))
+
+
+def combine_here(ranks: Ranks, X: Part, C: Array) -> Array:
+    """Return rows of X C."""
+    return combine(own(ranks, X), C)
+
+
+def subtract_here(ranks: Ranks, Y: Part, X: Part, C: Array) -> None:
+    """Take rows of X C from those of Y."""
+    subtract(own(ranks, Y), own(ranks, X), C)
+
+
+def scale_here(ranks: Ranks, X: Part, factors: Array) -> None:
+    """Multiply columns by their factors."""
+    ArraySpace(0).scale(own(ranks, X), factors)
+
+
+def basis_here(ranks: Ranks, key: str, rows: Rows, capacity: int) -> None:
+    """Make room for rows of a basis."""
+    ranks.store[key] = ArrayBasis(rows.count(ranks.rank), capacity)
+
+
+def put_here(ranks: Ranks, key: str, first: int, X: Part) -> None:
+    """Write rows of columns into a basis."""
+    ranks.store[key].put(first, own(ranks, X))
+
+
+def turn_here(ranks: Ranks, key: str, m: int, C: Array) -> None:
+    """Turn rows of a basis."""
+    ranks.store[key].turn(m, C)
+
+
+def grow_here(ranks: Ranks, key: str, capacity: int, m: int) -> None:
+    """Make room for more."""
+    ranks.store[key].grow(capacity, m)
+
+
+def product_here(ranks: Ranks, key: str, rows: Rows) -> None:
+    """Replace the matrix that rank 0 has by this rank's rows of it; compressed columns are rows, A is symmetric."""
+    A = ranks.store.pop(key, None)
+    given = None if A is None else (A.indptr, A.indices, A.data)
+    ranks.store[key] = RowsProduct(ranks, rows, *spread(ranks, rows, given))
+
+
+def multiplied_here(ranks: Ranks, key: str, x: Part) -> Array:
+    """Return rows of A x."""
+    return np.asarray(ranks.store[key] @ own(ranks, x))
+
+
+def solved_here(ranks: Ranks, key: str, rows: Rows, b: Part) -> Array:
+    """Return rows of A⁻¹ b, some columns at a time."""
+    x = np.empty((rows.count(ranks.rank), b.last - b.first), order="F")
+    for first in range(b.first, b.last, CHUNK):
+        some = Part(b.key, first, min(first + CHUNK, b.last))
+        x[:, first - b.first : some.last - b.first] = solved_rows(ranks, key, rows, own(ranks, some))
+    return x

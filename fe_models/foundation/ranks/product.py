@@ -1,0 +1,48 @@
+"""Products of a sparse matrix and tall arrays, rows of both on many ranks."""
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.ranks.ranks import Ranks
+from fe_models.foundation.ranks.rows import Rows
+
+__all__ = ["RowsProduct"]
+
+COLUMNS = 16  #: columns per pass over the matrix; the rows of x it touches then stay in the cache
+
+
+class RowsProduct:
+    """The map x -> A x, of which each rank has its rows of A, x and A x.
+
+    (1) once: every rank tells the others which of their rows its entries touch, the halo
+    (2) columns of its part of A are numbered anew: own rows of x, then the halo, owner by owner
+    (3) a product: the rows that others asked for go to them, then own rows of A times [own x; halo]
+    """
+
+    def __init__(self, ranks: Ranks, rows: Rows, indptr: np.ndarray, indices: np.ndarray, data: Array) -> None:
+        """Prepare; called on all ranks at once, each with its compressed rows of A, columns of all, (n_own, n)."""
+        self.ranks = ranks
+        own = rows.of(ranks.rank)
+        is_own = (indices >= own.start) & (indices < own.stop)
+        halo = np.unique(indices[~is_own])
+        bounds = np.searchsorted(halo, rows.starts)
+        asked = [(halo[a:b] - first) for a, b, first in zip(bounds, bounds[1:], rows.starts, strict=False)]  # (1)
+        self.sent = [asked[0]] if ranks.size == 1 else ranks.comm.alltoall(asked)
+        columns = np.where(is_own, indices - own.start, 0).astype(np.int32)  # (2)
+        columns[~is_own] = (own.stop - own.start) + np.searchsorted(halo, indices[~is_own])
+        self.n_own, self.n_halo = own.stop - own.start, len(halo)
+        self.A = sp.csr_array((data, columns, indptr), shape=(self.n_own, self.n_own + self.n_halo))
+
+    def __matmul__(self, x: Array) -> Array:
+        """Return this rank's rows of A x, (n_own, k), in Fortran order, by its rows of x; on all ranks at once."""
+        result = np.empty((self.n_own, x.shape[1]), order="F")
+        for first in range(0, x.shape[1], COLUMNS):
+            block = slice(first, min(first + COLUMNS, x.shape[1]))
+            whole = np.empty((self.n_own + self.n_halo, block.stop - first))  # (3)
+            whole[: self.n_own] = x[:, block]
+            if self.ranks.size > 1:
+                halo = self.ranks.comm.alltoall([whole[index] for index in self.sent])
+                np.concatenate(halo, out=whole[self.n_own :])
+            result[:, block] = self.A @ whole
+        return result
