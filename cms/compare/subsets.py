@@ -66,12 +66,12 @@ def _kept(modes: ModeSet, n_modes: int) -> IntArray:
     return np.sort(np.concatenate([np.flatnonzero(modes.is_static), vibration])).astype(np.int64)
 
 
-#: sets that are made once, with the most modes; others are made anew for each number of modes
+#: sets that are made once, with the most modes; others are made anew for each number of modes ("multilevel", whose tree
+#: keeps what the highest frequency asks for)
 SUBSETS: dict[str, Subset] = {
     "guyan": whole_set,
     "craig-bampton": column_subset,
     "craig-bampton-ir": column_subset,
-    "multilevel": column_subset,
     "benfield-hruda": column_subset,
     "attachment": column_subset,
     "unrestrained-attachment": column_subset,

@@ -125,7 +125,7 @@ def _modes_of(
         except FactorizationError:
             families.fixed  # noqa: B018 - says where the mechanism is
             raise
-    families.adopt(FixedInterfaceBody(body, i, body.b, K, M, Factorization(found.tree, families.solver)))
+    families.adopt(FixedInterfaceBody(body, i, body.b, Factorization(found.tree, families.solver)))
     return found
 
 

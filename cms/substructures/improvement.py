@@ -5,29 +5,28 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from cms.solvers.sparse_product import SymmetricProduct
-from cms.solvers.tall import inner
+from cms.solvers.tall import combine, combined, inner
 from cms.substructures.tree import SubstructureTree
 from fe_models.foundation.arrays import Array, IntArray
 
-__all__ = ["COLUMNS", "GROUP", "SLICE", "ApproximateModes"]
+__all__ = ["COLUMNS", "SLICE", "ApproximateModes", "groups"]
 
 COLUMNS = 128  #: of a block
-GROUP = 4  #: modes whose residuals are measured by one column
-SLICE = 16384  #: rows that are combined at a time
+SLICE = 16384  #: rows that are put elsewhere at a time
+SAME_SIZE = 16  #: groups of modes of one size, whose residuals are measured by one column each
 
 
 class ApproximateModes:
-    """Approximate modes X of K x = omega² M x, M-orthonormal, in blocks of columns; they change in place.
+    """Approximate modes X of K x = omega² M x, M-orthonormal; they change in place.
 
     All rows are in the order of elimination.
     """
 
-    def __init__(
-        self, tree: SubstructureTree, K: sp.csc_array, M: sp.csc_array, omega2: Array, blocks: list[Array]
-    ) -> None:
-        self.tree, self.K, self.M = tree, SymmetricProduct(K), SymmetricProduct(M)
+    def __init__(self, tree: SubstructureTree, K: sp.csc_array, M: sp.csc_array, omega2: Array, X: Array) -> None:
+        self.tree = tree
+        self.K, self.M = (SymmetricProduct(A, columns=COLUMNS) for A in (K, M))
         self.omega2 = omega2  #: Rayleigh quotients, (p,)
-        self.blocks = blocks  #: X, each (n, 128 or less)
+        self.X = X  #: (n, p), C order
         self.residuals = np.full(len(omega2), np.nan)  #: |r|_K / omega of the modes before the last step, (p,)
         self.n_solves = 0
 
@@ -41,69 +40,59 @@ class ApproximateModes:
         """
         p = len(self.omega2)
         H, G = np.zeros((p, p)), np.zeros((p, p))
-        starts = self._starts()
-        for c in range(len(self.blocks)):
-            columns = slice(starts[c], starts[c + 1])
-            M_X = self.M @ self.blocks[c]
-            Y = self.blocks[c]  # (1)
-            Y[:] = M_X
+        for first in range(0, p, COLUMNS):
+            stop = min(first + COLUMNS, p)
+            M_X = self.M @ self.X[:, first:stop]
+            Y = M_X.copy()  # (1)
             self.tree.solve_ordered(Y)
-            self.n_solves += Y.shape[1]
-            for a in range(c + 1):  # (2)
-                H[starts[a] : starts[a + 1], columns] = inner(self.blocks[a], M_X)
+            self.n_solves += stop - first
+            self.X[:, first:stop] = Y
+            H[:stop, first:stop] = inner(self.X[:, :stop], M_X)  # (2)
             del M_X
-            M_Y = self.M @ Y
-            for a in range(c + 1):
-                G[starts[a] : starts[a + 1], columns] = inner(self.blocks[a], M_Y)
+            G[:stop, first:stop] = inner(self.X[:, :stop], self.M @ Y)
         H, G = (np.triu(A) + np.triu(A, 1).T for A in (H, G))
         self.residuals = np.sqrt(np.maximum(self.omega2 * np.diag(H) - 1, 0.0))  # (3)
         scale = np.sqrt(np.diag(H))
         self.omega2, Z = la.eigh(H / np.outer(scale, scale), G / np.outer(scale, scale))  # (4)
-        self._combine(Z / scale[:, None])
+        self.X = combined(self.X, Z / scale[:, None])
 
-    def measured(self, count: int) -> Array:
-        """Measure |r|_K / omega of the first modes as they are, (count,): of each, or of groups of modes together.
+    def errors(self, count: int) -> Array:
+        """Return about how much too high each of the first frequencies is at most, relative, (count,).
 
-        The sum of r_j / omega_j with random signs over a group has the expected squared length of all of them together,
-        which bounds that of each.
+        (1) r = x - omega² K⁻¹ M x of each mode, or of a group of modes together: the sum of r_j / omega_j with random
+            signs has the expected squared length of all of them, which bounds that of each
+        (2) a = |r|²_K / omega²,  b = |r|²_M
+        (3) (a + b / (1 - omega² / omega_next²)) / 2, omega_next that of the first mode that does not take part
+            (docs/theory.md §2)
         """
-        n_groups = -(-count // GROUP) if count > COLUMNS else count
-        of_mode = (np.arange(count) * n_groups) // count
-        signs = np.random.default_rng(0).choice([-1.0, 1.0], size=count)
+        of_mode = groups(count)
+        n_groups = int(of_mode.max(initial=-1)) + 1
         pick = np.zeros((count, n_groups))
-        pick[np.arange(count), of_mode] = signs
+        pick[np.arange(count), of_mode] = np.random.default_rng(0).choice([-1.0, 1.0], size=count)
         omega = np.sqrt(self.omega2[:count])
-        r = self.combination(pick / omega[:, None])
-        S_x = self.M @ self.combination(pick * omega[:, None])
+        X = self.X[:, :count]
+        S_x = self.M @ combine(X, pick * omega[:, None])  # (1)
         self.tree.solve_ordered(S_x)
-        r -= S_x
         self.n_solves += n_groups
-        squared = np.einsum("nk,nk->k", r, self.K @ r)
-        return np.sqrt(np.maximum(squared, 0.0))[of_mode]
-
-    def combination(self, Z: Array) -> Array:
-        """Return the columns X Z of the leading modes, (n, l)."""
-        total = np.zeros((self.tree.n, Z.shape[1]))
-        for block, first in zip(self.blocks, self._starts(), strict=False):
-            part = Z[first : first + block.shape[1]]
-            if len(part):
-                total += block[:, : len(part)] @ part
-        return total
+        r = combine(X, pick / omega[:, None])
+        r -= S_x
+        del S_x
+        a, b = (np.maximum(np.einsum("nk,nk->k", r, A @ r), 0.0)[of_mode] for A in (self.K, self.M))  # (2)
+        apart = 1 - self.omega2[:count] / self.omega2[-1]
+        return (a + self.omega2[:count] * b / np.maximum(apart, np.finfo(float).eps)) / 2  # (3)
 
     def into(self, Phi: Array, rows: IntArray) -> None:
         """Put the leading modes into these rows of Phi, (n_dof, k)."""
-        for block, first in zip(self.blocks, self._starts(), strict=False):
-            width = min(block.shape[1], Phi.shape[1] - first)
-            for a in range(0, self.tree.n if width > 0 else 0, SLICE):
-                Phi[rows[a : a + SLICE], first : first + width] = block[a : a + SLICE, :width]
+        for a in range(0, self.tree.n, SLICE):
+            Phi[rows[a : a + SLICE]] = self.X[a : a + SLICE, : Phi.shape[1]]
 
-    def _starts(self) -> IntArray:
-        return np.concatenate([[0], np.cumsum([block.shape[1] for block in self.blocks])])
 
-    def _combine(self, Z: Array) -> None:
-        starts = self._starts()
-        for first in range(0, self.tree.n, SLICE):
-            part = slice(first, first + SLICE)
-            rows = np.concatenate([block[part] for block in self.blocks], axis=1) @ Z
-            for block, a, z in zip(self.blocks, starts[:-1], starts[1:], strict=True):
-                block[part] = rows[:, a:z]
+def groups(count: int) -> IntArray:
+    """Return the group of each mode, (count,): the highest stand alone, downwards groups of 2, 4, 8 ...
+
+    The lower a frequency, the smaller its error, so that more of them together may stand for each.
+    """
+    sizes: list[int] = []
+    while sum(sizes) < count:
+        sizes.append(min(2 ** (len(sizes) // SAME_SIZE), count - sum(sizes)))
+    return np.repeat(np.arange(len(sizes)), sizes)[::-1].copy()

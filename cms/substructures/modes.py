@@ -13,10 +13,11 @@ from cms.solvers.mode_count import ModeCount
 from cms.solvers.orientation import orientation
 from cms.solvers.registry import solver_of
 from cms.solvers.shift_inverted import Wanted
+from cms.solvers.tall import combined
 from cms.substructures.dissection import Dissection, dissect, node_graph
 from cms.substructures.frequency_guess import guessed_omega2
-from cms.substructures.improvement import COLUMNS, SLICE, ApproximateModes
-from cms.substructures.reduced_modes import reduced_modes
+from cms.substructures.improvement import ApproximateModes
+from cms.substructures.reduced_modes import reduced_modes, reduced_omega2
 from cms.substructures.tree import SubstructureTree, substructure_tree
 from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.solver import Solver
@@ -27,7 +28,7 @@ __all__ = ["Interior", "MultilevelResult", "multilevel_modes"]
 
 log = logging.getLogger(__name__)
 
-LEAF = 300  #: dofs of a part: larger ones cost more arithmetic, smaller ones more calls
+LEAF = 200  #: dofs of a part: larger ones cost more arithmetic, smaller ones more calls
 GUARDS, GUARD_SHARE = 12, 0.08  #: modes beyond the wanted ones that take part: a number, and a share of these
 MOST_STEPS = 8  #: of inverse iteration
 SHARE = 8  #: interior dofs for each wanted mode, at least
@@ -88,10 +89,9 @@ def multilevel_modes(
     (1) nested dissection: parts of some hundred dofs, and separators
     (2) bound: `cutoff_factor` times the cutoff; of a number of modes, times an estimate of its highest frequency
     (3) every substructure is reduced to its own modes up to the bound, and eliminated from those above it
-    (4) the reduced pencil: its lowest modes, expanded down the tree
-    (5) steps of inverse iteration by the tree, until the error that is left is below the tolerance
-    (6) the error that is left: |r|²_K / (2 omega² (1 - omega² / omega_next²)), r = x - omega² K⁻¹ M x, omega_next
-        that of the first mode that does not take part
+    (4) of a number of modes: its highest frequency again, by the reduced pencil up to the estimate; a lower bound
+    (5) the reduced pencil: its lowest modes, expanded down the tree
+    (6) steps of inverse iteration by the tree, until the error that is left is below the tolerance
 
     Frequencies are those of a Rayleigh-Ritz basis: never below the true ones.
 
@@ -105,7 +105,7 @@ def multilevel_modes(
     tolerance
         Largest relative error of a frequency. What stays above it after some steps is told, not raised.
     cutoff_factor
-        Larger: more modes of substructures, fewer steps (5).
+        Larger: more modes of substructures, fewer steps (6).
     tasks
         Where subtrees are eliminated; None: in threads of this process.
     rows
@@ -138,29 +138,25 @@ def multilevel_modes(
     bound = cutoff_factor**2 * highest
     tree = substructure_tree(dissection, K, M, bound, multipliers=multipliers, tasks=tasks)  # (3)
     require_regular(interior.K, Factorization(tree, solver_of(solver)))  # pivots of rounding are positive too
-    own = tree.omega2
-    count = wanted.n if wanted.n is not None else 0
-    if wanted.cutoff is not None:
-        reduced, Z = reduced_modes(own, tree.mass(), _most_below(own, MARGIN**2 * highest))  # (4)
-        count = int((reduced <= MARGIN**2 * highest).sum())
-    p = min(count + GUARDS + int(GUARD_SHARE * count), len(own))
-    if wanted.cutoff is None:
-        if count > len(own):
-            raise EigenError(
-                f"multilevel: {wanted.words}, but the substructures have {len(own)} modes up to {cutoff_factor:g} "
-                "times the estimated frequency; choose a larger cutoff_factor, or fewer modes"
-            )
-        reduced, Z = reduced_modes(own, tree.mass(), p)
-    elif p > len(reduced):
-        reduced, Z = reduced_modes(own, tree.mass(), p)
-    reduced, Z = reduced[:p], Z[:, :p]
-    blocks = [tree.expand(Z[:, a : a + COLUMNS]) for a in range(0, p, COLUMNS)]
-    modes = ApproximateModes(tree, K, M, reduced, blocks)
-    del Z, reduced
     with one_blas_thread():
-        errors, n_steps = _improved(modes, count, tolerance, highest if wanted.cutoff is not None else 0.0)  # (5), (6)
+        own, mass = tree.omega2, tree.mass()
+        if wanted.n is not None:
+            if wanted.n > len(own):
+                raise EigenError(
+                    f"multilevel: {wanted.words}, but the substructures have {len(own)} modes up to {cutoff_factor:g} "
+                    "times the estimated frequency; choose a larger cutoff_factor, or fewer modes"
+                )
+            bound = min(bound, cutoff_factor**2 * _highest(own, mass, highest, wanted.n))  # (4)
+        kept = np.flatnonzero(own <= bound)
+        reduced, Z_kept = _reduced(own[kept], mass[kept][:, kept], wanted, highest)  # (5)
+        p, count = len(reduced), wanted.n if wanted.n is not None else int((reduced <= MARGIN**2 * highest).sum())
+        Z = np.zeros((len(own), p))
+        Z[kept] = Z_kept
+        modes = ApproximateModes(tree, K, M, reduced, tree.expand(Z))
+        del Z, Z_kept, mass
+        errors, n_steps = _improved(modes, count, tolerance, highest if wanted.cutoff is not None else 0.0)  # (6)
     k = count if wanted.n is not None else int((modes.omega2 <= highest).sum())
-    if wanted.n is None and k == p < len(own):
+    if wanted.n is None and k == p < len(kept):
         raise EigenError(
             f"multilevel: {wanted.words}: all {p} modes that take part came to lie below it, so that others may be "
             "missing; choose a larger cutoff_factor"
@@ -177,28 +173,47 @@ def multilevel_modes(
     n_rows, of_interior = rows or (n, np.arange(n))
     Phi = np.zeros((n_rows, k))
     modes.into(Phi, of_interior[dissection.order])
-    modes.blocks.clear()
+    modes.X = np.empty((0, 0))
     if k:
-        turn(Phi, omega2)
+        with one_blas_thread():
+            Phi = combined(Phi, orientation(Phi, omega2))
     method = (
-        f"multilevel substructures: {dissection.n} in a tree, {len(own)} modes up to {cutoff_factor:g} times the "
+        f"multilevel substructures: {dissection.n} in a tree, {len(kept)} modes up to {cutoff_factor:g} times the "
         f"highest wanted frequency, {n_steps} steps of inverse iteration"
     )
     found = EigenResult(
         omega2, np.sqrt(omega2) / (2 * np.pi), Phi, modes.residuals[:k], modes.n_solves, method, is_proven=wanted.verify
     )
-    return MultilevelResult(found, errors, n_steps, len(own), cutoff_factor, tree)
+    return MultilevelResult(found, errors, n_steps, len(kept), cutoff_factor, tree)
 
 
-def turn(Phi: Array, omega2: Array) -> None:
-    """Turn modes into their standard basis, in place."""
-    Z = orientation(Phi, omega2)
-    for first in range(0, len(Phi), SLICE):
-        Phi[first : first + SLICE] = Phi[first : first + SLICE] @ Z
+def _highest(own: Array, mass: sp.csc_array, guess: float, count: int) -> float:
+    """(4) Return omega² of the highest of `count` modes, somewhat too high, by modes of substructures below a guess."""
+    most = max(guess, np.partition(own, count - 1)[count - 1]) if count else guess
+    kept = np.flatnonzero(own <= most)
+    return float(reduced_omega2(own[kept], mass[kept][:, kept], count)) if count else guess
+
+
+def _reduced(own: Array, mass: sp.csc_array, wanted: ModeCount, highest: float) -> tuple[Array, Array]:
+    """(5) Return omega² of the wanted modes of the reduced pencil and of guards beyond them, and the modes."""
+    n = len(own)
+    if wanted.n is not None:
+        return reduced_modes(own, mass, min(wanted.n + _guards(wanted.n), n))
+    first = min(n, int(2 * (own <= MARGIN**2 * highest).sum()) + GUARDS + 20)
+    omega2, Z = reduced_modes(own, mass, first)
+    count = int((omega2 <= MARGIN**2 * highest).sum())
+    p = min(count + _guards(count), n)
+    if p > first:
+        omega2, Z = reduced_modes(own, mass, p)
+    return omega2[:p], Z[:, :p]
+
+
+def _guards(count: int) -> int:
+    return GUARDS + int(GUARD_SHARE * count)
 
 
 def _improved(modes: ApproximateModes, count: int, tolerance: float, highest: float) -> tuple[Array, int]:
-    """(5), (6) Improve modes until the error that is left in the wanted ones is below the tolerance.
+    """(6) Improve modes until the error that is left in the wanted ones is below the tolerance.
 
     The wanted ones: at least `count`, and all that came to lie below omega² = `highest`.
     """
@@ -207,17 +222,10 @@ def _improved(modes: ApproximateModes, count: int, tolerance: float, highest: fl
         n_steps += 1
         modes.improve()
         count = max(count, int((modes.omega2 <= highest).sum()))
-        apart = 1 - modes.omega2[:count] / modes.omega2[-1]
-        squared = modes.measured(count) ** 2
-        errors = squared / (2 * np.maximum(apart, np.finfo(float).eps))
+        errors = modes.errors(count)
         if (errors <= tolerance).all():
             break
     return errors, n_steps
-
-
-def _most_below(own: Array, omega2: float) -> int:
-    """Return how many modes of the reduced pencil are computed at first, where all below a bound are wanted."""
-    return min(len(own), int(2 * (own <= omega2).sum()) + GUARDS + 20)
 
 
 def _require_all(interior: Interior, omega2: Array, k: int, wanted: ModeCount, solver: Solver | None) -> None:

@@ -9,7 +9,7 @@ from cms.solvers.factorization import Inertia
 from cms.solvers.registry import solver_of
 from fe_models.foundation.arrays import Array
 
-__all__ = ["reduced_modes"]
+__all__ = ["reduced_modes", "reduced_omega2"]
 
 DENSE = 3000  #: modes of substructures up to which dense matrices are fast and small
 TOLERANCE = 1e-4  #: residual of the iteration, far below what the substructures leave out
@@ -41,8 +41,21 @@ def reduced_modes(omega2: Array, M: sp.csc_array, count: int) -> tuple[Array, Ar
             sp.csc_array(sp.diags_array(omega2)), M, count, factorization=Diagonal(omega2), tolerance=TOLERANCE
         )
         return np.array(found.omega2), np.array(found.Phi)
-    scale = 1 / np.sqrt(omega2)
-    A = scale[:, None] * M.toarray() * scale
+    A, scale = _scaled(omega2, M)
     theta, Z = la.eigh(A, subset_by_index=(n - count, n - 1), overwrite_a=True)
     theta, Z = theta[::-1], Z[:, ::-1]
     return 1 / theta, scale[:, None] * Z / np.sqrt(theta)
+
+
+def reduced_omega2(omega2: Array, M: sp.csc_array, k: int) -> float:
+    """Return the k-th lowest eigenvalue, k from 1; dense."""
+    n = len(omega2)
+    A, _ = _scaled(omega2, M)
+    theta = la.eigh(A, subset_by_index=(n - k, n - k), overwrite_a=True, eigvals_only=True)
+    return float(1 / theta[0])
+
+
+def _scaled(omega2: Array, M: sp.csc_array) -> tuple[Array, Array]:
+    """Return D^-½ M D^-½ and the diagonal of D^-½."""
+    scale = 1 / np.sqrt(omega2)
+    return scale[:, None] * M.toarray() * scale, scale

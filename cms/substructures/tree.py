@@ -1,7 +1,7 @@
 """The tree of eliminated substructures: solves by all of it, and the motions that its modes span."""
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import replace
 
 import numpy as np
@@ -145,7 +145,7 @@ def substructure_tree(
     tasks: TaskMap | None = None,
     progress: Progress | None = None,
 ) -> SubstructureTree:
-    """Eliminate all substructures: subtrees as tasks beside each other, then the separators above them.
+    """Eliminate all substructures: subtrees as tasks beside each other, and each separator above when it can be.
 
     Parameters
     ----------
@@ -170,25 +170,43 @@ def substructure_tree(
     lower_K, lower_M = (sp.csc_array(sp.tril(A, format="csc")) for A in (K, M))
     body = _Body(dissection, lower_K, lower_M, omega2, multipliers)
     runs, is_top = body.runs()
-    parts = [body.part(run) for run in runs]
-    reduced: list[Reduced]
-    if tasks is not None:
-        reduced = tasks.map(eliminate_part, parts, progress=progress)
-    else:
-        with bounded_threads(1), ThreadPoolExecutor(body.n_threads) as pool:
-            reduced = list(pool.map(eliminate_part, parts))
     found: dict[int, Substructure] = {}
     left: dict[int, Remainder] = {}
-    for run, each in zip(runs, reduced, strict=True):
-        for t, x in zip(run, each.substructures, strict=True):
+    work: dict[Future[Reduced], range] = {}
+
+    def keep(run: range, reduced: Reduced) -> None:
+        for t, x in zip(run, reduced.substructures, strict=True):
             found[t] = replace(x, children=tuple(body.children[t]))
-        left[run[-1]] = each.remainder
-    del reduced
-    for t in np.flatnonzero(is_top).tolist():
-        below = tuple(left.pop(c) for c in body.children[t])
-        one = eliminate_part(body.part(range(t, t + 1), below))
-        found[t] = replace(one.substructures[0], children=tuple(body.children[t]))
-        left[t] = one.remainder
+        left[run[-1]] = reduced.remainder
+
+    def begin(t: int) -> None:
+        if is_top[t] and all(c in left for c in body.children[t]):
+            below = tuple(left.pop(c) for c in body.children[t])
+            run = range(t, t + 1)
+            work[pool.submit(eliminate_part, body.part(run, below))] = run
+
+    if tasks is not None:
+        parts = [body.part(run) for run in runs]
+        for run, each in zip(runs, tasks.map(eliminate_part, parts, progress=progress), strict=True):
+            keep(run, each)
+        del parts
+    # one thread of BLAS in each: those of OpenBLAS wait for each other longer than they work on fronts of this size
+    with bounded_threads(1), ThreadPoolExecutor(body.n_threads) as pool:
+        if tasks is None:
+            work.update({pool.submit(eliminate_part, body.part(run)): run for run in runs})
+        for t in np.flatnonzero(is_top).tolist():
+            begin(t)
+        while work:
+            done, _ = wait(work, return_when=FIRST_COMPLETED)
+            for future in done:
+                run = work.pop(future)
+                try:
+                    keep(run, future.result())
+                except BaseException:
+                    pool.shutdown(cancel_futures=True)
+                    raise
+                if run[-1] < dissection.n - 1:
+                    begin(int(dissection.parents[run[-1]]))
     return SubstructureTree(dissection, [found[t] for t in range(dissection.n)], len(multipliers))
 
 

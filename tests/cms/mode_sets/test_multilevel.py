@@ -9,7 +9,9 @@ import cms
 from cms.errors import BodyError, FactorizationError, ModeSetError
 from cms.solvers.mode_count import ModeCount
 from cms.solvers.superlu import SuperLuFactor
+from cms.substructures import modes as modes_module
 from cms.substructures.modes import Interior, multilevel_modes
+from cms.substructures.tree import substructure_tree
 from fe_models.foundation.solver import Solver
 from tests.bodies import bar
 from tests.cms.substructures.shells import between, panel
@@ -33,6 +35,12 @@ def modes(shell):
     return cms.multilevel(shell, n_modes=ModeCount(N, verify=True), inertia_relief=True)
 
 
+def interior_of(body):
+    i = body.i
+    K, M = (sp.csc_array(A[i][:, i]) for A in (body.K, body.M))
+    return Interior(K, M, body.dofs[i, 0], body.nodes, np.zeros(len(i), bool))
+
+
 def relative_errors(modes, direct):
     found = modes.frequencies[np.isfinite(modes.frequencies)]
     return found / direct.frequencies[np.isfinite(direct.frequencies)][: len(found)] - 1
@@ -51,7 +59,23 @@ def test_the_estimated_error_is_no_less_than_the_true_one(modes, direct):
     estimated = modes.data["frequency error"]
     assert np.isnan(estimated[:-N]).all()
     assert (estimated[-N:] >= relative_errors(modes, direct) - 1e-9).all()
-    assert estimated[-N:].max() < 100 * relative_errors(modes, direct).max()
+    assert estimated[-N:].max() < 4 * relative_errors(modes, direct).max()
+
+
+@pytest.mark.parametrize("times", [1.0, 4.0])
+def test_a_guess_that_is_too_high_keeps_no_more_modes_of_substructures(shell, direct, monkeypatch, times):
+    guessed = modes_module.guessed_omega2
+    monkeypatch.setattr(modes_module, "guessed_omega2", lambda *of: times * guessed(*of))
+    kept = int(cms.multilevel(shell, n_modes=N).options["eigensolver"].split(" in a tree, ")[1].split()[0])
+    highest = (2 * np.pi * direct.frequencies[np.isfinite(direct.frequencies)][N - 1]) ** 2
+    interior = interior_of(shell)
+    dissection = interior.dissection(modes_module.LEAF)
+    K, M = (dissection.in_order(A) for A in (interior.K, interior.M))
+    least, most = (
+        len(substructure_tree(dissection, K, M, 9 * factor * highest, multipliers=np.zeros(0, int)).omega2)
+        for factor in (1.0, 1.4)
+    )
+    assert least <= kept <= most
 
 
 def test_static_columns_are_those_of_craig_bampton(shell, modes, direct):

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 import scipy.linalg as la
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from cms.errors import FactorizationError
 from cms.substructures.modes import Interior
@@ -10,6 +10,7 @@ from cms.substructures.tree import substructure_tree
 from fe_models.body.couplings import couple
 from fe_models.body.fe_body import MULTIPLIER
 from fe_models.body.submatrix import principal_block
+from fe_models.foundation.tasks.this_process import ThisProcess
 from tests.bodies import bar
 from tests.cms.substructures.shells import between
 
@@ -77,6 +78,17 @@ def test_the_tree_solves_as_a_factorisation_does(interior, pencil):
     b = np.random.default_rng(0).standard_normal((len(interior.nodes), 130))
     assert len(tree.omega2) == 0
     assert_allclose(tree.solve(b), la.solve(interior.K.toarray(), b), rtol=0, atol=1e-10 * np.abs(tree.solve(b)).max())
+
+
+def test_subtrees_as_tasks_give_the_tree_of_threads_bit_for_bit(pencil):
+    dissection, K, M = pencil
+    one, two = (
+        substructure_tree(dissection, K, M, 1e12, multipliers=NONE, tasks=tasks) for tasks in (None, ThisProcess())
+    )
+    assert len(one.omega2) > 0
+    assert dissection.n > 3
+    assert_array_equal(one.omega2, two.omega2)
+    assert_array_equal(one.mass().toarray(), two.mass().toarray())
 
 
 def test_multipliers_of_distributing_interfaces_stay_in_the_root():

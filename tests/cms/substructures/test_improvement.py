@@ -1,0 +1,82 @@
+import numpy as np
+import pytest
+import scipy.linalg as la
+from numpy.testing import assert_allclose, assert_array_equal
+
+from cms.substructures.improvement import ApproximateModes, groups
+from cms.substructures.modes import Interior
+from cms.substructures.tree import substructure_tree
+from fe_models.body.couplings import couple
+from fe_models.body.submatrix import principal_block
+from tests.bodies import bar
+
+COUNT = 6
+
+
+@pytest.fixture(scope="module")
+def pencil():
+    """Tree without modes of its own, K and M in its order, and all exact eigenpairs."""
+    body = couple(bar(nx=10, ny=2, nz=1, kind="hexahedron"))
+    i = body.i
+    K, M = principal_block(body.K, i), principal_block(body.M, i)
+    interior = Interior(K, M, body.dofs[i, 0], body.nodes, np.zeros(len(i), dtype=bool))
+    dissection = interior.dissection(30)
+    K, M = dissection.in_order(interior.K), dissection.in_order(interior.M)
+    tree = substructure_tree(dissection, K, M, 1.0, multipliers=np.zeros(0, dtype=int))
+    return tree, K, M, la.eigh(K.toarray(), M.toarray())
+
+
+def spoiled(pencil, amount):
+    """The first modes, and as guards those after them, each with some of one mode far above."""
+    tree, K, M, (omega2, Phi) = pencil
+    p, n = COUNT + 3, len(omega2)
+    X = Phi[:, :p] + amount * Phi[:, n // 2 : n // 2 + p]
+    X /= np.sqrt(np.einsum("nk,nk->k", X, M @ X))
+    quotient = np.einsum("nk,nk->k", X, K @ X)
+    return ApproximateModes(tree, K, M, quotient, np.ascontiguousarray(X))
+
+
+def test_errors_that_lie_far_above_are_estimated_closely_and_from_above(pencil):
+    """Of one disturbing mode far above, the bound is nearly the error itself."""
+    modes = spoiled(pencil, 1e-4)
+    true = np.sqrt(modes.omega2[:COUNT] / pencil[3][0][:COUNT]) - 1
+    found = modes.errors(COUNT)
+    assert (found > true).all()
+    assert_allclose(found, true, rtol=0.1)
+
+
+def test_an_error_next_to_the_modes_that_take_part_is_bounded(pencil):
+    """The worst case of the bound: all of the error along the first mode that does not take part."""
+    tree, K, M, (omega2, Phi) = pencil
+    p, amount = COUNT + 3, 1e-3
+    X = Phi[:, :p].copy()
+    X[:, COUNT - 1] += amount * Phi[:, p]
+    X[:, COUNT - 1] /= np.sqrt(1 + amount**2)
+    quotient = np.einsum("nk,nk->k", X, K @ X)
+    modes = ApproximateModes(tree, K, M, quotient, np.ascontiguousarray(X))
+    modes.omega2[-1] = omega2[p]
+    true = np.sqrt(quotient[COUNT - 1] / omega2[COUNT - 1]) - 1
+    assert_allclose(modes.errors(COUNT)[-1], true, rtol=1e-3)
+
+
+def test_a_step_takes_off_what_lies_far_above(pencil):
+    """The part along a mode shrinks by omega² / omega_k², so the error by its square."""
+    modes = spoiled(pencil, 1e-3)
+    before = np.sqrt(modes.omega2[:COUNT] / pencil[3][0][:COUNT]) - 1
+    modes.improve()
+    after = np.sqrt(modes.omega2[:COUNT] / pencil[3][0][:COUNT]) - 1
+    n = len(pencil[3][0])
+    ratio = (pencil[3][0][:COUNT] / pencil[3][0][n // 2 : n // 2 + COUNT]) ** 2
+    assert (after < 1.1 * before * ratio + 1e-12).all()
+    assert_allclose(modes.X.T @ pencil[2] @ modes.X, np.eye(COUNT + 3), rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("count", [0, 1, 16, 17, 300])
+def test_the_highest_modes_stand_alone_and_no_group_is_smaller_than_one_above(count):
+    of_mode = groups(count)
+    assert len(of_mode) == count
+    sizes = np.bincount(of_mode)
+    assert (np.diff(of_mode) <= 0).all()
+    assert (sizes[:16] == 1).all()
+    assert (np.diff(sizes)[: len(sizes) - 2] >= 0).all()
+    assert_array_equal(np.unique(of_mode), np.arange(len(sizes)))
