@@ -10,10 +10,11 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.discrete.bodies import CentralBody
+from floatframe.discrete.contacts import V_0
 from floatframe.discrete.kernels.records import N_BLOCKS, Discrete, Pattern, StepWork
 from floatframe.discrete.system import DiscreteSystem
-from floatframe.joints.rows import is_held_length
-from floatframe.kernels.model import STIFFNESS, Model
+from floatframe.joints.rows import is_held_length, is_held_velocity
+from floatframe.kernels.model import CONTACT, STIFFNESS, Model
 from floatframe.kernels.records import filled, measured, zeros
 from floatframe.kernels.work import Work, sizes_of
 from floatframe.start.initial import has_normal_friction
@@ -74,12 +75,15 @@ def pattern_of(ds: DiscreteSystem) -> tuple[Pattern, dict[str, int]]:
     unknowns = [np.arange(u0[i], u0[i + 1]) for i in range(n_b)]
     near: list[set[int]] = [{i} for i in range(n_b)]
     for c in ds.connections:
-        bodies = {m.body for m in (c.a, c.b)} - {-1}
+        bodies = set(c.bodies)
         together = set(bodies)
-        if c.held:
-            together.add(len(unknowns))
-            unknowns.append(int(u0[-1]) + c.first + np.arange(len(c.held)))
-            near.append(set())
+        multipliers = int(u0[-1]) + c.first + np.arange(len(c.held))
+        states = int(u0[-1]) + ds.n_held + c.first_state + np.arange(len(c.states))
+        for own in (multipliers, states):
+            if len(own):
+                together.add(len(unknowns))
+                unknowns.append(own)
+                near.append(set())
         for block in together:
             near[block] |= together
     rows = [np.concatenate([unknowns[k] for k in sorted(blocks)]) for blocks in near]
@@ -132,17 +136,21 @@ def discrete_of(ds: DiscreteSystem, scheme: int, h: float, rho_inf: float) -> tu
         scale[own] = ds.length * np.sqrt(mass / weight[own])
         center[kinds[i]], is_bent[kinds[i]] = body.S, body.K_t is not None
     held = np.array([k for c in ds.connections for k in c.held], dtype=np.int64)
-    of_multipliers = mass * ds.length * np.where(is_held_length(model.rows.kind[held]), 1.0, ds.length)
+    is_length = is_held_length(model.rows.kind[held]) | is_held_velocity(model.rows.kind[held])
+    of_multipliers = mass * ds.length * np.where(is_length, 1.0, ds.length)
+    of_states = np.maximum(model.states.size, np.abs(model.states.start))
     markers = [(end.body, end.turns) for end in ds.markers]
     sizes_of_markers = [ds.bodies[body].n if body >= 0 else 0 for body, _ in markers]
     weighted = [modal_weight(model, i) * modal_matrix(model, i, STIFFNESS) for i in range(len(ds.bodies))]
-    scale = np.concatenate([scale, of_multipliers])
+    row_scale = np.concatenate([scale, of_multipliers]) / (mass * ds.length**2)
+    scale = np.concatenate([scale, of_multipliers, of_states])
     made = filled(
         Discrete(), scheme=scheme, center=center, is_bent=is_bent, is_filtered=int(rho_inf < 1.0),
         is_loaded=int(does_work(model)), blocks=blocks, block0=block0, turns=[turns for _, turns in markers],
         psi0=np.cumsum([0, *sizes_of_markers])[:-1], first=[*(c.first for c in ds.connections), ds.n_held], row=held,
-        weight=weight, scale=scale, row_scale=scale / (mass * ds.length**2),
-        delta=np.concatenate([delta, SMALL * of_multipliers]), is_linear=int(not has_normal_friction(model)),
+        weight=weight, scale=scale, row_scale=np.concatenate([row_scale, 1.0 / of_states]),
+        delta=np.concatenate([delta, SMALL * of_multipliers, SMALL * of_states]), remembered=remembered_rows(model),
+        is_linear=int(not has_normal_friction(model)),
         weighted=np.concatenate([*(part.ravel() for part in weighted), np.zeros(0)]),
         weighted0=np.cumsum([0, *(part.size for part in weighted)])[:-1], pattern=pattern,
     )  # fmt: skip
@@ -152,12 +160,22 @@ def discrete_of(ds: DiscreteSystem, scheme: int, h: float, rho_inf: float) -> tu
 def does_work(model: Model) -> bool:
     """Whether something but potentials and modal damping does work."""
     springs = model.springs
-    counts = (model.loads.marker, model.body_loads.body, model.joint_forces.motor)
+    counts = (
+        model.loads.marker, model.body_loads.body, model.joint_forces.motor, model.contacts.stiffness,
+        model.users.n_forces,
+    )  # fmt: skip
     return (
         any(len(each) for each in counts)
         or bool(springs.damping.any() or (springs.table >= 0).any())
+        or bool(model.bushings.damping.any() or (model.bushings.table >= 0).any())
         or bool((model.rows.motion >= 0).any())
     )
+
+
+def remembered_rows(model: Model) -> IntArray:
+    """Return the rows of the memory that connections remember from step to step."""
+    contacts = model.connections.w0[:-1][model.connections.law == CONTACT] + V_0
+    return np.concatenate([model.coordinates.row, model.states.row, model.states.row + 1, contacts]).astype(np.int64)
 
 
 def new_step_work(model: Model, discrete: Discrete, sizes: dict[str, int]) -> StepWork:

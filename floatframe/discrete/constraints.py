@@ -13,7 +13,8 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.discrete.functions import value_of
 from floatframe.discrete.markers import Load, MarkerStep
-from floatframe.joints.rows import DISTANCE, DOT, POINT, SCREW, SLIDE, TURN, kind_of
+from floatframe.joints.rows import DISTANCE, DOT, POINT, SCREW, SLIDE, TURN, TURN_B, kind_of
+from floatframe.joints.rows.kinds import EQUAL_TURN
 from floatframe.kernels.model import Model
 from floatframe.rotations import dot
 
@@ -26,6 +27,7 @@ __all__ = [
     "angle_loads",
     "constraint_value",
     "end_angle",
+    "held",
     "is_driven",
     "rate_in_time",
     "reaction_direction",
@@ -37,10 +39,15 @@ Loads = tuple[Load | None, Load | None]
 
 
 class Span:
-    """The times of a step: at its ends, and where its forces are taken."""
+    """The times of a step, at its ends and where its forces are taken; and what connections remember there.
 
-    def __init__(self, t_0: float, t_1: float, t_force: float) -> None:
+    w, (n_w,): in the rows of coordinates their values, angles counted through full turns; of states; of the speeds of
+    approach of contacts. Of other rows it is not read.
+    """
+
+    def __init__(self, t_0: float, t_1: float, t_force: float, w: Array | None = None) -> None:
         self.t_0, self.t_1, self.t_force = t_0, t_1, t_force
+        self.w = np.zeros(0) if w is None else w
 
     @property
     def h(self) -> float:
@@ -59,8 +66,8 @@ def held(model: Model, k: int, t: float) -> float:
 
 
 def turn_direction(model: Model, k: int, t: float) -> Array:
-    """Return the direction of marker A of a prescribed angle at time t."""
-    angle = held(model, k, t)
+    """Return the direction of marker A (TURN_B: of B, from where A turns back) of a prescribed angle at time t."""
+    angle = held(model, k, t) * (-1 if int(model.rows.kind[k]) == TURN_B else 1)
     return math.cos(angle) * model.rows.x[k] + math.sin(angle) * model.rows.z[k]
 
 
@@ -81,8 +88,12 @@ def constraint_value(model: Model, k: int, pair: Pair, span: Span) -> Array:
         along, angle = dot(a.ends(slide_axis(model, k))[1], d), end_angle(model, k, pair)
         turns = np.floor((np.real(along) / slope - np.real(angle)) / (2 * np.pi) + 0.5)
         return along - slope * (angle + 2 * np.pi * turns)
-    if kind == TURN:
-        return dot(a.ends(turn_direction(model, k, span.t_1))[1], b.ends(y)[1])
+    if kind == EQUAL_TURN:
+        one = dot(a.ends(x)[1], b.ends(model.rows.u[k])[1])
+        return one - dot(a.ends(model.rows.z[k])[1], b.ends(y)[1])
+    if kind in (TURN, TURN_B):
+        holder, other = (a, b) if kind == TURN else (b, a)
+        return dot(holder.ends(turn_direction(model, k, span.t_1))[1], other.ends(y)[1])
     assert kind == DOT
     return dot(a.ends(x)[1], b.ends(y)[1]) - float(model.rows.c[k])
 
@@ -100,7 +111,20 @@ def add_reaction(model: Model, k: int, pair: Pair, loads: Loads, span: Span, f: 
         if kind == SCREW:
             angle_loads(model, k, pair, loads, -float(model.rows.c[k]) * f)
         return
-    e = turn_direction(model, k, span.t_force) if kind == TURN else x
+    if kind == TURN_B:
+        add_product(pair[::-1], loads[::-1], turn_direction(model, k, span.t_force), y, f)
+    elif kind == TURN:
+        add_product(pair, loads, turn_direction(model, k, span.t_force), y, f)
+    elif kind == EQUAL_TURN:
+        add_product(pair, loads, x, model.rows.u[k], f)
+        add_product(pair, loads, model.rows.z[k], y, -f)
+    else:
+        add_product(pair, loads, x, y, f)
+
+
+def add_product(pair: Pair, loads: Loads, e: Array, y: Array, f: Array) -> None:
+    """Add the loads of f times the product of direction e of the first marker and y of the second."""
+    a, b = pair
     (E_0, E_1), (D_0, D_1) = a.ends(e), b.ends(y)
     a.add_direction(loads[0], e, f[..., None] * 0.5 * (D_0 + D_1))
     b.add_direction(loads[1], y, f[..., None] * 0.5 * (E_0 + E_1))
@@ -136,8 +160,9 @@ def rate_in_time(model: Model, k: int, pair: Pair, t: float) -> float:
     if kind == DISTANCE:
         d = b.x_1 - a.x_1
         return -0.5 * rate * (float(d @ d) / value**2 + 1)
-    turning = math.cos(value) * model.rows.z[k] - math.sin(value) * model.rows.x[k]
-    return rate * float(a.ends(turning)[1] @ b.ends(model.rows.y[k])[1])
+    sense, (holder, other) = (-1, (b, a)) if kind == TURN_B else (1, (a, b))
+    turning = math.cos(value) * model.rows.z[k] - sense * math.sin(value) * model.rows.x[k]
+    return sense * rate * float(holder.ends(turning)[1] @ other.ends(model.rows.y[k])[1])
 
 
 def end_angle(model: Model, k: int, pair: Pair) -> Array:

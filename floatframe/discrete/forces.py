@@ -11,7 +11,8 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.discrete.bodies import BodyStep, CentralBody
-from floatframe.discrete.constraints import Loads, Pair, Span, angle_change, angle_loads, end_angle, slip_change
+from floatframe.discrete.constraints import Loads, Pair, Span
+from floatframe.discrete.coordinates import add_coordinate_force, add_pair, coordinate_change, coordinate_ends
 from floatframe.discrete.functions import along_imaginary, value_of
 from floatframe.discrete.markers import Load, MarkerStep
 from floatframe.joints.rows import kind_of
@@ -52,12 +53,6 @@ def spring_load(model: Model, c: int, pair: Pair, loads: Loads, span: Span) -> G
     return Given(given, damping * change**2 / span.h)
 
 
-def add_pair(pair: Pair, loads: Loads, F: Array) -> None:
-    """Add a force on B and its opposite on A."""
-    pair[1].add_force(loads[1], F)
-    pair[0].add_force(loads[0], -F)
-
-
 def point_load(model: Model, k: int, marker: MarkerStep, load: Load | None, span: Span) -> Given:
     """Add load k, fixed in space or in its marker."""
     factor = value_of(model, int(model.loads.factor[k]), span.t_force)[0] if model.loads.factor[k] >= 0 else 1.0
@@ -96,17 +91,10 @@ def body_load(model: Model, k: int, body: CentralBody, step: BodyStep, load: Loa
 
 
 def coordinate_load(model: Model, k: int, pair: Pair, loads: Loads, span: Span, normal: Array) -> Given:
-    """Add the forces along the coordinate of row k (PUSH or TWIST); normal: force in the joint across its axis."""
+    """Add the forces along the coordinate of row k (PUSH, TWIST, TWIST_B); normal: force in the joint across it."""
     is_angle = kind_of(model.rows.kind[k]).is_angle
-    if is_angle:
-        change = angle_change(model, k, pair)
-        end = end_angle(model, k, pair)
-        begin = end - change if has_two_ends(pair) else end
-    else:
-        change, E, d = slip_change(model, k, pair)
-        x = model.rows.x[k]
-        begin = dot(pair[0].ends(x)[0], pair[1].x_0 - pair[0].x_0)
-        end = dot(pair[0].ends(x)[1], pair[1].x_1 - pair[0].x_1)
+    change = coordinate_change(model, k, pair)
+    begin, end = coordinate_ends(model, k, pair)
     rate = change / span.h
     Q, given, taken = 0.0 * rate, 0.0 * rate, 0.0 * rate
     for i in range(int(model.rows.force0[k]), int(model.rows.force1[k])):
@@ -125,14 +113,5 @@ def coordinate_load(model: Model, k: int, pair: Pair, loads: Loads, span: Span, 
         Q = Q + entering - f.stiffness[i] * mean - resisting
         given = given + entering * change
         taken = taken + resisting * change
-    if is_angle:
-        angle_loads(model, k, pair, loads, Q)
-    else:
-        add_pair(pair, loads, Q[..., None] * E)
-        pair[0].add_direction(loads[0], model.rows.x[k], Q[..., None] * d)
+    add_coordinate_force(model, k, pair, loads, Q)
     return Given(given, taken)
-
-
-def has_two_ends(pair: Pair) -> bool:
-    """Whether the two ends of the step are two configurations."""
-    return any(m.step is not None and m.step.R_0 is not m.step.R_1 for m in pair)

@@ -2,7 +2,7 @@
 
 Unknowns are the increments x = (d, theta, dq) of the bodies and mu = h²/2 f, f the multipliers of the joints; equations
 of motion are multiplied by h/2, so that the matrix stays well-conditioned as h falls. Residuals of a body, or of a
-joint and its two bodies, are taken for a stack of complex arguments, one along each unknown: their imaginary parts
+connection and its bodies, are taken for a stack of complex arguments, one along each unknown: their imaginary parts
 are the derivatives, exact to rounding.
 """
 
@@ -17,11 +17,11 @@ from scipy.sparse.linalg import splu
 
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.discrete.bodies import BodyStep, CentralBody, Placed, step_of
-from floatframe.discrete.constraints import Span, add_reaction
-from floatframe.discrete.markers import BodyMarker, Load, MarkerStep, marker_step
-from floatframe.discrete.system import Connection, DiscreteSystem
+from floatframe.discrete.constraints import Span
+from floatframe.discrete.markers import Load, marker_step
+from floatframe.discrete.system import Connection, DiscreteSystem, Ends
 
-__all__ = ["Scheme", "Solution", "StepError", "generalised_force", "pair_of", "solve_step", "work_of"]
+__all__ = ["Scheme", "Solution", "StepError", "ends_of", "generalised_force", "remembered", "solve_step", "work_of"]
 
 TINY = 1e-20  #: of the imaginary parts
 SLOW = 0.1  #: ratio of corrections above which the derivatives are made anew
@@ -57,10 +57,11 @@ class StepError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Increments and multipliers of a step."""
+    """Increments, multipliers and changes of states of a step."""
 
     x: list[Array]  #: of each body, (6 + n,)
     f: Array  #: (n_held,)
+    dz: Array  #: changes of states, (n_states,)
     n_iterations: int
 
 
@@ -82,11 +83,10 @@ def empty_load(n: int, x: Array) -> Load:
     return Load(n, x.shape[:-1], x.dtype.type)
 
 
-def pair_of(
-    connection: Connection, steps: tuple[BodyStep | None, BodyStep | None]
-) -> tuple[MarkerStep, MarkerStep]:  # fmt: skip
-    """Return the markers of a connection over a step."""
-    return marker_step(connection.a, steps[0]), marker_step(connection.b, steps[1])
+def ends_of(ds: DiscreteSystem, connection: Connection, steps: dict[int, BodyStep], loads: dict[int, Load]) -> Ends:
+    """Return the markers of a connection over a step, and the loads on their bodies, by the numbers of bodies."""
+    markers = [marker_step(marker, steps.get(marker.body)) for marker in connection.ends]
+    return Ends(markers, [loads.get(marker.body) for marker in connection.ends])
 
 
 def body_residual(ds: DiscreteSystem, scheme: Scheme, i: int, place: Placed, span: Span, x: Array) -> Array:
@@ -101,39 +101,36 @@ def connection_residual(
     ds: DiscreteSystem, scheme: Scheme, connection: Connection, placed: list[Placed], span: Span, z: Array
 ) -> Array:
     """Return what a connection adds to its bodies, and its rows, for z = (x of A, x of B, mu), (..., n)."""
-    ends: list[tuple[BodyMarker, Array | None]] = []
+    x: dict[int, Array] = {}
     first = 0
-    for marker in (connection.a, connection.b):
-        size = 6 + ds.bodies[marker.body].n if marker.body >= 0 else 0
-        ends.append((marker, z[..., first : first + size] if size else None))
+    for i in connection.bodies:
+        size = 6 + ds.bodies[i].n
+        x[i] = z[..., first : first + size]
         first += size
-    mu = z[..., first:]
-    loads, where = [], []
-    for marker, x in ends:
-        loads.append(None if x is None else empty_load(ds.bodies[marker.body].n, x))
-        where.append(None if x is None else scheme.force_step(placed[marker.body], x))
-    pair = pair_of(connection, (where[0], where[1]))
-    ds.connection_loads(connection, pair, (loads[0], loads[1]), span, 2 * mu / span.h**2)
-    out = [
-        -0.5 * span.h**2 * generalised_force(scheme, placed[marker.body], x, load)
-        for (marker, x), load in zip(ends, loads, strict=True)
-        if x is not None and load is not None
-    ]
+    n_held = len(connection.held)
+    mu, dz = z[..., first : first + n_held], z[..., first + n_held :]
+    loads = {i: empty_load(ds.bodies[i].n, x[i]) for i in x}
+    ends = ends_of(ds, connection, {i: scheme.force_step(placed[i], x[i]) for i in x}, loads)
+    ds.connection_loads(connection, ends, span, 2 * mu / span.h**2, dz, is_middle=scheme.acts_along)
+    out = [-0.5 * span.h**2 * generalised_force(scheme, placed[i], x[i], load) for i, load in loads.items()]
+    if not scheme.acts_along:
+        ends = ends_of(ds, connection, {i: step_of(placed[i], x[i]) for i in x}, {})
     if connection.held:
-        if not scheme.acts_along:
-            steps = [None if x is None else step_of(placed[marker.body], x) for marker, x in ends]
-            pair = pair_of(connection, (steps[0], steps[1]))
-        values = ds.values(connection, pair, span)
+        values = [ds.value(connection, k, ends, span) for k in connection.held]
+        values = [np.broadcast_to(value, mu.shape[:-1]) for value in values]
         out.append(np.stack(values, axis=-1) + ds.model.rows.soft[list(connection.held)] * mu)
+    if connection.states:
+        out.append(ds.state_residual(connection, ends, span, dz))
     return np.concatenate(out, axis=-1)
 
 
 def unknowns_of(ds: DiscreteSystem, connection: Connection) -> IntArray:
     """Return the numbers of the unknowns of a connection."""
-    parts = [np.arange(ds.model.bodies.u0[m.body], ds.model.bodies.u0[m.body + 1]) for m in (connection.a, connection.b)
-             if m.body >= 0]  # fmt: skip
+    parts = [np.arange(ds.model.bodies.u0[i], ds.model.bodies.u0[i + 1]) for i in connection.bodies]
     n_u = int(ds.model.bodies.u0[-1])
-    return np.concatenate([*parts, n_u + connection.first + np.arange(len(connection.held))])
+    multipliers = n_u + connection.first + np.arange(len(connection.held))
+    states = n_u + ds.n_held + connection.first_state + np.arange(len(connection.states))
+    return np.concatenate([*parts, multipliers, states])
 
 
 def assemble(
@@ -195,14 +192,16 @@ def solve_step(
     """
     h, n_u = span.h, int(ds.model.bodies.u0[-1])
     weight, floor = np.zeros(n_u), 0.0
-    z = np.zeros(n_u + ds.n_held)
+    z = np.zeros(n_u + ds.n_held + ds.n_states)
     for i, (body, place) in enumerate(zip(ds.bodies, placed, strict=True)):
         u = slice(int(ds.model.bodies.u0[i]), int(ds.model.bodies.u0[i + 1]))
         z[u] = h * np.concatenate([place.v, place.omega, place.q_dot])
         modal = np.diag(body.M) + 0.25 * h**2 * np.diag(body.K)
         weight[u] = np.concatenate([np.full(3, body.m), np.diag(body.J0), modal])
         floor += body.m * (ds.length + np.abs(place.c).sum()) ** 2
-    z[n_u:] = 0.5 * h**2 * f
+    n_mu = n_u + ds.n_held
+    z[n_u:n_mu] = 0.5 * h**2 * f
+    known = span.w[[k for c in ds.connections for k in c.states]]
     fall = 0.5 * h**2 * np.linalg.norm(ds.model.gravity) * np.sqrt(sum(body.m for body in ds.bodies))
     last, solver, excess = np.inf, None, np.inf
     for iteration in range(max_iterations):
@@ -220,10 +219,12 @@ def solve_step(
         if not np.isfinite(norm):
             raise StepError("Newton's method diverged", np.inf)
         allowed = tolerance * (size + fall) + ROUNDOFF * np.sqrt(floor)
+        of_states = np.abs(change[n_mu:]) / (np.abs(known) + np.abs(z[n_mu:]) + ds.model.states.size)
+        norm = max(norm, float(of_states.max(initial=0.0)) * allowed / tolerance)
         excess = norm / allowed
         if norm <= allowed or (norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2):
             x = [z[ds.model.bodies.u0[i] : ds.model.bodies.u0[i + 1]] for i in range(len(placed))]
-            return Solution(x, 2 * z[n_u:] / h**2, iteration + 1)
+            return Solution(x, 2 * z[n_u:n_mu] / h**2, z[n_mu:], iteration + 1)
         if norm > SLOW * last:
             solver = None
         last = norm
@@ -244,20 +245,25 @@ def work_of(
         given += float(ds.own_loads(i, steps[i], load, span).given)
         dq = solution.x[i][6:]
         taken += float(dq @ body.D @ dq) / span.h
+    of_bodies = dict(enumerate(steps))
     for connection in ds.connections:
-        pair = pair_of(connection, tuple(steps[m.body] if m.body >= 0 else None
-                                         for m in (connection.a, connection.b)))  # type: ignore[arg-type]  # fmt: skip
-        sizes = [ds.bodies[m.body].n if m.body >= 0 else 0 for m in (connection.a, connection.b)]
         f = solution.f[connection.first : connection.first + len(connection.held)]
-        loads = (Load(sizes[0], (), float), Load(sizes[1], (), float))
-        part = ds.connection_loads(connection, pair, loads, span, f)
+        dz = solution.dz[connection.first_state : connection.first_state + len(connection.states)]
+        loads = {i: Load(ds.bodies[i].n, (), float) for i in connection.bodies}
+        ends = ends_of(ds, connection, of_bodies, loads)
+        part = ds.connection_loads(connection, ends, span, f, dz, is_middle=scheme.acts_along)
         given, taken = given + float(part.given), taken + float(part.taken)
         driven = f * (ds.model.rows.motion[list(connection.held)] >= 0)
         if driven.any():
-            loads = (Load(sizes[0], (), float), Load(sizes[1], (), float))
+            loads = {i: Load(ds.bodies[i].n, (), float) for i in connection.bodies}
+            ends = ends_of(ds, connection, of_bodies, loads)
             for j, k in enumerate(connection.held):
-                add_reaction(ds.model, k, pair, loads, span, driven[j])
-            for load, marker in zip(loads, (connection.a, connection.b), strict=True):
-                if marker.body >= 0:
-                    given += float(load.work(steps[marker.body]))
+                ds.add_row(connection, k, ends, span, driven[j])
+            given += sum(float(load.work(steps[i])) for i, load in loads.items())
     return given, taken
+
+
+def remembered(ds: DiscreteSystem, placed: list[Placed], span: Span, solution: Solution) -> Array:
+    """Return what connections remember at the end of a step, (n_w,)."""
+    steps = {i: step_of(place, x) for i, (place, x) in enumerate(zip(placed, solution.x, strict=True))}
+    return ds.remembered([ends_of(ds, connection, steps, {}) for connection in ds.connections], span, solution.dz)

@@ -5,34 +5,70 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.compiling.system import compiled_system
+from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.discrete.bodies import BodyStep, CentralBody, central_bodies
-from floatframe.discrete.constraints import Loads, Pair, Span, add_reaction, constraint_value, reaction_direction
+from floatframe.discrete.bushings import bushing_load
+from floatframe.discrete.constraints import (
+    Loads,
+    Pair,
+    Span,
+    add_reaction,
+    constraint_value,
+    rate_in_time,
+    reaction_direction,
+)
+from floatframe.discrete.contacts import V_0, contact_load, speed_of_approach
+from floatframe.discrete.coordinates import coordinate_ends, counted
+from floatframe.discrete.couplers import add_coupler_reaction, coordinates_of, coupler_value
 from floatframe.discrete.forces import Given, body_load, coordinate_load, point_load, spring_load
-from floatframe.discrete.markers import BodyMarker, Load, body_marker, marker_step
+from floatframe.discrete.functions import value_of
+from floatframe.discrete.markers import BodyMarker, Load, MarkerStep, body_marker, marker_step
+from floatframe.discrete.rolling import add_height_reaction, add_roll_reaction, height_value, roll_value
+from floatframe.discrete.user_forces import element_of, state_rows, user_force_load, user_state_rates
 from floatframe.errors import ModelError
-from floatframe.forces import BodyLoad, Gravity, JointForce, PointForce, SpringDamper
-from floatframe.joints.rows import PUSH, is_held_length, kind_of
-from floatframe.kernels.model import JOINT, Model
+from floatframe.joints.rows import COUPLE, PUSH, RIM_HEIGHT, ROLL, is_held_length, is_held_velocity, kind_of
+from floatframe.kernels.model import BUSHING, CONTACT, COUPLER, ELEMENT, JOINT, USER_FORCE, Model
 from floatframe.kernels.model import SPRING as SPRING_LAW
 from floatframe.rotations import dot
 from floatframe.system import System
 
-__all__ = ["Connection", "DiscreteSystem", "discrete_system"]
-
-KNOWN_FORCES = (BodyLoad, Gravity, JointForce, PointForce, SpringDamper)
+__all__ = ["Connection", "DiscreteSystem", "Ends", "discrete_system"]
 
 
 @dataclass(frozen=True, eq=False)
 class Connection:
-    """A joint or spring-damper between two markers."""
+    """A joint, force or coupler between markers A and B; of couplers and user forces those of each coordinate."""
 
     number: int
-    a: BodyMarker
-    b: BodyMarker
+    ends: tuple[BodyMarker, ...]
     held: tuple[int, ...]  #: rows that hold something
     loaded: tuple[int, ...]  #: rows with forces along their coordinate
     first: int  #: first multiplier
+    states: tuple[int, ...]  #: rows of its states
+    first_state: int  #: number of the first of them among all
+
+    @property
+    def bodies(self) -> tuple[int, ...]:
+        """Numbers of its bodies, each once."""
+        return tuple(sorted({end.body for end in self.ends} - {-1}))
+
+
+@dataclass(frozen=True, eq=False)
+class Ends:
+    """The markers of a connection over a step, and the loads on their bodies."""
+
+    markers: list[MarkerStep]
+    loads: list[Load | None]
+
+    @property
+    def pairs(self) -> list[Pair]:
+        """The markers A and B of each coordinate."""
+        return list(zip(self.markers[::2], self.markers[1::2], strict=True))
+
+    @property
+    def of_loads(self) -> list[Loads]:
+        """The loads of these."""
+        return list(zip(self.loads[::2], self.loads[1::2], strict=True))
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +81,7 @@ class DiscreteSystem:
     loads: tuple[tuple[tuple[int, BodyMarker], ...], ...]  #: point forces on each body: number, marker
     cases: tuple[tuple[int, ...], ...]  #: load cases on each body
     n_held: int
+    n_states: int
     length: float
     markers: tuple[BodyMarker, ...]  #: all
 
@@ -59,13 +96,25 @@ class DiscreteSystem:
             given = given + body_load(self.model, k, body, step, load, span).given
         return Given(given)
 
-    def connection_loads(self, connection: Connection, pair: Pair, loads: Loads, span: Span, f: Array) -> Given:
-        """Add reactions with multipliers f, (..., n_held of it), and the forces of a connection."""
-        model = self.model
-        if model.connections.law[connection.number] == SPRING_LAW:
-            return spring_load(model, connection.number, pair, loads, span)
+    def connection_loads(
+        self, connection: Connection, ends: Ends, span: Span, f: Array, dz: Array, *, is_middle: bool
+    ) -> Given:
+        """Add reactions with multipliers f, (..., n_held of it), and the forces of a connection.
+
+        dz, (..., n_states of it): changes of its states; is_middle: whether forces act in the middle of the step.
+        """
+        model, c = self.model, connection.number
+        law, pair, loads = int(model.connections.law[c]), ends.pairs[0], ends.of_loads[0]
+        if law == SPRING_LAW:
+            return spring_load(model, c, pair, loads, span)
+        if law == BUSHING:
+            return Given(*bushing_load(model, c, pair, loads, span))
+        if law == CONTACT:
+            return Given(0.0, contact_load(model, c, pair, loads, span))
+        if law == USER_FORCE:
+            return Given(user_force_load(model, c, ends.pairs, ends.of_loads, span, dz, is_middle=is_middle))
         for j, k in enumerate(connection.held):
-            add_reaction(model, k, pair, loads, span, f[..., j])
+            self.add_row(connection, k, ends, span, f[..., j])
         given: Array | float = 0.0
         taken: Array | float = 0.0
         for k in connection.loaded:
@@ -74,9 +123,57 @@ class DiscreteSystem:
             given, taken = given + part.given, taken + part.taken
         return Given(given, taken)
 
-    def values(self, connection: Connection, pair: Pair, span: Span) -> list[Array]:
-        """Return the held rows of a connection at the end of a step."""
-        return [constraint_value(self.model, k, pair, span) for k in connection.held]
+    def add_row(self, connection: Connection, k: int, ends: Ends, span: Span, f: Array) -> None:
+        """Add the loads of held row k with multiplier f, (...,)."""
+        kind, pair, loads = int(self.model.rows.kind[k]), ends.pairs[0], ends.of_loads[0]
+        if kind == COUPLE:
+            add_coupler_reaction(self.model, connection.number, ends.pairs, ends.of_loads, f)
+        elif kind == RIM_HEIGHT:
+            add_height_reaction(self.model, k, pair, loads, f)
+        elif kind == ROLL:
+            add_roll_reaction(self.model, k, pair, loads, f)
+        else:
+            add_reaction(self.model, k, pair, loads, span, f)
+
+    def value(self, connection: Connection, k: int, ends: Ends, span: Span) -> Array:
+        """Return held row k of a connection at the end of a step."""
+        kind, pair = int(self.model.rows.kind[k]), ends.pairs[0]
+        if kind == COUPLE:
+            return coupler_value(self.model, connection.number, ends.pairs, span)
+        if kind == RIM_HEIGHT:
+            return height_value(self.model, k, pair)
+        if kind == ROLL:
+            return roll_value(self.model, k, pair)
+        return constraint_value(self.model, k, pair, span)
+
+    def rate_in_time(self, k: int, ends: Ends, t: float) -> float:
+        """Return the rate of held row k at one configuration while nothing moves."""
+        if int(self.model.rows.kind[k]) != COUPLE:
+            return rate_in_time(self.model, k, ends.pairs[0], t)
+        motion = int(self.model.rows.motion[k])
+        return 0.0 if motion < 0 else -float(self.model.rows.x[k, 0]) * value_of(self.model, motion, t)[1]
+
+    def state_residual(self, connection: Connection, ends: Ends, span: Span, dz: Array) -> Array:
+        """Return the equations of the states of a connection for their changes, (..., n_states of it)."""
+        rates = user_state_rates(self.model, connection.number, ends.pairs, span, dz)
+        return dz - span.h * rates
+
+    def remembered(self, ends: list[Ends], span: Span, dz: Array) -> Array:
+        """Return what connections remember at the end of a step, (n_w,), by their ends over it."""
+        model, w = self.model, span.w.copy()
+        for connection, own in zip(self.connections, ends, strict=True):
+            c = connection.number
+            law = int(model.connections.law[c])
+            if law == CONTACT:
+                w[int(model.connections.w0[c]) + V_0] = speed_of_approach(model, c, own.pairs[0], span)
+            if law in (COUPLER, USER_FORCE):
+                element = int(model.connections.item[c]) if law == COUPLER else element_of(model, c)
+                for p, pair in zip(coordinates_of(model, c, element), own.pairs, strict=True):
+                    k = int(model.coordinates.row[p])
+                    w[k] = float(counted(model, k, coordinate_ends(model, k, pair)[1], span.w[k]))
+            for s, k in enumerate(connection.states, start=connection.first_state):
+                w[k] += dz[s]
+        return w
 
 
 def normal_force(model: Model, k: int, connection: Connection, pair: Pair, f: Array, span: Span) -> Array:
@@ -104,28 +201,19 @@ def discrete_system(system: System, scheme: str) -> DiscreteSystem:
     """
     compiled = compiled_system(system)
     model = compiled.model
-    for force in system.forces:
-        if not isinstance(force, KNOWN_FORCES):
-            raise ModelError(f"{scheme}: forces of the kind {type(force).__name__} are not known to it; "
-                             "use generalized-alpha")  # fmt: skip
-    for c, name in enumerate(compiled.connection_names):
-        if model.connections.law[c] not in (JOINT, SPRING_LAW):
-            raise ModelError(f"{scheme}: {name!r} is of a kind that is not known to it; use generalized-alpha")
-        if max(model.markers.line[model.connections.a[c]], model.markers.line[model.connections.b[c]]) >= 0:
-            words = "slides along a deformed line, which is not known to it"
-            raise ModelError(f"{scheme}: {name!r} {words}; use generalized-alpha")
-        if not all(kind_of(k).in_steps for k in model.rows.kind[model.connections.w0[c] : model.connections.w0[c + 1]]):
-            raise ModelError(f"{scheme}: joint {name!r} is of a kind that is not known to it; use generalized-alpha")
+    require_known(compiled, scheme)
     bodies = central_bodies(model, compiled.body_names, scheme)
     markers = tuple(body_marker(model, bodies, m) for m in range(len(model.markers.body)))
-    connections, n_held = [], 0
+    connections, n_held, n_states = [], 0, 0
     for c in range(len(model.connections.size)):
         rows = range(int(model.connections.w0[c]), int(model.connections.w0[c + 1]))
+        law = int(model.connections.law[c])
         held = tuple(k for k in rows if kind_of(model.rows.kind[k]).holds)
-        loaded = tuple(k for k in rows if kind_of(model.rows.kind[k]).is_loaded)
-        a, b = int(model.connections.a[c]), int(model.connections.b[c])
-        connections.append(Connection(c, markers[a], markers[b], held, loaded, n_held))
-        n_held += len(held)
+        loaded = tuple(k for k in rows if kind_of(model.rows.kind[k]).is_loaded and law == JOINT)
+        ends = tuple(markers[m] for m in ends_of(model, c))
+        states = state_rows(model, c) if law == USER_FORCE else ()
+        connections.append(Connection(c, ends, held, loaded, n_held, states, n_states))
+        n_held, n_states = n_held + len(held), n_states + len(states)
     point_forces: list[list[tuple[int, BodyMarker]]] = [[] for _ in bodies]
     cases: list[list[int]] = [[] for _ in bodies]
     for k, m in enumerate(model.loads.marker):
@@ -136,5 +224,32 @@ def discrete_system(system: System, scheme: str) -> DiscreteSystem:
         cases[int(i)].append(k)
     return DiscreteSystem(
         model, bodies, tuple(connections), tuple(map(tuple, point_forces)), tuple(map(tuple, cases)), n_held,
-        compiled.length, markers,
+        n_states, compiled.length, markers,
     )  # fmt: skip
+
+
+def ends_of(model: Model, c: int) -> list[int]:
+    """Return the markers of connection c."""
+    law, item = int(model.connections.law[c]), int(model.connections.item[c])
+    if law not in (COUPLER, USER_FORCE):
+        return [int(model.connections.a[c]), int(model.connections.b[c])]
+    element = item if law == COUPLER else element_of(model, c)
+    own = coordinates_of(model, c, element)
+    return [int(m) for p in own for m in (model.coordinates.a[p], model.coordinates.b[p])]
+
+
+def require_known(compiled: CompiledSystem, scheme: str) -> None:
+    """Raise `ModelError` naming the joint or element that the scheme does not know."""
+    model = compiled.model
+    for c, name in enumerate(compiled.connection_names):
+        kinds = model.rows.kind[model.connections.w0[c] : model.connections.w0[c + 1]]
+        if model.connections.law[c] == ELEMENT:
+            raise ModelError(f"{scheme}: element {name!r} is of a kind that is not known to it; use generalized-alpha")
+        if max(model.markers.line[model.connections.a[c]], model.markers.line[model.connections.b[c]]) >= 0:
+            words = "slides along a deformed line, which is not known to it"
+            raise ModelError(f"{scheme}: {name!r} {words}; use generalized-alpha")
+        if scheme == "Variational" and is_held_velocity(kinds).any():
+            raise ModelError(
+                f"{scheme}: joint {name!r} holds velocities that come from no positions, which no variational "
+                "principle gives; use energy-momentum or generalized-alpha"
+            )

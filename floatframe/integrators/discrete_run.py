@@ -30,6 +30,7 @@ class StepResult:
     f: Array  #: multipliers of the joints, (n_held,)
     work: tuple[float, float]  #: that entered; taken by dampers and friction
     n_iterations: int
+    w: Array  #: what connections remember, (n_w,), see `discrete.constraints.Span`
 
 
 class DiscreteScheme:
@@ -54,7 +55,7 @@ class DiscreteScheme:
 
     def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
         """Return the memory at the beginning, from a state made consistent; `a` holds the multipliers of the joints."""
-        consistent = consistent_motion(system, state, t=t)
+        consistent = consistent_motion(system, state, t=t, known=None if before is None else before.w)
         n_held = discrete_system(system, type(self).__name__).n_held
         carry = Carry(
             consistent.state, consistent.u_dot, np.zeros(n_held), 0.0, consistent.w, np.zeros(2), np.zeros(2)
@@ -69,8 +70,11 @@ class DiscreteScheme:
         """Return the results at the carried state, with accelerations and reactions of the equations of motion."""
         compiled = compiled_system(system)
         work.state.time[...] = t
-        fitting = with_compatible_velocities(compiled, work, carry.state)
-        u_dot, w = solve_accelerations(compiled, work, fitting)
+        work.state.w_start[:] = carry.w
+        work.states.base[:], work.states.rate_base[:] = carry.w[compiled.model.states.row], 0.0
+        work.states.kappa[...], work.states.rho[...] = 0.0, 1.0
+        fitting = with_compatible_velocities(compiled, work, carry.state, carry.w)
+        u_dot, w = solve_accelerations(compiled, work, fitting, carry.w)
         _, rows = observed(system, t, replace(carry, u_dot=u_dot, w=w), work)
         return carry, rows
 
@@ -79,6 +83,7 @@ class DiscreteScheme:
     ) -> tuple[Carry, Rows, int, Failure | None]:
         """Advance by n_steps of size h, the first of them number `first` from t0; see `carry.Integrator`."""
         from floatframe.discrete.kernels.entry import advance_discrete_steps
+        from floatframe.discrete.kernels.newton import NO_ACCELERATION
 
         model = compiled_system(system).model
         ds = discrete_system(system, type(self).__name__)
@@ -93,6 +98,9 @@ class DiscreteScheme:
             model, work, kept.discrete, step, memory, rows, t0=t0, h=h, first=first, n_steps=n_steps, every=every,
             tolerance=self.tolerance, max_iterations=self.max_iterations, length=ds.length,
         )  # fmt: skip
+        if outcome.status == NO_ACCELERATION:  # the memory has gone on to where there is none: the good steps again
+            again = self.advance(system, carry, work, t0=t0, h=h, first=first, n_steps=outcome.n_steps, every=every)
+            return *again[:3], explained(outcome, self.max_iterations)
         memory.h[...] = h
         n_iterations = carry.n_iterations + int(step.n_iterations) - iterations
         after = replace(carry_of(memory, n_iterations), a=step.f_kept.copy(), power=carry.power)
@@ -103,12 +111,14 @@ class DiscreteScheme:
 
 def explained(outcome: Outcome, max_iterations: int) -> Failure | None:
     """Say why a step failed; None if none did."""
-    from floatframe.discrete.kernels.newton import CONVERGED, SINGULAR
+    from floatframe.discrete.kernels.newton import CONVERGED, NO_ACCELERATION, SINGULAR
 
     if outcome.status == CONVERGED:
         return None
     words = f"Newton's method did not converge in {max_iterations} iterations"
-    if outcome.status == SINGULAR:
+    if outcome.status == NO_ACCELERATION:
+        words = "where it ends, constraints depend on each other or a force has no direction: no accelerations"
+    elif outcome.status == SINGULAR:
         words = "the matrix of Newton's method is singular"
     elif not np.isfinite(outcome.excess):
         words = "Newton's method diverged"

@@ -9,7 +9,7 @@ from floatframe.discrete.bodies import BodyStep, CentralBody, Placed, moved, ste
 from floatframe.discrete.compiled import Filter, filter_of
 from floatframe.discrete.constraints import Span
 from floatframe.discrete.kernels.records import CONSERVING
-from floatframe.discrete.newton import solve_step, work_of
+from floatframe.discrete.newton import remembered, solve_step, work_of
 from floatframe.discrete.system import DiscreteSystem
 from floatframe.errors import ModelError
 from floatframe.integrators.discrete_run import DiscreteScheme, StepResult, check_options
@@ -175,4 +175,5 @@ def conserving_step(
     for body, place, x in zip(ds.bodies, placed, solution.x, strict=True):
         omega, q_dot = scheme.rates(body, place, x, h)
         after.append(moved(place, x, 2 * x[:3] / h - place.v, omega, q_dot))
-    return StepResult(after, solution.f, work_of(ds, scheme, placed, span, solution), solution.n_iterations)
+    work, w = work_of(ds, scheme, placed, span, solution), remembered(ds, placed, span, solution)
+    return StepResult(after, solution.f, work, solution.n_iterations, w)

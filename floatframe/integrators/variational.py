@@ -6,10 +6,10 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.discrete.bodies import BodyStep, CentralBody, Placed, moved, still
-from floatframe.discrete.constraints import Span, add_reaction, rate_in_time
+from floatframe.discrete.constraints import Span
 from floatframe.discrete.kernels.records import VARIATIONAL
 from floatframe.discrete.markers import Load
-from floatframe.discrete.newton import Solution, StepError, pair_of, solve_step, work_of
+from floatframe.discrete.newton import Solution, StepError, ends_of, remembered, solve_step, work_of
 from floatframe.discrete.system import DiscreteSystem
 from floatframe.errors import ModelError
 from floatframe.integrators.carry import Carry
@@ -72,14 +72,15 @@ class Variational(DiscreteScheme):
     def one_step(self, ds: DiscreteSystem, placed: list[Placed], span: Span, f: Array) -> StepResult:
         """(1), (2): return the bodies, multipliers and work after a step."""
         scheme = VariationalScheme()
-        begin = Span(span.t_0, span.t_1, span.t_0)
+        begin = Span(span.t_0, span.t_1, span.t_0, span.w)
         solution = solve_step(ds, scheme, placed, begin, f, self.tolerance, self.max_iterations)
         given, taken = work_of(ds, scheme, placed, begin, solution)
-        after, f_after = closed_velocities(ds, placed, span, solution)
-        end = Solution(solution.x, f_after, solution.n_iterations)
-        given_after, taken_after = work_of(ds, scheme, after, Span(span.t_0, span.t_1, span.t_1), end)
+        at_end = Span(span.t_0, span.t_1, span.t_1, remembered(ds, placed, span, solution))
+        after, f_after = closed_velocities(ds, placed, at_end, solution)
+        end = Solution(solution.x, f_after, solution.dz, solution.n_iterations)
+        given_after, taken_after = work_of(ds, scheme, after, at_end, end)
         work = 0.5 * (given + given_after), 0.5 * (taken + taken_after)
-        return StepResult(after, solution.f, work, solution.n_iterations)
+        return StepResult(after, solution.f, work, solution.n_iterations, at_end.w)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,23 +117,22 @@ def interval(body: CentralBody, place: Placed, x: Array, h: float) -> tuple[Arra
 
 
 def closed_velocities(
-    ds: DiscreteSystem, placed: list[Placed], span: Span, solution: Solution
+    ds: DiscreteSystem, placed: list[Placed], end: Span, solution: Solution
 ) -> tuple[list[Placed], Array]:
     """(2): return the bodies at the end of a step with the momenta that close the joints, and the multipliers."""
-    h, model = span.h, ds.model
-    end = Span(span.t_0, span.t_1, span.t_1)
+    h, model = end.h, ds.model
     zeros = [np.zeros_like(x) for x in solution.x]
     moved_to = [moved(place, x, zero[:3], zero[3:6], zero[6:])
                 for place, x, zero in zip(placed, solution.x, zeros, strict=True)]  # fmt: skip
     steps = [still(place, x) for place, x in zip(moved_to, solution.x, strict=True)]
+    at = dict(enumerate(steps))
     loads = [Load(body.n, (), float) for body in ds.bodies]
     nothing = np.zeros(ds.n_held)
     for i, load in enumerate(loads):
         ds.own_loads(i, steps[i], load, end)
     for c in ds.connections:
-        pair = pair_of(c, (at(steps, c.a.body), at(steps, c.b.body)))
-        f = nothing[c.first : c.first + len(c.held)]
-        ds.connection_loads(c, pair, (at(loads, c.a.body), at(loads, c.b.body)), end, f)
+        f, dz = nothing[c.first : c.first + len(c.held)], np.zeros(len(c.states))
+        ds.connection_loads(c, ends_of(ds, c, at, dict(enumerate(loads))), end, f, dz, is_middle=False)
     momenta, masses = [], []
     for body, place, after, x, load in zip(ds.bodies, placed, moved_to, solution.x, loads, strict=True):
         Pi, Y, force = interval(body, place, x, h)
@@ -144,14 +144,14 @@ def closed_velocities(
     n_u = int(model.bodies.u0[-1])
     G, rate = np.zeros((ds.n_held, n_u)), np.zeros(ds.n_held)
     for c in ds.connections:
-        pair = pair_of(c, (at(steps, c.a.body), at(steps, c.b.body)))
         for j, k in enumerate(c.held, start=c.first):
-            parts = [Load(body.n, (), float) for body in ds.bodies]
-            add_reaction(model, k, pair, (at(parts, c.a.body), at(parts, c.b.body)), end, np.array(1.0))
-            for i in {c.a.body, c.b.body} - {-1}:
-                own = np.concatenate([parts[i].force, moved_to[i].R.T @ parts[i].torque, parts[i].modal])
+            parts = {i: Load(ds.bodies[i].n, (), float) for i in c.bodies}
+            ends = ends_of(ds, c, at, parts)
+            ds.add_row(c, k, ends, end, np.array(1.0))
+            for i, part in parts.items():
+                own = np.concatenate([part.force, moved_to[i].R.T @ part.torque, part.modal])
                 G[j, model.bodies.u0[i] : model.bodies.u0[i + 1]] = own
-            rate[j] = rate_in_time(model, k, pair, span.t_1)
+            rate[j] = ds.rate_in_time(k, ends, end.t_1)
     u, X = np.zeros(n_u), np.zeros((n_u, ds.n_held))
     for i, (M, p) in enumerate(zip(masses, momenta, strict=True)):
         rows = slice(int(model.bodies.u0[i]), int(model.bodies.u0[i + 1]))
@@ -169,11 +169,6 @@ def closed_velocities(
         own = u[model.bodies.u0[i] : model.bodies.u0[i + 1]]
         result.append(moved(place, x, own[:3], own[3:6], own[6:]))
     return result, np.asarray(2 * impulse / h, dtype=float)
-
-
-def at(items: list, i: int):
-    """Return the item of body i, None for the ground."""
-    return items[i] if i >= 0 else None
 
 
 def mass_matrix(body: CentralBody, q: Array) -> Array:

@@ -2,9 +2,15 @@
 
 import math
 
-from floatframe.discrete.kernels.markers import add_direction, add_force, add_moment, ends, turning
-from floatframe.discrete.kernels.rows import angle_change, angle_loads, end_angle, force_of_row, slip_change
-from floatframe.joints.rows.kinds import PUSH, TWIST
+from floatframe.discrete.kernels.coordinates import (
+    add_coordinate_force,
+    add_pair,
+    coordinate_change,
+    coordinate_ends,
+)
+from floatframe.discrete.kernels.markers import add_force, add_moment, ends, turning
+from floatframe.discrete.kernels.rows import force_of_row
+from floatframe.joints.rows.kinds import PUSH
 from floatframe.kernels.body import column
 from floatframe.kernels.compiler.compilation import inner, loops
 from floatframe.kernels.time_function import time_function
@@ -24,13 +30,6 @@ from floatframe.kernels.vector import (
 )
 
 __all__ = ["body_load", "coordinate_load", "normal_force", "point_load", "spring_load"]
-
-
-@inner
-def add_pair(step, a, b, F):
-    """Add a force on B and its opposite on A."""
-    add_force(step, b, F)
-    add_force(step, a, scaled(-1.0, F))
 
 
 @inner
@@ -112,19 +111,10 @@ def normal_force(model, discrete, step, c, k):
 
 @inner
 def coordinate_load(model, discrete, step, k, a, b, normal):
-    """Add the forces along the coordinate of row k (PUSH or TWIST); normal: force in the joint across its axis."""
-    is_angle = model.rows.kind[k] == TWIST
-    E, d = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    x = vector(model.rows.x[k])
-    if is_angle:
-        change = angle_change(model, discrete, step, k, a, b)
-        end = end_angle(model, step, k, a, b)
-        begin = end if step.is_still else end - change
-    else:
-        change, E, d = slip_change(model, discrete, step, x, a, b)
-        E_0, E_1 = ends(step, a, x)
-        begin = dot(E_0, sub(vector(step.x_0[b]), vector(step.x_0[a])))
-        end = dot(E_1, sub(vector(step.x_f[b]), vector(step.x_f[a])))
+    """Add the forces along the coordinate of row k (PUSH, TWIST, TWIST_B); normal: force in the joint across it."""
+    is_angle = model.rows.is_angle[k]
+    change = coordinate_change(model, discrete, step, k, a, b)
+    begin, end = coordinate_ends(model, step, k, a, b, change)
     rate, f = change / step.h, model.joint_forces
     Q, given, taken = 0.0, 0.0, 0.0
     for i in range(model.rows.force0[k], model.rows.force1[k]):
@@ -144,9 +134,5 @@ def coordinate_load(model, discrete, step, k, a, b, normal):
         Q += entering - f.stiffness[i] * mean - resisting
         given += entering * change
         taken += resisting * change
-    if is_angle:
-        angle_loads(model, discrete, step, k, a, b, Q)
-    else:
-        add_pair(step, a, b, scaled(Q, E))
-        add_direction(model, discrete, step, a, x, scaled(Q, d))
+    add_coordinate_force(model, discrete, step, k, a, b, Q)
     return given, taken

@@ -8,20 +8,23 @@ import math
 
 from floatframe.discrete.kernels.band import band_factor, band_solve
 from floatframe.discrete.kernels.bodies import body_inertia, body_step
+from floatframe.discrete.kernels.connections.bushings import bushing_load
+from floatframe.discrete.kernels.connections.contacts import contact_load
+from floatframe.discrete.kernels.connections.user_forces import user_force_load, user_state_residual
+from floatframe.discrete.kernels.held_rows import add_reaction, row_change, row_rate, row_value
 from floatframe.discrete.kernels.loads import body_load, coordinate_load, normal_force, point_load, spring_load
 from floatframe.discrete.kernels.markers import marker_loads, marker_step
-from floatframe.discrete.kernels.rows import add_reaction, row_change, row_rate, row_value
 from floatframe.kernels.compiler.compilation import inner
-from floatframe.kernels.model import SPRING
+from floatframe.kernels.model import BUSHING, CONTACT, JOINT, SPRING, USER_FORCE
 from floatframe.kernels.vector import cross, matrix, norm, put_sum, scaled, sub, turned_back, vector
 
-__all__ = ["CONVERGED", "NOT_CONVERGED", "SINGULAR", "add_loads", "move", "solve"]
+__all__ = ["CONVERGED", "NOT_CONVERGED", "NO_ACCELERATION", "SINGULAR", "add_loads", "move", "solve"]
 
 SLOW = 0.25  # ratio of corrections above which the derivatives are made anew
 MANY = 7  # iterations of a step after which the next one starts with new factors
 LEFT = 1e-2  # of what a correction may be, what is left after it may be: the factors are not those of the iterate
 ROUNDOFF = 2e-15  # of a position
-CONVERGED, NOT_CONVERGED, SINGULAR = range(3)
+CONVERGED, NOT_CONVERGED, SINGULAR, NO_ACCELERATION = range(4)
 
 
 @inner
@@ -36,7 +39,7 @@ def move(model, discrete, step):
 
 
 @inner
-def add_loads(model, discrete, step):
+def add_loads(model, work, discrete, step):
     """Add all forces but reactions to the loads on markers and bodies, and sum their work over the step."""
     given, taken = 0.0, 0.0
     for i in range(model.bodies.kind.shape[0]):
@@ -47,21 +50,37 @@ def add_loads(model, discrete, step):
     for k in range(model.body_loads.body.shape[0]):
         given += body_load(model, discrete, step, k)
     for c in range(model.connections.size.shape[0]):
-        a, b = model.connections.a[c], model.connections.b[c]
-        if model.connections.law[c] == SPRING:
-            of_spring, of_damper = spring_load(model, step, c)
-            given += of_spring
-            taken += of_damper
-            continue
-        for k in range(model.connections.w0[c], model.connections.w0[c + 1]):
-            if model.rows.is_loaded[k]:
-                normal = 0.0
-                if has_normal(model.joint_forces, model.rows.force0[k], model.rows.force1[k]):
-                    normal = normal_force(model, discrete, step, c, k)
-                entering, resisting = coordinate_load(model, discrete, step, k, a, b, normal)
-                given += entering
-                taken += resisting
+        entering, resisting = connection_load(model, work, discrete, step, c)
+        given += entering
+        taken += resisting
     step.given, step.taken = given, taken
+
+
+@inner
+def connection_load(model, work, discrete, step, c):
+    """Add the forces of connection c; return the work they give and take."""
+    law = model.connections.law[c]
+    if law == SPRING:
+        return spring_load(model, step, c)
+    if law == BUSHING:
+        return bushing_load(model, discrete, step, c)
+    if law == CONTACT:
+        return 0.0, contact_load(model, discrete, step, c)
+    if law == USER_FORCE:
+        return user_force_load(model, work, discrete, step, c), 0.0
+    given, taken = 0.0, 0.0
+    if law != JOINT:
+        return given, taken
+    for k in range(model.connections.w0[c], model.connections.w0[c + 1]):
+        if model.rows.is_loaded[k]:
+            normal = 0.0
+            if has_normal(model.joint_forces, model.rows.force0[k], model.rows.force1[k]):
+                normal = normal_force(model, discrete, step, c, k)
+            a, b = model.connections.a[c], model.connections.b[c]
+            entering, resisting = coordinate_load(model, discrete, step, k, a, b, normal)
+            given += entering
+            taken += resisting
+    return given, taken
 
 
 @inner
@@ -74,7 +93,7 @@ def has_normal(forces, first, last):
 
 
 @inner
-def write_residual(model, discrete, step):
+def write_residual(model, work, discrete, step):
     """Write the residual at the unknowns."""
     n_u, h = step.load.shape[0], step.h
     c = 0.5 * h * h
@@ -82,17 +101,18 @@ def write_residual(model, discrete, step):
         step.f[j] = step.z[n_u + j] / c
     move(model, discrete, step)
     if not step.is_closing:
-        add_loads(model, discrete, step)
+        add_loads(model, work, discrete, step)
     for connection in range(model.connections.size.shape[0]):
-        a, b = model.connections.a[connection], model.connections.b[connection]
         for j in range(discrete.first[connection], discrete.first[connection + 1]):
             k, soft = discrete.row[j], model.rows.soft[discrete.row[j]] * step.z[n_u + j]
-            add_reaction(model, discrete, step, k, a, b, step.f[j])
+            add_reaction(model, discrete, step, connection, k, step.f[j])
             if step.is_closing:
-                rate = row_rate(model, step, k, a, b, step.t_force)
-                step.residual[n_u + j] = row_change(model, discrete, step, k, a, b) + h * rate + soft
+                rate = row_rate(model, step, connection, k, step.t_force)
+                step.residual[n_u + j] = row_change(model, discrete, step, connection, k) + h * rate + soft
             else:
-                step.residual[n_u + j] = row_value(model, step, k, a, b) + soft
+                step.residual[n_u + j] = row_value(model, step, connection, k) + soft
+        if model.connections.law[connection] == USER_FORCE:
+            write_state_residual(model, work, step, connection)
     for m in range(model.markers.body.shape[0]):
         marker_loads(model, discrete, step, m)
     for i in range(model.bodies.kind.shape[0]):
@@ -108,7 +128,19 @@ def write_residual(model, discrete, step):
 
 
 @inner
-def factorize(model, discrete, step, stage):
+def write_state_residual(model, work, step, c):
+    """Write the equations of the states of connection c; while velocities are closed they do not change."""
+    if not step.is_closing:
+        user_state_residual(model, work, step, c)
+        return
+    u = model.connections.item[c]
+    first = step.load.shape[0] + step.f.shape[0]
+    for s in range(first + model.users.state0[u], first + model.users.state0[u + 1]):
+        step.residual[s] = step.z[s]
+
+
+@inner
+def factorize(model, work, discrete, step, stage):
     """Write the factors of the derivatives of the residual; return whether there are."""
     pattern, A, n = discrete.pattern, step.band[stage], step.z.shape[0]
     below, above = pattern.below, pattern.above
@@ -120,7 +152,7 @@ def factorize(model, discrete, step, stage):
         first, last = pattern.color0[color], pattern.color0[color + 1]
         for e in range(first, last):
             step.z[pattern.column[e]] += discrete.delta[pattern.column[e]]
-        write_residual(model, discrete, step)
+        write_residual(model, work, discrete, step)
         for e in range(first, last):
             j = pattern.column[e]
             step.z[j] -= discrete.delta[j]
@@ -137,9 +169,10 @@ def factorize(model, discrete, step, stage):
 
 
 @inner
-def correct(discrete, step, stage):
-    """Add Newton's correction to the unknowns; return its norm."""
-    pattern, total = discrete.pattern, 0.0
+def correct(model, discrete, step, stage):
+    """Add Newton's correction to the unknowns; return its norm, and write the largest of states over their sizes."""
+    pattern, total, first_state = discrete.pattern, 0.0, step.load.shape[0] + step.f.shape[0]
+    step.state_change = 0.0
     for i in range(step.z.shape[0]):
         step.right[pattern.place[i]] = -discrete.row_scale[i] * step.residual[i]
     band_solve(step.band[stage], step.band_pivot[stage], pattern.below, pattern.above, step.right)
@@ -148,6 +181,10 @@ def correct(discrete, step, stage):
         step.z[i] += change
         if i < discrete.weight.shape[0]:
             total += discrete.weight[i] * change * change
+        elif i >= first_state:
+            s = i - first_state
+            size = abs(step.known[model.states.row[s]]) + abs(step.z[i]) + model.states.size[s]
+            step.state_change = max(step.state_change, abs(change) / size)
     return math.sqrt(total)
 
 
@@ -175,7 +212,7 @@ def smallest(model, step, order):
 
 
 @inner
-def solve(model, discrete, step, order, stage, is_exact):
+def solve(model, work, discrete, step, order, stage, is_exact):
     """Find the unknowns of a step. Return CONVERGED, NOT_CONVERGED or SINGULAR.
 
     is_exact: with derivatives made anew in each iteration that needs them, as far as it goes.
@@ -186,18 +223,19 @@ def solve(model, discrete, step, order, stage, is_exact):
     if is_exact:
         step.is_due[stage] = 1
     for iteration in range(order.max_iterations):
-        write_residual(model, discrete, step)
+        write_residual(model, work, discrete, step)
         if step.is_due[stage]:
-            if not factorize(model, discrete, step, stage):
+            if not factorize(model, work, discrete, step, stage):
                 return SINGULAR
             step.is_due[stage] = 0
-        change = correct(discrete, step, stage)
+        change = correct(model, discrete, step, stage)
         step.n_iterations += 1
         if not math.isfinite(change):
             step.is_due[stage] = 1
             step.excess = math.inf
             return NOT_CONVERGED
         allowed = order.tolerance * size_of(discrete, step) + least
+        change = max(change, step.state_change * allowed / order.tolerance)
         step.excess = change / allowed
         left = change * min(change / last, 1.0)  # what the next correction would be
         is_rounding = change <= 1e3 * allowed and change > 0.5 * last and iteration > 2

@@ -4,6 +4,9 @@
     (3) M u_dot - Jᵀ w = f,    G u_dot = -d(G)/dt u     there
 """
 
+import math
+
+from floatframe.discrete.kernels.memory import keep
 from floatframe.joints.rows.kinds import NOTHING
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.connections.connection import constraint_rates
@@ -58,17 +61,23 @@ def begin(model, work, memory, t):
         work.state.u_dot[k] = 0.0
     for k in range(work.state.w.shape[0]):
         work.state.w[k] = 0.0
-    for s in range(model.states.row.shape[0]):
-        work.state.w[model.states.row[s]] = memory.w[model.states.row[s]]
+    for k in range(work.state.w.shape[0]):
+        work.state.w_start[k] = memory.w[k]
+    work.states.rho = 1.0
+    for s in range(model.states.row.shape[0]):  # they stay, their rates are those of their laws
+        z = memory.w[model.states.row[s]]
+        work.state.w[model.states.row[s]], work.states.base[s] = z, z
+        work.states.kappa[s], work.states.rate_base[s] = 0.0, 0.0
     for p in range(model.coordinates.row.shape[0]):
         work.state.w[model.coordinates.row[p]] = memory.w[model.coordinates.row[p]]
 
 
 @inner
-def observe(model, work, discrete, memory, t, rows):
+def observe(model, work, discrete, step, memory, t, rows):
     """Write the next row of the results, with accelerations and reactions, which the memory learns; whether it could.
 
-    Reactions that friction depends on are found by iteration.
+    Reactions that friction depends on are found by iteration. What connections remember stays as the step left it, so
+    that outputs do not change the motion.
     """
     begin(model, work, memory, t)
     g = work.connections.g
@@ -104,7 +113,15 @@ def observe(model, work, discrete, memory, t, rows):
         if discrete.is_linear or change <= SAME * largest:
             break
     put_in_ground_axes(model, work, memory.u_dot, False)
+    total = 0.0
+    for k in range(memory.u_dot.shape[0]):
+        total += memory.u_dot[k]
+    if not math.isfinite(total):
+        return False
+    for j in range(discrete.remembered.shape[0]):
+        step.known[discrete.remembered[j]] = memory.w[discrete.remembered[j]]
     for k in range(g.shape[0]):
         memory.w[k] = work.state.w[k]
     write_row(model, work, memory, t, rows)
+    keep(discrete, step, memory)
     return True

@@ -1,14 +1,14 @@
 """What the compiled steps know of a system besides its model, and their working arrays.
 
 Sizes as in `kernels.model`, and n_z: unknowns of a step, n_u increments of the bodies (d, theta in the axes of the body
-at the beginning of the step, dq), then n_mu multipliers. Blocks are the bodies and then the connections with
-multipliers.
+at the beginning of the step, dq), then n_mu multipliers, then changes of states. Blocks are the bodies and then the
+connections with multipliers or states.
 """
 
 from typing import NamedTuple
 
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.kernels.model import n_b, n_c, n_m, n_t
+from floatframe.kernels.model import n_b, n_c, n_m, n_t, n_w
 from floatframe.kernels.records import Size, integer, real
 from floatframe.kernels.work import n_most, n_q, n_u
 
@@ -53,6 +53,7 @@ class Discrete(NamedTuple):
     first: IntArray = integer(n_c + 1)  #: multipliers of a connection
     row: IntArray = integer(n_mu)  #: of each multiplier among the rows of the model
     weight: Array = real(n_u, unit="kg, kg m²")  #: of the norm of corrections
+    remembered: IntArray = integer(Size("remembered"))  #: rows of the memory that connections remember
     scale: Array = real(n_z)  #: by which unknowns are scaled in the matrix,
     row_scale: Array = real(n_z)  #: and residuals
     delta: Array = real(n_z)  #: by which unknowns are changed for derivatives
@@ -123,6 +124,11 @@ class StepWork(NamedTuple):
     F: Array = real(n_m, 3, unit="N")
     T: Array = real(n_m, 3, unit="N m")
     m: Array = real(n_m, 3, unit="N m")  #: on the elastic rotation, body axes
+    # connections
+    known: Array = real(n_w)  #: what they remember, in its rows of the memory
+    xi: Array = real(6, unit="m, rad")  #: mean deformations of a bushing,
+    dxi: Array = real(6, unit="m, rad")  #: their changes,
+    xi_force: Array = real(6, unit="N, N m")  #: and the forces that belong to them
     # unknowns
     z: Array = real(n_z)
     residual: Array = real(n_z)
@@ -139,4 +145,5 @@ class StepWork(NamedTuple):
     n_iterations: IntArray = integer()
     n_factors: IntArray = integer()
     excess: Array = real()
+    state_change: Array = real()  #: largest relative correction of a state
     acceleration: Array = real(n_u)  #: change of w over the last step over h, v in body axes; for the start of Newton

@@ -3,13 +3,13 @@
 import math
 
 from floatframe.discrete.kernels.markers import add_direction, add_force, change, ends
-from floatframe.joints.rows.kinds import DISTANCE, DOT, POINT, SCREW, SLIDE, TURN
+from floatframe.joints.rows.kinds import DISTANCE, EQUAL_TURN, POINT, SCREW, SLIDE, TURN, TURN_B
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.time_function import time_function
 from floatframe.kernels.vector import add, cross, dot, scaled, sub, turned, vector
 
-__all__ = ["add_reaction", "angle_change", "angle_loads", "end_angle", "force_of_row", "row_change", "row_rate",
-           "row_value", "slip_change"]  # fmt: skip
+__all__ = ["add_reaction", "angle_change", "angle_loads", "angle_of", "end_angle", "force_of_row", "held",
+           "mean_direction", "mean_distance", "row_change", "row_rate", "row_value", "slip_change"]  # fmt: skip
 
 
 @inner
@@ -23,8 +23,10 @@ def held(model, k, t):
 
 @inner
 def turn_direction(model, k, t):
-    """Return the direction of marker A of a prescribed angle at time t."""
+    """Return the direction of marker A (TURN_B: of B, from where A turns back) of a prescribed angle at time t."""
     angle, _ = held(model, k, t)
+    if model.rows.kind[k] == TURN_B:
+        angle = -angle
     return add(scaled(math.cos(angle), vector(model.rows.x[k])), scaled(math.sin(angle), vector(model.rows.z[k])))
 
 
@@ -78,6 +80,11 @@ def row_value(model, step, k, a, b):
         return along - slope * (angle + 2 * math.pi * turns)
     if kind == TURN:
         return dot(turned(step.A_1[a], turn_direction(model, k, step.t_1)), turned(step.A_1[b], y))
+    if kind == TURN_B:
+        return dot(turned(step.A_1[b], turn_direction(model, k, step.t_1)), turned(step.A_1[a], y))
+    if kind == EQUAL_TURN:
+        U, D = turned(step.A_1[b], vector(model.rows.u[k])), turned(step.A_1[b], y)
+        return dot(turned(step.A_1[a], x), U) - dot(turned(step.A_1[a], vector(model.rows.z[k])), D)
     return dot(turned(step.A_1[a], x), turned(step.A_1[b], y)) - model.rows.c[k]
 
 
@@ -97,7 +104,7 @@ def force_of_row(model, step, k, a, b):
 def add_reaction(model, discrete, step, k, a, b, f):
     """Add the loads of row k with multiplier f: their work is f times the change of the row."""
     kind = model.rows.kind[k]
-    if kind != TURN and kind != DOT:
+    if model.rows.is_length[k]:
         F = scaled(f, force_of_row(model, step, k, a, b))
         if kind == SLIDE or kind == SCREW:
             add_direction(model, discrete, step, a, slide_axis(model, k), scaled(f, mean_distance(step, a, b)))
@@ -106,18 +113,32 @@ def add_reaction(model, discrete, step, k, a, b, f):
         if kind == SCREW:
             angle_loads(model, discrete, step, k, a, b, -model.rows.c[k] * f)
         return
-    e, y = direction_of_a(model, step, k), vector(model.rows.y[k])
+    y = vector(model.rows.y[k])
+    if kind == TURN_B:
+        add_product(model, discrete, step, b, turn_direction(model, k, step.t_force), a, y, f)
+    elif kind == TURN:
+        add_product(model, discrete, step, a, turn_direction(model, k, step.t_force), b, y, f)
+    elif kind == EQUAL_TURN:
+        add_product(model, discrete, step, a, vector(model.rows.x[k]), b, vector(model.rows.u[k]), f)
+        add_product(model, discrete, step, a, vector(model.rows.z[k]), b, y, -f)
+    else:
+        add_product(model, discrete, step, a, vector(model.rows.x[k]), b, y, f)
+
+
+@inner
+def add_product(model, discrete, step, a, e, b, y, f):
+    """Add the loads of f times the product of direction e of marker a and y of marker b."""
     E, D = mean_direction(step, a, e), mean_direction(step, b, y)
     add_direction(model, discrete, step, a, e, scaled(f, D))
     add_direction(model, discrete, step, b, y, scaled(f, E))
 
 
 @inner
-def direction_of_a(model, step, k):
-    """Return the direction of marker A of which a TURN or DOT row speaks."""
-    if model.rows.kind[k] == TURN:
-        return turn_direction(model, k, step.t_force)
-    return vector(model.rows.x[k])
+def product_change(model, discrete, step, a, e, b, y):
+    """Return the change of the product of direction e of marker a and y of marker b."""
+    E, D = mean_direction(step, a, e), mean_direction(step, b, y)
+    dE, dD = change(model, discrete, step, a, e, E), change(model, discrete, step, b, y, D)
+    return dot(dE, D) + dot(E, dD)
 
 
 @inner
@@ -132,10 +153,15 @@ def row_change(model, discrete, step, k, a, b):
         if kind == SCREW:
             slip -= model.rows.c[k] * angle_change(model, discrete, step, k, a, b)
         return slip
-    e, y = direction_of_a(model, step, k), vector(model.rows.y[k])
-    E, D = mean_direction(step, a, e), mean_direction(step, b, y)
-    dE, dD = change(model, discrete, step, a, e, E), change(model, discrete, step, b, y, D)
-    return dot(dE, D) + dot(E, dD)
+    y = vector(model.rows.y[k])
+    if kind == TURN_B:
+        return product_change(model, discrete, step, b, turn_direction(model, k, step.t_force), a, y)
+    if kind == TURN:
+        return product_change(model, discrete, step, a, turn_direction(model, k, step.t_force), b, y)
+    if kind == EQUAL_TURN:
+        one = product_change(model, discrete, step, a, vector(model.rows.x[k]), b, vector(model.rows.u[k]))
+        return one - product_change(model, discrete, step, a, vector(model.rows.z[k]), b, y)
+    return product_change(model, discrete, step, a, vector(model.rows.x[k]), b, y)
 
 
 @inner
@@ -150,9 +176,12 @@ def row_rate(model, step, k, a, b, t):
     if kind == DISTANCE:
         d = sub(vector(step.x_0[b]), vector(step.x_0[a]))
         return -0.5 * rate * (dot(d, d) / (value * value) + 1.0)
-    x, z = vector(model.rows.x[k]), vector(model.rows.z[k])
+    x, y, z = vector(model.rows.x[k]), vector(model.rows.y[k]), vector(model.rows.z[k])
+    if kind == TURN_B:
+        back = add(scaled(math.cos(value), z), scaled(math.sin(value), x))
+        return -rate * dot(turned(step.A_0[b], back), turned(step.A_0[a], y))
     across = sub(scaled(math.cos(value), z), scaled(math.sin(value), x))
-    return rate * dot(turned(step.A_0[a], across), turned(step.A_0[b], vector(model.rows.y[k])))
+    return rate * dot(turned(step.A_0[a], across), turned(step.A_0[b], y))
 
 
 @inner

@@ -1,11 +1,12 @@
 """The steps of the conserving and variational schemes in a compiled loop; formulas in `floatframe.integrators`."""
 
 from floatframe.discrete.kernels.bodies import begin_bodies, end_rates, interval, keep_bodies, move_bodies
+from floatframe.discrete.kernels.held_rows import row_change
 from floatframe.discrete.kernels.markers import begin_markers, marker_loads
-from floatframe.discrete.kernels.newton import CONVERGED, SINGULAR, add_loads, move, solve
+from floatframe.discrete.kernels.memory import keep, recall, remember
+from floatframe.discrete.kernels.newton import CONVERGED, NO_ACCELERATION, add_loads, move, solve
 from floatframe.discrete.kernels.observation import observe
 from floatframe.discrete.kernels.records import CONSERVING, DAMPING
-from floatframe.discrete.kernels.rows import row_change
 from floatframe.kernels.body import block
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.generalized_alpha import load_state
@@ -27,6 +28,8 @@ def guess(model, step):
         put(step.z, u0, add(v, scaled(0.5 * h * h, vector(step.acceleration[u0:]))))
     for j in range(step.f.shape[0]):
         step.z[n_u + j] = 0.5 * h * h * step.f_kept[j]
+    for s in range(model.states.row.shape[0]):
+        step.z[n_u + step.f.shape[0] + s] = h * step.known[model.states.row[s] + 1]
 
 
 @inner
@@ -59,50 +62,52 @@ def work_of_dampers(model, discrete, step):
 def add_drives(model, discrete, step):
     """Add to the work that is given that of prescribed motions: of their multipliers."""
     for c in range(model.connections.size.shape[0]):
-        a, b = model.connections.a[c], model.connections.b[c]
         for j in range(discrete.first[c], discrete.first[c + 1]):
             k = discrete.row[j]
             if model.rows.motion[k] >= 0:
-                step.given += step.f[j] * row_change(model, discrete, step, k, a, b)
+                step.given += step.f[j] * row_change(model, discrete, step, c, k)
 
 
 @inner
 def begin(model, discrete, step, memory):
     """Write what is known where the step begins."""
+    recall(memory, step)
     begin_bodies(model, discrete, step, memory)
     begin_markers(model, discrete, step)
 
 
 @inner
-def solve_both_ways(model, discrete, step, order, stage):
+def solve_both_ways(model, work, discrete, step, order, stage):
     """Find the unknowns with the factors that are kept, or else with new ones in each iteration."""
     guess(model, step)
-    status = solve(model, discrete, step, order, stage, False)
+    status = solve(model, work, discrete, step, order, stage, False)
     if status != CONVERGED:
         guess(model, step)
-        status = solve(model, discrete, step, order, stage, True)
+        status = solve(model, work, discrete, step, order, stage, True)
     return status
 
 
 @inner
-def conserving_step(model, discrete, step, memory, order):
+def conserving_step(model, work, discrete, step, memory, order):
     """Advance the memory by one step of the conserving or decaying scheme; return the status."""
     step.t_force, step.is_still, step.is_closing = 0.5 * (step.t_0 + step.t_1), 0, 0
     begin(model, discrete, step, memory)
-    status = solve_both_ways(model, discrete, step, order, 0)
+    status = solve_both_ways(model, work, discrete, step, order, 0)
     if status != CONVERGED:
         return status
     take_multipliers(step)
     move(model, discrete, step)
     step.given, step.taken = 0.0, 0.0
     if discrete.is_loaded:
-        add_loads(model, discrete, step)
+        add_loads(model, work, discrete, step)
         add_drives(model, discrete, step)
     for i in range(model.bodies.kind.shape[0]):
         end_rates(model, discrete, step, i)
     memory.work_given += step.given
     memory.work_taken += step.taken + work_of_dampers(model, discrete, step)
     learn(model, step)
+    remember(model, step)
+    keep(discrete, step, memory)
     move_bodies(model, step)
     keep_bodies(model, discrete, step, memory)
     return status
@@ -117,21 +122,22 @@ def take_multipliers(step):
 
 
 @inner
-def variational_step(model, discrete, step, memory, order):
+def variational_step(model, work, discrete, step, memory, order):
     """Advance the memory by one step of the variational scheme; return the status."""
     step.t_force, step.is_still, step.is_closing = step.t_0, 1, 0
     h = step.h
     begin(model, discrete, step, memory)
-    status = solve_both_ways(model, discrete, step, order, 0)
+    status = solve_both_ways(model, work, discrete, step, order, 0)
     if status != CONVERGED:
         return status
     take_multipliers(step)
     move(model, discrete, step)
-    add_loads(model, discrete, step)
+    add_loads(model, work, discrete, step)
     add_drives(model, discrete, step)
     dampers = work_of_dampers(model, discrete, step)
     given, taken = step.given, step.taken
     learn_multipliers(step)
+    remember(model, step)
     for i in range(model.bodies.kind.shape[0]):
         interval(model, discrete, step, i)
         put_elastic(model, step, i)
@@ -140,7 +146,7 @@ def variational_step(model, discrete, step, memory, order):
     step.t_force = step.t_1
     step.is_closing = 1
     move(model, discrete, step)
-    add_loads(model, discrete, step)
+    add_loads(model, work, discrete, step)
     for m in range(model.markers.body.shape[0]):
         marker_loads(model, discrete, step, m)
     given, taken = given + step.given, taken + step.taken
@@ -150,8 +156,7 @@ def variational_step(model, discrete, step, memory, order):
         for j in range(discrete.first[c], discrete.first[c + 1]):
             k = discrete.row[j]
             if model.rows.motion[k] >= 0:
-                a, b = model.connections.a[c], model.connections.b[c]
-                step.change[j] = row_change(model, discrete, step, k, a, b)
+                step.change[j] = row_change(model, discrete, step, c, k)
     for i in range(model.bodies.kind.shape[0]):
         u0, n, R = model.bodies.u0[i], model.bodies.n_q[i], matrix(step.R_0[i])
         m, theta, Pi = model.body_types.mass[model.bodies.kind[i]], vector(step.z[u0 + 3 :]), vector(step.P_1[u0 + 3 :])
@@ -161,11 +166,11 @@ def variational_step(model, discrete, step, memory, order):
         put(step.P_0, u0 + 3, add(turning, scaled(0.5 * h, torque)))
         for k in range(u0 + 6, u0 + 6 + n):
             step.P_0[k] = step.P_1[k] + 0.5 * h * (step.elastic[k] + step.load[k])
-    status = solve(model, discrete, step, order, 1, False)
+    status = solve(model, work, discrete, step, order, 1, False)
     if status != CONVERGED:
         for k in range(step.z.shape[0]):
             step.z[k] = 0.0
-        status = solve(model, discrete, step, order, 1, True)
+        status = solve(model, work, discrete, step, order, 1, True)
         if status != CONVERGED:
             return status
     take_multipliers(step)
@@ -182,6 +187,7 @@ def variational_step(model, discrete, step, memory, order):
     learn(model, step)
     for j in range(step.f.shape[0]):
         step.f_kept[j] = step.kept[j]
+    keep(discrete, step, memory)
     keep_bodies(model, discrete, step, memory)
     return status
 
@@ -205,7 +211,8 @@ def put_elastic(model, step, i):
 def advance(model, work, discrete, step, memory, rows, order):
     """Advance by n_steps of size h, the first of them number `first` from t0; keep the state after every `every`-th.
 
-    Return (status, steps done, rows written).
+    Return (status, good steps, rows written). A step is good where its output can be made: after NO_ACCELERATION the
+    memory has gone one step further.
     """
     h = order.h
     step.h = h
@@ -213,16 +220,16 @@ def advance(model, work, discrete, step, memory, rows, order):
     for k in range(order.n_steps):
         step.t_0, step.t_1 = order.t0 + (order.first + k) * h, order.t0 + (order.first + k + 1) * h
         if discrete.scheme == CONSERVING:
-            status = conserving_step(model, discrete, step, memory, order)
+            status = conserving_step(model, work, discrete, step, memory, order)
         else:
-            status = variational_step(model, discrete, step, memory, order)
+            status = variational_step(model, work, discrete, step, memory, order)
         if status != CONVERGED:
             return status, k, work.counted.rows
         count_angles(model, work, memory, h)
         memory.n_accepted += 1
         if (order.first + k + 1) % order.every == 0:
-            if not observe(model, work, discrete, memory, step.t_1, rows):
-                return SINGULAR, k + 1, work.counted.rows
+            if not observe(model, work, discrete, step, memory, step.t_1, rows):
+                return NO_ACCELERATION, k, work.counted.rows
     return CONVERGED, order.n_steps, work.counted.rows
 
 

@@ -115,24 +115,23 @@ class RowKind:
     can_yield: bool = False  #: redundant ones share their load where the system asks for it
     is_loaded: bool = False  #: it carries forces along a coordinate
     is_free: bool = False  #: it leaves a coordinate free, along which a force may act
-    in_steps: bool = False  #: the schemes of discrete steps know it
 
 
 ROW_KINDS = (
-    RowKind(POINT, "closes a point", POSITION, is_length=True, can_yield=True, in_steps=True),
-    RowKind(DOT, "closes an angle", POSITION, can_yield=True, in_steps=True),
-    RowKind(GAUGE, "no force along what is free", is_free=True, in_steps=True),
-    RowKind(SPRING, "force of a spring-damper", in_steps=True),
-    RowKind(TURN, "turns about an axis of A", POSITION, in_steps=True),
-    RowKind(SLIDE, "distance along an axis of A", POSITION, is_length=True, can_yield=True, in_steps=True),
-    RowKind(DISTANCE, "distance of the points", POSITION, is_length=True, in_steps=True),
-    RowKind(SCREW, "distance follows the angle", POSITION, is_length=True, in_steps=True),
-    RowKind(GAUGE_B, "no moment about an axis of B", is_free=True, in_steps=True),
-    RowKind(THREAD, "no work of moment and force of a screw", in_steps=True),
-    RowKind(ARM, "wrenches on A and B balance", in_steps=True),
-    RowKind(ROD, "force along the line of the points", in_steps=True),
-    RowKind(PUSH, "force along a free distance", is_loaded=True, in_steps=True),
-    RowKind(TWIST, "torque about a free angle", is_angle=True, is_loaded=True, in_steps=True),
+    RowKind(POINT, "closes a point", POSITION, is_length=True, can_yield=True),
+    RowKind(DOT, "closes an angle", POSITION, can_yield=True),
+    RowKind(GAUGE, "no force along what is free", is_free=True),
+    RowKind(SPRING, "force of a spring-damper"),
+    RowKind(TURN, "turns about an axis of A", POSITION),
+    RowKind(SLIDE, "distance along an axis of A", POSITION, is_length=True, can_yield=True),
+    RowKind(DISTANCE, "distance of the points", POSITION, is_length=True),
+    RowKind(SCREW, "distance follows the angle", POSITION, is_length=True),
+    RowKind(GAUGE_B, "no moment about an axis of B", is_free=True),
+    RowKind(THREAD, "no work of moment and force of a screw"),
+    RowKind(ARM, "wrenches on A and B balance"),
+    RowKind(ROD, "force along the line of the points"),
+    RowKind(PUSH, "force along a free distance", is_loaded=True),
+    RowKind(TWIST, "torque about a free angle", is_angle=True, is_loaded=True),
     RowKind(RIM_HEIGHT, "a disc touches a plane", POSITION, is_length=True),
     RowKind(ROLL, "the rim does not slip", VELOCITY, is_length=True),
     RowKind(RIM, "the force acts at the rim"),

@@ -17,7 +17,10 @@ from floatframe.kernels.connections.coordinate import (
 )
 from floatframe.kernels.connections.tape import tape_gradient, tape_value
 
-__all__ = ["begin_states", "resize_states", "user_force_derivatives", "user_force_power", "user_force_rows"]
+__all__ = [
+    "begin_states", "element_of", "resize_states", "user_force_derivatives", "user_force_power", "user_force_rows",
+    "user_outputs",
+]  # fmt: skip
 
 STEP = 1e-7  # of differences of users' functions, relative
 LEAST_STEP = 1e-9
@@ -49,8 +52,14 @@ def gather_inputs(model, work, c):
 @inner
 def user_values(model, work, c):
     """Write forces and rates of states into work.users.outputs; return how many coordinates, inputs and outputs."""
-    u = model.connections.item[c]
     n, n_in = gather_inputs(model, work, c)
+    return n, n_in, user_outputs(model, work, c)
+
+
+@inner
+def user_outputs(model, work, c):
+    """Write forces and rates of states for work.users.inputs into work.users.outputs; return how many."""
+    u = model.connections.item[c]
     n_out = model.users.n_forces[u] + model.users.n_states[u]
     if model.users.address[u] != 0:
         call_user_function(model.users.address[u], work.users.inputs, work.users.outputs)
@@ -58,7 +67,7 @@ def user_values(model, work, c):
         for j in range(n_out):
             f = model.users.tape0[u] + j
             work.users.outputs[j] = tape_value(model.tapes, model.functions, f, work.users.inputs, work.tapes)
-    return n, n_in, n_out
+    return n_out
 
 
 @inner

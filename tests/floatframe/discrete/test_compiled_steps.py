@@ -4,31 +4,39 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from fe_models.body.load_cases import ReducedLoadCase
 from floatframe import (
     GROUND,
+    AxialDistance,
     BodyLoad,
+    ConvergenceError,
     EnergyDecaying,
     EnergyMomentum,
     Gravity,
     JointForce,
     Marker,
     PointForce,
+    RigidBody,
     SphericalJoint,
     SpringDamper,
     System,
+    UserForce,
     Variational,
+    integrate,
 )
 from floatframe.compiling.system import compiled_system
 from floatframe.discrete.bodies import placed_bodies, state_of
 from floatframe.discrete.constraints import Span
+from floatframe.discrete.contacts import V_0
 from floatframe.discrete.system import discrete_system
 from floatframe.functions.time_functions import cycloidal_spin_up, harmonic
 from floatframe.functions.time_functions import table as table_function
 from floatframe.joints.rows import POINT
+from floatframe.kernels.model import CONTACT
 from floatframe.kernels.work import new_work
+from tests.floatframe.discrete.systems import CONNECTED, CONTACTS, ROLLING
 from tests.floatframe.integrators.test_conserving import floating_pair
 from tests.floatframe.point_masses import random_point_masses, stiffened_body, stiffness
 
@@ -90,23 +98,53 @@ def test_compiled_steps_are_those_of_the_python_version(kind, name):
     assert_steps_are_those_of_python(SYSTEMS[kind](), SCHEMES[name], name)
 
 
+@pytest.mark.parametrize("kind", [kind for kind in CONNECTED if kind not in ROLLING])
+@pytest.mark.parametrize("name", SCHEMES)
+def test_connections_in_compiled_steps_are_those_of_the_python_version(kind, name):
+    n_steps, h = (6, 0.06) if kind in CONTACTS else (4, 0.04)
+    assert_steps_are_those_of_python(CONNECTED[kind](), SCHEMES[name], name, n_steps, h)
+
+
+@pytest.mark.parametrize("name", ["momentum", "decaying"])
+def test_rolling_in_compiled_steps_is_that_of_the_python_version(name):
+    assert_steps_are_those_of_python(ROLLING["rolling disc"](), SCHEMES[name], name, 4)
+
+
 @pytest.mark.parametrize("name", ["momentum", "decaying"])
 def test_friction_by_the_normal_force_is_that_of_the_python_version(name):
     assert_steps_are_those_of_python(floating_pair("prismatic", RUB), SCHEMES[name], name)
 
 
-def assert_steps_are_those_of_python(system, method, name):
-    """Eight steps, each from where the compiled one before ended: state, multipliers and work.
+@pytest.mark.parametrize("every", [1, 2, 4])
+def test_steps_before_one_whose_end_has_no_accelerations_are_told_with_as_many_rows(every):
+    """A ball flies, in numbers without rounding, to the point where a tiny force is infinite, after four steps."""
+    ball = RigidBody("ball", 1.0, np.eye(3), position=(-1.0, 0, 0), velocity=(1.0, 0, 0))
+    along = AxialDistance(Marker(GROUND), Marker("ball"), (1, 0, 0))
+    system, method = System([ball], [], [UserForce("pull", {"x": along}, {"x": "1e-300/x"})]), EnergyMomentum()
+    carry, work = method.start(system, 0.0), new_work(compiled_system(system).model)
+    after, rows, n_good, failure = method.advance(system, carry, work, t0=0.0, h=0.25, first=0, n_steps=8, every=every)
+    assert failure is not None
+    assert "no accelerations" in failure.words
+    assert n_good == after.n_steps == 3
+    assert_array_equal(rows.t, 0.25 * np.arange(every, 4, every))
+    assert_array_equal(after.state.r, [[-0.25, 0, 0]])
+    with pytest.raises(ConvergenceError, match=r"from t = 0\.75 failed: where it ends") as caught:
+        integrate(system, method, 2.0, 0.25, output_every=every)
+    assert_array_equal(caught.value.trajectory.t, 0.25 * np.arange(0, 4, every))
+
+
+def assert_steps_are_those_of_python(system, method, name, n_steps=8, h=0.04):
+    """Steps, each from where the compiled one before ended: state, multipliers, work, what connections remember.
 
     The multipliers of a point are forces in ground axes there, in axes of a body here: their sizes are the same.
     """
-    h = 0.04
     ds = discrete_system(system, name)
     model = compiled_system(system).model
+    contacts = model.connections.w0[:-1][model.connections.law == CONTACT] + V_0
     carry, work, f = method.start(system, 0.0), new_work(model), np.zeros(ds.n_held)
-    for k in range(8):
+    for k in range(n_steps):
         placed = placed_bodies(ds.bodies, ds.model, carry.state)
-        expected = method.one_step(ds, placed, Span(k * h, (k + 1) * h, (k + 0.5) * h), f)
+        expected = method.one_step(ds, placed, Span(k * h, (k + 1) * h, (k + 0.5) * h, carry.w), f)
         before = carry.work
         carry, _, _, failure = method.advance(system, carry, work, t0=0.0, h=h, first=k, n_steps=1, every=100)
         assert failure is None
@@ -114,6 +152,8 @@ def assert_steps_are_those_of_python(system, method, name):
         for field in ("r", "p", "q", "u"):
             assert_allclose(getattr(carry.state, field), getattr(state, field), rtol=0, atol=1e-11)
         assert_allclose(carry.work - before, expected.work, rtol=0, atol=1e-11)
+        for rows in (model.coordinates.row, model.states.row, contacts):
+            assert_allclose(carry.w[rows], expected.w[rows], rtol=0, atol=1e-10)
         f = expected.f
         points = model.rows.kind[[k for c in ds.connections for k in c.held]] == POINT
         sizes = [np.linalg.norm(each[points].reshape(-1, 3), axis=1) for each in (carry.a, f)]
