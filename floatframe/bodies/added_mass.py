@@ -120,7 +120,13 @@ def with_particle(geometric: GeometricStiffness, k: int, m: float, c: Array, rho
 
     Its unit loads (see `GeometricStiffness`) are forces at the particle: a force f and the moment rho × f at the node.
     """
-    K = geometric.interfaces[k]
+    if not geometric.is_loaded[k]:
+        raise ModelError(
+            f"added mass at interface {k}, whose loads were left out of the geometric stiffness: its inertia would not "
+            "stiffen the body; reduce the body with this interface among geometric_stiffness = [...], or leave the "
+            "geometric stiffness out (replace(body, geometric=None))"
+        )
+    K = geometric.of_interface(k)
 
     def of_force(f: Array) -> Array:
         return np.asarray(np.tensordot(np.concatenate([f, np.cross(rho, f)]), K, axes=1))

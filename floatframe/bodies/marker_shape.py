@@ -101,11 +101,11 @@ def bent(K: Array, x: Array) -> Array:
 
 
 def bending_of(reduced: ReducedBody, name: str) -> Array:
-    """Return K_P of an interface, (6, n_q, n_q); zero where the body has none."""
+    """Return K_P of an interface, (6, n_q, n_q); zero where the body has none, or its loads were left out."""
     if reduced.geometric is None:
         return np.zeros((6, reduced.n_q, reduced.n_q))
     place = [interface.name for interface in reduced.interfaces].index(name)
-    return np.asarray(reduced.geometric.interfaces[place])
+    return reduced.geometric.of_interface(place)
 
 
 def interface_shape(reduced: ReducedBody, name: str, *, is_stiffened: bool) -> MarkerShape:

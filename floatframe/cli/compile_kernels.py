@@ -36,6 +36,27 @@ def make_schemes() -> None:
     integrate(block(), EnergyMomentum(), 1e-3, 1e-3)
 
 
+def make_recursion() -> None:
+    """Give its equations of motion by recursion."""
+    from floatframe import relative_model
+
+    model = relative_model(block())
+    model.mass_matrix(model.positions()[0])
+
+
+def make_cholesky() -> None:
+    """Factorise a matrix by the fronts of this package, which serve where no other solver for large matrices is."""
+    import scipy.sparse as sp
+
+    from cms.sparse_cholesky.factor import CholeskyFactor
+
+    line = sp.diags_array([-1.0, 2.1, -1.0], offsets=[-1, 0, 1], shape=(12, 12))
+    lower = sp.csc_array(sp.tril(sp.kronsum(sp.kronsum(line, line), line)))
+    factor = CholeskyFactor(lower)
+    factor.solve(np.ones((lower.shape[0], 1)))
+    factor.close()
+
+
 def make_reduction() -> None:
     """Reduce the shipped rod: assembly, stress and geometric stiffness of solids."""
     import cms
@@ -56,6 +77,8 @@ PARTS: dict[str, tuple[str, Callable[[], None]]] = {
     "motion": ("motions, equilibria, linearisation", make_motion),
     "relative": ("motions in the coordinates of joints", make_relative),
     "schemes": ("conserving, decaying and variational schemes", make_schemes),
+    "recursion": ("equations of motion by recursion", make_recursion),
+    "cholesky": ("factors of large matrices, without PARDISO", make_cholesky),
     "reduction": ("finite element bodies: assembly, stress, geometric stiffness", make_reduction),
 }
 

@@ -102,8 +102,7 @@ def co_simulate(
             for number, rows in enumerate(unit.steps, start=k * per_step + 1):
                 if number % output_every == 0:
                     run.keep(rows)
-            if writer is not None:
-                run.close_segment_when_due()
+            run.close_segment_when_due()
             if progress is not None:
                 n_done = (k + 1) * per_step
                 counts = unit.carry.n_iterations, run.watch.notes, unit.carry.n_rejected
@@ -113,6 +112,7 @@ def co_simulate(
 
 def with_motion(error: CosimulationError | ConvergenceError, run: Run, t: float, H: float) -> Exception:
     """Return the error with the motion so far, and where it is."""
+    run.look()
     trajectory, where = motion_so_far(run.system, run.head, run.kept, run.writer, run.watch.notes)
     words = f"system {run.system.name!r}: the macro-step of {H:g} from t = {t:.9g} failed: {error}{where}"
     if isinstance(error, ConvergenceError):

@@ -43,7 +43,7 @@ log = logging.getLogger(__name__)
 
 ANALYSES = ("run", "static", "rotation", "eig")
 METHODS = ("direct", "adjoint")
-TOLERANCE = 1e-11  #: of Newton's method in the steps that are differentiated
+TOLERANCE = 1e-12  #: of Newton's method in the steps that are differentiated
 SLOPE_STEP = 2e-4  #: of differences of sensors, relative to the size of what they see
 
 

@@ -31,7 +31,10 @@ __all__ = [
 
 DONE, DIVERGED, SINGULAR_BODY, SINGULAR_CONNECTION, INACCURATE, STOPPED = 0, 1, 2, 3, 4, 5
 SLOW = 0.2  # ratio of corrections above which the factors are made anew
-MANY = 4  # iterations of a step after which the next one starts with new factors
+OF_MOTION = 1e-5  # of the way of a step counts beside what accelerations move in it
+FAST = 0.1  # corrections that shrink this fast end a step where the next one is expected to be small enough:
+SAFE = 0.5  # this much of the one that is wanted
+OF_ROUNDOFF = 0.1  # and of roundoff
 ROUNDOFF = 2e-15  # of a position
 SAFETY = 0.9  # of the step that would just meet the error that is allowed
 LEAST, MOST, WORTH = 0.2, 2.0, 1.2  # a step becomes this much shorter, longer at most; longer only if by this much
@@ -86,6 +89,18 @@ def turn_body(state, memory, i):
 
 
 @inner
+def take_age(solver, n_iterations):
+    """Count a step with the present factors; new ones are due where it took longer than the mean of all of them.
+
+    The mean counts what the factors cost: to go on would raise it, and new ones come back to it.
+    """
+    solver.n_steps += 1
+    solver.n_spent += n_iterations
+    if n_iterations * solver.n_steps > solver.n_spent:
+        solver.is_due = 1
+
+
+@inner
 def predict(model, work, memory, h, alpha_f):
     """(1): a_new = a. Return the squared size of the acceleration and of the increment, in the norm of `weight`."""
     begin_step(model, work, memory, h, alpha_f)
@@ -133,6 +148,17 @@ def update(model, work, memory, by_rate, by_acceleration, c_k):
     for k in range(work.solver.mu.shape[0]):
         work.state.w[k] += work.solver.mu[k] / c_k
     return total
+
+
+@inner
+def is_enough(norm, last, wanted, allowed):
+    """Whether a correction is small enough, or the next one will be: they shrink by the ratio of the last two.
+
+    allowed: what is wanted and roundoff. A correction that is not made counts more than one at roundoff, for what is
+    left open in every step has the same sign.
+    """
+    left = SAFE * (wanted + OF_ROUNDOFF * (allowed - wanted))
+    return norm <= allowed or (last < math.inf and norm <= FAST * last and norm * norm <= last * left)
 
 
 @inner
@@ -208,8 +234,8 @@ def one_step(model, work, memory, order, h):
     for i in range(model.bodies.kind.shape[0]):
         mass += model.body_types.mass[model.bodies.kind[i]]
     size += mass * dot(model.gravity, model.gravity)
-    allowed = order.tolerance * (c_k * math.sqrt(size) + 1e-3 * math.sqrt(size_x))
-    allowed += math.sqrt(roundoff_floor(model, work, order.length))
+    wanted = order.tolerance * (c_k * math.sqrt(size) + OF_MOTION * math.sqrt(size_x))
+    allowed = wanted + math.sqrt(roundoff_floor(model, work, order.length))
     solver = work.solver
     if solver.c_m != c_m or solver.c_d != c_d or solver.c_k != c_k:
         work.solver.is_due = 1
@@ -226,7 +252,7 @@ def one_step(model, work, memory, order, h):
             if body >= 0:
                 return SINGULAR_BODY, body, excess, -1.0
             solver.c_m, solver.c_d, solver.c_k = c_m, c_d, c_k
-            work.solver.is_due = 0
+            work.solver.is_due, solver.n_steps, solver.n_spent = 0, 0, solver.price
             is_new = True
         connection = correction(model, work, c_k, is_new)
         if connection >= 0:
@@ -250,10 +276,10 @@ def one_step(model, work, memory, order, h):
                 is_new = of_states > 1.0
                 continue
             is_new = of_states > max(1.0, SLOW * last_of_states)
-        is_small = norm <= allowed or (norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2)
+        is_stuck = norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2
+        is_small = is_enough(norm, last, wanted, allowed) or is_stuck
         if is_small and (of_states <= 1.0 or (of_states <= 1e3 and of_states > 0.5 * last_of_states and iteration > 2)):
-            if iteration >= MANY:
-                work.solver.is_due = 1
+            take_age(work.solver, iteration + 1)
             error = -1.0
             if order.most_error > 0.0:
                 error = local_error(model, work, memory, order, h)
@@ -261,7 +287,7 @@ def one_step(model, work, memory, order, h):
                     return INACCURATE, -1, excess, error
             accept(model, work, memory, h, alpha_m, alpha_f)
             return DONE, -1, excess, error
-        if (norm > SLOW * last and not is_small) or iteration >= MANY:
+        if norm > SLOW * last and not is_small:
             work.solver.is_due = 1
         last, last_of_states = norm, of_states
         excess = max(excess, of_states)

@@ -225,6 +225,9 @@ class Solver(NamedTuple):
     c_d: Array = real(unit="s")
     c_k: Array = real(unit="s²")
     is_due: IntArray = integer()  #: whether to factorise at the next iterate
+    price: Array = real()  #: of new factors, in iterations
+    n_steps: IntArray = integer()  #: done with the present factors
+    n_spent: Array = real()  #: iterations of these steps, and the price of the factors
 
 
 class Counted(NamedTuple):
@@ -319,4 +322,5 @@ def new_work(model: Model) -> Work:
     work.states.base[:] = model.states.start
     work.states.rho[...] = 1.0
     work.solver.is_due[...] = 1
+    work.solver.price[...] = 3.0 + max(model.bodies.n_q, default=0) / 8.0
     return work

@@ -116,9 +116,15 @@ class BodyShelf:
             return None
         require_geometric_stiffness(families.body)
         frame = moving_frame_of(job)
-        key = (path, repr(frame))
+        key = (path, repr((frame, job.reduction.geometric_stiffness)))
         if key not in self._states:
-            self._states[key] = unit_states(families, frame=frame, spread=job.reduction.spread_loads is not False)
+            asked = job.reduction.geometric_stiffness
+            self._states[key] = unit_states(
+                families,
+                frame=frame,
+                spread=job.reduction.spread_loads is not False,
+                interfaces=asked if isinstance(asked, list) else None,
+            )
         return self._states[key]
 
 

@@ -46,6 +46,7 @@ __all__ = ["Progress", "integrate", "resume"]
 log = logging.getLogger(__name__)
 
 BATCH_STEPS = 400  #: steps per call of the compiled loop
+LOOK_ROWS, LOOK_SECONDS = 1000, 0.2  #: rows of results are looked at when they are so many, or so much time has gone
 SEGMENT_SECONDS = 2.0  #: a segment of the results is closed after this time
 TIMES = ("t_start", "t_end", "h", "output_every")  #: of the run, in the head
 MOST_STEPS = 1e12  #: of a run: months of computing
@@ -156,8 +157,7 @@ def integrate(
         writer = None if place is None else ResultsWriter(place, head)
         run = Run(system, integrator, head, t_start, t_end, step, n_total, output_every, writer, events=watch)
         run.keep(rows)
-        if writer is not None:
-            writer.close_segment(run.record(carry, 0))
+        run.close_segment(run.record(carry, 0))
         return run.advance(carry, 0, batch_steps, progress)
 
 
@@ -284,7 +284,8 @@ class Run:
 
     def __post_init__(self) -> None:
         self.watch = ValidityWatch(self.system, self.notes)
-        self.closed = time.monotonic()  # when the last segment was
+        self.closed = self.looked = time.monotonic()  # when the last segment was, and rows were looked at
+        self.waiting: list[Rows] = []
 
     def wanted(self, rows: Rows, n_done: int, n_good: int, has_stopped: bool) -> Rows:
         """Return of the results after each of n_good steps those at output times, and those at a stop."""
@@ -294,9 +295,19 @@ class Run:
         return Rows(*(array[:n_good][is_due] for array in rows))
 
     def keep(self, rows: Rows) -> None:
-        """Take rows of results; tell when a body leaves the range of its linear frame."""
-        if not len(rows.t):
+        """Take rows of results, which wait for others: a look at a few costs as much as one at a thousand."""
+        if len(rows.t):
+            self.waiting.append(rows)
+        if sum(len(each.t) for each in self.waiting) >= LOOK_ROWS or time.monotonic() - self.looked > LOOK_SECONDS:
+            self.look()
+
+    def look(self) -> None:
+        """Hand on the rows that wait; tell when a body leaves the range of its linear frame."""
+        self.looked = time.monotonic()
+        if not self.waiting:
             return
+        rows = Rows(*(np.concatenate(arrays) for arrays in zip(*self.waiting, strict=True)))
+        self.waiting = []
         for note in self.watch.observe(rows):
             log.warning("%s", note.words)
         told = rows_of_file(compiled_system(self.system), rows)
@@ -305,6 +316,13 @@ class Run:
         else:
             self.writer.validity = notes_to_json(self.watch.notes)
             self.writer.append(told)
+
+    def close_segment(self, record: dict[str, np.ndarray] | None = None) -> None:
+        """Close a segment of the results, if they go to a file, with a record to go on from."""
+        self.look()
+        self.closed = time.monotonic()
+        if self.writer is not None:
+            self.writer.close_segment(record)
 
     def advance(
         self, carry: Carry, n_done: int, batch_steps: int, progress: Callable[[Progress], None] | None
@@ -316,16 +334,14 @@ class Run:
         _, row = self.integrator.observe(begun, t_begun, carry, work)  # the iterate to begin from
         if self.events is not None:
             self.events.begin(row)
-        closed = time.monotonic()
         jumps = jumps_of_steps(self.system, self.t_start, self.h, self.n_total)
         failure, has_stopped = None, False
         try:
             while n_done < self.n_total and failure is None and not has_stopped:
                 if n_done % RESTART_STEPS == 0:
                     work.solver.c_k[...] = 0.0  # factors are made anew, as after a resumption
-                    if self.writer is not None and n_done and time.monotonic() - closed > SEGMENT_SECONDS:
-                        self.writer.close_segment(self.record(carry, n_done))
-                        closed = time.monotonic()
+                    if n_done and time.monotonic() - self.closed > SEGMENT_SECONDS:
+                        self.close_segment(self.record(carry, n_done))
                 n_batch = min(batch_steps, self.n_total - n_done, RESTART_STEPS - n_done % RESTART_STEPS)
                 n_smooth = min((k - n_done for k in jumps if k >= n_done), default=n_batch)
                 if n_smooth == 0:
@@ -353,13 +369,14 @@ class Run:
                     rows = self.wanted(rows, n_done, n_good, has_stopped)
                 self.keep(rows)
                 n_done += n_good
+                if n_done == self.n_total or failure is not None or has_stopped:
+                    self.look()
                 if progress is not None:
                     t = self.t_start + n_done * self.h
                     counts = carry.n_iterations, self.watch.notes, carry.n_rejected
                     progress(Progress(t, self.t_end, n_done, self.n_total, *counts))
         except BaseException:
-            if self.writer is not None:
-                self.writer.close_segment(self.record(carry, n_done) if n_done % RESTART_STEPS == 0 else None)
+            self.close_segment(self.record(carry, n_done) if n_done % RESTART_STEPS == 0 else None)
             raise
         raise_errors_of(compiled_system(self.system).callbacks)
         if failure is not None:
@@ -378,12 +395,12 @@ class Run:
 
     def close_segment_when_due(self) -> None:
         """Close a segment of the results without a record to go on from, when the last one is old enough."""
-        if self.writer is not None and time.monotonic() - self.closed > SEGMENT_SECONDS:
-            self.writer.close_segment()
-            self.closed = time.monotonic()
+        if time.monotonic() - self.closed > SEGMENT_SECONDS:
+            self.close_segment()
 
     def finished(self, carry: Carry) -> Trajectory:
         """Return the motion, all of whose steps have been kept."""
+        self.look()
         if self.writer is None:
             head = replace(self.head, summary=self.summary(carry))
             arrays = MemorySource(joint_rows(self.system, self.kept))

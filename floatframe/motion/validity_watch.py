@@ -258,9 +258,11 @@ def scaled_unit_loads(reduced: ReducedBody) -> tuple[Array, Array]:
     if geometric is None:
         K = np.concatenate([np.zeros((N_INERTIAL, n, n)), estimated_interface_loads(reduced).reshape(-1, n, n)])
     else:
-        K = np.concatenate(
-            [geometric.translation, geometric.rotation, geometric.spin, geometric.interfaces.reshape(-1, n, n)]
-        )
+        of_interfaces = np.zeros((len(reduced.interfaces), 6, n, n))
+        if not all(geometric.is_loaded):
+            of_interfaces[:] = estimated_interface_loads(reduced)
+        of_interfaces[geometric.loaded] = geometric.interfaces
+        K = np.concatenate([geometric.translation, geometric.rotation, geometric.spin, of_interfaces.reshape(-1, n, n)])
     scaled = root.T @ K @ root
     return scaled.reshape(len(K), n * n), np.abs(np.linalg.eigvalsh(scaled)).max(axis=1)
 

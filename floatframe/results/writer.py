@@ -10,6 +10,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -194,12 +195,17 @@ class ResultsWriter:
         if len(rows.t):
             self.open_rows.append(rows)
 
+    def open_arrays(self) -> dict[str, Array]:
+        """Return the datasets of the open segment."""
+        arrays = arrays_of(self.open_rows)
+        arrays["drift"] = arrays["drift"][:, : len(self.head.joints)]
+        return arrays
+
     def close_segment(self, restart: Mapping[str, Array] | None = None) -> None:
         """Write the open segment, if it holds anything, with a record from which the run can go on."""
         if not self.open_rows:
             return
-        arrays = arrays_of(self.open_rows)
-        arrays["drift"] = arrays["drift"][:, : len(self.head.joints)]
+        arrays = self.open_arrays()
 
         def fill(file: h5py.File) -> None:
             manifest = Manifest(file)
@@ -216,25 +222,35 @@ class ResultsWriter:
         self.open_rows = []
 
     def finish(self, summary: Mapping[str, Any] | None = None) -> None:
-        """Join the segments into the results file, with the summary of the run, and remove them."""
-        self.close_segment()
+        """Join the segments, the open one too, into the results file, with the summary of the run, and remove them."""
+        try:
+            self.join(summary or {})
+        except BaseException:
+            self.close_segment()  # nothing is lost
+            raise
+        self.place.remove()
+
+    def join(self, summary: Mapping[str, Any]) -> None:
+        """Write the results file."""
         _, source = open_segments(self.folder)
         if len(source.paths) != self.n_segments or sum(map(rows_in, source.paths)) != self.n_rows:
             raise ResultsError(
                 f"{self.folder}: expected {self.n_segments} segments with {self.n_rows} rows, got {len(source.paths)} "
                 "others: the folder was changed while the run lasted; run it anew"
             )
-        self.head = replace(self.head, summary=summary or {})
+        self.head = replace(self.head, summary=summary)
+        last = self.open_arrays() if self.open_rows else {}
+        n_rows = self.n_rows + (len(last["t"]) if last else 0)
 
         def fill(file: h5py.File) -> None:
             manifest = Manifest(file)
             for name, shape in row_shapes(self.head).items():
-                manifest.rows(f"/{name}", (self.n_rows, *shape), parts_of(source, name), {"is": DATASETS[name][1]})
+                parts = chain(parts_of(source, name), [last[name]] if last else [])
+                manifest.rows(f"/{name}", (n_rows, *shape), parts, {"is": DATASETS[name][1]})
             manifest.attributes("/", self.attributes(is_complete=True))
             manifest.close()
 
         self.guarded(lambda: self.write_file(self.path, fill))
-        self.place.remove()
 
 
 def arrays_of(parts: list[Rows]) -> dict[str, Array]:

@@ -12,10 +12,11 @@ from floatframe.kernels.generalized_alpha import (
     DIVERGED,
     DONE,
     INACCURATE,
-    MANY,
+    OF_MOTION,
     SLOW,
     copy,
     correction_of_states,
+    is_enough,
     is_resized,
     keep_iterate,
     load_state,
@@ -35,8 +36,7 @@ from floatframe.relative.kernels.weights import sizes_of_step, squared_size, wei
 __all__ = ["SINGULAR", "advance_tree", "correct", "renew", "write_tree_row"]
 
 SINGULAR = 6  #: status: the Newton matrix is
-FAST = 0.1  # corrections that shrink this fast end a step where the next one is expected to be small enough:
-SAFE = 0.5  # this much of the one that is allowed
+MANY = 4  # iterations of a step after which the next one starts with new factors
 EXACT_STEPS = 4  # steps that take exact matrices after those that are kept have failed
 MOST_PATIENCE = 31  # steps that make their own factors before older ones are tried again
 
@@ -172,7 +172,7 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
     c_m = (1 - alpha_m) / (1 - alpha_f)
     work.counted.no_number = 0
     work.counted.stopped = 0
-    last, last_of_states, excess, allowed = math.inf, math.inf, math.inf, 0.0
+    last, last_of_states, excess, wanted, allowed = math.inf, math.inf, math.inf, 0.0, 0.0
     solver, iteration = work.solver, 0
     if solver.c_m != c_m or solver.c_d != c_d or solver.c_k != c_k:
         work.solver.is_due = 1
@@ -201,8 +201,8 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
         correct(model, work, tree, joints, tangent, c_k)
         if iteration == 0:
             size, size_x = sizes_of_step(model, work, memory, h)
-            allowed = order.tolerance * (c_k * math.sqrt(size) + 1e-3 * math.sqrt(size_x))
-            allowed += math.sqrt(roundoff_floor(model, work, order.length))
+            wanted = order.tolerance * (c_k * math.sqrt(size) + OF_MOTION * math.sqrt(size_x))
+            allowed = wanted + math.sqrt(roundoff_floor(model, work, order.length))
         norm = math.sqrt(update(model, work, tree, joints, tangent, c_d / c_k, c_m / c_k, c_k))
         work.counted.iterations += 1
         if is_old and work.counted.factorisations > factorisations:
@@ -240,10 +240,8 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
             if not math.isfinite(of_states):
                 work.solver.is_due = 1
                 return DIVERGED, math.inf, -1.0
-        is_enough = norm <= allowed or (
-            is_open and last < math.inf and norm <= FAST * last and norm * norm <= SAFE * last * allowed
-        )
-        is_small = is_enough or (norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2)
+        is_small = is_enough(norm, last, wanted, allowed) if is_open else norm <= allowed
+        is_small = is_small or (norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2)
         if is_small and (of_states <= 1.0 or (of_states <= 1e3 and of_states > 0.5 * last_of_states and iteration > 2)):
             if iteration >= MANY:
                 work.solver.is_due = 1

@@ -57,6 +57,20 @@ def test_a_mass_in_an_interface_node_is_a_heavier_particle():
         assert_allclose(getattr(found.geometric, name), value, rtol=0, atol=ROUNDOFF * np.abs(value).max())
 
 
+def test_a_mass_is_refused_where_the_loads_were_left_out_of_the_geometric_stiffness():
+    points = random_point_masses(N_Q, 3)
+    body = reduced_body(points, stiffness(N_Q))
+    whole = random_second_order(points, 3).geometric(tuple(int(each.members[0]) for each in body.interfaces))
+    loaded = (False,) + (True,) * (len(body.interfaces) - 1)
+    body = replace(body, geometric=replace(whole, interfaces=whole.interfaces[1:], turned=None, is_loaded=loaded))
+    first, last = body.interfaces[0].name, body.interfaces[-1].name
+    with pytest.raises(ModelError, match="whose loads were left out of the geometric stiffness"):
+        with_masses(body, [AddedMass(first, 0.4)])
+    found = with_masses(body, [AddedMass(last, 0.4)]).geometric
+    expected = with_masses(replace(body, geometric=replace(whole, turned=None)), [AddedMass(last, 0.4)]).geometric
+    assert_allclose(found.spin, expected.spin, rtol=0, atol=0)
+
+
 def test_particles_have_mass_centre_and_inertia_of_the_part():
     part = AddedMass("a", 0.5, (0.1, -0.2, 0.3), INERTIA)
     m, places = part.particles()

@@ -8,6 +8,7 @@ from tests.floatframe.point_masses import random_point_masses, reduced_body, sti
 JUMPS = (0.0, 0.05, 0.1)
 MOTORS = (10.0, 25.0, 5.0)
 H, MACRO, T_END = 1e-3, 5e-3, 0.15
+TOLERANCE = 1e-12  # of Newton's method: ways to run the arm are compared to 1e-8, accelerations too
 PIECES = ", ".join(f'{{type = "constant", value = {value}}}' for value in MOTORS)
 ARM = f"""
 [system]
@@ -88,6 +89,7 @@ coordinate = "angle"
 [run]
 t_end = {T_END}
 h = {H}
+tolerance = {TOLERANCE}
 """
 
 

@@ -19,7 +19,7 @@ from floatframe import ModelError, SystemFileError, integrate, measured, read_sy
 from floatframe.cli.app import app
 from floatframe.cosimulation.archive import write_fmu
 from floatframe.cosimulation.unit_words import BaseUnit, base_unit
-from tests.floatframe.cosimulation.arms import JUMPS, MACRO, MOTORS, T_END, H, write_arm
+from tests.floatframe.cosimulation.arms import JUMPS, MACRO, MOTORS, T_END, TOLERANCE, H, write_arm
 
 ROOT = Path(__file__).resolve().parents[3]
 MOTOR = "forces.motor.motor"
@@ -186,7 +186,7 @@ def test_the_command_writes_what_fmpy_runs(arm, tmp_path):
         ((), {"parameters": {"tip.x": "bodies.arm.mass"}}, "two variables are called 'tip.x'"),
         ((("[run]", "[fmu]\ninput = []\n[run]"),), {}, "fmu.input: unknown key; did you mean 'inputs'"),
         ((("[run]", "[events.stop]\nat = 0.1\nstop = true\n[run]"),), {}, r"table \[events\] cannot be a part"),
-        (((f"[run]\nt_end = {T_END}\nh = {H}\n", ""),), {}, "run: missing"),
+        (((f"[run]\nt_end = {T_END}\nh = {H}\ntolerance = {TOLERANCE}\n", ""),), {}, "run: missing"),
     ],
 )  # fmt: skip
 def test_bad_requests_are_refused_and_nothing_is_written(tmp_path, changes, options, words):
