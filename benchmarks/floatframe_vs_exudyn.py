@@ -168,7 +168,7 @@ def figures(short):
     told = {}
     for n_bodies in (1, 10):
         for n_q in (8, 20) if short else (8, 20, 50):
-            ours, theirs, *_ = both(n_bodies, n_q, 500, 80 if short else 200)
+            ours, theirs, *_ = both(n_bodies, n_q, 2000, 800)
             told[f"against exudyn, bodies: {n_bodies}, modes: {n_q}, speedup"] = theirs / ours
             told[f"a step, bodies: {n_bodies}, modes: {n_q} [µs]"] = 1e6 * ours
     return told

@@ -23,7 +23,7 @@ WORSE = 1.15  #: a ratio that grows by more is a regression
 MORE_IS_BETTER = ("speedup", "saving")  #: ends of the names of figures
 PACKAGES = ("numpy", "scipy", "numba", "pypardiso", "mkl", "exudyn", "pin")
 #: a number in a text, and the figure of a benchmark that it quotes
-QUOTED = re.compile(r"(?P<number>\d+(?:\.\d+)?)<!-- *(?P<module>\w+): (?P<name>[^>]*?) *-->")
+QUOTED = re.compile(r"(?P<number>-?\d+(?:\.\d+)?)<!-- *(?P<module>\w+): (?P<name>[^>]*?) *-->")
 HEAD = """# Figures of the last run
 
 Written by `python -m benchmarks --keep`, which measures all that is short, each benchmark in a process of its own; do

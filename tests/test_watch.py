@@ -61,6 +61,16 @@ def test_quoted_figures_are_renewed_with_their_decimals(tmp_path, monkeypatch):
     )
 
 
+def test_texts_quote_what_was_kept():
+    kept = Results.read(watch.RESULTS)
+    quoted = [(path, match) for path in watch.texts() for match in watch.QUOTED.finditer(path.read_text())]
+    assert kept is not None
+    assert quoted
+    for path, match in quoted:
+        value = kept.figures[match["module"]][match["name"]]
+        assert match["number"] == watch.as_quoted(value, match["number"]), f"{path.name}: {match[0]}"
+
+
 def test_a_benchmark_that_fails_says_why(monkeypatch, tmp_path):
     with pytest.raises(RuntimeError, match=r"No module named .benchmarks\.none."):
         watch.measured("none", short=True, limit=60.0)
