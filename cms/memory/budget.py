@@ -3,8 +3,8 @@
 The peak is the largest of three stages. n: dofs, c: columns of the mode set, m: vibration modes, b: their block,
 h: what the process holds when the stage begins.
 
-(1) factorisation: h + permuted matrix + fronts (`Fronts.n_working`) + factor, if that is in memory
-(2) vibration and static modes: h + factor, or its largest panel + 8 n columns of
+(1) factorisation: h + permuted matrix + fronts at work and waiting (`Blocks.n_working`) + factor, if in memory
+(2) vibration and static modes: h + factor, or its largest part for each thread + 8 n columns of
     (4 m + 8 b + k) while modes are searched; basis: 3 m + 6 b columns
     (k + c + m) while the set is put together of the k = c - m static columns and the modes
 (3) finish, moments and stress, the factor freed: what the coupled body held + 6.2 arrays of (n, c)
@@ -27,14 +27,16 @@ from cms.errors import MemoryBudgetError
 from cms.memory.size import resident_bytes
 from cms.solvers.superlu import SuperLuFactor
 from cms.sparse_cholesky.analysis import Fronts, analyse
+from cms.sparse_cholesky.blocks import blocks_of
 from cms.sparse_cholesky.factor import CholeskyFactor
 from fe_models.foundation.solver import Factor, Solver
+from fe_models.foundation.threads import n_threads
 
 __all__ = ["Peak", "ReductionShape", "columns_within", "peak_of", "solver_within"]
 
 log = logging.getLogger(__name__)
 
-PERMUTED = 44.0  #: bytes an entry of the lower triangle while it is brought into the new order
+PERMUTED = 12.0  #: bytes an entry of the lower triangle in the new order
 TALL = 6.2  #: arrays of all columns that are held in the third stage
 SQUARES = 54.0  #: matrices over all columns that are held where those lie on disk: Gram matrices, moments, invariants
 SLICES = 4e8  #: bytes of slices and products that are held then
@@ -82,14 +84,16 @@ def peak_of(shape: ReductionShape, fronts: Fronts, n_entries: int, held: float, 
     on_disk
         Whether the factor is.
     """
-    w, u = fronts.width, fronts.below
-    factor = 8.0 * (int((w * (w + u)).max(initial=0)) if on_disk else fronts.n_stored)
+    blocks, threads = blocks_of(fronts), n_threads()
+    stored = np.diff(blocks.stored)
+    factor = 0.0 if on_disk else 8.0 * fronts.n_stored
+    at_hand = 8.0 * np.sort(stored)[-threads:].sum() if on_disk else factor
     block = 16 if shape.n_modes >= 32 else 8
     n_static = 0 if shape.to_disk else shape.n_columns - shape.n_modes
     columns = max(4 * shape.n_modes + 8 * block + n_static, 2 * (n_static + shape.n_modes))
     return Peak(
-        held + PERMUTED * n_entries + 8.0 * fronts.n_working + factor,
-        held + factor + 8.0 * shape.n_dof * columns,
+        held + PERMUTED * n_entries + 8.0 * blocks.n_working(threads, on_disk=on_disk) + factor,
+        held + at_hand + 8.0 * shape.n_dof * columns,
         reduction_peak(shape),
     )
 

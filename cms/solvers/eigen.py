@@ -80,7 +80,7 @@ def eigenmodes(
         Stiffness, (n, n); semidefinite (a free body), and indefinite only by Lagrange multipliers.
     M
         Mass, (n, n), semidefinite: massless dofs and multipliers have none. Of K and M given as `PrincipalBlock` the
-        entries are not held during the search, but for those of M that its products need.
+        entries are not held during the search.
     n_modes
         Number of modes, or a `ModeCount`: all modes up to a frequency [Hz]; proof that none was missed.
     factorization
@@ -104,7 +104,8 @@ def eigenmodes(
     FactorizationError
         If K - shift M is singular.
     """
-    K, M = (A if isinstance(A, PrincipalBlock) else matrix_of(A) for A in (K, M))
+    if not isinstance(K, PrincipalBlock) or not isinstance(M, PrincipalBlock):
+        K, M = matrix_of(K), matrix_of(M)
     n = K.shape[0]
     if K.shape != (n, n) or M.shape != (n, n):
         raise EigenError(f"eigenmodes: expected K and M of one square shape, got {K.shape} and {M.shape}")
@@ -134,7 +135,7 @@ def eigenmodes(
             if kind is KrylovSearch and factorization.factor.ranks.size > 1:
                 space = RankSpace(factorization.factor)
                 stack.callback(space.close)
-        operator = ShiftInverted(M, shift, factorization, tolerance, progress, space)
+        operator = ShiftInverted(matrix_of(M), shift, factorization, tolerance, progress, space)
         search = kind(operator, wanted)
         modes = search.modes(wanted)
         if asked.verify:

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg as la
+import scipy.sparse as sp
 
 from cms.errors import EigenError
-from cms.solvers.factorization import Matrix, matrix_of
 from cms.solvers.inverse import Inverse
 from cms.solvers.mode_count import ModeCount
 from cms.solvers.tall_space import ArraySpace, TallSpace
@@ -41,7 +41,7 @@ class ShiftInverted:
 
     def __init__(
         self,
-        M: Matrix,
+        M: sp.csc_array,
         shift: float,
         factorization: Inverse,
         tolerance: float,
@@ -49,11 +49,10 @@ class ShiftInverted:
         space: TallSpace | None = None,
     ) -> None:
         self.shift, self.tolerance = shift, tolerance
-        self.M = M
         self.has_mass_everywhere = bool((M.diagonal() > 0).all())
         self.n = M.shape[0]
         self.space: TallSpace = space or ArraySpace(self.n)
-        self.M_product = self.space.product(matrix_of(M))
+        self.M_product = self.space.product(M)
         self.n_solves = 0
         self.factorization, self._progress = factorization, progress
         self._solve = self.space.solver(factorization)

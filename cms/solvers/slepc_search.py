@@ -5,10 +5,11 @@ from itertools import count
 import numpy as np
 
 from cms.errors import EigenError
-from cms.solvers.factorization import Factorization, lower_triangle, matrix_of
+from cms.solvers.factorization import Factorization, lower_triangle
 from cms.solvers.petsc.factor import PetscFactor, communicator
 from cms.solvers.petsc.libraries import petsc, slepc
 from cms.solvers.shift_inverted import Modes, ShiftInverted, Wanted
+from cms.solvers.sparse_product import SymmetricProduct
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.ranks.ranks import Ranks
 from fe_models.foundation.ranks.rows import Rows, collected, spread
@@ -28,11 +29,12 @@ class SlepcSearch:
         assert isinstance(operator.factorization, Factorization)
         factor = operator.factorization.factor
         assert isinstance(factor, PetscFactor)
+        assert isinstance(operator.M_product, SymmetricProduct)
         self.operator, self.factor = operator, factor
         version = ".".join(str(k) for k in slepc().Sys.getVersion())
         self.description = f"Krylov-Schur (SLEPc {version})"
         self.key = f"mass {next(numbers)}"
-        factor.ranks.store[self.key] = lower_triangle(matrix_of(operator.M))
+        factor.ranks.store[self.key] = lower_triangle(operator.M_product.A)
         factor.ranks.everywhere(spread_mass, self.key, factor.rows)
 
     def modes(self, wanted: Wanted, at_least: int = 0) -> Modes:

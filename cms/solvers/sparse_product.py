@@ -1,6 +1,7 @@
 """Products of a large symmetric sparse matrix with blocks of columns, in threads (SciPy's own use one)."""
 
 from concurrent.futures import ThreadPoolExecutor
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -8,7 +9,7 @@ import scipy.sparse as sp
 
 from cms.solvers.tall import ordered
 from fe_models.body.submatrix import scalar_part
-from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.arrays import Array
 from fe_models.foundation.tall.on_disk import in_memory
 from fe_models.foundation.threads import n_threads
 
@@ -19,23 +20,19 @@ COLUMNS = 16  #: columns per pass over the matrix; the rows of x it touches then
 
 
 class SymmetricProduct:
-    """The map x -> A x of a symmetric matrix A; its compressed columns are read as rows, and not copied.
+    """The map x -> A x of a symmetric matrix A; its compressed columns are read as rows, nothing is copied.
 
     Where A begins with S ⊗ 1₃ (`scalar_part`), as the mass of a solid does, columns x of three components a node are
     rows of S three times as wide: a third of the entries is read, and the rows of x come in longer pieces. With
     B = A[:, 3p:] for what else there is (reference nodes, multipliers)
 
         (A x)_lead = (S ⊗ 1₃) x_lead + B_lead x_rest,   (A x)_rest = Bᵀ x
-
-    and A itself is not held.
     """
 
     def __init__(self, A: sp.csc_array, *, columns: int = COLUMNS) -> None:
-        self._columns = columns
+        self.A, self._columns = A, columns
         S = scalar_part(A) if A.nnz > SMALL else sp.csr_array((0, 0))
         self._n_lead = 3 * S.shape[0] if 6 * S.shape[0] > A.shape[0] else 0
-        if self._n_lead:
-            self._rest = rest_of(A, self._n_lead)
         rows = S if self._n_lead else sp.csr_array((A.data, A.indices, A.indptr), shape=A.shape)
         n_parts = max(1, min(n_threads(), A.nnz // SMALL))
         cuts = np.searchsorted(rows.indptr, np.linspace(0, rows.nnz, n_parts + 1)[1:-1])
@@ -77,13 +74,13 @@ class SymmetricProduct:
         target[rows] += B_rows @ block[self._n_lead :]
         target[self._n_lead :] = rest @ block
 
-
-def rest_of(A: sp.csc_array, n_lead: int) -> tuple[sp.csr_array, tuple[IntArray, sp.csr_array]]:
-    """Return Bᵀ of the columns B after the leading ones; rows of B_lead that are not empty, with their numbers."""
-    B = sp.csc_array(A[:, n_lead:])
-    rows = np.unique(B.indices)
-    rows = rows[rows < n_lead]
-    return sp.csr_array(B.T), (rows, sp.csr_array(B)[rows])
+    @cached_property
+    def _rest(self) -> tuple[sp.csr_array, tuple[Array, sp.csr_array]]:
+        """Bᵀ, and the rows of B_lead that are not empty with their numbers."""
+        B = sp.csc_array(self.A[:, self._n_lead :])
+        rows = np.unique(B.indices)
+        rows = rows[rows < self._n_lead]
+        return sp.csr_array(B.T), (rows, sp.csr_array(B)[rows])
 
 
 def _rows(A: sp.csr_array, first: int, last: int) -> sp.csr_array:

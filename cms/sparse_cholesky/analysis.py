@@ -1,6 +1,7 @@
 """Analysis of a sparse symmetric matrix before its numbers: order of elimination, fronts, and what they will cost."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,29 +45,37 @@ class Fronts:
         w, u = self.width, self.below
         return int((w * (w + 1) // 2 + w * u).sum())
 
-    @property
-    def n_stored(self) -> int:
-        """Numbers that are stored for it: diagonal blocks as squares."""
-        return int((self.width * (self.width + self.below)).sum())
+    @cached_property
+    def stored(self) -> IntArray:
+        """Where the numbers of each front begin among those that are stored for the factor, and their end.
+
+        Tiles of eight rows: up to their diagonal in the columns of a front, over all its columns below.
+        """
+        columns, below = -(-self.width // 8), -(-self.below // 8)
+        return np.concatenate([[0], np.cumsum(32 * columns * (columns + 1) + 8 * below * self.width)])
 
     @property
-    def n_working(self) -> int:
-        """Most numbers that the factorisation holds at once beside the factor: what fronts leave, and one front."""
-        w, u = self.width, self.below
-        held = most = 0
-        waiting = np.zeros(len(w), np.int64)  # left by the children of each front
-        for f in range(len(w)):
-            most = max(most, held + int((w[f] + u[f]) ** 2))
-            held += int(u[f] ** 2) - int(waiting[f])
-            if self.above[f] >= 0:
-                waiting[self.above[f]] += u[f] ** 2
-        return most
+    def n_stored(self) -> int:
+        """Numbers that are stored for the factor."""
+        return int(self.stored[-1])
+
+    @cached_property
+    def place(self) -> IntArray:
+        """The place of each row below a front in the front of its parent: its columns first, then the rows below."""
+        from cms.sparse_cholesky import kernels
+
+        return kernels.places_above(self.begin, self.rows, self.first, self.above)
+
+    @property
+    def front_operations(self) -> "Array":
+        """Multiplications and additions of the factorisation of each front, (n_fronts,)."""
+        w, u = self.width.astype(float), self.below.astype(float)
+        return w**3 / 3 + u * w**2 + u**2 * w
 
     @property
     def operations(self) -> float:
         """Multiplications and additions of the factorisation."""
-        w, u = self.width.astype(float), self.below.astype(float)
-        return float((w**3 / 3 + u * w**2 + u**2 * w).sum())
+        return float(self.front_operations.sum())
 
 
 def analyse(lower: sp.csc_array) -> Fronts:
@@ -124,30 +133,17 @@ def quotient(lower: sp.csc_array) -> "tuple[IntArray, IntArray, IntArray, IntArr
     group
         Vertex of each row, (n,).
     """
-    n = lower.shape[0]
-    indices, indptr = lower.indices, lower.indptr
-    columns = np.repeat(np.arange(n, dtype=indices.dtype), np.diff(indptr))
-    is_off = indices != columns
-    i, j = indices[is_off], columns[is_off]
-    keys = np.random.default_rng(0).integers(1, 2**63, size=n, dtype=np.uint64)
+    from cms.sparse_cholesky import kernels
+
+    keys = np.random.default_rng(0).integers(1, 2**63, size=lower.shape[0], dtype=np.uint64)
     # equal sums of random numbers over a row and its neighbours: equal rows, but for one case in 2**64
-    total = keys.copy()
-    for a, b in ((i, j), (j, i)):
-        order = np.argsort(a, kind="stable")
-        sums = np.concatenate([[np.uint64(0)], np.cumsum(keys[b[order]], dtype=np.uint64)])
-        ends = np.searchsorted(a[order], np.arange(n + 1))
-        total += sums[ends[1:]] - sums[ends[:-1]]
+    total = kernels.sums_over_rows(lower.indptr, lower.indices, keys)
     _, representative, group = np.unique(total, return_index=True, return_inverse=True)
     rank = inverse(np.argsort(representative, kind="stable"))  # vertices in the order of their first rows
     group = rank[group].astype(np.int32)
-    weight = np.bincount(group)
-    n_v = len(weight)
-    gi, gj = group[i], group[j]
-    is_between = gi != gj
-    gi, gj = gi[is_between], gj[is_between]
-    graph = sp.csr_array((np.ones(len(gi), bool), (gi, gj)), shape=(n_v, n_v))  # small integers would overflow to 0
-    graph = graph + graph.T
-    return graph.indptr.astype(np.int64), graph.indices, weight, group
+    representative = np.sort(representative)
+    start, neighbours = kernels.graph_of(lower.indptr, lower.indices, representative, group)
+    return start, neighbours, np.bincount(group), group
 
 
 def renumbered(start: IntArray, neighbours: IntArray, order: IntArray) -> "tuple[IntArray, IntArray]":

@@ -1,19 +1,21 @@
 """Cholesky factorisation by fronts (multifrontal), in memory or with the factor on disk."""
 
+import threading
 from pathlib import Path
 
 import numpy as np
-import scipy.linalg as la
 import scipy.sparse as sp
 
 from cms.errors import FactorizationError
 from cms.sparse_cholesky.analysis import Fronts, analyse, inverse
+from cms.sparse_cholesky.blocks import blocks_of, for_each
 from cms.sparse_cholesky.panels import Panels, PanelsInFile, PanelsInMemory
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.threads import n_threads, one_blas_thread
 
 __all__ = ["CholeskyFactor"]
 
-AT_ONCE = 64  #: right-hand sides that pass the panels together
+WIDTHS = (8, 16)  #: columns that pass the factor together: so many numbers read 8 and 16 times as many products
 
 
 class CholeskyFactor:
@@ -47,83 +49,102 @@ class CholeskyFactor:
         self.n_factor_entries = self._fronts.n_entries
         self.n_negative = self.n_perturbed = 0
         self.n_positive = self.n
-        self._panels: Panels = (
-            PanelsInFile(self._fronts.width, self._fronts.below, folder) if on_disk else PanelsInMemory()
-        )
+        self._blocks = blocks_of(self._fronts)
+        self._panels: Panels = PanelsInFile(self._blocks.stored, folder) if on_disk else PanelsInMemory()
         self.is_open = True
         try:
-            self._factorise(permuted(lower, self._fronts))
+            self._factorise(lower)
         except BaseException:
             self.close()
             raise
         where = "factor on disk" if on_disk else "factor in memory"
         self.description = f"Cholesky by {len(self._fronts.above)} fronts (own; nested dissection; {where})"
 
-    def _factorise(self, A: sp.csc_array) -> None:
-        from cms.sparse_cholesky import kernels
+    def _factorise(self, lower: sp.csc_array) -> None:
+        from cms.sparse_cholesky import front_kernels, kernels
 
-        fronts = self._fronts
-        first, begin, rows, above = fronts.first, fronts.begin, fronts.rows, fronts.above
-        local = np.zeros(self.n, np.int32)
-        left: list[list[tuple[Array, Array]]] = [[] for _ in above]  # by the children of each front
-        for f in range(len(above)):
-            lo, hi = first[f], first[f + 1]
-            below = rows[begin[f] : begin[f + 1]]
-            w, u = hi - lo, len(below)
-            F11, F21, F22 = (np.zeros(shape, order="F") for shape in ((w, w), (u, w), (u, u)))
-            kernels.assemble_columns(A.indptr, A.indices, A.data, lo, hi, below, local, F11, F21)  # (1)
-            for U, rows_of in left[f]:
-                kernels.extend_add(U, rows_of, lo, hi, local, F11, F21, F22)
-            left[f] = []
-            L11, info = la.lapack.dpotrf(F11, lower=1, overwrite_a=1, clean=0)  # (2)
-            if info:
-                row = int(fronts.order[lo + info - 1])
+        rank = inverse(self._fronts.order)
+        entries = front_kernels.Entries(*kernels.permuted(lower.indptr, lower.indices, lower.data, rank))
+        tree, blocks = self._blocks.tree, self._blocks
+        left_size = self._fronts.below.astype(np.int64) ** 2
+        left: dict[int, Array] = {}  # by blocks that wait for the one above
+        local = threading.local()
+
+        def factorise(k: int) -> None:
+            if not hasattr(local, "rows"):
+                local.rows, local.words = np.empty(self.n, np.int32), front_kernels.words()
+            lo, hi = int(blocks.first[k]), int(blocks.first[k + 1])
+            n_front, n_stack, n_left = blocks.room(k, left_size)
+            F, stack = np.empty(n_front), np.empty(n_stack)
+            panels = np.empty(int(tree.stored[hi] - tree.stored[lo]))
+            if blocks.below[k]:
+                front_kernels.begin_front(tree, entries, lo, F, stack, local.rows)  # (1)
+                for child in blocks.below[k]:
+                    of_child = int(blocks.first[child]), int(blocks.first[child + 1])
+                    front_kernels.take_updates(tree, *of_child, left.pop(child), lo, F, stack)
+                failed = front_kernels.finish_front(tree, lo, F, stack, panels, local.words)  # (2)
+                failed += tree.first[lo] if failed else 0
+            else:
+                failed = front_kernels.factorise_fronts(
+                    tree, entries, lo, hi, F, stack, local.rows, panels, local.words
+                )
+            if failed:
+                row = int(self._fronts.order[failed - 1])
                 raise FactorizationError(f"cholesky: a pivot is zero or negative (row {row} of {self.n})")
-            L21 = F21
-            if u:
-                L21 = la.blas.dtrsm(1.0, L11, F21, side=1, lower=1, trans_a=1, overwrite_b=1)
-                F22 = la.blas.dsyrk(-1.0, L21, beta=1.0, c=F22, lower=1, overwrite_c=1)
-                left[above[f]].append((F22, below))
-            self._panels.append(L11, L21)  # (3)
+            del F
+            left[k] = stack if n_left == n_stack else stack[:n_left].copy()
+            self._panels.put(k, panels)  # (3)
+
+        with one_blas_thread():
+            for_each(blocks, factorise, n_threads())
 
     def solve(self, b: Array) -> Array:
         """Return A⁻¹ b for b (n, k), any order; the result is in Fortran order."""
         x = np.empty(b.shape, order="F")
-        for start in range(0, b.shape[1], AT_ONCE):
-            some = slice(start, start + AT_ONCE)
-            X = np.ascontiguousarray(b[self._fronts.order, some])
-            self._substitute(X)
-            x[self._fronts.order, some] = X
+        start = 0
+        while start < b.shape[1]:
+            width = WIDTHS[-1] if b.shape[1] - start > WIDTHS[0] else WIDTHS[0]
+            some = slice(start, min(start + width, b.shape[1]))
+            self._substitute(np.asfortranarray(b[:, some]), x[:, some], width)
+            start += width
         return x
 
-    def _substitute(self, X: Array) -> None:
-        """Overwrite right-hand sides in the new order, (n, k) in C order, by the solutions."""
-        from cms.sparse_cholesky import kernels
+    def _substitute(self, b: Array, x: Array, width: int) -> None:
+        """Put the solutions for b, (n, k) with k <= width, into x, both in Fortran order."""
+        from cms.sparse_cholesky import solve_kernels
+        from cms.sparse_cholesky.tiles import LANES, ROWS
 
-        first, begin, rows = self._fronts.first, self._fronts.begin, self._fronts.rows
-        for f, (L11, L21) in self._panels.each():  # L y = b
-            y = X[first[f] : first[f + 1]]
-            la.blas.dtrsm(1.0, L11, y.T, side=1, lower=1, trans_a=1, overwrite_b=1)
-            if len(L21):
-                kernels.subtract_rows(X, rows[begin[f] : begin[f + 1]], L21 @ y)
-        for f, (L11, L21) in self._panels.each(backwards=True):  # Lᵀ x = y
-            x = X[first[f] : first[f + 1]]
-            if len(L21):
-                x -= L21.T @ kernels.take_rows(X, rows[begin[f] : begin[f + 1]])
-            la.blas.dtrsm(1.0, L11, x.T, side=1, lower=1, trans_a=0, overwrite_b=1)
+        tree, blocks, order = self._blocks.tree, self._blocks, self._fronts.order
+        parts = (0.0,) * (width // LANES)
+        Y = np.empty((self.n, width))
+        left_size = width * ROWS * -(-self._fronts.below // ROWS)
+        left: dict[int, Array] = {}
+        most = int(self._fronts.width.max(initial=0)) + ROWS
+
+        def eliminate(k: int) -> None:  # L y = b
+            lo, hi = int(blocks.first[k]), int(blocks.first[k + 1])
+            _, n_stack, _ = blocks.room(k, left_size)
+            own, stack = np.empty(most * width), np.empty(n_stack)
+            if blocks.below[k]:
+                solve_kernels.begin_rows(tree, lo, parts, order, b, own, stack)
+                for child in blocks.below[k]:
+                    of_child = int(blocks.first[child]), int(blocks.first[child + 1])
+                    solve_kernels.take_rows_of(tree, *of_child, left.pop(child), lo, parts, own, stack)
+                solve_kernels.finish_rows(tree, lo, parts, self._panels.of(k), own, stack, Y)
+            else:
+                solve_kernels.eliminate_fronts(tree, lo, hi, parts, order, b, self._panels.of(k), own, stack, Y)
+            left[k] = stack
+
+        def substitute(k: int) -> None:  # Lᵀ x = y
+            lo, hi = int(blocks.first[k]), int(blocks.first[k + 1])
+            own, eight = np.empty(most * width), np.empty(ROWS * width)
+            solve_kernels.substitute_back(tree, lo, hi, parts, order, self._panels.of(k), own, eight, Y, x)
+
+        for_each(blocks, eliminate, n_threads())
+        for_each(blocks, substitute, n_threads(), downwards=True)
 
     def close(self) -> None:
         """Free the factor; a second time does nothing."""
         if self.is_open:
             self.is_open = False
             self._panels.close()
-
-
-def permuted(lower: sp.csc_array, fronts: Fronts) -> sp.csc_array:
-    """Return the lower triangle of the matrix in the order of the fronts."""
-    rank = inverse(fronts.order).astype(np.int32)
-    columns = rank[np.repeat(np.arange(lower.shape[0]), np.diff(lower.indptr))]
-    rows = rank[lower.indices]
-    return sp.csc_array(
-        sp.coo_array((lower.data, (np.maximum(rows, columns), np.minimum(rows, columns))), shape=lower.shape)
-    )

@@ -8,17 +8,57 @@ from numba import njit
 
 __all__ = [
     "amalgamate",
-    "assemble_columns",
     "elimination_tree",
-    "extend_add",
     "front_rows",
+    "graph_of",
+    "permuted",
+    "places_above",
     "postorder",
-    "subtract_rows",
-    "take_rows",
+    "sums_over_rows",
     "weighted_counts",
 ]
 
 jit = njit(cache=True, nogil=True, error_model="numpy")
+
+
+@jit
+def sums_over_rows(indptr, indices, keys):
+    """Return the sum of the keys of each row and its neighbours, (n,), of a lower triangle."""
+    total = keys.copy()
+    for j in range(keys.size):
+        for e in range(indptr[j], indptr[j + 1]):
+            i = indices[e]
+            if i != j:
+                total[i] += keys[j]
+                total[j] += keys[i]
+    return total
+
+
+@jit
+def graph_of(indptr, indices, representative, group):
+    """Return the graph of the vertices that one row each stands for, both directions of the lower triangle."""
+    n = representative.size
+    start, stands = np.zeros(n + 2, np.int64), np.zeros(group.size, np.bool_)
+    stands[representative] = True
+    for fill in range(2):
+        if fill:
+            start[2:] = np.cumsum(start[2:])
+            neighbours = np.empty(start[n + 1], np.int32)
+        for a in range(n):
+            j = representative[a]
+            for e in range(indptr[j], indptr[j + 1]):
+                i = indices[e]
+                if i == j or not stands[i]:
+                    continue
+                b = group[i]
+                if fill:
+                    neighbours[start[a + 1]], neighbours[start[b + 1]] = b, a
+                    start[b + 1] += 1
+                    start[a + 1] += 1
+                else:
+                    start[b + 2] += 1
+                    start[a + 2] += 1
+    return start[: n + 1], neighbours
 
 
 @jit
@@ -175,52 +215,42 @@ def front_rows(start, neighbours, first, above):
 
 
 @jit
-def assemble_columns(indptr, indices, data, lo, hi, rows, local, F11, F21):
-    """Add the columns lo to hi of a lower triangle to a front; `local` becomes the places of the rows below."""
-    for k in range(rows.size):
-        local[rows[k]] = k
-    for j in range(lo, hi):
-        for e in range(indptr[j], indptr[j + 1]):
-            i = indices[e]
-            if i < hi:
-                F11[i - lo, j - lo] += data[e]
+def places_above(begin, rows, first, above):
+    """Return the place of each row below a front in the front of its parent: columns first, then the rows below."""
+    place = np.empty(rows.size, np.int32)
+    for f in range(above.size):
+        p = above[f]
+        if p == -1:
+            continue
+        lo, hi, k = first[p], first[p + 1], begin[p]
+        for e in range(begin[f], begin[f + 1]):
+            if rows[e] < hi:
+                place[e] = rows[e] - lo
             else:
-                F21[local[i], j - lo] += data[e]
+                while rows[k] != rows[e]:
+                    k += 1
+                place[e] = hi - lo + k - begin[p]
+    return place
 
 
 @jit
-def extend_add(U, rows, lo, hi, local, F11, F21, F22):
-    """Add the lower triangle of what a child leaves to a front."""
-    m = rows.size
-    inside = 0
-    while inside < m and rows[inside] < hi:
-        inside += 1
-    for j in range(m):
-        if j < inside:
-            c = rows[j] - lo
-            for i in range(j, inside):
-                F11[rows[i] - lo, c] += U[i, j]
-            for i in range(inside, m):
-                F21[local[rows[i]], c] += U[i, j]
-        else:
-            c = local[rows[j]]
-            for i in range(j, m):
-                F22[local[rows[i]], c] += U[i, j]
-
-
-@jit
-def subtract_rows(X, rows, Y):
-    """X[rows] -= Y."""
-    for k in range(rows.size):
-        for c in range(X.shape[1]):
-            X[rows[k], c] -= Y[k, c]
-
-
-@jit
-def take_rows(X, rows):
-    """Return X[rows]."""
-    Y = np.empty((rows.size, X.shape[1]))
-    for k in range(rows.size):
-        for c in range(X.shape[1]):
-            Y[k, c] = X[rows[k], c]
-    return Y
+def permuted(indptr, indices, data, rank):
+    """Return the lower triangle of a matrix in another order by columns: row i becomes rank[i]; rows as they come."""
+    n = rank.size
+    start = np.zeros(n + 1, np.int64)
+    for j in range(n):
+        for e in range(indptr[j], indptr[j + 1]):
+            start[min(rank[indices[e]], rank[j]) + 1] += 1
+    for j in range(n):
+        start[j + 1] += start[j]
+    rows, values = np.empty(data.size, np.int32), np.empty(data.size)
+    for j in range(n):
+        for e in range(indptr[j], indptr[j + 1]):
+            a, b = rank[indices[e]], rank[j]
+            at = start[min(a, b)]
+            rows[at], values[at] = max(a, b), data[e]
+            start[min(a, b)] += 1
+    for j in range(n, 0, -1):
+        start[j] = start[j - 1]
+    start[0] = 0
+    return start, rows, values

@@ -2,7 +2,7 @@
 
 import os
 import tempfile
-from collections.abc import Iterator
+import threading
 from pathlib import Path
 from typing import Protocol
 
@@ -13,17 +13,15 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["Panels", "PanelsInFile", "PanelsInMemory"]
 
-Panel = tuple[Array, Array]  #: of a front: its diagonal block (w, w) and the rows below (u, w), in Fortran order
-
 
 class Panels(Protocol):
-    """Panels of all fronts, written once in their order."""
+    """The numbers of the factor, block by block (`cms.sparse_cholesky.blocks`); each is written once."""
 
-    def append(self, diagonal: Array, below: Array) -> None:
-        """Keep the panel of the next front."""
+    def put(self, k: int, numbers: Array) -> None:
+        """Keep those of block k."""
 
-    def each(self, *, backwards: bool = False) -> Iterator[tuple[int, Panel]]:
-        """Go through the panels; one is to be used up before the next is asked for."""
+    def of(self, k: int) -> Array:
+        """Return those of block k."""
 
     def close(self) -> None:
         """Give up what they take."""
@@ -33,38 +31,41 @@ class PanelsInMemory:
     """Panels as arrays."""
 
     def __init__(self) -> None:
-        self._panels: list[Panel] = []
+        self._numbers: dict[int, Array] = {}
 
-    def append(self, diagonal: Array, below: Array) -> None:
-        """Keep the panel of the next front."""
-        self._panels.append((diagonal, below))
+    def put(self, k: int, numbers: Array) -> None:
+        """Keep the numbers of block k."""
+        self._numbers[k] = numbers
 
-    def each(self, *, backwards: bool = False) -> Iterator[tuple[int, Panel]]:
-        """Go through the panels."""
-        numbers = range(len(self._panels))
-        for f in reversed(numbers) if backwards else numbers:
-            yield f, self._panels[f]
+    def of(self, k: int) -> Array:
+        """Return the numbers of block k."""
+        return self._numbers[k]
 
     def close(self) -> None:
         """Free them."""
-        self._panels = []
+        self._numbers = {}
 
 
 class PanelsInFile:
     """Panels in a file without a name, which the system removes with the process, however that ends."""
 
-    def __init__(self, width: IntArray, below: IntArray, folder: Path | None = None) -> None:
-        """Open the file for fronts of these sizes, (n_fronts,) each, in the folder for temporary files by default.
+    def __init__(self, ends: IntArray, folder: Path | None = None) -> None:
+        """Open the file, in the folder for temporary files by default.
+
+        Parameters
+        ----------
+        ends
+            Where the numbers of each block begin, and their end, (n_blocks + 1,).
+        folder
+            Of the file.
 
         Raises
         ------
         FactorRoomError
             If the folder does not exist, cannot be written, or has too little room.
         """
-        self._shapes = [(int(w), int(u)) for w, u in zip(width, below, strict=True)]
-        sizes = 8 * (np.asarray(width) * (np.asarray(width) + np.asarray(below)))
-        self._ends = np.concatenate([[0], np.cumsum(sizes)])
-        self._buffer = np.empty(int(sizes.max(initial=0)) // 8)
+        self._ends = 8 * np.asarray(ends, dtype=np.int64)
+        self._lock = threading.Lock()
         where = Path(folder or tempfile.gettempdir())
         needed = int(self._ends[-1])
         try:
@@ -79,38 +80,30 @@ class PanelsInFile:
                 f"{status.f_bavail * status.f_frsize / 1e9:.3g} GB; choose another folder by TMPDIR"
             )
 
-    def append(self, diagonal: Array, below: Array) -> None:
-        """Write the panel of the next front."""
+    def put(self, k: int, numbers: Array) -> None:
+        """Write the numbers of block k."""
+        left = numbers.data.cast("B")
         try:
-            for part in (diagonal, below):
-                left = part.ravel(order="K").data.cast("B")
+            with self._lock:
+                self._file.seek(int(self._ends[k]))
                 while len(left):
                     left = left[self._file.write(left) :]
         except OSError as error:
             raise FactorRoomError(f"the factor could not be written to disk: {error.strerror}") from error
 
-    def each(self, *, backwards: bool = False) -> Iterator[tuple[int, Panel]]:
-        """Read the panels one by one into the same memory."""
-        numbers = range(len(self._shapes))
-        for f in reversed(numbers) if backwards else numbers:
-            w, u = self._shapes[f]
-            numbers_of = self._buffer[: w * (w + u)]
-            self._file.seek(int(self._ends[f]))
-            left = numbers_of.data.cast("B")
+    def of(self, k: int) -> Array:
+        """Read the numbers of block k."""
+        numbers = np.empty(int(self._ends[k + 1] - self._ends[k]) // 8)
+        left = numbers.data.cast("B")
+        with self._lock:
+            self._file.seek(int(self._ends[k]))
             while len(left):
                 got = self._file.readinto(left)
                 if not got:
                     raise FactorRoomError("the factor on disk is shorter than what was written; is the disk full?")
                 left = left[got:]
-            yield (
-                f,
-                (
-                    numbers_of[: w * w].reshape((w, w), order="F"),
-                    numbers_of[w * w :].reshape((u, w), order="F"),
-                ),
-            )
+        return numbers
 
     def close(self) -> None:
         """Remove the file."""
         self._file.close()
-        self._buffer = np.empty(0)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from cms.sparse_cholesky.lapack import routine_address
 from fe_models.foundation.arrays import Array
 
 __all__ = [
@@ -27,16 +28,7 @@ __all__ = [
 @cache
 def routine(name: str) -> Any:
     """Return a routine of BLAS or LAPACK; all its arguments are pointers."""
-    from scipy.linalg import cython_blas, cython_lapack
-
-    capsules = cython_blas.__pyx_capi__ if name in cython_blas.__pyx_capi__ else cython_lapack.__pyx_capi__
-    get_name, get_pointer = ctypes.pythonapi.PyCapsule_GetName, ctypes.pythonapi.PyCapsule_GetPointer
-    get_name.restype, get_name.argtypes = ctypes.c_char_p, [ctypes.py_object]
-    get_pointer.restype, get_pointer.argtypes = ctypes.c_void_p, [ctypes.py_object, ctypes.c_char_p]
-    capsule = capsules[name]
-    signature = get_name(capsule)
-    address = get_pointer(capsule, signature)
-    n_arguments = signature.count(b",") + 1
+    address, n_arguments = routine_address(name)
     return ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * n_arguments)(address)
 
 

@@ -1,4 +1,1 @@
-"""Many values of one function: here, in processes beside, or on a Dask cluster; a journal of what is done.
-
-Work that is interrupted by its user ends (`interrupts`).
-"""
+"""Many values of one function: here, in processes beside, or on a Dask cluster; a journal of what is done."""

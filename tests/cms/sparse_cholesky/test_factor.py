@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from cms.solvers.cholesky import SMALL, cholesky_or_superlu
 from cms.solvers.factorization import factorize, lower_triangle
 from cms.sparse_cholesky import analysis
 from cms.sparse_cholesky.analysis import analyse, dissection_order
+from cms.sparse_cholesky.blocks import blocks_of, for_each
 from cms.sparse_cholesky.factor import CholeskyFactor
 from fe_models.foundation.solver import Solver
 from tests.bodies import bar
@@ -101,6 +103,48 @@ def test_fronts_hold_the_factor_and_no_less(name):
     known = np.tril(known)
     assert (known | (np.abs(L) < 1e-14)).all()
     assert fronts.n_entries == known.sum()
+
+
+@pytest.mark.parametrize("on_disk", [False, True])
+def test_solutions_are_the_same_numbers_on_any_number_of_threads(on_disk, monkeypatch):
+    A = lower_triangle(grid(16))
+    b = np.random.default_rng(2).standard_normal((A.shape[0], 25))
+    solutions = []
+    for threads in (1, 2, 5):
+        monkeypatch.setattr("cms.sparse_cholesky.factor.n_threads", lambda n=threads: n)
+        factor = CholeskyFactor(A, on_disk=on_disk)
+        solutions.append(factor.solve(b))
+        factor.close()
+    for x in solutions[1:]:
+        assert_array_equal(x, solutions[0])
+
+
+def test_blocks_are_subtrees_or_fronts_above_them_and_each_comes_after_those_it_waits_for():
+    fronts = analyse(lower_triangle(grid(14)))
+    blocks = blocks_of(fronts)
+    assert len(blocks) > 8
+    assert_array_equal(blocks.first[[0, -1]], [0, len(fronts.above)])
+    for k, (lo, hi) in enumerate(pairwise(blocks.first)):
+        parents = fronts.above[lo:hi]
+        outside = parents[parents >= hi]
+        if len(outside):
+            assert blocks.first[blocks.above[k]] == outside.min() == outside.max()
+        if blocks.below[k]:
+            assert hi == lo + 1
+    for downwards in (False, True):
+        done = []
+        for_each(blocks, done.append, 3, downwards=downwards)
+        assert_array_equal(np.sort(done), np.arange(len(blocks)))
+        for k, above in enumerate(blocks.above):
+            assert above < 0 or (done.index(above) < done.index(k)) == downwards
+
+
+def test_what_fails_in_a_thread_is_raised():
+    def fail(k):
+        raise RuntimeError(f"block {k}")
+
+    with pytest.raises(RuntimeError, match="block"):
+        for_each(blocks_of(analyse(lower_triangle(grid(14)))), fail, 3)
 
 
 def test_dofs_of_a_node_are_one_vertex():

@@ -1,0 +1,179 @@
+"""Blocks of fronts, each one task: whole subtrees below, single fronts above; and threads that go through them."""
+
+import heapq
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cms.sparse_cholesky.analysis import Fronts
+from fe_models.foundation.arrays import IntArray
+
+if TYPE_CHECKING:
+    from cms.sparse_cholesky.front_kernels import Tree
+    from fe_models.foundation.arrays import Array
+
+__all__ = ["Blocks", "blocks_of", "for_each"]
+
+PARTS = 32  #: a subtree with more than this part of all work is divided
+ENTRY = 100.0  #: operations that take as long as an entry of the factor does otherwise
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """Runs of fronts in their order: each a subtree, several beside each other, or one front above other blocks."""
+
+    fronts: Fronts
+    first: IntArray  #: first front of each block, (n_blocks + 1,)
+    above: IntArray  #: the block of the parent of its roots, -1: none, (n_blocks,)
+
+    def __len__(self) -> int:
+        return len(self.above)
+
+    @cached_property
+    def below(self) -> list[list[int]]:
+        """The blocks right below each, in order."""
+        below: list[list[int]] = [[] for _ in self.above]
+        for k, above in enumerate(self.above):
+            if above >= 0:
+                below[above].append(k)
+        return below
+
+    @cached_property
+    def tree(self) -> "Tree":
+        """The fronts as kernels read them."""
+        from cms.sparse_cholesky.front_kernels import Tree
+
+        fronts = self.fronts
+        return Tree(fronts.first, fronts.begin, fronts.rows, fronts.above, fronts.place, fronts.stored)
+
+    @property
+    def stored(self) -> IntArray:
+        """Where the numbers of each block begin among those that are stored for the factor, and their end."""
+        return self.fronts.stored[self.first]
+
+    def room(self, k: int, size: IntArray) -> tuple[int, int, int]:
+        """Return the numbers of the largest front of a block, of its stack, and of what it leaves there.
+
+        size: of what each front leaves, (n_fronts,).
+        """
+        from cms.sparse_cholesky.front_kernels import room
+
+        return room(self.tree, self.first[k], self.first[k + 1], size)
+
+    def n_working(self, n_threads: int, *, on_disk: bool = False) -> int:
+        """Most numbers that the factorisation holds at once beside the factor: fronts, and what waits for its parent.
+
+        Blocks in the order of `for_each`, each for as long as it has operations; on disk with the panels of those at
+        work.
+        """
+        size = self.fronts.below.astype(np.int64) ** 2
+        rooms = [self.room(k, size) for k in range(len(self))]
+        work = np.add.reduceat(front_work(self.fronts), self.first[:-1])
+        panels = np.diff(self.stored) if on_disk else np.zeros(len(self), np.int64)
+        waits = [len(below) for below in self.below]
+        ready = [k for k in range(len(self)) if not waits[k]]
+        busy: list[tuple[float, int]] = []
+        now, held, most = 0.0, 0, 0
+        while ready or busy:
+            while ready and len(busy) < n_threads:
+                k = heapq.heappop(ready)
+                held += rooms[k][0] + rooms[k][1] + int(panels[k])
+                most = max(most, held)
+                heapq.heappush(busy, (now + work[k], k))
+            now, k = heapq.heappop(busy)
+            held -= rooms[k][0] + rooms[k][1] + int(panels[k]) - rooms[k][2] + sum(rooms[c][2] for c in self.below[k])
+            if self.above[k] >= 0:
+                waits[self.above[k]] -= 1
+                if not waits[self.above[k]]:
+                    heapq.heappush(ready, int(self.above[k]))
+        return most
+
+
+def front_work(fronts: Fronts) -> "Array":
+    """Return what each front takes of time, in operations, (n_fronts,): its entries are written and read as well."""
+    return fronts.front_operations + ENTRY * fronts.width * (fronts.width + fronts.below)
+
+
+def blocks_of(fronts: Fronts) -> Blocks:
+    """Cut the tree of fronts into blocks; the same whatever the number of threads is."""
+    n_fronts, above = len(fronts.above), fronts.above
+    work = front_work(fronts)
+    start = np.arange(n_fronts)  # first front of each subtree
+    for f in range(n_fronts):
+        if above[f] >= 0:
+            work[above[f]] += work[f]
+            start[above[f]] = min(start[above[f]], start[f])
+    limit = work[above < 0].sum() / PARTS
+    first: list[int] = []
+    parents: list[int] = []  # of blocks, from the last to the first
+    f, run = n_fronts - 1, 0.0
+    while f >= 0:
+        is_large = work[f] > limit
+        joins = bool(first) and not is_large and run > 0 and parents[-1] == above[f] and run + work[f] <= limit
+        if joins:
+            first[-1] = start[f]
+            run += work[f]
+        else:
+            first.append(f if is_large else start[f])
+            parents.append(above[f])
+            run = 0.0 if is_large else work[f]
+        f = f - 1 if is_large else start[f] - 1
+    bounds = np.array([*reversed(first), n_fronts])
+    parent = np.array(parents[::-1], dtype=np.int64)
+    return Blocks(fronts, bounds, np.where(parent >= 0, np.searchsorted(bounds, parent, side="right") - 1, -1))
+
+
+def for_each(blocks: Blocks, task: Callable[[int], None], n_threads: int, *, downwards: bool = False) -> None:
+    """Do a task for every block, each after those below it (downwards: after the one above it), in some threads.
+
+    Those that come first in this order go before others, so that little waits for its parent.
+    """
+    n = len(blocks)
+    if n_threads == 1 or n == 1:
+        for k in reversed(range(n)) if downwards else range(n):
+            task(k)
+        return
+    waits = [int(above >= 0) for above in blocks.above] if downwards else [len(below) for below in blocks.below]
+    ready = [-k if downwards else k for k in range(n) if not waits[k]]
+    heapq.heapify(ready)
+    change = threading.Condition()
+    failures: list[BaseException] = []
+    begun: list[int] = []
+
+    def after(k: int) -> list[int]:
+        return blocks.below[k] if downwards else [int(blocks.above[k])] if blocks.above[k] >= 0 else []
+
+    def worker() -> None:
+        while True:
+            with change:
+                change.wait_for(lambda: ready or failures or len(begun) == n)
+                if failures or len(begun) == n:
+                    return
+                k = abs(heapq.heappop(ready))
+                begun.append(k)
+            try:
+                task(k)
+            except BaseException as error:  # handed to the thread that asked
+                with change:
+                    failures.append(error)
+                    change.notify_all()
+                return
+            with change:
+                for other in after(k):
+                    waits[other] -= 1
+                    if not waits[other]:
+                        heapq.heappush(ready, -other if downwards else other)
+                change.notify_all()
+
+    threads = [threading.Thread(target=worker) for _ in range(min(n_threads, n) - 1)]
+    for thread in threads:
+        thread.start()
+    worker()
+    for thread in threads:
+        thread.join()
+    if failures:
+        raise failures[0]

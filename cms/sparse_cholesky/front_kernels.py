@@ -1,0 +1,215 @@
+"""Compiled loops over fronts that make the factor; imported where they are used.
+
+A front of w columns and u rows below them is F, (w + u, w), and what it leaves, U, (u, u), one column after the other
+in flat arrays; of symmetric parts the lower triangle. What fronts of a subtree leave lies on a stack until their parent
+takes it.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from llvmlite import binding
+from numba import njit, types
+
+from cms.sparse_cholesky.lapack import routine_address
+from cms.sparse_cholesky.tiles import ROWS
+from fe_models.foundation.arrays import Array, IntArray
+
+__all__ = [
+    "Entries",
+    "Tree",
+    "Words",
+    "begin_front",
+    "factorise_fronts",
+    "finish_front",
+    "room",
+    "take_updates",
+    "words",
+]
+
+jit = njit(cache=True, nogil=True, error_model="numpy")
+
+
+def external(name: str) -> Any:
+    """Return a routine of BLAS or LAPACK for kernels; they find it by its name, so that they can be kept on disk."""
+    address, n_arguments = routine_address(name)
+    binding.add_symbol(f"sparse_cholesky_{name}", address)
+    return types.ExternalFunction(f"sparse_cholesky_{name}", types.void(*[types.intp] * n_arguments))
+
+
+dpotrf, dtrsm, dsyrk = external("dpotrf"), external("dtrsm"), external("dsyrk")
+
+
+class Tree(NamedTuple):
+    """Fronts as kernels read them (`Fronts`)."""
+
+    first: IntArray
+    begin: IntArray
+    rows: IntArray
+    above: IntArray
+    place: IntArray
+    stored: IntArray
+
+
+class Entries(NamedTuple):
+    """The lower triangle of the matrix in the order of the fronts, by columns."""
+
+    start: IntArray
+    rows: IntArray
+    values: Array
+
+
+class Words(NamedTuple):
+    """Arguments of BLAS and LAPACK, which take addresses alone; of one thread."""
+
+    sizes: IntArray
+    factors: Array
+    letters: np.ndarray
+
+
+def words() -> Words:
+    """Return them: sizes, which kernels fill in; 1 and -1; the letters L, N, R and T."""
+    return Words(np.zeros(4, np.intc), np.array([1.0, -1.0]), np.frombuffer(b"LNRT", np.uint8).copy())
+
+
+@jit
+def room(tree, lo, hi, size):
+    """Return what a run of subtrees needs: numbers of the largest F, of the stack, and of what roots leave on it.
+
+    size: of what each front leaves, (n_fronts,).
+    """
+    front = stack = top = 0
+    waiting = np.zeros(hi - lo, np.int64)  # left by the children of each front
+    for f in range(lo, hi):
+        w, u = tree.first[f + 1] - tree.first[f], tree.begin[f + 1] - tree.begin[f]
+        front = max(front, w * (w + u))
+        stack = max(stack, top + size[f])
+        top += size[f] - waiting[f - lo]
+        if 0 <= tree.above[f] < hi:
+            waiting[tree.above[f] - lo] += size[f]
+    return front, stack, top
+
+
+@jit
+def begin_front(tree, entries, f, F, U, local):
+    """Put the entries of the matrix into an empty front; `local`: a workspace over all rows."""
+    lo, hi = tree.first[f], tree.first[f + 1]
+    w, u = hi - lo, tree.begin[f + 1] - tree.begin[f]
+    F[: w * (w + u)] = 0.0
+    for j in range(u):
+        U[j * u + j : (j + 1) * u] = 0.0
+    for k in range(u):
+        local[tree.rows[tree.begin[f] + k]] = w + k
+    for j in range(lo, hi):
+        at = (j - lo) * (w + u)
+        for e in range(entries.start[j], entries.start[j + 1]):
+            i = entries.rows[e]
+            F[at + (i - lo if i < hi else local[i])] += entries.values[e]
+
+
+@jit
+def add_update(place, left, w, u, F, U):
+    """Add what a child leaves, (m, m), to a front, by the places of its rows."""
+    m = place.size
+    for j in range(m):
+        if place[j] < w:
+            at = place[j] * (w + u)
+            for i in range(j, m):
+                F[at + place[i]] += left[j * m + i]
+        else:
+            at = (place[j] - w) * u - w
+            for i in range(j, m):
+                U[at + place[i]] += left[j * m + i]
+
+
+@jit
+def take_updates(tree, lo, hi, stack, f, F, U):
+    """Add what the roots among fronts lo to hi leave on their stack to front f, their parent."""
+    w, u = tree.first[f + 1] - tree.first[f], tree.begin[f + 1] - tree.begin[f]
+    at = 0
+    for c in range(lo, hi):
+        if tree.above[c] >= hi:
+            m = tree.begin[c + 1] - tree.begin[c]
+            add_update(tree.place[tree.begin[c] : tree.begin[c + 1]], stack[at : at + m * m], w, u, F, U)
+            at += m * m
+
+
+@jit
+def finish_front(tree, f, F, U, panel, words):
+    """Eliminate the columns of a front and write them as tiles; return 0, or the number of the pivot that failed.
+
+    F11 = L11 L11ᵀ;  L21 = F21 L11⁻ᵀ;  U <- U - L21 L21ᵀ
+    """
+    w, u = tree.first[f + 1] - tree.first[f], tree.begin[f + 1] - tree.begin[f]
+    sizes = words.sizes
+    sizes[0], sizes[1], sizes[2], sizes[3] = w, w + u, u, 0
+    at, step = sizes.ctypes.data, sizes.itemsize
+    n_w, n_front, n_u, info = at, at + step, at + 2 * step, at + 3 * step
+    one, minus_one = words.factors.ctypes.data, words.factors.ctypes.data + 8
+    letters = words.letters.ctypes.data
+    lower, plain, right, transposed = letters, letters + 1, letters + 2, letters + 3
+    dpotrf(lower, n_w, F.ctypes.data, n_front, info)
+    if sizes[3] != 0:
+        return sizes[3]
+    if u:
+        below = F.ctypes.data + 8 * w
+        dtrsm(right, lower, transposed, plain, n_u, n_w, one, F.ctypes.data, n_front, below, n_front)
+        dsyrk(lower, plain, n_u, n_w, minus_one, below, n_front, one, U.ctypes.data, n_u)
+    write_tiles(F, w, u, panel)
+    return 0
+
+
+@jit
+def write_tiles(F, w, u, panel):
+    """Write the columns of a front as tiles of eight rows: their diagonal as reciprocals, rows that miss as zeros."""
+    at = 0
+    for top in range(0, w, ROWS):
+        for j in range(top + ROWS):
+            for i in range(ROWS):
+                row = top + i
+                if row == j:
+                    panel[at] = 1.0 / F[j * (w + u) + j] if row < w else 1.0
+                else:
+                    panel[at] = F[j * (w + u) + row] if row < w and j < row else 0.0
+                at += 1
+    for top in range(0, u, ROWS):
+        n = min(ROWS, u - top)
+        for j in range(w):
+            source = j * (w + u) + w + top
+            for i in range(n):
+                panel[at + i] = F[source + i]
+            for i in range(n, ROWS):
+                panel[at + i] = 0.0
+            at += ROWS
+
+
+@jit
+def factorise_fronts(tree, entries, lo, hi, F, stack, local, panels, words):
+    """Factorise a run of subtrees; return 0, or a failed row in the new order, counted from 1.
+
+    (1) the front: entries of the matrix, and what its children left, which are last on the stack
+    (2) its columns are eliminated and written; what it leaves takes the place of what its children left
+    """
+    left_by, n_left, top = np.empty(hi - lo, np.int64), 0, 0
+    for f in range(lo, hi):
+        w, u = tree.first[f + 1] - tree.first[f], tree.begin[f + 1] - tree.begin[f]
+        U = stack[top : top + u * u]
+        begin_front(tree, entries, f, F, U, local)  # (1)
+        under = top
+        while n_left and tree.above[left_by[n_left - 1]] == f:
+            n_left -= 1
+            c = left_by[n_left]
+            m = tree.begin[c + 1] - tree.begin[c]
+            under -= m * m
+            place = tree.place[tree.begin[c] : tree.begin[c + 1]]
+            add_update(place, stack[under : under + m * m], w, u, F, U)
+        failed = finish_front(tree, f, F, U, panels[tree.stored[f] - tree.stored[lo] :], words)  # (2)
+        if failed:
+            return tree.first[f] + failed
+        if under < top:
+            for k in range(u * u):
+                stack[under + k] = U[k]
+        top = under + u * u
+        left_by[n_left] = f
+        n_left += 1
+    return 0
