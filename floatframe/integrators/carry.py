@@ -18,6 +18,7 @@ __all__ = [
     "Failure",
     "Integrator",
     "carry_of",
+    "carry_of_past",
     "memory_of",
     "observed",
     "one_step_of",
@@ -119,6 +120,30 @@ def carry_of(memory: Memory, n_iterations: int) -> Carry:
         int(memory.n_rejected),
         memory.angle,
         memory.angle_rate,
+    )
+
+
+def carry_of_past(work: Work, end: Carry, k: int) -> Carry:
+    """Return the memory after step k, from 0, of a call of `advance` that led to the memory `end`.
+
+    The working arrays have room for it, and had kept none before the call.
+    """
+    past, last = work.past, int(work.past.n) - 1
+    n_steps, n_rejected, n_iterations = (int(count) for count in past.counts[k])
+    return Carry(
+        State(past.r[k], past.p[k], past.q[k], past.u[k]),
+        past.u_dot[k].copy(),
+        past.a[k, : len(end.a)].copy(),
+        float(past.h[k]),
+        past.w[k].copy(),
+        past.work[k].copy(),
+        past.power[k].copy(),
+        end.n_iterations - int(past.counts[last, 2]) + n_iterations,
+        float(past.h_wanted[k]),
+        n_steps,
+        n_rejected,
+        past.angle[k].copy(),
+        past.angle_rate[k].copy(),
     )
 
 

@@ -13,7 +13,7 @@ from fe_models.foundation.arrays import Array, IntArray
 from floatframe.kernels.compiler.choice import is_lean, words
 from floatframe.kernels.compiler.compilation import kept_entry
 from floatframe.kernels.compiler.sources import source_digest
-from floatframe.kernels.compiler.structure import converter, kept_table_of, table_of
+from floatframe.kernels.compiler.structure import converter, kept_table_of, table_of, table_of_numbers
 from floatframe.kernels.connections.connection import constraint_rates
 from floatframe.kernels.diagnostics import power
 from floatframe.kernels.evaluation import evaluate, linearize
@@ -27,7 +27,7 @@ from floatframe.kernels.generalized_alpha import (
 )
 from floatframe.kernels.memory import Memory, Rows, new_rows
 from floatframe.kernels.model import Model
-from floatframe.kernels.records import filled, integer, real, zeros
+from floatframe.kernels.records import integer, real, zeros
 from floatframe.kernels.schur import correction, factorize_bodies
 from floatframe.kernels.turns import count_turns
 from floatframe.kernels.work import Work
@@ -129,7 +129,7 @@ run = make_entry(source_digest(__name__, "lean" if is_lean else "plain"))
 SIGNATURE = (types.Array(types.int64, 1, "C"),) * 5
 
 NO_SIZES = dict.fromkeys(("n_t", "n_b", "n_c", "n_q", "n_u", "n_w", "angles"), 0)
-NOTHING = zeros(Order(), {})
+ORDER, NOTHING = Order(), zeros(Order(), {})
 NO_ROWS = zeros(Rows(), NO_SIZES)
 
 
@@ -150,8 +150,10 @@ def call(model: Model, work: Work, memory: Memory, rows: Rows, **order: float) -
         if prepare():
             level = logging.INFO if is_lean else logging.WARNING  # what is not as usual is said
             log.log(level, "compiled the code of the motion in %.0f s, once: %s", time.perf_counter() - began, words())
-    ordered = filled(Order(), **(NOTHING._asdict() | order))
-    return Outcome(*run(kept_table_of(model), kept_table_of(work), table_of(memory), table_of(rows), table_of(ordered)))
+    ordered, numbers = table_of_numbers(ORDER, order)
+    outcome = run(kept_table_of(model), kept_table_of(work), table_of(memory), table_of(rows), ordered)
+    del numbers  # not before
+    return Outcome(*outcome)
 
 
 def no_memory() -> Memory:

@@ -8,6 +8,7 @@ from floatframe.kernels.diagnostics import diagnose, power
 from floatframe.kernels.evaluation import evaluate
 from floatframe.kernels.memory import WORK_GIVEN, WORK_TAKEN
 from floatframe.kernels.model import MASS, STIFFNESS
+from floatframe.kernels.past import keep_past
 from floatframe.kernels.rotation import exp_matrix, matrix_of_euler_parameters, rotate_euler_parameters
 from floatframe.kernels.schur import correction, factorize_bodies
 from floatframe.kernels.step_start import begin_step
@@ -421,6 +422,7 @@ def time_loop(try_step, write):
                 has_failed = True
             if (first + k + 1) % order.every == 0:
                 write(model, work, memory, others, end, rows)
+            keep_past(work.past, memory, memory.a, memory.h, work.counted.iterations)
         return DONE, order.n_steps, work.counted.rows, -1, excess
 
     return advance

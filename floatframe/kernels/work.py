@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.kernels.model import Model, n_b, n_c, n_lines, n_m, n_pairs, n_states, n_w
+from floatframe.kernels.model import Model, n_angles, n_b, n_c, n_lines, n_m, n_pairs, n_states, n_w
 from floatframe.kernels.records import Size, integer, measured, real, zeros
 
 __all__ = [
@@ -23,6 +23,7 @@ __all__ = [
     "LineWork",
     "MarkerWork",
     "PairWork",
+    "Past",
     "Solver",
     "StateWork",
     "TapeWork",
@@ -36,6 +37,7 @@ __all__ = [
 n_q, n_u, n_x, n_most, most_rows = (Size(name) for name in ("n_q", "n_u", "n_x", "n_most", "most_rows"))
 n_inputs, n_outputs, n_gradients, n_results = (Size(name) for name in ("inputs", "outputs", "gradients", "results"))
 n_accelerated, n_a = Size("accelerated markers"), Size("n_a")
+n_past, n_remembered = Size("n_past"), Size("n_remembered")
 n_law_inputs, n_law_outputs, n_law_slopes = (Size(f"{name} of a law") for name in ("inputs", "outputs", "slopes"))
 
 
@@ -241,6 +243,26 @@ class Counted(NamedTuple):
     rows: IntArray = integer()  #: written into the results of the present call
 
 
+class Past(NamedTuple):
+    """The memories after each of the last steps, as many as there is room for; see kernels/past.py."""
+
+    n: IntArray = integer()  #: kept so far; from zero on where the caller says so
+    r: Array = real(n_past, n_b, 3, unit="m")
+    p: Array = real(n_past, n_b, 4)
+    q: Array = real(n_past, n_q)
+    u: Array = real(n_past, n_u, unit="m/s, rad/s, 1/s")
+    u_dot: Array = real(n_past, n_u, unit="m/s², rad/s², 1/s²")
+    a: Array = real(n_past, n_remembered)  #: what the method remembers: algorithmic accelerations, or multipliers
+    w: Array = real(n_past, n_w, unit="N, N m")
+    work: Array = real(n_past, 2, unit="J")  #: given, taken
+    power: Array = real(n_past, 2, unit="W")  #: given, taken
+    h: Array = real(n_past, unit="s")
+    h_wanted: Array = real(n_past, unit="s")
+    angle: Array = real(n_past, n_angles, unit="rad")
+    angle_rate: Array = real(n_past, n_angles, unit="rad/s")
+    counts: IntArray = integer(n_past, 3)  #: steps accepted and rejected, iterations
+
+
 class Work(NamedTuple):
     """The working arrays of a system."""
 
@@ -258,6 +280,7 @@ class Work(NamedTuple):
     tapes: TapeWork = TapeWork()
     solver: Solver = Solver()
     counted: Counted = Counted()
+    past: Past = Past()
 
 
 def state_sizes(model: Model) -> dict[str, int]:
@@ -315,9 +338,11 @@ def acceleration_sizes(model: Model) -> dict[str, int]:
     }
 
 
-def new_work(model: Model) -> Work:
-    """Return working arrays for a compiled system."""
-    work = zeros(Work(), sizes_of(model))
+def new_work(model: Model, n_past: int = 0) -> Work:
+    """Return working arrays for a compiled system, with room for the memories after n_past steps of a call."""
+    sizes = sizes_of(model)
+    remembered = max(sizes["n_u"], sizes["n_w"])
+    work = zeros(Work(), sizes | {"n_past": n_past, "n_remembered": remembered})
     work.markers.psi[:] = model.markers.psi
     work.states.base[:] = model.states.start
     work.states.rho[...] = 1.0

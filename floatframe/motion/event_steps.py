@@ -1,14 +1,14 @@
 """Steps with events: values watched after each of many steps, and the step refined to where one passes its level.
 
-Steps are taken by the compiled loop in blocks, and what is watched is measured for a whole block at once. A block in
-which something happens is taken again up to the step in question, from the memory and the factors that it began with:
-the same numbers, bit for bit.
+Steps are taken by the compiled loop in blocks, and what is watched is measured for a whole block at once. Where
+something happens in a step it is found by steps of other sizes from the memory before that step, which the loop kept:
+nothing is taken twice, and a motion that events only record goes on as if there were none, bit for bit.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,13 +17,15 @@ from floatframe.compiling.file_frames import rows_of_file, state_of_file
 from floatframe.compiling.public_elements import PlacedLaw
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
-from floatframe.integrators.carry import Carry, Failure, Integrator
+from floatframe.integrators.carry import Carry, Failure, Integrator, carry_of_past
+from floatframe.integrators.generalized_alpha import GeneralizedAlpha
 from floatframe.integrators.ida import Ida
+from floatframe.integrators.relative_ode import RelativeOde
 from floatframe.joints.rows import NOTHING, POSITION
 from floatframe.kernels.memory import KINETIC, SPRINGS, WORK_GIVEN, WORK_TAKEN, Rows
-from floatframe.kernels.records import leaves
 from floatframe.kernels.work import Work, new_work
 from floatframe.motion.events import Event, events_of, off_at_start, require_events, switched
+from floatframe.motion.passage import MOST_NEIGHBOURS, expected_passage, passage
 from floatframe.motion.stop_events import (
     INWARD,
     StopEvent,
@@ -34,6 +36,7 @@ from floatframe.motion.stop_events import (
     stop_values,
     sum_rows,
 )
+from floatframe.motion.watched_values import direct_values
 from floatframe.results.head import Head
 from floatframe.results.results_file import MemorySource
 from floatframe.results.sensors import sensor_of
@@ -47,8 +50,44 @@ __all__ = ["EventWatch"]
 
 BLOCK = 400  #: most steps between which what is watched is not measured; blocks end where a multiple of it does
 STANDS = 1e-9  #: change of what is watched in a step, relative to its level or 1, below which it is held or at rest
+MOST_NUMBERS = 2**23  #: in the results of a block
 SHUT = 1e-6  #: of the length of the system, or rad: what a coupler may close that takes hold of a value
 MOST_IN_A_STEP = 100  #: events in one step; more mean that events switch each other without end
+
+
+class Ended(NamedTuple):
+    """What a step led to."""
+
+    carry: Carry  #: of it, or of steps after it
+    row: Rows | None  #: None: not known
+    values: Array  #: of the events, (n_events,)
+
+
+class Place(NamedTuple):
+    """A place in a step where event j happens."""
+
+    part: float  #: of the step
+    j: int
+    carry: Carry
+    row: Rows
+    failure: Failure | None  #: of the step that leads there
+
+
+def joined_rows(parts: list[Rows]) -> Rows:
+    """Return rows of results one after the other."""
+    return Rows(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+
+def past_rows(work: Work, n_steps: int, t0: float, h: float, first: int) -> Rows:
+    """Return times and angles after each of n_steps that were kept, without the other results."""
+    empty = Rows(*(np.zeros(0) for _ in Rows._fields))
+    times: Array = t0 + h * np.arange(first + 1, first + n_steps + 1, dtype=float)
+    return empty._replace(t=times, angle=work.past.angle[:n_steps])
+
+
+def one_of(rows: Rows, k: int) -> Rows:
+    """Return one of several rows of results."""
+    return Rows(*(array[k : k + 1] for array in rows))
 
 
 @dataclass
@@ -63,16 +102,18 @@ class EventWatch:
     caught: dict[str, float] = field(default_factory=dict)  #: what couplers that have been engaged hold
     resting: dict[str, str] = field(default_factory=dict)  #: side of the limits at which couplers hold
     values: Array = field(init=False)  #: of the events at the last time, angles without jumps, (n_events,)
-    row: Rows | None = field(init=False, default=None)  #: results at the last time
+    row: Rows | None = field(init=False, default=None)  #: results at the last time, where sensors measure
     #: the last two rows that were measured, each with itself in the frames of the files
     told: tuple[tuple[Rows, Rows], ...] = field(init=False, default=())
     happened: list[dict[str, Any]] = field(default_factory=list)
     recorded: list[Rows] = field(default_factory=list)  #: results at events since they were last taken
     has_stopped: bool = False
+    #: for each event what it watches straight from rows of results; None: by its sensor
+    direct: list[Callable[[Rows], Array] | None] = field(init=False)
     due: int = -1  #: number of the step in which something is known to happen
-    #: working arrays, those that are not empty, and what they were where the present block began
-    held: tuple[Work, list[Array], list[Array]] | None = field(init=False, default=None)
-    calm: int = BLOCK  #: most steps of the next block: few after an event, which may be one of many
+    trial: tuple[System, Work] | None = field(init=False, default=None)  #: working arrays of steps that lead no further
+    calm: int = BLOCK  #: most steps of the next block: few after an event that changed the motion, perhaps one of many
+    changed: int = 0  #: number of the step with which the last of these ended
 
     def __post_init__(self) -> None:
         require_events(self.full)
@@ -80,6 +121,7 @@ class EventWatch:
         released = {coupler.name for coupler in self.full.couplers if not coupler.engaged}
         self.switch(off_at_start(events_of(self.full)) | released)
         self.values = np.zeros(len(self.events))
+        self.direct = [None if isinstance(each, StopEvent) else direct_values(self.full, each) for each in self.events]
 
     def switch(self, off: frozenset[str]) -> None:
         """Take these forces and couplers off, all others on, with what couplers have caught and stops hold."""
@@ -102,12 +144,12 @@ class EventWatch:
         """Return what each event watches at the times of rows of results, (n_times, n_events)."""
         compiled = compiled_system(self.full)
         motion, columns = None, []
-        for event in self.events:
+        for event, direct in zip(self.events, self.direct, strict=True):
             if isinstance(event, StopEvent):
                 columns.append(stop_values(compiled, event, self.resting, rows))
                 continue
-            if event.at is not None:
-                columns.append(np.concatenate([row.t for row in rows]))
+            if direct is not None:
+                columns.append(np.concatenate([direct(row) for row in rows]))
                 continue
             if motion is None:
                 arrays = arrays_of([self.in_files(row) for row in rows])
@@ -133,8 +175,15 @@ class EventWatch:
 
     def values_after(self, row: Rows) -> Array:
         """Return what is watched at a later time."""
+        if self.is_direct:
+            return np.asarray(self.measured(row)[0])
         assert self.row is not None
         return np.asarray(self.measured(self.row, row)[1])
+
+    @property
+    def is_direct(self) -> bool:
+        """Whether all that is watched stands in the memories of the method."""
+        return None not in self.direct
 
     def happens(self, event: Event, before: float, after: float) -> bool:
         """Whether an event happens from one value to the next.
@@ -158,95 +207,151 @@ class EventWatch:
         each = zip(self.events, before, after, strict=True)
         return any(self.happens(event, float(first), float(then)) for event, first, then in each)
 
+    def new_work(self) -> Work:
+        """Return working arrays for the system as it is switched, with room for the memories of a block."""
+        return new_work(compiled_system(self.system).model, min(BLOCK, self.longest))
+
+    @property
+    def longest(self) -> int:
+        """Most steps of a block, so that its results do not fill the memory."""
+        state = compiled_system(self.full).placed
+        numbers = 8 * state.r.size + 5 * len(state.u) + len(compiled_system(self.full).owners)
+        return max(1, MOST_NUMBERS // (numbers + 1))
+
+    def trial_work(self) -> Work:
+        """Return working arrays of steps that lead no further; those of the run keep their factors."""
+        if self.trial is None or self.trial[0] is not self.system:
+            self.trial = self.system, new_work(compiled_system(self.system).model)
+        return self.trial[1]
+
     def steps(
-        self, integrator: Integrator, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int
-    ) -> tuple[Carry, Rows, Work, int, Failure | None]:
+        self, integrator: Integrator, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int,
+        every: int,
+    ) -> tuple[Carry, Rows, Work, int, Failure | None]:  # fmt: skip
         """Take steps of size h, the first of them number `first` from t0, as many as make a block, n_steps at most.
 
-        Return the results after each of them (those at a stop, if the run ends there), and how many are done.
+        Return the results after every `every`-th of them (and at a stop, if the run ends there), and how many are done.
 
-        (1) the steps of a block, as many as there were without an event, by one call; what is watched, after each
-        (2) nothing happens: the block is done
-        (3) something happens in its first step: that step is taken by `step`
-        (4) something happens later: the steps before are taken again from where the block began, and are done
+        (1) the steps of a block by one call, which keeps the memory after each; what is watched, after each
+        (2) where something happens in a step, it is found by steps from the memory before it (`settled`)
+        (3) the motion is the same after it: the steps that were taken stay as they are
+        (4) it is another one: the block ends with that step
+        A method that does not keep its memories takes the steps before anew, and the one in question alone.
         """
-        n = min(n_steps, BLOCK - first % BLOCK, self.calm)
-        if n == 1 or first == self.due or isinstance(integrator, Ida):  # each call of Ida begins anew
-            n_before = len(self.happened)
-            carry, row, work, failure = self.step(integrator, carry, work, t0=t0, h=h, k=first)
-            self.calm = min(2 * self.calm, BLOCK) if len(self.happened) == n_before else 1
-            return carry, row, work, int(failure is None), failure
-        if self.held is None or self.held[0] is not work:
-            arrays = [array for _, array in leaves(work) if array.size]
-            self.held = work, arrays, [np.empty_like(array) for array in arrays]
-        _, arrays, kept = self.held
-        begin = carry
-        for array, value in zip(arrays, kept, strict=True):
-            value[...] = array
+        keeps_past = not isinstance(integrator, Ida | RelativeOde)
+        is_single = first == self.due or isinstance(integrator, Ida)  # each call of Ida begins anew
+        n = 1 if is_single else min(n_steps, BLOCK - first % BLOCK, self.calm, self.longest)
+        # others complete their memories where results are written
+        every_row = every if self.is_direct and isinstance(integrator, GeneralizedAlpha) else 1
+        begin, before = carry, self.row
+        work.past.n[...] = 0
         carry, rows, n_good, failure = integrator.advance(
-            self.system, begin, work, t0=t0, h=h, first=first, n_steps=n, every=1
+            self.system, begin, work, t0=t0, h=h, first=first, n_steps=n, every=every_row
         )
-        assert self.row is not None
-        values = np.concatenate([self.values[None], self.measured(self.row, rows)[1:]])
-        n_free = next((k for k in self.near_levels(values) if self.any_happens(values[k], values[k + 1])), n_good)
-        if n_free < n_good:
-            for array, value in zip(arrays, kept, strict=True):
-                array[...] = value
-            self.due = first + n_free
-            carry = begin
-            if n_free == 0:
-                return self.steps(integrator, carry, work, t0=t0, h=h, first=first, n_steps=1)
-            carry, rows, n_free, failure = integrator.advance(
-                self.system, begin, work, t0=t0, h=h, first=first, n_steps=n_free, every=1
+        if every_row == 1:
+            assert before is not None
+            found = self.measured(before, rows)[1:]
+        else:
+            found = self.measured(past_rows(work, n_good, t0, h, first))
+        values = np.concatenate([self.values[None], found])
+        for k in map(int, self.near_levels(values)):
+            if not self.any_happens(values[k], values[k + 1]):
+                continue
+            if k > 0 and not keeps_past:
+                self.due = first + k
+                n_good, values = k, values[: k + 1]
+                carry, rows, _, failure = integrator.advance(
+                    self.system, begin, work, t0=t0, h=h, first=first, n_steps=n_good, every=1
+                )
+                break
+            self.values = values[k]
+            if every_row == 1:
+                self.row = before if k == 0 else one_of(rows, k - 1)
+            ended = Ended(carry, one_of(rows, k) if every_row == 1 else None, values[k + 1])
+            close = slice(max(0, k + 1 - MOST_NEIGHBOURS), k + 1 + MOST_NEIGHBOURS)
+            settled, row, work_after, failed = self.settled(
+                integrator,
+                begin if k == 0 else carry_of_past(work, carry, k - 1),
+                ended,
+                work,
+                t=t0 + (first + k) * h,
+                t_end=t0 + (first + k + 1) * h,
+                h=h,
+                neighbours=(k - close.start, values[close]),
             )
-        if n_free:
-            self.values, self.row = values[n_free], Rows(*(array[n_free - 1 : n_free] for array in rows))
+            if failed is not None or settled is not carry:
+                n_good = k + int(failed is None)
+                due = (first + k) // every_row - first // every_row
+                rows = Rows(*(array[:due] for array in rows))
+                self.calm = max(1, (first + n_good - self.changed) // 2)
+                self.changed = first + n_good
+                if failed is None and row is not None and (self.has_stopped or (first + n_good) % every_row == 0):
+                    rows = joined_rows([rows, row])
+                return settled, self.due_of(rows, first, every // every_row), work_after, n_good, failed
+        self.values = values[n_good]
+        if n_good and every_row == 1:
+            self.row = one_of(rows, n_good - 1)
         self.calm = min(2 * self.calm, BLOCK)
-        return carry, rows, work, n_free, failure
+        return carry, self.due_of(rows, first, every // every_row), work, n_good, failure
+
+    def due_of(self, rows: Rows, first: int, every: int) -> Rows:
+        """Return of the results after steps from `first` on every `every`-th, and those at a stop."""
+        if every == 1:
+            return rows
+        is_due = (first + 1 + np.arange(len(rows.t))) % every == 0
+        if self.has_stopped:
+            is_due[-1:] = True
+        return Rows(*(array[is_due] for array in rows))
 
     def step(
         self, integrator: Integrator, carry: Carry, work: Work, *, t0: float, h: float, k: int
     ) -> tuple[Carry, Rows, Work, Failure | None]:
         """Take step k of size h from t0 + k h, with the events in it; return the results at its end, or at the stop."""
-        t, t_end = t0 + k * h, t0 + (k + 1) * h
-        where, size, number = t0, h, k
+        after, row, _, failure = integrator.advance(self.system, carry, work, t0=t0, h=h, first=k, n_steps=1, every=1)
+        if failure is not None:
+            return carry, row, work, failure
+        ended = Ended(after, row, self.values_after(row))
+        carry, last, work, failure = self.settled(
+            integrator, carry, ended, work, t=t0 + k * h, t_end=t0 + (k + 1) * h, h=h
+        )
+        return carry, row if last is None else last, work, failure
+
+    def settled(
+        self, integrator: Integrator, begin: Carry, ended: "Ended", work: Work, *, t: float, t_end: float, h: float,
+        neighbours: tuple[int, Array] | None = None,
+    ) -> tuple[Carry, Rows | None, Work, Failure | None]:  # fmt: skip
+        """Settle what happens in a step of size h from t; return memory and results at its end, or at the stop.
+
+        begin, ended: the memory before the step, and what it led to. neighbours: values at steps around it, (n_times,
+        n_events), the first of them so many steps before it.
+        """
+        size = h
         for _ in range(MOST_IN_A_STEP):
-            begin = carry
-            carry, row, _, failure = integrator.advance(
-                self.system, begin, work, t0=where, h=size, first=number, n_steps=1, every=1
-            )
-            if failure is not None:
-                return begin, row, work, failure
-            values = self.values_after(row)
-            events = self.events
+            events, values = self.events, ended.values
             passed = [j for j, e in enumerate(events) if self.happens(e, float(self.values[j]), float(values[j]))]
-            trial = new_work(compiled_system(self.system).model) if passed else work  # leaves the factors of the run
+            if not passed:
+                self.values, self.row = values, ended.row
+                return ended.carry, ended.row, work, None
             found = sorted(
-                (self.locate(integrator, begin, work if events[j].is_active else trial, t, size, j, values[j]), j)
-                for j in passed
+                (self.located(integrator, begin, ended, t, size, j, neighbours) for j in passed),
+                key=lambda place: (place.part, place.j),
             )
-            acting = next(((part, j) for part, j in found if events[j].is_active), None)
-            last = 1.0 if acting is None else acting[0]
-            noted = [(part, j) for part, j in found if not events[j].is_active and part <= last]
-            for part, j in noted:
-                failure = self.note(integrator, begin, trial, t, size, part, j)
-                if failure is not None:
-                    return begin, row, work, failure
+            acting = next((place for place in found if events[place.j].is_active), None)
+            last = 1.0 if acting is None else acting.part
+            noted = [place for place in found if not events[place.j].is_active and place.part <= last]
+            failure = next((place.failure for place in (*noted, acting) if place and place.failure is not None), None)
+            if failure is not None:
+                return begin, ended.row, work, failure
+            for place in noted:
+                self.note(place, t + place.part * size)
             if acting is None:
-                self.values, self.row = values, row
-                return carry, row, work, None
-            part, j = acting
-            event = events[j]
-            if part < 1.0:
-                carry, row, _, failure = integrator.advance(
-                    self.system, begin, work, t0=t, h=part * size, first=0, n_steps=1, every=1
-                )
-                if failure is not None:
-                    return begin, row, work, failure
-            t = t + part * size if event.at is None else event.at
-            row = row._replace(t=np.array([t]))
+                self.values, self.row = values, ended.row
+                return ended.carry, ended.row, work, None
+            event, carry = events[acting.j], acting.carry
+            t = t + acting.part * size if event.at is None else event.at
+            row = acting.row._replace(t=np.array([t]))
             reached = self.values_after(row)
-            for i in (j, *(i for _, i in noted)):  # has passed its level, whatever rounding says
+            for i in (acting.j, *(place.j for place in noted)):  # has passed its level, whatever rounding says
                 level = events[i].level_passed
                 if (reached[i] - level) * (self.values[i] - level) > 0.0:
                     reached[i] = level
@@ -261,14 +366,20 @@ class EventWatch:
                     self.has_stopped = True
                     return carry, row, work, None
                 state = self.engage(event, carry, t)
-            carry, row, work = self.begun_anew(integrator, carry, state, row, t)
+            begin, row, work = self.begun_anew(integrator, carry, state, row, t)
             self.row = row
             self.take_inside()
-            where, size, number = t, t_end - t, 0
+            size, neighbours = t_end - t, None
             if size <= 1e-12 * h:
-                return carry, row._replace(t=np.array([t_end])), work, None
+                return begin, row._replace(t=np.array([t_end])), work, None
+            carry, row, _, failure = integrator.advance(
+                self.system, begin, work, t0=t, h=size, first=0, n_steps=1, every=1
+            )
+            if failure is not None:
+                return begin, row, work, failure
+            ended = Ended(carry, row, self.values_after(row))
         words = f"{MOST_IN_A_STEP} events happened in one step: {', '.join(e['name'] for e in self.happened[-3:])}, ..."
-        return carry, row, work, Failure(words, np.inf)
+        return ended.carry, ended.row, work, Failure(words, np.inf)
 
     def begun_anew(
         self, integrator: Integrator, carry: Carry, state: State, row: Rows, t: float
@@ -285,7 +396,7 @@ class EventWatch:
             fresh, work=work_done, n_iterations=carry.n_iterations, n_steps=carry.n_steps,
             n_rejected=carry.n_rejected, h_next=0.0,
         )  # fmt: skip
-        work = new_work(compiled_system(self.system).model)
+        work = self.new_work()
         carry, row = integrator.observe(self.system, t, carry, work)
         after = row.diagnostics[-1]
         taken = float(before[KINETIC] - after[KINETIC]) if is_struck else 0.0
@@ -373,53 +484,53 @@ class EventWatch:
         self.happened.append({"name": event.name, "t": t, "stop": event.stop, "switch_on": list(event.switch_on),
                               "switch_off": list(event.switch_off)})  # fmt: skip
 
-    def note(
-        self, integrator: Integrator, begin: Carry, trial: Work, t: float, size: float, part: float, j: int
-    ) -> Failure | None:
-        """Record the results at an event that does not change the motion, by a step to it that leads no further."""
-        event = self.events[j]
-        _, row, _, failure = integrator.advance(
-            self.system, begin, trial, t0=t, h=part * size, first=0, n_steps=1, every=1
-        )
-        if failure is None:
-            self.add(event, t + part * size if event.at is None else event.at)
-            self.recorded.append(row if event.at is None else row._replace(t=np.array([event.at])))
-        return failure
+    def note(self, place: "Place", t: float) -> None:
+        """Record the results at an event that does not change the motion, found by a step that leads no further."""
+        event = self.events[place.j]
+        self.add(event, t if event.at is None else event.at)
+        self.recorded.append(place.row if event.at is None else place.row._replace(t=np.array([event.at])))
 
     def taken(self) -> list[Rows]:
         """Return the results recorded at events since the last call."""
         rows, self.recorded = self.recorded, []
         return rows
 
-    def locate(
-        self, integrator: Integrator, begin: Carry, work: Work, t: float, size: float, j: int, last: float
-    ) -> float:
-        """Return the part of a step after which event j has just happened."""
-        event = self.events[j]
+    def located(
+        self, integrator: Integrator, begin: Carry, ended: "Ended", t: float, size: float, j: int,
+        neighbours: tuple[int, Array] | None,
+    ) -> "Place":  # fmt: skip
+        """Return the part of a step of size `size` from t after which event j has just happened, and what is there.
+
+        Places are tried by steps of their size from the beginning of the step.
+        """
+        event, work = self.events[j], self.trial_work()
+        tried = {} if ended.row is None else {1.0: Place(1.0, j, ended.carry, ended.row, None)}
+
+        def at(part: float) -> Place:
+            if part not in tried:
+                work.solver.c_k[...] = 0.0  # without the factors of other places
+                carry, row, _, failure = integrator.advance(
+                    self.system, begin, work, t0=t, h=part * size, first=0, n_steps=1, every=1
+                )
+                tried[part] = Place(part, j, carry, row, failure)
+            return tried[part]
+
         if event.at is not None:
-            return (event.at - t) / size
-        sign = np.sign(last - event.level) or -np.sign(self.values[j] - event.level)
+            return at((event.at - t) / size)
+        begun, last = float(self.values[j]) - event.level, float(ended.values[j]) - event.level
+        sign = float(np.sign(last) or -np.sign(begun))
 
         def beyond(part: float) -> float:
-            if part <= 0.0:
-                return float(sign * (self.values[j] - event.level))
-            if part >= 1.0:
-                return max(float(sign * (last - event.level)), 0.0)
-            _, row, _, failure = integrator.advance(
-                self.system, begin, work, t0=t, h=part * size, first=0, n_steps=1, every=1
-            )
-            if failure is not None:
+            place = at(part)
+            if place.failure is not None:
                 raise ModelError(f"event {event.name!r}: its time in the step from t = {t:g} was not found")
-            return float(sign * (self.values_after(row)[j] - event.level))
+            return sign * (float(self.values_after(place.row)[j]) - event.level)
 
-        if beyond(1.0) == 0.0:
-            return 1.0
-        from scipy.optimize import brentq  # slow to import, seldom wanted
-
-        part = float(brentq(beyond, 0.0, 1.0, xtol=event.tolerance, rtol=4 * np.finfo(float).eps))
-        while part < 1.0 and beyond(part) < 0.0:
-            part = min(1.0, part + event.tolerance)
-        return part
+        before, values = (0, np.array([begun, last])) if neighbours is None else neighbours
+        if neighbours is not None:
+            values = values[:, j] - event.level
+        guess = expected_passage([float(k - before) for k in range(len(values))], [sign * float(x) for x in values])
+        return at(passage(beyond, sign * begun, max(sign * last, 0.0), event.tolerance, guess))
 
     def record(self) -> dict[str, Array]:
         """Return what a run needs to go on."""

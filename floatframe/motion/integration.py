@@ -329,7 +329,7 @@ class Run:
     ) -> Trajectory:
         """Take the steps that are left, in batches that end where a run can go on; return the motion."""
         begun = self.system if self.events is None else self.events.system
-        work = new_work(compiled_system(begun).model)
+        work = new_work(compiled_system(begun).model) if self.events is None else self.events.new_work()
         t_begun = self.t_start + n_done * self.h
         _, row = self.integrator.observe(begun, t_begun, carry, work)  # the iterate to begin from
         if self.events is not None:
@@ -359,14 +359,14 @@ class Run:
                 else:
                     carry, rows, work, n_good, failure = self.events.steps(
                         self.integrator, carry, work, t0=self.t_start, h=self.h, first=n_done,
-                        n_steps=min(n_batch, n_smooth),
+                        n_steps=min(n_batch, n_smooth), every=self.output_every,
                     )  # fmt: skip
                 if self.events is not None:
                     has_stopped = self.events.has_stopped
-                    for recorded in self.events.taken():
-                        self.keep(recorded)
-                if self.events is not None or n_smooth == 0:
+                if n_smooth == 0:
                     rows = self.wanted(rows, n_done, n_good, has_stopped)
+                if self.events is not None:
+                    rows = in_order([*self.events.taken(), rows])
                 self.keep(rows)
                 n_done += n_good
                 if n_done == self.n_total or failure is not None or has_stopped:
@@ -407,6 +407,15 @@ class Run:
             return Trajectory(head, arrays, is_complete=True, validity=self.watch.notes)
         self.writer.finish(self.summary(carry))
         return read_results(self.writer.path)
+
+
+def in_order(parts: list[Rows]) -> Rows:
+    """Return rows of results in the order of time; of two at one time, that of an earlier part first."""
+    if len(parts) == 1:
+        return parts[0]
+    rows = Rows(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+    order = np.argsort(rows.t, kind="stable")
+    return Rows(*(array[order] for array in rows))
 
 
 def stopped(system, head, kept, writer, failure, t: float, h: float, notes, state: State) -> ConvergenceError:

@@ -87,7 +87,7 @@ def stop_values(compiled: CompiledSystem, event: StopEvent, resting: Mapping[str
     if side is not None:
         return np.full(len(w), event.level + INWARD[event.side])
     held, factors, _ = sum_rows(compiled, event.coupler)
-    return np.array([float(factors @ one[held]) for one in w])
+    return np.sum(factors[:, None] * w[:, held].T, axis=0)  # term by term, the same for one row as for many
 
 
 def require_within_limits(compiled: CompiledSystem, events: Sequence[Event], values: Array) -> None:

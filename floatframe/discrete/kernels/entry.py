@@ -7,11 +7,10 @@ from floatframe.discrete.kernels.steps import advance
 from floatframe.kernels.compiler.choice import is_lean
 from floatframe.kernels.compiler.compilation import kept_entry
 from floatframe.kernels.compiler.sources import source_digest
-from floatframe.kernels.compiler.structure import converter, kept_table_of, table_of
+from floatframe.kernels.compiler.structure import converter, kept_table_of, table_of, table_of_numbers
 from floatframe.kernels.entry import Order, Outcome
 from floatframe.kernels.memory import Memory, Rows
 from floatframe.kernels.model import Model
-from floatframe.kernels.records import filled, zeros
 from floatframe.kernels.work import Work
 
 __all__ = ["advance_discrete_steps"]
@@ -39,7 +38,7 @@ def make_entry(digest):
 
 run = make_entry(source_digest(__name__, "lean" if is_lean else "plain"))
 SIGNATURE = (types.Array(types.int64, 1, "C"),) * 7
-NOTHING = zeros(Order(), {})
+ORDER = Order()
 
 
 def advance_discrete_steps(
@@ -48,6 +47,8 @@ def advance_discrete_steps(
     """Advance the memory by steps of the scheme; see `kernels.steps.advance`."""
     if not run.signatures:
         run.compile(SIGNATURE)
-    ordered = filled(Order(), **(NOTHING._asdict() | order))
+    ordered, numbers = table_of_numbers(ORDER, order)
     kept = (kept_table_of(record) for record in (model, work, discrete, step))
-    return Outcome(*run(*kept, table_of(memory), table_of(rows), table_of(ordered)))
+    outcome = run(*kept, table_of(memory), table_of(rows), ordered)
+    del numbers  # not before
+    return Outcome(*outcome)

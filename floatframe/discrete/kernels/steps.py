@@ -10,6 +10,7 @@ from floatframe.discrete.kernels.records import CONSERVING, DAMPING
 from floatframe.kernels.body import block
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.generalized_alpha import load_state
+from floatframe.kernels.past import keep_past
 from floatframe.kernels.turns import count_turns
 from floatframe.kernels.vector import add, cross, dot, matrix, put, scaled, sub, turned, turned_back, vector
 
@@ -230,6 +231,7 @@ def advance(model, work, discrete, step, memory, rows, order):
         if (order.first + k + 1) % order.every == 0:
             if not observe(model, work, discrete, step, memory, step.t_1, rows):
                 return NO_ACCELERATION, k, work.counted.rows
+        keep_past(work.past, memory, step.f_kept, h, step.n_iterations)
     return CONVERGED, order.n_steps, work.counted.rows
 
 

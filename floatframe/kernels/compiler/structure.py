@@ -6,6 +6,7 @@ is read and written as such, `work.counted.iterations += 1`. Tables and arrays b
 count no references; numbers in a table do not change while a kernel runs, so that they may be kept in registers.
 """
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -17,11 +18,11 @@ from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, lower_setattr_generic, register_model
 from numba.np.arrayobj import make_array
 
-from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.arrays import Array, IntArray
 from floatframe.kernels.compiler.compilation import array_type, array_value
 from floatframe.kernels.records import Declared
 
-__all__ = ["Structure", "converter", "kept_table_of", "n_words", "table_of"]
+__all__ = ["Structure", "converter", "kept_table_of", "n_words", "table_of", "table_of_numbers"]
 
 WORD = ir.IntType(64)
 
@@ -130,6 +131,21 @@ def table_of(record) -> IntArray:
     words: list[int] = []
     add_words(record, words)
     return np.array(words, np.int64)
+
+
+def table_of_numbers(declaration, values: Mapping[str, float]) -> tuple[IntArray, Array]:
+    """Return the table of a record of numbers, zero where none is given, and these, which the caller keeps alive."""
+    reals = np.zeros(len(declaration))
+    integers = reals.view(np.int64)
+    left = len(values)
+    for k, (name, declared) in enumerate(zip(declaration._fields, declaration, strict=True)):
+        if name in values:
+            (integers if declared.dtype is np.int64 else reals)[k] = values[name]
+            left -= 1
+    if left:
+        unknown = ", ".join(name for name in values if name not in declaration._fields)
+        raise TypeError(f"{type(declaration).__name__} has no numbers {unknown}")
+    return reals.__array_interface__["data"][0] + reals.itemsize * np.arange(len(declaration)), reals
 
 
 KEPT = 4  # tables of as many records

@@ -1,0 +1,99 @@
+"""Where in a step a value passes its level: a bracketed secant method from a place that is nearly right."""
+
+from collections.abc import Callable, Sequence
+from math import ceil, floor
+
+__all__ = ["MOST_NEIGHBOURS", "expected_passage", "passage"]
+
+MOST_NEIGHBOURS = 3  #: values on either side of a passage from which its place is guessed
+MOST_EVALUATIONS = 200
+PATIENCE = 3  #: evaluations in which a bracket has to shrink to half, else it is halved
+ALIKE = 0.01  #: relative difference of two slopes in a row that are known
+SURE = 0.97  #: of what such a slope makes of the tolerance
+EQUAL = 1e-12
+POLISHED = 1e-13  #: place in a step to which the guess is made
+
+
+def expected_passage(places: Sequence[float], values: Sequence[float]) -> tuple[float, float]:
+    """Return where between 0 and 1 the polynomial through values at places passes zero, and its slope there.
+
+    Both 0 and 1 are among the places, with values of different signs; Newton's divided differences, Newton's method in
+    a bracket.
+    """
+    n, c = len(places), list(values)
+    for j in range(1, n):
+        for i in range(n - 1, j - 1, -1):
+            c[i] = (c[i] - c[i - 1]) / (places[i] - places[i - j])
+
+    def at(x: float) -> tuple[float, float]:
+        value, slope = c[-1], 0.0
+        for i in range(n - 2, -1, -1):
+            slope = slope * (x - places[i]) + value
+            value = value * (x - places[i]) + c[i]
+        return value, slope
+
+    begin, end = (values[places.index(place)] for place in (0.0, 1.0))
+    low, high, x = 0.0, 1.0, begin / (begin - end)
+    for _ in range(MOST_EVALUATIONS):
+        value, slope = at(x)
+        low, high = (x, high) if value * end < 0.0 else (low, x)
+        new = x - value / slope if slope else low
+        if not low < new < high:
+            new = 0.5 * (low + high)
+        done, x = abs(new - x) < POLISHED, new
+        if done:
+            break
+    return x, at(x)[1]
+
+
+def passage(
+    beyond: Callable[[float], float], before: float, after: float, tolerance: float, guess: tuple[float, float]
+) -> float:
+    """Return the first multiple of the tolerance, 1 at most, where a function that was below zero is not any more.
+
+    (1) x is where the zero is expected, a multiple of the tolerance; f = beyond(x) bounds the bracket,
+        f(low) < 0 <= f(high)
+    (2) high is the place if low is the multiple before it, or if f(high) is too small for the one before to be beyond,
+        by a slope that two evaluations in a row agree on
+    (3) the multiple after x - f/slope, within the bracket, is the next x; the slope is that of the last two places.
+        Where the bracket has not shrunk to half in three evaluations, its middle is taken
+    So the place does not depend on the guess, which saves evaluations alone.
+
+    Parameters
+    ----------
+    beyond
+        The function; called at places between 0 and 1, among them the one that is returned unless that is 1.
+    before, after
+        Its values at 0, below zero, and at 1, zero or above.
+    tolerance
+        How far behind the zero the place may lie.
+    guess
+        Where the zero is expected, and the slope there.
+    """
+    if after <= 0.0:
+        return 1.0
+    most = ceil(1.0 / tolerance * (1.0 - EQUAL))
+    low, high, at_high = 0, most, after
+    x, slope = ceil(guess[0] / tolerance), guess[1]
+    if not slope > 0.0:
+        slope = after - before
+    last, widths, is_known = None, [most], False
+    for _ in range(MOST_EVALUATIONS):
+        if high - low <= 1 or (is_known and at_high < SURE * slope * tolerance):
+            break
+        x = min(max(x, low + 1), high - 1)
+        if len(widths) > PATIENCE and widths[-1] > 0.5 * widths[-1 - PATIENCE]:
+            x = (low + high) // 2
+        f = beyond(x * tolerance)
+        if f < 0.0:
+            low = x
+        else:
+            high, at_high = x, f
+        secant = 0.0 if last is None else (f - last[1]) / (x - last[0]) / tolerance
+        is_known = high < most and abs(secant - slope) <= ALIKE * slope
+        slope = secant if secant > 0.0 else slope
+        last = x, f
+        widths.append(high - low)
+        step = f / slope / tolerance
+        x = x - floor(step) if abs(step) < most else 0
+    return 1.0 if high == most else high * tolerance
