@@ -4,7 +4,7 @@
 #
 #     sh benchmarks/install_petsc.sh .venv/bin/python
 #
-# Needs root for apt-get (or sudo), a compiler, and some ten minutes of one processor (7 of them were measured). NumPy 1.26 and 2 both do.
+# Needs root for apt-get (or sudo), a compiler, and some ten minutes of one processor (6 of them were measured). NumPy 1.26 and 2 both do.
 set -eu
 python=${1:-python3}
 with=$(command -v sudo || true)

@@ -33,7 +33,7 @@ def mesh_file(million):
     return path
 
 
-def solid(path):
+def solid(path, ranks=None):
     import cms
     import fe_models
 
@@ -43,7 +43,8 @@ def solid(path):
     fe_models.report_mesh(mesh, steel, units="mm-t-s").raise_for_errors()
     yield "report", None
     ends = [fe_models.rigid_interface(mesh, name, fe_models.FaceGroup(name)) for name in ("big_end", "small_end")]
-    body = fe_models.solid_body(mesh, steel, name="rod", units=cms.unit_system("mm-t-s"), interfaces=ends)
+    units = cms.unit_system("mm-t-s")
+    body = fe_models.solid_body(mesh, steel, name="rod", units=units, interfaces=ends, ranks=ranks)
     yield "assemble", None
     body = cms.couple(body)
     yield "couple", body

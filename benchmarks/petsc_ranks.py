@@ -100,7 +100,7 @@ def whole(body, solver, stage):
 def measured(million, what, solver, ranks):
     """Return the stages, the factor and the number of dofs."""
     stage = Stages(ranks)
-    made, body = solid(mesh_file(million)), None
+    made, body = solid(mesh_file(million), ranks), None
     for name in ("read", "report", "assemble", "couple"):
         with stage(name):
             _, body = next(made)

@@ -61,7 +61,9 @@ def box_mesh(nx=2, ny=2, nz=2, lx=1.0, ly=1.0, lz=1.0, kind="hexahedron") -> Mes
     )
 
 
-def bar(nx=8, ny=1, nz=1, length=1.0, width=0.05, height=0.04, kind="hexahedron20", material=STEEL) -> FEBody:
+def bar(
+    nx=8, ny=1, nz=1, length=1.0, width=0.05, height=0.04, kind="hexahedron20", material=STEEL, ranks=None
+) -> FEBody:
     """A free bar along x with rigid interfaces "left" and "right", still to be coupled, at its end faces."""
     from fe_models.foundation.units import unit_system
     from fe_models.solids.body import solid_body
@@ -71,7 +73,7 @@ def bar(nx=8, ny=1, nz=1, length=1.0, width=0.05, height=0.04, kind="hexahedron2
         Interface(name, "rigid", mesh.node_sets[name], np.array([x, width / 2, height / 2]))
         for name, x in (("left", 0.0), ("right", length))
     ]
-    return solid_body(mesh, material, name="bar", units=unit_system("m-kg-s"), interfaces=ends)
+    return solid_body(mesh, material, name="bar", units=unit_system("m-kg-s"), interfaces=ends, ranks=ranks)
 
 
 def chain(n=6, stiffness=1000.0, mass=2.0) -> FEBody:

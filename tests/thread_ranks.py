@@ -44,18 +44,25 @@ class FakeRanks(OneRank):
 
 
 def on_threads(size, work):
-    """Return what work(ranks) gives on each of so many ranks."""
+    """Return what work(ranks) gives on each of so many ranks; raise the first error of them."""
     queues = {(a, b): Queue() for a in range(size) for b in range(size)}
     answers = [None] * size
 
+    errors = []
+
     def run(rank):
-        answers[rank] = work(FakeRanks(rank, size, queues))
+        try:
+            answers[rank] = work(FakeRanks(rank, size, queues))
+        except Exception as error:
+            errors.append(error)
 
     threads = [threading.Thread(target=run, args=(rank,)) for rank in range(size)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join(timeout=30)
+    if errors:
+        raise errors[0]
     return answers
 
 

@@ -6,6 +6,7 @@ from cms.compare.comparison import Drawing
 from cms.rendering.shape import surface_edges
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.ranks.spread_matrix import whole_matrix
 
 __all__ = ["draw_modes", "thinned_surface"]
 
@@ -59,7 +60,7 @@ def thinned_surface(nodes: Array, triangles: IntArray, most: int = MOST_TRIANGLE
 
 def stiffness_lines(body: FEBody) -> IntArray:
     """Return pairs of nodes that a stiffness joins, (n_lines, 2): the elements of a body of beams or springs."""
-    rows = body.K.tocoo()
+    rows = whole_matrix(body.K).tocoo()
     node = body.dofs[:, 0]
     a, b = node[rows.row], node[rows.col]
     pairs = np.unique(np.stack([a, b], axis=1)[a < b], axis=0)

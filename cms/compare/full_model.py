@@ -23,6 +23,7 @@ from cms.solvers.mode_count import ModeCount
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.paths import replace_file
+from fe_models.foundation.ranks.spread_matrix import whole_matrix
 
 __all__ = ["FullModel", "read_full_model", "reference_digest", "solve_full_model", "write_full_model"]
 
@@ -218,7 +219,7 @@ def held_mass(families: Families, directions: Array) -> Array:
 def reference_digest(body: FEBody, *asked: object) -> str:
     """Return a digest of all that the reference solution depends on: matrices, dofs, interfaces, what was asked for."""
     digest = hashlib.sha256(repr((VERSION, body.units.name, asked)).encode())
-    for matrix in (body.K, body.M):
+    for matrix in (whole_matrix(body.K), whole_matrix(body.M)):
         for array in (matrix.data, matrix.indices, matrix.indptr):
             digest.update(np.ascontiguousarray(array).data)
     for interface in body.interfaces:

@@ -31,6 +31,7 @@ from cms.solvers.tall import combine
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.ranks.spread_matrix import largest_entry
 from fe_models.foundation.solver import Solver
 from fe_models.foundation.tall.on_disk import release
 
@@ -271,7 +272,7 @@ class Families:
         if self.body.is_held:
             return  # as it is meant to be: it has no rigid-body motion
         force = np.abs(self.body.K @ self.Psi_R).max(axis=0)
-        scale = np.abs(self.body.K).max() * np.abs(self.Psi_R).max(axis=0)
+        scale = largest_entry(self.body.K) * np.abs(self.Psi_R).max(axis=0)
         if (force > GROUNDED * scale).any():
             raise BodyError(
                 f"body {self.body.name!r}: K times its rigid-body modes is {(force / scale).max():.1e} of |K|, "

@@ -18,6 +18,7 @@ from cms.solvers.tall import combine, inner
 from fe_models.body.fe_body import FEBody
 from fe_models.body.submatrix import principal_block
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.ranks.spread_matrix import whole_matrix
 from fe_models.foundation.solver import Solver
 
 __all__ = ["BoundaryConditions", "CondensedBody", "Flexibility"]
@@ -88,11 +89,19 @@ class Flexibility:
         self.e = np.setdiff1d(np.arange(Z.shape[1]), self.r)
         self._factor = _cholesky(condensed, Z, S_z, self.e)
         self.T = None if Z.shape[0] == Z.shape[1] else _expansion(condensed, Z)
-        self.M = self._with_load(body.M, conditions.M_load)
-        self.K = self._with_load(body.K, conditions.K_load)
+        self.M = self._with_load(whole_matrix(body.M), conditions.M_load)
+        self.K = self._with_load(whole_matrix(body.K), conditions.K_load)
         self.N, self.M_N = self._orthonormal(motions if self.T is None else self.T.T @ motions)
         self.n = self.M.shape[0]
         self.n_rigid = n_n
+
+    @property
+    def numbering(self) -> IntArray | None:
+        """Of the rows, whatever the order of the interior dofs (`eigenmodes`), (n,); None: as they lie."""
+        if self.T is None:
+            return None
+        i = self.condensed.fixed.i
+        return np.concatenate([np.searchsorted(np.sort(i), i), np.arange(len(i), self.n)])
 
     @property
     def description(self) -> str:

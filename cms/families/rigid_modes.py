@@ -2,11 +2,11 @@
 
 import numpy as np
 import scipy.linalg as la
-import scipy.sparse as sp
 
 from cms.errors import BodyError
 from fe_models.body.fe_body import FEBody
 from fe_models.body.rigid_motion import rigid_motion_of_dofs
+from fe_models.body.submatrix import principal_block
 from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = [
@@ -144,7 +144,7 @@ def static_rigid_modes(body: FEBody, r: IntArray) -> Array:
     columns = body.K[:, r].toarray()
     Psi_R = np.zeros((body.n_dof, len(r)))
     Psi_R[r, np.arange(len(r))] = 1.0
-    with factorize(sp.csc_array(body.K[f][:, f]), definite=not (body.dofs[:, 1] < 0).any()) as factorization:
+    with factorize(principal_block(body.K, f), definite=not (body.dofs[:, 1] < 0).any()) as factorization:
         Psi_R[f] = -factorization.solve(columns[f])
     return Psi_R
 

@@ -26,7 +26,8 @@ def fixed_interface_modes(fixed: FixedInterfaceBody, wanted: ModeCount) -> Eigen
         matrices: tuple[Matrix, Matrix] = PrincipalBlock(fixed.body.K, fixed.i), PrincipalBlock(fixed.body.M, fixed.i)
     else:
         matrices = fixed.K_ii, fixed.M_ii
-    modes = eigenmodes(*matrices, wanted, factorization=fixed.factorization)
+    numbering = np.searchsorted(np.sort(fixed.i), fixed.i)
+    modes = eigenmodes(*matrices, wanted, factorization=fixed.factorization, numbering=numbering)
     Phi = np.zeros((fixed.body.n_dof, modes.Phi.shape[1]))
     Phi[fixed.i] = modes.Phi
     return replace(modes, Phi=Phi)
@@ -38,7 +39,8 @@ def elastic_modes(flexibility: Flexibility, wanted: ModeCount) -> EigenResult:
     Free modes are those of a free boundary, loaded modes those of K + K_load, M + M_load, mixed ones hold some boundary
     dofs. Rigid-body motions the conditions leave free are known beforehand, so they are not among them.
     """
-    modes = eigenmodes(flexibility.K, flexibility.M, replace(wanted, verify=False), factorization=flexibility)
+    K, M, numbering = flexibility.K, flexibility.M, flexibility.numbering
+    modes = eigenmodes(K, M, replace(wanted, verify=False), factorization=flexibility, numbering=numbering)
     if wanted.verify:
         modes = _proven(flexibility, modes, wanted)
     return replace(modes, Phi=flexibility.expand(modes.Phi))
@@ -55,7 +57,9 @@ def _proven(flexibility: Flexibility, modes: EigenResult, asked: ModeCount) -> E
     last, sigma = counting_shift(modes.omega2, k, wanted, 0.0)
     for n_extra in (4, 12, 36):  # a gap to count in lies beyond the modes that were asked for
         try:
-            more = eigenmodes(flexibility.K, flexibility.M, k + n_extra, factorization=flexibility)
+            more = eigenmodes(
+                flexibility.K, flexibility.M, k + n_extra, factorization=flexibility, numbering=flexibility.numbering
+            )
         except EigenError:  # there are no more modes
             break
         last, sigma = counting_shift(more.omega2, k, wanted, 0.0)

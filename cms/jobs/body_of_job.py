@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from cms.errors import JobError
 from cms.jobs.job import Job
 from fe_models.body.fe_body import FEBody
+from fe_models.foundation.ranks.ranks import Ranks
 from fe_models.foundation.stages import Stages
 from fe_models.foundation.units import unit_system
 
@@ -25,6 +26,7 @@ def job_body(
     *,
     on_report: Callable[[Any], None] | None = None,
     mesh: "Mesh | None" = None,
+    ranks: Ranks | None = None,
 ) -> FEBody:
     """Run a job up to the coupled body: read, check, assemble, couple the interfaces.
 
@@ -33,9 +35,12 @@ def job_body(
     mesh
         The solid mesh of the job as `checked_mesh` made it for the same job with other numbers: it is neither read nor
         judged again.
+    ranks
+        Processes that assemble a body of one solid mesh by its parts (`fe_models.solid_body`); bodies of other kinds
+        are made here.
     """
     stages = stages or Stages()
-    body = uncoupled_body(job, stages, on_report=on_report, mesh=mesh)
+    body = uncoupled_body(job, stages, on_report=on_report, mesh=mesh, ranks=ranks)
     with stages("couple interfaces"):
         return coupled_body(job, body)
 
@@ -56,12 +61,17 @@ def coupled_body(job: Job, body: FEBody) -> FEBody:
 
 
 def uncoupled_body(
-    job: Job, stages: Stages, *, on_report: Callable[[Any], None] | None = None, mesh: "Mesh | None" = None
+    job: Job,
+    stages: Stages,
+    *,
+    on_report: Callable[[Any], None] | None = None,
+    mesh: "Mesh | None" = None,
+    ranks: Ranks | None = None,
 ) -> FEBody:
     """Run a job up to the body whose interfaces are still to be coupled, with the nodes and points it asks for."""
     from fe_models.body.kept_nodes import keep_nodes
 
-    body = keep_nodes(made_body(job, stages, on_report, mesh), job.body.keep)
+    body = keep_nodes(made_body(job, stages, on_report, mesh, ranks), job.body.keep)
     if not job.body.stress_points:
         return body
     from fe_models.recovery.element_points import element_points
@@ -71,7 +81,13 @@ def uncoupled_body(
     return element_points(body, job.body.stress_points)
 
 
-def made_body(job: Job, stages: Stages, on_report: Callable[[Any], None] | None, mesh: "Mesh | None" = None) -> FEBody:
+def made_body(
+    job: Job,
+    stages: Stages,
+    on_report: Callable[[Any], None] | None,
+    mesh: "Mesh | None" = None,
+    ranks: Ranks | None = None,
+) -> FEBody:
     """Make the body of a job from what it names: a deck, a mesh, tables or matrices."""
     if job.body.deck is not None:
         from cms.jobs.deck_body import body_of_deck
@@ -86,7 +102,7 @@ def made_body(job: Job, stages: Stages, on_report: Callable[[Any], None] | None,
 
         return body_of_frame(job, stages, on_report)
     if job.body.mesh is not None:
-        return body_of_mesh(job, stages, on_report, mesh)
+        return body_of_mesh(job, stages, on_report, mesh, ranks)
     if job.body.matrices is not None:
         from cms.jobs.matrices_of_job import body_of_matrices
 
@@ -125,7 +141,11 @@ def checked_mesh(
 
 
 def body_of_mesh(
-    job: Job, stages: Stages, on_report: Callable[[Any], None] | None, mesh: "Mesh | None" = None
+    job: Job,
+    stages: Stages,
+    on_report: Callable[[Any], None] | None,
+    mesh: "Mesh | None" = None,
+    ranks: Ranks | None = None,
 ) -> FEBody:
     """Read and check the mesh, unless that was done, and assemble it with the materials and interfaces of the job."""
     from fe_models.solids.body import solid_body
@@ -145,6 +165,7 @@ def body_of_mesh(
             interfaces=interfaces,
             incompatible_modes=bricks,
             progress=advance,
+            ranks=None if job.ties else ranks,  # beams that are tied to it take K and M apart
         )
         if first_order is not None:
             body = replace(body, provenance={**body.provenance, **first_order.provenance()})

@@ -15,6 +15,7 @@ from cms.memory.size import memory_bytes, resident_bytes
 from cms.reduced_body.reduced_body import ReducedBody
 from cms.solvers.registry import solver_of
 from fe_models.body.fe_body import FEBody
+from fe_models.foundation.ranks.mpi import all_ranks
 from fe_models.foundation.solver import Solver
 from fe_models.foundation.stages import Stages
 
@@ -86,7 +87,8 @@ def reduce_job(
         raise MemoryBudgetError(
             f"memory = {allowed}: the tree of the set multilevel is not held to it; take craig-bampton, or no memory"
         )
-    coupled = job_body(job, stages, on_report=on_report)
+    ranks = None if chosen.spread is None else all_ranks()
+    coupled = job_body(job, stages, on_report=on_report, ranks=ranks)
     announce_stiffness(job, coupled)
     to_disk = False
     if budget is not None:

@@ -22,6 +22,7 @@ from cms.solvers.factorization import factorize
 from cms.solvers.sparse_product import SymmetricProduct
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.ranks.spread_matrix import whole_matrix
 
 __all__ = ["krylov"]
 
@@ -218,7 +219,7 @@ def _shifted_expansion(families: Families, shift: float, F_extra: Array, stack: 
     """Return the expansion at a shift; the stack holds its factorisation."""
     body = families.body
     sigma = (2 * np.pi * shift) ** 2
-    A = sp.csc_array(body.K - sigma * body.M)
+    A = sp.csc_array(whole_matrix(body.K) - sigma * whole_matrix(body.M))
     try:
         factor = stack.enter_context(factorize(A, definite=False, solver=families.solver))
     except FactorizationError as error:

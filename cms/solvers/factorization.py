@@ -1,6 +1,8 @@
 """Factorise a large symmetric matrix once, solve for many columns."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
@@ -10,6 +12,7 @@ from cms.errors import FactorizationError
 from cms.solvers.registry import solver_of
 from fe_models.body.submatrix import PrincipalBlock
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.ranks.spread_matrix import whole_matrix
 from fe_models.foundation.solver import Factor, Solver
 
 __all__ = ["EmptyFactor", "Factorization", "Inertia", "Matrix", "factorize", "matrix_of", "require_regular"]
@@ -22,7 +25,7 @@ Matrix: TypeAlias = sp.csc_array | PrincipalBlock
 
 def matrix_of(A: Matrix) -> sp.csc_array:
     """Return a matrix that was given, or cut it out."""
-    return A.cut() if isinstance(A, PrincipalBlock) else sp.csc_array(A)
+    return A.cut() if isinstance(A, PrincipalBlock) else sp.csc_array(whole_matrix(A))
 
 
 @dataclass(frozen=True)
@@ -141,16 +144,28 @@ def factorize(A: Matrix, *, definite: bool = True, solver: str | Solver | None =
         If memory or disk have no room for the factor.
     """
     chosen = solver_of(solver)
-    lower = checked_lower(matrix_of(A))
-    if definite:
-        _require_positive_diagonal(lower)
+    make = _ready(A, definite, chosen)
     try:
-        factorization = Factorization(chosen.factor(lower, definite=definite), chosen)
+        factorization = Factorization(make(), chosen)
     except FactorizationError as error:
         hint = "; it is singular or not positive definite" if definite else "; it is singular"
         raise FactorizationError(f"factorize: {error}{hint}") from error
+    del make  # and with it the lower triangle
     require_regular(A, factorization)
     return factorization
+
+
+def _ready(A: Matrix, definite: bool, solver: Solver) -> Callable[[], Factor]:
+    """Step (1): return what makes the factor; rows on many ranks stay there, where the solver takes them so."""
+    block = A.spread() if isinstance(A, PrincipalBlock) and solver.spread is not None else None
+    if block is not None and solver.spread is not None:
+        if definite:
+            _require_positive(A.diagonal())
+        return partial(solver.spread, block, definite=definite)
+    lower = checked_lower(matrix_of(A))
+    if definite:
+        _require_positive(lower.data[lower.indptr[:-1]])
+    return partial(solver.factor, lower, definite=definite)
 
 
 def checked_lower(A: sp.csc_array) -> sp.csc_array:
@@ -185,8 +200,7 @@ def lower_triangle(A: sp.csc_array) -> sp.csc_array:
     return sp.csc_array((data, indices, indptr), shape=(n, n))
 
 
-def _require_positive_diagonal(lower: sp.csc_array) -> None:
-    diagonal = lower.data[lower.indptr[:-1]]
+def _require_positive(diagonal: Array) -> None:
     bad = np.flatnonzero(diagonal <= 0)
     if len(bad):
         raise FactorizationError(

@@ -12,15 +12,16 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from cms.solvers.factorization import Factorization
+from cms.solvers.factorization import Factorization, Matrix, matrix_of
 from cms.solvers.inverse import Inverse
-from cms.solvers.petsc.factor import CHUNK, PetscFactor, solved_rows
+from cms.solvers.petsc.factor import CHUNK, PetscFactor, rows_here, solved_rows
 from cms.solvers.tall import combine, inner, subtract
-from cms.solvers.tall_space import ArrayBasis, ArraySpace
-from fe_models.foundation.arrays import Array
+from cms.solvers.tall_space import ArrayBasis, ArraySpace, dealt
+from fe_models.body.submatrix import PrincipalBlock
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.ranks.product import RowsProduct
 from fe_models.foundation.ranks.ranks import Ranks
-from fe_models.foundation.ranks.rows import Rows, collected, own_rows, spread
+from fe_models.foundation.ranks.rows import Rows, collected, own_rows
 from fe_models.foundation.ranks.trim import give_back
 
 __all__ = ["RankColumns", "RankSpace"]
@@ -75,9 +76,13 @@ class RankBasis:
 class RankProduct:
     """The product with a matrix whose rows lie on all ranks."""
 
-    def __init__(self, space: "RankSpace", A: sp.csc_array) -> None:
+    def __init__(self, space: "RankSpace", A: Matrix) -> None:
         self.space, self.key = space, new_key()
-        space.ranks.store[self.key] = A
+        block = A.spread() if isinstance(A, PrincipalBlock) else None
+        if block is not None and block.rows == space.rows:
+            block.keep(self.key)
+        else:
+            space.ranks.store[self.key] = matrix_of(A)
         space.ask(None, product_here, self.key, space.rows)
         weakref.finalize(self, space.dropped.append, self.key).atexit = False
 
@@ -89,8 +94,9 @@ class RankProduct:
 class RankSpace:
     """Columns are names of rows on all ranks, of which rank 0 has no more than its own, until `close`."""
 
-    def __init__(self, factor: PetscFactor) -> None:
-        """Lay out columns as the factor has its rows."""
+    def __init__(self, factor: PetscFactor, numbering: IntArray | None = None) -> None:
+        """Lay out columns as the factor has its rows; numbering: as that of `ArraySpace`."""
+        self.numbering = numbering
         self.factor, self.ranks, self.rows, self.n = factor, factor.ranks, factor.rows, factor.n
         self.dropped: list[str] = []  #: keys that nobody names any more; told with the next question
 
@@ -111,7 +117,7 @@ class RankSpace:
 
     def random(self, generator: np.random.Generator, k: int) -> RankColumns:
         """Return columns of normally distributed numbers, those of one process, (n, k)."""
-        self.ranks.store["columns"] = generator.standard_normal((k, self.n)).T
+        self.ranks.store["columns"] = dealt(generator.standard_normal((k, self.n)).T, self.numbering)
         return self.made(k, given_here, self.rows)
 
     def inner(self, X: RankColumns, Y: RankColumns) -> Array:
@@ -138,8 +144,8 @@ class RankSpace:
         """Return columns as an array of rank 0, (n, k)."""
         return self.ask(None, collected_here, self.rows, X.part)[0]
 
-    def product(self, A: sp.csc_array) -> RankProduct:
-        """Spread the rows of a symmetric matrix, (n, n), and return the product with it."""
+    def product(self, A: Matrix) -> RankProduct:
+        """Spread the rows of a symmetric matrix, (n, n), which may lie so, and return the product with it."""
         return RankProduct(self, A)
 
     def solver(self, factorization: Inverse) -> Callable[[RankColumns], RankColumns]:
@@ -229,8 +235,8 @@ def grow_here(ranks: Ranks, key: str, capacity: int, m: int) -> None:
 def product_here(ranks: Ranks, key: str, rows: Rows) -> None:
     """Replace the matrix that rank 0 has by this rank's rows of it; compressed columns are rows, A is symmetric."""
     A = ranks.store.pop(key, None)
-    given = None if A is None else (A.indptr, A.indices, A.data)
-    ranks.store[key] = RowsProduct(ranks, rows, *spread(ranks, rows, given))
+    ranks.store[key] = (A.indptr, A.indices, A.data) if isinstance(A, sp.csc_array) else A
+    ranks.store[key] = RowsProduct(ranks, rows, *rows_here(ranks, key, rows))
 
 
 def multiplied_here(ranks: Ranks, key: str, x: Part) -> Array:

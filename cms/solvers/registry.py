@@ -17,15 +17,17 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["SOLVERS", "solver_of"]
 
+ON_DISK = partial(PetscFactor, on_disk=True)
+WITH_MATRIX = partial(PetscFactor, keeps_matrix=True)
 SOLVERS = {
     solver.name: solver
     for solver in (
         Solver("pardiso", PardisoFactor, missing_pardiso),
         Solver("cholesky", cholesky_or_superlu),
         Solver("superlu", SuperLuFactor),
-        Solver("petsc", PetscFactor, missing_petsc),
-        Solver("slepc", PetscFactor, missing_petsc),
-        Solver("petsc-disk", partial(PetscFactor, on_disk=True), missing_petsc),
+        Solver("petsc", PetscFactor, missing_petsc, PetscFactor),
+        Solver("slepc", WITH_MATRIX, missing_petsc, WITH_MATRIX),
+        Solver("petsc-disk", ON_DISK, missing_petsc, ON_DISK),
     )
 }
 DEFAULTS = ("pardiso", "cholesky")  #: the first that is installed, where none is asked for

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg as la
-import scipy.sparse as sp
 
 from cms.errors import EigenError
+from cms.solvers.factorization import Matrix
 from cms.solvers.inverse import Inverse
 from cms.solvers.mode_count import ModeCount
 from cms.solvers.tall_space import ArraySpace, TallSpace
@@ -41,7 +41,7 @@ class ShiftInverted:
 
     def __init__(
         self,
-        M: sp.csc_array,
+        M: Matrix,
         shift: float,
         factorization: Inverse,
         tolerance: float,

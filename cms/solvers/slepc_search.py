@@ -82,7 +82,7 @@ def search_here(
 ) -> tuple[Array, Array, Array | None, int]:
     """Return omega² above the shift, ascending, their errors, and the modes on rank 0, and the number of solves."""
     SLEPc = slepc()
-    ksp, _, A = ranks.store[factor_key]
+    _, ksp, A = ranks.store[factor_key]
     M = ranks.store[mass_key]
     eps = SLEPc.EPS().create(communicator(ranks))
     eps.setOperators(A, M)

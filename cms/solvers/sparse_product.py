@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from cms.solvers.tall import ordered
 from fe_models.body.submatrix import scalar_part
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 from fe_models.foundation.tall.on_disk import in_memory
 from fe_models.foundation.threads import n_threads
 
@@ -27,10 +28,15 @@ class SymmetricProduct:
     B = A[:, 3p:] for what else there is (reference nodes, multipliers)
 
         (A x)_lead = (S ⊗ 1₃) x_lead + B_lead x_rest,   (A x)_rest = Bᵀ x
+
+    A matrix by rows on all ranks (`SpreadMatrix`) is multiplied there.
     """
 
     def __init__(self, A: sp.csc_array, *, columns: int = COLUMNS) -> None:
         self.A, self._columns = A, columns
+        self._is_spread = isinstance(A, SpreadMatrix)
+        if self._is_spread:
+            return
         S = scalar_part(A) if A.nnz > SMALL else sp.csr_array((0, 0))
         self._n_lead = 3 * S.shape[0] if 6 * S.shape[0] > A.shape[0] else 0
         rows = S if self._n_lead else sp.csr_array((A.data, A.indices, A.indptr), shape=A.shape)
@@ -43,6 +49,8 @@ class SymmetricProduct:
     def __matmul__(self, x: Array) -> Array:
         """Return A x in the order of x, (n, k), in memory."""
         x = in_memory(x)
+        if self._is_spread:
+            return np.asarray(self.A @ x)
         order: Literal["C", "F"] = "F" if x.flags.f_contiguous else "C"
         result = np.empty(x.shape)
         for first in range(0, x.shape[1], self._columns):

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from cms.solvers.inverse import Inverse
 from cms.solvers.sparse_product import SymmetricProduct
 from cms.solvers.tall import combine, inner, ordered, subtract
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["ArraySpace", "TallBasis", "TallProduct", "TallSpace"]
 
@@ -70,7 +70,7 @@ class TallSpace(Protocol):
     def whole(self, X: Any) -> Array:
         """Return columns as an array of this process, (n, k)."""
 
-    def product(self, A: sp.csc_array) -> TallProduct:
+    def product(self, A: Any) -> TallProduct:
         """Return the product with a symmetric matrix, (n, n)."""
 
     def solver(self, factorization: Inverse) -> Callable[[Any], Any]:
@@ -108,12 +108,13 @@ class ArrayBasis:
 class ArraySpace:
     """Columns are arrays of this process."""
 
-    def __init__(self, n: int) -> None:
-        self.n = n
+    def __init__(self, n: int, numbering: IntArray | None = None) -> None:
+        """Columns of n rows; numbering: of the rows, by which random numbers are dealt to them, None: as they lie."""
+        self.n, self.numbering = n, numbering
 
     def random(self, generator: np.random.Generator, k: int) -> Array:
         """Return columns of normally distributed numbers, (n, k)."""
-        return generator.standard_normal((k, self.n)).T
+        return dealt(generator.standard_normal((k, self.n)).T, self.numbering)
 
     def inner(self, X: Array, Y: Array) -> Array:
         """Return Xᵀ Y, (k, l)."""
@@ -146,3 +147,8 @@ class ArraySpace:
     def solver(self, factorization: Inverse) -> Callable[[Array], Array]:
         """Return what solves for columns by a factorisation, in Fortran order."""
         return lambda b: ordered(factorization.solve(b), "F")
+
+
+def dealt(X: Array, numbering: IntArray | None) -> Array:
+    """Return row numbering[r] of X at each row r, (n, k), in the order in memory that X has."""
+    return X if numbering is None else X.T[:, numbering].T

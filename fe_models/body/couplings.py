@@ -11,11 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
+from fe_models.body.coupling_on_ranks import spread_extension
 from fe_models.body.fe_body import MULTIPLIER, FEBody, Interface, Recovery
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.body.submatrix import principal_block
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
+from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 
 __all__ = ["couple", "mean_motion"]
 
@@ -70,15 +72,18 @@ def couple(body: FEBody) -> FEBody:
     T_s = sp.block_diag(blocks, format="csr") if blocks else sp.csr_array((0, 0))
     recovery = _recovery_matrix(body.n_dof, keep, slave_rows, T_s, first_reference, n_new)
     n_constrained = n_new - first_reference - T_s.shape[1]
-    K = _congruence(body.K, keep, slave_rows, T_s, n_constrained)
-    M = _congruence(body.M, keep, slave_rows, T_s, n_constrained)
     D = None if body.D is None else _congruence(body.D, keep, slave_rows, T_s, n_constrained)
     new_index = np.full(body.n_dof, -1, np.int64)
     new_index[keep] = np.arange(len(keep))
-    if distributing:
-        K = K + _multiplier_rows(
+    constraints = (
+        _multiplier_rows(
             body, distributing, dofs_of_node, new_index, first_reference + 6 * len(rigid), first_multiplier, n_new
         )
+        if distributing
+        else None
+    )
+    K = _congruence(body.K, keep, slave_rows, T_s, n_constrained, constraints)
+    M = _congruence(body.M, keep, slave_rows, T_s, n_constrained)
 
     boundary = {interface.name: first_reference + 6 * k + np.arange(6) for k, interface in enumerate(references)}
     for interface in todo:
@@ -183,17 +188,36 @@ def _recovery_matrix(
     return sp.csr_array((values, (rows, columns)), shape=(n_dof, n_new))
 
 
-def _congruence(A: sp.csc_array, keep: IntArray, slave_rows: IntArray, T_s: sp.csr_array, n_more: int) -> sp.csc_array:
-    """Return Tᵀ A T of T = [1 0; 0 T_s] with n_more empty rows and columns at the end.
+def _congruence(
+    A: sp.csc_array,
+    keep: IntArray,
+    slave_rows: IntArray,
+    T_s: sp.csr_array,
+    n_more: int,
+    more: sp.csc_array | None = None,
+) -> sp.csc_array:
+    """Return Tᵀ A T + more of T = [1 0; 0 T_s] with n_more empty rows and columns at the end.
 
     The kept block is cut out in one pass and the few new rows and columns are added: the product with the whole T
-    would walk all of A three times.
+    would walk all of A three times. A matrix by rows on all ranks stays there.
     """
-    n_kept, n_new = len(keep), len(keep) + T_s.shape[1] + n_more
+    n_new = len(keep) + T_s.shape[1] + n_more
+    new = _reference_entries(A, keep, slave_rows, T_s, n_new) if len(slave_rows) else None
+    if isinstance(A, SpreadMatrix):
+        return spread_extension(A, keep, sum((B for B in (new, more) if B is not None), sp.csc_array((n_new, n_new))))
     A_kk = principal_block(A, keep)
-    A_kk = sp.csc_array((A_kk.data, A_kk.indices, _longer(A_kk.indptr, n_new)), shape=(n_new, n_new))
-    if not len(slave_rows):
-        return A_kk
+    result = sp.csc_array((A_kk.data, A_kk.indices, _longer(A_kk.indptr, n_new)), shape=(n_new, n_new))
+    for B in (new, more):
+        if B is not None:
+            result = sp.csc_array(result + B)
+    return result
+
+
+def _reference_entries(
+    A: sp.csc_array, keep: IntArray, slave_rows: IntArray, T_s: sp.csr_array, n_new: int
+) -> sp.csc_array:
+    """Return the rows and columns of the reference nodes, (n_new, n_new)."""
+    n_kept = len(keep)
     A_slave = sp.csr_array(A[:, slave_rows] @ T_s)  # (n_dof, 6 n_rigid)
     A_kr = sp.coo_array(A_slave[keep])
     A_rr = sp.coo_array(T_s.T @ A_slave[slave_rows])
@@ -204,7 +228,7 @@ def _congruence(A: sp.csc_array, keep: IntArray, slave_rows: IntArray, T_s: sp.c
         ),
         shape=(n_new, n_new),
     ).tocsc()
-    return sp.csc_array(A_kk + (half + half.T))
+    return sp.csc_array(half + half.T)
 
 
 def _longer(indptr: IntArray, n: int) -> IntArray:

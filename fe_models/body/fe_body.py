@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -21,6 +21,7 @@ from fe_models.foundation.arrays import (
     symmetric_csc,
 )
 from fe_models.foundation.errors import BodyError
+from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 from fe_models.foundation.tall.on_disk import in_memory, is_on_disk, release, row_slices, zeros_like
 from fe_models.foundation.units import Units, unit_system
 from fe_models.foundation.words import nearest, quoted
@@ -221,8 +222,8 @@ class FEBody:
     """
 
     name: str
-    M: sp.csc_array  #: mass, (n_dof, n_dof) [kg, kg m²]
-    K: sp.csc_array  #: stiffness, (n_dof, n_dof) [N/m, N m]
+    M: sp.csc_array  #: mass, (n_dof, n_dof) [kg, kg m²]; a `SpreadMatrix` where many ranks work on the body
+    K: sp.csc_array  #: stiffness, (n_dof, n_dof) [N/m, N m]; likewise
     nodes: Array  #: positions in mesh axes, (n_nodes, 3) [m]
     dofs: IntArray  #: (node, component) of every dof, (n_dof, 2)
     interfaces: tuple[Interface, ...] = ()
@@ -266,8 +267,8 @@ class FEBody:
                 f"{where}: dofs: expected components 0..5, got {self.dofs[:, 1].min()}..{self.dofs[:, 1].max()}"
             )
         n_dof = len(self.dofs)
-        put(self, "M", symmetric_csc(f"{where}: M", self.M, n_dof))
-        put(self, "K", symmetric_csc(f"{where}: K", self.K, n_dof))
+        for name in ("M", "K"):
+            put(self, name, checked_matrix(f"{where}: {name}", getattr(self, name), n_dof))
         if self.D is not None:
             put(self, "D", symmetric_csc(f"{where}: D", self.D, n_dof))
         if self.node_volumes is not None:
@@ -370,6 +371,15 @@ class FEBody:
     def with_load_cases(self, *load_cases: LoadCase) -> "FEBody":
         """Return the body with these load cases added."""
         return replace(self, load_cases=(*self.load_cases, *load_cases))
+
+
+def checked_matrix(where: str, A: Any, n: int) -> Any:
+    """Return a symmetric matrix; one on many ranks was made so."""
+    if not isinstance(A, SpreadMatrix):
+        return symmetric_csc(where, A, n)
+    if A.shape != (n, n) or not np.isfinite(A.largest):
+        raise BodyError(f"{where}: expected finite entries and shape {(n, n)}, got {A.shape}, up to {A.largest:g}")
+    return A
 
 
 def put_translations(field_: Array, dofs: IntArray, u: Array) -> None:

@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from fe_models.body.submatrix import principal_block
 from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 
 __all__ = ["nearby_order"]
 
@@ -18,7 +19,7 @@ SMALL = 20_000  #: dofs whose columns stay in the cache in any order
 
 
 def nearby_order(A: sp.csc_array, dofs: IntArray, index: IntArray) -> IntArray:
-    """Return some dofs in an order in which neighbours are near; few dofs as they come.
+    """Return some dofs in an order in which neighbours are near; few dofs as they come, all in that of rows on ranks.
 
     (1) graph of the nodes: entries of A between the first of the given dofs of each node
     (2) reverse Cuthill-McKee order of the nodes
@@ -34,6 +35,8 @@ def nearby_order(A: sp.csc_array, dofs: IntArray, index: IntArray) -> IntArray:
     index
         The dofs to be ordered, ascending, (n,).
     """
+    if isinstance(A, SpreadMatrix):
+        return A.ordered(index)
     if len(index) < SMALL:
         return index
     node, component = dofs[index].T

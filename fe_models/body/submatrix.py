@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.ranks.spread_matrix import SpreadBlock, SpreadMatrix, whole_matrix
 from fe_models.foundation.threads import n_threads
 
 __all__ = ["PrincipalBlock", "principal_block", "scalar_part"]
@@ -38,6 +39,10 @@ class PrincipalBlock:
         whole[self.index] = x
         return np.asarray((self.A @ whole)[self.index])
 
+    def spread(self) -> SpreadBlock | None:
+        """Return it by rows on the ranks that have A by rows; None where they have not, or not in this order."""
+        return self.A.block(self.index) if isinstance(self.A, SpreadMatrix) else None
+
     def cut(self) -> sp.csc_array:
         """Return the matrix."""
         return principal_block(self.A, self.index)
@@ -45,6 +50,7 @@ class PrincipalBlock:
 
 def principal_block(A: sp.csc_array, index: IntArray) -> sp.csc_array:
     """Return A[index][:, index], (n, n), with sorted row indices; the index may have any order."""
+    A = whole_matrix(A)
     n = len(index)
     if n == A.shape[0] and (index[1:] > index[:-1]).all():
         return A

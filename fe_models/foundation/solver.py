@@ -11,8 +11,9 @@ from typing import Protocol
 import scipy.sparse as sp
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.ranks.spread_matrix import SpreadBlock
 
-__all__ = ["Factor", "MakeFactor", "Solver"]
+__all__ = ["Factor", "MakeFactor", "MakeSpreadFactor", "Solver"]
 
 
 class Factor(Protocol):
@@ -67,6 +68,19 @@ class MakeFactor(Protocol):
         """
 
 
+class MakeSpreadFactor(Protocol):
+    """Factorises a matrix whose rows lie on many ranks."""
+
+    def __call__(self, lower: SpreadBlock, *, definite: bool) -> Factor:
+        """Return the factor, rows of columns in solution on the ranks that have those of the block.
+
+        Parameters
+        ----------
+        lower, definite
+            As of `MakeFactor`; of the block each rank takes its rows from the diagonal on.
+        """
+
+
 @dataclass(frozen=True)
 class Solver:
     """A way to factorise, by the name that users choose it by."""
@@ -74,3 +88,4 @@ class Solver:
     name: str
     factor: MakeFactor
     missing: Callable[[], str] = lambda: ""  #: "" where it can be used, else what is missing and what to install
+    spread: MakeSpreadFactor | None = None  #: None: it takes matrices of one process

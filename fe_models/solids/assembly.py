@@ -108,16 +108,7 @@ def assemble(
         If there is no solid cell, a cell names a node that does not exist, a node belongs to no solid cell, or an
         element is inverted (Jacobian not positive at a quadrature point).
     """
-    kinds = [kind for kind, cells in mesh.cells.items() if len(cells)]
-    if not kinds:
-        raise MeshError("assembly: the mesh has no solid cells; expected tetrahedra, hexahedra or wedges")
-    if not np.isfinite(mesh.nodes).all():
-        raise MeshError(
-            f"assembly: {(~np.isfinite(mesh.nodes)).any(axis=1).sum()} nodes have coordinates that are not "
-            f"finite numbers"
-        )
-    for kind in kinds:
-        require_known_nodes(kind, mesh.cells[kind], len(mesh.nodes))
+    kinds = require_assemblable(mesh)
     lists = {kind: np.ascontiguousarray(mesh.cells[kind], dtype=np.int32) for kind in kinds}
     with ThreadPoolExecutor(n_threads()) as pool:
         graph = node_graph(list(lists.values()), len(mesh.nodes), pool)
@@ -327,6 +318,21 @@ def run(pool: ThreadPoolExecutor, calls: list[tuple[Any, ...]]) -> None:
     futures = [pool.submit(function, *arguments) for function, *arguments in calls]
     for future in futures:
         future.result()
+
+
+def require_assemblable(mesh: Mesh) -> list[str]:
+    """Return the kinds of cells; raise `MeshError` where nodes or cells cannot be those of a body."""
+    kinds = [kind for kind, cells in mesh.cells.items() if len(cells)]
+    if not kinds:
+        raise MeshError("assembly: the mesh has no solid cells; expected tetrahedra, hexahedra or wedges")
+    if not np.isfinite(mesh.nodes).all():
+        raise MeshError(
+            f"assembly: {(~np.isfinite(mesh.nodes)).any(axis=1).sum()} nodes have coordinates that are not "
+            f"finite numbers"
+        )
+    for kind in kinds:
+        require_known_nodes(kind, mesh.cells[kind], len(mesh.nodes))
+    return kinds
 
 
 def require_known_nodes(kind: str, cells: IntArray, n_nodes: int) -> None:

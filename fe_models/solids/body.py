@@ -15,6 +15,7 @@ from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.mass_loads import MassLoads
 from fe_models.foundation.arrays import Array, IntArray, frozen_int
 from fe_models.foundation.errors import BodyError
+from fe_models.foundation.ranks.ranks import Ranks
 from fe_models.foundation.tall.on_disk import in_memory, row_slices
 from fe_models.foundation.threads import n_threads
 from fe_models.foundation.units import Units
@@ -26,6 +27,7 @@ from fe_models.meshes.cell_shapes import cell_jacobians
 from fe_models.meshes.mesh import Mesh
 from fe_models.meshes.mesh_numbering import solid_numbering
 from fe_models.solids.assembly import Progress, assemble, elastic_properties, expand_scalar_mass
+from fe_models.solids.assembly_on_ranks import assemble_on_ranks
 from fe_models.solids.elements import INTEGRATIONS, MASSES, reference_element
 from fe_models.solids.geometric import internal_forces, projected_geometric_stiffness
 from fe_models.solids.incompatible import KIND
@@ -129,6 +131,7 @@ def solid_body(
     integration: str = "full",
     mass: str = "consistent",
     progress: Progress | None = None,
+    ranks: Ranks | None = None,
 ) -> FEBody:
     """Make the body of a mesh of solid cells: isoparametric elements, consistent mass, dof 3 i + c of every node i.
 
@@ -158,6 +161,9 @@ def solid_body(
         by too few points leaves motions without mass: the rank of the mass is then less than its size.
     progress
         Called with the finished fraction of the assembly, 0 to 1.
+    ranks
+        Processes that assemble parts of the mesh and keep rows of K and M (`SpreadMatrix`); None, or one: K and M are
+        here.
 
     Returns
     -------
@@ -175,20 +181,21 @@ def solid_body(
     mesh = as_mesh(mesh)
     used, of_cell = assign_materials(mesh, materials)
     properties, tensors = elastic_properties(used)
-    K, M_s = assemble(
-        mesh,
-        properties,
-        of_cell,
-        incompatible=incompatible_modes,
-        integration=integration,
-        mass=mass,
-        tensors=tensors,
-        progress=progress,
-    )
+    rules: dict[str, Any] = {
+        "incompatible": incompatible_modes,
+        "integration": integration,
+        "mass": mass,
+        "tensors": tensors,
+    }
+    if ranks is None or ranks.size == 1:
+        K, M_s = assemble(mesh, properties, of_cell, progress=progress, **rules)
+        M = expand_scalar_mass(M_s)
+    else:
+        K, M, M_s = assemble_on_ranks(ranks, mesh, properties, of_cell, rules)
     n_nodes = len(mesh.nodes)
     return FEBody(
         name=name,
-        M=expand_scalar_mass(M_s),
+        M=M,
         K=K,
         nodes=mesh.nodes,
         dofs=np.stack([np.repeat(np.arange(n_nodes), 3), np.tile(np.arange(3), n_nodes)], axis=1),

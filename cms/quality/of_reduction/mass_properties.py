@@ -9,6 +9,7 @@ from cms.quality.record import QualityRecord, information, judge
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.ranks.spread_matrix import largest_entry
 
 __all__ = ["check_grounding", "check_invariants", "check_mass_properties", "rigid_mass_matrix"]
 
@@ -95,7 +96,7 @@ def check_grounding(body: FEBody) -> QualityRecord:
     Psi_R = geometric_rigid_modes(body, origin=body.nodes.mean(axis=0))
     Psi_R[:, 3:] /= body.length or 1.0
     size = np.abs(Psi_R).max(axis=0)
-    stiffest = float(np.abs(body.K.data).max(initial=0.0)) or 1.0
+    stiffest = largest_entry(body.K) or 1.0
     force = np.abs(body.K @ Psi_R)
     ratio = force.max(axis=0) / np.where(size > 0, size, 1.0) / stiffest
     k = int(np.argmax(ratio))

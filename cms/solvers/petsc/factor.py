@@ -17,6 +17,7 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.ranks.mpi import all_ranks
 from fe_models.foundation.ranks.ranks import Ranks
 from fe_models.foundation.ranks.rows import Rows, collected, even_rows, own_rows, spread
+from fe_models.foundation.ranks.spread_matrix import OwnRows, SpreadBlock
 from fe_models.foundation.ranks.trim import give_back
 
 __all__ = ["PetscFactor"]
@@ -41,22 +42,35 @@ numbers = count()
 class PetscFactor:
     """Cholesky or L D Lᵀ factor of a symmetric matrix on all ranks, until `close`."""
 
-    def __init__(self, lower: sp.csc_array, *, definite: bool, on_disk: bool = False) -> None:
+    def __init__(
+        self,
+        lower: sp.csc_array | SpreadBlock,
+        *,
+        definite: bool,
+        on_disk: bool = False,
+        keeps_matrix: bool = False,
+    ) -> None:
         """Factorise the matrix with this lower triangle, (n, n), every diagonal entry stored, sorted row indices.
 
-        Its entries go to the ranks: `lower` is empty afterwards, so that rank 0 does not hold them twice.
+        Its entries go to the ranks: `lower` is empty afterwards, so that rank 0 does not hold them twice. Of a matrix
+        by rows on the ranks each takes its own.
 
         on_disk: the factor is kept in files of each rank, in the folder that MUMPS_OOC_TMPDIR names (/tmp).
+        keeps_matrix: the matrix stays beside its factor, for a search by SLEPc.
         """
-        self.n = lower.shape[0]
         self.is_open = True
         self.ranks = all_ranks()
         self.key = f"factor {next(numbers)}"
-        self.rows = even_rows(lower.indptr, self.ranks.size)
-        n_entries = lower.nnz
-        self.ranks.store[self.key] = (lower.indptr, lower.indices, lower.data)
-        lower.indptr, lower.indices, lower.data = emptied(self.n)
-        found = self.ranks.everywhere(factorize_here, self.key, self.rows, definite, on_disk)
+        if isinstance(lower, SpreadBlock):
+            self.rows = lower.rows
+            n_entries = lower.keep(self.key, upper=True)
+        else:
+            self.rows = even_rows(lower.indptr, self.ranks.size)
+            n_entries = lower.nnz
+            self.ranks.store[self.key] = (lower.indptr, lower.indices, lower.data)
+            lower.indptr, lower.indices, lower.data = emptied(self.rows.n)
+        self.n = self.rows.n
+        found = self.ranks.everywhere(factorize_here, self.key, self.rows, definite, on_disk, keeps_matrix)
         self.record, self.records = found[0], found
         error = self.record["INFOG(1)"]
         n_negative = self.record["negative"]
@@ -104,11 +118,13 @@ def communicator(ranks: Ranks) -> Any:
     return PETSc.COMM_SELF if ranks.size == 1 else PETSc.COMM_WORLD
 
 
-def factorize_here(ranks: Ranks, key: str, rows: Rows, definite: bool, on_disk: bool) -> dict[str, Any]:
+def factorize_here(
+    ranks: Ranks, key: str, rows: Rows, definite: bool, on_disk: bool, keeps_matrix: bool
+) -> dict[str, Any]:
     """Steps (1) and (2), on every rank; return what MUMPS tells."""
     PETSc = petsc()
     comm = communicator(ranks)
-    indptr, indices, data = spread(ranks, rows, ranks.store.pop(key, None))
+    indptr, indices, data = rows_here(ranks, key, rows)
     n_own = rows.count(ranks.rank)
     A = PETSc.Mat().createSBAIJ(((n_own, rows.n), (n_own, rows.n)), 1, csr=(indptr, indices, data), comm=comm)
     del indptr, indices, data
@@ -140,7 +156,10 @@ def factorize_here(ranks: Ranks, key: str, rows: Rows, definite: bool, on_disk: 
         if error not in TOO_SMALL:
             break
         ksp.destroy()
-    ranks.store[key] = (ksp, F, A)
+    if not keeps_matrix and error >= 0:  # the factor does not need it any more
+        for each in (pc, ksp, A):  # pc too: left to Python it would wait in PETSc's garbage
+            each.destroy()
+    ranks.store[key] = (F, ksp, A) if keeps_matrix else (F,)
     give_back()
     return {
         "INFOG(1)": error,
@@ -150,6 +169,12 @@ def factorize_here(ranks: Ranks, key: str, rows: Rows, definite: bool, on_disk: 
         "MB": F.getMumpsInfo(22) if error >= 0 else 0,
         "flops": F.getMumpsRinfo(3) if error >= 0 else 0.0,
     }
+
+
+def rows_here(ranks: Ranks, key: str, rows: Rows) -> tuple[np.ndarray, np.ndarray, Array]:
+    """Return the rows that this rank has, or gets from rank 0."""
+    given = ranks.store.pop(key, None)
+    return (given.indptr, given.indices, given.data) if isinstance(given, OwnRows) else spread(ranks, rows, given)
 
 
 def entries(value: int) -> int:
@@ -169,7 +194,7 @@ def solved_rows(ranks: Ranks, key: str, rows: Rows, own: Array) -> Array:
     """Return this rank's rows of the solutions, by its rows of the right-hand sides, (n_own, k)."""
     PETSc = petsc()
     comm = communicator(ranks)
-    _, F, _ = ranks.store[key]
+    F = ranks.store[key][0]
     n_own, k = own.shape
     size = ((n_own, rows.n), (PETSc.DECIDE, k))
     B = PETSc.Mat().createDense(size, array=np.asfortranarray(own), comm=comm)

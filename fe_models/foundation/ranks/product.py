@@ -24,6 +24,7 @@ class RowsProduct:
         """Prepare; called on all ranks at once, each with its compressed rows of A, columns of all, (n_own, n)."""
         self.ranks = ranks
         own = rows.of(ranks.rank)
+        self.first, self.n = own.start, rows.n
         is_own = (indices >= own.start) & (indices < own.stop)
         halo = np.unique(indices[~is_own])
         bounds = np.searchsorted(halo, rows.starts)
@@ -31,7 +32,7 @@ class RowsProduct:
         self.sent = [asked[0]] if ranks.size == 1 else ranks.comm.alltoall(asked)
         columns = np.where(is_own, indices - own.start, 0).astype(np.int32)  # (2)
         columns[~is_own] = (own.stop - own.start) + np.searchsorted(halo, indices[~is_own])
-        self.n_own, self.n_halo = own.stop - own.start, len(halo)
+        self.n_own, self.n_halo, self.halo = own.stop - own.start, len(halo), halo
         self.A = sp.csr_array((data, columns, indptr), shape=(self.n_own, self.n_own + self.n_halo))
 
     def __matmul__(self, x: Array) -> Array:
@@ -46,3 +47,8 @@ class RowsProduct:
                 np.concatenate(halo, out=whole[self.n_own :])
             result[:, block] = self.A @ whole
         return result
+
+    def rows_of_all(self) -> sp.csr_array:
+        """Return this rank's rows of A with the columns of all, (n_own, n)."""
+        columns = np.concatenate([np.arange(self.first, self.first + self.n_own), self.halo]).astype(np.int32)
+        return sp.csr_array((self.A.data, columns[self.A.indices], self.A.indptr), shape=(self.n_own, self.n))

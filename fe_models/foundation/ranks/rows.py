@@ -51,7 +51,7 @@ def own_rows(ranks: Ranks, rows: Rows, x: Array | None) -> Array:
         for other in range(1, ranks.size):
             send(ranks, np.ascontiguousarray(x[rows.of(other)].T), other)
         return np.asfortranarray(x[rows.of(0)])
-    return receive(ranks, k * rows.count(ranks.rank), np.float64).reshape(k, -1).T
+    return receive(ranks, k * rows.count(ranks.rank), np.float64).reshape(k, rows.count(ranks.rank)).T
 
 
 def collected(ranks: Ranks, rows: Rows, own: Array) -> Array | None:
@@ -65,7 +65,9 @@ def collected(ranks: Ranks, rows: Rows, own: Array) -> Array | None:
     x[rows.of(0)] = own
     for other in range(1, ranks.size):
         x[rows.of(other)] = (
-            receive(ranks, own.shape[1] * rows.count(other), np.float64, other).reshape(-1, rows.count(other)).T
+            receive(ranks, own.shape[1] * rows.count(other), np.float64, other)
+            .reshape(own.shape[1], rows.count(other))
+            .T
         )
     return x
 

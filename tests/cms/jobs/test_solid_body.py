@@ -3,11 +3,14 @@
 import pytest
 
 from cms.errors import JobError
+from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
 from cms.jobs.reduce_job import reduce_job
 from cms.quality.body_check import check_body
+from fe_models.foundation.ranks.spread_matrix import SpreadMatrix, whole_matrix
 from tests.bodies import box_mesh
 from tests.decks import JOB, write_deck
+from tests.thread_ranks import ThreadRanks
 
 
 def job_of(folder, kind, key=""):
@@ -52,3 +55,11 @@ def test_the_key_is_refused_where_there_are_no_such_bricks(tmp_path):
     job.write_text(text.replace("[interfaces.left]", "[shells.a]\nthickness = 1.0\n[interfaces.left]"))
     with pytest.raises(JobError, match="belongs to a mesh of solid cells"):
         read_job(job)
+
+
+def test_ranks_assemble_a_job_of_one_solid_mesh(tmp_path):
+    job = job_of(tmp_path, "hexahedron")
+    body = job_body(job, ranks=ThreadRanks(2))
+    assert isinstance(body.K, SpreadMatrix)
+    assert isinstance(body.M, SpreadMatrix)
+    assert (whole_matrix(body.K) != job_body(job).K).nnz == 0

@@ -17,7 +17,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from cms.errors import FactorizationError
 from cms.solvers.factorization import factorize, lower_triangle
 from cms.solvers.pardiso import CHUNK, mkl_runtime
+from cms.solvers.superlu import SuperLuFactor
+from fe_models.body.couplings import couple
+from fe_models.body.submatrix import PrincipalBlock
+from fe_models.foundation.solver import Solver
 from tests.bodies import bar
+from tests.thread_ranks import ThreadRanks
 
 HAS_PARDISO = mkl_runtime() is not None
 if not HAS_PARDISO and os.environ.get("FLOATFRAME_REQUIRE_ALL") and sys.platform == "linux":
@@ -281,3 +286,34 @@ print(hashlib.sha256(f.solve(np.random.default_rng(0).standard_normal((K.shape[0
     ]
     assert runs[0].stdout == runs[1].stdout
     assert len(runs[0].stdout.strip()) == 64
+
+
+def test_rows_on_many_ranks_stay_there_for_a_solver_that_takes_them():
+    """Upper triangles of what the ranks keep are put together and factorised by another solver."""
+    body = couple(bar(nx=4, kind="hexahedron", ranks=ThreadRanks(2)))
+    A = PrincipalBlock(body.K, body.K.ordered(body.i))
+    seen = []
+
+    def of_rows(block, *, definite):
+        block.keep("rows", upper=True)
+        kept = [store.pop("rows") for store in body.K.ranks.stores]
+        seen.extend(len(own.indptr) - 1 for own in kept)
+        parts = [sp.csr_array((o.data, o.indices, o.indptr), shape=(len(o.indptr) - 1, block.rows.n)) for o in kept]
+        return SuperLuFactor(sp.csc_array(sp.vstack(parts).T), definite=definite)
+
+    def of_the_whole(lower, *, definite):
+        raise AssertionError("the matrix was cut out on rank 0")
+
+    with factorize(A, solver=Solver("of rows", of_the_whole, spread=of_rows)) as factorization:
+        x = factorization.solve(np.ones(len(A.index)))
+    assert sum(seen) == len(A.index)
+    assert min(seen) > 0
+    assert_allclose(A.cut() @ x, 1.0, rtol=0, atol=1e-8)
+
+
+def test_a_spread_matrix_that_is_not_definite_is_refused():
+    spread = couple(bar(nx=4, kind="hexahedron", ranks=ThreadRanks(2))).K
+    spread._diagonal = -spread.diagonal()
+    A = PrincipalBlock(spread, spread.order)
+    with pytest.raises(FactorizationError, match=r"^factorize: \d+ diagonal entries are zero or negative"):
+        factorize(A, solver=Solver("of rows", SuperLuFactor, spread=SuperLuFactor))

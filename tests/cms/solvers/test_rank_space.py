@@ -1,6 +1,7 @@
 """The columns of an iteration on ranks beside arrays, with ranks that are threads and a solver of one process."""
 
 import gc
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,10 @@ from cms.solvers.block_lanczos import BlockLanczos
 from cms.solvers.factorization import factorize
 from cms.solvers.rank_space import RankSpace
 from cms.solvers.tall_space import ArraySpace
+from fe_models.body.couplings import couple
+from fe_models.body.submatrix import PrincipalBlock
 from fe_models.foundation.ranks.rows import collected, even_rows, own_rows
+from tests.bodies import bar
 from tests.thread_ranks import ThreadRanks
 
 N = 97
@@ -92,3 +96,18 @@ def test_columns_that_nobody_names_are_forgotten_on_every_rank(space):
     gc.collect()
     space.close()
     assert [list(store) for store in space.ranks.stores] == [[kept.part.key]] * space.ranks.size
+
+
+@pytest.mark.parametrize("size", [1, 2, 3])
+def test_a_matrix_by_rows_on_the_ranks_of_a_space_is_multiplied_there(size, monkeypatch):
+    body = couple(bar(nx=5, kind="hexahedron", ranks=(ranks := ThreadRanks(size))))
+    one = couple(bar(nx=5, kind="hexahedron"))
+    i = body.K.ordered(body.i) if size > 1 else body.i
+    block = PrincipalBlock(body.M, i)
+    rows = block.spread().rows if size > 1 else even_rows(one.M.indptr[: len(i) + 1], 1)
+    space = RankSpace(SimpleNamespace(ranks=ranks, rows=rows, n=len(i), key="factor"))
+    if size > 1:
+        monkeypatch.setattr("cms.solvers.rank_space.matrix_of", None)  # nothing is collected
+    X = space.random(np.random.default_rng(0), 3)
+    expected = PrincipalBlock(one.M, i) @ space.whole(X)
+    assert_allclose(space.whole(space.product(block) @ X), expected, rtol=0, atol=1e-13 * np.abs(expected).max())

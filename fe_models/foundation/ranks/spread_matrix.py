@@ -1,0 +1,233 @@
+"""A symmetric sparse matrix by rows on all ranks: rank 0 has its own rows, and a name for the rest.
+
+Rows lie in an order in which neighbours are near (`order`), so that a rank needs few rows of others in a product, and
+rows of a principal block are those of the same ranks: the factor and the search for modes take them where they are.
+"""
+
+import weakref
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import count
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.ranks.product import RowsProduct
+from fe_models.foundation.ranks.ranks import Ranks
+from fe_models.foundation.ranks.rows import Rows, collected, own_rows, receive, send
+from fe_models.foundation.ranks.trim import give_back
+
+__all__ = ["OwnRows", "SpreadMatrix", "largest_entry", "whole_matrix"]
+
+COLUMNS = 32  #: of a product at once
+numbers = count()
+dropped: list[str] = []  #: keys that nobody names any more; told with the next question
+
+
+@dataclass(frozen=True, eq=False)
+class OwnRows:
+    """Compressed rows of a matrix that a rank has, columns of all."""
+
+    indptr: np.ndarray  #: (n_own + 1,) int32
+    indices: np.ndarray  #: ascending in each row, (n_entries,) int32
+    data: Array  #: (n_entries,)
+
+
+class SpreadMatrix:
+    """A symmetric matrix, (n, n), whose rows lie on all ranks; with the last name of it they go.
+
+    Columns x and products A x are arrays of rank 0 in the order of the dofs. What is not offered here needs the whole
+    matrix: `whole`.
+    """
+
+    __array_ufunc__ = None  #: NumPy leaves products to it
+
+    def __init__(
+        self, ranks: Ranks, order: IntArray, rows: Rows, function: Callable[..., Any], *arguments: Any
+    ) -> None:
+        """Let every rank keep its rows.
+
+        Parameters
+        ----------
+        order
+            The dof of each row as they lie on the ranks, (n,).
+        rows
+            Which of them each rank has.
+        function
+            Called on all ranks at once with the arguments; returns `OwnRows`, columns in the same order as rows.
+        """
+        self.ranks, self.order, self.rows, self.key = ranks, order, rows, new_key()
+        self.position = np.empty(len(order), np.int32)
+        self.position[order] = np.arange(len(order), dtype=np.int32)
+        found = self._ask(made_here, self.key, rows, function, *arguments)
+        weakref.finalize(self, dropped.append, self.key).atexit = False
+        self.nnz = sum(entries for entries, _ in found)
+        self.largest = max(largest for _, largest in found)  #: in size of all entries
+        self._diagonal: Array | None = None
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return len(self.order), len(self.order)
+
+    def _ask(self, function: Callable[..., Any], *arguments: Any) -> list[Any]:
+        """Call function(ranks, *arguments) on all ranks, after they have forgotten what has no name."""
+        return self.ranks.everywhere(asked_here, [dropped.pop() for _ in range(len(dropped))], function, *arguments)
+
+    def diagonal(self) -> Array:
+        """Return the diagonal, (n,)."""
+        if self._diagonal is None:
+            self._diagonal = np.concatenate(self._ask(diagonal_here, self.key))[self.position]
+        return self._diagonal.copy()
+
+    def __matmul__(self, x: Array) -> Array:
+        """Return A x of one column, (n,), or many, (n, k), some at a time."""
+        x = np.asarray(x)
+        if x.ndim == 1:
+            return np.asarray((self @ x[:, None])[:, 0])
+        result = np.empty(x.shape)
+        for first in range(0, x.shape[1], COLUMNS):
+            block = slice(first, first + COLUMNS)
+            self.ranks.store["columns"] = x[self.order, block]
+            result[self.order, block] = self._ask(multiplied_here, self.key, self.rows)[0]
+        return result
+
+    def __getitem__(self, index: tuple[slice, IntArray]) -> sp.csc_array:
+        """Return columns of it, A[:, dofs], (n, k), as a matrix of rank 0."""
+        every, dofs = index
+        if not isinstance(every, slice) or every != slice(None):
+            raise IndexError("SpreadMatrix: expected A[:, dofs]; take whole() for other parts")
+        parts = self._ask(columns_here, self.key, self.position[np.asarray(dofs)])
+        return sp.csc_array(sp.vstack(parts, format="csr")[self.position])
+
+    def ordered(self, dofs: IntArray) -> IntArray:
+        """Return some dofs in the order of the rows."""
+        return dofs[np.argsort(self.position[dofs])]
+
+    def block(self, dofs: IntArray) -> "SpreadBlock | None":
+        """Return A[dofs][:, dofs] by rows on the same ranks; None where the dofs are not in the order of the rows."""
+        where = self.position[dofs]
+        if not (where[1:] > where[:-1]).all():
+            return None
+        return SpreadBlock(self, where)
+
+    def whole(self) -> sp.csc_array:
+        """Return the matrix on rank 0, (n, n), with sorted row indices."""
+        A = self._ask(collected_here, self.key, self.rows)[0]
+        columns = self.order[A.indices].astype(A.indices.dtype)
+        A = sp.csr_array((A.data, columns, A.indptr), shape=A.shape)[self.position]
+        A.sort_indices()
+        whole = sp.csc_array((A.data, A.indices, A.indptr), shape=A.shape)
+        whole.has_canonical_format = True
+        return whole
+
+
+class SpreadBlock:
+    """A principal block of a matrix by rows on all ranks."""
+
+    def __init__(self, matrix: SpreadMatrix, where: np.ndarray) -> None:
+        """Choose rows, ascending."""
+        self.matrix, self.is_chosen = matrix, np.zeros(len(matrix.order), bool)
+        self.is_chosen[where] = True
+        before = np.concatenate([[0], np.cumsum(self.is_chosen)])
+        self.rows = Rows(tuple(int(before[start]) for start in matrix.rows.starts))  #: of the block on each rank
+
+    def keep(self, key: str, *, upper: bool = False) -> int:
+        """Let every rank keep its `OwnRows` under a key, of all columns or from the diagonal on; return how many."""
+        return sum(self.matrix._ask(block_here, key, self.matrix.key, self.is_chosen, self.rows, upper))
+
+
+def whole_matrix(A: Any) -> sp.csc_array:
+    """Return a matrix that rank 0 has, or collect it there."""
+    return A.whole() if isinstance(A, SpreadMatrix) else A
+
+
+def largest_entry(A: Any) -> float:
+    """Return the largest entry of a matrix in size; 0 without entries."""
+    return A.largest if isinstance(A, SpreadMatrix) else float(np.abs(A.data).max(initial=0.0))
+
+
+def new_key() -> str:
+    """Return a key that no rank has used."""
+    return f"matrix {next(numbers)}"
+
+
+def asked_here(ranks: Ranks, forgotten: list[str], function: Callable[..., Any], *arguments: Any) -> Any:
+    """Forget what nobody names, then call the function."""
+    for key in forgotten:
+        ranks.store.pop(key, None)
+    return function(ranks, *arguments)
+
+
+def made_here(ranks: Ranks, key: str, rows: Rows, function: Callable[..., Any], *arguments: Any) -> tuple[int, float]:
+    """Keep this rank's rows; return how many entries they have, and the largest in size."""
+    own: OwnRows = function(ranks, *arguments)
+    product = RowsProduct(ranks, rows, own.indptr, own.indices, own.data)
+    del own
+    ranks.store[key] = product
+    give_back()
+    data = product.A.data
+    return len(data), float(max(data.max(initial=0.0), -data.min(initial=0.0)))
+
+
+def diagonal_here(ranks: Ranks, key: str) -> Array:
+    """Return the diagonal of these rows; the first columns are the own ones."""
+    return np.asarray(ranks.store[key].A.diagonal())
+
+
+def multiplied_here(ranks: Ranks, key: str, rows: Rows) -> Array | None:
+    """Return A x of columns that rank 0 has, there."""
+    x = own_rows(ranks, rows, ranks.store.pop("columns", None))
+    return collected(ranks, rows, ranks.store[key] @ x)
+
+
+def columns_here(ranks: Ranks, key: str, columns: np.ndarray) -> sp.csr_array:
+    """Return some columns of these rows, (n_own, k)."""
+    return sp.csr_array(ranks.store[key].rows_of_all()[:, columns])
+
+
+def block_here(ranks: Ranks, key: str, matrix_key: str, is_chosen: np.ndarray, rows: Rows, upper: bool) -> int:
+    """Keep the chosen rows and columns of these rows."""
+    A, own = ranks.store[matrix_key].rows_of_all(), rows.of(ranks.rank)
+    number = np.cumsum(is_chosen, dtype=np.int32) - np.int32(1)
+    number[~is_chosen] = -1
+    of_row = number[ranks.store[matrix_key].first :][: A.shape[0]]
+    columns = number[A.indices]
+    row = np.repeat(of_row, np.diff(A.indptr))
+    is_kept = (row >= 0) & (columns >= (row if upper else 0))
+    counts = np.bincount(row[is_kept] - own.start, minlength=own.stop - own.start)
+    indptr = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+    block = sp.csr_array((A.data[is_kept], columns[is_kept], indptr), shape=(own.stop - own.start, rows.n))
+    block.sort_indices()
+    ranks.store[key] = with_diagonal(block, own.start) if upper else OwnRows(block.indptr, block.indices, block.data)
+    return block.nnz
+
+
+def with_diagonal(upper: sp.csr_array, first: int) -> OwnRows:
+    """Return rows from the diagonal on, the first of them the given one, with every diagonal entry stored."""
+    indptr, indices, data = upper.indptr, upper.indices, upper.data
+    lacks = np.diff(indptr) == 0
+    full = np.flatnonzero(~lacks)
+    lacks[full] = indices[indptr[full]] != first + full
+    missing = np.flatnonzero(lacks)
+    if len(missing):
+        indices, data = np.insert(indices, indptr[missing], first + missing), np.insert(data, indptr[missing], 0.0)
+        indptr = (indptr + np.concatenate([[0], np.cumsum(lacks)])).astype(np.int32)
+    return OwnRows(indptr, indices, data)
+
+
+def collected_here(ranks: Ranks, key: str, rows: Rows) -> sp.csr_array | None:
+    """Return the whole matrix in the order of the rows on rank 0."""
+    A = ranks.store[key].rows_of_all()
+    if ranks.rank:
+        for x in (A.indptr.astype(np.int64), A.indices, A.data):
+            send(ranks, x, 0)
+        return None
+    parts = [A]
+    for other in range(1, ranks.size):
+        indptr = receive(ranks, rows.count(other) + 1, np.int64, other)
+        indices, data = (receive(ranks, int(indptr[-1]), dtype, other) for dtype in (np.int32, np.float64))
+        parts.append(sp.csr_array((data, indices, indptr), shape=(rows.count(other), rows.n)))
+    return sp.csr_array(sp.vstack(parts, format="csr"))

@@ -1,0 +1,154 @@
+"""Stiffness and mass of a mesh of solid elements by parts of the mesh, rows of both on all ranks.
+
+(1) rank 0 orders the nodes so that neighbours are near, and cuts the order into parts of about as many entries
+(2) every rank gets the elements that touch its nodes, and these elements alone
+(3) it assembles them and keeps the rows of its own nodes, which are whole: no sums pass between ranks
+(4) rank 0 collects the scalar mass M_s, a thirteenth of all entries, for the moments of the body
+
+Elements at a cut are computed by each rank whose nodes they touch. Entries are those of one process bit for bit, since
+the elements of a node are added in the same sequence.
+"""
+
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+from fe_models.errors import MeshError
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.ranks.ranks import Ranks
+from fe_models.foundation.ranks.rows import Rows, even_rows
+from fe_models.foundation.ranks.spread_matrix import OwnRows, SpreadMatrix
+from fe_models.foundation.ranks.trim import give_back
+from fe_models.foundation.threads import n_threads
+from fe_models.meshes.mesh import Mesh
+from fe_models.solids.assembly import assemble, in_parts, node_graph, require_assemblable
+
+__all__ = ["assemble_on_ranks"]
+
+KEY = "assembled rows"  #: of what a rank has assembled and not yet handed on
+
+
+@dataclass(frozen=True, eq=False)
+class MeshPart:
+    """What a rank needs of the mesh."""
+
+    mesh: Mesh  #: nodes of the elements that touch its own nodes, and these elements
+    of_cell: Mapping[str, IntArray]  #: material of each
+    position: np.ndarray  #: of each node of the part in the order of all, (n_part_nodes,)
+    own: np.ndarray  #: its own nodes among them, in that order, (n_own,)
+
+
+def assemble_on_ranks(
+    ranks: Ranks, mesh: Mesh, properties: Array, of_cell: Mapping[str, IntArray], options: Mapping[str, Any]
+) -> tuple[SpreadMatrix, SpreadMatrix, sp.csr_array]:
+    """Return K and M = M_s ⊗ 1₃ by rows on all ranks, and M_s on rank 0 (`fe_models.solids.assembly.assemble`).
+
+    Parameters
+    ----------
+    properties, of_cell
+        As there.
+    options
+        Its further arguments.
+    """
+    kinds = require_assemblable(mesh)
+    lists = {kind: np.ascontiguousarray(mesh.cells[kind], dtype=np.int32) for kind in kinds}
+    order, rows = node_order(list(lists.values()), len(mesh.nodes), ranks.size)  # (1)
+    ranks.store[KEY] = [mesh_part(mesh, lists, of_cell, order, rows, rank) for rank in range(ranks.size)]  # (2)
+    try:
+        parts = ranks.everywhere(assemble_here, len(order), properties, dict(options))  # (3)
+    except MeshError:  # told of a part of the mesh: one process finds the same in the whole
+        assemble(mesh, properties, of_cell, **options)
+        raise
+    position = np.empty(len(order), np.int64)
+    position[order] = np.arange(len(order))
+    M_s = sp.csr_array(sp.vstack(parts, format="csr")[position])  # (4)
+    M_s = sp.csr_array((M_s.data, order[M_s.indices].astype(np.int32), M_s.indptr), shape=M_s.shape)
+    M_s.sort_indices()
+    of_dofs = (3 * order[:, None] + np.arange(3)).ravel()
+    rows = Rows(tuple(3 * start for start in rows.starts))
+    K, M = (SpreadMatrix(ranks, of_dofs, rows, handed_here, name) for name in ("K", "M"))
+    return K, M, M_s
+
+
+def node_order(lists: list[np.ndarray], n_nodes: int, size: int) -> tuple[IntArray, Rows]:
+    """Step (1): the node at each place, (n_nodes,), and the places of each rank."""
+    with ThreadPoolExecutor(n_threads()) as pool:
+        graph = node_graph(lists, n_nodes, pool)
+    starts = graph.row_start.astype(np.int32)
+    A = sp.csr_array((np.ones(len(graph.columns), np.int8), graph.columns, starts), shape=(n_nodes, n_nodes))
+    order = reverse_cuthill_mckee(A, symmetric_mode=True).astype(np.int64)
+    return order, even_rows(np.concatenate([[0], np.cumsum(np.diff(graph.row_start)[order])]), size)
+
+
+def mesh_part(
+    mesh: Mesh,
+    lists: Mapping[str, np.ndarray],
+    of_cell: Mapping[str, IntArray],
+    order: IntArray,
+    rows: Rows,
+    rank: int,
+) -> MeshPart:
+    """Return the elements that touch the nodes of a rank."""
+    is_own = np.zeros(len(order), bool)
+    is_own[order[rows.of(rank)]] = True
+    chosen = {kind: np.flatnonzero(is_own[cells].any(axis=1)) for kind, cells in lists.items()}
+    is_there = is_own.copy()
+    for kind, index in chosen.items():
+        is_there[lists[kind][index]] = True
+    nodes = np.flatnonzero(is_there)
+    new = np.full(len(order), -1, np.int32)
+    new[nodes] = np.arange(len(nodes), dtype=np.int32)
+    position = np.empty(len(order), np.int32)
+    position[order] = np.arange(len(order), dtype=np.int32)
+    part = Mesh(mesh.nodes[nodes], {kind: new[lists[kind][index]] for kind, index in chosen.items() if len(index)})
+    return MeshPart(
+        part,
+        {kind: np.asarray(of_cell[kind])[index] for kind, index in chosen.items() if len(index)},
+        position[nodes],
+        new[order[rows.of(rank)]],
+    )
+
+
+def assemble_here(ranks: Ranks, n_nodes: int, properties: Array, options: dict[str, Any]) -> sp.csr_array:
+    """Step (3): keep own rows of K and M; return those of M_s, columns in the order of all, (n_own, n_nodes)."""
+    parts = ranks.store.pop(KEY, None) or [None] * ranks.size
+    part: MeshPart = parts[0] if ranks.size == 1 else ranks.comm.alltoall(parts)[0]
+    del parts
+    if not len(part.own):  # fewer nodes than ranks
+        for name in ("K", "M"):
+            ranks.store[f"{KEY} {name}"] = OwnRows(np.zeros(1, np.int32), np.zeros(0, np.int32), np.zeros(0))
+        return sp.csr_array((0, n_nodes))
+    K, M_s = assemble(part.mesh, properties, part.of_cell, **options)
+    dofs = (3 * part.own[:, None] + np.arange(3)).ravel()
+    own_K = sp.csr_array((K.data, K.indices, K.indptr), shape=K.shape)[dofs]  # columns of a symmetric matrix are rows
+    del K
+    own_M = sp.csr_array(M_s[part.own])
+    del M_s
+    of_dofs = (3 * part.position[:, None] + np.arange(3, dtype=np.int32)).ravel()
+    ranks.store[f"{KEY} K"] = OwnRows(own_K.indptr, of_dofs[own_K.indices], own_K.data)
+    columns = part.position[own_M.indices]
+    ranks.store[f"{KEY} M"] = expanded_rows(own_M.indptr, columns, own_M.data)
+    give_back()
+    return sp.csr_array((own_M.data, columns, own_M.indptr), shape=(len(part.own), n_nodes))
+
+
+def handed_here(ranks: Ranks, name: str) -> OwnRows:
+    """Return the rows that were assembled, and forget them."""
+    rows: OwnRows = ranks.store.pop(f"{KEY} {name}")
+    return rows
+
+
+def expanded_rows(indptr: np.ndarray, columns: np.ndarray, data: Array) -> OwnRows:
+    """Return S ⊗ 1₃ of rows of a scalar matrix S."""
+    from fe_models.solids.assembly_kernels import expand_mass
+
+    n = 3 * len(data)
+    wide, indices, values = np.zeros(3 * len(indptr) - 2, np.int32), np.empty(n, np.int32), np.empty(n)
+    with ThreadPoolExecutor(n_threads()) as pool:
+        in_parts(pool, expand_mass, (indptr.astype(np.int64), columns, data), (wide, indices, values))
+    return OwnRows(wide, indices, values)
