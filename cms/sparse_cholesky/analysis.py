@@ -1,5 +1,6 @@
 """Analysis of a sparse symmetric matrix before its numbers: order of elimination, fronts, and what they will cost."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -8,13 +9,16 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.threads import n_threads
 
 if TYPE_CHECKING:
     from fe_models.foundation.arrays import Array
 
 __all__ = ["Fronts", "analyse", "dissection_order"]
 
-LEAF = 24  #: vertices, mostly nodes of the mesh, below which a part is not dissected further
+LEAF = 12  #: vertices, mostly nodes of the mesh, below which a part is not dissected further
+MANY = 5000  #: vertices above which parts of a graph are dissected beside each other
+SHARES = 8  #: of all vertices, as large as such parts are at most
 FEW = 24  #: columns up to which small fronts are joined whatever zeros that brings
 SHARE = 0.5  #: of zeros that is allowed in a front of about so many columns; less in larger ones
 
@@ -85,10 +89,10 @@ def analyse(lower: sp.csc_array) -> Fronts:
     (2) nested dissection of the vertices
     (3) elimination tree, in postorder; columns of the factor with nearly the same rows are one front
     """
-    from cms.sparse_cholesky import dissection_kernels, kernels
+    from cms.sparse_cholesky import kernels
 
     start, neighbours, weight, group = quotient(lower)  # (1)
-    order = dissection_kernels.dissection(start, neighbours, weight, LEAF)  # (2)
+    order = nested_dissection(start, neighbours, weight)  # (2)
     start, neighbours = renumbered(start, neighbours, order)
     parent = kernels.elimination_tree(start, neighbours)  # (3)
     post = kernels.postorder(parent)
@@ -114,11 +118,27 @@ def analyse(lower: sp.csc_array) -> Fronts:
 
 def dissection_order(lower: sp.csc_array) -> IntArray:
     """Return an order of elimination by nested dissection, (n,): the row that comes k-th."""
-    from cms.sparse_cholesky import dissection_kernels
-
     start, neighbours, weight, group = quotient(lower)
-    order = dissection_kernels.dissection(start, neighbours, weight, LEAF)
+    order = nested_dissection(start, neighbours, weight)
     return np.argsort(inverse(order)[group], kind="stable")
+
+
+def nested_dissection(start: IntArray, neighbours: IntArray, weight: IntArray) -> IntArray:
+    """Return an order of elimination of a graph by nested dissection, (n_v,): the vertex that comes k-th.
+
+    Parts below the first cuts are dissected by themselves, in threads; on their number nothing depends.
+    """
+    from cms.sparse_cholesky.dissection_kernels import dissect
+    from cms.sparse_cholesky.separator_kernels import Graph, workspace
+
+    n = len(weight)
+    graph, order = Graph(start, neighbours, weight), np.arange(n)
+    small = n // SHARES if n > MANY else 0
+    parts = dissect(graph, workspace(n), order, 0, n, LEAF, small)
+    if parts:
+        with ThreadPoolExecutor(n_threads()) as pool:
+            list(pool.map(lambda part: dissect(graph, workspace(n), order, part[0], part[1], LEAF, 0), parts))
+    return order
 
 
 def quotient(lower: sp.csc_array) -> "tuple[IntArray, IntArray, IntArray, IntArray]":

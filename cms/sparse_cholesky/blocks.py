@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cms.sparse_cholesky.analysis import Fronts
+from cms.sparse_cholesky.analysis import Fronts, inverse
 from fe_models.foundation.arrays import IntArray
 
 if TYPE_CHECKING:
@@ -64,32 +64,65 @@ class Blocks:
 
         return room(self.tree, self.first[k], self.first[k + 1], size)
 
+    @cached_property
+    def work(self) -> "Array":
+        """What each block takes of time in the factorisation, in operations, (n_blocks,)."""
+        return np.add.reduceat(front_work(self.fronts), self.first[:-1])
+
+    @cached_property
+    def by_distance(self) -> IntArray:
+        """The turn of each block if the work from it to its root decides, the most first, (n_blocks,)."""
+        path = self.work.copy()
+        for k in reversed(range(len(self))):
+            if self.above[k] >= 0:
+                path[k] += path[self.above[k]]
+        return inverse(np.argsort(-path, kind="stable"))
+
+    @cached_property
+    def by_height(self) -> IntArray:
+        """The turn of each block on the way down if the longest way below it decides, the most first, (n_blocks,)."""
+        height = self.work.copy()
+        for k, above in enumerate(self.above):
+            if above >= 0:
+                height[above] = max(height[above], self.work[above] + height[k])
+        return inverse(np.argsort(-height, kind="stable"))
+
+    @cached_property
+    def by_depth(self) -> IntArray:
+        """The turn of each block if what waits for its parent decides: subtree after subtree, (n_blocks,)."""
+        return np.arange(len(self))
+
+    def turns(self, *, on_disk: bool) -> IntArray:
+        """Return the turns in the factorisation: as fast as possible, or with as little memory."""
+        return self.by_depth if on_disk else self.by_distance
+
     def n_working(self, n_threads: int, *, on_disk: bool = False) -> int:
         """Most numbers that the factorisation holds at once beside the factor: fronts, and what waits for its parent.
 
         Blocks in the order of `for_each`, each for as long as it has operations; on disk with the panels of those at
         work.
         """
+        turns = self.turns(on_disk=on_disk) if n_threads > 1 else self.by_depth
         size = self.fronts.below.astype(np.int64) ** 2
         rooms = [self.room(k, size) for k in range(len(self))]
-        work = np.add.reduceat(front_work(self.fronts), self.first[:-1])
         panels = np.diff(self.stored) if on_disk else np.zeros(len(self), np.int64)
         waits = [len(below) for below in self.below]
-        ready = [k for k in range(len(self)) if not waits[k]]
+        ready = [(int(turns[k]), k) for k in range(len(self)) if not waits[k]]
+        heapq.heapify(ready)
         busy: list[tuple[float, int]] = []
         now, held, most = 0.0, 0, 0
         while ready or busy:
             while ready and len(busy) < n_threads:
-                k = heapq.heappop(ready)
+                _, k = heapq.heappop(ready)
                 held += rooms[k][0] + rooms[k][1] + int(panels[k])
                 most = max(most, held)
-                heapq.heappush(busy, (now + work[k], k))
+                heapq.heappush(busy, (now + self.work[k], k))
             now, k = heapq.heappop(busy)
             held -= rooms[k][0] + rooms[k][1] + int(panels[k]) - rooms[k][2] + sum(rooms[c][2] for c in self.below[k])
             if self.above[k] >= 0:
                 waits[self.above[k]] -= 1
                 if not waits[self.above[k]]:
-                    heapq.heappush(ready, int(self.above[k]))
+                    heapq.heappush(ready, (int(turns[self.above[k]]), int(self.above[k])))
         return most
 
 
@@ -127,10 +160,12 @@ def blocks_of(fronts: Fronts) -> Blocks:
     return Blocks(fronts, bounds, np.where(parent >= 0, np.searchsorted(bounds, parent, side="right") - 1, -1))
 
 
-def for_each(blocks: Blocks, task: Callable[[int], None], n_threads: int, *, downwards: bool = False) -> None:
+def for_each(
+    blocks: Blocks, task: Callable[[int], None], n_threads: int, turns: IntArray, *, downwards: bool = False
+) -> None:
     """Do a task for every block, each after those below it (downwards: after the one above it), in some threads.
 
-    Those that come first in this order go before others, so that little waits for its parent.
+    Of blocks that may begin the one with the first turn does. One thread goes subtree by subtree.
     """
     n = len(blocks)
     if n_threads == 1 or n == 1:
@@ -138,7 +173,7 @@ def for_each(blocks: Blocks, task: Callable[[int], None], n_threads: int, *, dow
             task(k)
         return
     waits = [int(above >= 0) for above in blocks.above] if downwards else [len(below) for below in blocks.below]
-    ready = [-k if downwards else k for k in range(n) if not waits[k]]
+    ready = [(int(turns[k]), k) for k in range(n) if not waits[k]]
     heapq.heapify(ready)
     change = threading.Condition()
     failures: list[BaseException] = []
@@ -153,7 +188,7 @@ def for_each(blocks: Blocks, task: Callable[[int], None], n_threads: int, *, dow
                 change.wait_for(lambda: ready or failures or len(begun) == n)
                 if failures or len(begun) == n:
                     return
-                k = abs(heapq.heappop(ready))
+                _, k = heapq.heappop(ready)
                 begun.append(k)
             try:
                 task(k)
@@ -166,7 +201,7 @@ def for_each(blocks: Blocks, task: Callable[[int], None], n_threads: int, *, dow
                 for other in after(k):
                     waits[other] -= 1
                     if not waits[other]:
-                        heapq.heappush(ready, -other if downwards else other)
+                        heapq.heappush(ready, (int(turns[other]), other))
                 change.notify_all()
 
     threads = [threading.Thread(target=worker) for _ in range(min(n_threads, n) - 1)]

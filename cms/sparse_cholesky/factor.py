@@ -53,14 +53,14 @@ class CholeskyFactor:
         self._panels: Panels = PanelsInFile(self._blocks.stored, folder) if on_disk else PanelsInMemory()
         self.is_open = True
         try:
-            self._factorise(lower)
+            self._factorise(lower, on_disk)
         except BaseException:
             self.close()
             raise
         where = "factor on disk" if on_disk else "factor in memory"
         self.description = f"Cholesky by {len(self._fronts.above)} fronts (own; nested dissection; {where})"
 
-    def _factorise(self, lower: sp.csc_array) -> None:
+    def _factorise(self, lower: sp.csc_array, on_disk: bool) -> None:
         from cms.sparse_cholesky import front_kernels, kernels
 
         rank = inverse(self._fronts.order)
@@ -96,7 +96,7 @@ class CholeskyFactor:
             self._panels.put(k, panels)  # (3)
 
         with one_blas_thread():
-            for_each(blocks, factorise, n_threads())
+            for_each(blocks, factorise, n_threads(), blocks.turns(on_disk=on_disk))
 
     def solve(self, b: Array) -> Array:
         """Return A⁻¹ b for b (n, k), any order; the result is in Fortran order."""
@@ -140,8 +140,8 @@ class CholeskyFactor:
             own, eight = np.empty(most * width), np.empty(ROWS * width)
             solve_kernels.substitute_back(tree, lo, hi, parts, order, self._panels.of(k), own, eight, Y, x)
 
-        for_each(blocks, eliminate, n_threads())
-        for_each(blocks, substitute, n_threads(), downwards=True)
+        for_each(blocks, eliminate, n_threads(), blocks.by_distance)
+        for_each(blocks, substitute, n_threads(), blocks.by_height, downwards=True)
 
     def close(self) -> None:
         """Free the factor; a second time does nothing."""

@@ -133,7 +133,7 @@ def test_blocks_are_subtrees_or_fronts_above_them_and_each_comes_after_those_it_
             assert hi == lo + 1
     for downwards in (False, True):
         done = []
-        for_each(blocks, done.append, 3, downwards=downwards)
+        for_each(blocks, done.append, 3, blocks.by_distance, downwards=downwards)
         assert_array_equal(np.sort(done), np.arange(len(blocks)))
         for k, above in enumerate(blocks.above):
             assert above < 0 or (done.index(above) < done.index(k)) == downwards
@@ -143,8 +143,9 @@ def test_what_fails_in_a_thread_is_raised():
     def fail(k):
         raise RuntimeError(f"block {k}")
 
+    blocks = blocks_of(analyse(lower_triangle(grid(14))))
     with pytest.raises(RuntimeError, match="block"):
-        for_each(blocks_of(analyse(lower_triangle(grid(14)))), fail, 3)
+        for_each(blocks, fail, 3, blocks.by_depth)
 
 
 def test_dofs_of_a_node_are_one_vertex():
