@@ -89,8 +89,8 @@ class Flexibility:
         self.e = np.setdiff1d(np.arange(Z.shape[1]), self.r)
         self._factor = _cholesky(condensed, Z, S_z, self.e)
         self.T = None if Z.shape[0] == Z.shape[1] else _expansion(condensed, Z)
-        self.M = self._with_load(whole_matrix(body.M), conditions.M_load)
-        self.K = self._with_load(whole_matrix(body.K), conditions.K_load)
+        self.M = self._with_load(body.M, conditions.M_load)
+        self.K = self._with_load(body.K, conditions.K_load)
         self.N, self.M_N = self._orthonormal(motions if self.T is None else self.T.T @ motions)
         self.n = self.M.shape[0]
         self.n_rigid = n_n
@@ -183,6 +183,10 @@ class Flexibility:
         return x if self.T is None else self.T @ x
 
     def _with_load(self, A: sp.csc_array, load: Array | None) -> sp.csc_array:
+        """Return Tᵀ (A + load) T; where that is A, one by rows on many ranks stays there."""
+        if load is None and self.T is None:
+            return A
+        A = whole_matrix(A)
         if load is not None:
             h, n = self.condensed.fixed.b, A.shape[0]
             row, column = np.nonzero(load)

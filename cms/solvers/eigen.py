@@ -21,6 +21,7 @@ from cms.solvers.tall import combine
 from cms.solvers.tall_space import ArraySpace
 from fe_models.body.submatrix import PrincipalBlock
 from fe_models.foundation.arrays import Array, IntArray, frozen
+from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 from fe_models.foundation.solver import Solver
 from fe_models.foundation.threads import one_blas_thread
 
@@ -82,7 +83,7 @@ def eigenmodes(
         Stiffness, (n, n); semidefinite (a free body), and indefinite only by Lagrange multipliers.
     M
         Mass, (n, n), semidefinite: massless dofs and multipliers have none. Of K and M given as `PrincipalBlock` the
-        entries are not held during the search.
+        entries are not held during the search; those by rows on many ranks (`SpreadMatrix`) stay there.
     n_modes
         Number of modes, or a `ModeCount`: all modes up to a frequency [Hz]; proof that none was missed.
     factorization
@@ -110,7 +111,7 @@ def eigenmodes(
         If K - shift M is singular.
     """
     if not isinstance(K, PrincipalBlock) or not isinstance(M, PrincipalBlock):
-        K, M = matrix_of(K), matrix_of(M)
+        K, M = (A if isinstance(A, SpreadMatrix) else matrix_of(A) for A in (K, M))
     n = K.shape[0]
     if K.shape != (n, n) or M.shape != (n, n):
         raise EigenError(f"eigenmodes: expected K and M of one square shape, got {K.shape} and {M.shape}")
@@ -141,7 +142,7 @@ def eigenmodes(
             if kind is KrylovSearch and factorization.factor.ranks.size > 1:
                 space = RankSpace(factorization.factor, numbering)
                 stack.callback(space.close)
-        mass = matrix_of(M) if space is None else M
+        mass = M if space is not None or isinstance(M, SpreadMatrix) else matrix_of(M)
         operator = ShiftInverted(mass, shift, factorization, tolerance, progress, space or here)
         search = kind(operator, wanted)
         modes = search.modes(wanted)

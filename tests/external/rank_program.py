@@ -2,6 +2,7 @@
 
 import gc
 import json
+from contextlib import contextmanager
 from dataclasses import fields
 
 import numpy as np
@@ -15,6 +16,7 @@ from cms.reduced_basis.frames import TisserandFrame, frame_condition
 from cms.reduction import reduce
 from fe_models.body.couplings import couple
 from fe_models.foundation.ranks.mpi import all_ranks
+from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 from tests.bodies import bar
 
 # krylov by whole blocks: a number of modes cuts between directions that are as significant, where rounding chooses
@@ -60,7 +62,8 @@ def arrays(record):
 
 def compared(spread, body, name):
     """Return by how much frequencies, subspaces (sines of principal angles), invariants and responses differ."""
-    Phi, ours, H = reduced_by("petsc", spread, name)
+    with counted_collections() as collections:
+        Phi, ours, H = reduced_by("petsc", spread, name)
     Phi_1, one, H_1 = reduced_by(None, body, name)
     rest = Phi - Phi_1 @ (Phi_1.T @ (body.M @ Phi))
     size = np.sqrt([one.moments.m, np.trace(one.moments.R)])  # of 1 and c; shapes are M-orthonormal
@@ -74,7 +77,22 @@ def compared(spread, body, name):
         "invariants": float(max(invariants)),
         "response": relative(H, H_1),
         "solver": ours.provenance.get("mode set solver", ""),
+        "collected": len(collections),
     }
+
+
+@contextmanager
+def counted_collections():
+    """Note whenever rank 0 collects a whole matrix."""
+    collections, kept = [], SpreadMatrix.whole
+
+    def whole(matrix):
+        collections.append(matrix)
+        return kept(matrix)
+
+    SpreadMatrix.whole = whole
+    yield collections
+    SpreadMatrix.whole = kept
 
 
 def n_kept(ranks):
