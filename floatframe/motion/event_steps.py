@@ -8,6 +8,7 @@ nothing is taken twice, and a motion that events only record goes on as if there
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -58,8 +59,8 @@ MOST_IN_A_STEP = 100  #: events in one step; more mean that events switch each o
 class Ended(NamedTuple):
     """What a step led to."""
 
-    carry: Carry  #: of it, or of steps after it
-    row: Rows | None  #: None: not known
+    carry: Callable[[], Carry]  #: the memory after it
+    row: Rows | None  #: None: not written
     values: Array  #: of the events, (n_events,)
 
 
@@ -71,6 +72,11 @@ class Place(NamedTuple):
     carry: Carry
     row: Rows
     failure: Failure | None  #: of the step that leads there
+
+
+def same(carry: Carry) -> Carry:
+    """Return a memory that is known."""
+    return carry
 
 
 def joined_rows(parts: list[Rows]) -> Rows:
@@ -267,9 +273,10 @@ class EventWatch:
             self.values = values[k]
             if every_row == 1:
                 self.row = before if k == 0 else one_of(rows, k - 1)
-            ended = Ended(carry, one_of(rows, k) if every_row == 1 else None, values[k + 1])
+            after = partial(carry_of_past, work, carry, k) if keeps_past else partial(same, carry)
+            ended = Ended(after, one_of(rows, k) if every_row == 1 else None, values[k + 1])
             close = slice(max(0, k + 1 - MOST_NEIGHBOURS), k + 1 + MOST_NEIGHBOURS)
-            settled, row, work_after, failed = self.settled(
+            settled = self.settled(
                 integrator,
                 begin if k == 0 else carry_of_past(work, carry, k - 1),
                 ended,
@@ -279,15 +286,15 @@ class EventWatch:
                 h=h,
                 neighbours=(k - close.start, values[close]),
             )
-            if failed is not None or settled is not carry:
-                n_good = k + int(failed is None)
-                due = (first + k) // every_row - first // every_row
-                rows = Rows(*(array[:due] for array in rows))
+            if settled is not None:
+                carry, row, work, failure = settled
+                n_good = k + int(failure is None)
+                rows = Rows(*(array[: (first + k) // every_row - first // every_row] for array in rows))
+                if failure is None and (self.has_stopped or (first + n_good) % every_row == 0):
+                    rows = joined_rows([rows, row])
                 self.calm = max(1, (first + n_good - self.changed) // 2)
                 self.changed = first + n_good
-                if failed is None and row is not None and (self.has_stopped or (first + n_good) % every_row == 0):
-                    rows = joined_rows([rows, row])
-                return settled, self.due_of(rows, first, every // every_row), work_after, n_good, failed
+                return carry, self.due_of(rows, first, every // every_row), work, n_good, failure
         self.values = values[n_good]
         if n_good and every_row == 1:
             self.row = one_of(rows, n_good - 1)
@@ -310,28 +317,27 @@ class EventWatch:
         after, row, _, failure = integrator.advance(self.system, carry, work, t0=t0, h=h, first=k, n_steps=1, every=1)
         if failure is not None:
             return carry, row, work, failure
-        ended = Ended(after, row, self.values_after(row))
-        carry, last, work, failure = self.settled(
-            integrator, carry, ended, work, t=t0 + k * h, t_end=t0 + (k + 1) * h, h=h
-        )
-        return carry, row if last is None else last, work, failure
+        ended = Ended(partial(same, after), row, self.values_after(row))
+        settled = self.settled(integrator, carry, ended, work, t=t0 + k * h, t_end=t0 + (k + 1) * h, h=h)
+        return (after, row, work, None) if settled is None else settled
 
     def settled(
         self, integrator: Integrator, begin: Carry, ended: "Ended", work: Work, *, t: float, t_end: float, h: float,
         neighbours: tuple[int, Array] | None = None,
-    ) -> tuple[Carry, Rows | None, Work, Failure | None]:  # fmt: skip
-        """Settle what happens in a step of size h from t; return memory and results at its end, or at the stop.
+    ) -> tuple[Carry, Rows, Work, Failure | None] | None:  # fmt: skip
+        """Settle what happens in a step of size h from t; None if the motion is the same after it.
 
+        Else return memory, results and working arrays at its end, or at the stop, and why it failed, if it did.
         begin, ended: the memory before the step, and what it led to. neighbours: values at steps around it, (n_times,
         n_events), the first of them so many steps before it.
         """
-        size = h
+        size, reached_end = h, None
         for _ in range(MOST_IN_A_STEP):
             events, values = self.events, ended.values
             passed = [j for j, e in enumerate(events) if self.happens(e, float(self.values[j]), float(values[j]))]
             if not passed:
                 self.values, self.row = values, ended.row
-                return ended.carry, ended.row, work, None
+                return reached_end
             found = sorted(
                 (self.located(integrator, begin, ended, t, size, j, neighbours) for j in passed),
                 key=lambda place: (place.part, place.j),
@@ -341,12 +347,12 @@ class EventWatch:
             noted = [place for place in found if not events[place.j].is_active and place.part <= last]
             failure = next((place.failure for place in (*noted, acting) if place and place.failure is not None), None)
             if failure is not None:
-                return begin, ended.row, work, failure
+                return begin, found[0].row, work, failure
             for place in noted:
                 self.note(place, t + place.part * size)
             if acting is None:
                 self.values, self.row = values, ended.row
-                return ended.carry, ended.row, work, None
+                return reached_end
             event, carry = events[acting.j], acting.carry
             t = t + acting.part * size if event.at is None else event.at
             row = acting.row._replace(t=np.array([t]))
@@ -377,9 +383,10 @@ class EventWatch:
             )
             if failure is not None:
                 return begin, row, work, failure
-            ended = Ended(carry, row, self.values_after(row))
+            ended = Ended(partial(same, carry), row, self.values_after(row))
+            reached_end = carry, row, work, None
         words = f"{MOST_IN_A_STEP} events happened in one step: {', '.join(e['name'] for e in self.happened[-3:])}, ..."
-        return ended.carry, ended.row, work, Failure(words, np.inf)
+        return carry, row, work, Failure(words, np.inf)
 
     def begun_anew(
         self, integrator: Integrator, carry: Carry, state: State, row: Rows, t: float
@@ -504,9 +511,14 @@ class EventWatch:
         Places are tried by steps of their size from the beginning of the step.
         """
         event, work = self.events[j], self.trial_work()
-        tried = {} if ended.row is None else {1.0: Place(1.0, j, ended.carry, ended.row, None)}
+        tried: dict[float, Place] = {}
 
         def at(part: float) -> Place:
+            if part == 1.0:
+                carry, row = ended.carry(), ended.row
+                if row is None:
+                    _, row = integrator.observe(self.system, t + size, carry, work)
+                return Place(part, j, carry, row, None)
             if part not in tried:
                 work.solver.c_k[...] = 0.0  # without the factors of other places
                 carry, row, _, failure = integrator.advance(

@@ -259,6 +259,30 @@ def test_blocks_of_steps_change_neither_the_motion_nor_its_events(method, monkey
             assert_array_equal(step_by_step.source.read(name), motion.source.read(name))
 
 
+@pytest.mark.parametrize("watch", [{"at": 0.4}, {"watch": "hinge.angle", "level": 2.0}])
+@pytest.mark.parametrize("formulation", ["absolute", "relative"])
+def test_what_happens_at_the_end_of_a_step_happens_there(formulation, watch, monkeypatch):
+    """A wheel at 5 rad/s, stopped or driven from 0.4 s on, the fortieth of the steps of a block; then 3 rad/s²."""
+    wheel = RigidBody("wheel", 1.0, np.eye(3), omega_B=(0, 0, 5.0))
+    hinge = RevoluteJoint("hinge", Marker(GROUND), Marker("wheel"), axis=(0, 0, 1))
+    drive = JointForce("drive", "hinge", "angle", preload=3.0)
+
+    def run(**options):
+        system = System([wheel], [hinge], [drive], events=[Event("end", **watch, switch_on=("drive",), **options)])
+        return integrate(system, GeneralizedAlpha(), 1.0, 0.01, output_every=7, formulation=formulation)
+
+    stopped = run(stop=True)
+    assert_allclose(stopped.t[-1], 0.4, rtol=0, atol=1e-11)
+    assert_allclose(stopped.t[:-1], 0.07 * np.arange(6), rtol=0, atol=1e-15)
+    motions = []
+    for size in (1, 400):
+        monkeypatch.setattr(event_steps, "BLOCK", size)
+        motions.append(run())
+    assert_array_equal(*(motion.source.read("u") for motion in motions))
+    late = np.maximum(motions[0].t - 0.4, 0.0)
+    assert_allclose(motions[0].body("wheel").omega_B[:, 2], 5.0 + 3.0 * late, rtol=0, atol=1e-8)
+
+
 def test_a_record_and_a_stop_at_one_level_happen_once_each():
     watch, level = "guide.distance", -0.7
     events = Event("note", watch, level=level, record=True), Event("halt", watch, level=level, stop=True)
