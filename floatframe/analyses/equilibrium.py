@@ -7,7 +7,8 @@ A flow that ends in the equilibrium, made implicit with growing steps (pseudo-tr
     (3) tau grows as f falls: small tau follows the flow downhill, large tau is Newton's method
     (4) states z of elements follow their rates by implicit steps of sqrt(tau), z_new = z + sqrt(tau) g(z_new)
 
-Motions that cost nothing (a wheel on its hinge) stay where they are, since W/tau holds them.
+Motions that cost nothing (a wheel on its hinge) stay where they are, since W/tau holds them. Where the flow loses its
+way, as along beams of stiff bushings that bend and twist, loads that grow lead to the equilibrium (`led_equilibrium`).
 """
 
 import logging
@@ -19,6 +20,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array, IntArray
+from floatframe.analyses.led_equilibrium import Balance, is_left_by_none, led_equilibrium
 from floatframe.analyses.observed_state import observed_state
 from floatframe.analyses.relative.tree_flow import tree_flow
 from floatframe.analyses.system_matrices import held_rows, turning_matrices
@@ -147,6 +149,17 @@ class StatesAtRest:
         return f"; state {self.names[int(self.change.argmax())]!r} of an element does not come to rest"
 
 
+@dataclass(frozen=True, eq=False)
+class Lost:
+    """Where the flow has ended without an equilibrium."""
+
+    iteration: int
+    error: float  #: forces out of balance by those at work
+    state: State
+    W: tuple[Array, ...]
+    forces: Array
+
+
 def static_equilibrium(
     system: System,
     state: State | None = None,
@@ -231,74 +244,124 @@ def steady_rotation(
     require_placed_near(compiled, given, state)
     require_independent_constraints(compiled, work, tree_of(system).tree, state)
     holds = held_rows(model)
-    tau, last = 0.0, np.inf
-    for iteration in range(max_iterations + 1):
-        state, u_dot = turning(compiled, state, omega, center)
-        set_iterate(work, state, u_dot, w)
-        states.prepare(work, w, tau)
-        if flow is not None:
-            w = flow.wrenches(work, state, u_dot, w)
-        parts, K = _tangent(resting, work, omega)
-        raise_errors_of(compiled.callbacks)
-        require_numbers(compiled, work)
-        W = with_modal_weight(model, linearized(resting, work, 1.0, 0.0, 0.0).H)
-        forces, gaps = work.bodies.residual.copy(), work.connections.g.copy()
-        size = size_of(W, forces)
-        scale_of_forces = forces_at_work(compiled, work, parts, W)
-        if not np.isfinite(size + scale_of_forces):  # a stiffened body beyond the second order
-            error = np.inf
-            break
-        noise = rounding_of(compiled, parts, state)
-        is_nothing = scale_of_forces <= size_of(
-            W, abs(parts.J).T @ np.where(holds, 0.0, noise)
-        )  # springs relax to none
-        error = 0.0 if is_nothing else size / scale_of_forces
-        is_closed = np.abs(gaps[holds]).max(initial=0.0) <= CLOSED * max(compiled.length, 1.0)
-        told = tolerance * np.abs(w[~states.own]).max(initial=0.0) + noise
-        is_told = bool((np.abs(gaps) <= told)[~holds & ~states.own].all())
-        if error <= tolerance and is_closed and is_told and states.are_at_rest(tolerance):
-            _require_rotation(compiled, work, omega)
-            require_off_stops(system, w)
-            notes = notes_at(system, work, state, u_dot, w)
-            told_state, told_u_dot = motion_of_file(compiled, state, u_dot)
-            return Equilibrium(replace(told_state, w=w), told_u_dot, w, omega, error, iteration, notes)
-        if iteration == max_iterations:
-            break
-        if tau == 0.0:
-            pulled = forces - parts.J.T @ wrenches_by_law(model, parts, gaps, holds | states.own)
-            at_first = size if size > STANDING_SPRINGS * size_of(W, pulled) else size_of(W, pulled)
-            tau = 0.1 * compiled.length / max(at_first / np.sqrt(_total_mass(W)), STANDSTILL)
-        else:
-            fall = last / max(size, np.finfo(float).tiny) if error > tolerance else np.inf  # below, it is rounding
-            tau *= min(max(fall, LEAST_GROWTH), FASTEST_GROWTH) if fall > STANDING else max(fall, 0.1)
-        last = size
-        ds = None
-        if flow is not None:
-            ds, moved, dw = flow.step(work, state, u_dot, w, tau)
-        if ds is None or not np.abs(moved).max() > ROUNDING:  # so little is noise of coordinates: bodies one by one
-            y, dw = solve(tuple(k + m / tau for k, m in zip(K, W, strict=True)), parts, -forces, -gaps)
-            ds, moved = None, in_ground_axes(model, state, y)
-        if not np.isfinite(moved).all():
-            break
-        part = min(1.0, LARGEST_TURN / max(largest_motion(compiled, moved), 1e-300))
-        if flow is not None and ds is not None:
-            state = flow.displaced(work, state, part * ds)
-        else:
-            state = displaced(model, state, part * moved)
-        w = w + part * dw
-        states.follow(w, dw)
-    lost = indefinite_masses(system, state)
-    raise ConvergenceError(
-        f"no equilibrium found in {iteration} steps: loads at or above buckling bend it too far, or it lies far away; "
-        f"{indefinite_mass_words(lost)}"
+
+    def followed(state: State, w: Array) -> "Equilibrium | Lost":
+        """Follow the flow from a state."""
+        tau, last = 0.0, np.inf
+        for iteration in range(max_iterations + 1):
+            state, u_dot = turning(compiled, state, omega, center)
+            set_iterate(work, state, u_dot, w)
+            states.prepare(work, w, tau)
+            if flow is not None:
+                w = flow.wrenches(work, state, u_dot, w)
+            parts, K = _tangent(resting, work, omega)
+            raise_errors_of(compiled.callbacks)
+            require_numbers(compiled, work)
+            W = with_modal_weight(model, linearized(resting, work, 1.0, 0.0, 0.0).H)
+            forces, gaps = work.bodies.residual.copy(), work.connections.g.copy()
+            size = size_of(W, forces)
+            scale_of_forces = forces_at_work(compiled, work, parts, W)
+            if not np.isfinite(size + scale_of_forces):  # a stiffened body beyond the second order
+                error = np.inf
+                break
+            noise = rounding_of(compiled, parts, state)
+            is_nothing = scale_of_forces <= size_of(
+                W, abs(parts.J).T @ np.where(holds, 0.0, noise)
+            )  # springs relax to none
+            error = 0.0 if is_nothing else size / scale_of_forces
+            is_closed = np.abs(gaps[holds]).max(initial=0.0) <= CLOSED * max(compiled.length, 1.0)
+            told = tolerance * np.abs(w[~states.own]).max(initial=0.0) + noise
+            is_told = bool((np.abs(gaps) <= told)[~holds & ~states.own].all())
+            if error <= tolerance and is_closed and is_told and states.are_at_rest(tolerance):
+                _require_rotation(compiled, work, omega)
+                require_off_stops(system, w)
+                notes = notes_at(system, work, state, u_dot, w)
+                told_state, told_u_dot = motion_of_file(compiled, state, u_dot)
+                return Equilibrium(replace(told_state, w=w), told_u_dot, w, omega, error, iteration, notes)
+            if iteration == max_iterations:
+                break
+            if tau == 0.0:
+                pulled = forces - parts.J.T @ wrenches_by_law(model, parts, gaps, holds | states.own)
+                at_first = size if size > STANDING_SPRINGS * size_of(W, pulled) else size_of(W, pulled)
+                tau = 0.1 * compiled.length / max(at_first / np.sqrt(_total_mass(W)), STANDSTILL)
+            else:
+                fall = last / max(size, np.finfo(float).tiny) if error > tolerance else np.inf  # below, it is rounding
+                tau *= min(max(fall, LEAST_GROWTH), FASTEST_GROWTH) if fall > STANDING else max(fall, 0.1)
+            last = size
+            ds = None
+            if flow is not None:
+                ds, moved, dw = flow.step(work, state, u_dot, w, tau)
+            if ds is None or not np.abs(moved).max() > ROUNDING:  # so little is noise of coordinates: bodies one by one
+                y, dw = solve(tuple(k + m / tau for k, m in zip(K, W, strict=True)), parts, -forces, -gaps)
+                ds, moved = None, in_ground_axes(model, state, y)
+            if not np.isfinite(moved).all():
+                break
+            part = min(1.0, LARGEST_TURN / max(largest_motion(compiled, moved), 1e-300))
+            if flow is not None and ds is not None:
+                state = flow.displaced(work, state, part * ds)
+            else:
+                state = displaced(model, state, part * moved)
+            w = w + part * dw
+            states.follow(w, dw)
+        return Lost(iteration, error, state, tuple(W), forces)
+
+    found = followed(state, w)
+    if isinstance(found, Lost) and flow is None and not states.own.any():
+        led = led_by_loads(compiled, work, omega, center, state, w)
+        if led is not None:
+            again = followed(*led)
+            if isinstance(again, Equilibrium):
+                log.info("system %r: the equilibrium was found by loads that grow, in small steps", system.name)
+                return replace(again, n_iterations=found.iteration + again.n_iterations)
+    if isinstance(found, Equilibrium):
+        return found
+    lost = indefinite_masses(system, found.state)
+    why = (
+        f"loads at or above buckling bend it too far, or it lies far away; {indefinite_mass_words(lost)}"
         if lost
-        else f"no equilibrium found in {iteration} steps: forces are out of balance by {error:.2g} of those at work, "
-        f"most at body {worst_body(compiled, W, forces)!r}{states.words(tolerance)}; hold what can fall or drift, "
-        "start nearer, or add damping and integrate until it rests",
-        t=0.0,
-        h=0.0,
-        residual=error,
+        else f"forces are out of balance by {found.error:.2g} of those at work, most at body "
+        f"{worst_body(compiled, found.W, found.forces)!r}{states.words(tolerance)}; hold what can fall or drift, start "
+        "nearer, or add damping and integrate until it rests"
     )
+    words = f"no equilibrium found in {found.iteration} steps: {why}"
+    raise ConvergenceError(words, t=0.0, h=0.0, residual=found.error)
+
+
+def led_by_loads(
+    compiled: CompiledSystem, work: Work, omega: Array, center: Array, state: State, w: Array
+) -> tuple[State, Array] | None:
+    """Return state and wrenches near an equilibrium to which loads lead that grow, None if there is no stable one."""
+    model, resting = compiled.model, compiled.resting_model
+
+    def tangents(state: State, w: Array) -> tuple[Linearized, tuple[Array, ...], Array]:
+        moving, u_dot = turning(compiled, state, omega, center)
+        set_iterate(work, moving, u_dot, w)
+        parts, K = _tangent(resting, work, omega)
+        return parts, K, u_dot
+
+    def balance(state: State, w: Array) -> Balance | None:
+        parts, K, _ = tangents(state, w)
+        forces, gaps = work.bodies.residual.copy(), work.connections.g.copy()
+        if not (np.isfinite(forces).all() and np.isfinite(gaps).all()):
+            return None
+
+        def way(out_of_balance: Array, open_by: Array) -> tuple[Array, Array]:
+            try:
+                y, dw = solve(K, parts, -out_of_balance, -open_by)
+            except RuntimeError:  # exactly singular: something is free to move
+                return np.full(len(forces), np.inf), gaps
+            return in_ground_axes(model, state, y), dw
+
+        return Balance(forces, gaps, way)
+
+    led = led_equilibrium(
+        state, w, balance, lambda state, way: displaced(model, state, way), lambda way: largest_motion(compiled, way)
+    )
+    if led is None:
+        return None
+    parts, K, _ = tangents(*led)
+    W = with_modal_weight(model, linearized(resting, work, 1.0, 0.0, 0.0).H)
+    return led if is_left_by_none(parts, K, W) else None
 
 
 def wrenches_by_law(model: Model, parts: Linearized, gaps: Array, others: NDArray[np.bool_]) -> Array:

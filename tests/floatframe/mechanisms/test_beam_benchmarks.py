@@ -50,6 +50,12 @@ def test_rods_by_shooting_end_where_the_elastica_does():
     np.testing.assert_allclose([1 - end[0], end[2]], [0.05643, 0.30172], rtol=0, atol=1e-5)
 
 
+def test_segments_find_the_oblique_equilibrium_to_second_order():
+    errors = [error_of(segments(n), 13.345, 45) for n in (5, 9)]
+    assert errors[0] < 1e-2
+    assert 0.2 < errors[1] / errors[0] < 0.35
+
+
 def test_the_princeton_beam_in_two_parts_is_exact_to_a_thousandth_where_a_part_may_twist_along_its_length():
     assert 4e-3 < error_of(parts(1), 13.345, 45) < 7e-3
     assert error_of(parts(2), 13.345, 45) < 1e-3

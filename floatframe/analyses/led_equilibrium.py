@@ -1,0 +1,112 @@
+"""Towards an equilibrium by loads that grow: for those whose flow (`equilibrium`) loses its way.
+
+At a state x0 forces f0 are out of balance, and rows g0 open. The equilibria of
+
+    (1) f(x, w) = (1 - p) f0,   g(x, w) = (1 - p) g0
+
+lead from x0 at p = 0 to that of the system at p = 1. Each is found by Newton's method from the one before; p takes
+longer steps while that is quick, and half as long ones where it is not found. (Newton homotopy, [1]_.)
+
+.. [1] Allgower, Georg, "Numerical Continuation Methods", Springer 1990, §11.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import count
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+
+from fe_models.foundation.arrays import Array
+from floatframe.start.newton_equations import Linearized
+from floatframe.state import State
+
+__all__ = ["Balance", "is_left_by_none", "led_equilibrium"]
+
+FIRST, LEAST = 0.25, 1e-3  #: steps of p
+QUICK, MOST = 4, 8  #: iterations of one p: after so few the next step is twice as long; after so many it is given up
+LONGEST = 0.3  #: rad, and part of the size of the system, in one iteration
+SETTLED = 1e-7  #: the same, of an iteration after which an equilibrium on the way is taken as found
+MOST_SOLVES = 600
+LARGEST = 4000  #: unknowns up to which it is looked whether the flow leaves an equilibrium
+LEAVING = 1e-9  #: of the fastest rate of the flow, below which one is rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """What is out of balance at a state and wrenches, and the way Newton's method goes from there."""
+
+    forces: Array  #: f, (n_u,)
+    gaps: Array  #: g, (n_w,)
+    way: Callable[[Array, Array], tuple[Array, Array]]  #: of forces and gaps to take off: (n_u,) in ground axes, (n_w,)
+
+
+def led_equilibrium(
+    state: State,
+    w: Array,
+    balance: Callable[[State, Array], Balance | None],
+    displaced: Callable[[State, Array], State],
+    length_of: Callable[[Array], float],
+) -> tuple[State, Array] | None:
+    """Return state and wrenches near an equilibrium of the system, None if (1) did not lead to one.
+
+    Parameters
+    ----------
+    state, w
+        Where to begin.
+    balance
+        What is out of balance at a state; None where that is no number.
+    displaced
+        The state after a way, (n_u,) in ground axes.
+    length_of
+        Largest translation of a way by the size of the system, or rotation [rad].
+    """
+    begun = balance(state, w)
+    if begun is None:
+        return None
+    p, step, n_solves = 0.0, FIRST, 0
+    while p < 1.0 and n_solves < MOST_SOLVES:
+        target = min(1.0, p + step)
+        x, y, at = state, w, begun if p == 0.0 else balance(state, w)
+        for iteration in count(1):
+            if at is None or iteration > MOST:
+                break
+            n_solves += 1
+            moved, dw = at.way(at.forces - (1 - target) * begun.forces, at.gaps - (1 - target) * begun.gaps)
+            length = length_of(moved) if np.isfinite(moved).all() else np.inf
+            if length > LONGEST:
+                at = None
+                break
+            x, y = displaced(x, moved), y + dw
+            if length <= SETTLED:
+                break
+            at = balance(x, y)
+        if at is None or iteration > MOST:
+            step = (target - p) / 2
+            if step < LEAST:
+                return None
+            continue
+        state, w, p = x, y, target
+        step *= 2.0 if iteration <= QUICK else 1.0
+    return (state, w) if p == 1.0 else None
+
+
+def is_left_by_none(parts: Linearized, K: tuple[Array, ...], W: tuple[Array, ...]) -> bool:
+    """Whether the flow W dx/dtau = -f, with all joints closed, leads back to an equilibrium from all places near by.
+
+    Loads that grow go along branches which the flow leaves, such as a beam that stays straight beyond its buckling. The
+    rates are the eigenvalues of [[K, -Jᵀ], [G, V]] over [[W, 0], [0, 0]]; one below zero leads away. False for systems
+    too large to look.
+    """
+    n_u, n_w = parts.J.shape[1], parts.J.shape[0]
+    if n_u + n_w > LARGEST:
+        return False
+    A = sp.block_array([[sp.block_diag(K), -parts.J.T], [parts.G, parts.V]]).toarray() if n_w else la.block_diag(*K)
+    B = np.zeros_like(A)
+    B[:n_u, :n_u] = la.block_diag(*W)
+    try:  # the largest of 1/rate: 0 where joints hold, and one over a negative rate is negative
+        inverse = la.eigvals(la.solve(A, B)).real
+    except la.LinAlgError:
+        return False
+    return bool(inverse.min() >= -LEAVING * np.abs(inverse).max())
