@@ -21,7 +21,7 @@ import numpy as np
 
 TOLERANCE = 1e-3
 STUDY = [("shell", 128, 300), ("shell", 208, 300), ("shell", 208, 1000), ("solid", 16, 100), ("solid", 28, 100)]
-FACTORS = (1.5, 2.0, 2.5, 3.0, 4.0)
+FACTORS = (4.0, 10.0, 20.0)
 BODIES = [
     ("shell", 40, 30), ("shell", 64, 100), ("shell", 64, 400), ("plate", 64, 100), ("cantilever", 64, 100),
     ("solid", 10, 40), ("solid", 14, 100), ("bar", 60, 60), ("bar", 60, 150),
@@ -113,7 +113,7 @@ def table(cases):
 
 
 def errors():
-    """Print the largest error for several cutoff factors, after one step of inverse iteration and as delivered."""
+    """Print the largest error for several cutoff factors, without a step of inverse iteration and as delivered."""
     import cms
     from cms.substructures import modes
 
@@ -124,7 +124,7 @@ def errors():
         told = []
         for factor in FACTORS:
             found = []
-            for modes.MOST_STEPS in (1, most):
+            for modes.MOST_STEPS in (0, most):
                 made = cms_modes(body, n_modes=n_modes, cutoff_factor=factor)
                 estimate = np.nanmax(made.data["frequency error"])
                 found.append(((made.frequencies[-n_modes:] / true - 1).max(), estimate))

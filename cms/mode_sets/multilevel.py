@@ -30,7 +30,7 @@ def multilevel(
     *,
     inertia_relief: bool = False,
     tolerance: float = 1e-3,
-    cutoff_factor: float = 3.0,
+    cutoff_factor: float | None = None,
     workers: Workers = None,
 ) -> ModeSet:
     """Craig-Bampton whose fixed-interface modes come from multilevel substructures: [Psi_C, (Psi_H,) modes] [1]_.
@@ -51,8 +51,8 @@ def multilevel(
     tolerance
         Largest relative error of a frequency, 1e-10 to 0.1; a warning says what is above it.
     cutoff_factor
-        Substructures keep their modes up to so many times the cutoff (of a number of modes: times an estimate of its
-        highest frequency), 1.2 or more.
+        Substructures keep their modes up to so many times the cutoff (of a number of modes: times its highest
+        frequency), 1.2 or more; None: 20 for shells and beams, 4 for solids.
     workers
         Where subtrees are eliminated: a number of processes, dask, or dask://host:port; None: threads of this process.
 
@@ -74,7 +74,8 @@ def multilevel(
         body, wanted = families.body, mode_count(n_modes)
         require_interfaces("multilevel", body)
         _require_range("tolerance", tolerance, 1e-10, 0.1)
-        _require_range("cutoff_factor", cutoff_factor, 1.2, 100.0)
+        if cutoff_factor is not None:
+            _require_range("cutoff_factor", cutoff_factor, 1.2, 100.0)
         if len(families.h) > len(body.b):
             raise ModeSetError(
                 f"multilevel: the interfaces of body {body.name!r} leave a rigid-body motion free; expected interfaces "
@@ -107,7 +108,7 @@ def multilevel(
 
 
 def _modes_of(
-    families: Families, wanted: ModeCount, tolerance: float, cutoff_factor: float, workers: Workers
+    families: Families, wanted: ModeCount, tolerance: float, cutoff_factor: float | None, workers: Workers
 ) -> MultilevelResult:
     """Find the modes over all dofs; the tree becomes the factorisation of the families, if they have none yet."""
     body = families.body

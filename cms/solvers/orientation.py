@@ -1,11 +1,13 @@
 """One fixed basis among many equal ones: signs of modes, and directions within multiple frequencies."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array
 
-__all__ = ["orientation"]
+__all__ = ["orientation", "turn"]
 
+SLICE = 8192  #: rows that are turned at a time
 MULTIPLE = 1e-10  #: relative gap of omega² below which modes count as one multiple mode
 
 
@@ -51,3 +53,24 @@ def _standard_rotation(group: Array) -> Array:
     # rows of the leading entries = L Qᵀ with L lower triangular, so Q turns them into L; its diagonal made positive
     Q, R = np.linalg.qr(group[leading].T)
     return Q * np.where(np.diag(R) < 0, -1.0, 1.0)
+
+
+def turn(Phi: Array, Z: Array) -> None:
+    """Put Phi Z into Phi, (n, k); the Z of `orientation` is a diagonal but for small blocks."""
+    signs = np.diag(Z)
+    groups = np.split(np.arange(len(Z)), np.flatnonzero(_new_block(Z)))
+    for first in range(0, len(Phi), SLICE):
+        part = Phi[first : first + SLICE]
+        turned = [(group, part[:, group] @ Z[np.ix_(group, group)]) for group in groups if len(group) > 1]
+        part *= signs
+        for group, columns in turned:
+            part[:, group] = columns
+
+
+def _new_block(Z: Array) -> NDArray[np.bool_]:
+    """Return whether a block begins at each column of a matrix of blocks along the diagonal, (k,); not at the first."""
+    row, column = np.nonzero(Z)
+    last = np.arange(len(Z))
+    np.maximum.at(last, row, column)
+    np.maximum.at(last, column, row)
+    return np.arange(len(Z)) > np.concatenate([[len(Z)], np.maximum.accumulate(last)[:-1]])

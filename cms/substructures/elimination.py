@@ -38,6 +38,7 @@ class Substructure:
     coupling: Array  #: their mass with the modes of all substructures below, in order, (m_below, m)
     children: tuple[int, ...]
     pivots: Array | None = None  #: of a root with multipliers: L holds the factors of SciPy's `lu_factor` instead
+    spread: Array | None = None  #: and this S with S Sᵀ f = u of [K Cᵀ; C 0] [u; .] = [f; 0], (s, s - ties)
 
     @property
     def stop(self) -> int:
@@ -56,6 +57,13 @@ class Substructure:
             return
         solve_triangular(self.L, f.T, transposed=True, right=True)
         solve_triangular(self.L, f.T, right=True)
+
+    def spread_own(self, xi: Array) -> None:
+        """Put S xi with S Sᵀ = K_ss⁻¹ into xi, (s, k) in C order."""
+        if self.spread is not None:
+            xi[:] = self.spread @ xi[: self.spread.shape[1]]
+            return
+        solve_triangular(self.L, xi.T, right=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +129,8 @@ def eliminate(
     (4) M_bb <- Psi_ᵀ M Psi_ of Psi_ = [Psi; 1]: M_bb + Psiᵀ X + Xᵀ Psi,  X = M_sb + M_ss Psi / 2
     (5) mass of own modes with b: phiᵀ (M_sb + M_ss Psi);  of modes below: D_b + D_s Psi with b, D_s phi with own modes
     """
+    from cms.substructures.extend_add import extend_add, put_rows
+
     start, stop = int(part.starts[t]), int(part.starts[t + 1])
     s = stop - start
     first = int(part.starts[0])
@@ -136,12 +146,10 @@ def eliminate(
     for r in below:
         p = int(np.searchsorted(r.boundary, stop))
         own, out = r.boundary[:p] - start, np.searchsorted(boundary, r.boundary[p:])
-        for (A_ss, A_sb, A_bb), A in (((K_ss, K_sb, K_bb), r.K), ((M_ss, M_sb, M_bb), r.M)):
-            A_ss[np.ix_(own, own)] += A[:p, :p]
-            A_sb[np.ix_(own, out)] += A[p:, :p].T
-            A_bb[np.ix_(out, out)] += A[p:, p:]
-        D[row : row + len(r.rows), own] = r.rows[:, :p]
-        D[row : row + len(r.rows), s + out] = r.rows[:, p:]
+        place = np.concatenate([own, out])
+        extend_add(K_ss, K_sb, K_bb, r.K, place, p)
+        extend_add(M_ss, M_sb, M_bb, r.M, place, p)
+        put_rows(D, r.rows, row, np.concatenate([own, s + out]))
         row += len(r.rows)
     if len(part.multipliers) and part.multipliers[-1] < stop:
         return _root_with_multipliers(part, start, K_ss, M_ss, D, children)
@@ -192,10 +200,12 @@ def _root_with_multipliers(
     Phi = np.zeros((len(K_ss), len(omega2)), order="F")
     Phi[~is_tie] = Z @ Phi_z
     factors, pivots = la.lu_factor(K_ss)
+    spread = np.zeros((len(K_ss), Z.shape[1]))
+    spread[~is_tie] = la.solve_triangular(L, Z.T, lower=True).T
     none = np.zeros(0, dtype=np.int64)
     empty = np.zeros((0, 0), order="F")
     Psi = np.zeros((len(K_ss), 0), order="F")
-    done = Substructure(start, none, factors, Psi, Phi, omega2, D @ Phi, children, pivots)
+    done = Substructure(start, none, factors, Psi, Phi, omega2, D @ Phi, children, pivots, spread)
     return done, Remainder(none, empty, empty, np.zeros((len(D) + len(omega2), 0)))
 
 

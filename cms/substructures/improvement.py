@@ -3,17 +3,20 @@
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
+from scipy.special import gammaincinv
 
 from cms.solvers.sparse_product import SymmetricProduct
 from cms.solvers.tall import combine, combined, inner
 from cms.substructures.tree import SubstructureTree
 from fe_models.foundation.arrays import Array, IntArray
 
-__all__ = ["COLUMNS", "SLICE", "ApproximateModes", "groups"]
+__all__ = ["COLUMNS", "PROBES", "SLICE", "ApproximateModes"]
 
 COLUMNS = 128  #: of a block
 SLICE = 16384  #: rows that are put elsewhere at a time
-SAME_SIZE = 16  #: groups of modes of one size, whose residuals are measured by one column each
+PROBES = 64  #: random columns that measure the residuals of any number of modes
+RARE = 1e-3  #: part of the modes whose residual the probes find too small
+SUMS = 16  #: of neighbouring modes, whose residuals are measured together
 
 
 class ApproximateModes:
@@ -59,40 +62,52 @@ class ApproximateModes:
     def errors(self, count: int) -> Array:
         """Return about how much too high each of the first frequencies is at most, relative, (count,).
 
-        (1) r = x - omega² K⁻¹ M x of each mode, or of a group of modes together: the sum of r_j / omega_j with random
-            signs has the expected squared length of all of them, which bounds that of each
-        (2) a = |r|²_K / omega²,  b = |r|²_M
+        (1) r = x - omega² K⁻¹ M x,  a = |r|²_K / omega²,  b = |r|²_M  of each mode, one solve for each
+        (2) of many modes: a by random probes, from above; b / a by sums of neighbours, r_j / omega_j with random signs
         (3) (a + b / (1 - omega² / omega_next²)) / 2, omega_next that of the first mode that does not take part
             (docs/theory.md §2)
         """
-        of_mode = groups(count)
-        n_groups = int(of_mode.max(initial=-1)) + 1
-        pick = np.zeros((count, n_groups))
-        pick[np.arange(count), of_mode] = np.random.default_rng(0).choice([-1.0, 1.0], size=count)
+        omega2 = self.omega2[:count]
+        if count <= PROBES:  # (1)
+            a, b = self._residuals_of_sums(np.eye(count))
+        else:  # (2)
+            a = self._probed(count)
+            of_mode = np.arange(count) * SUMS // count
+            pick = np.zeros((count, SUMS))
+            pick[np.arange(count), of_mode] = np.random.default_rng(0).choice([-1.0, 1.0], size=count)
+            a_sum, b_sum = self._residuals_of_sums(pick)
+            b = a * (b_sum / np.maximum(a_sum, np.finfo(float).tiny))[of_mode]
+        apart = 1 - omega2 / self.omega2[-1]
+        return (a + omega2 * b / np.maximum(apart, np.finfo(float).eps)) / 2  # (3)
+
+    def _residuals_of_sums(self, pick: Array) -> tuple[Array, Array]:
+        """(1) Return a, and b / omega², of the sums of r_j / omega_j by the columns of pick, (count, m)."""
+        count, m = pick.shape
         omega = np.sqrt(self.omega2[:count])
         X = self.X[:, :count]
-        S_x = self.M @ combine(X, pick * omega[:, None])  # (1)
+        S_x = self.M @ combine(X, pick * omega[:, None])
         self.tree.solve_ordered(S_x)
-        self.n_solves += n_groups
+        self.n_solves += m
         r = combine(X, pick / omega[:, None])
         r -= S_x
         del S_x
-        a, b = (np.maximum(np.einsum("nk,nk->k", r, A @ r), 0.0)[of_mode] for A in (self.K, self.M))  # (2)
-        apart = 1 - self.omega2[:count] / self.omega2[-1]
-        return (a + self.omega2[:count] * b / np.maximum(apart, np.finfo(float).eps)) / 2  # (3)
+        a, b = (np.maximum(np.einsum("nk,nk->k", r, A @ r), 0.0) for A in (self.K, self.M))
+        return a, b
+
+    def _probed(self, count: int) -> Array:
+        """(2) Return a of each mode from above, but for one in a thousand of them, (count,).
+
+        With y = omega² M x - K x it is yᵀ K⁻¹ y / omega². Of probes w with covariance K⁻¹ each (wᵀ y)² has that as its
+        mean, the sum of so many of them the distribution chi²: divided by the quantile that it hardly ever is below.
+        """
+        W = np.random.default_rng(0).standard_normal((self.tree.n, PROBES))
+        self.tree.spread_ordered(W)
+        X, omega2 = self.X[:, :count], self.omega2[:count, None]
+        y = omega2 * inner(X, self.M @ W)
+        y -= inner(X, self.K @ W)
+        return (y**2).sum(axis=1) / (2 * gammaincinv(PROBES / 2, RARE)) / omega2[:, 0]
 
     def into(self, Phi: Array, rows: IntArray) -> None:
         """Put the leading modes into these rows of Phi, (n_dof, k)."""
         for a in range(0, self.tree.n, SLICE):
             Phi[rows[a : a + SLICE]] = self.X[a : a + SLICE, : Phi.shape[1]]
-
-
-def groups(count: int) -> IntArray:
-    """Return the group of each mode, (count,): the highest stand alone, downwards groups of 2, 4, 8 ...
-
-    The lower a frequency, the smaller its error, so that more of them together may stand for each.
-    """
-    sizes: list[int] = []
-    while sum(sizes) < count:
-        sizes.append(min(2 ** (len(sizes) // SAME_SIZE), count - sum(sizes)))
-    return np.repeat(np.arange(len(sizes)), sizes)[::-1].copy()

@@ -10,13 +10,13 @@ from cms.errors import EigenError, ModeSetError
 from cms.solvers.eigen import EigenResult, counting_shift
 from cms.solvers.factorization import Factorization, factorize, require_regular
 from cms.solvers.mode_count import ModeCount
-from cms.solvers.orientation import orientation
+from cms.solvers.orientation import orientation, turn
 from cms.solvers.registry import solver_of
 from cms.solvers.shift_inverted import Wanted
-from cms.solvers.tall import combined
 from cms.substructures.dissection import Dissection, dissect, node_graph
 from cms.substructures.frequency_guess import guessed_omega2
 from cms.substructures.improvement import ApproximateModes
+from cms.substructures.reduced_mass import ReducedMass
 from cms.substructures.reduced_modes import reduced_modes, reduced_omega2
 from cms.substructures.tree import SubstructureTree, substructure_tree
 from fe_models.foundation.arrays import Array, IntArray, frozen
@@ -32,6 +32,11 @@ LEAF = 200  #: dofs of a part: larger ones cost more arithmetic, smaller ones mo
 GUARDS, GUARD_SHARE = 12, 0.08  #: modes beyond the wanted ones that take part: a number, and a share of these
 MOST_STEPS = 8  #: of inverse iteration
 SHARE = 8  #: interior dofs for each wanted mode, at least
+THIN, SOLID = (
+    20.0,
+    4.0,
+)  #: cutoff factors: modes of a surface grow with the first power of frequency, of a solid the third
+TOO_HIGH = 1.5  #: that the estimated highest frequency is too high at least, as a rule
 MARGIN = 1.1  #: of a cutoff: reduced frequencies lie above the true ones
 
 
@@ -79,7 +84,7 @@ def multilevel_modes(
     wanted: ModeCount,
     *,
     tolerance: float = 1e-3,
-    cutoff_factor: float = 3.0,
+    cutoff_factor: float | None = None,
     tasks: TaskMap | None = None,
     rows: tuple[int, IntArray] | None = None,
     solver: Solver | None = None,
@@ -87,11 +92,12 @@ def multilevel_modes(
     """Lowest vibration modes by automated multilevel substructuring.
 
     (1) nested dissection: parts of some hundred dofs, and separators
-    (2) bound: `cutoff_factor` times the cutoff; of a number of modes, times an estimate of its highest frequency
+    (2) bound: `cutoff_factor` times the cutoff; of a number of modes, times an estimate of its highest frequency, which
+        is `TOO_HIGH` times too high as a rule
     (3) every substructure is reduced to its own modes up to the bound, and eliminated from those above it
     (4) of a number of modes: its highest frequency again, by the reduced pencil up to the estimate; a lower bound
     (5) the reduced pencil: its lowest modes, expanded down the tree
-    (6) steps of inverse iteration by the tree, until the error that is left is below the tolerance
+    (6) where the error that is left is above the tolerance: steps of inverse iteration by the tree
 
     Frequencies are those of a Rayleigh-Ritz basis: never below the true ones.
 
@@ -105,7 +111,7 @@ def multilevel_modes(
     tolerance
         Largest relative error of a frequency. What stays above it after some steps is told, not raised.
     cutoff_factor
-        Larger: more modes of substructures, fewer steps (6).
+        Larger: more modes of substructures, fewer steps (6). None: 20 for shells and beams, 4 for solids.
     tasks
         Where subtrees are eliminated; None: in threads of this process.
     rows
@@ -135,7 +141,8 @@ def multilevel_modes(
                 "take craig-bampton"
             )
         highest = guessed_omega2(dissection, interior.K, interior.M, int(wanted.n or 0))
-    bound = cutoff_factor**2 * highest
+    factor = _factor(interior) if cutoff_factor is None else cutoff_factor
+    bound = factor**2 * highest / (TOO_HIGH**2 if wanted.n is not None else 1.0)
     tree = substructure_tree(dissection, K, M, bound, multipliers=multipliers, tasks=tasks)  # (3)
     require_regular(interior.K, Factorization(tree, solver_of(solver)))  # pivots of rounding are positive too
     with one_blas_thread():
@@ -143,12 +150,12 @@ def multilevel_modes(
         if wanted.n is not None:
             if wanted.n > len(own):
                 raise EigenError(
-                    f"multilevel: {wanted.words}, but the substructures have {len(own)} modes up to {cutoff_factor:g} "
+                    f"multilevel: {wanted.words}, but the substructures have {len(own)} modes up to {factor:g} "
                     "times the estimated frequency; choose a larger cutoff_factor, or fewer modes"
                 )
-            bound = min(bound, cutoff_factor**2 * _highest(own, mass, highest, wanted.n))  # (4)
-        kept = np.flatnonzero(own <= bound)
-        reduced, Z_kept = _reduced(own[kept], mass[kept][:, kept], wanted, highest)  # (5)
+            bound = min(bound, factor**2 * _highest(own, mass, highest, wanted.n))  # (4)
+        kept = own <= bound
+        reduced, Z_kept = _reduced(own[kept], mass.of(kept), wanted, highest)  # (5)
         p, count = len(reduced), wanted.n if wanted.n is not None else int((reduced <= MARGIN**2 * highest).sum())
         Z = np.zeros((len(own), p))
         Z[kept] = Z_kept
@@ -156,7 +163,7 @@ def multilevel_modes(
         del Z, Z_kept, mass
         errors, n_steps = _improved(modes, count, tolerance, highest if wanted.cutoff is not None else 0.0)  # (6)
     k = count if wanted.n is not None else int((modes.omega2 <= highest).sum())
-    if wanted.n is None and k == p < len(kept):
+    if wanted.n is None and k == p < kept.sum():
         raise EigenError(
             f"multilevel: {wanted.words}: all {p} modes that take part came to lie below it, so that others may be "
             "missing; choose a larger cutoff_factor"
@@ -165,7 +172,7 @@ def multilevel_modes(
     if (worst := errors > tolerance).any():
         log.warning(
             "multilevel: %d of %d frequencies may be more than %g too high after %d steps, first mode %d (%.1e); raise "
-            "cutoff_factor (%g)", worst.sum(), k, tolerance, n_steps, np.argmax(worst) + 1, errors.max(), cutoff_factor,
+            "cutoff_factor (%g)", worst.sum(), k, tolerance, n_steps, np.argmax(worst) + 1, errors.max(), factor,
         )  # fmt: skip
     if wanted.verify:
         _require_all(interior, modes.omega2, k, wanted, solver)
@@ -176,25 +183,31 @@ def multilevel_modes(
     modes.X = np.empty((0, 0))
     if k:
         with one_blas_thread():
-            Phi = combined(Phi, orientation(Phi, omega2))
+            turn(Phi, orientation(Phi, omega2))
     method = (
-        f"multilevel substructures: {dissection.n} in a tree, {len(kept)} modes up to {cutoff_factor:g} times the "
+        f"multilevel substructures: {dissection.n} in a tree, {kept.sum()} modes up to {factor:g} times the "
         f"highest wanted frequency, {n_steps} steps of inverse iteration"
     )
     found = EigenResult(
         omega2, np.sqrt(omega2) / (2 * np.pi), Phi, modes.residuals[:k], modes.n_solves, method, is_proven=wanted.verify
     )
-    return MultilevelResult(found, errors, n_steps, len(kept), cutoff_factor, tree)
+    return MultilevelResult(found, errors, n_steps, int(kept.sum()), factor, tree)
 
 
-def _highest(own: Array, mass: sp.csc_array, guess: float, count: int) -> float:
+def _factor(interior: Interior) -> float:
+    """Return the cutoff factor of shells and beams, whose nodes have rotations, or of solids."""
+    n_nodes = len(np.unique(interior.nodes))
+    return THIN if len(interior.nodes) > 4.5 * n_nodes else SOLID
+
+
+def _highest(own: Array, mass: ReducedMass, guess: float, count: int) -> float:
     """(4) Return omega² of the highest of `count` modes, somewhat too high, by modes of substructures below a guess."""
     most = max(guess, np.partition(own, count - 1)[count - 1]) if count else guess
-    kept = np.flatnonzero(own <= most)
-    return float(reduced_omega2(own[kept], mass[kept][:, kept], count)) if count else guess
+    kept = own <= most
+    return float(reduced_omega2(own[kept], mass.of(kept), count)) if count else guess
 
 
-def _reduced(own: Array, mass: sp.csc_array, wanted: ModeCount, highest: float) -> tuple[Array, Array]:
+def _reduced(own: Array, mass: ReducedMass, wanted: ModeCount, highest: float) -> tuple[Array, Array]:
     """(5) Return omega² of the wanted modes of the reduced pencil and of guards beyond them, and the modes."""
     n = len(own)
     if wanted.n is not None:
@@ -217,14 +230,13 @@ def _improved(modes: ApproximateModes, count: int, tolerance: float, highest: fl
 
     The wanted ones: at least `count`, and all that came to lie below omega² = `highest`.
     """
-    errors, n_steps = np.zeros(0), 0
-    while n_steps < (MOST_STEPS if count else 0):
+    count = max(count, int((modes.omega2 <= highest).sum()))
+    errors, n_steps = modes.errors(count) if count else np.zeros(0), 0
+    while n_steps < MOST_STEPS and not (errors <= tolerance).all():
         n_steps += 1
         modes.improve()
         count = max(count, int((modes.omega2 <= highest).sum()))
         errors = modes.errors(count)
-        if (errors <= tolerance).all():
-            break
     return errors, n_steps
 
 

@@ -7,12 +7,16 @@ import scipy.sparse as sp
 from cms.solvers.eigen import eigenmodes
 from cms.solvers.factorization import Inertia
 from cms.solvers.registry import solver_of
+from cms.substructures.reduced_mass import ReducedMass
 from fe_models.foundation.arrays import Array
 
 __all__ = ["reduced_modes", "reduced_omega2"]
 
+START = 5  #: modes of substructures for each wanted one in the pencil that the search begins with
 DENSE = 3000  #: modes of substructures up to which dense matrices are fast and small
 TOLERANCE = 1e-4  #: residual of the iteration, far below what the substructures leave out
+SETTLED = 1e-3  #: relative change of omega² in a step after which the next ones change less than a tenth of that
+MOST_STEPS = 20
 
 
 class Diagonal:
@@ -30,15 +34,42 @@ class Diagonal:
         return b / self.d[:, None]
 
 
-def reduced_modes(omega2: Array, M: sp.csc_array, count: int) -> tuple[Array, Array]:
+def reduced_modes(omega2: Array, M: ReducedMass, count: int) -> tuple[Array, Array]:
     """Return the lowest `count` eigenvalues, ascending, and M-orthonormal vectors, (n, count).
 
-    Dense: with D = diag(omega²), the largest theta of D^-½ M D^-½ are 1 / omega² of the modes.
+    (1) the pencil of the lowest modes of substructures, some for each wanted mode
+    (2) subspace iteration with all of them: Y = D⁻¹ M Z of D = diag(omega²), H = Yᵀ D Y, G = Yᵀ M Y,
+        H c = lam G c, Z <- Y C, until no lam changes any more
     """
+    n = len(omega2)
+    few = min(n, max(START * count, DENSE // 2))
+    if 2 * few >= n:
+        return _at_once(omega2, M, count)
+    is_low = omega2 <= np.partition(omega2, few - 1)[few - 1]
+    lam, Z_low = _at_once(omega2[is_low], M.of(is_low), count)  # (1)
+    Z = np.zeros((n, count))
+    Z[is_low] = Z_low
+    M_Z = M @ Z
+    for _ in range(MOST_STEPS):  # (2)
+        before = lam
+        Y = M_Z / omega2[:, None]
+        H = Y.T @ M_Z
+        M_Y = M @ Y
+        scale = 1 / np.sqrt(np.diag(H))
+        lam, C = la.eigh(H * np.outer(scale, scale), (Y.T @ M_Y) * np.outer(scale, scale))
+        C *= scale[:, None]
+        Z, M_Z = Y @ C, M_Y @ C
+        if (before - lam <= SETTLED * lam).all():
+            break
+    return lam, Z
+
+
+def _at_once(omega2: Array, M: ReducedMass, count: int) -> tuple[Array, Array]:
+    """Dense: with D = diag(omega²), the largest theta of D^-½ M D^-½ are 1 / omega² of the modes."""
     n = len(omega2)
     if n > DENSE and 3 * count < n:
         found = eigenmodes(
-            sp.csc_array(sp.diags_array(omega2)), M, count, factorization=Diagonal(omega2), tolerance=TOLERANCE
+            sp.csc_array(sp.diags_array(omega2)), M.tocsc(), count, factorization=Diagonal(omega2), tolerance=TOLERANCE
         )
         return np.array(found.omega2), np.array(found.Phi)
     A, scale = _scaled(omega2, M)
@@ -47,7 +78,7 @@ def reduced_modes(omega2: Array, M: sp.csc_array, count: int) -> tuple[Array, Ar
     return 1 / theta, scale[:, None] * Z / np.sqrt(theta)
 
 
-def reduced_omega2(omega2: Array, M: sp.csc_array, k: int) -> float:
+def reduced_omega2(omega2: Array, M: ReducedMass, k: int) -> float:
     """Return the k-th lowest eigenvalue, k from 1; dense."""
     n = len(omega2)
     A, _ = _scaled(omega2, M)
@@ -55,7 +86,7 @@ def reduced_omega2(omega2: Array, M: sp.csc_array, k: int) -> float:
     return float(1 / theta[0])
 
 
-def _scaled(omega2: Array, M: sp.csc_array) -> tuple[Array, Array]:
+def _scaled(omega2: Array, M: ReducedMass) -> tuple[Array, Array]:
     """Return D^-½ M D^-½ and the diagonal of D^-½."""
     scale = 1 / np.sqrt(omega2)
     return scale[:, None] * M.toarray() * scale, scale

@@ -1,21 +1,21 @@
 """The tree of eliminated substructures: solves by all of it, and the motions that its modes span."""
 
-from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
 
+from cms.substructures.by_columns import by_columns
 from cms.substructures.dissection import Dissection
 from cms.substructures.elimination import Part, Reduced, Remainder, Substructure, eliminate_part
+from cms.substructures.reduced_mass import ReducedMass
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.tasks.task_map import Progress, TaskMap
 from fe_models.foundation.threads import bounded_threads, n_threads
 
 __all__ = ["SubstructureTree", "substructure_tree"]
 
-COLUMNS = 64  #: that go through the whole tree at once in one thread
 BLOCK = 256  #: columns that are put into the order of elimination at once
 PARTS = 16  #: tasks are no larger than the body over so many for each processor
 
@@ -58,20 +58,10 @@ class SubstructureTree:
         """Of the modes of all substructures in their order, (n_modes,) [1/s²]: the reduced stiffness, a diagonal."""
         return np.concatenate([each.omega2 for each in self.substructures])
 
-    def mass(self) -> sp.csc_array:
-        """Return the reduced mass, (n_modes, n_modes): 1 on the diagonal, blocks of each with all below it."""
-        first = self.dissection.first_of_subtrees()
-        rows, columns, values = [], [], []
-        for t, each in enumerate(self.substructures):
-            below, own = self.mode_starts[first[t]], self.mode_starts[t]
-            k, m = each.coupling.shape
-            rows.append(np.repeat(np.arange(below, below + k), m))
-            columns.append(np.tile(np.arange(own, own + m), k))
-            values.append(each.coupling.ravel())
-        n = int(self.mode_starts[-1])
-        entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-        upper = sp.csc_array(sp.coo_array(entries, shape=(n, n)))
-        return sp.csc_array(upper + upper.T + sp.eye_array(n))
+    def mass(self) -> ReducedMass:
+        """Return the reduced mass."""
+        firsts = self.mode_starts[self.dissection.first_of_subtrees()]
+        return ReducedMass(self.mode_starts, firsts, [each.coupling for each in self.substructures])
 
     def expand(self, Z: Array) -> Array:
         """Return the motion of all dofs in the order of elimination, (n, k), for amplitudes of the modes, (n_modes, k).
@@ -90,7 +80,7 @@ class SubstructureTree:
                 if len(each.boundary):
                     own += each.Psi @ u[each.boundary]
 
-        _by_columns(Z.shape[1], part)
+        by_columns(Z.shape[1], part)
         return X
 
     def solve(self, b: Array) -> Array:
@@ -132,7 +122,24 @@ class SubstructureTree:
             if u is not b:
                 b[:, columns] = u
 
-        _by_columns(b.shape[1], part)
+        by_columns(b.shape[1], part)
+
+    def spread_ordered(self, Xi: Array) -> None:
+        """Put W Xi into Xi, (n, k) in C order, rows in the order of elimination, of some W with W Wᵀ = K⁻¹.
+
+        From the root down: u_s = L_s⁻ᵀ xi_s + Psi u_b. With multipliers W Wᵀ f = K⁻¹ f in the motions, f without any.
+        """
+
+        def part(columns: slice) -> None:
+            u = np.ascontiguousarray(Xi[:, columns])
+            for each in reversed(self.substructures):
+                own = u[each.start : each.stop]
+                each.spread_own(own)
+                if len(each.boundary):
+                    own += each.Psi @ u[each.boundary]
+            Xi[:, columns] = u
+
+        by_columns(Xi.shape[1], part)
 
 
 def substructure_tree(
@@ -245,12 +252,3 @@ def _columns(A: sp.csc_array, first: int, last: int) -> sp.csc_array:
     entries = slice(A.indptr[first], A.indptr[last])
     indptr = A.indptr[first : last + 1] - A.indptr[first]
     return sp.csc_array((A.data[entries], A.indices[entries], indptr), shape=(A.shape[0], last - first))
-
-
-def _by_columns(k: int, work: Callable[[slice], None]) -> None:
-    """Call with slices of k columns, in threads."""
-    n = n_threads()
-    width = max(1, min(COLUMNS, -(-k // n)))
-    slices = [slice(a, min(a + width, k)) for a in range(0, k, width)]
-    with bounded_threads(1), ThreadPoolExecutor(n) as pool:
-        list(pool.map(work, slices))

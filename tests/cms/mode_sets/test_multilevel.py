@@ -62,11 +62,13 @@ def test_the_estimated_error_is_no_less_than_the_true_one(modes, direct):
     assert estimated[-N:].max() < 4 * relative_errors(modes, direct).max()
 
 
-@pytest.mark.parametrize("times", [1.0, 4.0])
+@pytest.mark.parametrize("times", [2.5, 4.0])
 def test_a_guess_that_is_too_high_keeps_no_more_modes_of_substructures(shell, direct, monkeypatch, times):
     guessed = modes_module.guessed_omega2
     monkeypatch.setattr(modes_module, "guessed_omega2", lambda *of: times * guessed(*of))
-    kept = int(cms.multilevel(shell, n_modes=N).options["eigensolver"].split(" in a tree, ")[1].split()[0])
+    kept = int(
+        cms.multilevel(shell, n_modes=N, cutoff_factor=3.0).options["eigensolver"].split(" in a tree, ")[1].split()[0]
+    )
     highest = (2 * np.pi * direct.frequencies[np.isfinite(direct.frequencies)][N - 1]) ** 2
     interior = interior_of(shell)
     dissection = interior.dissection(modes_module.LEAF)
@@ -94,8 +96,14 @@ def test_modes_are_orthonormal_and_vanish_on_the_boundary(shell, modes):
     assert_allclose(Phi.T @ (shell.K @ Phi), np.diag(omega2), rtol=0, atol=1e-8 * omega2.max())
 
 
+def test_many_modes_of_substructures_need_no_step(shell, direct):
+    modes = cms.multilevel(shell, n_modes=N)
+    assert "0 steps" in modes.options["eigensolver"]
+    assert 1e-6 < relative_errors(modes, direct).max() < 1e-3
+
+
 def test_a_tighter_tolerance_takes_more_steps_and_is_met(shell, direct):
-    modes = cms.multilevel(shell, n_modes=N, tolerance=1e-6)
+    modes = cms.multilevel(shell, n_modes=N, tolerance=1e-6, cutoff_factor=3.0)
     assert "1 steps" not in modes.options["eigensolver"]
     assert np.abs(relative_errors(modes, direct)).max() < 1e-6
 

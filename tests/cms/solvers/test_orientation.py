@@ -2,7 +2,7 @@ import numpy as np
 from numpy.testing import assert_allclose
 from scipy.stats import ortho_group
 
-from cms.solvers.orientation import orientation
+from cms.solvers.orientation import orientation, turn
 
 
 def test_any_rotation_of_a_multiple_mode_gives_the_same_basis():
@@ -26,3 +26,12 @@ def test_orientation_is_orthogonal_and_mixes_only_equal_frequencies():
 def test_largest_entry_of_a_single_mode_is_positive():
     Phi = np.array([[0.1], [-3.0], [2.0]])
     assert_allclose(Phi @ orientation(Phi, np.array([1.0])), -Phi, rtol=0, atol=0)
+
+
+def test_turning_in_place_is_the_product():
+    rng = np.random.default_rng(3)
+    Phi = rng.normal(size=(20, 6))
+    Z = orientation(Phi, np.array([1.0, 2.0, 2.0, 2.0, 5.0, 5.0]))
+    product = Phi @ Z
+    turn(Phi, Z)
+    assert_allclose(Phi, product, rtol=0, atol=1e-14)

@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
 import scipy.linalg as la
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
+from scipy.special import gammaincinv
 
-from cms.substructures.improvement import ApproximateModes, groups
+from cms.substructures.improvement import ApproximateModes
 from cms.substructures.modes import Interior
 from cms.substructures.tree import substructure_tree
 from fe_models.body.couplings import couple
@@ -71,12 +72,24 @@ def test_a_step_takes_off_what_lies_far_above(pencil):
     assert_allclose(modes.X.T @ pencil[2] @ modes.X, np.eye(COUNT + 3), rtol=0, atol=1e-10)
 
 
-@pytest.mark.parametrize("count", [0, 1, 16, 17, 300])
-def test_the_highest_modes_stand_alone_and_no_group_is_smaller_than_one_above(count):
-    of_mode = groups(count)
-    assert len(of_mode) == count
-    sizes = np.bincount(of_mode)
-    assert (np.diff(of_mode) <= 0).all()
-    assert (sizes[:16] == 1).all()
-    assert (np.diff(sizes)[: len(sizes) - 2] >= 0).all()
-    assert_array_equal(np.unique(of_mode), np.arange(len(sizes)))
+def test_probes_find_residuals_from_above_and_not_far_above(pencil, monkeypatch):
+    """The same residuals one by one; those of neighbours point the same way here, so that their sums cancel."""
+    modes = spoiled(pencil, 1e-4)
+    exact = modes.errors(COUNT)
+    monkeypatch.setattr("cms.substructures.improvement.PROBES", 5)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("cms.substructures.improvement.RARE", 0.5)
+        middle = modes.errors(COUNT)
+    found = modes.errors(COUNT)
+    assert (found >= exact).all()
+    assert 0.2 < np.mean(middle / exact) < 5
+    factor = gammaincinv(2.5, 0.5) / gammaincinv(2.5, 1e-3)
+    assert_allclose(found / middle, factor, rtol=0.3)
+
+
+def test_the_spread_of_white_noise_has_the_flexibility_as_covariance(pencil):
+    tree, K, _, _ = pencil
+    W = np.eye(K.shape[0])
+    tree.spread_ordered(W)
+    flexibility = la.inv(K.toarray())
+    assert_allclose(W @ W.T, flexibility, rtol=0, atol=1e-10 * np.abs(flexibility).max())

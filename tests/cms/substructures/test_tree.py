@@ -108,6 +108,14 @@ def test_multipliers_of_distributing_interfaces_stay_in_the_root():
     x = tree.solve(b)
     assert_allclose(interior.K @ x, b, rtol=0, atol=1e-7 * np.abs(b).max())
     assert tree.n_negative == 12
+    W = np.eye(len(i))
+    tree.spread_ordered(W)
+    b[is_multiplier[dissection.order]] = 0.0
+    spread = (W @ (W.T @ b))[~is_multiplier[dissection.order]]
+    unordered = np.empty_like(b)
+    unordered[dissection.order] = b
+    expected = tree.solve(unordered)[dissection.order][~is_multiplier[dissection.order]]
+    assert_allclose(spread, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
 
 
 def test_a_singular_stiffness_is_refused(pencil):

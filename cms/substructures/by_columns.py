@@ -1,0 +1,19 @@
+"""Work on columns beside each other, in threads."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+from fe_models.foundation.threads import bounded_threads, n_threads
+
+__all__ = ["by_columns"]
+
+COLUMNS = 64  #: at once in one thread, at most
+
+
+def by_columns(k: int, work: Callable[[slice], None]) -> None:
+    """Call with slices of k columns, in threads with one thread of BLAS in each."""
+    n = n_threads()
+    width = max(1, min(COLUMNS, -(-k // n)))
+    slices = [slice(a, min(a + width, k)) for a in range(0, k, width)]
+    with bounded_threads(1), ThreadPoolExecutor(n) as pool:
+        list(pool.map(work, slices))
