@@ -338,9 +338,24 @@ def acceleration_sizes(model: Model) -> dict[str, int]:
     }
 
 
+KEPT = 4  # sizes of as many models
+kept: list[tuple[Model, dict[str, int]]] = []
+
+
+def kept_sizes_of(model: Model) -> dict[str, int]:
+    """Return `sizes_of` a model that is used again and again, from what is kept; models keep their sizes."""
+    for known, sizes in kept:
+        if known is model:
+            return sizes
+    sizes = sizes_of(model)
+    kept.insert(0, (model, sizes))
+    del kept[KEPT:]
+    return sizes
+
+
 def new_work(model: Model, n_past: int = 0) -> Work:
     """Return working arrays for a compiled system, with room for the memories after n_past steps of a call."""
-    sizes = sizes_of(model)
+    sizes = kept_sizes_of(model)
     remembered = max(sizes["n_u"], sizes["n_w"])
     work = zeros(Work(), sizes | {"n_past": n_past, "n_remembered": remembered})
     work.markers.psi[:] = model.markers.psi

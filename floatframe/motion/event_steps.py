@@ -44,6 +44,7 @@ from floatframe.results.sensors import sensor_of
 from floatframe.results.trajectory import Trajectory
 from floatframe.results.writer import arrays_of
 from floatframe.start.impact import impact
+from floatframe.start.initial import consistent_motion
 from floatframe.state import State
 from floatframe.system import System
 
@@ -53,6 +54,7 @@ BLOCK = 400  #: most steps between which what is watched is not measured; blocks
 STANDS = 1e-9  #: change of what is watched in a step, relative to its level or 1, below which it is held or at rest
 MOST_NUMBERS = 2**23  #: in the results of a block
 SHUT = 1e-6  #: of the length of the system, or rad: what a coupler may close that takes hold of a value
+MOST_MADE = 8  #: systems that are kept to switch to
 MOST_IN_A_STEP = 100  #: events in one step; more mean that events switch each other without end
 
 
@@ -103,6 +105,8 @@ class EventWatch:
     full: System  #: with all forces
     head: Head
     system: System = field(init=False)  #: with some off
+    #: systems by what is off and what is held: a stop that is struck again and again needs no new ones
+    made: dict[tuple, System] = field(init=False, default_factory=dict)
     events: tuple[Event, ...] = field(init=False)  #: those of the system, then those of its stops
     off: frozenset[str] = field(init=False)  #: forces at zero, couplers not engaged, elements that do nothing
     caught: dict[str, float] = field(default_factory=dict)  #: what couplers that have been engaged hold
@@ -135,7 +139,13 @@ class EventWatch:
         self.caught = {name: value for name, value in self.caught.items() if name not in off}
         limits = {coupler.name: coupler.limits for coupler in self.full.couplers}
         stops = {name: float(getattr(limits[name], side)) for name, side in self.resting.items()}
-        self.system = switched(self.full, off, self.caught | stops)
+        held = self.caught | stops
+        key = off, tuple(sorted(held.items()))
+        if key not in self.made:
+            if len(self.made) >= MOST_MADE:
+                self.made.clear()
+            self.made[key] = switched(self.full, off, held)
+        self.system = self.made[key]
 
     def begin(self, row: Rows) -> None:
         """Take the results at the time from which steps go on."""
@@ -363,7 +373,7 @@ class EventWatch:
                     reached[i] = level
             self.values, self.row = reached, row
             if isinstance(event, StopEvent):
-                state = self.strike(integrator, carry, event, t, h)
+                state = self.strike(carry, event, t, h)
             else:
                 self.add(event, t)
                 if event.record and not event.stop:
@@ -448,7 +458,7 @@ class EventWatch:
         self.happened[-1]["impulse"] = impulse
         return hit.state
 
-    def strike(self, integrator: Integrator, carry: Carry, event: StopEvent, t: float, h: float) -> State:
+    def strike(self, carry: Carry, event: StopEvent, t: float, h: float) -> State:
         """Meet a limit, or leave it; return the state of the engine with the velocities after it."""
         self.add(event, t)
         happened = self.happened[-1]
@@ -465,7 +475,7 @@ class EventWatch:
         hit = impact(holding, carry.state, t=t, known=carry.w, restitution={})
         speed = float(hit.rate[core]) * float(np.abs(factors).max())  # rows of couplers have a largest coefficient of 1
         told = state_of_file(compiled_system(self.full), hit.state)
-        pressed = INWARD[event.side] * float(integrator.start(self.system, t, told, before=carry).w[core])
+        pressed = INWARD[event.side] * float(consistent_motion(self.system, told, t=t, known=carry.w).w[core])
         thrown = 2 * limits.restitution * abs(float(hit.impulse[core]))  # pressed by this for the time of the flight
         happened["speed before"], happened["speed after"] = speed, 0.0
         if pressed > 0.0 and thrown <= pressed * h:
