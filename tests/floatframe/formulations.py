@@ -60,8 +60,6 @@ EXCEPTIONS: dict[str, str] = {
         KINDS + "agree to 1e-8 there, to 6e-6 here",
     "joints/test_sliding.py::test_energy_is_kept_while_the_block_slides_on_a_beam_that_bends[True-True]":
         "half the step leaves at most 0.35 of the drift of energy there, 0.43 here",
-    "motion/test_events.py::test_blocks_of_steps_change_neither_the_motion_nor_its_events[method0]":
-        "compares bit for bit over blocks of steps: times of events differ by up to 1e-9 here",
     "motion/test_restart.py::test_killed_run_is_readable_and_can_be_resumed[2]": BESIDE,
     "motion/test_stops.py::test_a_latch_between_free_flexible_bodies_keeps_momentum_and_loses_what_carnot_says":
         "linear momentum is kept to 1e-8 there, to 1.3e-7 here",
