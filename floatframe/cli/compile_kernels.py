@@ -53,7 +53,8 @@ def make_cholesky() -> None:
     line = sp.diags_array([-1.0, 2.1, -1.0], offsets=[-1, 0, 1], shape=(12, 12))
     lower = sp.csc_array(sp.tril(sp.kronsum(sp.kronsum(line, line), line)))
     factor = CholeskyFactor(lower)
-    factor.solve(np.ones((lower.shape[0], 1)))
+    for columns in (1, 16):
+        factor.solve(np.ones((lower.shape[0], columns)))
     factor.close()
 
 
