@@ -3,10 +3,12 @@
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from cms.solvers.eigen import eigenmodes
 from cms.solvers.factorization import Inertia
 from cms.solvers.registry import solver_of
+from cms.solvers.tall import combine, inner
 from cms.substructures.reduced_mass import ReducedMass
 from fe_models.foundation.arrays import Array
 
@@ -15,7 +17,9 @@ __all__ = ["reduced_modes", "reduced_omega2"]
 START = 5  #: modes of substructures for each wanted one in the pencil that the search begins with
 DENSE = 3000  #: modes of substructures up to which dense matrices are fast and small
 TOLERANCE = 1e-4  #: residual of the iteration, far below what the substructures leave out
-SETTLED = 1e-3  #: relative change of omega² in a step after which the next ones change less than a tenth of that
+WIDER = 4  #: times as many modes of substructures in the next pencil
+SETTLED = 5e-5  #: relative error of omega² that the iteration may leave
+LAG = 4.0  #: times so much is left after a step as modes far above alone would leave
 MOST_STEPS = 20
 
 
@@ -38,28 +42,44 @@ def reduced_modes(omega2: Array, M: ReducedMass, count: int) -> tuple[Array, Arr
     """Return the lowest `count` eigenvalues, ascending, and M-orthonormal vectors, (n, count).
 
     (1) the pencil of the lowest modes of substructures, some for each wanted mode
-    (2) subspace iteration with all of them: Y = D⁻¹ M Z of D = diag(omega²), H = Yᵀ D Y, G = Yᵀ M Y,
-        H c = lam G c, Z <- Y C, until no lam changes any more
+    (2) four times as many, and so on, at last all: subspace iteration that begins with the vectors found before
     """
     n = len(omega2)
     few = min(n, max(START * count, DENSE // 2))
     if 2 * few >= n:
         return _at_once(omega2, M, count)
-    is_low = omega2 <= np.partition(omega2, few - 1)[few - 1]
-    lam, Z_low = _at_once(omega2[is_low], M.of(is_low), count)  # (1)
-    Z = np.zeros((n, count))
-    Z[is_low] = Z_low
+    is_in = _lowest(omega2, few)
+    lam, Z = _at_once(omega2[is_in], M.of(is_in), count)  # (1)
+    while not is_in.all():  # (2)
+        few *= WIDER
+        before, is_in = is_in, _lowest(omega2, few) if 2 * few < n else np.ones(n, dtype=bool)
+        begin = np.zeros((int(is_in.sum()), count))
+        begin[before[is_in]] = Z
+        lam, Z = _iterated(omega2[is_in], M.of(is_in), lam, begin, float(omega2[is_in & ~before].min()))
+    return lam, Z
+
+
+def _lowest(omega2: Array, few: int) -> NDArray[np.bool_]:
+    return omega2 <= np.partition(omega2, few - 1)[few - 1]
+
+
+def _iterated(omega2: Array, M: ReducedMass, lam: Array, Z: Array, cut: float) -> tuple[Array, Array]:
+    """(2) Subspace iteration: Y = D⁻¹ M Z of D = diag(omega²), H = Yᵀ D Y, G = Yᵀ M Y, H c = lam G c, Z <- Y C.
+
+    What the modes lack lies along those from the cut on: a step leaves about (lam / cut)² of their error. It ends where
+    that part of what the last step took off is small.
+    """
     M_Z = M @ Z
-    for _ in range(MOST_STEPS):  # (2)
+    for _ in range(MOST_STEPS):
         before = lam
         Y = M_Z / omega2[:, None]
-        H = Y.T @ M_Z
-        M_Y = M @ Y
+        H, M_Y = inner(Y, M_Z), M @ Y
         scale = 1 / np.sqrt(np.diag(H))
-        lam, C = la.eigh(H * np.outer(scale, scale), (Y.T @ M_Y) * np.outer(scale, scale))
+        lam, C = la.eigh(H * np.outer(scale, scale), inner(Y, M_Y) * np.outer(scale, scale))
         C *= scale[:, None]
-        Z, M_Z = Y @ C, M_Y @ C
-        if (before - lam <= SETTLED * lam).all():
+        Z, M_Z = combine(Y, C), combine(M_Y, C)
+        left = (before / lam - 1) * np.minimum(LAG * (lam / cut) ** 2, 0.5)
+        if (left <= SETTLED).all():
             break
     return lam, Z
 

@@ -72,6 +72,25 @@ def test_with_all_modes_of_all_substructures_nothing_is_left_out(pencil):
     assert_allclose(found, exact, rtol=1e-8)
 
 
+def test_the_pencil_in_stages_gives_the_modes_of_the_whole_one(pencil, monkeypatch):
+    dissection, K, M = pencil
+    exact = la.eigvalsh(K.toarray(), M.toarray())
+    tree = substructure_tree(dissection, K, M, 1e3 * exact[-1], multipliers=NONE)
+    mass = tree.mass()
+    Z = np.random.default_rng(0).standard_normal((mass.n, 3))
+    assert_allclose(mass @ Z, mass.toarray() @ Z, rtol=0, atol=1e-12)
+    assert_array_equal(mass.toarray(), mass.tocsc().toarray())
+    is_kept = np.arange(mass.n) % 3 > 0
+    assert_array_equal(mass.of(is_kept).toarray(), mass.toarray()[np.ix_(is_kept, is_kept)])
+    monkeypatch.setattr("cms.substructures.reduced_modes.DENSE", 2)
+    monkeypatch.setattr("cms.substructures.reduced_modes.START", 2)
+    found, Z = reduced_modes(tree.omega2, mass, 5)
+    assert mass.n > 8 * 2 * 5  # two stages and more
+    assert (found >= exact[:5] * (1 - 1e-12)).all()
+    assert 1e-12 < (found / exact[:5] - 1).max() < 5e-5  # SETTLED
+    assert_allclose(Z.T @ (mass @ Z), np.eye(5), rtol=0, atol=1e-10)
+
+
 def test_the_tree_solves_as_a_factorisation_does(interior, pencil):
     dissection, K, M = pencil
     tree = substructure_tree(dissection, K, M, 1.0, multipliers=NONE)
