@@ -11,6 +11,7 @@ from cms.sparse_cholesky.analysis import Fronts, analyse, inverse
 from cms.sparse_cholesky.blocks import blocks_of, for_each
 from cms.sparse_cholesky.panels import Panels, PanelsInFile, PanelsInMemory
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.ranks.trim import give_back
 from fe_models.foundation.threads import n_threads, one_blas_thread
 
 __all__ = ["CholeskyFactor"]
@@ -97,6 +98,7 @@ class CholeskyFactor:
 
         with one_blas_thread():
             for_each(blocks, factorise, n_threads(), blocks.turns(on_disk=on_disk))
+        give_back()
 
     def solve(self, b: Array) -> Array:
         """Return A⁻¹ b for b (n, k), any order; the result is in Fortran order."""
