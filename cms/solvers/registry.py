@@ -6,16 +6,19 @@ Another one is a line of `SOLVERS`: its name, what makes a factor (`MakeFactor` 
 
 from functools import partial
 
+import scipy.sparse as sp
+
 from cms.errors import FactorizationError
 from cms.solvers.cholesky import cholesky_or_superlu
 from cms.solvers.pardiso import PardisoFactor, missing_pardiso
 from cms.solvers.petsc.factor import PetscFactor
 from cms.solvers.petsc.libraries import missing_petsc
 from cms.solvers.superlu import SuperLuFactor
-from fe_models.foundation.solver import Solver
+from cms.sparse_cholesky.factor import CholeskyFactor
+from fe_models.foundation.solver import Factor, Solver
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["SOLVERS", "solver_of"]
+__all__ = ["DEFAULTS", "SOLVERS", "solver_of"]
 
 ON_DISK = partial(PetscFactor, on_disk=True)
 WITH_MATRIX = partial(PetscFactor, keeps_matrix=True)
@@ -30,11 +33,22 @@ SOLVERS = {
         Solver("petsc-disk", ON_DISK, missing_petsc, ON_DISK),
     )
 }
-DEFAULTS = ("pardiso", "cholesky")  #: the first that is installed, where none is asked for
+LARGE = 150_000  #: rows from which our Cholesky factor, whose solves are faster, makes up for its compilation
+
+
+def pardiso_or_cholesky(lower: sp.csc_array, *, definite: bool) -> Factor:
+    """Return the factor of PARDISO; our Cholesky factor of a large matrix that is meant to be positive definite."""
+    if definite and lower.shape[0] >= LARGE:
+        return CholeskyFactor(lower)
+    return SOLVERS["pardiso"].factor(lower, definite=definite)
+
+
+#: where none is asked for, the first that is installed
+DEFAULTS = (Solver("pardiso", pardiso_or_cholesky, lambda: SOLVERS["pardiso"].missing()), SOLVERS["cholesky"])
 
 
 def solver_of(choice: str | Solver | None = None) -> Solver:
-    """Return the solver of a name, or one given as such; None: the fastest one that is installed.
+    """Return the solver of a name, or one given as such; None: the fastest of those installed, by size.
 
     Raises
     ------
@@ -44,7 +58,7 @@ def solver_of(choice: str | Solver | None = None) -> Solver:
     if isinstance(choice, Solver):
         return choice
     if choice is None:
-        return next(SOLVERS[name] for name in DEFAULTS if not SOLVERS[name].missing())
+        return next(solver for solver in DEFAULTS if not solver.missing())
     if choice not in SOLVERS:
         raise FactorizationError(f"unknown solver {quoted(choice)}{nearest(str(choice), SOLVERS)}")
     solver = SOLVERS[choice]

@@ -7,6 +7,7 @@ from typer.testing import CliRunner
 import cms
 from cms.cli.app import app
 from cms.errors import FactorizationError
+from cms.solvers import registry
 from cms.solvers.eigen import eigenmodes
 from cms.solvers.factorization import factorize
 from cms.solvers.mode_count import ModeCount
@@ -54,8 +55,21 @@ def test_the_fastest_that_is_installed_is_the_default(monkeypatch):
     assert solver_of().name == "cholesky"
 
 
+def test_large_definite_matrices_go_to_our_cholesky_factorisation(monkeypatch):
+    if mkl_runtime() is None:
+        pytest.skip("no MKL here: all go there")
+    A = clamped_bar()
+    with factorize(A) as small:
+        assert small.description.startswith("PARDISO")
+    monkeypatch.setattr(registry, "LARGE", A.shape[0])
+    with factorize(A) as large, factorize(A, definite=False) as indefinite, factorize(A, solver="pardiso") as asked:
+        assert large.description.startswith("Cholesky by")
+        assert indefinite.description.startswith("PARDISO")
+        assert asked.description.startswith("PARDISO")
+
+
 def test_defaults_are_registered_under_their_names():
-    assert set(DEFAULTS) <= set(SOLVERS)
+    assert {solver.name for solver in DEFAULTS} <= set(SOLVERS)
     assert all(solver.name == name for name, solver in SOLVERS.items())
 
 
