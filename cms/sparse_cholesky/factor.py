@@ -101,21 +101,22 @@ class CholeskyFactor:
         give_back()
 
     def solve(self, b: Array) -> Array:
-        """Return A⁻¹ b for b (n, k), any order; the result is in Fortran order."""
+        """Return A⁻¹ b for b (n, k), any order; up to 16 columns come by rows, more in Fortran order."""
+        if b.shape[1] <= WIDTHS[-1]:
+            return self._substituted(b)
         x = np.empty(b.shape, order="F")
-        start = 0
-        while start < b.shape[1]:
-            width = WIDTHS[-1] if b.shape[1] - start > WIDTHS[0] else WIDTHS[0]
-            some = slice(start, min(start + width, b.shape[1]))
-            self._substitute(np.asfortranarray(b[:, some]), x[:, some], width)
-            start += width
+        for start in range(0, b.shape[1], WIDTHS[-1]):
+            some = slice(start, start + WIDTHS[-1])
+            x[:, some] = self._substituted(b[:, some])
         return x
 
-    def _substitute(self, b: Array, x: Array, width: int) -> None:
-        """Put the solutions for b, (n, k) with k <= width, into x, both in Fortran order."""
+    def _substituted(self, b: Array) -> Array:
+        """Return the solutions for b, (n, k) with k <= 16, by rows."""
         from cms.sparse_cholesky import solve_kernels
         from cms.sparse_cholesky.tiles import LANES, ROWS
 
+        b, x = np.ascontiguousarray(b), np.empty(b.shape)
+        width = next(each for each in WIDTHS if each >= b.shape[1])
         tree, blocks, order = self._blocks.tree, self._blocks, self._fronts.order
         parts = (0.0,) * (width // LANES)
         Y = np.empty((self.n, width))
@@ -144,6 +145,7 @@ class CholeskyFactor:
 
         for_each(blocks, eliminate, n_threads(), blocks.by_distance)
         for_each(blocks, substitute, n_threads(), blocks.by_height, downwards=True)
+        return x
 
     def close(self) -> None:
         """Free the factor; a second time does nothing."""

@@ -24,7 +24,7 @@ jit = njit(cache=True, nogil=True, error_model="numpy")
 
 @jit
 def begin_rows(tree, f, parts, order, b, own, below):
-    """Take right-hand sides of the columns of a front from b, (n, k) in Fortran order; nothing below yet."""
+    """Take right-hand sides of the columns of a front from b, (n, k) by rows; nothing below yet."""
     width = LANES * len(parts)
     lo, w, u = tree.first[f], tree.first[f + 1] - tree.first[f], tree.begin[f + 1] - tree.begin[f]
     own[: -(-w // ROWS) * ROWS * width] = 0.0
@@ -110,7 +110,7 @@ def eliminate_fronts(tree, lo, hi, parts, order, b, panels, own, stack, Y):
 def substitute_back(tree, lo, hi, parts, order, panels, own, eight, Y, x):
     """Solve Lᵀ x = y for fronts lo to hi, the last one first; y in Y, (n, width), which x overwrites.
 
-    x: (n, k) in Fortran order, in the order of the matrix;
+    x: (n, k) by rows, in the order of the matrix;
     own, eight: workspaces, rows of the largest front and eight rows.
     """
     width = LANES * len(parts)

@@ -46,7 +46,7 @@ class Factor(Protocol):
         """Solver, its version and settings, in words for the provenance."""
 
     def solve(self, b: Array) -> Array:
-        """Return A⁻¹ b for b (n, k), any order; the result is in Fortran order."""
+        """Return A⁻¹ b for b (n, k), any order; that of the result is the solver's."""
 
     def close(self) -> None:
         """Free the factor; a second time does nothing."""

@@ -7,7 +7,7 @@ At a state x0 forces f0 are out of balance, and rows g0 open. The equilibria of
 lead from x0 at p = 0 to that of the system at p = 1. Each is found by Newton's method from the one before; p takes
 longer steps while that is quick, and half as long ones where it is not found. (Newton homotopy, [1]_.)
 
-.. [1] Allgower, Georg, "Numerical Continuation Methods", Springer 1990, §11.
+.. [1] Allgower & Georg 1990.
 """
 
 from collections.abc import Callable
