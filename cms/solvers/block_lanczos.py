@@ -45,7 +45,7 @@ class BlockLanczos:
     (6) thick restart when the basis is full: V <- V X of the leading Ritz pairs, whose residuals all lie in V_{j+1}
 
     Full reorthogonalisation leaves no spurious copies to sort out; one pass is enough because (2) has taken off all
-    that is not rounding. Blocks lie in Fortran order, the basis by rows: solver and products read them as they are.
+    that is not rounding. Blocks lie as the solver gives them, the basis column by column.
     """
 
     def __init__(

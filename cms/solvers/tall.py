@@ -20,7 +20,7 @@ from fe_models.foundation.threads import n_threads
 if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
 
-__all__ = ["combine", "combined", "inner", "ordered", "squares", "subtract"]
+__all__ = ["combine", "combined", "inner", "ordered", "put", "squares", "subtract"]
 
 SMALL = 20_000  #: rows below which threads cost more than they bring
 SLICE = 8192  #: rows at a time; what is made of them on the way stays in the cache
@@ -95,13 +95,18 @@ def ordered(X: Array, order: Literal["C", "F"]) -> Array:
     if _order(X) == order:
         return X
     result = np.empty(X.shape, order=order)
+    put(X, result)
+    return result
+
+
+def put(X: Array, target: Array) -> None:
+    """Copy X, (n, k), into an array of its shape in any order."""
 
     def copy(rows: slice) -> None:
         for part in _slices(rows, X):
-            result[part] = X[part]
+            target[part] = X[part]
 
     _by_rows(len(X), copy)
-    return result
 
 
 def _order(X: Array) -> Literal["C", "F"]:

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 
 from cms.solvers.inverse import Inverse
 from cms.solvers.sparse_product import SymmetricProduct
-from cms.solvers.tall import combine, inner, ordered, subtract
+from cms.solvers.tall import combine, inner, put, subtract
 from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["ArraySpace", "TallBasis", "TallProduct", "TallSpace"]
@@ -74,11 +74,11 @@ class TallSpace(Protocol):
         """Return the product with a symmetric matrix, (n, n)."""
 
     def solver(self, factorization: Inverse) -> Callable[[Any], Any]:
-        """Return what solves for columns by a factorisation, in Fortran order."""
+        """Return what solves for columns by a factorisation."""
 
 
 class ArrayBasis:
-    """The basis by rows: solver and products read blocks of it as they are."""
+    """The basis, column by column."""
 
     def __init__(self, n: int, capacity: int) -> None:
         self.rows, self.capacity = np.empty((capacity, n)), capacity
@@ -89,7 +89,7 @@ class ArrayBasis:
 
     def put(self, first: int, X: Array) -> None:
         """Write columns, from this one on."""
-        self.rows[first : first + X.shape[1]] = X.T
+        put(X, self.columns(first, first + X.shape[1]))
 
     def turn(self, m: int, C: Array) -> None:
         """Replace the first k columns by V C of the first m."""
@@ -145,8 +145,8 @@ class ArraySpace:
         return SymmetricProduct(A)
 
     def solver(self, factorization: Inverse) -> Callable[[Array], Array]:
-        """Return what solves for columns by a factorisation, in Fortran order."""
-        return lambda b: ordered(factorization.solve(b), "F")
+        """Return what solves for columns by a factorisation, in the order of the factor."""
+        return factorization.solve
 
 
 def dealt(X: Array, numbering: IntArray | None) -> Array:
