@@ -33,7 +33,11 @@ class Master:
             instanceName=name,
         )  # fmt: skip
         fmu.instantiate(loggingOn=True)
-        self.begin(fmu, **start)
+        try:
+            self.begin(fmu, **start)
+        except FMICallException:
+            fmu.freeInstance()  # else its library is left to the end of the process, after that of Python
+            raise
         return fmu
 
     def begin(self, fmu, **start):
