@@ -6,6 +6,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
+from fe_models.foundation.tasks.interrupts import heeded_interrupts
 from fe_models.foundation.words import nearest, quoted
 from floatframe.cosimulation.foreign_slave import ForeignSlave
 from floatframe.cosimulation.held_inputs import input_choices
@@ -94,7 +95,9 @@ def co_simulate(
         writer = None if place is None else ResultsWriter(place, head)
         run = Run(unit.system, integrator, head, 0.0, t_end, H / per_step, n_total, output_every, writer)
         run.keep(unit.row)
+        raise_if_interrupted = held.enter_context(heeded_interrupts())
         for k in range(n_macro):
+            raise_if_interrupted()
             try:
                 master.step(k * H, H)
             except (CosimulationError, ConvergenceError) as error:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.digest import file_digest
+from fe_models.foundation.tasks.interrupts import heeded_interrupts
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.checked_values import number
 from floatframe.compiling.callbacks import raise_errors_of
@@ -158,7 +159,8 @@ def integrate(
         run = Run(system, integrator, head, t_start, t_end, step, n_total, output_every, writer, events=watch)
         run.keep(rows)
         run.close_segment(run.record(carry, 0))
-        return run.advance(carry, 0, batch_steps, progress)
+        raise_if_interrupted = held.enter_context(heeded_interrupts())
+        return run.advance(carry, 0, batch_steps, progress, raise_if_interrupted)
 
 
 def require_no_units(system: System) -> None:
@@ -240,7 +242,8 @@ def resume(
             seconds_before=float(record.get("seconds", 0.0)),
             events=watch,
         )  # fmt: skip
-        return again.advance(carry, n_done, BATCH_STEPS, progress)
+        with heeded_interrupts() as raise_if_interrupted:
+            return again.advance(carry, n_done, BATCH_STEPS, progress, raise_if_interrupted)
 
 
 @dataclass
@@ -325,7 +328,12 @@ class Run:
             self.writer.close_segment(record)
 
     def advance(
-        self, carry: Carry, n_done: int, batch_steps: int, progress: Callable[[Progress], None] | None
+        self,
+        carry: Carry,
+        n_done: int,
+        batch_steps: int,
+        progress: Callable[[Progress], None] | None,
+        raise_if_interrupted: Callable[[], None],
     ) -> Trajectory:
         """Take the steps that are left, in batches that end where a run can go on; return the motion."""
         begun = self.system if self.events is None else self.events.system
@@ -338,6 +346,7 @@ class Run:
         failure, has_stopped = None, False
         try:
             while n_done < self.n_total and failure is None and not has_stopped:
+                raise_if_interrupted()
                 if n_done % RESTART_STEPS == 0:
                     work.solver.c_k[...] = 0.0  # factors are made anew, as after a resumption
                     if n_done and time.monotonic() - self.closed > SEGMENT_SECONDS:

@@ -117,6 +117,25 @@ def test_a_callback_that_raises_leaves_the_closed_results_and_the_old_file(tmp_p
     assert len(read_results(path).t) == 101  # found in the place of the missing file
 
 
+class Interrupting:
+    """Is interrupted while it is freed, where Python drops what is raised."""
+
+    def __del__(self):
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_an_interrupt_while_something_is_freed_ends_the_run():
+    reached = []
+
+    def free(progress):
+        reached.append(progress.n_steps)
+        Interrupting()
+
+    with pytest.raises(KeyboardInterrupt):
+        integrate(SYSTEM, METHOD, 0.1, 1e-3, progress=free, batch_steps=10)
+    assert reached == [10]
+
+
 KILLED = """
 import sys
 from floatframe.motion import integration
