@@ -12,7 +12,6 @@ from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.body.nearby import nearby_order
 from fe_models.body.submatrix import PrincipalBlock, principal_block
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.ranks.ranks import started_ranks
 from fe_models.foundation.solver import Solver
 from fe_models.foundation.words import node_list
 
@@ -83,8 +82,7 @@ def fix_interfaces(
     K_ii = PrincipalBlock(body.K, i)
     is_definite = not (body.dofs[:, 1] == MULTIPLIER).any()
     try:
-        # of many ranks the one that has the whole body holds as little beside it as it can
-        factorization = factorize(K_ii if started_ranks() > 1 else K_ii.cut(), definite=is_definite, solver=chosen)
+        factorization = factorize(K_ii, definite=is_definite, solver=chosen)
     except FactorizationError as error:
         raise BodyError(_mechanism_message(body, i, K_ii.cut(), principal_block(body.M, i), chosen)) from error
     return FixedInterfaceBody(body, i, b, factorization)

@@ -8,12 +8,10 @@ from cms.errors import EigenError
 from cms.families.fixed_interface import FixedInterfaceBody
 from cms.families.flexibility import Flexibility
 from cms.solvers.eigen import EigenResult, counting_shift, eigenmodes
-from cms.solvers.factorization import Matrix
 from cms.solvers.mode_count import ModeCount
 from cms.solvers.shift_inverted import Wanted
 from fe_models.body.submatrix import PrincipalBlock
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.ranks.ranks import started_ranks
 
 __all__ = ["elastic_modes", "fixed_interface_modes", "no_modes"]
 
@@ -22,12 +20,9 @@ def fixed_interface_modes(fixed: FixedInterfaceBody, wanted: ModeCount) -> Eigen
     """Vibration modes with all boundary dofs held: K_II phi = omega² M_II phi, phi over all dofs (n_dof, k)."""
     if not len(fixed.i):  # every dof is one of an interface
         return no_modes(fixed.body.n_dof)
-    if started_ranks() > 1:  # the search has rows of M on all ranks, and of K takes a few products
-        matrices: tuple[Matrix, Matrix] = PrincipalBlock(fixed.body.K, fixed.i), PrincipalBlock(fixed.body.M, fixed.i)
-    else:
-        matrices = fixed.K_ii, fixed.M_ii
+    blocks = PrincipalBlock(fixed.body.K, fixed.i), PrincipalBlock(fixed.body.M, fixed.i)
     numbering = np.searchsorted(np.sort(fixed.i), fixed.i)
-    modes = eigenmodes(*matrices, wanted, factorization=fixed.factorization, numbering=numbering)
+    modes = eigenmodes(*blocks, wanted, factorization=fixed.factorization, numbering=numbering)
     Phi = np.zeros((fixed.body.n_dof, modes.Phi.shape[1]))
     Phi[fixed.i] = modes.Phi
     return replace(modes, Phi=Phi)

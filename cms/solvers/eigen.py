@@ -110,8 +110,7 @@ def eigenmodes(
     FactorizationError
         If K - shift M is singular.
     """
-    if not isinstance(K, PrincipalBlock) or not isinstance(M, PrincipalBlock):
-        K, M = (A if isinstance(A, SpreadMatrix) else matrix_of(A) for A in (K, M))
+    K, M = (A if isinstance(A, PrincipalBlock | SpreadMatrix) else matrix_of(A) for A in (K, M))
     n = K.shape[0]
     if K.shape != (n, n) or M.shape != (n, n):
         raise EigenError(f"eigenmodes: expected K and M of one square shape, got {K.shape} and {M.shape}")
