@@ -100,7 +100,7 @@ class Factorization:
         return Inertia(factor.n_negative, factor.n_perturbed, factor.n_positive)
 
     def solve(self, b: Array) -> Array:
-        """Return A⁻¹ b for one column (n,) or many (n, k); many come in Fortran order, chunks bound the workspace."""
+        """Return A⁻¹ b for one column (n,) or many (n, k); these come in the order of the factor."""
         if not self._factor.is_open:
             raise FactorizationError("solve: the factorisation was closed; factorise again")
         b = np.asarray(b, dtype=np.float64)
@@ -123,7 +123,8 @@ def factorize(A: Matrix, *, definite: bool = True, solver: str | Solver | None =
     """Factorise a symmetric sparse matrix.
 
     (1) lower triangle, every diagonal entry stored
-    (2) factor by the solver asked for; PARDISO where it exists, our Cholesky factorisation elsewhere
+    (2) factor by the solver asked for; else by PARDISO, and by our Cholesky factorisation where there is none, or
+        for large definite matrices
     (3) proof by two solves from a fixed random column: an (almost) singular matrix is refused
 
     Parameters

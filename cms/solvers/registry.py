@@ -43,8 +43,13 @@ def pardiso_or_cholesky(lower: sp.csc_array, *, definite: bool) -> Factor:
     return SOLVERS["pardiso"].factor(lower, definite=definite)
 
 
+def missing_default() -> str:
+    """Say what PARDISO lacks here."""
+    return SOLVERS["pardiso"].missing()
+
+
 #: where none is asked for, the first that is installed
-DEFAULTS = (Solver("pardiso", pardiso_or_cholesky, lambda: SOLVERS["pardiso"].missing()), SOLVERS["cholesky"])
+DEFAULTS = (Solver("pardiso", pardiso_or_cholesky, missing_default), SOLVERS["cholesky"])
 
 
 def solver_of(choice: str | Solver | None = None) -> Solver:

@@ -205,10 +205,24 @@ def for_each(
                 change.notify_all()
 
     threads = [threading.Thread(target=worker) for _ in range(min(n_threads, n) - 1)]
-    for thread in threads:
-        thread.start()
-    worker()
-    for thread in threads:
-        thread.join()
+    started: list[threading.Thread] = []
+    try:
+        for thread in threads:
+            thread.start()
+            started.append(thread)
+        worker()
+        for thread in started:
+            thread.join()
+    except BaseException as error:  # an interrupt while this thread waits: the others end after their tasks
+        with change:
+            failures.append(error)
+            change.notify_all()
+        for thread in started:
+            thread.join()
     if failures:
-        raise failures[0]
+        first = failures[0]
+        failures.clear()  # its traceback holds what the tasks held
+        try:
+            raise first
+        finally:
+            del first

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 
-from cms.errors import FactorizationError
+from cms.errors import FactorizationError, FactorRoomError
 from cms.sparse_cholesky.analysis import Fronts, analyse, inverse
 from cms.sparse_cholesky.blocks import blocks_of, for_each
 from cms.sparse_cholesky.panels import Panels, PanelsInFile, PanelsInMemory
@@ -46,7 +46,10 @@ class CholeskyFactor:
         if not definite:
             raise FactorizationError("cholesky: expected a positive definite matrix; take superlu for others")
         self.n = lower.shape[0]
-        self._fronts = analyse(lower) if fronts is None else fronts
+        try:
+            self._fronts = analyse(lower) if fronts is None else fronts
+        except MemoryError as error:
+            raise FactorRoomError(f"cholesky: not enough memory for the analysis; n = {self.n}") from error
         self.n_factor_entries = self._fronts.n_entries
         self.n_negative = self.n_perturbed = 0
         self.n_positive = self.n
@@ -55,6 +58,11 @@ class CholeskyFactor:
         self.is_open = True
         try:
             self._factorise(lower, on_disk)
+        except MemoryError as error:
+            self.close()
+            raise FactorRoomError(
+                f"cholesky: not enough memory; n = {self.n}, {self.n_factor_entries} entries of the factor"
+            ) from error
         except BaseException:
             self.close()
             raise

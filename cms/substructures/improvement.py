@@ -60,7 +60,7 @@ class ApproximateModes:
         self.X = combined(self.X, Z / scale[:, None])
 
     def errors(self, count: int) -> Array:
-        """Return about how much too high each of the first frequencies is at most, relative, (count,).
+        """Return an estimate of how much too high each of the first frequencies is, relative, (count,).
 
         (1) r = x - omega² K⁻¹ M x,  a = |r|²_K / omega²,  b = |r|²_M  of each mode, one solve for each
         (2) of many modes: a by random probes, from above; b / a by sums of neighbours, r_j / omega_j with random signs

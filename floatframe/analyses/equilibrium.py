@@ -20,7 +20,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.analyses.led_equilibrium import Balance, is_left_by_none, led_equilibrium
+from floatframe.analyses.led_equilibrium import LARGEST, Balance, is_left_by_none, led_equilibrium
 from floatframe.analyses.observed_state import observed_state
 from floatframe.analyses.relative.tree_flow import tree_flow
 from floatframe.analyses.system_matrices import held_rows, turning_matrices
@@ -332,11 +332,14 @@ def led_by_loads(
 ) -> tuple[State, Array] | None:
     """Return state and wrenches near an equilibrium to which loads lead that grow, None if there is no stable one."""
     model, resting = compiled.model, compiled.resting_model
+    if len(state.u) + len(w) > LARGEST:
+        return None
 
     def tangents(state: State, w: Array) -> tuple[Linearized, tuple[Array, ...], Array]:
         moving, u_dot = turning(compiled, state, omega, center)
         set_iterate(work, moving, u_dot, w)
         parts, K = _tangent(resting, work, omega)
+        raise_errors_of(compiled.callbacks)
         return parts, K, u_dot
 
     def balance(state: State, w: Array) -> Balance | None:

@@ -22,14 +22,14 @@ from fe_models.foundation.arrays import Array
 from floatframe.start.newton_equations import Linearized
 from floatframe.state import State
 
-__all__ = ["Balance", "is_left_by_none", "led_equilibrium"]
+__all__ = ["LARGEST", "Balance", "is_left_by_none", "led_equilibrium"]
 
 FIRST, LEAST = 0.25, 1e-3  #: steps of p
 QUICK, MOST = 4, 8  #: iterations of one p: after so few the next step is twice as long; after so many it is given up
 LONGEST = 0.3  #: rad, and part of the size of the system, in one iteration
 SETTLED = 1e-7  #: the same, of an iteration after which an equilibrium on the way is taken as found
 MOST_SOLVES = 600
-LARGEST = 4000  #: unknowns up to which it is looked whether the flow leaves an equilibrium
+LARGEST = 4000  #: unknowns up to which this is tried: whether the flow leaves an equilibrium takes dense eigenvalues
 LEAVING = 1e-9  #: of the fastest rate of the flow, below which one is rounding
 
 
@@ -96,17 +96,15 @@ def is_left_by_none(parts: Linearized, K: tuple[Array, ...], W: tuple[Array, ...
     """Whether the flow W dx/dtau = -f, with all joints closed, leads back to an equilibrium from all places near by.
 
     Loads that grow go along branches which the flow leaves, such as a beam that stays straight beyond its buckling. The
-    rates are the eigenvalues of [[K, -Jᵀ], [G, V]] over [[W, 0], [0, 0]]; one below zero leads away. False for systems
-    too large to look.
+    rates are the eigenvalues of [[K, -Jᵀ], [G, V]] over [[W, 0], [0, 0]]; one below zero leads away. It is for systems
+    of up to `LARGEST` unknowns.
     """
     n_u, n_w = parts.J.shape[1], parts.J.shape[0]
-    if n_u + n_w > LARGEST:
-        return False
     A = sp.block_array([[sp.block_diag(K), -parts.J.T], [parts.G, parts.V]]).toarray() if n_w else la.block_diag(*K)
     B = np.zeros_like(A)
     B[:n_u, :n_u] = la.block_diag(*W)
     try:  # the largest of 1/rate: 0 where joints hold, and one over a negative rate is negative
-        inverse = la.eigvals(la.solve(A, B)).real
-    except la.LinAlgError:
+        inverse = np.linalg.eigvals(np.linalg.solve(A, B)).real
+    except np.linalg.LinAlgError:  # singular, or no numbers
         return False
     return bool(inverse.min() >= -LEAVING * np.abs(inverse).max())

@@ -99,6 +99,7 @@ class DiscreteScheme:
             tolerance=self.tolerance, max_iterations=self.max_iterations, length=ds.length,
         )  # fmt: skip
         if outcome.status == NO_ACCELERATION:  # the memory has gone on to where there is none: the good steps again
+            work.past.n[...] = 0
             again = self.advance(system, carry, work, t0=t0, h=h, first=first, n_steps=outcome.n_steps, every=every)
             return *again[:3], explained(outcome, self.max_iterations)
         memory.h[...] = h

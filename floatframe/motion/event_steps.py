@@ -273,8 +273,10 @@ class EventWatch:
         for k in map(int, self.near_levels(values)):
             if not self.any_happens(values[k], values[k + 1]):
                 continue
-            if k > 0 and not keeps_past:
+            if n > 1 and not keeps_past:
                 self.due = first + k
+                if k == 0:
+                    return self.steps(integrator, begin, work, t0=t0, h=h, first=first, n_steps=1, every=every)
                 n_good, values = k, values[: k + 1]
                 carry, rows, _, failure = integrator.advance(
                     self.system, begin, work, t0=t0, h=h, first=first, n_steps=n_good, every=1
@@ -371,6 +373,9 @@ class EventWatch:
                 level = events[i].level_passed
                 if (reached[i] - level) * (self.values[i] - level) > 0.0:
                     reached[i] = level
+            for place in found:  # what acts at the same time has its turn after this one
+                if place.j != acting.j and events[place.j].is_active and place.part <= acting.part:
+                    reached[place.j] = self.values[place.j]
             self.values, self.row = reached, row
             if isinstance(event, StopEvent):
                 state = self.strike(carry, event, t, h)
@@ -529,6 +534,9 @@ class EventWatch:
                 if row is None:
                     _, row = integrator.observe(self.system, t + size, carry, work)
                 return Place(part, j, carry, row, None)
+            if part <= 0.0:  # at once, as after another event at this time
+                begun, row = integrator.observe(self.system, t, begin, work)
+                return Place(0.0, j, begun, row, None)
             if part not in tried:
                 work.solver.c_k[...] = 0.0  # without the factors of other places
                 carry, row, _, failure = integrator.advance(
@@ -539,8 +547,8 @@ class EventWatch:
 
         if event.at is not None:
             return at((event.at - t) / size)
-        begun, last = float(self.values[j]) - event.level, float(ended.values[j]) - event.level
-        sign = float(np.sign(last) or -np.sign(begun))
+        first, last = float(self.values[j]) - event.level, float(ended.values[j]) - event.level
+        sign = float(np.sign(last) or -np.sign(first))
 
         def beyond(part: float) -> float:
             place = at(part)
@@ -548,17 +556,17 @@ class EventWatch:
                 raise ModelError(f"event {event.name!r}: its time in the step from t = {t:g} was not found")
             return sign * (float(self.values_after(place.row)[j]) - event.level)
 
-        before, values = (0, np.array([begun, last])) if neighbours is None else neighbours
+        before, values = (0, np.array([first, last])) if neighbours is None else neighbours
         if neighbours is not None:
             values = values[:, j] - event.level
         guess = expected_passage([float(k - before) for k in range(len(values))], [sign * float(x) for x in values])
-        return at(passage(beyond, sign * begun, max(sign * last, 0.0), event.tolerance, guess))
+        return at(passage(beyond, sign * first, max(sign * last, 0.0), event.tolerance, guess))
 
     def record(self) -> dict[str, Array]:
         """Return what a run needs to go on."""
         words = json.dumps(
             {"off": sorted(self.off)}
-            | {name: getattr(self, name) for name in ("happened", "caught", "resting", "calm")}
+            | {name: getattr(self, name) for name in ("happened", "caught", "resting", "calm", "changed", "due")}
         )
         return {"event_values": self.values, "events": np.frombuffer(words.encode(), dtype=np.uint8)}
 
@@ -567,6 +575,7 @@ class EventWatch:
         data = json.loads(np.asarray(record["events"], dtype=np.uint8).tobytes().decode())
         self.caught, self.resting = data.get("caught", {}), data.get("resting", {})
         self.calm = data.get("calm", BLOCK)
+        self.changed, self.due = data.get("changed", 0), data.get("due", -1)
         self.switch(frozenset(data["off"]))
         self.happened = data["happened"]
         self.values = np.array(record["event_values"], dtype=float)

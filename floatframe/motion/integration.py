@@ -275,6 +275,10 @@ class Run:
         events = {} if self.events is None else self.events.record()
         return restart_record(carry, n_done) | {"seconds": np.array(self.seconds)} | events
 
+    def record_where_due(self, carry: Carry, n_done: int) -> dict[str, np.ndarray] | None:
+        """Return what is needed to go on from here, None where a run does not go on."""
+        return self.record(carry, n_done) if n_done % RESTART_STEPS == 0 else None
+
     def summary(self, carry: Carry) -> dict[str, Any]:
         """Return what the run took, and its events."""
         events = {} if self.events is None else {"events": self.events.happened}
@@ -344,6 +348,7 @@ class Run:
             self.events.begin(row)
         jumps = jumps_of_steps(self.system, self.t_start, self.h, self.n_total)
         failure, has_stopped = None, False
+        safe = self.record_where_due(carry, n_done)  # while a block runs its events are ahead of its memory
         try:
             while n_done < self.n_total and failure is None and not has_stopped:
                 raise_if_interrupted()
@@ -378,6 +383,7 @@ class Run:
                     rows = in_order([*self.events.taken(), rows])
                 self.keep(rows)
                 n_done += n_good
+                safe = self.record_where_due(carry, n_done)
                 if n_done == self.n_total or failure is not None or has_stopped:
                     self.look()
                 if progress is not None:
@@ -385,7 +391,7 @@ class Run:
                     counts = carry.n_iterations, self.watch.notes, carry.n_rejected
                     progress(Progress(t, self.t_end, n_done, self.n_total, *counts))
         except BaseException:
-            self.close_segment(self.record(carry, n_done) if n_done % RESTART_STEPS == 0 else None)
+            self.close_segment(safe)
             raise
         raise_errors_of(compiled_system(self.system).callbacks)
         if failure is not None:

@@ -1,7 +1,7 @@
 """Where in a step a value passes its level: a bracketed secant method from a place that is nearly right."""
 
 from collections.abc import Callable, Sequence
-from math import ceil, floor
+from math import ceil, floor, isfinite
 
 __all__ = ["MOST_NEIGHBOURS", "expected_passage", "passage"]
 
@@ -57,7 +57,8 @@ def passage(
         by a slope that two evaluations in a row agree on
     (3) the multiple after x - f/slope, within the bracket, is the next x; the slope is that of the last two places.
         Where the bracket has not shrunk to half in three evaluations, its middle is taken
-    So the place does not depend on the guess, which saves evaluations alone.
+    So the place does not depend on the guess, which saves evaluations alone, but for (2) where the slope changes within
+    a few tolerances.
 
     Parameters
     ----------
@@ -74,6 +75,8 @@ def passage(
         return 1.0
     most = ceil(1.0 / tolerance * (1.0 - EQUAL))
     low, high, at_high = 0, most, after
+    if not (isfinite(guess[0]) and isfinite(guess[1])):  # of values after the event, which may be no numbers
+        guess = before / (before - after), after - before
     x, slope = ceil(guess[0] / tolerance), guess[1]
     if not slope > 0.0:
         slope = after - before

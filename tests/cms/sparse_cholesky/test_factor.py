@@ -1,9 +1,12 @@
 """Our Cholesky factorisation against SuperLU, LAPACK and closed forms, in memory and on disk."""
 
+import _thread
 import os
 import signal
 import subprocess
 import sys
+import threading
+import time
 from itertools import pairwise
 
 import numpy as np
@@ -148,6 +151,23 @@ def test_what_fails_in_a_thread_is_raised():
         for_each(blocks, fail, 3, blocks.by_depth)
 
 
+def test_an_interrupt_ends_all_threads():
+    """It comes while a task of this thread or another runs; tasks that have begun end, no other begins."""
+    blocks, done = blocks_of(analyse(lower_triangle(grid(14)))), []
+
+    def task(k):
+        done.append(k)
+        if len(done) == 4:
+            _thread.interrupt_main()
+        time.sleep(0.02)
+
+    before = threading.active_count()
+    with pytest.raises(KeyboardInterrupt):
+        for_each(blocks, task, 3, blocks.by_depth)
+    assert threading.active_count() == before
+    assert len(done) < len(blocks)
+
+
 def test_dofs_of_a_node_are_one_vertex():
     A = lower_triangle(grid(4, dofs=3))
     _, _, weight, group = analysis.quotient(A)
@@ -228,3 +248,12 @@ def test_nothing_is_left_on_disk_by_a_process_that_was_killed(tmp_path):
     child.wait()
     child.stdout.close()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_no_memory_is_told_as_by_other_solvers(monkeypatch):
+    def without(*_):
+        raise MemoryError
+
+    monkeypatch.setattr(CholeskyFactor, "_factorise", without)
+    with pytest.raises(FactorRoomError, match=r"cholesky: not enough memory; n = 64, \d+ entries"):
+        CholeskyFactor(lower_triangle(grid(4)))

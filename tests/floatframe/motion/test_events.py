@@ -32,6 +32,7 @@ from floatframe import (
     resume,
     trapezoidal,
 )
+from floatframe.integrators.relative_ode import RelativeOde
 from floatframe.motion.event_steps import EventWatch
 from floatframe.results.sensors import PlaceSensor
 from tests.floatframe.motion import test_restart
@@ -281,6 +282,32 @@ def test_what_happens_at_the_end_of_a_step_happens_there(formulation, watch, mon
     assert_array_equal(*(motion.source.read("u") for motion in motions))
     late = np.maximum(motions[0].t - 0.4, 0.0)
     assert_allclose(motions[0].body("wheel").omega_B[:, 2], 5.0 + 3.0 * late, rtol=0, atol=1e-8)
+
+
+def turned_wheel(*events):
+    """Return a wheel of 3 kg m² on a hinge, at rest, turned by two torques of 3 N m."""
+    wheel = RigidBody("wheel", 1.0, np.diag([1.0, 2.0, 3.0]))
+    hinge = RevoluteJoint("hinge", Marker(GROUND), Marker("wheel"), axis=(0, 0, 1))
+    torques = [JointForce(name, "hinge", "angle", preload=3.0) for name in ("f", "g")]
+    return System([wheel], [hinge], torques, events=events)
+
+
+@pytest.mark.parametrize("at", [0.01, 0.5])
+@pytest.mark.parametrize("method", [GeneralizedAlpha(), RelativeOde()])
+def test_an_event_where_a_step_ends_switches_there_by_every_method(method, at):
+    motion = integrate(turned_wheel(Event("off", at=at, switch_off=("f", "g"))), method, 1.0, 0.01)
+    assert_allclose(motion.source.read("u")[-1, 5], 2.0 * at, rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("watch", "speed"), [({"at": 0.505}, 1.01), ({"watch": "hinge.angle", "level": 0.2}, np.sqrt(0.8))]
+)
+@pytest.mark.parametrize("method", [GeneralizedAlpha(), RelativeOde()])
+def test_two_events_that_switch_at_one_time_both_happen(method, watch, speed):
+    events = [Event(f"{name} off", **watch, switch_off=(name,)) for name in ("f", "g")]
+    motion = integrate(turned_wheel(*events), method, 1.0, 0.01)
+    assert [event["name"] for event in motion.head.summary["events"]] == ["f off", "g off"]
+    assert_allclose(motion.source.read("u")[-1, 5], speed, rtol=1e-6)
 
 
 def test_a_record_and_a_stop_at_one_level_happen_once_each():
