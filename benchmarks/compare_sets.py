@@ -16,11 +16,11 @@ import resource
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 
-OUT = Path(__file__).parent / "out"
+from benchmarks.rods import rod_file
+
 SIZE = 2.56  # element size [mm]
 N_MODES = 50
 SETS = ("craig-bampton", "craig-bampton-ir", "herting", "rubin", "craig-chang", "benfield-hruda")
@@ -29,13 +29,8 @@ SETS = ("craig-bampton", "craig-bampton-ir", "herting", "rubin", "craig-chang", 
 def coupled_rod(size):
     import cms
     import fe_models
-    from fe_models.parts import mesh_connecting_rod
 
-    path = OUT / f"rod_{size}mm.msh"
-    if not path.is_file():
-        OUT.mkdir(exist_ok=True)
-        mesh_connecting_rod(size=size, path=path)
-    mesh = fe_models.read_mesh(path)
+    mesh = fe_models.read_mesh(rod_file(f"{size}mm", size))
     steel = fe_models.Material("steel", E=210e3, nu=0.3, rho=7.85e-9)
     ends = [fe_models.rigid_interface(mesh, name, fe_models.FaceGroup(name)) for name in ("big_end", "small_end")]
     return cms.couple(fe_models.solid_body(mesh, steel, name="rod", units=cms.unit_system("mm-t-s"), interfaces=ends))

@@ -13,19 +13,14 @@ import sys
 import time
 from pathlib import Path
 
-OUT = Path(__file__).parent / "out"
+from benchmarks.rods import rod_file
+
 SIZES = {"small": 5.0, "large": 2.5}  #: element size [mm]
 NAMES = ("pardiso", "cholesky", "cholesky on disk", "superlu", "superlu, minimum degree")
 
 
 def mesh_file(size):
-    from fe_models.parts import mesh_connecting_rod
-
-    path = OUT / f"rod_fallback_{size}.msh"
-    if not path.is_file():
-        OUT.mkdir(exist_ok=True)
-        mesh_connecting_rod(size=SIZES[size], path=path)
-    return path
+    return rod_file(f"fallback_{size}", SIZES[size])
 
 
 def one(name, path):

@@ -13,10 +13,10 @@ Seconds of the wall and of the processor, the second also fair on a machine that
 import sys
 import time
 from dataclasses import replace
-from pathlib import Path
+
+from benchmarks.rods import OUT, rod_file
 
 SIZES = {"0.1": 3.0, "0.5": 1.62}  # million dofs -> element size [mm]
-OUT = Path(__file__).parent / "out"
 N_MODES = 50
 
 
@@ -27,12 +27,8 @@ def measured(million):
     from cms.reduced_basis.frames import TisserandFrame, frame_condition
     from cms.second_order.geometric_reduction import reduced_geometric_stiffness, stiffness_of_states
     from cms.second_order.unit_states import states_of
-    from fe_models.parts import mesh_connecting_rod
 
-    path = OUT / f"rod_{million}.msh"
-    if not path.is_file():
-        OUT.mkdir(exist_ok=True)
-        mesh_connecting_rod(size=SIZES[million], path=path)
+    path = rod_file(million, SIZES[million])
     warm_up()
     clock = Clock()
     mesh = fe_models.read_mesh(path)

@@ -18,19 +18,14 @@ from pathlib import Path
 
 import numpy as np
 
-OUT = Path(__file__).parent / "out"
+from benchmarks.rods import OUT, rod_file
+
 SIZES = {"0.1": 3.0, "0.25": 2.05, "0.5": 1.62, "1.0": 1.24}  # million dofs -> element size [mm]
 N_MODES = 50
 
 
 def mesh_file(million):
-    from fe_models.parts import mesh_connecting_rod
-
-    path = OUT / f"rod_{million}.msh"
-    if not path.is_file():
-        OUT.mkdir(exist_ok=True)
-        mesh_connecting_rod(size=SIZES[million], path=path)
-    return path
+    return rod_file(million, SIZES[million])
 
 
 def solid(path, ranks=None):

@@ -19,7 +19,8 @@ import tempfile
 import threading
 from pathlib import Path
 
-OUT = Path(__file__).parent / "out"
+from benchmarks.rods import OUT, rod_file
+
 RODS = {"50k": 3.76, "160k": 2.44, "300k": 1.91, "475k": 1.62}  #: element size [mm]
 AMPLE = "22GB"  #: a budget that keeps all in core
 EVERY = 0.002  #: s between two looks at the resident size
@@ -27,13 +28,7 @@ EVERY = 0.002  #: s between two looks at the resident size
 
 def mesh_file(name):
     """Return the mesh of a rod, made once."""
-    from fe_models.parts import mesh_connecting_rod
-
-    path = OUT / f"rod_{name}.msh"
-    if not path.is_file():
-        OUT.mkdir(exist_ok=True)
-        mesh_connecting_rod(size=RODS[name], path=path)
-    return path
+    return rod_file(name, RODS[name])
 
 
 def job_file(name, folder):
@@ -106,6 +101,7 @@ def run(job, budget, folder):
 
 def measured(name, budget=AMPLE, threads=1):
     """Return the record of a reduction in a process of its own, its peak among it."""
+    OUT.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory(dir=OUT) as folder, tempfile.TemporaryFile("w+", dir=OUT) as output:
         job = job_file(name, folder)
         arguments = [sys.executable, "-m", "benchmarks.memory_forecast", "run", str(job), budget, folder]

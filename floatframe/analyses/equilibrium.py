@@ -335,15 +335,15 @@ def led_by_loads(
     if len(state.u) + len(w) > LARGEST:
         return None
 
-    def tangents(state: State, w: Array) -> tuple[Linearized, tuple[Array, ...], Array]:
+    def tangents(state: State, w: Array) -> tuple[Linearized, tuple[Array, ...]]:
         moving, u_dot = turning(compiled, state, omega, center)
         set_iterate(work, moving, u_dot, w)
         parts, K = _tangent(resting, work, omega)
         raise_errors_of(compiled.callbacks)
-        return parts, K, u_dot
+        return parts, K
 
     def balance(state: State, w: Array) -> Balance | None:
-        parts, K, _ = tangents(state, w)
+        parts, K = tangents(state, w)
         forces, gaps = work.bodies.residual.copy(), work.connections.g.copy()
         if not (np.isfinite(forces).all() and np.isfinite(gaps).all()):
             return None
@@ -362,7 +362,7 @@ def led_by_loads(
     )
     if led is None:
         return None
-    parts, K, _ = tangents(*led)
+    parts, K = tangents(*led)
     W = with_modal_weight(model, linearized(resting, work, 1.0, 0.0, 0.0).H)
     return led if is_left_by_none(parts, K, W) else None
 
