@@ -1,7 +1,9 @@
 """Fixed-interface modes of a large body by multilevel substructures (docs/theory.md §2)."""
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy.sparse as sp
@@ -38,6 +40,7 @@ THIN, SOLID = (
 )  #: cutoff factors: modes of a surface grow with the first power of frequency, of a solid the third
 TOO_HIGH = 1.5  #: that the estimated highest frequency is too high at least, as a rule
 MARGIN = 1.1  #: of a cutoff: reduced frequencies lie above the true ones
+RAISE, MOST_RAISES = 2.0, 3  #: of the bound, as a frequency, where it leaves too few modes of substructures
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +97,10 @@ def multilevel_modes(
     (1) nested dissection: parts of some hundred dofs, and separators
     (2) bound: `cutoff_factor` times the cutoff; of a number of modes, times an estimate of its highest frequency, which
         is `TOO_HIGH` times too high as a rule
-    (3) every substructure is reduced to its own modes up to the bound, and eliminated from those above it
-    (4) of a number of modes: its highest frequency again, by the reduced pencil up to the estimate; a lower bound
+    (3) every substructure is reduced to its own modes up to the bound, and eliminated from those above it; once more
+        with a higher bound where they are fewer than a number of modes and its guards
+    (4) of a number of modes: its highest frequency again, by the reduced pencil up to the estimate; a lower bound, but
+        none that leaves fewer modes than these
     (5) the reduced pencil: its lowest modes, expanded down the tree
     (6) where the error that is left is above the tolerance: steps of inverse iteration by the tree
 
@@ -142,8 +147,10 @@ def multilevel_modes(
             )
         highest = guessed_omega2(dissection, interior.K, interior.M, int(wanted.n or 0))
     factor = _factor(interior) if cutoff_factor is None else cutoff_factor
-    bound = factor**2 * highest / (TOO_HIGH**2 if wanted.n is not None else 1.0)
-    tree = substructure_tree(dissection, K, M, bound, multipliers=multipliers, tasks=tasks)  # (3)
+    bound = factor**2 * highest if wanted.n is None else max((factor / TOO_HIGH) ** 2, 1.0) * highest
+    least = wanted.n + _guards(wanted.n) if wanted.n else 0
+    make = partial(substructure_tree, dissection, K, M, multipliers=multipliers, tasks=tasks)
+    tree, bound = _tree_of(make, bound, least)  # (3)
     require_regular(interior.K, Factorization(tree, solver_of(solver)))  # pivots of rounding are positive too
     with one_blas_thread():
         own, mass = tree.omega2, tree.mass()
@@ -154,6 +161,7 @@ def multilevel_modes(
                     "times the estimated frequency; choose a larger cutoff_factor, or fewer modes"
                 )
             bound = min(bound, factor**2 * _highest(own, mass, highest, wanted.n))  # (4)
+            bound = max(bound, _smallest(own, min(least, len(own))))
         kept = own <= bound
         reduced, Z_kept = _reduced(own[kept], mass.of(kept), wanted, highest)  # (5)
         p, count = len(reduced), wanted.n if wanted.n is not None else int((reduced <= MARGIN**2 * highest).sum())
@@ -200,9 +208,26 @@ def _factor(interior: Interior) -> float:
     return THIN if len(interior.nodes) > 4.5 * n_nodes else SOLID
 
 
+def _tree_of(make: Callable[[float], SubstructureTree], bound: float, least: int) -> tuple[SubstructureTree, float]:
+    """(3) Return a tree with at least so many modes up to a bound on omega², if some raises of it bring them."""
+    tree = make(bound)
+    for _ in range(MOST_RAISES):
+        if tree.mode_starts[-1] >= least:
+            break
+        tree.close()
+        bound *= RAISE**2
+        tree = make(bound)
+    return tree, bound
+
+
+def _smallest(values: Array, k: int) -> float:
+    """Return the k-th smallest of some values, k from 1; of k = 0 zero."""
+    return float(np.partition(values, k - 1)[k - 1]) if k else 0.0
+
+
 def _highest(own: Array, mass: ReducedMass, guess: float, count: int) -> float:
     """(4) Return omega² of the highest of `count` modes, somewhat too high, by modes of substructures below a guess."""
-    most = max(guess, np.partition(own, count - 1)[count - 1]) if count else guess
+    most = max(guess, _smallest(own, count))
     kept = own <= most
     return float(reduced_omega2(own[kept], mass.of(kept), count)) if count else guess
 

@@ -205,8 +205,26 @@ def test_a_large_part_of_all_modes_is_refused(shell):
         cms.multilevel(shell, n_modes=len(shell.i) // 7)
 
 
+@pytest.mark.parametrize("factor", [1.2, 1.5])
+@pytest.mark.parametrize("count", [8, 24])
+def test_small_cutoff_factors_leave_as_many_modes_as_are_wanted_and_guards(shell, direct, count, factor):
+    """Before, 6 to 24 modes of substructures were kept."""
+    modes = cms.multilevel(shell, n_modes=count, cutoff_factor=factor)
+    errors = relative_errors(modes, direct)
+    assert len(errors) == count
+    assert modes.data["frequency error"][-count:].max() < 1e-3
+    assert -1e-8 < errors.min() <= errors.max() < 1e-3
+
+
+def test_a_guess_that_is_too_low_is_made_up_for(shell, direct, monkeypatch):
+    guessed = modes_module.guessed_omega2
+    monkeypatch.setattr(modes_module, "guessed_omega2", lambda *of: guessed(*of) / 40)
+    modes = cms.multilevel(shell, n_modes=N, cutoff_factor=3.0)
+    assert 0 < relative_errors(modes, direct).max() < 1e-3
+
+
 def test_more_modes_than_the_substructures_keep_are_refused(shell, monkeypatch):
-    monkeypatch.setattr("cms.substructures.modes.guessed_omega2", lambda *_: 1e4)
+    monkeypatch.setattr("cms.substructures.modes.guessed_omega2", lambda *_: 1.0)
     with pytest.raises(cms.CmsError, match="choose a larger cutoff_factor"):
         cms.multilevel(shell, n_modes=N)
 
