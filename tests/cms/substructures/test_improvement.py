@@ -68,7 +68,8 @@ def test_a_step_takes_off_what_lies_far_above(pencil):
     after = np.sqrt(modes.omega2[:COUNT] / pencil[3][0][:COUNT]) - 1
     n = len(pencil[3][0])
     ratio = (pencil[3][0][:COUNT] / pencil[3][0][n // 2 : n // 2 + COUNT]) ** 2
-    assert (after < 1.1 * before * ratio + 1e-12).all()
+    rounding = np.finfo(float).eps * pencil[3][0][-1] / pencil[3][0][:COUNT]  # of the dense eigenvalues
+    assert (after < 1.1 * before * ratio + rounding).all()
     assert_allclose(modes.X.T @ pencil[2] @ modes.X, np.eye(COUNT + 3), rtol=0, atol=1e-10)
 
 
