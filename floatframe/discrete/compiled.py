@@ -138,19 +138,24 @@ def discrete_of(ds: DiscreteSystem, scheme: int, h: float, rho_inf: float) -> tu
     held = np.array([k for c in ds.connections for k in c.held], dtype=np.int64)
     is_length = is_held_length(model.rows.kind[held]) | is_held_velocity(model.rows.kind[held])
     of_multipliers = mass * ds.length * np.where(is_length, 1.0, ds.length)
+    of_held_rows = of_multipliers / (mass * ds.length**2)
+    equation = np.flatnonzero(np.isin(held, model.laws.equation))
+    of_multipliers[equation], of_held_rows[equation] = 0.5 * h**2 * model.laws.equation_size, 1.0
     of_states = np.maximum(model.states.size, np.abs(model.states.start))
-    markers = [(end.body, end.turns) for end in ds.markers]
+    slides = model.markers.line >= 0
+    markers = [(end.body, end.turns or slides[m]) for m, end in enumerate(ds.markers)]
     sizes_of_markers = [ds.bodies[body].n if body >= 0 else 0 for body, _ in markers]
     weighted = [modal_weight(model, i) * modal_matrix(model, i, STIFFNESS) for i in range(len(ds.bodies))]
-    row_scale = np.concatenate([scale, of_multipliers]) / (mass * ds.length**2)
+    row_scale = np.concatenate([scale / (mass * ds.length**2), of_held_rows])
     scale = np.concatenate([scale, of_multipliers, of_states])
     made = filled(
         Discrete(), scheme=scheme, center=center, is_bent=is_bent, is_filtered=int(rho_inf < 1.0),
         is_loaded=int(does_work(model)), blocks=blocks, block0=block0, turns=[turns for _, turns in markers],
         psi0=np.cumsum([0, *sizes_of_markers])[:-1], first=[*(c.first for c in ds.connections), ds.n_held], row=held,
-        weight=weight, scale=scale, row_scale=np.concatenate([row_scale, 1.0 / of_states]),
+        is_driven=[ds.is_driven(c, k) for c in ds.connections for k in c.held], weight=weight, scale=scale,
+        row_scale=np.concatenate([row_scale, 1.0 / of_states]),
         delta=np.concatenate([delta, SMALL * of_multipliers, SMALL * of_states]), remembered=remembered_rows(model),
-        is_linear=int(not has_normal_friction(model)),
+        is_linear=int(not has_normal_friction(model) and not model.laws.head[:, 2:4].any()), equation=equation,
         weighted=np.concatenate([*(part.ravel() for part in weighted), np.zeros(0)]),
         weighted0=np.cumsum([0, *(part.size for part in weighted)])[:-1], pattern=pattern,
     )  # fmt: skip
@@ -162,7 +167,7 @@ def does_work(model: Model) -> bool:
     springs = model.springs
     counts = (
         model.loads.marker, model.body_loads.body, model.joint_forces.motor, model.contacts.stiffness,
-        model.users.n_forces,
+        model.users.n_forces, model.laws.length,
     )  # fmt: skip
     return (
         any(len(each) for each in counts)
@@ -175,7 +180,8 @@ def does_work(model: Model) -> bool:
 def remembered_rows(model: Model) -> IntArray:
     """Return the rows of the memory that connections remember from step to step."""
     contacts = model.connections.w0[:-1][model.connections.law == CONTACT] + V_0
-    return np.concatenate([model.coordinates.row, model.states.row, model.states.row + 1, contacts]).astype(np.int64)
+    rows = [model.coordinates.row, model.states.row, model.states.row + 1, contacts, model.laws.equation]
+    return np.concatenate(rows).astype(np.int64)
 
 
 def new_step_work(model: Model, discrete: Discrete, sizes: dict[str, int]) -> StepWork:

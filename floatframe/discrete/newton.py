@@ -18,6 +18,7 @@ from scipy.sparse.linalg import splu
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.discrete.bodies import BodyStep, CentralBody, Placed, step_of
 from floatframe.discrete.constraints import Span
+from floatframe.discrete.deformed_lines import slid
 from floatframe.discrete.markers import Load, marker_step
 from floatframe.discrete.system import Connection, DiscreteSystem, Ends
 
@@ -83,10 +84,16 @@ def empty_load(n: int, x: Array) -> Load:
     return Load(n, x.shape[:-1], x.dtype.type)
 
 
-def ends_of(ds: DiscreteSystem, connection: Connection, steps: dict[int, BodyStep], loads: dict[int, Load]) -> Ends:
+def ends_of(
+    ds: DiscreteSystem, connection: Connection, steps: dict[int, BodyStep], loads: dict[int, Load], span: Span
+) -> Ends:
     """Return the markers of a connection over a step, and the loads on their bodies, by the numbers of bodies."""
     markers = [marker_step(marker, steps.get(marker.body)) for marker in connection.ends]
-    return Ends(markers, [loads.get(marker.body) for marker in connection.ends])
+    slide = None
+    if connection.line is not None:
+        sliding = connection.ends[0]
+        markers[0], slide = slid(ds.model, connection.line, sliding, steps[sliding.body], markers[1], span)
+    return Ends(markers, [loads.get(marker.body) for marker in connection.ends], slide)
 
 
 def body_residual(ds: DiscreteSystem, scheme: Scheme, i: int, place: Placed, span: Span, x: Array) -> Array:
@@ -110,17 +117,17 @@ def connection_residual(
     n_held = len(connection.held)
     mu, dz = z[..., first : first + n_held], z[..., first + n_held :]
     loads = {i: empty_load(ds.bodies[i].n, x[i]) for i in x}
-    ends = ends_of(ds, connection, {i: scheme.force_step(placed[i], x[i]) for i in x}, loads)
+    ends = ends_of(ds, connection, {i: scheme.force_step(placed[i], x[i]) for i in x}, loads, span)
     ds.connection_loads(connection, ends, span, 2 * mu / span.h**2, dz, is_middle=scheme.acts_along)
     out = [-0.5 * span.h**2 * generalised_force(scheme, placed[i], x[i], load) for i, load in loads.items()]
     if not scheme.acts_along:
-        ends = ends_of(ds, connection, {i: step_of(placed[i], x[i]) for i in x}, {})
+        ends = ends_of(ds, connection, {i: step_of(placed[i], x[i]) for i in x}, {}, span)
     if connection.held:
-        values = [ds.value(connection, k, ends, span) for k in connection.held]
+        values = ds.values(connection, ends, span, dz, 2 * mu / span.h**2)
         values = [np.broadcast_to(value, mu.shape[:-1]) for value in values]
         out.append(np.stack(values, axis=-1) + ds.model.rows.soft[list(connection.held)] * mu)
     if connection.states:
-        out.append(ds.state_residual(connection, ends, span, dz))
+        out.append(ds.state_residual(connection, ends, span, dz, 2 * mu / span.h**2))
     return np.concatenate(out, axis=-1)
 
 
@@ -250,13 +257,13 @@ def work_of(
         f = solution.f[connection.first : connection.first + len(connection.held)]
         dz = solution.dz[connection.first_state : connection.first_state + len(connection.states)]
         loads = {i: Load(ds.bodies[i].n, (), float) for i in connection.bodies}
-        ends = ends_of(ds, connection, of_bodies, loads)
+        ends = ends_of(ds, connection, of_bodies, loads, span)
         part = ds.connection_loads(connection, ends, span, f, dz, is_middle=scheme.acts_along)
         given, taken = given + float(part.given), taken + float(part.taken)
-        driven = f * (ds.model.rows.motion[list(connection.held)] >= 0)
+        driven = f * np.array([ds.is_driven(connection, k) for k in connection.held], dtype=bool)
         if driven.any():
             loads = {i: Load(ds.bodies[i].n, (), float) for i in connection.bodies}
-            ends = ends_of(ds, connection, of_bodies, loads)
+            ends = ends_of(ds, connection, of_bodies, loads, span)
             for j, k in enumerate(connection.held):
                 ds.add_row(connection, k, ends, span, driven[j])
             given += sum(float(load.work(steps[i])) for i, load in loads.items())
@@ -266,4 +273,4 @@ def work_of(
 def remembered(ds: DiscreteSystem, placed: list[Placed], span: Span, solution: Solution) -> Array:
     """Return what connections remember at the end of a step, (n_w,)."""
     steps = {i: step_of(place, x) for i, (place, x) in enumerate(zip(placed, solution.x, strict=True))}
-    return ds.remembered([ends_of(ds, connection, steps, {}) for connection in ds.connections], span, solution.dz)
+    return ds.remembered([ends_of(ds, connection, steps, {}, span) for connection in ds.connections], span, solution.dz)

@@ -20,9 +20,24 @@ from floatframe.discrete.constraints import (
 from floatframe.discrete.contacts import V_0, contact_load, speed_of_approach
 from floatframe.discrete.coordinates import coordinate_ends, counted
 from floatframe.discrete.couplers import add_coupler_reaction, coordinates_of, coupler_value
+from floatframe.discrete.deformed_lines import (
+    DeformedLine,
+    Slide,
+    add_line_reaction,
+    deformed_line,
+    line_rate_in_time,
+    line_value,
+)
 from floatframe.discrete.forces import Given, body_load, coordinate_load, point_load, spring_load
 from floatframe.discrete.functions import value_of
 from floatframe.discrete.markers import BodyMarker, Load, MarkerStep, body_marker, marker_step
+from floatframe.discrete.public_elements import (
+    element_load,
+    element_rates,
+    element_states,
+    element_values,
+    multiplier_rows,
+)
 from floatframe.discrete.rolling import add_height_reaction, add_roll_reaction, height_value, roll_value
 from floatframe.discrete.user_forces import element_of, state_rows, user_force_load, user_state_rates
 from floatframe.errors import ModelError
@@ -46,6 +61,7 @@ class Connection:
     first: int  #: first multiplier
     states: tuple[int, ...]  #: rows of its states
     first_state: int  #: number of the first of them among all
+    line: DeformedLine | None = None  #: along which marker A slides
 
     @property
     def bodies(self) -> tuple[int, ...]:
@@ -59,6 +75,7 @@ class Ends:
 
     markers: list[MarkerStep]
     loads: list[Load | None]
+    slide: Slide | None = None  #: of a marker A that slides along a line
 
     @property
     def pairs(self) -> list[Pair]:
@@ -104,7 +121,10 @@ class DiscreteSystem:
         dz, (..., n_states of it): changes of its states; is_middle: whether forces act in the middle of the step.
         """
         model, c = self.model, connection.number
-        law, pair, loads = int(model.connections.law[c]), ends.pairs[0], ends.of_loads[0]
+        law = int(model.connections.law[c])
+        if law == ELEMENT:
+            return Given(*element_load(model, c, ends.markers, ends.loads, span, dz, f, is_middle=is_middle))
+        pair, loads = ends.pairs[0], ends.of_loads[0]
         if law == SPRING_LAW:
             return spring_load(model, c, pair, loads, span)
         if law == BUSHING:
@@ -124,9 +144,11 @@ class DiscreteSystem:
         return Given(given, taken)
 
     def add_row(self, connection: Connection, k: int, ends: Ends, span: Span, f: Array) -> None:
-        """Add the loads of held row k with multiplier f, (...,)."""
+        """Add the loads of held row k with multiplier f, (...,); those of elements are among their forces."""
         kind, pair, loads = int(self.model.rows.kind[k]), ends.pairs[0], ends.of_loads[0]
-        if kind == COUPLE:
+        if ends.slide is not None:
+            add_line_reaction(self.model, k, pair, loads, ends.slide, f)
+        elif kind == COUPLE:
             add_coupler_reaction(self.model, connection.number, ends.pairs, ends.of_loads, f)
         elif kind == RIM_HEIGHT:
             add_height_reaction(self.model, k, pair, loads, f)
@@ -135,9 +157,17 @@ class DiscreteSystem:
         else:
             add_reaction(self.model, k, pair, loads, span, f)
 
+    def values(self, connection: Connection, ends: Ends, span: Span, dz: Array, f: Array) -> list[Array]:
+        """Return the held rows of a connection at the end of a step."""
+        if self.model.connections.law[connection.number] == ELEMENT:
+            return element_values(self.model, connection.number, ends.markers, span, dz, f)
+        return [self.value(connection, k, ends, span) for k in connection.held]
+
     def value(self, connection: Connection, k: int, ends: Ends, span: Span) -> Array:
-        """Return held row k of a connection at the end of a step."""
+        """Return held row k of a joint or coupler at the end of a step."""
         kind, pair = int(self.model.rows.kind[k]), ends.pairs[0]
+        if ends.slide is not None:
+            return line_value(self.model, k, pair, ends.slide)
         if kind == COUPLE:
             return coupler_value(self.model, connection.number, ends.pairs, span)
         if kind == RIM_HEIGHT:
@@ -148,14 +178,24 @@ class DiscreteSystem:
 
     def rate_in_time(self, k: int, ends: Ends, t: float) -> float:
         """Return the rate of held row k at one configuration while nothing moves."""
+        if ends.slide is not None:
+            return line_rate_in_time(self.model, k, ends.pairs[0], ends.slide, t)
         if int(self.model.rows.kind[k]) != COUPLE:
             return rate_in_time(self.model, k, ends.pairs[0], t)
         motion = int(self.model.rows.motion[k])
         return 0.0 if motion < 0 else -float(self.model.rows.x[k, 0]) * value_of(self.model, motion, t)[1]
 
-    def state_residual(self, connection: Connection, ends: Ends, span: Span, dz: Array) -> Array:
+    def is_driven(self, connection: Connection, k: int) -> bool:
+        """Whether held row k of a connection does the work of a prescribed motion."""
+        driven = connection.line is not None and connection.line.row >= 0
+        return driven or bool(self.model.rows.motion[k] >= 0)
+
+    def state_residual(self, connection: Connection, ends: Ends, span: Span, dz: Array, f: Array) -> Array:
         """Return the equations of the states of a connection for their changes, (..., n_states of it)."""
-        rates = user_state_rates(self.model, connection.number, ends.pairs, span, dz)
+        if self.model.connections.law[connection.number] == ELEMENT:
+            rates = element_rates(self.model, connection.number, ends.markers, span, dz, f)
+        else:
+            rates = user_state_rates(self.model, connection.number, ends.pairs, span, dz)
         return dz - span.h * rates
 
     def remembered(self, ends: list[Ends], span: Span, dz: Array) -> Array:
@@ -209,10 +249,14 @@ def discrete_system(system: System, scheme: str) -> DiscreteSystem:
         rows = range(int(model.connections.w0[c]), int(model.connections.w0[c + 1]))
         law = int(model.connections.law[c])
         held = tuple(k for k in rows if kind_of(model.rows.kind[k]).holds)
+        if law == ELEMENT:
+            held = multiplier_rows(model, c)
         loaded = tuple(k for k in rows if kind_of(model.rows.kind[k]).is_loaded and law == JOINT)
         ends = tuple(markers[m] for m in ends_of(model, c))
-        states = state_rows(model, c) if law == USER_FORCE else ()
-        connections.append(Connection(c, ends, held, loaded, n_held, states, n_states))
+        states = state_rows(model, c) if law == USER_FORCE else element_states(model, c) if law == ELEMENT else ()
+        number = int(model.markers.line[model.connections.a[c]]) if law == JOINT else -1
+        line = deformed_line(model, markers, number) if number >= 0 else None
+        connections.append(Connection(c, ends, held, loaded, n_held, states, n_states, line))
         n_held, n_states = n_held + len(held), n_states + len(states)
     point_forces: list[list[tuple[int, BodyMarker]]] = [[] for _ in bodies]
     cases: list[list[int]] = [[] for _ in bodies]
@@ -231,6 +275,9 @@ def discrete_system(system: System, scheme: str) -> DiscreteSystem:
 def ends_of(model: Model, c: int) -> list[int]:
     """Return the markers of connection c."""
     law, item = int(model.connections.law[c]), int(model.connections.item[c])
+    if law == ELEMENT:
+        first = int(model.connections.a[c])
+        return list(range(first, first + int(model.laws.head[item, 0])))
     if law not in (COUPLER, USER_FORCE):
         return [int(model.connections.a[c]), int(model.connections.b[c])]
     element = item if law == COUPLER else element_of(model, c)
@@ -244,12 +291,26 @@ def require_known(compiled: CompiledSystem, scheme: str) -> None:
     for c, name in enumerate(compiled.connection_names):
         kinds = model.rows.kind[model.connections.w0[c] : model.connections.w0[c + 1]]
         if model.connections.law[c] == ELEMENT:
-            raise ModelError(f"{scheme}: element {name!r} is of a kind that is not known to it; use generalized-alpha")
-        if max(model.markers.line[model.connections.a[c]], model.markers.line[model.connections.b[c]]) >= 0:
-            words = "slides along a deformed line, which is not known to it"
-            raise ModelError(f"{scheme}: {name!r} {words}; use generalized-alpha")
+            require_known_element(model, c, name, scheme)
+            continue
         if scheme == "Variational" and is_held_velocity(kinds).any():
             raise ModelError(
                 f"{scheme}: joint {name!r} holds velocities that come from no positions, which no variational "
                 "principle gives; use energy-momentum or generalized-alpha"
             )
+
+
+def require_known_element(model: Model, c: int, name: str, scheme: str) -> None:
+    """Raise `ModelError` if element c is one that the scheme does not know."""
+    first = int(model.connections.a[c])
+    markers = range(first, first + int(model.laws.head[int(model.connections.item[c]), 0]))
+    if (model.markers.accelerated[list(markers)] >= 0).any():
+        raise ModelError(
+            f"{scheme}: element {name!r} feels accelerations, and a step of this scheme has none, only changes of "
+            "momenta; use generalized-alpha"
+        )
+    if scheme == "Variational" and multiplier_rows(model, c):
+        raise ModelError(
+            f"{scheme}: element {name!r} has multipliers of its own, which would act at both ends of a step with two "
+            "values, in a law that need not be linear in them; use energy-momentum or generalized-alpha"
+        )

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.compiling.system import compiled_system
+from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.discrete.bodies import Placed
 from floatframe.discrete.compiled import kept_of
 from floatframe.discrete.constraints import Span
@@ -85,7 +85,8 @@ class DiscreteScheme:
         from floatframe.discrete.kernels.entry import advance_discrete_steps
         from floatframe.discrete.kernels.newton import NO_ACCELERATION
 
-        model = compiled_system(system).model
+        compiled = compiled_system(system)
+        model = compiled.model
         ds = discrete_system(system, type(self).__name__)
         kept = kept_of(work, ds, self.equations, h, self.damping)
         step = kept.step
@@ -101,21 +102,30 @@ class DiscreteScheme:
         if outcome.status == NO_ACCELERATION:  # the memory has gone on to where there is none: the good steps again
             work.past.n[...] = 0
             again = self.advance(system, carry, work, t0=t0, h=h, first=first, n_steps=outcome.n_steps, every=every)
-            return *again[:3], explained(outcome, self.max_iterations)
+            return *again[:3], explained(compiled, work, outcome, self.max_iterations)
         memory.h[...] = h
         n_iterations = carry.n_iterations + int(step.n_iterations) - iterations
         after = replace(carry_of(memory, n_iterations), a=step.f_kept.copy(), power=carry.power)
         kept.after = after
         rows = Rows(*(array[: outcome.n_rows] for array in rows))
-        return after, rows, outcome.n_steps, explained(outcome, self.max_iterations)
+        return after, rows, outcome.n_steps, explained(compiled, work, outcome, self.max_iterations)
 
 
-def explained(outcome: Outcome, max_iterations: int) -> Failure | None:
+def explained(compiled: CompiledSystem, work: Work, outcome: Outcome, max_iterations: int) -> Failure | None:
     """Say why a step failed; None if none did."""
-    from floatframe.discrete.kernels.newton import CONVERGED, NO_ACCELERATION, SINGULAR
+    from floatframe.discrete.kernels.newton import CONVERGED, NO_ACCELERATION, SINGULAR, STOPPED
 
     if outcome.status == CONVERGED:
         return None
+    if outcome.status == STOPPED:
+        return Failure(compiled.stop_words[int(work.counted.stopped) - 1], outcome.excess)
+    if int(work.counted.no_number):
+        name = compiled.connection_names[int(work.counted.no_number) - 1]
+        words = (
+            f"element {name!r} gives what is no number (NaN or infinity) for a motion that is one; see its law, or "
+            "choose a smaller h if it is only known near the motion"
+        )
+        return Failure(words, outcome.excess)
     words = f"Newton's method did not converge in {max_iterations} iterations"
     if outcome.status == NO_ACCELERATION:
         words = "where it ends, constraints depend on each other or a force has no direction: no accelerations"

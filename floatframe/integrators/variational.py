@@ -132,7 +132,7 @@ def closed_velocities(
         ds.own_loads(i, steps[i], load, end)
     for c in ds.connections:
         f, dz = nothing[c.first : c.first + len(c.held)], np.zeros(len(c.states))
-        ds.connection_loads(c, ends_of(ds, c, at, dict(enumerate(loads))), end, f, dz, is_middle=False)
+        ds.connection_loads(c, ends_of(ds, c, at, dict(enumerate(loads)), end), end, f, dz, is_middle=False)
     momenta, masses = [], []
     for body, place, after, x, load in zip(ds.bodies, placed, moved_to, solution.x, loads, strict=True):
         Pi, Y, force = interval(body, place, x, h)
@@ -146,7 +146,7 @@ def closed_velocities(
     for c in ds.connections:
         for j, k in enumerate(c.held, start=c.first):
             parts = {i: Load(ds.bodies[i].n, (), float) for i in c.bodies}
-            ends = ends_of(ds, c, at, parts)
+            ends = ends_of(ds, c, at, parts, end)
             ds.add_row(c, k, ends, end, np.array(1.0))
             for i, part in parts.items():
                 own = np.concatenate([part.force, moved_to[i].R.T @ part.torque, part.modal])

@@ -1,8 +1,8 @@
 """Rows that hold something over a step, of joints and couplers: one place that knows all kinds."""
 
-from floatframe.discrete.kernels import rows
+from floatframe.discrete.kernels import deformed_lines, rows
 from floatframe.discrete.kernels.connections import couplers, rolling
-from floatframe.joints.rows.kinds import COUPLE, RIM_HEIGHT, ROLL
+from floatframe.joints.rows.kinds import COUPLE, LINE, LINE_TURN, RIM_HEIGHT, ROLL
 from floatframe.kernels.compiler.compilation import inner
 
 __all__ = ["add_reaction", "row_change", "row_rate", "row_value"]
@@ -18,6 +18,8 @@ def row_value(model, step, c, k):
         return rolling.height_value(model, step, k, a, b)
     if kind == ROLL:
         return rolling.roll_value(model, step, k, a, b)
+    if kind == LINE or kind == LINE_TURN:
+        return deformed_lines.line_value(model, step, k, a, b)
     return rows.row_value(model, step, k, a, b)
 
 
@@ -31,6 +33,8 @@ def add_reaction(model, discrete, step, c, k, f):
         rolling.add_height_reaction(model, discrete, step, k, a, b, f)
     elif kind == ROLL:
         rolling.add_roll_reaction(model, step, k, a, b, f)
+    elif kind == LINE or kind == LINE_TURN:
+        deformed_lines.add_line_reaction(model, discrete, step, k, a, b, f)
     else:
         rows.add_reaction(model, discrete, step, k, a, b, f)
 
@@ -38,14 +42,20 @@ def add_reaction(model, discrete, step, c, k, f):
 @inner
 def row_change(model, discrete, step, c, k):
     """Return the change of row k over the step, by the motion alone; those of a rolling disc are in no such need."""
-    if model.rows.kind[k] == COUPLE:
+    kind, a, b = model.rows.kind[k], model.connections.a[c], model.connections.b[c]
+    if kind == COUPLE:
         return couplers.coupler_change(model, discrete, step, c)
-    return rows.row_change(model, discrete, step, k, model.connections.a[c], model.connections.b[c])
+    if kind == LINE or kind == LINE_TURN:
+        return deformed_lines.line_change(model, discrete, step, k, a, b)
+    return rows.row_change(model, discrete, step, k, a, b)
 
 
 @inner
 def row_rate(model, step, c, k, t):
     """Return the rate of row k at the beginning of a step while nothing moves: that of a prescribed motion."""
-    if model.rows.kind[k] == COUPLE:
+    kind, a, b = model.rows.kind[k], model.connections.a[c], model.connections.b[c]
+    if kind == COUPLE:
         return couplers.coupler_rate(model, c, t)
-    return rows.row_rate(model, step, k, model.connections.a[c], model.connections.b[c], t)
+    if kind == LINE or kind == LINE_TURN:
+        return deformed_lines.line_rate(model, step, k, a, b, t)
+    return rows.row_rate(model, step, k, a, b, t)

@@ -20,7 +20,7 @@ def recall(memory, step):
 
 
 @inner
-def remember(model, step):
+def remember(model, discrete, step):
     """Take what is remembered where the step ends, for its unknowns and the places of markers there."""
     for c in range(model.connections.size.shape[0]):
         if model.connections.law[c] == CONTACT:
@@ -28,6 +28,8 @@ def remember(model, step):
     for p in range(model.coordinates.row.shape[0]):
         k = model.coordinates.row[p]
         _, step.known[k] = ends_of_step(model, step, k, model.coordinates.a[p], model.coordinates.b[p])
+    for e in range(discrete.equation.shape[0]):
+        step.known[model.laws.equation[e]] = step.f[discrete.equation[e]]
     change0 = step.load.shape[0] + step.f.shape[0]
     for s in range(model.states.row.shape[0]):
         k = model.states.row[s]

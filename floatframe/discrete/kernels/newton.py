@@ -10,21 +10,23 @@ from floatframe.discrete.kernels.band import band_factor, band_solve
 from floatframe.discrete.kernels.bodies import body_inertia, body_step
 from floatframe.discrete.kernels.connections.bushings import bushing_load
 from floatframe.discrete.kernels.connections.contacts import contact_load
+from floatframe.discrete.kernels.connections.public_elements import element_load, element_residual
 from floatframe.discrete.kernels.connections.user_forces import user_force_load, user_state_residual
+from floatframe.discrete.kernels.deformed_lines import line_steps
 from floatframe.discrete.kernels.held_rows import add_reaction, row_change, row_rate, row_value
 from floatframe.discrete.kernels.loads import body_load, coordinate_load, normal_force, point_load, spring_load
 from floatframe.discrete.kernels.markers import marker_loads, marker_step
 from floatframe.kernels.compiler.compilation import inner
-from floatframe.kernels.model import BUSHING, CONTACT, JOINT, SPRING, USER_FORCE
+from floatframe.kernels.model import BUSHING, CONTACT, ELEMENT, JOINT, SPRING, USER_FORCE
 from floatframe.kernels.vector import cross, matrix, norm, put_sum, scaled, sub, turned_back, vector
 
-__all__ = ["CONVERGED", "NOT_CONVERGED", "NO_ACCELERATION", "SINGULAR", "add_loads", "move", "solve"]
+__all__ = ["CONVERGED", "NOT_CONVERGED", "NO_ACCELERATION", "SINGULAR", "STOPPED", "add_loads", "move", "solve"]
 
 SLOW = 0.25  # ratio of corrections above which the derivatives are made anew
 MANY = 7  # iterations of a step after which the next one starts with new factors
 LEFT = 1e-2  # of what a correction may be, what is left after it may be: the factors are not those of the iterate
 ROUNDOFF = 2e-15  # of a position
-CONVERGED, NOT_CONVERGED, SINGULAR, NO_ACCELERATION = range(4)
+CONVERGED, NOT_CONVERGED, SINGULAR, NO_ACCELERATION, STOPPED = range(5)
 
 
 @inner
@@ -34,6 +36,7 @@ def move(model, discrete, step):
         body_step(model, discrete, step, i)
     for m in range(model.markers.body.shape[0]):
         marker_step(model, discrete, step, m)
+    line_steps(model, discrete, step)
     for k in range(step.load.shape[0]):
         step.load[k] = 0.0
 
@@ -68,6 +71,8 @@ def connection_load(model, work, discrete, step, c):
         return 0.0, contact_load(model, discrete, step, c)
     if law == USER_FORCE:
         return user_force_load(model, work, discrete, step, c), 0.0
+    if law == ELEMENT:
+        return element_load(model, work, discrete, step, c)
     given, taken = 0.0, 0.0
     if law != JOINT:
         return given, taken
@@ -103,6 +108,9 @@ def write_residual(model, work, discrete, step):
     if not step.is_closing:
         add_loads(model, work, discrete, step)
     for connection in range(model.connections.size.shape[0]):
+        if model.connections.law[connection] == ELEMENT:
+            element_residual(model, work, discrete, step, connection)
+            continue
         for j in range(discrete.first[connection], discrete.first[connection + 1]):
             k, soft = discrete.row[j], model.rows.soft[discrete.row[j]] * step.z[n_u + j]
             add_reaction(model, discrete, step, connection, k, step.f[j])
@@ -185,6 +193,10 @@ def correct(model, discrete, step, stage):
             s = i - first_state
             size = abs(step.known[model.states.row[s]]) + abs(step.z[i]) + model.states.size[s]
             step.state_change = max(step.state_change, abs(change) / size)
+    for e in range(discrete.equation.shape[0]):
+        i, c = step.load.shape[0] + discrete.equation[e], 0.5 * step.h * step.h
+        size = max(abs(step.z[i]), c * model.laws.equation_size[e])
+        step.state_change = max(step.state_change, abs(discrete.scale[i] * step.right[pattern.place[i]]) / size)
     return math.sqrt(total)
 
 

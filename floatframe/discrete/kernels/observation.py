@@ -68,6 +68,8 @@ def begin(model, work, memory, t):
         z = memory.w[model.states.row[s]]
         work.state.w[model.states.row[s]], work.states.base[s] = z, z
         work.states.kappa[s], work.states.rate_base[s] = 0.0, 0.0
+    for e in range(model.laws.equation.shape[0]):
+        work.state.w[model.laws.equation[e]] = memory.w[model.laws.equation[e]]
     for p in range(model.coordinates.row.shape[0]):
         work.state.w[model.coordinates.row[p]] = memory.w[model.coordinates.row[p]]
 

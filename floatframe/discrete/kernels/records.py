@@ -8,7 +8,7 @@ connections with multipliers or states.
 from typing import NamedTuple
 
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.kernels.model import n_b, n_c, n_m, n_t, n_w
+from floatframe.kernels.model import n_b, n_c, n_lines, n_m, n_stations, n_t, n_w
 from floatframe.kernels.records import Size, integer, real
 from floatframe.kernels.work import n_most, n_q, n_u
 
@@ -52,11 +52,13 @@ class Discrete(NamedTuple):
     psi0: IntArray = integer(n_m)  #: Σ n over the markers before it
     first: IntArray = integer(n_c + 1)  #: multipliers of a connection
     row: IntArray = integer(n_mu)  #: of each multiplier among the rows of the model
+    is_driven: IntArray = integer(n_mu)  #: whether a multiplier does the work of a prescribed motion
     weight: Array = real(n_u, unit="kg, kg m²")  #: of the norm of corrections
     remembered: IntArray = integer(Size("remembered"))  #: rows of the memory that connections remember
     scale: Array = real(n_z)  #: by which unknowns are scaled in the matrix,
     row_scale: Array = real(n_z)  #: and residuals
     delta: Array = real(n_z)  #: by which unknowns are changed for derivatives
+    equation: IntArray = integer(Size("equations of laws"))  #: multipliers of elements that hold nothing
     is_linear: IntArray = integer()  #: whether the equations of motion are linear in reactions
     weighted: Array = real(Size("numbers of s K"), unit="kg m²")  #: s K of each body, by which velocities are closed
     weighted0: IntArray = integer(n_b)  #: where it begins
@@ -124,6 +126,20 @@ class StepWork(NamedTuple):
     F: Array = real(n_m, 3, unit="N")
     T: Array = real(n_m, 3, unit="N m")
     m: Array = real(n_m, 3, unit="N m")  #: on the elastic rotation, body axes
+    # deformed lines
+    station_d: Array = real(2, n_stations, 3, unit="m")  #: displacements of stations at both ends, body axes
+    station_th: Array = real(2, n_stations, 3, unit="rad")  #: and rotations
+    line_s: Array = real(n_lines, 2, unit="m")  #: places at both ends
+    line_t: Array = real(n_lines, 3)  #: way of the sliding marker by its place
+    line_kappa: Array = real(n_lines, 3, unit="rad/m")  #: turning of its axes by its place, body axes
+    line_end: Array = real(n_lines, 3)  #: r' at the end of the step
+    # markers of public elements
+    r_law: Array = real(n_m, 3, unit="m")  #: in the middle of the step
+    A_law: Array = real(n_m, 3, 3)  #: there
+    d_law: Array = real(n_m, 3, unit="m")  #: way over the step
+    turn: Array = real(n_m, 3, unit="rad")  #: Cayley vector of the rotation over the step
+    wrench: Array = real(n_m, 6, unit="N, N m")
+    way: Array = real(n_m, 6, unit="m, m² rad")  #: along which the potential is made up for
     # connections
     known: Array = real(n_w)  #: what they remember, in its rows of the memory
     xi: Array = real(6, unit="m, rad")  #: mean deformations of a bushing,

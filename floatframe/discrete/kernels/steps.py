@@ -1,10 +1,11 @@
 """The steps of the conserving and variational schemes in a compiled loop; formulas in `floatframe.integrators`."""
 
 from floatframe.discrete.kernels.bodies import begin_bodies, end_rates, interval, keep_bodies, move_bodies
+from floatframe.discrete.kernels.deformed_lines import begin_lines
 from floatframe.discrete.kernels.held_rows import row_change
 from floatframe.discrete.kernels.markers import begin_markers, marker_loads
 from floatframe.discrete.kernels.memory import keep, recall, remember
-from floatframe.discrete.kernels.newton import CONVERGED, NO_ACCELERATION, add_loads, move, solve
+from floatframe.discrete.kernels.newton import CONVERGED, NO_ACCELERATION, STOPPED, add_loads, move, solve
 from floatframe.discrete.kernels.observation import observe
 from floatframe.discrete.kernels.records import CONSERVING, DAMPING
 from floatframe.kernels.body import block
@@ -64,9 +65,8 @@ def add_drives(model, discrete, step):
     """Add to the work that is given that of prescribed motions: of their multipliers."""
     for c in range(model.connections.size.shape[0]):
         for j in range(discrete.first[c], discrete.first[c + 1]):
-            k = discrete.row[j]
-            if model.rows.motion[k] >= 0:
-                step.given += step.f[j] * row_change(model, discrete, step, c, k)
+            if discrete.is_driven[j]:
+                step.given += step.f[j] * row_change(model, discrete, step, c, discrete.row[j])
 
 
 @inner
@@ -75,6 +75,7 @@ def begin(model, discrete, step, memory):
     recall(memory, step)
     begin_bodies(model, discrete, step, memory)
     begin_markers(model, discrete, step)
+    begin_lines(model, step)
 
 
 @inner
@@ -99,6 +100,7 @@ def conserving_step(model, work, discrete, step, memory, order):
     take_multipliers(step)
     move(model, discrete, step)
     step.given, step.taken = 0.0, 0.0
+    work.counted.stopped = 0
     if discrete.is_loaded:
         add_loads(model, work, discrete, step)
         add_drives(model, discrete, step)
@@ -107,7 +109,7 @@ def conserving_step(model, work, discrete, step, memory, order):
     memory.work_given += step.given
     memory.work_taken += step.taken + work_of_dampers(model, discrete, step)
     learn(model, step)
-    remember(model, step)
+    remember(model, discrete, step)
     keep(discrete, step, memory)
     move_bodies(model, step)
     keep_bodies(model, discrete, step, memory)
@@ -133,19 +135,21 @@ def variational_step(model, work, discrete, step, memory, order):
         return status
     take_multipliers(step)
     move(model, discrete, step)
+    work.counted.stopped = 0
     add_loads(model, work, discrete, step)
     add_drives(model, discrete, step)
     dampers = work_of_dampers(model, discrete, step)
     given, taken = step.given, step.taken
     learn_multipliers(step)
-    remember(model, step)
+    remember(model, discrete, step)
     for i in range(model.bodies.kind.shape[0]):
         interval(model, discrete, step, i)
         put_elastic(model, step, i)
     move_bodies(model, step)
-    begin_markers(model, discrete, step)
     step.t_force = step.t_1
     step.is_closing = 1
+    begin_markers(model, discrete, step)
+    begin_lines(model, step)
     move(model, discrete, step)
     add_loads(model, work, discrete, step)
     for m in range(model.markers.body.shape[0]):
@@ -155,9 +159,8 @@ def variational_step(model, work, discrete, step, memory, order):
         step.f[j] = 0.0
     for c in range(model.connections.size.shape[0]):
         for j in range(discrete.first[c], discrete.first[c + 1]):
-            k = discrete.row[j]
-            if model.rows.motion[k] >= 0:
-                step.change[j] = row_change(model, discrete, step, c, k)
+            if discrete.is_driven[j]:
+                step.change[j] = row_change(model, discrete, step, c, discrete.row[j])
     for i in range(model.bodies.kind.shape[0]):
         u0, n, R = model.bodies.u0[i], model.bodies.n_q[i], matrix(step.R_0[i])
         m, theta, Pi = model.body_types.mass[model.bodies.kind[i]], vector(step.z[u0 + 3 :]), vector(step.P_1[u0 + 3 :])
@@ -176,7 +179,7 @@ def variational_step(model, work, discrete, step, memory, order):
             return status
     take_multipliers(step)
     for j in range(step.f.shape[0]):
-        if model.rows.motion[discrete.row[j]] >= 0:
+        if discrete.is_driven[j]:
             given += step.f[j] * step.change[j]
     for i in range(model.bodies.kind.shape[0]):
         u0, n, R = model.bodies.u0[i], model.bodies.n_q[i], matrix(step.R_0[i])
@@ -219,6 +222,7 @@ def advance(model, work, discrete, step, memory, rows, order):
     step.h = h
     work.counted.rows = 0
     for k in range(order.n_steps):
+        work.counted.no_number = 0
         step.t_0, step.t_1 = order.t0 + (order.first + k) * h, order.t0 + (order.first + k + 1) * h
         if discrete.scheme == CONSERVING:
             status = conserving_step(model, work, discrete, step, memory, order)
@@ -228,6 +232,8 @@ def advance(model, work, discrete, step, memory, rows, order):
             return status, k, work.counted.rows
         count_angles(model, work, memory, h)
         memory.n_accepted += 1
+        if work.counted.stopped > 0:
+            return STOPPED, k, work.counted.rows
         if (order.first + k + 1) % order.every == 0:
             if not observe(model, work, discrete, step, memory, step.t_1, rows):
                 return NO_ACCELERATION, k, work.counted.rows

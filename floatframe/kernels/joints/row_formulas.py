@@ -84,13 +84,16 @@ WRENCH = {
     TWIST_B: LOADED,
 }
 
-held_value = by_code({code: kind.value for code, kind in HELD.items()}, "model, work, k, a, b")
-held_rates = by_code({code: kind.rates for code, kind in HELD.items()}, "model, work, k, a, b")
+held_value = by_code("held_value", {code: kind.value for code, kind in HELD.items()}, "model, work, k, a, b")
+held_rates = by_code("held_rates", {code: kind.rates for code, kind in HELD.items()}, "model, work, k, a, b")
 held_by_place = by_code(
+    "held_by_place",
     {code: kind.by_place for code, kind in HELD.items() if kind.by_place is not None},
     "model, work, k, r, a, b, P_a, P_b",
 )
-wrench_value = by_code({code: kind.value for code, kind in WRENCH.items()}, "model, work, k, a, b, w")
+wrench_value = by_code("wrench_value", {code: kind.value for code, kind in WRENCH.items()}, "model, work, k, a, b, w")
 wrench_derivatives = by_code(
-    {code: kind.derivatives for code, kind in WRENCH.items()}, "model, work, k, r, a, b, w, c_k, P_a, P_b, V"
+    "wrench_derivatives",
+    {code: kind.derivatives for code, kind in WRENCH.items()},
+    "model, work, k, r, a, b, w, c_k, P_a, P_b, V",
 )

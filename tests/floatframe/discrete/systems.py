@@ -24,9 +24,11 @@ from floatframe import (
 from floatframe.functions.time_functions import cycloidal_spin_up, harmonic
 from floatframe.functions.time_functions import table as table_function
 from floatframe.rotations import euler_parameters_of_rotation_vector
-from tests.floatframe.integrators.test_conserving import AXIS, floating_pair
+from tests.floatframe.discrete.lines import SLIDING
+from tests.floatframe.elements.laws import Creeping, Mount, OnPlane, Spring
+from tests.floatframe.integrators.test_conserving import AXIS, STIFFENED, floating_pair
 
-__all__ = ["CONNECTED", "CONTACTS", "FORCED", "POTENTIALS", "ROLLING", "geared"]
+__all__ = ["CONNECTED", "CONTACTS", "FORCED", "HELD_BY_ELEMENTS", "POTENTIALS", "ROLLING", "geared"]
 
 K = np.array([
     [30, 1, 2, 0.3, 0.1, 0.2], [1, 25, 1, 0.1, 0.4, 0], [2, 1, 40, 0, 0.2, 0.1], [0.3, 0.1, 0, 3, 0.2, 0.1],
@@ -108,6 +110,18 @@ def rolling():
     return System([plate, wheel], [disc], [pull])
 
 
+def with_element(element, joint="spherical", body=None):
+    """Return the pair with a public element."""
+    pair = floating_pair(joint, body=body)
+    return System(pair.bodies, pair.joints, pair.forces, elements=[element])
+
+
+def without_joint(element):
+    """Return the pair held together by an element."""
+    pair = floating_pair("revolute")
+    return System(pair.bodies, [], pair.forces, elements=[element])
+
+
 TABLE = table_function([-4.0, -1.0, 1.0, 4.0], [-0.2, -0.03, 0.02, 0.1])
 #: what has a potential or holds something: energy is kept
 POTENTIALS: dict[str, Callable[[], System]] = {
@@ -115,11 +129,16 @@ POTENTIALS: dict[str, Callable[[], System]] = {
     "constant velocity": constant_velocity,
     "gear": geared,
     "rack": lambda: geared(RACK),
+    "element between points": lambda: with_element(Spring("law", *ENDS, 30.0)),
+    "element between bodies": lambda: with_element(Mount("law", *ENDS, 2.0, 2.0, 1.0)),
+    "element between bodies that bend": lambda: with_element(Mount("law", *ENDS, 2.0, 2.0, 1.0), body=STIFFENED),
 }
 #: what gives or takes energy beside
 FORCED: dict[str, Callable[[], System]] = {
     "damped bushing": lambda: mounted("spherical", damping=2e-3 * K, characteristics={"x": TABLE, "rz": TABLE}),
     "driven gear": lambda: geared(constant=harmonic(0.2, 5.0)),
+    "damped element": lambda: with_element(Mount("law", *ENDS, 2.0, 2.0, 1.0, 2.0), "revolute"),
+    "element with a state": lambda: with_element(Creeping("law", *ENDS, 30.0, 0.2)),
     "user force": controlled,
     "function": programmed,
     "user force about the axis of B": lambda: floating_pair(
@@ -136,4 +155,12 @@ CONTACTS: dict[str, Callable[[], System]] = {
     "contact with a sphere": lambda: struck(0.4, restitution=0.6, friction=0.3, exponent=1.2),
 }
 ROLLING: dict[str, Callable[[], System]] = {"rolling disc": rolling}
-CONNECTED = POTENTIALS | FORCED | CONTACTS | ROLLING
+#: elements with reactions of their own, which the variational scheme refuses
+HELD_BY_ELEMENTS: dict[str, Callable[[], System]] = {
+    "plane of an element": lambda: without_joint(
+        OnPlane("law", Marker("soft", "end_a"), Marker("block", position=(0.1, 0.4, 0.2)))
+    ),
+}
+POTENTIALS |= {name: make for name, make in SLIDING.items() if "driven" not in name}
+FORCED |= {name: make for name, make in SLIDING.items() if "driven" in name}
+CONNECTED = POTENTIALS | FORCED | CONTACTS | ROLLING | HELD_BY_ELEMENTS

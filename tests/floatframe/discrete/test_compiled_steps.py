@@ -36,7 +36,7 @@ from floatframe.functions.time_functions import table as table_function
 from floatframe.joints.rows import POINT
 from floatframe.kernels.model import CONTACT
 from floatframe.kernels.work import new_work
-from tests.floatframe.discrete.systems import CONNECTED, CONTACTS, ROLLING
+from tests.floatframe.discrete.systems import CONNECTED, CONTACTS, HELD_BY_ELEMENTS, ROLLING
 from tests.floatframe.integrators.test_conserving import floating_pair
 from tests.floatframe.point_masses import random_point_masses, stiffened_body, stiffness
 
@@ -98,7 +98,7 @@ def test_compiled_steps_are_those_of_the_python_version(kind, name):
     assert_steps_are_those_of_python(SYSTEMS[kind](), SCHEMES[name], name)
 
 
-@pytest.mark.parametrize("kind", [kind for kind in CONNECTED if kind not in ROLLING])
+@pytest.mark.parametrize("kind", [kind for kind in CONNECTED if kind not in ROLLING | HELD_BY_ELEMENTS])
 @pytest.mark.parametrize("name", SCHEMES)
 def test_connections_in_compiled_steps_are_those_of_the_python_version(kind, name):
     n_steps, h = (6, 0.06) if kind in CONTACTS else (4, 0.04)
@@ -108,6 +108,12 @@ def test_connections_in_compiled_steps_are_those_of_the_python_version(kind, nam
 @pytest.mark.parametrize("name", ["momentum", "decaying"])
 def test_rolling_in_compiled_steps_is_that_of_the_python_version(name):
     assert_steps_are_those_of_python(ROLLING["rolling disc"](), SCHEMES[name], name, 4)
+
+
+@pytest.mark.parametrize("kind", HELD_BY_ELEMENTS)
+@pytest.mark.parametrize("name", ["momentum", "decaying"])
+def test_reactions_of_elements_in_compiled_steps_are_those_of_the_python_version(kind, name):
+    assert_steps_are_those_of_python(HELD_BY_ELEMENTS[kind](), SCHEMES[name], name, 4)
 
 
 @pytest.mark.parametrize("name", ["momentum", "decaying"])

@@ -230,3 +230,128 @@ class Disc(Element):
             holds=(POSITION, VELOCITY, VELOCITY),
             tangent="complex",
         )
+
+
+@njit
+def mount_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+    """Follow the energy k p²/2 + a p⁴/4 - kappa (tr Q - 3)/2: p the place of b as a sees it, Q the turn of b against a.
+
+    A damper takes what the velocity of b against the body of a gives.
+    """
+    k, a, kappa, c = data
+    d0, d1, d2 = x[1, 0] - x[0, 0], x[1, 1] - x[0, 1], x[1, 2] - x[0, 2]
+    w0, w1, w2 = x[0, 15], x[0, 16], x[0, 17]
+    v0 = x[1, 12] - x[0, 12] - (w1 * d2 - w2 * d1)
+    v1 = x[1, 13] - x[0, 13] - (w2 * d0 - w0 * d2)
+    v2 = x[1, 14] - x[0, 14] - (w0 * d1 - w1 * d0)
+    square = d0 * d0 + d1 * d1 + d2 * d2
+    f = k + a * square
+    f0, f1, f2 = -f * d0 - c * v0, -f * d1 - c * v1, -f * d2 - c * v2
+    trace, m0, m1, m2 = 0.0 * d0, 0.0 * d0, 0.0 * d0, 0.0 * d0
+    for j in range(3):  # Q = A_b A_aᵀ, its axial vector
+        a0, a1, a2 = x[0, 3 + j], x[0, 6 + j], x[0, 9 + j]
+        b0, b1, b2 = x[1, 3 + j], x[1, 6 + j], x[1, 9 + j]
+        trace += a0 * b0 + a1 * b1 + a2 * b2
+        m0 -= 0.5 * kappa * (b2 * a1 - b1 * a2)
+        m1 -= 0.5 * kappa * (b0 * a2 - b2 * a0)
+        m2 -= 0.5 * kappa * (b1 * a0 - b0 * a1)
+    wrench[1, 0], wrench[1, 1], wrench[1, 2] = f0, f1, f2
+    wrench[1, 3], wrench[1, 4], wrench[1, 5] = m0, m1, m2
+    wrench[0, 0], wrench[0, 1], wrench[0, 2] = -f0, -f1, -f2
+    wrench[0, 3] = -m0 - (d1 * f2 - d2 * f1)
+    wrench[0, 4] = -m1 - (d2 * f0 - d0 * f2)
+    wrench[0, 5] = -m2 - (d0 * f1 - d1 * f0)
+    seen[0] = 0.5 * k * square + 0.25 * a * square * square - 0.5 * kappa * (trace - 3.0)
+    seen[1] = c * (v0 * v0 + v1 * v1 + v2 * v2)
+
+
+@dataclass(frozen=True, eq=False)
+class Mount(Element):
+    """A mount with a potential that is not quadratic, in six directions."""
+
+    name: str
+    marker_a: Marker
+    marker_b: Marker
+    stiffness: float
+    hardening: float
+    turning: float
+    damping: float = 0.0
+
+    def law(self, placed):
+        return ElementLaw(
+            function=mount_law,
+            data=[self.stiffness, self.hardening, self.turning, self.damping],
+            outputs=("energy", "lost"),
+            output_units=("J", "W"),
+            tangent="complex",
+            energy="energy",
+            power_lost="lost",
+        )
+
+
+@njit
+def creep_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+    """Pull with k (L - z) between two points, z' = (L - z)/T."""
+    k, T = data
+    d0, d1, d2 = x[1, 0] - x[0, 0], x[1, 1] - x[0, 1], x[1, 2] - x[0, 2]
+    length = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+    f = k * (length - z[0]) / length
+    z_dot[0] = (length - z[0]) / T
+    wrench[0, 0], wrench[0, 1], wrench[0, 2] = f * d0, f * d1, f * d2
+    wrench[1, 0], wrench[1, 1], wrench[1, 2] = -f * d0, -f * d1, -f * d2
+
+
+@dataclass(frozen=True, eq=False)
+class Creeping(Element):
+    """A spring whose free length follows its length; its power counts as work."""
+
+    name: str
+    marker_a: Marker
+    marker_b: Marker
+    stiffness: float
+    time: float
+
+    def law(self, placed):
+        free = float(np.linalg.norm(placed.r[1] - placed.r[0]))
+        return ElementLaw(
+            function=creep_law,
+            data=[self.stiffness, self.time],
+            states=("free",),
+            start=(0.8 * free,),
+            state_units=("m",),
+            tangent="complex",
+            acts=("force", "force"),
+            is_opposite=True,
+        )
+
+
+@njit
+def plane_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+    """Keep point b in the plane through point a normal to the axis z of a, by the reaction lam along it."""
+    e0, e1, e2 = x[0, 5], x[0, 8], x[0, 11]
+    d0, d1, d2 = x[1, 0] - x[0, 0], x[1, 1] - x[0, 1], x[1, 2] - x[0, 2]
+    g[0] = e0 * d0 + e1 * d1 + e2 * d2 - data[0]
+    f0, f1, f2 = lam[0] * e0, lam[0] * e1, lam[0] * e2
+    wrench[1, 0], wrench[1, 1], wrench[1, 2] = f0, f1, f2
+    wrench[0, 0], wrench[0, 1], wrench[0, 2] = -f0, -f1, -f2
+    wrench[0, 3], wrench[0, 4], wrench[0, 5] = -(d1 * f2 - d2 * f1), -(d2 * f0 - d0 * f2), -(d0 * f1 - d1 * f0)
+
+
+@dataclass(frozen=True, eq=False)
+class OnPlane(Element):
+    """Keeps point b at its height above the plane of marker a: one reaction."""
+
+    name: str
+    marker_a: Marker
+    marker_b: Marker
+
+    def law(self, placed):
+        height = float(placed.A[0][:, 2] @ (placed.r[1] - placed.r[0]))
+        return ElementLaw(
+            function=plane_law,
+            data=[height],
+            multipliers=("force",),
+            multiplier_units=("N",),
+            holds=(POSITION,),
+            tangent="complex",
+        )

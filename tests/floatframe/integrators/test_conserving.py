@@ -4,7 +4,6 @@ Energies and momenta are those of the compiled diagnostics, about the frame orig
 the centre of mass on which the schemes stand.
 """
 
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -24,7 +23,6 @@ from floatframe import (
     ModelError,
     PointForce,
     RigidBody,
-    SlidingJoint,
     SphericalJoint,
     SpringDamper,
     System,
@@ -278,14 +276,6 @@ def test_massless_modes_are_refused():
     body = FlexibleBody("body", reduced_body(type(points)(points.m, points.c, phi), stiffness(2)))
     with pytest.raises(ModelError, match="body 'body' has a mode without mass"):
         integrate(System([body]), EnergyMomentum(), 1.0, 0.1)
-
-
-def test_joints_that_a_scheme_does_not_know_are_refused_by_name():
-    soft, block = floating_pair("revolute").bodies
-    slide = SlidingJoint("slide", Marker("soft", "end_a"), Marker("block"), line=("end_b",))
-    with pytest.raises(ModelError, match="Variational: 'slide' slides along a deformed line"):
-        integrate(System([soft, replace(block, position=soft.reduced.interface("end_a").position)], [slide]),
-                  Variational(), 1.0, 0.1)  # fmt: skip
 
 
 def test_friction_by_the_normal_force_is_refused_by_the_variational_scheme():
