@@ -23,7 +23,7 @@ numpy=$("$python" -c "import numpy; print(numpy.__version__)")
 "$build/env/bin/pip" install "setuptools<70" wheel "cython<3" "numpy==$numpy"
 "$build/env/bin/pip" install --no-build-isolation --no-deps "petsc4py==3.18.5"
 "$build/env/bin/pip" install --no-build-isolation --no-deps "slepc4py==3.18.2"
-"$build/env/bin/pip" install --no-binary mpi4py "mpi4py<5"
+"$build/env/bin/pip" install "mpi4py>=4.1,<5"  # its wheel takes the MPI that it finds when it is loaded
 from=$("$build/env/bin/python" -c "import sysconfig; print(sysconfig.get_path('purelib'))")
 to=$("$python" -c "import sysconfig; print(sysconfig.get_path('purelib'))")
 cp -r "$from"/petsc4py* "$from"/slepc4py* "$from"/mpi4py* "$to"

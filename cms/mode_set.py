@@ -3,11 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
 from cms.errors import ModeSetError
 from fe_models.foundation.arrays import Array, frozen, require_finite
+from fe_models.foundation.ranks.spread_columns import SpreadColumns, on_rows
 from fe_models.foundation.tall.on_disk import row_slices
 
 __all__ = ["ModeSet"]
@@ -18,7 +20,7 @@ class ModeSet:
     """Columns over all dofs of a coupled body, before the finishing step of `reduce`."""
 
     name: str  #: key in the registry, such as "craig-bampton"
-    columns: Array  #: displacement columns, (n_dof, n_columns)
+    columns: Array  #: displacement columns, (n_dof, n_columns); `SpreadColumns` of a body on many ranks
     labels: tuple[str, ...]  #: one per column, such as "constraint big_end ux", "fixed-interface 3"
     frequencies: Array  #: of the column's own vibration problem, (n_columns,) [Hz]; NaN for static columns
     options: Mapping[str, str] = field(default_factory=dict)  #: what was asked for and which solver ran
@@ -28,7 +30,10 @@ class ModeSet:
     data: Mapping[str, Array] = field(default_factory=dict)  #: numbers about the set, such as Hankel singular values
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "columns", frozen(self.columns))
+        columns: Any = self.columns
+        is_spread = isinstance(columns, SpreadColumns)
+        if not is_spread:
+            object.__setattr__(self, "columns", frozen(self.columns))
         object.__setattr__(self, "labels", tuple(self.labels))
         groups = tuple(self.groups) or tuple(label.rsplit(" ", 1)[0] for label in self.labels)
         object.__setattr__(self, "groups", groups)
@@ -41,10 +46,17 @@ class ModeSet:
                 f"mode set {self.name!r}: {n_columns} columns need as many labels and frequencies, got "
                 f"{len(self.labels)} and {self.frequencies.shape}"
             )
-        for rows in row_slices(len(self.columns), self.columns):
+        for rows in () if is_spread else row_slices(len(self.columns), self.columns):
             require_finite(f"mode set {self.name!r}", self.columns[rows])
+        if is_spread and not all(on_rows(columns.layout, are_finite, columns)):
+            raise ModeSetError(f"mode set {self.name!r}: expected finite numbers, got NaN or infinite ones")
 
     @property
     def is_static(self) -> np.ndarray:
         """Which columns are static ones, (n_columns,) bool."""
         return np.isnan(self.frequencies)
+
+
+def are_finite(X: Array) -> bool:
+    """Return whether all numbers are finite."""
+    return bool(np.isfinite(X).all())

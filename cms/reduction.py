@@ -22,7 +22,7 @@ from cms.reduced_basis.finishing import FinishedBasis, finish
 from cms.reduced_basis.frames import Frame, FrameCondition, HeldFrame, TisserandFrame, frame_condition
 from cms.reduced_basis.kept_rotations import kept_points
 from cms.reduced_basis.matrix_moments import gram_from_matrices
-from cms.reduced_basis.node_motion import reference_motion
+from cms.reduced_basis.node_motion import reference_motion, translation_rows
 from cms.reduced_basis.node_weights import node_weights, weighted_rigid_modes
 from cms.reduced_basis.stress_modes import nodal_stress_modes, point_stress_modes
 from cms.reduced_body.invariants import Moments, moments_from_gram
@@ -32,12 +32,13 @@ from cms.second_order.geometric_reduction import stiffness_of_states
 from cms.second_order.quadratic_modes import quadratic_modes
 from cms.second_order.room_for_stiffness import chosen_words, left_out_words, require_room_for_stiffness
 from cms.second_order.unit_states import UnitStates, has_geometric_stiffness, require_geometric_stiffness, states_of
-from cms.solvers.tall import inner
+from cms.solvers.tall import inner, rows_times
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.kept_nodes import keep_nodes
 from fe_models.body.load_cases import LoadCase, ReducedLoadCase
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.tall.on_disk import release, zeros_like
+from fe_models.foundation.ranks.spread_columns import SpreadColumns
+from fe_models.foundation.tall.on_disk import in_memory, release, zeros_like
 
 __all__ = ["assembled", "reduce"]
 
@@ -135,11 +136,11 @@ def reduce(
     return replace(
         reduced,
         provenance={**reduced.provenance, **({"geometric stiffness": told} if told else {})},
-        recovery=recovery_of_model(source, finished.Phi, condition, reduced, recovery),
+        recovery=recovery_of_model(source, in_memory(finished.Phi), condition, reduced, recovery) if recovery else {},
         stress=nodal_stress_modes(body, finished.Phi, kept, axes) if stress else None,
         point_stress=point_stress_modes(body, finished.Phi, origin, axes) if stress else None,
         geometric=None if states is None else stiffness_of_states(body, finished.Phi, states),
-        quadratic=quadratic_modes(source, finished.Phi, condition, kept) if quadratic else None,
+        quadratic=quadratic_modes(source, in_memory(finished.Phi), condition, kept) if quadratic else None,
     )
 
 
@@ -196,6 +197,9 @@ def assembled(
 
 def kept_translations(body: FEBody, Phi: Array, nodes: IntArray, axes: Array) -> Array:
     """Return the translations of the shapes at some nodes in axes of B, (n, 3, n_q), some shapes at a time."""
+    if isinstance(Phi, SpreadColumns):  # the rows of these nodes alone
+        moved = rows_times(translation_rows(body, nodes), Phi).reshape(len(nodes), 3, -1)
+        return np.einsum("ba,nbk->nak", axes, moved)
     kept = zeros_like(Phi, (len(nodes), 3, Phi.shape[1]))
     for first in range(0, Phi.shape[1], SHAPES_AT_ONCE):
         some = slice(first, first + SHAPES_AT_ONCE)
@@ -276,7 +280,8 @@ def reduced_load_case(body: FEBody, case: LoadCase, Phi: Array, frame: BodyFrame
     """Modal forces of a load case, and its resultant about the origin of B."""
     wrench = geometric_rigid_modes(body, origin=frame.origin).T @ case.f
     R = frame.axes.T
-    return ReducedLoadCase(case.name, case.kind, force=R @ wrench[:3], torque=R @ wrench[3:], h=Phi.T @ case.f)
+    h = inner(Phi, case.f[:, None])[:, 0] if isinstance(Phi, SpreadColumns) else Phi.T @ case.f
+    return ReducedLoadCase(case.name, case.kind, force=R @ wrench[:3], torque=R @ wrench[3:], h=h)
 
 
 def reduced_interface(
@@ -284,7 +289,7 @@ def reduced_interface(
 ) -> ReducedInterface:
     """Motion of an interface with the modes: of its reference node, or the mean motion of its nodes."""
     motion, reference, has_rotation = reference_motion(body, interface)
-    Psi = motion @ Phi
+    Psi = rows_times(motion, Phi)
     R = frame.axes.T
     return ReducedInterface(
         interface.name,
@@ -301,7 +306,8 @@ def reduced_damping(body: FEBody, finished: FinishedBasis, damping: Damping | No
     """Return D* = Phiᵀ D Phi plus the modal or Rayleigh part, (n_q, n_q) [1/s]."""
     D = np.zeros_like(finished.K)
     if body.D is not None:
-        D += finished.Phi.T @ (body.D @ finished.Phi)
+        Phi = in_memory(finished.Phi)
+        D += Phi.T @ (body.D @ Phi)
         D = (D + D.T) / 2
     if damping is not None:
         D += modal_damping(damping, finished.M, finished.K, second=body.units.time)

@@ -23,6 +23,7 @@ from cms.quality.reference.full_reference import FullReference
 from cms.quality.reference.port_model import PortModel, modal_response
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.tall.on_disk import in_memory
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["MEASURES", "Selection", "Trial", "select_modes"]
@@ -214,7 +215,7 @@ def _by_subspaces(make: _Maker, judge: _Judge, reference: FullReference, error: 
     n, first = min(make.n_most, max(FEWEST, 2 * reference.n_band)), 0
     while True:
         modes = make(n)
-        c = basis.coordinates(modes.columns)
+        c = basis.coordinates(in_memory(modes.columns))
         at_b = np.asarray(modes.columns[make.families.body.b])
         for k in range(first, n + 1):
             C, labels = SUBSETS[make.name](modes, at_b, k)
@@ -239,7 +240,7 @@ def _by_bisection(make: _Maker, judge: _Judge, reference: FullReference, error: 
     def tried(n: int) -> Trial:
         try:
             modes = make(n)
-            c = basis.coordinates(modes.columns)
+            c = basis.coordinates(in_memory(modes.columns))
             subset = judged_subset(c, c.columns, modes.labels, c.reference[:, :n_r], basis.omega2)
         except ModeSetError as problem:
             return Trial(n, 0, np.inf, str(problem))

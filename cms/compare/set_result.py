@@ -19,6 +19,7 @@ from cms.families.families import Families
 from cms.mode_set import ModeSet
 from cms.mode_sets import MODE_SETS
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.tall.on_disk import in_memory
 
 __all__ = ["SetPart", "counts_of_parts", "joined_parts", "set_part", "set_result"]
 
@@ -123,7 +124,7 @@ def judged_points(
         try:
             if most is None or name not in SUBSETS:
                 modes = made(n_modes)
-                most = modes, basis.coordinates(modes.columns)
+                most = modes, basis.coordinates(in_memory(modes.columns))
             modes, c = most
             if name in SUBSETS:
                 C, labels = SUBSETS[name](modes, np.asarray(modes.columns[body.b]), n_modes)

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -27,13 +28,14 @@ from cms.families.vibration_modes import elastic_modes, fixed_interface_modes, n
 from cms.solvers.eigen import EigenResult
 from cms.solvers.mode_count import ModeCount, mode_count
 from cms.solvers.registry import solver_of
-from cms.solvers.tall import combine
+from cms.solvers.tall import combine, rows_times
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.ranks.spread_columns import SpreadColumns
 from fe_models.foundation.ranks.spread_matrix import largest_entry
 from fe_models.foundation.solver import Solver
-from fe_models.foundation.tall.on_disk import release
+from fe_models.foundation.tall.on_disk import in_memory, release
 
 __all__ = ["Families"]
 
@@ -149,13 +151,13 @@ class Families:
 
     @cached_property
     def Psi_C(self) -> Array:
-        """Constraint modes of the held dofs, (n_dof, n_h)."""
+        """Constraint modes of the held dofs, (n_dof, n_h); `SpreadColumns` of a body on many ranks."""
         return constraint_modes(self.fixed, to_disk=self._to_disk)
 
     @cached_property
     def S(self) -> Array:
         """Stiffness condensed to the held dofs, Psi_Cᵀ K Psi_C, (n_h, n_h) [N/m]."""
-        S = self.body.K[:, self.h].T @ self.Psi_C
+        S = rows_times(self.body.K[:, self.h].T, self.Psi_C)
         release(self.Psi_C)
         return (S + S.T) / 2
 
@@ -241,9 +243,10 @@ class Families:
             self._flexibilities[conditions.key] = Flexibility(self.condensed, conditions)
         return self._flexibilities[conditions.key]
 
-    def without_boundary(self, Phi: Array) -> Array:
+    def without_boundary(self, Phi: Any) -> Any:
         """Return Phi - Psi_C Phi_h: beside Psi_C the same span, and zero on the held dofs, (n_dof, k)."""
-        return Phi - combine(self.Psi_C, Phi[self.h])
+        at_rest = combine(self.Psi_C, Phi[self.h])
+        return Phi - (at_rest if isinstance(Phi, SpreadColumns) else in_memory(at_rest))
 
     # -- words -----------------------------------------------------------------------------------------------------
 

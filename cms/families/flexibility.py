@@ -13,13 +13,15 @@ import scipy.sparse as sp
 
 from cms.errors import BodyError, EigenError
 from cms.families.fixed_interface import FixedInterfaceBody, moving_nodes
-from cms.solvers.factorization import Inertia, factorize
+from cms.solvers.factorization import Inertia, factorize, shifted_matrix
 from cms.solvers.tall import combine, inner
+from fe_models.body.coupling_on_ranks import spread_extension
 from fe_models.body.fe_body import FEBody
-from fe_models.body.submatrix import principal_block
+from fe_models.body.submatrix import PrincipalBlock, principal_block
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.ranks.spread_matrix import whole_matrix
+from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 from fe_models.foundation.solver import Solver
+from fe_models.foundation.tall.on_disk import in_memory
 
 __all__ = ["BoundaryConditions", "CondensedBody", "Flexibility"]
 
@@ -33,7 +35,7 @@ class CondensedBody:
     """A body with its held dofs h: the boundary B, and what else it takes to hold it (`determinate_partition`)."""
 
     fixed: FixedInterfaceBody  #: interior factorisation; `fixed.b` are the held dofs h
-    Psi_C: Array  #: constraint modes, (n_dof, n_h)
+    Psi_C: Array  #: constraint modes, (n_dof, n_h); `SpreadColumns` of a body on many ranks
     S: Array  #: Psi_Cᵀ K Psi_C = K_hh + K_hI Psi_C,I, (n_h, n_h) [N/m]
     Psi_R: Array  #: independent rigid-body modes, (n_dof, n_r)
 
@@ -138,7 +140,7 @@ class Flexibility:
         g = f_z - Z.T @ (self._K_hi @ v)
         z = np.zeros((Z.shape[1], f.shape[1]))
         z[self.e] = self.solve_boundary(g[self.e])
-        u = combine(self.condensed.Psi_C, Z @ z)
+        u = in_memory(combine(self.condensed.Psi_C, Z @ z))
         u[i] += v
         return u if self.T is None else np.concatenate([u[i], z])
 
@@ -166,7 +168,8 @@ class Flexibility:
         for load, factor in ((conditions.K_load, 1.0), (conditions.M_load, -sigma)):
             if load is not None:
                 A_zz = A_zz + factor * (Z.T @ load @ Z)
-        with factorize(sp.csc_array(fixed.K_ii - sigma * fixed.M_ii), definite=False, solver=self.solver) as shifted:
+        K_ii, M_ii = PrincipalBlock(body.K, i), PrincipalBlock(body.M, i)
+        with factorize(shifted_matrix(K_ii, M_ii, sigma), definite=False, solver=self.solver) as shifted:
             inertia = shifted.inertia
             A_zz = A_zz - A_hz[i].T @ shifted.solve(A_hz[i]) if A_zz.size else A_zz
         size = 1 / np.sqrt(np.where(np.diag(A_zz) != 0, np.abs(np.diag(A_zz)), 1.0))
@@ -183,16 +186,19 @@ class Flexibility:
         return x if self.T is None else self.T @ x
 
     def _with_load(self, A: sp.csc_array, load: Array | None) -> sp.csc_array:
-        """Return Tᵀ (A + load) T; where that is A, one by rows on many ranks stays there."""
+        """Return Tᵀ (A + load) T; of a matrix by rows on many ranks there."""
         if load is None and self.T is None:
             return A
-        A = whole_matrix(A)
+        fixed = self.condensed.fixed
         if load is not None:
-            h, n = self.condensed.fixed.b, A.shape[0]
+            h, n = fixed.b, A.shape[0]
             row, column = np.nonzero(load)
-            A = sp.csc_array(A + sp.csc_array((load[row, column], (h[row], h[column])), shape=(n, n)))
+            added = sp.csc_array((load[row, column], (h[row], h[column])), shape=(n, n))
+            A = spread_extension(A, np.arange(n), added) if isinstance(A, SpreadMatrix) else sp.csc_array(A + added)
         if self.T is None:
             return A
+        if isinstance(A, SpreadMatrix):
+            return spread_extension(A, fixed.i, _boundary_entries(A, fixed, self.conditions.Z))
         if self.T.shape[1] == len(self.condensed.fixed.i):
             return principal_block(A, self.condensed.fixed.i)
         A = sp.csc_array(self.T.T @ A @ self.T)
@@ -269,12 +275,23 @@ def _cholesky(condensed: CondensedBody, Z: Array, S_z: Array, e: IntArray) -> tu
     is_free = values < SINGULAR
     if is_free.any():
         body = condensed.body
-        moved = condensed.Psi_C @ (Z[:, e] @ (size[:, None] * vectors[:, is_free]))
+        moved = in_memory(combine(condensed.Psi_C, Z[:, e] @ (size[:, None] * vectors[:, is_free])))
         raise BodyError(
             f"body {body.name!r}: {int(is_free.sum())} motions besides the rigid ones cost no energy: a mechanism, "
             f"largest at {moving_nodes(body, np.arange(body.n_dof), moved)}; join the parts or add what holds them"
         )
     return size, la.cho_factor(scaled, lower=True)
+
+
+def _boundary_entries(A: SpreadMatrix, fixed: FixedInterfaceBody, Z: Array) -> sp.csc_array:
+    """Return Tᵀ A T without its interior block, (n_i + n_z, n_i + n_z)."""
+    n_i, n_z = len(fixed.i), Z.shape[1]
+    A_z = sp.csc_array(A[:, fixed.b] @ sp.csc_array(Z))
+    A_zi, A_zz = sp.coo_array(A_z[fixed.i].T), sp.coo_array(sp.csc_array(Z).T @ A_z[fixed.b] / 2)
+    rows = n_i + np.concatenate([A_zi.row, A_zz.row])
+    columns = np.concatenate([A_zi.col, n_i + A_zz.col])
+    half = sp.coo_array((np.concatenate([A_zi.data, A_zz.data]), (rows, columns)), shape=(n_i + n_z,) * 2).tocsc()
+    return sp.csc_array(half + half.T)
 
 
 def _expansion(condensed: CondensedBody, Z: Array) -> sp.csc_array:

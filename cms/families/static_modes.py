@@ -1,5 +1,7 @@
 """Static modes of a body by its boundary dofs (docs/theory.md §2)."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from cms.families.fixed_interface import FixedInterfaceBody
@@ -9,7 +11,9 @@ from cms.solvers.tall import combine
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.components import MOTION_COMPONENTS
-from fe_models.foundation.tall.on_disk import on_disk, release
+from fe_models.foundation.ranks.spread_columns import spread_parts
+from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
+from fe_models.foundation.tall.on_disk import in_memory, on_disk, release
 
 __all__ = [
     "attachment_modes",
@@ -25,13 +29,14 @@ __all__ = [
 STIFF = 1e-14  #: compliance over the largest one (rotations times the body length squared), below which it is rounding
 STILL = 1e-24  #: the same of the energy of a response to inertia loads, where both factors are rounding
 BLOCK = 60  #: right-hand sides solved at once; wider blocks gain nothing measurable and cost memory
+BLOCK_OF_RANKS = 16  #: the same of a body on many ranks, whose columns pass through rank 0
 
 
 def constraint_modes(fixed: FixedInterfaceBody, *, to_disk: bool = False) -> Array:
     """Constraint modes Psi_C: unit displacement of one boundary dof, the other boundary dofs held.
 
     Interior part -K_II⁻¹ K_IB; columns in the order of the held dofs `fixed.b`; `BLOCK` are solved at once, and lie on
-    disk (`fe_models.foundation.tall.on_disk`) where that is asked for.
+    disk (`fe_models.foundation.tall.on_disk`) where that is asked for, on all ranks (`SpreadColumns`) where K does.
 
     Returns
     -------
@@ -39,6 +44,8 @@ def constraint_modes(fixed: FixedInterfaceBody, *, to_disk: bool = False) -> Arr
         (n_dof, n_b), translations per translation [-] or per rotation [m].
     """
     body, i, b = fixed.body, fixed.i, fixed.b
+    if isinstance(body.K, SpreadMatrix):
+        return spread_parts(body.K.layout, len(b), _blocks_of_constraint_modes(fixed))  # type: ignore[return-value]
     Psi_C = on_disk((body.n_dof, len(b))) if to_disk else np.zeros((body.n_dof, len(b)))
     Psi_C[b, np.arange(len(b))] = 1.0
     K_b = body.K[:, b]
@@ -47,6 +54,16 @@ def constraint_modes(fixed: FixedInterfaceBody, *, to_disk: bool = False) -> Arr
         Psi_C[i, columns] = fixed.factorization.solve(-K_b[:, columns].toarray()[i])
         release(Psi_C)
     return Psi_C
+
+
+def _blocks_of_constraint_modes(fixed: FixedInterfaceBody) -> Iterator[Array]:
+    K_b, i, b = fixed.body.K[:, fixed.b], fixed.i, fixed.b
+    for first in range(0, len(b), BLOCK_OF_RANKS):
+        last = min(first + BLOCK_OF_RANKS, len(b))
+        block = np.zeros((fixed.body.n_dof, last - first))
+        block[b[first:last], np.arange(last - first)] = 1.0
+        block[i] = fixed.factorization.solve(-K_b[:, first:last].toarray()[i])
+        yield block
 
 
 def redundant_constraint_modes(free: Flexibility) -> Array:
@@ -62,7 +79,7 @@ def redundant_constraint_modes(free: Flexibility) -> Array:
     Array
         (n_dof, n_e), the constraint modes of the E dofs.
     """
-    return free.condensed.Psi_C[:, free.e]
+    return in_memory(free.condensed.Psi_C[:, free.e])
 
 
 def attachment_modes(free: Flexibility) -> Array:
@@ -73,7 +90,7 @@ def attachment_modes(free: Flexibility) -> Array:
     Array
         (n_dof, n_e), translations per force [m/N] or per moment [1/N].
     """
-    return combine(free.condensed.Psi_C[:, free.e], free.solve_boundary(np.eye(len(free.e))))
+    return in_memory(combine(free.condensed.Psi_C[:, free.e], free.solve_boundary(np.eye(len(free.e)))))
 
 
 def inertia_relief_modes(fixed: FixedInterfaceBody, Psi_R: Array) -> Array:
@@ -116,7 +133,7 @@ def unrestrained_attachment_modes(free: Flexibility) -> Array:
     n_b, h = len(free.condensed.body.b), free.condensed.fixed.b
     on_boundary = np.zeros((len(h), n_b))  # u_h of the unit forces with R held
     on_boundary[free.e] = free.solve_boundary(np.eye(len(h), n_b)[free.e])
-    u = combine(free.condensed.Psi_C, on_boundary)
+    u = in_memory(combine(free.condensed.Psi_C, on_boundary))
     u -= combine(free.held(free.M_N), free.N[h[:n_b]].T)
     u = u - combine(free.N, free.M_N.T @ u)
     body, b = free.condensed.body, h[:n_b]

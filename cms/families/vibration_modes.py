@@ -12,6 +12,7 @@ from cms.solvers.mode_count import ModeCount
 from cms.solvers.shift_inverted import Wanted
 from fe_models.body.submatrix import PrincipalBlock
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.ranks.spread_columns import SpreadColumns
 
 __all__ = ["elastic_modes", "fixed_interface_modes", "no_modes"]
 
@@ -23,6 +24,10 @@ def fixed_interface_modes(fixed: FixedInterfaceBody, wanted: ModeCount) -> Eigen
     blocks = PrincipalBlock(fixed.body.K, fixed.i), PrincipalBlock(fixed.body.M, fixed.i)
     numbering = np.searchsorted(np.sort(fixed.i), fixed.i)
     modes = eigenmodes(*blocks, wanted, factorization=fixed.factorization, numbering=numbering)
+    if isinstance(modes.Phi, SpreadColumns):
+        block = blocks[0].spread()
+        assert block is not None  # the modes lie as it does
+        return replace(modes, Phi=block.expanded(modes.Phi))
     Phi = np.zeros((fixed.body.n_dof, modes.Phi.shape[1]))
     Phi[fixed.i] = modes.Phi
     return replace(modes, Phi=Phi)

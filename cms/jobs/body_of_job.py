@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from cms.errors import JobError
 from cms.jobs.job import Job
+from fe_models.body.coupling_on_ranks import spread_body
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.ranks.ranks import Ranks
 from fe_models.foundation.stages import Stages
@@ -36,13 +37,14 @@ def job_body(
         The solid mesh of the job as `checked_mesh` made it for the same job with other numbers: it is neither read nor
         judged again.
     ranks
-        Processes that assemble a body of one solid mesh by its parts (`fe_models.solid_body`); bodies of other kinds
-        are made here.
+        Processes that assemble a body of one solid mesh by its parts (`fe_models.solid_body`); K and M of bodies of
+        other kinds are made here, and their rows go to all ranks.
     """
     stages = stages or Stages()
     body = uncoupled_body(job, stages, on_report=on_report, mesh=mesh, ranks=ranks)
     with stages("couple interfaces"):
-        return coupled_body(job, body)
+        body = coupled_body(job, body)
+    return body if ranks is None else spread_body(body, ranks)
 
 
 def coupled_body(job: Job, body: FEBody) -> FEBody:

@@ -12,6 +12,8 @@ from cms.solvers.eigen import EigenResult
 from cms.solvers.mode_count import ModeCount
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.ranks.spread_columns import spread_beside
+from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 from fe_models.foundation.tall.on_disk import beside
 
 __all__ = [
@@ -97,10 +99,17 @@ def mode_set(
         recorded["cutoff"] = repr(float(wanted.cutoff))
     return ModeSet(
         name,
-        beside(*[block.columns for block in blocks]) if len(blocks) > 1 else blocks[0].columns,
+        side_by_side(families.body, [block.columns for block in blocks]),
         tuple(label for block in blocks for label in block.labels),
         np.concatenate([block.frequencies for block in blocks]),
         {**recorded, **(options or {})},
         tuple(group for block in blocks for group in block.groups),
         data or {},
     )
+
+
+def side_by_side(body: FEBody, columns: Sequence[Array]) -> Array:
+    """Return blocks of columns side by side; on all ranks where the matrices of the body lie so."""
+    if isinstance(body.K, SpreadMatrix):
+        return spread_beside(body.K.layout, *columns)  # type: ignore[return-value]
+    return beside(*columns) if len(columns) > 1 else columns[0]

@@ -15,6 +15,7 @@ from cms.solvers.sparse_product import SymmetricProduct
 from cms.solvers.tall import combine
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.ranks.spread_columns import SpreadColumns
 from fe_models.foundation.tall.on_disk import in_memory, release
 
 __all__ = ["with_characteristic_modes"]
@@ -80,10 +81,11 @@ def with_characteristic_modes(
     if together:
         parts = [_side_by_side(parts)]
     kept = np.setdiff1d(np.arange(len(modes.labels)), np.concatenate([part.columns for part in parts]))
-    columns, labels, groups = [modes.columns[:, kept]], [modes.labels[k] for k in kept], [modes.groups[k] for k in kept]
+    V = in_memory(modes.columns) if isinstance(modes.columns, SpreadColumns) else modes.columns
+    columns, labels, groups = [V[:, kept]], [modes.labels[k] for k in kept], [modes.groups[k] for k in kept]
     options, data = dict(modes.options), dict(modes.data)
     for part in parts:
-        Psi_C = _side_of(modes.columns, part.columns)
+        Psi_C = _side_of(V, part.columns)
         Z, frequencies = _characteristic(body, Psi_C, part, wanted)
         n_r, n_z, name = part.R.shape[1], Z.shape[1], " + ".join(part.names)
         columns.append(combine(Psi_C, np.hstack([part.R, Z])))
@@ -92,7 +94,7 @@ def with_characteristic_modes(
         groups += [f"interface {name} rigid"] * n_r + [f"interface {name} modes"] * n_z
         options[f"interface modes {name}"] = f"{n_r} rigid and {n_z} deforming, of {len(part.columns)} constraint modes"
         data[f"interface modes {name}"] = frequencies
-    release(modes.columns)
+    release(V)
     n_new = len(labels) - len(kept)
     # the vibration modes stay last, as in the sets themselves
     frequencies = np.concatenate([modes.frequencies[kept], np.full(n_new, np.nan)])

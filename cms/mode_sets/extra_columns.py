@@ -14,6 +14,7 @@ from cms.solvers.sparse_product import SymmetricProduct
 from fe_models.body.fe_body import FEBody
 from fe_models.body.load_cases import LoadCase, load_columns
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.tall.on_disk import in_memory
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["EXTRA_COLUMNS", "with_centrifugal", "with_load_cases"]
@@ -102,7 +103,7 @@ def _with_responses(modes: ModeSet, source: FEBody | Families, cases: Sequence[L
         )
     F = load_columns(cases, body.n_dof)
     names = [f"{family} {case.name}".strip() for case in cases]
-    columns, labels, groups, known = modes.columns, [*modes.labels], [*modes.groups], []
+    columns, labels, groups, known = in_memory(modes.columns), [*modes.labels], [*modes.groups], []
     with families_of(source) as families:
         held = np.zeros_like(F)
         held[families.fixed.i] = families.fixed.factorization.solve(F[families.fixed.i])  # (1)

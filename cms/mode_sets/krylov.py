@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg as la
-import scipy.sparse as sp
 from scipy.linalg.lapack import dpstrf
 
 from cms.errors import FactorizationError, ModeSetError
@@ -18,11 +17,12 @@ from cms.mode_sets.blocks import mode_set, rigid_block, static_block
 from cms.mode_sets.selection import require_interfaces
 from cms.reduced_basis.independent import Columns, gram
 from cms.second_order.centrifugal import CENTRIFUGAL
-from cms.solvers.factorization import factorize
+from cms.solvers.factorization import factorize, shifted_matrix
 from cms.solvers.sparse_product import SymmetricProduct
 from fe_models.body.fe_body import FEBody
+from fe_models.body.submatrix import PrincipalBlock
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.ranks.spread_matrix import whole_matrix
+from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 
 __all__ = ["krylov"]
 
@@ -219,7 +219,8 @@ def _shifted_expansion(families: Families, shift: float, F_extra: Array, stack: 
     """Return the expansion at a shift; the stack holds its factorisation."""
     body = families.body
     sigma = (2 * np.pi * shift) ** 2
-    A = sp.csc_array(whole_matrix(body.K) - sigma * whole_matrix(body.M))
+    order = body.K.order if isinstance(body.K, SpreadMatrix) else np.arange(body.n_dof)
+    A = shifted_matrix(PrincipalBlock(body.K, order), PrincipalBlock(body.M, order), sigma)
     try:
         factor = stack.enter_context(factorize(A, definite=False, solver=families.solver))
     except FactorizationError as error:
@@ -231,9 +232,14 @@ def _shifted_expansion(families: Families, shift: float, F_extra: Array, stack: 
     def first_block() -> Array:
         F = np.zeros((body.n_dof, len(body.b)))
         F[body.b, np.arange(len(body.b))] = 1.0
-        return factor.solve(np.hstack([F, F_extra]))
+        return solve(np.hstack([F, F_extra]))
 
-    return _Expansion(f"{shift:g} Hz", first_block, factor.solve)
+    def solve(F: Array) -> Array:
+        x = np.empty(F.shape)
+        x[order] = factor.solve(F[order])
+        return x
+
+    return _Expansion(f"{shift:g} Hz", first_block, solve)
 
 
 def _check(

@@ -15,6 +15,7 @@ from cms.reduced_basis.independent import gram
 from cms.solvers.mode_count import ModeCount, mode_count
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
+from fe_models.foundation.tall.on_disk import in_memory
 
 __all__ = [
     "ReducedPencil",
@@ -59,7 +60,7 @@ class ReducedPencil:
 
 def pencil_of_modes(body: FEBody, modes: ModeSet) -> ReducedPencil:
     """Return the pencil of a mode set in its own columns: M = Vᵀ M V, K = Vᵀ K V, L = V_B."""
-    V = modes.columns
+    V = in_memory(modes.columns)
     return ReducedPencil(modes.name, gram(V, body.M @ V), gram(V, body.K @ V), modes.labels, V[body.b])
 
 
@@ -122,7 +123,7 @@ def dual_craig_bampton_pencil(
         macneal = _macneal_pencil(families, modes)
         n_b, n = len(body.b), len(macneal.labels)
         force = slice(n - n_b, n)
-        Psi_d = modes.columns[:, force]
+        Psi_d = in_memory(modes.columns[:, force])
         M, K = np.array(macneal.M), np.array(macneal.K)
         M[force, force] = gram(Psi_d, body.M @ Psi_d)
         K[:, force] = -macneal.interface.T

@@ -1,6 +1,7 @@
 """The finishing step every mode set passes: rank, body frame, M-orthonormal shapes (docs/theory.md §3)."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.linalg as la
@@ -23,7 +24,8 @@ from cms.solvers.orientation import orientation
 from cms.solvers.tall import combined, inner, squares, subtract
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.tall.on_disk import copied, row_slices
+from fe_models.foundation.ranks.spread_columns import SpreadColumns, on_rows
+from fe_models.foundation.tall.on_disk import copied, in_memory, row_slices
 
 __all__ = ["FinishedBasis", "finish"]
 
@@ -38,7 +40,7 @@ ORTHONORMAL_DEFECT = 1e-9  #: largest defect of Phi.T M Phi - 1 that is accepted
 class FinishedBasis:
     """M-orthonormal, K-diagonal elastic shapes in the chosen frame, and where they came from."""
 
-    Phi: Array  #: (n_dof, n_q)
+    Phi: Array  #: (n_dof, n_q); `SpreadColumns` where those of the mode set are
     M: Array  #: Phi.T M Phi, (n_q, n_q): identity, zero rows for massless static shapes
     K: Array  #: Phi.T K Phi, (n_q, n_q), diagonal
     columns: SourceColumns  #: the columns of the mode set and their parts in the energy of each shape
@@ -80,7 +82,7 @@ def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedB
     Phi = combined(X, Q.Z @ Z)
     is_free = is_massive & (omega2 < ZERO_ENERGY * rounding_of_energy(body, Phi))
     if is_free.any():
-        moving = moving_nodes(body, np.arange(body.n_dof), Phi[:, is_free])
+        moving = moving_nodes(body, np.arange(body.n_dof), in_memory(Phi[:, is_free]))
         raise BodyError(
             f"body {body.name!r}: {int(is_free.sum())} motions besides the rigid ones cost no energy: a "
             f"mechanism, largest at {moving}; join the parts or add what holds them"
@@ -150,8 +152,11 @@ def elastic_pencil(
     )
 
 
-def turn_in_place(Phi: Array, turn: Array) -> None:
+def turn_in_place(Phi: Any, turn: Array) -> None:
     """Make Phi turn of Phi; where the turn changes only the sign of a mode, no other is touched."""
+    if isinstance(Phi, SpreadColumns):
+        on_rows(Phi.layout, turn_in_place, Phi, turn)
+        return
     is_mixed = np.count_nonzero(turn, axis=0) > 1
     mixed = np.flatnonzero(is_mixed | (np.count_nonzero(turn, axis=1) > 1))
     signs, turn_mixed = np.diag(turn), turn[np.ix_(mixed, mixed)]
@@ -179,7 +184,7 @@ def elastic_part(body: FEBody, Q: Basis, condition: FrameCondition, omega2_1: fl
     """Return the directions of W-orthonormal columns that hold no rigid-body motion, (k, k - n_rigid)."""
     S = orthonormal_motions(condition.Psi_R.T @ condition.M_Psi_R, omega2_1)
     C = omega2_1 * Q.inner(condition.M_Psi_R @ S)
-    E = condition.Psi_R @ S - Q.combine(C)
+    E = condition.Psi_R @ S - in_memory(Q.combine(C))
     return elastic_directions(C, E.T @ (body.K @ E) + omega2_1 * (E.T @ (body.M @ E)))
 
 

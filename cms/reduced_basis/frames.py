@@ -15,7 +15,7 @@ from cms.errors import BodyError
 from cms.families.rigid_modes import geometric_rigid_modes
 from cms.reduced_basis.node_weights import node_weights, weighted_rigid_modes
 from cms.reduced_body.reduced_body import BodyFrame
-from cms.solvers.tall import inner
+from cms.solvers.tall import inner, rows_times
 from fe_models.body.fe_body import FEBody
 from fe_models.body.numbering import Numbering
 from fe_models.foundation.arrays import Array, IntArray
@@ -150,7 +150,7 @@ def frame_condition(body: FEBody, frame: Frame | HeldFrame) -> FrameCondition:
     lu = la.lu_factor(rows @ Psi_R)
     return FrameCondition(
         placed("nodal", frame, default, held),
-        lambda columns: la.lu_solve(lu, rows @ columns),
+        lambda columns: la.lu_solve(lu, rows_times(rows, columns)),
         Psi_R,
         M_Psi_R,
         rows.T.toarray(),

@@ -5,7 +5,8 @@ there: its remainder is formed, measured, and judged itself. This is a pivoted Q
 
 The columns of a body with many interfaces are the largest array there is. They are read where they lie: Gram matrices
 are formed from a few products K v and M v at a time, one half of each (`Products`), and a basis is kept as columns
-times a small matrix (`Basis`) until the shapes themselves are wanted.
+times a small matrix (`Basis`) until the shapes themselves are wanted. Rows of columns may lie on many ranks
+(`SpreadColumns`); what is done with tall columns here is done there.
 """
 
 from dataclasses import dataclass
@@ -15,9 +16,10 @@ import scipy.linalg as la
 from scipy.linalg.lapack import dpstrf
 
 from cms.solvers.sparse_product import SymmetricProduct
-from cms.solvers.tall import combine, inner, squares
+from cms.solvers.tall import combine, dots, inner, squares
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.tall.on_disk import beside
 
 __all__ = [
     "Basis", "Columns", "Products", "gram", "gram_in_blocks", "independent_basis", "independent_columns",
@@ -48,7 +50,7 @@ class Columns:
 
     def beside(self, other: "Columns") -> "Columns":
         """Return both, side by side."""
-        return Columns(*(np.hstack([getattr(self, a), getattr(other, a)]) for a in ("X", "KX", "MX", "T")))
+        return Columns(*(beside(getattr(self, a), getattr(other, a)) for a in ("X", "KX", "MX", "T")))
 
     def inner(self, other: "Columns", omega2: float) -> Array:
         """Return selfᵀ (K + omega² M) other."""
@@ -131,7 +133,7 @@ class Basis:
         Z = np.zeros((width + k, self.Z.shape[1] + k))
         Z[:width, :-k], Z[width:, -k:] = self.Z, np.eye(k)
         G_K, G_M = sides
-        return Basis(np.hstack([self.X, new.X]), Z, np.hstack([self.T, new.T]), G_K, G_M)
+        return Basis(beside(self.X, new.X), Z, np.hstack([self.T, new.T]), G_K, G_M)
 
 
 def independent_columns(V: Array, body: FEBody, omega2: float) -> tuple[Columns, IntArray]:
@@ -247,8 +249,8 @@ def within(G: Array, Z: Array) -> Array:
 
 def _length(columns: Columns, omega2: float) -> Array:
     """W-length of every column, (k,)."""
-    stiff = np.einsum("nk,nk->k", columns.X, columns.KX)
-    return np.sqrt(np.maximum(stiff + omega2 * np.einsum("nk,nk->k", columns.X, columns.MX), 0.0))
+    stiff = dots(columns.X, columns.KX)
+    return np.sqrt(np.maximum(stiff + omega2 * dots(columns.X, columns.MX), 0.0))
 
 
 def _unit(columns: Columns, size: Array) -> Columns:

@@ -5,6 +5,7 @@ import numpy as np
 from cms.reduced_body.kept_points import KeptPoints
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.tall.on_disk import in_memory
 
 __all__ = ["kept_points"]
 
@@ -30,6 +31,7 @@ def kept_points(body: FEBody, Phi: Array, axes: Array, row_of: IntArray) -> Kept
     nodes = body.kept
     if not len(nodes):
         return None
+    Phi = in_memory(Phi)
     u = body.mesh_displacement(Phi)
     rotation, has = rotations_of_dofs(body, Phi, u, nodes)
     source = np.where(has.any(axis=1), "dofs", "unknown").astype(object)

@@ -9,6 +9,7 @@ import numpy as np
 from cms.families.rigid_modes import geometric_rigid_modes
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.tall.on_disk import in_memory
 
 __all__ = ["gram_from_matrices"]
 
@@ -26,6 +27,7 @@ def gram_from_matrices(body: FEBody, Phi: Array) -> Array:
     Array
         (4 + 3 n_q, 4 + 3 n_q) in mesh axes about the mesh origin.
     """
+    Phi = in_memory(Phi)
     n = Phi.shape[1]
     node, component = body.dofs.T
     gram = np.zeros((4 + 3 * n, 4 + 3 * n))

@@ -19,6 +19,7 @@ from cms.second_order.link_work import followers, link_work
 from cms.second_order.mean_work import mean_second_order
 from cms.second_order.spread_loads import turned_rigid_work
 from cms.second_order.unit_states import UnitStates, states_of
+from cms.solvers.tall import rows_times
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.mass_loads import MassLoads
 from fe_models.foundation.arrays import Array
@@ -127,6 +128,6 @@ def distributing_part(body: FEBody, on_dofs: Array, Phi: Array) -> Array:
 def members_second_order(body: FEBody, interface: Interface, Phi: Array, turns: bool) -> Array:
     """Return the second order of the mean motion of the members with the shapes, (6, n, n), mesh axes."""
     rows = translation_rows(body, interface.nodes)
-    v = np.asarray(rows @ Phi).reshape(len(interface.nodes), 3, -1)
+    v = rows_times(rows, Phi).reshape(len(interface.nodes), 3, -1)
     weights = np.asarray(interface.weights)
     return mean_second_order(body.nodes[interface.nodes], weights, interface.reference, v, turns=turns)

@@ -3,12 +3,12 @@
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 
 from cms.errors import EigenError
-from cms.solvers.factorization import Factorization, Matrix, factorize, matrix_of
+from cms.solvers.factorization import Factorization, Matrix, factorize, matrix_of, shifted_matrix
 from cms.solvers.inverse import Inverse
 from cms.solvers.mode_count import ModeCount, mode_count
 from cms.solvers.mode_search import DenseSearch, KrylovSearch
@@ -21,8 +21,10 @@ from cms.solvers.tall import combine
 from cms.solvers.tall_space import ArraySpace
 from fe_models.body.submatrix import PrincipalBlock
 from fe_models.foundation.arrays import Array, IntArray, frozen
+from fe_models.foundation.ranks.spread_columns import SpreadColumns
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 from fe_models.foundation.solver import Solver
+from fe_models.foundation.tall.on_disk import in_memory
 from fe_models.foundation.threads import one_blas_thread
 
 __all__ = ["EigenResult", "eigenmodes"]
@@ -46,7 +48,7 @@ class EigenResult:
 
     omega2: Array  #: (n_modes,) [1/s²]; exactly 0 for rigid-body modes
     frequencies: Array  #: (n_modes,) [Hz]
-    Phi: Array  #: (n, n_modes)
+    Phi: Array  #: (n, n_modes); `SpreadColumns` of a body on many ranks
     residuals: Array  #: |x - (omega² - sigma) (K - sigma M)⁻¹ M x|_M of x before its last inverse iteration, (n_modes,)
     n_solves: int  #: columns solved for
     method: str  #: solver and its settings, in words
@@ -54,7 +56,8 @@ class EigenResult:
 
     def __post_init__(self) -> None:
         for name in ("omega2", "frequencies", "Phi", "residuals"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
+            value = getattr(self, name)
+            object.__setattr__(self, name, value if isinstance(value, SpreadColumns) else frozen(value))
 
 
 def eigenmodes(
@@ -83,7 +86,8 @@ def eigenmodes(
         Stiffness, (n, n); semidefinite (a free body), and indefinite only by Lagrange multipliers.
     M
         Mass, (n, n), semidefinite: massless dofs and multipliers have none. Of K and M given as `PrincipalBlock` the
-        entries are not held during the search; those by rows on many ranks (`SpreadMatrix`) stay there.
+        entries are not held during the search; those by rows on many ranks (`SpreadMatrix`) stay there, and so do the
+        modes of blocks of them that were factorised there (`SpreadColumns`).
     n_modes
         Number of modes, or a `ModeCount`: all modes up to a frequency [Hz]; proof that none was missed.
     factorization
@@ -146,18 +150,19 @@ def eigenmodes(
         search = kind(operator, wanted)
         modes = search.modes(wanted)
         if asked.verify:
-            modes = _proven_modes(matrix_of(K), matrix_of(M), search, modes, wanted)
+            modes = _proven_modes(K, M, search, modes, wanted)
         k = wanted.count if wanted.omega2 is None else int((modes.omega2[: modes.n_wanted] <= wanted.omega2).sum())
         residuals, method = modes.residuals, search.description
         n_solves, solver = operator.n_solves, factorization.description
         omega2 = _zero_rigid(modes.omega2, zero=max(ZERO * scale, 1e-9 * abs(shift)))
         columns, whole = modes.expand(), modes.space.whole
-        del search, modes, operator  # the basis, before this process takes the modes
+        del search, modes, operator  # the basis, before the modes are copied
         if space is not None:
             space.close()
-        Phi = whole(columns)
+        stays = space is not None and isinstance(K, PrincipalBlock) and space.has_rows_of(K)
+        Phi = space.columns(columns) if space is not None and stays else whole(columns)
         del columns  # before the space is closed: ranks forget what has no name then
-    Phi = combine(Phi, orientation(Phi, omega2)[:, :k], order="C")
+        Phi = combine(Phi, orientation(Phi, omega2)[:, :k], order="C")
     omega2 = omega2[:k]
     _require_match(K, M, Phi, omega2, shift, tolerance)
     method = f"{method}; shift {shift:.6g}, tolerance {tolerance:g}, {n_solves} columns solved by {solver}"
@@ -176,7 +181,7 @@ def frequency_scale(K: Matrix, M: Matrix) -> float:
 
 
 def _proven_modes(
-    K: sp.csc_array, M: sp.csc_array, search: KrylovSearch | DenseSearch | SlepcSearch, modes: Modes, wanted: Wanted
+    K: Matrix, M: Matrix, search: KrylovSearch | DenseSearch | SlepcSearch, modes: Modes, wanted: Wanted
 ) -> Modes:
     """Return the modes once their number agrees with the inertia; look for more as long as it is larger."""
     operator = search.operator
@@ -210,12 +215,12 @@ def counting_shift(omega2: Array, k: int, wanted: Wanted, shift: float) -> tuple
     return len(omega2), levels[-1] + GAP * (levels[-1] - shift)
 
 
-def _factorize_shifted(K: sp.csc_array, M: sp.csc_array, sigma: float, solver: str | Solver | None) -> Factorization:
-    A = K if sigma == 0 else sp.csc_array(K - sigma * M)
+def _factorize_shifted(K: Matrix, M: Matrix, sigma: float, solver: str | Solver | None) -> Factorization:
+    A = K if sigma == 0 else shifted_matrix(K, M, sigma)
     return factorize(A, definite=sigma <= 0 and bool((A.diagonal() > 0).all()), solver=solver)
 
 
-def _count_below(K: sp.csc_array, M: sp.csc_array, sigma: float, at_shift: Inverse) -> int:
+def _count_below(K: Matrix, M: Matrix, sigma: float, at_shift: Inverse) -> int:
     """Modes between the shift and sigma, by Sylvester's law: K - sigma M has one more negative eigenvalue for each."""
     with _factorize_shifted(K, M, sigma, at_shift.solver) as factorization:
         inertia = factorization.inertia
@@ -240,15 +245,20 @@ def _require_match(K: Matrix, M: Matrix, Phi: Array, omega2: Array, shift: float
     if not len(omega2):
         return
     signs = np.random.default_rng(0).choice([-1.0, 1.0], size=len(omega2)) / np.sqrt(omega2 - shift)
-    force = K @ (Phi @ signs)
-    inertia = M @ (Phi @ (omega2 * signs))
-    size = np.linalg.norm(force) + np.linalg.norm(M @ (Phi @ ((omega2 - shift) * signs)))
+    force = K @ _combination(Phi, signs)
+    inertia = M @ _combination(Phi, omega2 * signs)
+    size = np.linalg.norm(force) + np.linalg.norm(M @ _combination(Phi, (omega2 - shift) * signs))
     defect = np.linalg.norm(force - inertia) / size
     if not defect < max(MISMATCH, 1e3 * tolerance):
         raise EigenError(
             f"eigenmodes: K x - omega² M x is {defect:.1e} of its terms; expected a factorisation of K - shift M "
             f"(shift = {shift:g}) of these very matrices"
         )
+
+
+def _combination(Phi: Any, c: Array) -> Array:
+    """Return Phi c, (n,), on rank 0."""
+    return in_memory(combine(Phi, c[:, None]))[:, 0] if isinstance(Phi, SpreadColumns) else np.asarray(Phi @ c)
 
 
 def _hertz(omega2: float) -> float:

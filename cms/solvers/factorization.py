@@ -12,10 +12,19 @@ from cms.errors import FactorizationError
 from cms.solvers.registry import solver_of
 from fe_models.body.submatrix import PrincipalBlock
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.ranks.spread_matrix import whole_matrix
+from fe_models.foundation.ranks.spread_matrix import SpreadMatrix, spread_sum, whole_matrix
 from fe_models.foundation.solver import Factor, Solver
 
-__all__ = ["EmptyFactor", "Factorization", "Inertia", "Matrix", "factorize", "matrix_of", "require_regular"]
+__all__ = [
+    "EmptyFactor",
+    "Factorization",
+    "Inertia",
+    "Matrix",
+    "factorize",
+    "matrix_of",
+    "require_regular",
+    "shifted_matrix",
+]
 
 SINGULAR = 1e-3  #: relative residual after two solves; a regular matrix of condition 1e12 leaves 1e-4
 
@@ -26,6 +35,14 @@ Matrix: TypeAlias = sp.csc_array | PrincipalBlock
 def matrix_of(A: Matrix) -> sp.csc_array:
     """Return a matrix that was given, or cut it out."""
     return A.cut() if isinstance(A, PrincipalBlock) else sp.csc_array(whole_matrix(A))
+
+
+def shifted_matrix(K: Matrix, M: Matrix, sigma: float) -> Matrix:
+    """Return K - sigma M, (n, n); of blocks by rows on many ranks there, else as a sparse matrix."""
+    if isinstance(K, PrincipalBlock) and isinstance(M, PrincipalBlock) and K.index is M.index:
+        if isinstance(K.A, SpreadMatrix) and isinstance(M.A, SpreadMatrix):
+            return PrincipalBlock(spread_sum(K.A, M.A, -sigma), K.index)
+    return sp.csc_array(matrix_of(K) - sigma * matrix_of(M))
 
 
 @dataclass(frozen=True)

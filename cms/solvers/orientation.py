@@ -1,9 +1,12 @@
 """One fixed basis among many equal ones: signs of modes, and directions within multiple frequencies."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.tall.on_disk import in_memory
 
 __all__ = ["orientation", "turn"]
 
@@ -11,7 +14,7 @@ SLICE = 8192  #: rows that are turned at a time
 MULTIPLE = 1e-10  #: relative gap of omega² below which modes count as one multiple mode
 
 
-def orientation(Phi: Array, omega2: Array) -> Array:
+def orientation(Phi: Any, omega2: Array) -> Array:
     """Orthogonal matrix Z, (k, k), that turns modes into their standard basis Phi @ Z.
 
     Within a group of modes of one frequency any rotation is as good as another, and rounding chooses. The length of a
@@ -22,7 +25,7 @@ def orientation(Phi: Array, omega2: Array) -> Array:
     Parameters
     ----------
     Phi
-        Modes by ascending frequency, (n, k).
+        Modes by ascending frequency, (n, k); of those on all ranks one frequency at a time is collected.
     omega2
         Their squared frequencies, (k,) [1/s²].
     """
@@ -32,10 +35,11 @@ def orientation(Phi: Array, omega2: Array) -> Array:
     starts = np.flatnonzero(gaps > MULTIPLE * np.abs(omega2))
     for first, last in zip(starts, [*starts[1:], k], strict=True):
         if last == first + 1:
-            size = np.abs(Phi[:, first])
-            Z[first, first] = -1.0 if Phi[np.argmax(size > 0.99 * size.max()), first] < 0 else 1.0
+            mode = in_memory(Phi[:, first:last])[:, 0]
+            size = np.abs(mode)
+            Z[first, first] = -1.0 if mode[np.argmax(size > 0.99 * size.max())] < 0 else 1.0
         else:
-            Z[first:last, first:last] = _standard_rotation(Phi[:, first:last])
+            Z[first:last, first:last] = _standard_rotation(in_memory(Phi[:, first:last]))
     return Z
 
 

@@ -7,7 +7,7 @@ the factor, so that solves take them where they are, and nothing as long as the 
 import weakref
 from collections.abc import Callable
 from itertools import count
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -21,20 +21,14 @@ from fe_models.body.submatrix import PrincipalBlock
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.ranks.product import RowsProduct
 from fe_models.foundation.ranks.ranks import Ranks
+from fe_models.foundation.ranks.row_layout import RowLayout
 from fe_models.foundation.ranks.rows import Rows, collected, own_rows
+from fe_models.foundation.ranks.spread_columns import Part, SpreadColumns, own_part
 from fe_models.foundation.ranks.trim import give_back
 
 __all__ = ["RankColumns", "RankSpace"]
 
 numbers = count()
-
-
-class Part(NamedTuple):
-    """Columns of what every rank keeps its rows of under a key."""
-
-    key: str
-    first: int
-    last: int
 
 
 class RankColumns:
@@ -144,6 +138,15 @@ class RankSpace:
         """Return columns as an array of rank 0, (n, k)."""
         return self.ask(None, collected_here, self.rows, X.part)[0]
 
+    def has_rows_of(self, A: PrincipalBlock) -> bool:
+        """Return whether the rows of a block lie on the ranks as those of the columns do."""
+        block = A.spread()
+        return block is not None and block.rows == self.rows
+
+    def columns(self, X: RankColumns) -> SpreadColumns:
+        """Return columns by another name; they go with the space, and what is made of them stays."""
+        return SpreadColumns(RowLayout(self.ranks, np.arange(self.n), self.rows), X.part, X)
+
     def product(self, A: Matrix) -> RankProduct:
         """Spread the rows of a symmetric matrix, (n, n), which may lie so, and return the product with it."""
         return RankProduct(self, A)
@@ -171,12 +174,6 @@ def kept_here(ranks: Ranks, dropped: list[str], key: str | None, function: Calla
     return None
 
 
-def own(ranks: Ranks, part: Part) -> Array:
-    """Return this rank's rows of some columns, (n_own, k), a view."""
-    kept = ranks.store[part.key]
-    return kept.columns(part.first, part.last) if isinstance(kept, ArrayBasis) else kept[:, part.first : part.last]
-
-
 def give_back_here(ranks: Ranks) -> None:
     """Return memory of what was forgotten."""
     give_back()
@@ -189,27 +186,27 @@ def given_here(ranks: Ranks, rows: Rows) -> Array:
 
 def collected_here(ranks: Ranks, rows: Rows, X: Part) -> Array | None:
     """Return the columns on rank 0."""
-    return collected(ranks, rows, own(ranks, X))
+    return collected(ranks, rows, own_part(ranks, X))
 
 
 def inner_here(ranks: Ranks, X: Part, Y: Part) -> Array:
     """Return the part of Xᵀ Y of these rows."""
-    return inner(own(ranks, X), own(ranks, Y))
+    return inner(own_part(ranks, X), own_part(ranks, Y))
 
 
 def combine_here(ranks: Ranks, X: Part, C: Array) -> Array:
     """Return rows of X C."""
-    return combine(own(ranks, X), C)
+    return combine(own_part(ranks, X), C)
 
 
 def subtract_here(ranks: Ranks, Y: Part, X: Part, C: Array) -> None:
     """Take rows of X C from those of Y."""
-    subtract(own(ranks, Y), own(ranks, X), C)
+    subtract(own_part(ranks, Y), own_part(ranks, X), C)
 
 
 def scale_here(ranks: Ranks, X: Part, factors: Array) -> None:
     """Multiply columns by their factors."""
-    ArraySpace(0).scale(own(ranks, X), factors)
+    ArraySpace(0).scale(own_part(ranks, X), factors)
 
 
 def basis_here(ranks: Ranks, key: str, rows: Rows, capacity: int) -> None:
@@ -219,7 +216,7 @@ def basis_here(ranks: Ranks, key: str, rows: Rows, capacity: int) -> None:
 
 def put_here(ranks: Ranks, key: str, first: int, X: Part) -> None:
     """Write rows of columns into a basis."""
-    ranks.store[key].put(first, own(ranks, X))
+    ranks.store[key].put(first, own_part(ranks, X))
 
 
 def turn_here(ranks: Ranks, key: str, m: int, C: Array) -> None:
@@ -241,7 +238,7 @@ def product_here(ranks: Ranks, key: str, rows: Rows) -> None:
 
 def multiplied_here(ranks: Ranks, key: str, x: Part) -> Array:
     """Return rows of A x."""
-    return np.asarray(ranks.store[key] @ own(ranks, x))
+    return np.asarray(ranks.store[key] @ own_part(ranks, x))
 
 
 def solved_here(ranks: Ranks, key: str, rows: Rows, b: Part) -> Array:
@@ -249,5 +246,5 @@ def solved_here(ranks: Ranks, key: str, rows: Rows, b: Part) -> Array:
     x = np.empty((rows.count(ranks.rank), b.last - b.first), order="F")
     for first in range(b.first, b.last, CHUNK):
         some = Part(b.key, first, min(first + CHUNK, b.last))
-        x[:, first - b.first : some.last - b.first] = solved_rows(ranks, key, rows, own(ranks, some))
+        x[:, first - b.first : some.last - b.first] = solved_rows(ranks, key, rows, own_part(ranks, some))
     return x

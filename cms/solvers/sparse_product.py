@@ -2,7 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from cms.solvers.tall import ordered
 from fe_models.body.submatrix import scalar_part
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.ranks.spread_columns import SpreadColumns
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 from fe_models.foundation.tall.on_disk import in_memory
 from fe_models.foundation.threads import n_threads
@@ -46,11 +47,11 @@ class SymmetricProduct:
         self._parts = [_rows(rows, *bounds) for bounds in zip(self._bounds[:-1], self._bounds[1:], strict=True)]
         self._pool = ThreadPoolExecutor(n_parts) if n_parts > 1 else None
 
-    def __matmul__(self, x: Array) -> Array:
-        """Return A x in the order of x, (n, k), in memory."""
-        x = in_memory(x)
+    def __matmul__(self, x: Any) -> Any:
+        """Return A x in the order of x, (n, k), in memory; of columns on all ranks on these."""
         if self._is_spread:
-            return np.asarray(self.A @ x)
+            return self.A @ (x if isinstance(x, SpreadColumns) else in_memory(x))
+        x = in_memory(x)
         order: Literal["C", "F"] = "F" if x.flags.f_contiguous else "C"
         result = np.empty(x.shape)
         for first in range(0, x.shape[1], self._columns):

@@ -2,32 +2,38 @@
 
 NumPy's own BLAS threads wait for their next task on the processor, which the sparse solver working in turns with them
 then lacks; ours sleep. The slices are summed in their order, so that results repeat bit for bit. Arrays on disk
-(`fe_models.foundation.tall.on_disk`) are worked on in smaller slices.
+(`fe_models.foundation.tall.on_disk`) are worked on in smaller slices. Columns whose rows lie on all ranks
+(`SpreadColumns`) are worked on there, and an array beside them is sent there; so is what is made of them.
 """
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from itertools import pairwise
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+import scipy.sparse as sp
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.ranks.spread_columns import SpreadColumns, on_rows, spread_columns, spread_with
 from fe_models.foundation.tall.on_disk import is_on_disk, row_slices, zeros_like
 from fe_models.foundation.threads import n_threads
 
 if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
 
-__all__ = ["combine", "combined", "inner", "ordered", "put", "squares", "subtract"]
+__all__ = ["combine", "combined", "dots", "inner", "ordered", "put", "rows_times", "squares", "subtract"]
 
 SMALL = 20_000  #: rows below which threads cost more than they bring
 SLICE = 8192  #: rows at a time; what is made of them on the way stays in the cache
 
 
-def inner(X: Array, Y: Array) -> Array:
+def inner(X: Any, Y: Any) -> Array:
     """Return Xᵀ Y, (k, l)."""
+    if (found := next((each for each in (X, Y) if isinstance(each, SpreadColumns)), None)) is not None:
+        layout = found.layout
+        return _sum(iter(on_rows(layout, inner, spread_columns(layout, X), spread_columns(layout, Y))))
 
     def multiply(rows: slice) -> Array:
         return _sum(X[some].T @ Y[some] for some in row_slices(rows, X, Y))
@@ -35,13 +41,37 @@ def inner(X: Array, Y: Array) -> Array:
     return np.sum(_by_rows(len(X), multiply), axis=0)
 
 
-def squares(d: Array, X: Array) -> Array:
+def dots(X: Any, Y: Any) -> Array:
+    """Return Σ_n X_nk Y_nk of every column, (k,)."""
+    if isinstance(X, SpreadColumns):
+        return _sum(iter(on_rows(X.layout, dots, X, Y)))
+    return np.asarray(np.einsum("nk,nk->k", X, Y))
+
+
+def rows_times(S: Any, X: Any) -> Array:
+    """Return S X, (m, k), of a sparse matrix S, (m, n), that reads few rows of X."""
+    if not isinstance(X, SpreadColumns):
+        return np.asarray(S @ X)
+    S = sp.csr_array(S)
+    read = np.unique(S.indices).astype(np.int64)
+    return np.asarray(S[:, read] @ X[read])
+
+
+def squares(d: Array, X: Any) -> Array:
     """Return Σ_n d_n X_nk² of every column, (k,)."""
+    if isinstance(X, SpreadColumns):
+        return _sum(iter(on_rows(X.layout, _weighted_squares, spread_columns(X.layout, d[:, None]), X)))
     return _sum(np.einsum("n,nk,nk->k", d[some], X[some], X[some]) for some in row_slices(len(X), X))
 
 
-def combine(X: Array, C: Array, *, order: Literal["C", "F"] | None = None) -> Array:
+def _weighted_squares(d: Array, X: Array) -> Array:
+    return squares(d[:, 0], X)
+
+
+def combine(X: Any, C: Array, *, order: Literal["C", "F"] | None = None) -> Any:
     """Return X C, (n, l), in the order of X or the one given."""
+    if isinstance(X, SpreadColumns):
+        return spread_with(X.layout, C.shape[1], combine, X, C)
     order = order or _order(X)
     shape = (len(X), C.shape[1])
     result = zeros_like(X, shape) if order == "C" else np.empty(shape, order=order)
@@ -57,10 +87,10 @@ def combine(X: Array, C: Array, *, order: Literal["C", "F"] | None = None) -> Ar
     return result
 
 
-def combined(X: Array, C: Array) -> Array:
+def combined(X: Any, C: Array) -> Any:
     """Return X C, (n, m), in the place of X, (n, k), which is lost; an array of its own where m is much less than k."""
     k, m = C.shape
-    if not k // 2 <= m <= k:
+    if isinstance(X, SpreadColumns) or not k // 2 <= m <= k:
         return combine(X, C)
 
     def update(rows: slice) -> None:
@@ -76,8 +106,11 @@ def combined(X: Array, C: Array) -> Array:
     return whole[: len(X) * m].reshape(-1, m)
 
 
-def subtract(Y: Array, X: Array, C: Array) -> None:
+def subtract(Y: Any, X: Any, C: Array) -> None:
     """Take X C from Y, (n, l), in place."""
+    if isinstance(Y, SpreadColumns):
+        on_rows(Y.layout, subtract, Y, spread_columns(Y.layout, X), C)
+        return
     order = _order(Y)
 
     def update(rows: slice) -> None:

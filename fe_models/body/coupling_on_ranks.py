@@ -1,17 +1,26 @@
-"""Couplings of matrices by rows on all ranks: what stays, stays where it is; what is new comes from rank 0."""
+"""Bodies whose stiffness and mass lie by rows on all ranks.
+
+In couplings, what stays stays where it is, and what is new comes from rank 0; a body that rank 0 has made whole gives
+its rows away (`spread_body`).
+"""
+
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
 
+from fe_models.body.fe_body import FEBody, Recovery
+from fe_models.body.nearby import nearby_order
 from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.ranks.ranks import Ranks
-from fe_models.foundation.ranks.rows import Rows
+from fe_models.foundation.ranks.rows import Rows, even_rows, spread
 from fe_models.foundation.ranks.spread_matrix import OwnRows, SpreadMatrix
 from fe_models.foundation.ranks.trim import give_back
 
-__all__ = ["spread_extension"]
+__all__ = ["spread_body", "spread_extension"]
 
 KEY = "rows that stay"
+KEY_OF_WHOLE = "rows of rank 0"
 
 
 def spread_extension(A: SpreadMatrix, keep: IntArray, more: sp.csc_array) -> SpreadMatrix:
@@ -54,3 +63,40 @@ def extended_here(ranks: Ranks, rows: Rows, more: sp.csr_array) -> OwnRows:
     A.sort_indices()
     give_back()
     return OwnRows(A.indptr.astype(np.int32), A.indices.astype(np.int32), A.data)
+
+
+def spread_body(body: FEBody, ranks: Ranks) -> FEBody:
+    """Return a body whose K and M lie by rows on all ranks, those of rank 0 in place of the whole.
+
+    Rows in an order in which neighbours are near, cut into parts of about as many entries of K. One rank, and a body
+    that lies so already, as those of solid meshes do: the body itself.
+    """
+    if ranks.size == 1 or isinstance(body.K, SpreadMatrix):
+        return body
+    order = nearby_order(body.K, body.dofs, np.arange(body.n_dof))
+    rows = even_rows(np.concatenate([[0], np.cumsum(np.diff(body.K.indptr)[order])]), ranks.size)
+    # element models take columns of rank 0 where the recovery does not say where rows of the mesh lie
+    recovery = body.recovery or Recovery(sp.eye_array(body.n_dof, format="csr"), body.dofs)
+    return replace(
+        body,
+        K=spread_whole(ranks, body.K, order, rows),
+        M=spread_whole(ranks, body.M, order, rows),
+        recovery=replace(recovery, layout=None),
+    )
+
+
+def spread_whole(ranks: Ranks, A: sp.csc_array, order: IntArray, rows: Rows) -> SpreadMatrix:
+    """Return a symmetric matrix of rank 0 by rows on all ranks, in this order."""
+    by_rows = sp.csr_array((A.data, A.indices, A.indptr), shape=A.shape)[order]
+    place = np.empty(len(order), by_rows.indices.dtype)
+    place[order] = np.arange(len(order), dtype=place.dtype)
+    by_rows = sp.csr_array((by_rows.data, place[by_rows.indices], by_rows.indptr), shape=A.shape)
+    by_rows.sort_indices()
+    ranks.store[KEY_OF_WHOLE] = (by_rows.indptr, by_rows.indices, by_rows.data)
+    del by_rows
+    return SpreadMatrix(ranks, order, rows, given_here, rows)
+
+
+def given_here(ranks: Ranks, rows: Rows) -> OwnRows:
+    """Return this rank's rows of what rank 0 has."""
+    return OwnRows(*spread(ranks, rows, ranks.store.pop(KEY_OF_WHOLE, None)))

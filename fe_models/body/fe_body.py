@@ -21,6 +21,8 @@ from fe_models.foundation.arrays import (
     symmetric_csc,
 )
 from fe_models.foundation.errors import BodyError
+from fe_models.foundation.ranks.row_layout import RowLayout
+from fe_models.foundation.ranks.spread_columns import SpreadColumns, spread_parts
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 from fe_models.foundation.tall.on_disk import in_memory, is_on_disk, release, row_slices, zeros_like
 from fe_models.foundation.units import Units, unit_system
@@ -206,6 +208,7 @@ class Recovery:
 
     matrix: sp.csr_array  #: (n_mesh_dof, n_dof)
     dofs: IntArray  #: (node, component) of the mesh dofs, (n_mesh_dof, 2)
+    layout: RowLayout | None = None  #: where rows of the mesh dofs lie on many ranks
 
 
 @dataclass(frozen=True, eq=False)
@@ -339,10 +342,15 @@ class FEBody:
                 f"body {self.name!r}: interfaces {missing} have no boundary dofs yet; call cms.couple(body)"
             )
 
-    def mesh_displacement(self, u: Array) -> Array:
-        """Return displacement columns over the dofs of the mesh, (n_mesh_dof, k), of columns u, (n_dof, k)."""
+    def mesh_displacement(self, u: Any) -> Any:
+        """Return displacement columns over the dofs of the mesh, (n_mesh_dof, k), of columns u, (n_dof, k).
+
+        Those of columns on many ranks lie there too, if the recovery says how; else they are an array.
+        """
         if self.recovery is None:
             return u
+        if isinstance(u, SpreadColumns):
+            return self._spread_displacement(u)
         if not is_on_disk(u) or not u.flags.c_contiguous:  # some columns of an array on disk are few
             return self.recovery.matrix @ in_memory(u)
         T = sp.csr_array(self.recovery.matrix)
@@ -351,6 +359,13 @@ class FEBody:
             result[rows] = T[rows] @ u
             release(u)
         return result
+
+    def _spread_displacement(self, u: SpreadColumns) -> Any:
+        assert self.recovery is not None
+        T = self.recovery.matrix
+        if self.recovery.layout is None:
+            return T @ in_memory(u)
+        return spread_parts(self.recovery.layout, u.shape[1], (T @ x for _, x in u.parts()))
 
     def translations(self, u: Array) -> Array:
         """Return translations at all nodes, (n_nodes, 3, k), of displacement columns u, (n_dof, k) [m].

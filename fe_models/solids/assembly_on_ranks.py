@@ -3,12 +3,13 @@
 (1) rank 0 orders the nodes so that neighbours are near, and cuts the order into parts of about as many entries
 (2) every rank gets the elements that touch its nodes, and these elements alone
 (3) it assembles them and keeps the rows of its own nodes, which are whole: no sums pass between ranks
-(4) rank 0 collects the scalar mass M_s, a thirteenth of all entries, for the moments of the body
+(4) rows of the scalar mass M_s stay likewise, for the moments of the body
 
 Elements at a cut are computed by each rank whose nodes they touch. Entries are those of one process bit for bit, since
 the elements of a node are added in the same sequence.
 """
 
+import weakref
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.ranks.ranks import Ranks
+from fe_models.foundation.ranks.row_layout import RowLayout, asked, dropped, new_key
 from fe_models.foundation.ranks.rows import Rows, even_rows
 from fe_models.foundation.ranks.spread_matrix import OwnRows, SpreadMatrix
 from fe_models.foundation.ranks.trim import give_back
@@ -28,9 +30,11 @@ from fe_models.foundation.threads import n_threads
 from fe_models.meshes.mesh import Mesh
 from fe_models.solids.assembly import assemble, in_parts, node_graph, require_assemblable
 
-__all__ = ["assemble_on_ranks"]
+__all__ = ["MeshPart", "SpreadMesh", "assemble_on_ranks"]
 
 KEY = "assembled rows"  #: of what a rank has assembled and not yet handed on
+MATRICES = ("K", "M", "M_s")
+KEPT = (*MATRICES, "mesh")
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +46,29 @@ class MeshPart:
     position: np.ndarray  #: of each node of the part in the order of all, (n_part_nodes,)
     own: np.ndarray  #: its own nodes among them, in that order, (n_own,)
 
+    def cells_of(self, rows: slice) -> "MeshPart":
+        """Return the cells whose first node in the order of all is an own one: each is of one rank."""
+        first = {kind: self.position[cells].min(axis=1) for kind, cells in self.mesh.cells.items()}
+        index = {kind: np.flatnonzero((at >= rows.start) & (at < rows.stop)) for kind, at in first.items()}
+        cells = {kind: self.mesh.cells[kind][some] for kind, some in index.items() if len(some)}
+        of_cell = {kind: self.of_cell[kind][some] for kind, some in index.items() if len(some)}
+        return MeshPart(Mesh(self.mesh.nodes, cells), of_cell, self.position, self.own)
+
+
+class SpreadMesh:
+    """The mesh by parts: every rank keeps the cells that touch its nodes; with the last name of it they go."""
+
+    def __init__(self, layout: RowLayout) -> None:
+        """Let every rank keep what it assembled; layout: of the nodes."""
+        self.layout, self.key = layout, new_key()
+        layout.ask(mesh_here, self.key)
+        weakref.finalize(self, dropped.append, self.key).atexit = False
+
 
 def assemble_on_ranks(
     ranks: Ranks, mesh: Mesh, properties: Array, of_cell: Mapping[str, IntArray], options: Mapping[str, Any]
-) -> tuple[SpreadMatrix, SpreadMatrix, sp.csr_array]:
-    """Return K and M = M_s ⊗ 1₃ by rows on all ranks, and M_s on rank 0 (`fe_models.solids.assembly.assemble`).
+) -> tuple[SpreadMatrix, SpreadMatrix, SpreadMatrix, SpreadMesh]:
+    """Return K, M = M_s ⊗ 1₃ and M_s by rows on all ranks (`fe_models.solids.assembly.assemble`), and the mesh so.
 
     Parameters
     ----------
@@ -60,19 +82,16 @@ def assemble_on_ranks(
     order, rows = node_order(list(lists.values()), len(mesh.nodes), ranks.size)  # (1)
     ranks.store[KEY] = [mesh_part(mesh, lists, of_cell, order, rows, rank) for rank in range(ranks.size)]  # (2)
     try:
-        parts = ranks.everywhere(assemble_here, len(order), properties, dict(options))  # (3)
+        asked(ranks, assemble_here, properties, dict(options))  # (3)
     except MeshError:  # told of a part of the mesh: one process finds the same in the whole
+        asked(ranks, forget_here)  # the rows of ranks whose part does
         assemble(mesh, properties, of_cell, **options)
         raise
-    position = np.empty(len(order), np.int64)
-    position[order] = np.arange(len(order))
-    M_s = sp.csr_array(sp.vstack(parts, format="csr")[position])  # (4)
-    M_s = sp.csr_array((M_s.data, order[M_s.indices].astype(np.int32), M_s.indptr), shape=M_s.shape)
-    M_s.sort_indices()
     of_dofs = (3 * order[:, None] + np.arange(3)).ravel()
-    rows = Rows(tuple(3 * start for start in rows.starts))
-    K, M = (SpreadMatrix(ranks, of_dofs, rows, handed_here, name) for name in ("K", "M"))
-    return K, M, M_s
+    dof_rows = Rows(tuple(3 * start for start in rows.starts))
+    M_s = SpreadMatrix(ranks, order, rows, handed_here, "M_s")  # (4)
+    K, M = (SpreadMatrix(ranks, of_dofs, dof_rows, handed_here, name) for name in ("K", "M"))
+    return K, M, M_s, SpreadMesh(M_s.layout)
 
 
 def node_order(lists: list[np.ndarray], n_nodes: int, size: int) -> tuple[IntArray, Rows]:
@@ -114,15 +133,16 @@ def mesh_part(
     )
 
 
-def assemble_here(ranks: Ranks, n_nodes: int, properties: Array, options: dict[str, Any]) -> sp.csr_array:
-    """Step (3): keep own rows of K and M; return those of M_s, columns in the order of all, (n_own, n_nodes)."""
+def assemble_here(ranks: Ranks, properties: Array, options: dict[str, Any]) -> None:
+    """Step (3): keep own rows of K, M and M_s, columns in the order of all."""
     parts = ranks.store.pop(KEY, None) or [None] * ranks.size
     part: MeshPart = parts[0] if ranks.size == 1 else ranks.comm.alltoall(parts)[0]
     del parts
+    ranks.store[f"{KEY} mesh"] = part
     if not len(part.own):  # fewer nodes than ranks
-        for name in ("K", "M"):
+        for name in MATRICES:
             ranks.store[f"{KEY} {name}"] = OwnRows(np.zeros(1, np.int32), np.zeros(0, np.int32), np.zeros(0))
-        return sp.csr_array((0, n_nodes))
+        return
     K, M_s = assemble(part.mesh, properties, part.of_cell, **options)
     dofs = (3 * part.own[:, None] + np.arange(3)).ravel()
     own_K = sp.csr_array((K.data, K.indices, K.indptr), shape=K.shape)[dofs]  # columns of a symmetric matrix are rows
@@ -133,8 +153,20 @@ def assemble_here(ranks: Ranks, n_nodes: int, properties: Array, options: dict[s
     ranks.store[f"{KEY} K"] = OwnRows(own_K.indptr, of_dofs[own_K.indices], own_K.data)
     columns = part.position[own_M.indices]
     ranks.store[f"{KEY} M"] = expanded_rows(own_M.indptr, columns, own_M.data)
+    ranks.store[f"{KEY} M_s"] = OwnRows(own_M.indptr.astype(np.int32), columns, own_M.data)
     give_back()
-    return sp.csr_array((own_M.data, columns, own_M.indptr), shape=(len(part.own), n_nodes))
+
+
+def forget_here(ranks: Ranks) -> None:
+    """Forget what was assembled or given for it."""
+    for key in (KEY, *(f"{KEY} {name}" for name in KEPT)):
+        ranks.store.pop(key, None)
+    give_back()
+
+
+def mesh_here(ranks: Ranks, key: str) -> None:
+    """Keep the part of the mesh by another name."""
+    ranks.store[key] = ranks.store.pop(f"{KEY} mesh")
 
 
 def handed_here(ranks: Ranks, name: str) -> OwnRows:

@@ -1,6 +1,6 @@
 """A finite element body from a mesh of solid cells."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,7 +15,12 @@ from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.mass_loads import MassLoads
 from fe_models.foundation.arrays import Array, IntArray, frozen_int
 from fe_models.foundation.errors import BodyError
+from fe_models.foundation.ranks.product import RowsProduct
 from fe_models.foundation.ranks.ranks import Ranks
+from fe_models.foundation.ranks.row_layout import RowLayout
+from fe_models.foundation.ranks.rows import Rows
+from fe_models.foundation.ranks.spread_columns import Part, SpreadColumns, own_part, spread_columns
+from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 from fe_models.foundation.tall.on_disk import in_memory, row_slices
 from fe_models.foundation.threads import n_threads
 from fe_models.foundation.units import Units
@@ -27,9 +32,10 @@ from fe_models.meshes.cell_shapes import cell_jacobians
 from fe_models.meshes.mesh import Mesh
 from fe_models.meshes.mesh_numbering import solid_numbering
 from fe_models.solids.assembly import Progress, assemble, elastic_properties, expand_scalar_mass
-from fe_models.solids.assembly_on_ranks import assemble_on_ranks
+from fe_models.solids.assembly_on_ranks import SpreadMesh, assemble_on_ranks
 from fe_models.solids.elements import INTEGRATIONS, MASSES, reference_element
 from fe_models.solids.geometric import internal_forces, projected_geometric_stiffness
+from fe_models.solids.geometric_on_ranks import spread_geometric_stiffness
 from fe_models.solids.incompatible import KIND
 from fe_models.solids.rotation import nodal_rotation
 from fe_models.solids.stress import nodal_stress, stiffest_at_nodes
@@ -47,9 +53,10 @@ class SolidModel:
     mesh: Mesh
     materials: tuple[AnyMaterial, ...]
     of_cell: Mapping[str, IntArray]  #: cell type -> material of each cell, (n_cells,)
-    M_s: sp.csr_array  #: scalar consistent mass, (n_nodes, n_nodes) [kg]
+    M_s: sp.csr_array | SpreadMatrix  #: scalar consistent mass, (n_nodes, n_nodes) [kg]
     incompatible: bool = False  #: whether bricks of eight nodes have incompatible modes
     integration: str = "full"  #: of the stiffness, of `fe_models.solids.elements.INTEGRATIONS`
+    parts: SpreadMesh | None = None  #: the mesh by parts, where many ranks assembled it
 
     @cached_property
     def of_node(self) -> IntArray:
@@ -61,8 +68,10 @@ class SolidModel:
         """True: the elements know it."""
         return True
 
-    def mass_gram(self, u: Array) -> Array:
+    def mass_gram(self, u: Any) -> Array:
         """Return ∫ a aᵀ over mass, a = [1, c, u_x, u_y, u_z], (4 + 3 k, 4 + 3 k), exact; u is (3 n_nodes, k)."""
+        if isinstance(self.M_s, SpreadMatrix):
+            return spread_mass_gram(self.M_s, self.mesh.nodes, u)
         return scalar_mass_gram(self.M_s, self.mesh.nodes, np.asarray(u).reshape(len(self.mesh.nodes), 3, -1))
 
     def nodal_stress(self, u: Array, *, nodes: IntArray | None = None) -> Array:
@@ -105,10 +114,16 @@ class SolidModel:
             integration=self.integration,
         )
 
-    def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Array) -> Array:
-        """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), of the states u, (3 n_nodes, k); the stress alone makes it."""
+    def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Any) -> Array:
+        """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), of the states u, (3 n_nodes, k); the stress alone makes it.
+
+        Of columns on many ranks each rank does its cells.
+        """
         require_rows("geometric_stiffness", u, 3 * len(self.mesh.nodes))
         require_rows("geometric_stiffness", Phi, 3 * len(self.mesh.nodes))
+        if isinstance(Phi, SpreadColumns) and self.parts is not None:
+            rules = {"incompatible": self.incompatible, "integration": self.integration}
+            return spread_geometric_stiffness(self.parts, self.materials, u, Phi, rules)
         return projected_geometric_stiffness(
             self.mesh,
             self.materials,
@@ -189,9 +204,9 @@ def solid_body(
     }
     if ranks is None or ranks.size == 1:
         K, M_s = assemble(mesh, properties, of_cell, progress=progress, **rules)
-        M = expand_scalar_mass(M_s)
+        M, parts = expand_scalar_mass(M_s), None
     else:
-        K, M, M_s = assemble_on_ranks(ranks, mesh, properties, of_cell, rules)
+        K, M, M_s, parts = assemble_on_ranks(ranks, mesh, properties, of_cell, rules)
     n_nodes = len(mesh.nodes)
     return FEBody(
         name=name,
@@ -203,7 +218,7 @@ def solid_body(
         units=units,
         surface=boundary_triangles(mesh),
         node_volumes=node_volumes(mesh),
-        element_model=SolidModel(mesh, used, of_cell, M_s, incompatible_modes, integration),
+        element_model=SolidModel(mesh, used, of_cell, M_s, incompatible_modes, integration, parts),
         numbering=solid_numbering(mesh),
         provenance=provenance(mesh, used, of_cell) | _brick_words(mesh, incompatible_modes) | rule_words,
     )
@@ -221,28 +236,66 @@ def scalar_mass_gram(M_s: sp.csr_array, nodes: Array, u: Array) -> Array:
     u
         Translations of the nodes, (n_nodes, 3, k) [m].
     """
-    n_nodes = len(nodes)
-    linear = np.hstack([np.ones((n_nodes, 1)), nodes])
-    columns = u.reshape(n_nodes, -1)
-    k, n_parts = columns.shape[1], n_threads()
-    cuts = np.linspace(0, n_nodes, n_parts + 1).astype(int)
+    n_parts = n_threads()
+    cuts = np.linspace(0, len(nodes), n_parts + 1).astype(int)
     parts = [M_s[a:b] for a, b in pairwise(cuts)]
+    with ThreadPoolExecutor(n_parts) as pool:  # sparse products in threads; the dense ones have threads of their own
+
+        def multiply(block: Array) -> Array:
+            return np.concatenate(list(pool.map(lambda part: part @ block, parts)))
+
+        return gram_by_products(multiply, nodes, u.reshape(len(nodes), -1), width_of_gram(len(nodes)))
+
+
+def width_of_gram(n_nodes: int) -> int:
+    """Return how many columns are multiplied by M_s at once."""
+    return max(16, int(GRAM_BYTES / (8 * n_nodes)))
+
+
+def gram_by_products(multiply: Callable[[Array], Array], nodes: Array, columns: Array, width: int) -> Array:
+    """Return Aᵀ M_s A, A = [1, X, columns], by products x -> M_s x, so many columns at once.
+
+    Parameters
+    ----------
+    nodes, columns
+        Rows of X and of u_x, u_y, u_z of all nodes or, on one of many ranks, of its own; results of ranks are summed.
+    """
+    n_nodes, k = columns.shape
+    linear = np.hstack([np.ones((n_nodes, 1)), nodes])
     gram = np.zeros((4 + k, 4 + k))
-    first = linear.T @ (M_s @ linear)
+    first = linear.T @ multiply(linear)
     gram[:4, :4] = (first + first.T) / 2
-    width = max(16, int(GRAM_BYTES / (8 * n_nodes)))
-    with ThreadPoolExecutor(n_parts) as pool:
-        for begin in range(0, k, width):  # sparse products in threads; the dense ones have threads of their own
-            end = min(begin + width, k)
-            block = np.ascontiguousarray(in_memory(columns[:, begin:end]))
-            product = np.concatenate(list(pool.map(lambda part, block=block: part @ block, parts)))
-            own = slice(4 + begin, 4 + end)
-            gram[:4, own] = linear.T @ product
-            for rows in row_slices(n_nodes, columns):
-                gram[4 : 4 + end, own] += columns[rows, :end].T @ product[rows]
-            gram[own, : 4 + begin] = gram[: 4 + begin, own].T  # symmetric by definition: the other half is not formed
-            gram[own, own] = (gram[own, own] + gram[own, own].T) / 2
+    for begin in range(0, k, width):
+        end = min(begin + width, k)
+        product = multiply(np.ascontiguousarray(in_memory(columns[:, begin:end])))
+        own = slice(4 + begin, 4 + end)
+        gram[:4, own] = linear.T @ product
+        for rows in row_slices(n_nodes, columns):
+            gram[4 : 4 + end, own] += columns[rows, :end].T @ product[rows]
+        gram[own, : 4 + begin] = gram[: 4 + begin, own].T  # symmetric by definition: the other half is not formed
+        gram[own, own] = (gram[own, own] + gram[own, own].T) / 2
     return gram
+
+
+def spread_mass_gram(M_s: SpreadMatrix, nodes: Array, u: Any) -> Array:
+    """Return `scalar_mass_gram` of columns u, (3 n_nodes, k), where M_s lies by rows on many ranks, as a sum of these.
+
+    Columns on the ranks lie as the dofs of the nodes do; those of rank 0 go there.
+    """
+    order = (3 * M_s.order[:, None] + np.arange(3)).ravel()
+    layout = RowLayout(M_s.ranks, order, Rows(tuple(3 * start for start in M_s.rows.starts)))
+    columns, places = spread_columns(layout, u), spread_columns(M_s.layout, nodes)
+    if not columns.layout.is_like(layout):
+        raise BodyError(f"mass_gram: u, {columns.shape}: its rows lie on the ranks otherwise than those of the mass")
+    width = width_of_gram(len(nodes))
+    return np.asarray(np.sum(M_s.layout.ask(gram_here, M_s.key, places.part, columns.part, width), axis=0))
+
+
+def gram_here(ranks: Ranks, key: str, nodes: Part, u: Part, width: int) -> Array:
+    """Return the part of Aᵀ M_s A of this rank's rows."""
+    product: RowsProduct = ranks.store[key]
+    columns = np.ascontiguousarray(own_part(ranks, u)).reshape(product.n_own, -1)
+    return gram_by_products(product.__matmul__, own_part(ranks, nodes), columns, width)
 
 
 def node_volumes(mesh: Mesh) -> Array:

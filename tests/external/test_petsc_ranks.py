@@ -28,7 +28,7 @@ CLOSE = 1e-8
 #: mode sets that take other columns than those of the factor: functions, a file, a tree of substructures
 OTHERWISE = ("assumed-modes", "user-basis", "multilevel")
 #: those that take K and M apart, for which rank 0 collects them
-COLLECTED = ("attachment", "benfield-hruda", "krylov", "multilevel")
+COLLECTED = ("multilevel",)
 
 
 def on_ranks(n, *command):

@@ -1,4 +1,4 @@
-"""Products of a sparse matrix and tall arrays, rows of both on many ranks."""
+"""Products of a sparse matrix and tall arrays, rows of both on many ranks, and rows of neighbours."""
 
 import numpy as np
 import scipy.sparse as sp
@@ -7,9 +7,26 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.ranks.ranks import Ranks
 from fe_models.foundation.ranks.rows import Rows
 
-__all__ = ["RowsProduct"]
+__all__ = ["Halo", "RowsProduct"]
 
 COLUMNS = 16  #: columns per pass over the matrix; the rows of x it touches then stay in the cache
+
+
+class Halo:
+    """Rows of others that a rank needs: every rank tells the others once which, and gets them when it asks."""
+
+    def __init__(self, ranks: Ranks, rows: Rows, places: np.ndarray) -> None:
+        """Prepare; called on all ranks at once, each with the rows of others it needs, ascending."""
+        self.ranks, self.places = ranks, places
+        bounds = np.searchsorted(places, rows.starts)
+        asked = [(places[a:b] - first) for a, b, first in zip(bounds, bounds[1:], rows.starts, strict=False)]
+        self.sent = [asked[0]] if ranks.size == 1 else ranks.comm.alltoall(asked)
+
+    def rows(self, x: Array) -> Array:
+        """Return the rows it needs, (n_places, k), by its own rows, (n_own, k); called on all ranks at once."""
+        if self.ranks.size == 1:
+            return x[:0]
+        return np.concatenate(self.ranks.comm.alltoall([x[index] for index in self.sent]))
 
 
 class RowsProduct:
@@ -27,9 +44,7 @@ class RowsProduct:
         self.first, self.n = own.start, rows.n
         is_own = (indices >= own.start) & (indices < own.stop)
         halo = np.unique(indices[~is_own])
-        bounds = np.searchsorted(halo, rows.starts)
-        asked = [(halo[a:b] - first) for a, b, first in zip(bounds, bounds[1:], rows.starts, strict=False)]  # (1)
-        self.sent = [asked[0]] if ranks.size == 1 else ranks.comm.alltoall(asked)
+        self.exchange = Halo(ranks, rows, halo)  # (1)
         columns = np.where(is_own, indices - own.start, 0).astype(np.int32)  # (2)
         columns[~is_own] = (own.stop - own.start) + np.searchsorted(halo, indices[~is_own])
         self.n_own, self.n_halo, self.halo = own.stop - own.start, len(halo), halo
@@ -42,9 +57,7 @@ class RowsProduct:
             block = slice(first, min(first + COLUMNS, x.shape[1]))
             whole = np.empty((self.n_own + self.n_halo, block.stop - first))  # (3)
             whole[: self.n_own] = x[:, block]
-            if self.ranks.size > 1:
-                halo = self.ranks.comm.alltoall([whole[index] for index in self.sent])
-                np.concatenate(halo, out=whole[self.n_own :])
+            whole[self.n_own :] = self.exchange.rows(whole)
             result[:, block] = self.A @ whole
         return result
 

@@ -7,23 +7,23 @@ rows of a principal block are those of the same ranks: the factor and the search
 import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import count
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.errors import BodyError
 from fe_models.foundation.ranks.product import RowsProduct
 from fe_models.foundation.ranks.ranks import Ranks
+from fe_models.foundation.ranks.row_layout import RowLayout, dropped, new_key
 from fe_models.foundation.ranks.rows import Rows, collected, own_rows, receive, send
+from fe_models.foundation.ranks.spread_columns import Part, SpreadColumns, own_part
 from fe_models.foundation.ranks.trim import give_back
 
-__all__ = ["OwnRows", "SpreadMatrix", "largest_entry", "whole_matrix"]
+__all__ = ["OwnRows", "SpreadMatrix", "largest_entry", "spread_sum", "whole_matrix"]
 
 COLUMNS = 32  #: of a product at once
-numbers = count()
-dropped: list[str] = []  #: keys that nobody names any more; told with the next question
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +38,8 @@ class OwnRows:
 class SpreadMatrix:
     """A symmetric matrix, (n, n), whose rows lie on all ranks; with the last name of it they go.
 
-    Columns x and products A x are arrays of rank 0 in the order of the dofs. What is not offered here needs the whole
-    matrix: `whole`.
+    Columns x and products A x are arrays of rank 0 in the order of the dofs, or both lie on all ranks
+    (`SpreadColumns`). What is not offered here needs the whole matrix: `whole`.
     """
 
     __array_ufunc__ = None  #: NumPy leaves products to it
@@ -58,9 +58,9 @@ class SpreadMatrix:
         function
             Called on all ranks at once with the arguments; returns `OwnRows`, columns in the same order as rows.
         """
+        self.layout = RowLayout(ranks, order, rows)
         self.ranks, self.order, self.rows, self.key = ranks, order, rows, new_key()
-        self.position = np.empty(len(order), np.int32)
-        self.position[order] = np.arange(len(order), dtype=np.int32)
+        self.position = self.layout.position
         found = self._ask(made_here, self.key, rows, function, *arguments)
         weakref.finalize(self, dropped.append, self.key).atexit = False
         self.nnz = sum(entries for entries, _ in found)
@@ -74,7 +74,7 @@ class SpreadMatrix:
 
     def _ask(self, function: Callable[..., Any], *arguments: Any) -> list[Any]:
         """Call function(ranks, *arguments) on all ranks, after they have forgotten what has no name."""
-        return self.ranks.everywhere(asked_here, [dropped.pop() for _ in range(len(dropped))], function, *arguments)
+        return self.layout.ask(function, *arguments)
 
     def diagonal(self) -> Array:
         """Return the diagonal, (n,)."""
@@ -82,8 +82,10 @@ class SpreadMatrix:
             self._diagonal = np.concatenate(self._ask(diagonal_here, self.key))[self.position]
         return self._diagonal.copy()
 
-    def __matmul__(self, x: Array) -> Array:
-        """Return A x of one column, (n,), or many, (n, k), some at a time."""
+    def __matmul__(self, x: Any) -> Any:
+        """Return A x of one column, (n,), or many, (n, k), some at a time; columns on all ranks stay there."""
+        if isinstance(x, SpreadColumns):
+            return self._on_ranks(x)
         x = np.asarray(x)
         if x.ndim == 1:
             return np.asarray((self @ x[:, None])[:, 0])
@@ -93,6 +95,13 @@ class SpreadMatrix:
             self.ranks.store["columns"] = x[self.order, block]
             result[self.order, block] = self._ask(multiplied_here, self.key, self.rows)[0]
         return result
+
+    def _on_ranks(self, x: SpreadColumns) -> SpreadColumns:
+        if not self.layout.is_like(x.layout):
+            raise BodyError(f"SpreadMatrix: rows of columns {x.shape} lie otherwise than those of A, {self.shape}")
+        key = new_key()
+        self._ask(product_here, key, self.key, x.part)
+        return SpreadColumns(x.layout, Part(key, 0, x.shape[1]))
 
     def __getitem__(self, index: tuple[slice, IntArray]) -> sp.csc_array:
         """Return columns of it, A[:, dofs], (n, k), as a matrix of rank 0."""
@@ -138,6 +147,19 @@ class SpreadBlock:
         """Let every rank keep its `OwnRows` under a key, of all columns or from the diagonal on; return how many."""
         return sum(self.matrix._ask(block_here, key, self.matrix.key, self.is_chosen, self.rows, upper))
 
+    def expanded(self, x: SpreadColumns) -> SpreadColumns:
+        """Return columns over all rows of the matrix, zero where it is not the block; x has rows as the block has."""
+        layout, key = self.matrix.layout, new_key()
+        layout.ask(expanded_here, key, x.part, self.is_chosen, layout.rows)
+        return SpreadColumns(layout, Part(key, 0, x.shape[1]))
+
+
+def spread_sum(A: SpreadMatrix, B: SpreadMatrix, factor: float) -> SpreadMatrix:
+    """Return A + factor B of matrices whose rows lie alike, by rows on all ranks."""
+    if not A.layout.is_like(B.layout):
+        raise BodyError(f"spread_sum: rows of matrices {A.shape} and {B.shape} lie otherwise on the ranks")
+    return SpreadMatrix(A.ranks, A.order, A.rows, added_here, A.key, B.key, factor)
+
 
 def whole_matrix(A: Any) -> sp.csc_array:
     """Return a matrix that rank 0 has, or collect it there."""
@@ -147,18 +169,6 @@ def whole_matrix(A: Any) -> sp.csc_array:
 def largest_entry(A: Any) -> float:
     """Return the largest entry of a matrix in size; 0 without entries."""
     return A.largest if isinstance(A, SpreadMatrix) else float(np.abs(A.data).max(initial=0.0))
-
-
-def new_key() -> str:
-    """Return a key that no rank has used."""
-    return f"matrix {next(numbers)}"
-
-
-def asked_here(ranks: Ranks, forgotten: list[str], function: Callable[..., Any], *arguments: Any) -> Any:
-    """Forget what nobody names, then call the function."""
-    for key in forgotten:
-        ranks.store.pop(key, None)
-    return function(ranks, *arguments)
 
 
 def made_here(ranks: Ranks, key: str, rows: Rows, function: Callable[..., Any], *arguments: Any) -> tuple[int, float]:
@@ -172,6 +182,13 @@ def made_here(ranks: Ranks, key: str, rows: Rows, function: Callable[..., Any], 
     return len(data), float(max(data.max(initial=0.0), -data.min(initial=0.0)))
 
 
+def added_here(ranks: Ranks, key: str, other_key: str, factor: float) -> OwnRows:
+    """Return own rows of A + factor B."""
+    A = sp.csr_array(ranks.store[key].rows_of_all() + factor * ranks.store[other_key].rows_of_all())
+    A.sort_indices()
+    return OwnRows(A.indptr.astype(np.int32), A.indices.astype(np.int32), A.data)
+
+
 def diagonal_here(ranks: Ranks, key: str) -> Array:
     """Return the diagonal of these rows; the first columns are the own ones."""
     return np.asarray(ranks.store[key].A.diagonal())
@@ -181,6 +198,18 @@ def multiplied_here(ranks: Ranks, key: str, rows: Rows) -> Array | None:
     """Return A x of columns that rank 0 has, there."""
     x = own_rows(ranks, rows, ranks.store.pop("columns", None))
     return collected(ranks, rows, ranks.store[key] @ x)
+
+
+def product_here(ranks: Ranks, key: str, matrix_key: str, x: Part) -> None:
+    """Keep rows of A x of columns on all ranks."""
+    ranks.store[key] = ranks.store[matrix_key] @ own_part(ranks, x)
+
+
+def expanded_here(ranks: Ranks, key: str, x: Part, is_chosen: np.ndarray, rows: Rows) -> None:
+    """Keep own rows of a block among those of the matrix."""
+    whole = np.zeros((rows.count(ranks.rank), x.last - x.first), order="F")
+    whole[is_chosen[rows.of(ranks.rank)]] = own_part(ranks, x)
+    ranks.store[key] = whole
 
 
 def columns_here(ranks: Ranks, key: str, columns: np.ndarray) -> sp.csr_array:

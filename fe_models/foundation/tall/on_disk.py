@@ -2,7 +2,8 @@
 
 They are NumPy arrays as others are. What was touched of a mapped array counts as memory of the process until it is
 given back (`release`); so work goes by slices of rows (`row_slices`), after each of which it is. What is made of an
-array on disk, and is large, goes there as well (`zeros_like`): nobody has to hand on where arrays lie.
+array on disk, and is large, goes there as well (`zeros_like`): nobody has to hand on where arrays lie. `in_memory`,
+`copied` and `beside` also take columns whose rows lie on many ranks (`SpreadColumns`).
 """
 
 import mmap
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fe_models.foundation.errors import StorageError
+from fe_models.foundation.ranks.spread_columns import SpreadColumns, spread_beside
 
 __all__ = ["beside", "copied", "in_memory", "is_on_disk", "on_disk", "release", "row_slices", "zeros_like"]
 
@@ -97,13 +99,18 @@ def row_slices(rows: slice | int, *arrays: Array) -> Iterator[slice]:
             release(X)
 
 
-def copied(X: Array) -> Array:
-    """Return a copy, on disk where X is and it is large."""
+def copied(X: Any) -> Any:
+    """Return a copy, on disk or on the ranks where X is."""
     return beside(X)
 
 
-def beside(*arrays: Array) -> Array:
-    """Return arrays of as many rows side by side, (n, k); on disk where one of them is and they are large."""
+def beside(*arrays: Any) -> Any:
+    """Return arrays of as many rows side by side, (n, k).
+
+    On disk where one of them is and they are large; on all ranks where one of them is.
+    """
+    if found := [X for X in arrays if isinstance(X, SpreadColumns)]:
+        return spread_beside(found[0].layout, *arrays)
     width = sum(X.shape[1] for X in arrays)
     stored = next((X for X in arrays if is_on_disk(X)), arrays[0])
     result = zeros_like(stored, (len(stored), width))
@@ -112,10 +119,12 @@ def beside(*arrays: Array) -> Array:
     return result
 
 
-def in_memory(X: Array) -> Array:
-    """Return an array itself, or, of one on disk, a copy in memory in C order."""
+def in_memory(X: Any) -> Array:
+    """Return an array itself, or, of one on disk or on many ranks, a copy in memory in C order."""
+    if isinstance(X, SpreadColumns):
+        return X.whole()
     if not is_on_disk(X):
-        return X
+        return np.asarray(X)
     result = np.empty(X.shape)
     for rows in row_slices(len(X), X):
         result[rows] = X[rows]

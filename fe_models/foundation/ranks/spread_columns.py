@@ -1,0 +1,223 @@
+"""Tall columns by rows on all ranks: rank 0 has its own rows of them, and a name for the rest.
+
+Their rows lie as those of the matrices of a body (`SpreadMatrix`), so that products with these take them where they
+are. What is asked of columns, such as Xᵀ Y, all ranks do with their rows at once; rank 0 sums the small results.
+"""
+
+import operator
+import weakref
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.ranks.ranks import Ranks
+from fe_models.foundation.ranks.row_layout import RowLayout, dropped, new_key
+from fe_models.foundation.ranks.rows import Rows, collected, own_rows, receive, send
+from fe_models.foundation.ranks.trim import give_back
+
+__all__ = [
+    "Part", "SpreadColumns", "on_rows", "own_part", "rows_of", "spread_beside", "spread_columns", "spread_parts",
+    "spread_with",
+]  # fmt: skip
+
+COLUMNS = 4  #: that pass through rank 0 at once
+
+
+class Part(NamedTuple):
+    """Columns of what every rank keeps its rows of under a key."""
+
+    key: str
+    first: int
+    last: int
+
+
+class SpreadColumns:
+    """Columns whose rows lie on all ranks, (n, k), in an order of their own; with the last name of them they go.
+
+    Rows are counted in the order of the dofs. `X[:, a:b]` is a part of the same columns, `X[:, index]` a copy;
+    `X[rows]` is an array of rank 0, and so is `X.whole()`.
+    """
+
+    __array_ufunc__ = None  #: NumPy leaves sums and products to it
+    ndim = 2
+
+    def __init__(self, layout: RowLayout, part: Part, source: object = None) -> None:
+        """Name columns that all ranks keep; source: what owns them, where they are part of another's."""
+        self.layout, self.part, self.source = layout, part, source
+        self.shape = (layout.n, part.last - part.first)
+        if source is None:
+            weakref.finalize(self, dropped.append, part.key).atexit = False
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, index: Any) -> Any:
+        """Return columns X[:, c], or rows X[r] and X[r, c] of indices r as an array of rank 0."""
+        rows, columns = index if isinstance(index, tuple) else (index, slice(None))
+        X = self._columns(columns)
+        if isinstance(rows, slice):
+            if rows != slice(None):
+                raise IndexError("SpreadColumns: expected X[:, columns] or X[index of rows]; take whole() for slices")
+            return X
+        index = np.asarray(rows)
+        return rows_of(X, np.flatnonzero(index) if index.dtype == bool else index.astype(np.int64))
+
+    def _columns(self, columns: Any) -> "SpreadColumns":
+        if isinstance(columns, slice):
+            first, last, step = columns.indices(self.shape[1])
+            if step == 1:
+                part = Part(self.part.key, self.part.first + first, self.part.first + max(first, last))
+                return SpreadColumns(self.layout, part, self)
+        index = np.arange(self.shape[1])[columns]
+        return spread_with(self.layout, len(index), chosen, self, index)
+
+    def __add__(self, other: "SpreadColumns") -> "SpreadColumns":
+        return spread_with(self.layout, self.shape[1], operator.add, self, other)
+
+    def __sub__(self, other: "SpreadColumns") -> "SpreadColumns":
+        return spread_with(self.layout, self.shape[1], operator.sub, self, other)
+
+    def __mul__(self, factors: Any) -> "SpreadColumns":
+        """Return columns times a number, or each times its factor, (k,)."""
+        return spread_with(self.layout, self.shape[1], operator.mul, self, factors)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, factors: Any) -> "SpreadColumns":
+        """Return columns over a number, or each over its factor, (k,)."""
+        return spread_with(self.layout, self.shape[1], operator.truediv, self, factors)
+
+    def parts(self, width: int = COLUMNS) -> Iterator[tuple[slice, Array]]:
+        """Yield some columns at a time as arrays of rank 0, (n, width), and which they are."""
+        for first in range(0, self.shape[1], width):
+            some = slice(first, min(first + width, self.shape[1]))
+            lying = self.layout.ask(collected_here, self.layout.rows, self[:, some].part)[0]
+            x = np.empty(lying.shape)
+            x[self.layout.order] = lying
+            yield some, x
+
+    def whole(self) -> Array:
+        """Return them as an array of rank 0, (n, k)."""
+        X = np.empty(self.shape)
+        for some, x in self.parts():
+            X[:, some] = x
+        return X
+
+
+def spread_columns(layout: RowLayout, X: Any) -> SpreadColumns:
+    """Return columns of rank 0, (n, k), by rows on all ranks; those that lie so already themselves."""
+    return X if isinstance(X, SpreadColumns) else spread_beside(layout, X)
+
+
+def spread_beside(layout: RowLayout, *blocks: Any) -> SpreadColumns:
+    """Return columns, of rank 0 or on all ranks, side by side on all ranks, (n, k)."""
+    return spread_parts(layout, sum(X.shape[1] for X in blocks), blocks)
+
+
+def spread_parts(layout: RowLayout, k: int, blocks: Iterable[Any]) -> SpreadColumns:
+    """Return columns, k in all, which come one block after another."""
+    key = new_key()
+    layout.ask(room_here, key, layout.rows, k)
+    at = 0
+    for X in blocks:
+        if isinstance(X, SpreadColumns):
+            layout.ask(put_here, key, at, X.part)
+        else:
+            for first in range(0, X.shape[1], COLUMNS):
+                layout.ranks.store["columns"] = X[:, first : first + COLUMNS][layout.order]
+                layout.ask(given_here, key, layout.rows, at + first)
+        at += X.shape[1]
+    return SpreadColumns(layout, Part(key, 0, k))
+
+
+def on_rows(layout: RowLayout, function: Callable[..., Any], *arguments: Any) -> list[Any]:
+    """Call function(*arguments) on all ranks, each with its own rows of `SpreadColumns`; return their answers."""
+    return layout.ask(called_here, function, named(arguments))
+
+
+def spread_with(layout: RowLayout, k: int, function: Callable[..., Array], *arguments: Any) -> SpreadColumns:
+    """Return the columns, (n, k), whose rows function(*arguments) returns on all ranks, as `on_rows` calls it."""
+    key = new_key()
+    layout.ask(kept_here, key, function, named(arguments))
+    return SpreadColumns(layout, Part(key, 0, k))
+
+
+def rows_of(X: SpreadColumns, index: IntArray) -> Array:
+    """Return some rows of columns, (len(index), k), on rank 0."""
+    place = X.layout.position[index]
+    result: Array = X.layout.ask(rows_here, X.part, place, X.layout.rows)[0]
+    return result
+
+
+def named(arguments: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Return arguments with the names of columns in their place."""
+    return tuple(each.part if isinstance(each, SpreadColumns) else each for each in arguments)
+
+
+def own_part(ranks: Ranks, part: Part) -> Array:
+    """Return this rank's rows of some columns, (n_own, k), a view."""
+    kept = ranks.store[part.key]
+    if isinstance(kept, np.ndarray):
+        return kept[:, part.first : part.last]
+    columns: Array = kept.columns(part.first, part.last)  # of a basis that grows
+    return columns
+
+
+def owned(ranks: Ranks, arguments: tuple[Any, ...]) -> list[Any]:
+    """Return arguments with own rows in the place of names."""
+    return [own_part(ranks, each) if isinstance(each, Part) else each for each in arguments]
+
+
+def called_here(ranks: Ranks, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    """Call a function with own rows."""
+    return function(*owned(ranks, arguments))
+
+
+def kept_here(ranks: Ranks, key: str, function: Callable[..., Array], arguments: tuple[Any, ...]) -> None:
+    """Keep the rows that a function returns of own rows."""
+    ranks.store[key] = np.asfortranarray(function(*owned(ranks, arguments)))
+
+
+def chosen(X: Array, columns: IntArray) -> Array:
+    """Return some columns."""
+    return X[:, columns]
+
+
+def room_here(ranks: Ranks, key: str, rows: Rows, k: int) -> None:
+    """Make room for rows of columns."""
+    give_back()
+    ranks.store[key] = np.zeros((rows.count(ranks.rank), k), order="F")
+
+
+def put_here(ranks: Ranks, key: str, first: int, X: Part) -> None:
+    """Write own rows of columns from this column on."""
+    ranks.store[key][:, first : first + X.last - X.first] = own_part(ranks, X)
+
+
+def given_here(ranks: Ranks, key: str, rows: Rows, first: int) -> None:
+    """Write own rows of columns that rank 0 has, from this column on."""
+    x = own_rows(ranks, rows, ranks.store.pop("columns", None))
+    ranks.store[key][:, first : first + x.shape[1]] = x
+
+
+def collected_here(ranks: Ranks, rows: Rows, X: Part) -> Array | None:
+    """Return columns on rank 0, in the order in which they lie."""
+    return collected(ranks, rows, own_part(ranks, X))
+
+
+def rows_here(ranks: Ranks, X: Part, place: np.ndarray, rows: Rows) -> Array | None:
+    """Return rows at some places on rank 0, to which each rank sends its own."""
+    mine, k = own_part(ranks, X), X.last - X.first
+    owner = np.searchsorted(rows.starts, place, side="right") - 1
+    where = [np.flatnonzero(owner == rank) for rank in range(ranks.size)]
+    found = mine[place[where[ranks.rank]] - rows.starts[ranks.rank]]
+    if ranks.rank:
+        send(ranks, found, 0)
+        return None
+    result = np.empty((len(place), k))
+    result[where[0]] = found
+    for other in range(1, ranks.size):
+        result[where[other]] = receive(ranks, len(where[other]) * k, np.float64, other).reshape(-1, k)
+    return result

@@ -1,0 +1,70 @@
+"""Geometric stiffness of solid elements by parts of the mesh: each rank does its cells, rank 0 sums small matrices."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.errors import BodyError
+from fe_models.foundation.ranks.product import Halo
+from fe_models.foundation.ranks.ranks import Ranks
+from fe_models.foundation.ranks.rows import Rows
+from fe_models.foundation.ranks.spread_columns import Part, SpreadColumns, own_part, spread_columns
+from fe_models.material import AnyMaterial
+from fe_models.solids.assembly_on_ranks import MeshPart, SpreadMesh
+from fe_models.solids.geometric import projected_geometric_stiffness
+
+__all__ = ["spread_geometric_stiffness"]
+
+
+def spread_geometric_stiffness(
+    parts: SpreadMesh, materials: tuple[AnyMaterial, ...], u: Array, Phi: SpreadColumns, rules: Mapping[str, Any]
+) -> Array:
+    """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n) (`fe_models.solids.geometric.projected_geometric_stiffness`).
+
+    Parameters
+    ----------
+    u
+        Displacements of the states, on rank 0, (3 n_nodes, k).
+    Phi
+        Columns on all ranks, three rows a node in the order of the nodes, (3 n_nodes, n).
+    rules
+        Further arguments.
+    """
+    rows = parts.layout.rows
+    if Phi.layout.rows.starts != tuple(3 * start for start in rows.starts):
+        raise BodyError(f"geometric_stiffness: columns, {Phi.shape}: their rows lie otherwise than the mesh")
+    states = spread_columns(Phi.layout, u)
+    found = parts.layout.ask(stiffness_here, parts.key, rows, materials, states.part, Phi.part, dict(rules))
+    return np.asarray(np.sum(found, axis=0))
+
+
+def stiffness_here(
+    ranks: Ranks,
+    key: str,
+    rows: Rows,
+    materials: tuple[AnyMaterial, ...],
+    u: Part,
+    Phi: Part,
+    rules: dict[str, Any],
+) -> Array:
+    """Return the matrices of the cells of this rank."""
+    whole: MeshPart = ranks.store[key]
+    own = rows.of(ranks.rank)
+    part = whole.cells_of(own)
+    others = np.sort(part.position[(part.position < own.start) | (part.position >= own.stop)])
+    halo = Halo(ranks, rows, others)
+    place = np.searchsorted(others, part.position)  # of each node of the part among [own; others]
+    is_own = (part.position >= own.start) & (part.position < own.stop)
+    at = np.where(is_own, part.position - own.start, own.stop - own.start + place)
+    states, columns = (fields(halo, own_part(ranks, each), at) for each in (u, Phi))
+    if not part.mesh.cells:
+        return np.zeros((states.shape[1], columns.shape[1], columns.shape[1]))
+    return projected_geometric_stiffness(part.mesh, materials, part.of_cell, states, columns, **rules)
+
+
+def fields(halo: Halo, x: Array, at: np.ndarray) -> Array:
+    """Return columns over the nodes of a part, (3 n_part_nodes, k), by own rows, (3 n_own, k)."""
+    by_node = np.ascontiguousarray(x).reshape(len(x) // 3, -1)
+    return np.concatenate([by_node, halo.rows(by_node)])[at].reshape(-1, x.shape[1])
