@@ -69,6 +69,7 @@ def test_a_step_takes_off_what_lies_far_above(pencil):
     n = len(pencil[3][0])
     ratio = (pencil[3][0][:COUNT] / pencil[3][0][n // 2 : n // 2 + COUNT]) ** 2
     rounding = np.finfo(float).eps * pencil[3][0][-1] / pencil[3][0][:COUNT]  # of the dense eigenvalues
+    assert (after > -rounding).all()
     assert (after < 1.1 * before * ratio + rounding).all()
     assert_allclose(modes.X.T @ pencil[2] @ modes.X, np.eye(COUNT + 3), rtol=0, atol=1e-10)
 
