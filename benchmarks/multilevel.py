@@ -21,7 +21,7 @@ import numpy as np
 
 TOLERANCE = 1e-3
 STUDY = [("shell", 128, 300), ("shell", 208, 300), ("shell", 208, 1000), ("solid", 16, 100), ("solid", 28, 100)]
-FACTORS = (4.0, 10.0, 20.0)
+FACTORS = (4.0, 10.0, 14.0, 20.0)
 BODIES = [
     ("shell", 40, 30), ("shell", 64, 100), ("shell", 64, 400), ("plate", 64, 100), ("cantilever", 64, 100),
     ("solid", 10, 40), ("solid", 14, 100), ("bar", 60, 60), ("bar", 60, 150),

@@ -6,7 +6,7 @@ import scipy.sparse as sp
 from scipy.special import gammaincinv
 
 from cms.solvers.sparse_product import SymmetricProduct
-from cms.solvers.tall import combine, combined, inner
+from cms.solvers.tall import combine, combined, inner, subtract
 from cms.substructures.tree import SubstructureTree
 from fe_models.foundation.arrays import Array, IntArray
 
@@ -17,19 +17,22 @@ SLICE = 16384  #: rows that are put elsewhere at a time
 PROBES = 64  #: random columns that measure the residuals of any number of modes
 RARE = 1e-3  #: part of the modes whose residual the probes find too small
 SUMS = 16  #: of neighbouring modes, whose residuals are measured together
+FEW = 0.25  #: part of the modes up to which those with large errors are improved by themselves
+DEPENDENT = 1e-10  #: length of a residual against the longest, below which it is a combination of others
 
 
 class ApproximateModes:
     """Approximate modes X of K x = omega² M x, M-orthonormal; they change in place.
 
-    All rows are in the order of elimination.
+    X may hold the leading modes alone, whose frequencies are followed by those of others. All rows are in the order of
+    elimination.
     """
 
     def __init__(self, tree: SubstructureTree, K: sp.csc_array, M: sp.csc_array, omega2: Array, X: Array) -> None:
         self.tree = tree
         self.K, self.M = (SymmetricProduct(A, columns=COLUMNS) for A in (K, M))
         self.omega2 = omega2  #: Rayleigh quotients, (p,)
-        self.X = X  #: (n, p), C order
+        self.X = X  #: (n, p), C order; as many columns as it was given
         self.residuals = np.full(len(omega2), np.nan)  #: |r|_K / omega of the modes before the last step, (p,)
         self.n_solves = 0
 
@@ -59,29 +62,67 @@ class ApproximateModes:
         self.omega2, Z = la.eigh(H / np.outer(scale, scale), G / np.outer(scale, scale))  # (4)
         self.X = combined(self.X, Z / scale[:, None])
 
-    def errors(self, count: int) -> Array:
+    def improve_some(self, worst: IntArray) -> None:
+        """Improve a few modes by their residuals: Rayleigh-Ritz in the span of all X and of these.
+
+        (1) R = x - omega² K⁻¹ M x of the worst modes, M-orthonormal to X and to each other
+        (2) [Lambda E; Eᵀ H] z = omega² z,  E = Xᵀ K R,  H = Rᵀ K R
+        (3) X <- [X R] Z, the lowest
+        """
+        k = self.X.shape[1]
+        R = self._residuals(np.eye(k)[:, worst])  # (1)
+        for _ in range(2):  # once leaves what cancels
+            subtract(R, self.X, inner(self.X, self.M @ R))
+            length2, U = la.eigh(inner(R, self.M @ R))
+            is_new = length2 > DEPENDENT**2 * length2[-1]
+            R = combine(R, U[:, is_new] / np.sqrt(length2[is_new]))
+        K_R = self.K @ R  # (2)
+        E, H = inner(self.X, K_R), inner(R, K_R)
+        A = np.block([[np.diag(self.omega2[:k]), E], [E.T, (H + H.T) / 2]])
+        omega2, Z = la.eigh(A, subset_by_index=(0, k - 1))
+        self.omega2 = np.concatenate([omega2, self.omega2[k:]])
+        self.X = combined(self.X, Z[:k])  # (3)
+        subtract(self.X, R, -Z[k:])
+        self.residuals = np.full(len(self.omega2), np.nan)
+
+    def errors(self, count: int, tolerance: float = np.inf) -> Array:
         """Return an estimate of how much too high each of the first frequencies is, relative, (count,).
 
         (1) r = x - omega² K⁻¹ M x,  a = |r|²_K / omega²,  b = |r|²_M  of each mode, one solve for each
         (2) of many modes: a by random probes, from above; b / a by sums of neighbours, r_j / omega_j with random signs
         (3) (a + b / (1 - omega² / omega_next²)) / 2, omega_next that of the first mode that does not take part
             (docs/theory.md §2)
+        (4) those that (2) finds above the tolerance again by (1), the worst `PROBES` of them at most
         """
-        omega2 = self.omega2[:count]
-        if count <= PROBES:  # (1)
-            a, b = self._residuals_of_sums(np.eye(count))
-        else:  # (2)
-            a = self._probed(count)
-            of_mode = np.arange(count) * SUMS // count
-            pick = np.zeros((count, SUMS))
-            pick[np.arange(count), of_mode] = np.random.default_rng(0).choice([-1.0, 1.0], size=count)
-            a_sum, b_sum = self._residuals_of_sums(pick)
-            b = a * (b_sum / np.maximum(a_sum, np.finfo(float).tiny))[of_mode]
+        if count <= PROBES:
+            return self._errors_of(*self._residuals_of_sums(np.eye(count)), np.arange(count))
+        a = self._probed(count)  # (2)
+        of_mode = np.arange(count) * SUMS // count
+        pick = np.zeros((count, SUMS))
+        pick[np.arange(count), of_mode] = np.random.default_rng(0).choice([-1.0, 1.0], size=count)
+        a_sum, b_sum = self._residuals_of_sums(pick)
+        b = a * (b_sum / np.maximum(a_sum, np.finfo(float).tiny))[of_mode]
+        errors = self._errors_of(a, b, np.arange(count))
+        doubtful = np.flatnonzero(errors > tolerance)  # (4)
+        if 0 < len(doubtful) <= FEW * count:
+            doubtful = doubtful[np.argsort(-errors[doubtful])][:PROBES]
+            errors[doubtful] = self._errors_of(*self._residuals_of_sums(np.eye(count)[:, doubtful]), doubtful)
+        return errors
+
+    def _errors_of(self, a: Array, b: Array, which: IntArray) -> Array:
+        """(3) Return the error of some modes by a, and b / omega², of each."""
+        omega2 = self.omega2[which]
         apart = 1 - omega2 / self.omega2[-1]
-        return (a + omega2 * b / np.maximum(apart, np.finfo(float).eps)) / 2  # (3)
+        return (a + omega2 * b / np.maximum(apart, np.finfo(float).eps)) / 2
 
     def _residuals_of_sums(self, pick: Array) -> tuple[Array, Array]:
         """(1) Return a, and b / omega², of the sums of r_j / omega_j by the columns of pick, (count, m)."""
+        r = self._residuals(pick)
+        a, b = (np.maximum(np.einsum("nk,nk->k", r, A @ r), 0.0) for A in (self.K, self.M))
+        return a, b
+
+    def _residuals(self, pick: Array) -> Array:
+        """Return sums of r_j / omega_j, r = x - omega² K⁻¹ M x, by the columns of pick, (n, m); pick is (count, m)."""
         count, m = pick.shape
         omega = np.sqrt(self.omega2[:count])
         X = self.X[:, :count]
@@ -90,9 +131,7 @@ class ApproximateModes:
         self.n_solves += m
         r = combine(X, pick / omega[:, None])
         r -= S_x
-        del S_x
-        a, b = (np.maximum(np.einsum("nk,nk->k", r, A @ r), 0.0) for A in (self.K, self.M))
-        return a, b
+        return r
 
     def _probed(self, count: int) -> Array:
         """(2) Return a of each mode from above, but for one in a thousand of them, (count,).

@@ -17,11 +17,12 @@ from cms.solvers.registry import solver_of
 from cms.solvers.shift_inverted import Wanted
 from cms.substructures.dissection import Dissection, dissect, node_graph
 from cms.substructures.frequency_guess import guessed_omega2
-from cms.substructures.improvement import ApproximateModes
+from cms.substructures.improvement import FEW, ApproximateModes
 from cms.substructures.reduced_mass import ReducedMass
 from cms.substructures.reduced_modes import reduced_modes, reduced_omega2
 from cms.substructures.tree import SubstructureTree, substructure_tree
 from fe_models.foundation.arrays import Array, IntArray, frozen
+from fe_models.foundation.ranks.trim import give_back
 from fe_models.foundation.solver import Solver
 from fe_models.foundation.tasks.task_map import TaskMap
 from fe_models.foundation.threads import one_blas_thread
@@ -34,10 +35,7 @@ LEAF = 200  #: dofs of a part: larger ones cost more arithmetic, smaller ones mo
 GUARDS, GUARD_SHARE = 12, 0.08  #: modes beyond the wanted ones that take part: a number, and a share of these
 MOST_STEPS = 8  #: of inverse iteration
 SHARE = 8  #: interior dofs for each wanted mode, at least
-THIN, SOLID = (
-    20.0,
-    4.0,
-)  #: cutoff factors: modes of a surface grow with the first power of frequency, of a solid the third
+THIN, SOLID = 14.0, 4.0  #: cutoff factors: modes of a surface grow with the frequency, of a solid with its third power
 TOO_HIGH = 1.5  #: that the estimated highest frequency is too high at least, as a rule
 MARGIN = 1.1  #: of a cutoff: reduced frequencies lie above the true ones
 RAISE, MOST_RAISES = 2.0, 3  #: of the bound, as a frequency, where it leaves too few modes of substructures
@@ -102,7 +100,7 @@ def multilevel_modes(
     (4) of a number of modes: its highest frequency again, by the reduced pencil up to the estimate; a lower bound, but
         none that leaves fewer modes than these
     (5) the reduced pencil: its lowest modes, expanded down the tree
-    (6) where the error that is left is above the tolerance: steps of inverse iteration by the tree
+    (6) where the error that is left is above the tolerance: inverse iteration by the tree, of a few modes or all
 
     Frequencies are those of a Rayleigh-Ritz basis: never below the true ones.
 
@@ -116,7 +114,7 @@ def multilevel_modes(
     tolerance
         Largest relative error of a frequency. What stays above it after some steps is told, not raised.
     cutoff_factor
-        Larger: more modes of substructures, fewer steps (6). None: 20 for shells and beams, 4 for solids.
+        Larger: more modes of substructures, fewer steps (6). None: 14 for shells and beams, 4 for solids.
     tasks
         Where subtrees are eliminated; None: in threads of this process.
     rows
@@ -151,6 +149,7 @@ def multilevel_modes(
     least = wanted.n + _guards(wanted.n) if wanted.n else 0
     make = partial(substructure_tree, dissection, K, M, multipliers=multipliers, tasks=tasks)
     tree, bound = _tree_of(make, bound, least)  # (3)
+    give_back()
     require_regular(interior.K, Factorization(tree, solver_of(solver)))  # pivots of rounding are positive too
     with one_blas_thread():
         own, mass = tree.omega2, tree.mass()
@@ -167,9 +166,13 @@ def multilevel_modes(
         p, count = len(reduced), wanted.n if wanted.n is not None else int((reduced <= MARGIN**2 * highest).sum())
         Z = np.zeros((len(own), p))
         Z[kept] = Z_kept
-        modes = ApproximateModes(tree, K, M, reduced, tree.expand(Z))
-        del Z, Z_kept, mass
-        errors, n_steps = _improved(modes, count, tolerance, highest if wanted.cutoff is not None else 0.0)  # (6)
+        del Z_kept, mass
+        told = count if wanted.n is not None else p
+        modes = ApproximateModes(tree, K, M, reduced, tree.expand(Z[:, :told]))
+        few = 0.0 if wanted.verify else FEW  # the proof needs good guards, which follow in steps of all modes alone
+        below = highest if wanted.cutoff is not None else 0.0
+        errors, n_steps = _improved(modes, Z, count, tolerance, below, few)  # (6)
+        del Z
     k = count if wanted.n is not None else int((modes.omega2 <= highest).sum())
     if wanted.n is None and k == p < kept.sum():
         raise EigenError(
@@ -250,18 +253,28 @@ def _guards(count: int) -> int:
     return GUARDS + int(GUARD_SHARE * count)
 
 
-def _improved(modes: ApproximateModes, count: int, tolerance: float, highest: float) -> tuple[Array, int]:
+def _improved(
+    modes: ApproximateModes, Z: Array, count: int, tolerance: float, highest: float, few: float
+) -> tuple[Array, int]:
     """(6) Improve modes until the error that is left in the wanted ones is below the tolerance.
 
-    The wanted ones: at least `count`, and all that came to lie below omega² = `highest`.
+    The wanted ones: at least `count`, and all that came to lie below omega² = `highest`. A few that lack accuracy, this
+    part of them at most, are improved by themselves, more of them all together with the guards, whose amplitudes are
+    the last columns of Z.
     """
     count = max(count, int((modes.omega2 <= highest).sum()))
-    errors, n_steps = modes.errors(count) if count else np.zeros(0), 0
+    errors, n_steps = modes.errors(count, tolerance) if count else np.zeros(0), 0
     while n_steps < MOST_STEPS and not (errors <= tolerance).all():
         n_steps += 1
-        modes.improve()
+        worst = np.flatnonzero(errors > tolerance)
+        if len(worst) <= few * count:
+            modes.improve_some(worst)
+        else:
+            if modes.X.shape[1] < Z.shape[1]:
+                modes.X = np.hstack([modes.X, modes.tree.expand(Z[:, modes.X.shape[1] :])])
+            modes.improve()
         count = max(count, int((modes.omega2 <= highest).sum()))
-        errors = modes.errors(count)
+        errors = modes.errors(count, tolerance)
     return errors, n_steps
 
 

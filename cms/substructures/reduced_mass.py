@@ -43,6 +43,26 @@ class ReducedMass:
         by_columns(Z.shape[1], add)
         return product
 
+    def between(self, to: NDArray[np.bool_], of: NDArray[np.bool_], Z: Array) -> Array:
+        """Return M_to,of Z, (n_to, k), of two parts of the modes without a common one, (n,) each; Z is (n_of, k)."""
+        at_to, at_of = (np.concatenate([[0], np.cumsum(part)]) for part in (to, of))
+        product = np.zeros((int(at_to[-1]), Z.shape[1]))
+        work = []
+        for below, own, C in self._parts():
+            for rows, columns, A in ((below, own, C), (own, below, C.T)):
+                block = A[to[rows]][:, of[columns]]
+                if block.size:
+                    place = slice(at_to[rows.start], at_to[rows.stop]), slice(at_of[columns.start], at_of[columns.stop])
+                    work.append((*place, block))
+
+        def add(columns: slice) -> None:
+            z, y = np.ascontiguousarray(Z[:, columns]), product[:, columns]
+            for rows, others, block in work:
+                y[rows] += block @ z[others]
+
+        by_columns(Z.shape[1], add)
+        return product
+
     def of(self, is_kept: NDArray[np.bool_]) -> "ReducedMass":
         """Return the mass of a part of the modes, (n,) whether each is kept."""
         number = np.concatenate([[0], np.cumsum(is_kept)])

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from cms.solvers.eigen import eigenmodes
 from cms.solvers.factorization import Inertia
 from cms.solvers.registry import solver_of
-from cms.solvers.tall import combine, inner
+from cms.solvers.tall import combine, combined, inner
 from cms.substructures.reduced_mass import ReducedMass
 from fe_models.foundation.arrays import Array
 
@@ -42,7 +42,8 @@ def reduced_modes(omega2: Array, M: ReducedMass, count: int) -> tuple[Array, Arr
     """Return the lowest `count` eigenvalues, ascending, and M-orthonormal vectors, (n, count).
 
     (1) the pencil of the lowest modes of substructures, some for each wanted mode
-    (2) four times as many, and so on, at last all: subspace iteration that begins with the vectors found before
+    (2) four times as many, and so on, at last all: what the new ones add to first order; where that is not enough,
+        subspace iteration that begins with the vectors found
     """
     n = len(omega2)
     few = min(n, max(START * count, DENSE // 2))
@@ -53,10 +54,43 @@ def reduced_modes(omega2: Array, M: ReducedMass, count: int) -> tuple[Array, Arr
     while not is_in.all():  # (2)
         few *= WIDER
         before, is_in = is_in, _lowest(omega2, few) if 2 * few < n else np.ones(n, dtype=bool)
-        begin = np.zeros((int(is_in.sum()), count))
-        begin[before[is_in]] = Z
-        lam, Z = _iterated(omega2[is_in], M.of(is_in), lam, begin, float(omega2[is_in & ~before].min()))
+        part, is_new, cut = M.of(is_in), ~before[is_in], float(omega2[is_in & ~before].min())
+        found, Z = _widened(omega2[is_in], part, lam, Z, is_new)
+        is_settled, lam = _is_settled(lam, found, cut), found
+        if not is_settled:
+            lam, Z = _iterated(omega2[is_in], part, lam, Z, cut)
     return lam, Z
+
+
+def _widened(omega2: Array, M: ReducedMass, lam: Array, Z: Array, is_new: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """(2) Return the eigenpairs, with new modes of substructures beside those of Z, (n_old, k), whose eigenpairs Z are.
+
+    (1) what a step of subspace iteration adds along the new ones: d = D⁻¹ M_no Z Lambda;  it only scales Z
+    (2) H = Lambda + B,  B = dᵀ D d;  G = 1 + A + Aᵀ + dᵀ M_nn d,  A = dᵀ M_no Z = B Lambda⁻¹
+    (3) H c = lam G c,  Z <- [Z; d] C
+    """
+    whole = np.zeros((len(omega2), Z.shape[1]))
+    d = M.between(is_new, ~is_new, Z) * lam / omega2[is_new, None]  # (1)
+    root = np.sqrt(omega2[is_new])[:, None] * d
+    B = inner(root, root)  # (2)
+    del root
+    G = np.eye(len(lam)) + B / lam + (B / lam).T + _symmetric(inner(d, M.of(is_new) @ d))
+    lam, C = la.eigh(np.diag(lam) + B, G)  # (3)
+    whole[~is_new], whole[is_new] = Z, d
+    return lam, combined(whole, C)
+
+
+def _symmetric(A: Array) -> Array:
+    return (A + A.T) / 2
+
+
+def _is_settled(before: Array, lam: Array, cut: float) -> bool:
+    """Return whether that part of what a step took off is small, which it leaves.
+
+    What the modes lack lies along those from the cut on: a step leaves about (lam / cut)² of their error.
+    """
+    left = (before / lam - 1) * np.minimum(LAG * (lam / cut) ** 2, 0.5)
+    return bool((left <= SETTLED).all())
 
 
 def _lowest(omega2: Array, few: int) -> NDArray[np.bool_]:
@@ -66,8 +100,7 @@ def _lowest(omega2: Array, few: int) -> NDArray[np.bool_]:
 def _iterated(omega2: Array, M: ReducedMass, lam: Array, Z: Array, cut: float) -> tuple[Array, Array]:
     """(2) Subspace iteration: Y = D⁻¹ M Z of D = diag(omega²), H = Yᵀ D Y, G = Yᵀ M Y, H c = lam G c, Z <- Y C.
 
-    What the modes lack lies along those from the cut on: a step leaves about (lam / cut)² of their error. It ends where
-    that part of what the last step took off is small.
+    It ends when what a step leaves is small.
     """
     M_Z = M @ Z
     for _ in range(MOST_STEPS):
@@ -78,8 +111,7 @@ def _iterated(omega2: Array, M: ReducedMass, lam: Array, Z: Array, cut: float) -
         lam, C = la.eigh(H * np.outer(scale, scale), inner(Y, M_Y) * np.outer(scale, scale))
         C *= scale[:, None]
         Z, M_Z = combine(Y, C), combine(M_Y, C)
-        left = (before / lam - 1) * np.minimum(LAG * (lam / cut) ** 2, 0.5)
-        if (left <= SETTLED).all():
+        if _is_settled(before, lam, cut):
             break
     return lam, Z
 

@@ -82,6 +82,9 @@ def test_the_pencil_in_stages_gives_the_modes_of_the_whole_one(pencil, monkeypat
     assert_array_equal(mass.toarray(), mass.tocsc().toarray())
     is_kept = np.arange(mass.n) % 3 > 0
     assert_array_equal(mass.of(is_kept).toarray(), mass.toarray()[np.ix_(is_kept, is_kept)])
+    M, of = mass.toarray(), np.flatnonzero(is_kept)[::2]
+    is_of = np.isin(np.arange(mass.n), of)
+    assert_allclose(mass.between(~is_kept, is_of, Z[is_of]), M[np.ix_(~is_kept, is_of)] @ Z[is_of], rtol=0, atol=1e-12)
     monkeypatch.setattr("cms.substructures.reduced_modes.DENSE", 2)
     monkeypatch.setattr("cms.substructures.reduced_modes.START", 2)
     found, Z = reduced_modes(tree.omega2, mass, 5)
