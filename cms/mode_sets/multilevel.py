@@ -52,7 +52,8 @@ def multilevel(
         Largest relative error of a frequency, 1e-10 to 0.1; a warning says what is above it.
     cutoff_factor
         Substructures keep their modes up to so many times the cutoff (of a number of modes: times its highest
-        frequency), 1.2 or more; None: 14 for shells and beams, 4 for solids.
+        frequency), 1.2 or more; None: 20 for shells and beams, 14 where there are at
+        most 400 interior dofs for each wanted mode, 4 for solids.
     workers
         Where subtrees are eliminated: a number of processes, dask, or dask://host:port; None: threads of this process.
 

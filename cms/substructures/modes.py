@@ -35,7 +35,8 @@ LEAF = 200  #: dofs of a part: larger ones cost more arithmetic, smaller ones mo
 GUARDS, GUARD_SHARE = 12, 0.08  #: modes beyond the wanted ones that take part: a number, and a share of these
 MOST_STEPS = 8  #: of inverse iteration
 SHARE = 8  #: interior dofs for each wanted mode, at least
-THIN, SOLID = 14.0, 4.0  #: cutoff factors: modes of a surface grow with the frequency, of a solid with its third power
+THIN, SOLID = 20.0, 4.0  #: cutoff factors: modes of a surface grow with the frequency, of a solid with its third power
+DENSER, MANY = 14.0, 400  #: that of shells where at most so many dofs are there for each wanted mode
 TOO_HIGH = 1.5  #: that the estimated highest frequency is too high at least, as a rule
 MARGIN = 1.1  #: of a cutoff: reduced frequencies lie above the true ones
 RAISE, MOST_RAISES = 2.0, 3  #: of the bound, as a frequency, where it leaves too few modes of substructures
@@ -114,7 +115,8 @@ def multilevel_modes(
     tolerance
         Largest relative error of a frequency. What stays above it after some steps is told, not raised.
     cutoff_factor
-        Larger: more modes of substructures, fewer steps (6). None: 14 for shells and beams, 4 for solids.
+        Larger: more modes of substructures, fewer steps (6). None: 20 for shells and beams, 14 where there
+        are at most 400 interior dofs for each wanted mode, 4 for solids.
     tasks
         Where subtrees are eliminated; None: in threads of this process.
     rows
@@ -144,7 +146,7 @@ def multilevel_modes(
                 "take craig-bampton"
             )
         highest = guessed_omega2(dissection, interior.K, interior.M, int(wanted.n or 0))
-    factor = _factor(interior) if cutoff_factor is None else cutoff_factor
+    factor = _factor(interior, wanted) if cutoff_factor is None else cutoff_factor
     bound = factor**2 * highest if wanted.n is None else max((factor / TOO_HIGH) ** 2, 1.0) * highest
     least = wanted.n + _guards(wanted.n) if wanted.n else 0
     make = partial(substructure_tree, dissection, K, M, multipliers=multipliers, tasks=tasks)
@@ -205,10 +207,12 @@ def multilevel_modes(
     return MultilevelResult(found, errors, n_steps, int(kept.sum()), factor, tree)
 
 
-def _factor(interior: Interior) -> float:
+def _factor(interior: Interior, wanted: ModeCount) -> float:
     """Return the cutoff factor of shells and beams, whose nodes have rotations, or of solids."""
-    n_nodes = len(np.unique(interior.nodes))
-    return THIN if len(interior.nodes) > 4.5 * n_nodes else SOLID
+    n = len(interior.nodes)
+    if n <= 4.5 * len(np.unique(interior.nodes)):
+        return SOLID
+    return DENSER if wanted.n is not None and n <= MANY * wanted.n else THIN
 
 
 def _tree_of(make: Callable[[float], SubstructureTree], bound: float, least: int) -> tuple[SubstructureTree, float]:
