@@ -149,7 +149,7 @@ class BlockLanczos:
 
         `length` is that of what was taken off W before: a remainder is rounding by its measure.
         """
-        V, inner, combine = self.V, self.space.inner, self.space.combine
+        V, inner, combined = self.V, self.space.inner, self.space.combined
         C_sum = np.zeros((self.m, W.shape[1]))
         R_sum = np.eye(W.shape[1])
         M_W = self.M @ W
@@ -168,7 +168,7 @@ class BlockLanczos:
             floor = DEPENDENT * max(length, longest) if k_pass == 0 else 0.1
             kept = length2 > floor**2
             scaled = U[:, kept] / np.sqrt(length2[kept])
-            W, M_W = combine(W, scaled), combine(M_W, scaled)
+            W, M_W = combined(W, scaled), combined(M_W, scaled)
             R_sum = (U[:, kept] * np.sqrt(length2[kept])).T @ R_sum
             if not kept.any():
                 break
@@ -176,7 +176,7 @@ class BlockLanczos:
                 defect = _symmetric(inner(W, M_W))
                 if np.abs(defect - np.eye(len(defect))).max() > ROUNDOFF:
                     U = la.cholesky(defect)
-                    W, M_W = (combine(X, la.solve_triangular(U, np.eye(len(U)))) for X in (W, M_W))
+                    W, M_W = (combined(X, la.solve_triangular(U, np.eye(len(U)))) for X in (W, M_W))
                     R_sum = U @ R_sum
                 break
             M_W = self.M @ W

@@ -122,6 +122,10 @@ class RankSpace:
         """Return X C, (n, l)."""
         return self.made(C.shape[1], combine_here, X.part, C)
 
+    def combined(self, X: RankColumns, C: Array) -> RankColumns:
+        """Return X C, (n, l), in memory of its own; what X was is freed with its name."""
+        return self.combine(X, C)
+
     def subtract(self, Y: RankColumns, X: RankColumns, C: Array) -> None:
         """Take X C from Y in place."""
         self.ask(None, subtract_here, Y.part, X.part, C)

@@ -2,6 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -43,8 +44,8 @@ class SymmetricProduct:
         rows = S if self._n_lead else sp.csr_array((A.data, A.indices, A.indptr), shape=A.shape)
         n_parts = max(1, min(n_threads(), A.nnz // SMALL))
         cuts = np.searchsorted(rows.indptr, np.linspace(0, rows.nnz, n_parts + 1)[1:-1])
-        self._bounds = np.concatenate([[0], cuts, [rows.shape[0]]]).astype(int)
-        self._parts = [_rows(rows, *bounds) for bounds in zip(self._bounds[:-1], self._bounds[1:], strict=True)]
+        bounds = np.concatenate([[0], cuts, [rows.shape[0]]]).astype(int)
+        self._rows, self._shares = rows, list(pairwise(bounds.tolist()))
         self._pool = ThreadPoolExecutor(n_parts) if n_parts > 1 else None
 
     def __matmul__(self, x: Any) -> Any:
@@ -65,17 +66,21 @@ class SymmetricProduct:
         return ordered(result, order)
 
     def _multiply(self, block: Array, target: Array, n_components: int) -> None:
-        """Write the product by the rows in parts; rows of so many components lie in one row of the block."""
+        """Write the product by the rows; rows of so many components lie in one row of the block."""
+        rows = self._rows
         wide = block.reshape(-1, n_components * block.shape[1])
+        if rows.nnz <= SMALL:
+            target[:] = (rows @ wide).reshape(target.shape)
+            return
+        from cms.solvers.product_kernels import multiply_rows
 
-        def multiply(k: int) -> None:
-            rows = slice(n_components * self._bounds[k], n_components * self._bounds[k + 1])
-            target[rows] = (self._parts[k] @ wide).reshape(-1, block.shape[1])
+        def multiply(share: tuple[int, int]) -> None:
+            multiply_rows(rows.indptr, rows.indices, rows.data, *share, n_components, wide, target)
 
         if self._pool is None:
-            multiply(0)
+            multiply(self._shares[0])
         else:
-            list(self._pool.map(multiply, range(len(self._parts))))
+            list(self._pool.map(multiply, self._shares))
 
     def _add_rest(self, block: Array, target: Array) -> None:
         """Add what the columns after those of S have."""
@@ -90,9 +95,3 @@ class SymmetricProduct:
         rows = np.unique(B.indices)
         rows = rows[rows < self._n_lead]
         return sp.csr_array(B.T), (rows, sp.csr_array(B)[rows])
-
-
-def _rows(A: sp.csr_array, first: int, last: int) -> sp.csr_array:
-    entries = slice(A.indptr[first], A.indptr[last])
-    indptr = A.indptr[first : last + 1] - A.indptr[first]
-    return sp.csr_array((A.data[entries], A.indices[entries], indptr), shape=(last - first, A.shape[1]))

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 
 from cms.solvers.inverse import Inverse
 from cms.solvers.sparse_product import SymmetricProduct
-from cms.solvers.tall import combine, inner, put, subtract
+from cms.solvers.tall import combine, combined, inner, put, subtract
 from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["ArraySpace", "TallBasis", "TallProduct", "TallSpace"]
@@ -57,6 +57,9 @@ class TallSpace(Protocol):
 
     def combine(self, X: Any, C: Array) -> Any:
         """Return X C, (n, l)."""
+
+    def combined(self, X: Any, C: Array) -> Any:
+        """Return X C, (n, l), for columns X that are not used any more, in their place if that is possible."""
 
     def subtract(self, Y: Any, X: Any, C: Array) -> None:
         """Take X C from Y in place."""
@@ -123,6 +126,10 @@ class ArraySpace:
     def combine(self, X: Array, C: Array) -> Array:
         """Return X C, (n, l)."""
         return combine(X, C)
+
+    def combined(self, X: Array, C: Array) -> Array:
+        """Return X C, (n, l), in the place of X, which is lost."""
+        return combined(X, C)
 
     def subtract(self, Y: Array, X: Array, C: Array) -> None:
         """Take X C from Y in place."""
