@@ -1,6 +1,6 @@
 """The elements behind a shell body: integrals over mass, stress at the faces, geometric stiffness."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
@@ -51,9 +51,8 @@ class ShellModel:
         self._require_rows("mass_gram", u)
         k = np.shape(u)[1]
         gram = np.zeros((4 + 3 * k, 4 + 3 * k))
-        for group in self.groups:
-            for rows in group.chunks():
-                gram += group.slices(rows).gram(np.asarray(u))
+        for _, part in self._of_chunks(lambda group, rows: group.slices(rows).gram(np.asarray(u))):
+            gram += part
         return gram
 
     def nodal_stress(self, u: Array, *, nodes: IntArray | None = None) -> Array:
@@ -102,18 +101,16 @@ class ShellModel:
     def mass_forces(self, loads: MassLoads) -> Array:
         """Return the consistent forces and moments of loads per mass, (n_mesh_dof, k), couples of normals included."""
         forces = np.zeros((self.n_mesh_dof, loads.k))
-        for group in self.groups:
-            for rows in group.chunks():
-                np.add.at(forces, group.dofs[rows], slice_forces(group.slices(rows), loads))
+        for dofs, part in self._of_chunks(lambda group, rows: slice_forces(group.slices(rows), loads)):
+            np.add.at(forces, dofs, part)
         return forces
 
     def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
-        """Return K u of all cells, (n_mesh_dof, k) [N, N m], at all nodes."""
+        """Return K u of all cells, (n_mesh_dof, k) [N, N m]; of those near `nodes` where these are given."""
         self._require_rows("internal_forces", u)
         forces = np.zeros(np.shape(u))
-        for group in self.groups:
-            for rows in group.chunks():
-                np.add.at(forces, group.dofs[rows], group.internal_forces(np.asarray(u), rows))
+        for dofs, part in self._of_chunks(lambda group, rows: group.internal_forces(np.asarray(u), rows), nodes):
+            np.add.at(forces, dofs, part)
         return forces
 
     def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Array) -> Array:
@@ -122,11 +119,23 @@ class ShellModel:
             self._require_rows("geometric_stiffness", columns)
         u, Phi = np.asarray(u), np.asarray(Phi)
         K = np.zeros((loads.k, Phi.shape[1], Phi.shape[1]))
-        chunks = [(group, rows) for group in self.groups for rows in group.chunks()]
-        with one_blas_thread(), ThreadPoolExecutor(n_threads()) as pool:
-            for part in pool.map(lambda chunk: cell_geometric_stiffness(chunk[0], chunk[1], u, loads, Phi), chunks):
-                K += part  # in their order: results repeat bit for bit
+        for _, part in self._of_chunks(lambda group, rows: cell_geometric_stiffness(group, rows, u, loads, Phi)):
+            K += part
         return K
+
+    def _of_chunks(
+        self, work: Callable[[ShellCells, slice], Array], nodes: IntArray | None = None
+    ) -> Iterator[tuple[IntArray, Array]]:
+        """Yield the dofs of chunks of cells, or of those that meet some nodes, and what is made of them, in threads.
+
+        In the order of the chunks, so that sums repeat bit for bit.
+        """
+        chunks = [(group, rows) for group in self.groups for rows in group.chunks()]
+        if nodes is not None:
+            chunks = [(group, rows) for group, rows in chunks if np.isin(group.cells[rows], nodes).any()]
+        with one_blas_thread(), ThreadPoolExecutor(n_threads()) as pool:
+            for (group, rows), made in zip(chunks, pool.map(lambda chunk: work(*chunk), chunks), strict=True):
+                yield group.dofs[rows], made
 
     @cached_property
     def _means(self) -> tuple[tuple[sp.csc_array, ...], ...]:
