@@ -13,7 +13,8 @@ __all__ = ["multiply_rows"]
 def multiply_rows(indptr, indices, data, first, last, n_components, wide, y):
     """Write y = (S ⊗ 1_c) x, rows c first to c last of y, (n, k), of any strides, by the compressed rows of S.
 
-    wide: x, (n, k), as rows of c k numbers. Four entries at a time pass the sum, which stays in the nearest cache; the order of the sums is SciPy's.
+    wide: x, (n, k), as rows of c k numbers. Four entries at a time pass the sum, which stays in the nearest cache; the
+    order of the sums is SciPy's.
     """
     width = wide.shape[1]
     k = width // n_components
