@@ -6,7 +6,7 @@ import scipy.sparse as sp
 from scipy.special import gammaincinv
 
 from cms.solvers.sparse_product import SymmetricProduct
-from cms.solvers.tall import combine, combined, inner, subtract
+from cms.solvers.tall import combine, combined, inner
 from cms.substructures.tree import SubstructureTree
 from fe_models.foundation.arrays import Array, IntArray
 
@@ -17,8 +17,7 @@ SLICE = 16384  #: rows that are put elsewhere at a time
 PROBES = 64  #: random columns that measure the residuals of any number of modes
 RARE = 1e-3  #: part of the modes whose residual the probes find too small
 SUMS = 16  #: of neighbouring modes, whose residuals are measured together
-FEW = 0.25  #: part of the modes up to which those with large errors are improved by themselves
-DEPENDENT = 1e-10  #: length of a residual against the longest, below which it is a combination of others
+FEW = 0.25  #: part of the modes up to which those that the probes doubt are measured by themselves
 
 
 class ApproximateModes:
@@ -61,29 +60,6 @@ class ApproximateModes:
         scale = np.sqrt(np.diag(H))
         self.omega2, Z = la.eigh(H / np.outer(scale, scale), G / np.outer(scale, scale))  # (4)
         self.X = combined(self.X, Z / scale[:, None])
-
-    def improve_some(self, worst: IntArray) -> None:
-        """Improve a few modes by their residuals: Rayleigh-Ritz in the span of all X and of these.
-
-        (1) R = x - omega² K⁻¹ M x of the worst modes, M-orthonormal to X and to each other
-        (2) [Lambda E; Eᵀ H] z = omega² z,  E = Xᵀ K R,  H = Rᵀ K R
-        (3) X <- [X R] Z, the lowest
-        """
-        k = self.X.shape[1]
-        R = self._residuals(np.eye(k)[:, worst])  # (1)
-        for _ in range(2):  # once leaves what cancels
-            subtract(R, self.X, inner(self.X, self.M @ R))
-            length2, U = la.eigh(inner(R, self.M @ R))
-            is_new = length2 > DEPENDENT**2 * length2[-1]
-            R = combine(R, U[:, is_new] / np.sqrt(length2[is_new]))
-        K_R = self.K @ R  # (2)
-        E, H = inner(self.X, K_R), inner(R, K_R)
-        A = np.block([[np.diag(self.omega2[:k]), E], [E.T, (H + H.T) / 2]])
-        omega2, Z = la.eigh(A, subset_by_index=(0, k - 1))
-        self.omega2 = np.concatenate([omega2, self.omega2[k:]])
-        self.X = combined(self.X, Z[:k])  # (3)
-        subtract(self.X, R, -Z[k:])
-        self.residuals = np.full(len(self.omega2), np.nan)
 
     def errors(self, count: int, tolerance: float = np.inf) -> Array:
         """Return an estimate of how much too high each of the first frequencies is, relative, (count,).

@@ -17,7 +17,7 @@ from cms.solvers.registry import solver_of
 from cms.solvers.shift_inverted import Wanted
 from cms.substructures.dissection import Dissection, dissect, node_graph
 from cms.substructures.frequency_guess import guessed_omega2
-from cms.substructures.improvement import FEW, ApproximateModes
+from cms.substructures.improvement import ApproximateModes
 from cms.substructures.reduced_mass import ReducedMass
 from cms.substructures.reduced_modes import reduced_modes, reduced_omega2
 from cms.substructures.tree import SubstructureTree, substructure_tree
@@ -101,7 +101,7 @@ def multilevel_modes(
     (4) of a number of modes: its highest frequency again, by the reduced pencil up to the estimate; a lower bound, but
         none that leaves fewer modes than these
     (5) the reduced pencil: its lowest modes, expanded down the tree
-    (6) where the error that is left is above the tolerance: inverse iteration by the tree, of a few modes or all
+    (6) where the error that is left is above the tolerance: steps of inverse iteration by the tree
 
     Frequencies are those of a Rayleigh-Ritz basis: never below the true ones.
 
@@ -171,9 +171,8 @@ def multilevel_modes(
         del Z_kept, mass
         told = count if wanted.n is not None else p
         modes = ApproximateModes(tree, K, M, reduced, tree.expand(Z[:, :told]))
-        few = 0.0 if wanted.verify else FEW  # the proof needs good guards, which follow in steps of all modes alone
         below = highest if wanted.cutoff is not None else 0.0
-        errors, n_steps = _improved(modes, Z, count, tolerance, below, few)  # (6)
+        errors, n_steps = _improved(modes, Z, count, tolerance, below)  # (6)
         del Z
     k = count if wanted.n is not None else int((modes.omega2 <= highest).sum())
     if wanted.n is None and k == p < kept.sum():
@@ -258,25 +257,21 @@ def _guards(count: int) -> int:
 
 
 def _improved(
-    modes: ApproximateModes, Z: Array, count: int, tolerance: float, highest: float, few: float
+    modes: ApproximateModes, Z: Array, count: int, tolerance: float, highest: float
 ) -> tuple[Array, int]:
     """(6) Improve modes until the error that is left in the wanted ones is below the tolerance.
 
-    The wanted ones: at least `count`, and all that came to lie below omega² = `highest`. A few that lack accuracy, this
-    part of them at most, are improved by themselves, more of them all together with the guards, whose amplitudes are
-    the last columns of Z.
+    The wanted ones: at least `count`, and all that came to lie below omega² = `highest`. All are improved together with
+    the guards, whose amplitudes are the last columns of Z: a mode by itself would keep what it has of a poor guard next
+    to it, which the estimate does not see.
     """
     count = max(count, int((modes.omega2 <= highest).sum()))
     errors, n_steps = modes.errors(count, tolerance) if count else np.zeros(0), 0
     while n_steps < MOST_STEPS and not (errors <= tolerance).all():
         n_steps += 1
-        worst = np.flatnonzero(errors > tolerance)
-        if len(worst) <= few * count:
-            modes.improve_some(worst)
-        else:
-            if modes.X.shape[1] < Z.shape[1]:
-                modes.X = np.hstack([modes.X, modes.tree.expand(Z[:, modes.X.shape[1] :])])
-            modes.improve()
+        if modes.X.shape[1] < Z.shape[1]:
+            modes.X = np.hstack([modes.X, modes.tree.expand(Z[:, modes.X.shape[1] :])])
+        modes.improve()
         count = max(count, int((modes.omega2 <= highest).sum()))
         errors = modes.errors(count, tolerance)
     return errors, n_steps
