@@ -35,7 +35,7 @@ from fe_models.foundation.components import MOTION_COMPONENTS
 from fe_models.foundation.ranks.spread_columns import SpreadColumns
 from fe_models.foundation.ranks.spread_matrix import largest_entry
 from fe_models.foundation.solver import Solver
-from fe_models.foundation.tall.on_disk import in_memory, release
+from fe_models.foundation.tall.on_disk import of_this_process, release
 
 __all__ = ["Families"]
 
@@ -246,7 +246,7 @@ class Families:
     def without_boundary(self, Phi: Any) -> Any:
         """Return Phi - Psi_C Phi_h: beside Psi_C the same span, and zero on the held dofs, (n_dof, k)."""
         at_rest = combine(self.Psi_C, Phi[self.h])
-        return Phi - (at_rest if isinstance(Phi, SpreadColumns) else in_memory(at_rest))
+        return Phi - (at_rest if isinstance(Phi, SpreadColumns) else of_this_process(at_rest))
 
     # -- words -----------------------------------------------------------------------------------------------------
 

@@ -21,7 +21,7 @@ from fe_models.body.submatrix import PrincipalBlock, principal_block
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 from fe_models.foundation.solver import Solver
-from fe_models.foundation.tall.on_disk import in_memory
+from fe_models.foundation.tall.on_disk import of_this_process
 
 __all__ = ["BoundaryConditions", "CondensedBody", "Flexibility"]
 
@@ -140,7 +140,7 @@ class Flexibility:
         g = f_z - Z.T @ (self._K_hi @ v)
         z = np.zeros((Z.shape[1], f.shape[1]))
         z[self.e] = self.solve_boundary(g[self.e])
-        u = in_memory(combine(self.condensed.Psi_C, Z @ z))
+        u = of_this_process(combine(self.condensed.Psi_C, Z @ z))
         u[i] += v
         return u if self.T is None else np.concatenate([u[i], z])
 
@@ -275,7 +275,7 @@ def _cholesky(condensed: CondensedBody, Z: Array, S_z: Array, e: IntArray) -> tu
     is_free = values < SINGULAR
     if is_free.any():
         body = condensed.body
-        moved = in_memory(combine(condensed.Psi_C, Z[:, e] @ (size[:, None] * vectors[:, is_free])))
+        moved = of_this_process(combine(condensed.Psi_C, Z[:, e] @ (size[:, None] * vectors[:, is_free])))
         raise BodyError(
             f"body {body.name!r}: {int(is_free.sum())} motions besides the rigid ones cost no energy: a mechanism, "
             f"largest at {moving_nodes(body, np.arange(body.n_dof), moved)}; join the parts or add what holds them"

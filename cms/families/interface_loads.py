@@ -10,7 +10,7 @@ from cms.errors import BodyError, ModeSetError
 from fe_models.body.couplings import mean_motion
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
-from fe_models.foundation.tall.on_disk import in_memory
+from fe_models.foundation.tall.on_disk import of_this_process
 
 __all__ = ["InterfaceLoad", "boundary_load", "condensed_load", "point_load"]
 
@@ -103,7 +103,7 @@ def condensed_load(neighbour: FEBody, interfaces: Mapping[str, str]) -> Interfac
             )
     to_motion = la.block_diag(*[_to_interface_axes(interface) for interface in shared])
     with Families(replace(neighbour, interfaces=shared)) as families:
-        Psi = in_memory(families.Psi_C[:, : 6 * len(shared)]) @ to_motion.T
+        Psi = of_this_process(families.Psi_C[:, : 6 * len(shared)]) @ to_motion.T
         rigid = to_motion @ families.Psi_R[families.body.b]
     # a free body has no energy in its rigid-body motions: rounding there would be a spring, or a negative one
     size = np.where(np.arange(len(rigid)) % 6 < 3, 1.0, 1 / neighbour.length)

@@ -13,7 +13,7 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.components import MOTION_COMPONENTS
 from fe_models.foundation.ranks.spread_columns import spread_parts
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
-from fe_models.foundation.tall.on_disk import in_memory, on_disk, release
+from fe_models.foundation.tall.on_disk import of_this_process, on_disk, release
 
 __all__ = [
     "attachment_modes",
@@ -79,7 +79,7 @@ def redundant_constraint_modes(free: Flexibility) -> Array:
     Array
         (n_dof, n_e), the constraint modes of the E dofs.
     """
-    return in_memory(free.condensed.Psi_C[:, free.e])
+    return of_this_process(free.condensed.Psi_C[:, free.e])
 
 
 def attachment_modes(free: Flexibility) -> Array:
@@ -90,7 +90,7 @@ def attachment_modes(free: Flexibility) -> Array:
     Array
         (n_dof, n_e), translations per force [m/N] or per moment [1/N].
     """
-    return in_memory(combine(free.condensed.Psi_C[:, free.e], free.solve_boundary(np.eye(len(free.e)))))
+    return of_this_process(combine(free.condensed.Psi_C[:, free.e], free.solve_boundary(np.eye(len(free.e)))))
 
 
 def inertia_relief_modes(fixed: FixedInterfaceBody, Psi_R: Array) -> Array:
@@ -133,7 +133,7 @@ def unrestrained_attachment_modes(free: Flexibility) -> Array:
     n_b, h = len(free.condensed.body.b), free.condensed.fixed.b
     on_boundary = np.zeros((len(h), n_b))  # u_h of the unit forces with R held
     on_boundary[free.e] = free.solve_boundary(np.eye(len(h), n_b)[free.e])
-    u = in_memory(combine(free.condensed.Psi_C, on_boundary))
+    u = of_this_process(combine(free.condensed.Psi_C, on_boundary))
     u -= combine(free.held(free.M_N), free.N[h[:n_b]].T)
     u = u - combine(free.N, free.M_N.T @ u)
     body, b = free.condensed.body, h[:n_b]

@@ -235,6 +235,8 @@ def _shifted_expansion(families: Families, shift: float, F_extra: Array, stack: 
         return solve(np.hstack([F, F_extra]))
 
     def solve(F: Array) -> Array:
+        if not isinstance(body.K, SpreadMatrix):
+            return factor.solve(F)
         x = np.empty(F.shape)
         x[order] = factor.solve(F[order])
         return x

@@ -1,5 +1,7 @@
 """Everything a mode set and its reduced body can be asked against the full model."""
 
+from dataclasses import replace
+
 from cms.mode_set import ModeSet
 from cms.quality.body_check import check_body
 from cms.quality.errors import QualityError
@@ -20,6 +22,7 @@ from cms.quality.reference.port_model import port_model
 from cms.quality.reference.transient import Snapshots
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.body.fe_body import FEBody
+from fe_models.foundation.tall.on_disk import of_this_process
 
 __all__ = ["check_reduction", "require_same_units"]
 
@@ -66,6 +69,8 @@ def check_reduction(
             f"{body.n_dof}; check with the body it was made from"
         )
     require_same_units(body, reduced)
+    if (columns := of_this_process(modes.columns)) is not modes.columns:
+        modes = replace(modes, columns=columns)
     if reference is None:
         with FullReference(body, band=usable_band(modes, reduced)) as made:
             return check_reduction(

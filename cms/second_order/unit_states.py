@@ -16,7 +16,7 @@ from cms.solvers.tall import combine
 from fe_models.body.fe_body import FEBody
 from fe_models.body.mass_loads import MassLoads
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.tall.on_disk import in_memory
+from fe_models.foundation.tall.on_disk import of_this_process
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = [
@@ -150,7 +150,7 @@ def static_states(families: Families, F: Array) -> Array:
                 "add what holds them"
             ) from error
         z[e] = size[:, None] * la.cho_solve(factor, size[:, None] * g[e])
-    u = in_memory(combine(families.Psi_C, z))
+    u = of_this_process(combine(families.Psi_C, z))
     u[i] += v
     return u
 

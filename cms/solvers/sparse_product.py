@@ -19,6 +19,7 @@ from fe_models.foundation.threads import n_threads
 __all__ = ["SymmetricProduct"]
 
 SMALL = 200_000  #: stored entries below which threads cost more than they bring
+NARROW = 4  #: numbers in a row of columns below which SciPy's product takes less time
 COLUMNS = 16  #: columns per pass over the matrix; the rows of x it touches then stay in the cache
 
 
@@ -69,7 +70,7 @@ class SymmetricProduct:
         """Write the product by the rows; rows of so many components lie in one row of the block."""
         rows = self._rows
         wide = block.reshape(-1, n_components * block.shape[1])
-        if rows.nnz <= SMALL:
+        if rows.nnz <= SMALL or wide.shape[1] < NARROW:
             target[:] = (rows @ wide).reshape(target.shape)
             return
         from cms.solvers.product_kernels import multiply_rows

@@ -90,7 +90,7 @@ def combine(X: Any, C: Array, *, order: Literal["C", "F"] | None = None) -> Any:
 def combined(X: Any, C: Array) -> Any:
     """Return X C, (n, m), in the place of X, (n, k), which is lost; an array of its own where m is much less than k."""
     k, m = C.shape
-    if isinstance(X, SpreadColumns) or not k // 2 <= m <= k:
+    if isinstance(X, SpreadColumns) or not m or not k // 2 <= m <= k:
         return combine(X, C)
 
     def update(rows: slice) -> None:

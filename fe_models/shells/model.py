@@ -1,7 +1,8 @@
 """The elements behind a shell body: integrals over mass, stress at the faces, geometric stiffness."""
 
+from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,6 +20,7 @@ from fe_models.shells.skin import ShellSkin
 
 __all__ = ["ShellModel"]
 
+AHEAD = 2  #: chunks of cells for each thread whose results may wait
 TOP, MIDDLE, BOTTOM = 0.5, 0.0, -0.5  #: heights in the thickness, z/t
 
 
@@ -128,14 +130,20 @@ class ShellModel:
     ) -> Iterator[tuple[IntArray, Array]]:
         """Yield the dofs of chunks of cells, or of those that meet some nodes, and what is made of them, in threads.
 
-        In the order of the chunks, so that sums repeat bit for bit.
+        In the order of the chunks, so that sums repeat bit for bit; some wait to be taken, not all.
         """
         chunks = [(group, rows) for group in self.groups for rows in group.chunks()]
         if nodes is not None:
             chunks = [(group, rows) for group, rows in chunks if np.isin(group.cells[rows], nodes).any()]
         with one_blas_thread(), ThreadPoolExecutor(n_threads()) as pool:
-            for (group, rows), made in zip(chunks, pool.map(lambda chunk: work(*chunk), chunks), strict=True):
-                yield group.dofs[rows], made
+            ahead: deque[tuple[IntArray, Future[Array]]] = deque()
+            for group, rows in chunks:
+                ahead.append((group.dofs[rows], pool.submit(work, group, rows)))
+                if len(ahead) > AHEAD * n_threads():
+                    dofs, made = ahead.popleft()
+                    yield dofs, made.result()
+            for dofs, made in ahead:
+                yield dofs, made.result()
 
     @cached_property
     def _means(self) -> tuple[tuple[sp.csc_array, ...], ...]:

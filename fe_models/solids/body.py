@@ -294,7 +294,8 @@ def spread_mass_gram(M_s: SpreadMatrix, nodes: Array, u: Any) -> Array:
 def gram_here(ranks: Ranks, key: str, nodes: Part, u: Part, width: int) -> Array:
     """Return the part of Aᵀ M_s A of this rank's rows."""
     product: RowsProduct = ranks.store[key]
-    columns = np.ascontiguousarray(own_part(ranks, u)).reshape(product.n_own, -1)
+    own = own_part(ranks, u)
+    columns = np.ascontiguousarray(own).reshape(product.n_own, 3 * own.shape[1])
     return gram_by_products(product.__matmul__, own_part(ranks, nodes), columns, width)
 
 

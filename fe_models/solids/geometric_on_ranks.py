@@ -66,5 +66,6 @@ def stiffness_here(
 
 def fields(halo: Halo, x: Array, at: np.ndarray) -> Array:
     """Return columns over the nodes of a part, (3 n_part_nodes, k), by own rows, (3 n_own, k)."""
-    by_node = np.ascontiguousarray(x).reshape(len(x) // 3, -1)
-    return np.concatenate([by_node, halo.rows(by_node)])[at].reshape(-1, x.shape[1])
+    n, k = x.shape
+    by_node = np.ascontiguousarray(x).reshape(n // 3, 3 * k)
+    return np.concatenate([by_node, halo.rows(by_node)])[at].reshape(3 * len(at), k)

@@ -38,6 +38,15 @@ def same(a, b, scale=None):
     assert_allclose(a, b, rtol=0, atol=ROUNDOFF * scale)
 
 
+def test_the_check_of_a_reduction_is_that_of_one_process():
+    records = []
+    for body in pair(2):
+        modes = craig_bampton(body, n_modes=4)
+        records.append(cms.check_reduction(body, modes, reduce(body, modes, geometric=False)))
+    assert len(records[0]) > 20
+    assert [(r.name, r.verdict) for r in records[1]] == [(r.name, r.verdict) for r in records[0]]
+
+
 @pytest.mark.parametrize("size", [2, 3])
 @pytest.mark.parametrize("kind", ["rigid", "distributing", "nodes"])
 @pytest.mark.parametrize("frame", [cms.NodalFrame("left"), cms.TisserandFrame(), cms.BuckensFrame()])

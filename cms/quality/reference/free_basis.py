@@ -14,6 +14,7 @@ from cms.reduced_body.reduced_body import BodyFrame
 from cms.solvers.tall import combine, inner
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, frozen
+from fe_models.foundation.tall.on_disk import of_this_process
 
 __all__ = ["FreeBasis", "free_basis", "ritz_basis"]
 
@@ -60,7 +61,7 @@ def free_basis(body: FEBody, modes: ModeSet, families: Families) -> FreeBasis:
     N, M_N = families.free.N, families.free.M_N
     condition = FrameCondition(
         BodyFrame("tisserand", np.zeros(3)),
-        lambda columns: M_N.T @ columns,
+        lambda columns: inner(M_N, columns),
         Psi_R=N,
         M_Psi_R=M_N,
         W=M_N,
@@ -69,7 +70,8 @@ def free_basis(body: FEBody, modes: ModeSet, families: Families) -> FreeBasis:
     finished = finish(body, modes, condition)
     is_massive = np.diag(finished.M) > 0.5
     order = np.lexsort((np.diag(finished.K), np.logical_not(is_massive)))
-    return FreeBasis(finished.Phi[:, order], np.diag(finished.K)[order], is_massive[order], N, dropped=finished.dropped)
+    Phi = of_this_process(finished.Phi[:, order])
+    return FreeBasis(Phi, np.diag(finished.K)[order], is_massive[order], N, dropped=finished.dropped)
 
 
 def ritz_basis(body: FEBody, X: Array, N: Array) -> FreeBasis:

@@ -50,12 +50,20 @@ class SpreadColumns:
         if source is None:
             weakref.finalize(self, dropped.append, part.key).atexit = False
 
+    __iter__ = None  #: row by row nobody wants them
+
     def __len__(self) -> int:
         return self.shape[0]
+
+    def __array__(self, dtype: Any = None, copy: Any = None) -> Array:
+        """Return `whole()`, for callers that know arrays alone."""
+        return self.whole() if dtype is None else self.whole().astype(dtype)
 
     def __getitem__(self, index: Any) -> Any:
         """Return columns X[:, c], or rows X[r] and X[r, c] of indices r as an array of rank 0."""
         rows, columns = index if isinstance(index, tuple) else (index, slice(None))
+        if np.isscalar(rows) or np.isscalar(columns):
+            raise IndexError("SpreadColumns: expected X[:, columns] or X[rows], lists of them; take X[:, [k]] for one")
         X = self._columns(columns)
         if isinstance(rows, slice):
             if rows != slice(None):
@@ -74,9 +82,13 @@ class SpreadColumns:
         return spread_with(self.layout, len(index), chosen, self, index)
 
     def __add__(self, other: "SpreadColumns") -> "SpreadColumns":
+        if not isinstance(other, SpreadColumns):
+            return NotImplemented
         return spread_with(self.layout, self.shape[1], operator.add, self, other)
 
     def __sub__(self, other: "SpreadColumns") -> "SpreadColumns":
+        if not isinstance(other, SpreadColumns):
+            return NotImplemented
         return spread_with(self.layout, self.shape[1], operator.sub, self, other)
 
     def __mul__(self, factors: Any) -> "SpreadColumns":
@@ -118,7 +130,8 @@ def spread_beside(layout: RowLayout, *blocks: Any) -> SpreadColumns:
 
 def spread_parts(layout: RowLayout, k: int, blocks: Iterable[Any]) -> SpreadColumns:
     """Return columns, k in all, which come one block after another."""
-    key = new_key()
+    found = SpreadColumns(layout, Part(new_key(), 0, k))  # first of all: where a block fails, they go with their name
+    key = found.part.key
     layout.ask(room_here, key, layout.rows, k)
     at = 0
     for X in blocks:
@@ -129,7 +142,7 @@ def spread_parts(layout: RowLayout, k: int, blocks: Iterable[Any]) -> SpreadColu
                 layout.ranks.store["columns"] = X[:, first : first + COLUMNS][layout.order]
                 layout.ask(given_here, key, layout.rows, at + first)
         at += X.shape[1]
-    return SpreadColumns(layout, Part(key, 0, k))
+    return found
 
 
 def on_rows(layout: RowLayout, function: Callable[..., Any], *arguments: Any) -> list[Any]:
@@ -139,9 +152,9 @@ def on_rows(layout: RowLayout, function: Callable[..., Any], *arguments: Any) ->
 
 def spread_with(layout: RowLayout, k: int, function: Callable[..., Array], *arguments: Any) -> SpreadColumns:
     """Return the columns, (n, k), whose rows function(*arguments) returns on all ranks, as `on_rows` calls it."""
-    key = new_key()
-    layout.ask(kept_here, key, function, named(arguments))
-    return SpreadColumns(layout, Part(key, 0, k))
+    found = SpreadColumns(layout, Part(new_key(), 0, k))
+    layout.ask(kept_here, found.part.key, function, named(arguments))
+    return found
 
 
 def rows_of(X: SpreadColumns, index: IntArray) -> Array:

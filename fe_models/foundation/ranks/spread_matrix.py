@@ -61,8 +61,8 @@ class SpreadMatrix:
         self.layout = RowLayout(ranks, order, rows)
         self.ranks, self.order, self.rows, self.key = ranks, order, rows, new_key()
         self.position = self.layout.position
-        found = self._ask(made_here, self.key, rows, function, *arguments)
         weakref.finalize(self, dropped.append, self.key).atexit = False
+        found = self._ask(made_here, self.key, rows, function, *arguments)
         self.nnz = sum(entries for entries, _ in found)
         self.largest = max(largest for _, largest in found)  #: in size of all entries
         self._diagonal: Array | None = None
@@ -99,9 +99,9 @@ class SpreadMatrix:
     def _on_ranks(self, x: SpreadColumns) -> SpreadColumns:
         if not self.layout.is_like(x.layout):
             raise BodyError(f"SpreadMatrix: rows of columns {x.shape} lie otherwise than those of A, {self.shape}")
-        key = new_key()
-        self._ask(product_here, key, self.key, x.part)
-        return SpreadColumns(x.layout, Part(key, 0, x.shape[1]))
+        product = SpreadColumns(x.layout, Part(new_key(), 0, x.shape[1]))
+        self._ask(product_here, product.part.key, self.key, x.part)
+        return product
 
     def __getitem__(self, index: tuple[slice, IntArray]) -> sp.csc_array:
         """Return columns of it, A[:, dofs], (n, k), as a matrix of rank 0."""

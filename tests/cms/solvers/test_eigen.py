@@ -496,3 +496,16 @@ def test_a_search_starts_alike_whatever_the_order_of_the_rows():
         return np.abs(Phi * np.sign((Phi * one).sum(axis=0)) - one).max() / np.abs(one).max()
 
     assert difference(other) < 1e-9 < 1e-8 < difference(otherwise)
+
+
+@pytest.mark.parametrize("n_masses", [9, 17])
+def test_a_last_block_that_brings_nothing_ends_the_search(n_masses):
+    """Point masses on massless structure: the operator reaches as many directions as there are masses."""
+    n = 4000
+    K = sp.diags_array([-np.ones(n - 1), np.full(n, 2.0), -np.ones(n - 1)], offsets=[-1, 0, 1]).tocsc()
+    m = np.zeros(n)
+    m[np.linspace(100, 3900, n_masses).astype(int)] = 1.0
+    held = np.flatnonzero(m)
+    flexibility = sp.linalg.splu(K).solve(np.eye(n)[:, held])[held]
+    found = eigenmodes(K, sp.diags_array(m).tocsc(), 3, shift=-1e-6)
+    assert_allclose(found.omega2, 1 / la.eigvalsh(flexibility)[::-1][:3], rtol=1e-8)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from cms.solvers.tall import combine, inner, ordered, subtract
+from cms.solvers.tall import combine, combined, inner, ordered, subtract
 
 ROUNDOFF = 1e-12
 
@@ -44,3 +44,13 @@ def test_parts_of_rows_are_combined_in_place_of_copies():
     C = columns(8, 2, "C", seed=1)
     assert_allclose(combine(V, C), V @ C, rtol=0, atol=ROUNDOFF)
     assert combine(V, C).flags.f_contiguous
+
+
+def test_columns_are_combined_in_their_place_down_to_none():
+    X = np.random.default_rng(0).standard_normal((50, 5))
+    for k in (5, 1):
+        for m in range(k + 1):
+            for order in "CF":
+                C = np.random.default_rng(m).standard_normal((k, m))
+                some = np.array(X[:, :k], order=order)
+                assert_allclose(combined(some, C), X[:, :k] @ C, rtol=0, atol=1e-14)

@@ -2,11 +2,14 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
 from fe_models.body.couplings import couple
+from fe_models.body.mass_loads import MassLoads
 from fe_models.errors import MeshError
+from fe_models.foundation.ranks.spread_columns import spread_columns
 from fe_models.foundation.units import unit_system
 from fe_models.solids import assembly_on_ranks
 from fe_models.solids.body import solid_body
@@ -52,6 +55,15 @@ def test_a_rank_gets_its_share_of_the_mesh(monkeypatch):
 def test_more_ranks_than_nodes_leave_some_without_rows():
     one, spread = both(box_mesh(1, 1, 1), STEEL, 9)
     assert (spread.K.whole() != one.K).nnz == 0
+    u = np.random.default_rng(0).standard_normal((one.n_dof, 2))
+    gram, expected = (body.element_model.mass_gram(u) for body in (spread, one))
+    assert_allclose(gram, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+    loads = MassLoads(np.zeros((1, 3, 3)), np.ones((1, 3)))
+    columns = spread_columns(spread.K.layout, u)
+    stiff, expected = (
+        body.element_model.geometric_stiffness(u[:, :1], loads, v) for body, v in ((spread, columns), (one, u))
+    )
+    assert_allclose(stiff, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
 
 
 def test_an_inverted_element_is_told_as_by_one_process():

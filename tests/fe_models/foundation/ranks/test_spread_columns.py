@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from fe_models.foundation.errors import BodyError
 from fe_models.foundation.ranks.row_layout import RowLayout
 from fe_models.foundation.ranks.rows import Rows
-from fe_models.foundation.ranks.spread_columns import COLUMNS, spread_beside, spread_columns, spread_with
+from fe_models.foundation.ranks.spread_columns import COLUMNS, spread_beside, spread_columns, spread_parts, spread_with
 from tests.thread_ranks import ThreadRanks
 
 N, K = 30, COLUMNS + 3
@@ -43,6 +44,37 @@ def test_parts_are_those_of_an_array(layout, X):
     assert there[np.zeros(0, int)].shape == (0, K)
     with pytest.raises(IndexError, match="whole"):
         there[2:5]
+
+
+def test_callers_that_know_arrays_alone_get_one(layout, X):
+    there = spread_columns(layout, X)
+    assert_array_equal(np.asarray(there), X)
+    for index in (3, (slice(None), 3)):
+        with pytest.raises(IndexError, match="lists of them"):
+            there[index]
+    with pytest.raises(TypeError):
+        there + X
+    with pytest.raises(TypeError):
+        list(there)
+
+
+def test_columns_whose_making_fails_are_forgotten(layout, X):
+    def blocks():
+        yield X[:, :2]
+        raise BodyError("no more")
+
+    def failing(part):
+        raise BodyError("no rows")
+
+    for make in (
+        lambda: spread_parts(layout, K, blocks()),
+        lambda: spread_with(layout, K, failing, spread_columns(layout, X)),
+    ):
+        with pytest.raises(BodyError, match="no "):
+            make()
+    gc.collect()
+    layout.ask(lambda ranks: None)
+    assert layout.ranks.stores == [{}] * layout.ranks.size
 
 
 def test_sums_are_those_of_arrays(layout, X):
