@@ -283,15 +283,20 @@ def is_balanced(wrenches: Array, r: list[Array]) -> bool:
 
 
 def ways_of_points(motion: Motion) -> list[tuple[Array, Array]]:
-    """Return the forces of points on each other as large as their distances change, and no moments."""
-    n = len(motion.markers)
+    """Return the forces of points on each other as large as their distances change, and no moments.
+
+    Two points in one place have no line, and no forces on each other.
+    """
+    n, least = len(motion.markers), (LEAST * motion.length) ** 2
     F: list[Array] = [np.zeros(3) for _ in range(n)]
     for b in range(n):
         for a in range(b):
             if motion.acts("force", a) and motion.acts("force", b):
                 d = motion.r[b] - motion.r[a]
-                e = d / np.sqrt(dot(d, d))[..., None]
-                along = dot(e, motion.dr[b] - motion.dr[a])[..., None] * e
+                square = dot(d, d)
+                is_apart = np.real(square) > least
+                share = dot(d, motion.dr[b] - motion.dr[a]) * is_apart / np.where(is_apart, square, 1.0)
+                along = share[..., None] * d
                 F[a], F[b] = F[a] - along, F[b] + along
     return [(each, np.zeros(3)) for each in F]
 

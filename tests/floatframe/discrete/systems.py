@@ -25,7 +25,7 @@ from floatframe.functions.time_functions import cycloidal_spin_up, harmonic
 from floatframe.functions.time_functions import table as table_function
 from floatframe.rotations import euler_parameters_of_rotation_vector
 from tests.floatframe.discrete.lines import SLIDING
-from tests.floatframe.elements.laws import Creeping, Mount, OnPlane, Spring
+from tests.floatframe.elements.laws import Creeping, Loop, Mount, OnPlane, Spring
 from tests.floatframe.integrators.test_conserving import AXIS, STIFFENED, floating_pair
 
 __all__ = ["CONNECTED", "CONTACTS", "FORCED", "HELD_BY_ELEMENTS", "POTENTIALS", "ROLLING", "geared"]
@@ -130,6 +130,7 @@ POTENTIALS: dict[str, Callable[[], System]] = {
     "gear": geared,
     "rack": lambda: geared(RACK),
     "element between points": lambda: with_element(Spring("law", *ENDS, 30.0)),
+    "element that returns to a point": lambda: with_element(Loop("law", *ENDS, ENDS[0], 2.0, 0.6)),
     "element between bodies": lambda: with_element(Mount("law", *ENDS, 2.0, 2.0, 1.0)),
     "element between bodies that bend": lambda: with_element(Mount("law", *ENDS, 2.0, 2.0, 1.0), body=STIFFENED),
 }

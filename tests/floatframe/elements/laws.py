@@ -290,6 +290,42 @@ class Mount(Element):
 
 
 @njit
+def loop_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+    """Follow the energy k/4 (|d|² - L²)² of each side d of a loop through three points, also of none."""
+    for side in range(3):
+        a, b = side, (side + 1) % 3
+        d0, d1, d2 = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
+        more = d0 * d0 + d1 * d1 + d2 * d2 - data[1] * data[1]
+        seen[0] += 0.25 * data[0] * more * more
+        for k, d in enumerate((d0, d1, d2)):
+            wrench[a, k] += data[0] * more * d
+            wrench[b, k] -= data[0] * more * d
+
+
+@dataclass(frozen=True, eq=False)
+class Loop(Element):
+    """Points that draw each other, of which two may be in one place: a rope that returns to its hook."""
+
+    name: str
+    marker_a: Marker
+    marker_b: Marker
+    marker_c: Marker
+    stiffness: float
+    side: float
+
+    def law(self, placed):
+        return ElementLaw(
+            function=loop_law,
+            data=[self.stiffness, self.side],
+            outputs=("energy",),
+            output_units=("J",),
+            tangent="complex",
+            acts=("force",) * 3,
+            energy="energy",
+        )
+
+
+@njit
 def creep_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     """Pull with k (L - z) between two points, z' = (L - z)/T."""
     k, T = data

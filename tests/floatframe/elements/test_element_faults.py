@@ -13,6 +13,7 @@ from floatframe import (
     Element,
     ElementLaw,
     ElementSensor,
+    EnergyMomentum,
     Event,
     GeneralizedAlpha,
     Gravity,
@@ -270,8 +271,11 @@ def test_a_run_with_states_is_resumed_bit_for_bit(tmp_path):
 
 
 def test_schemes_that_do_not_know_elements_name_them():
-    with pytest.raises(ModelError, match="'e' is of a kind that is not known to it; use generalized-alpha"):
-        integrate(falling(Spring("e", *ENDS, 20.0)), Variational(), 0.01, 1e-3)
+    with pytest.raises(ModelError, match="Variational: element 'e' has multipliers of its own"):
+        integrate(falling(Disc("e", ENDS[1], 0.5)), Variational(), 0.01, 1e-3)
+    for method in (EnergyMomentum(), Variational()):
+        with pytest.raises(ModelError, match=f"{type(method).__name__}: element 'e' feels accelerations"):
+            integrate(falling(Law(square, accelerations=True)), method, 0.01, 1e-3)
     with pytest.raises(ModelError, match="open_equations: 'e' has states of its own"):
         open_equations(falling(Jack("e", ENDS[1])))
 

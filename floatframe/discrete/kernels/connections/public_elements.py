@@ -190,8 +190,9 @@ def put_ways(model, step, c, balances):
     if not has_moment:
         for m in range(a, last):
             for k in range(a, m):
-                if model.markers.force[m] >= 0 and model.markers.force[k] >= 0:
-                    d = sub(vector(step.r_law[m]), vector(step.r_law[k]))
+                d = sub(vector(step.r_law[m]), vector(step.r_law[k]))
+                is_apart = dot(d, d) > LEAST**2 * square  # two points in one place have no line
+                if is_apart and model.markers.force[m] >= 0 and model.markers.force[k] >= 0:
                     change = dot(d, sub(vector(step.dx[m]), vector(step.dx[k]))) / dot(d, d)
                     put_sum(step.way[k], 0, scaled(-change, d))
                     put_sum(step.way[m], 0, scaled(change, d))
