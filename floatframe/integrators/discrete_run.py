@@ -100,9 +100,10 @@ class DiscreteScheme:
             tolerance=self.tolerance, max_iterations=self.max_iterations, length=ds.length,
         )  # fmt: skip
         if outcome.status == NO_ACCELERATION:  # the memory has gone on to where there is none: the good steps again
+            failure = explained(compiled, work, outcome, self.max_iterations)  # of what they would forget
             work.past.n[...] = 0
             again = self.advance(system, carry, work, t0=t0, h=h, first=first, n_steps=outcome.n_steps, every=every)
-            return *again[:3], explained(compiled, work, outcome, self.max_iterations)
+            return *again[:3], failure
         memory.h[...] = h
         n_iterations = carry.n_iterations + int(step.n_iterations) - iterations
         after = replace(carry_of(memory, n_iterations), a=step.f_kept.copy(), power=carry.power)

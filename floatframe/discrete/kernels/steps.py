@@ -237,6 +237,8 @@ def advance(model, work, discrete, step, memory, rows, order):
         if (order.first + k + 1) % order.every == 0:
             if not observe(model, work, discrete, step, memory, step.t_1, rows):
                 return NO_ACCELERATION, k, work.counted.rows
+            if work.counted.stopped > 0:  # at the end of the step, whose row goes as the step does
+                return STOPPED, k, work.counted.rows - 1
         keep_past(work.past, memory, step.f_kept, h, step.n_iterations)
     return CONVERGED, order.n_steps, work.counted.rows
 

@@ -237,6 +237,21 @@ def test_an_output_may_end_a_run_with_its_words_and_the_motion_so_far():
     assert abs(error.value.trajectory.t[-1] - 0.04) < 2e-3
 
 
+def test_a_stop_reached_at_the_end_of_a_step_ends_a_run_of_a_conserving_scheme():
+    """The last step begins below the ceiling, is below it in its middle, and ends above."""
+    element = Law(watched, [Marker("b")], outputs=("high",), stops={"high": "it is above its ceiling"})
+    with pytest.raises(ConvergenceError, match="element 'e': it is above its ceiling") as error:
+        integrate(rising(element), EnergyMomentum(), 0.041, 0.0082)
+    assert_allclose(error.value.trajectory.t, 0.0082 * np.arange(5), atol=1e-15)
+
+
+def test_what_is_no_number_where_a_conserving_step_ends_is_told():
+    """The marker, 0.3 above the body, passes the place where the root ends in the second half of the last step."""
+    with pytest.raises(ConvergenceError, match="element 'e' gives what is no number") as error:
+        integrate(rising(Law(rooted, data=[0.34])), EnergyMomentum(), 0.041, 0.0082)
+    assert_allclose(error.value.trajectory.t, 0.0082 * np.arange(5), atol=1e-15)
+
+
 class Watching(Law):
     def events(self):
         return [Event("high", "e.high", level=0.0, direction="rising", stop=True)]
