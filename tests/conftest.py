@@ -4,6 +4,7 @@ FLOATFRAME_REQUIRE_ALL=1 (set by .ci/run) says that everything is required.
 """
 
 import os
+import signal
 
 import pytest
 
@@ -20,6 +21,8 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
+    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as a shell leaves it to what it starts in the background
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     if config.getoption("formulation") == "relative":
         from tests.floatframe.formulations import take_relative
 

@@ -5,6 +5,7 @@ best = optimize(design)                # best.values, best.numbers, best.history
 """
 
 import os
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -324,7 +325,11 @@ def minimum_of(evaluator: Evaluator, start: Array) -> tuple[bool, str]:
         if n_limits:
             limits = [NonlinearConstraint(excess, -np.inf, 0.0, jac=excess_rates)]
             options |= {"gtol": 0.0, "barrier_tol": design.tolerance}  # gtol looks at no complementarity: too early
-    found = minimize(goal, x, jac=goal_rates, method=design.method, bounds=bounds, constraints=limits, options=options)
+    with warnings.catch_warnings():  # a step that changes no gradient, as rounding has it near the end, is no news
+        warnings.filterwarnings("ignore", "delta_grad == 0.0", UserWarning)
+        found = minimize(
+            goal, x, jac=goal_rates, method=design.method, bounds=bounds, constraints=limits, options=options
+        )
     return bool(found.success), str(found.message)
 
 

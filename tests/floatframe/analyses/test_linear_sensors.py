@@ -156,12 +156,15 @@ def compare(system, about, linear, given=None, *, size=2e-5, tolerance=2e-7, see
         z_ddot = -np.linalg.solve(linear.M, linear.C @ z_dot + linear.K @ z)
         terms = [(linear.L, z), (linear.L_rate, z_dot), (linear.L_acceleration, z_ddot)]
         y, scale = (sum(f(L) @ f(x) for L, x in terms) for f in (np.asarray, np.abs))
-        slopes = []
+        slopes, largest = [], 0.0
         for h in (1.0, 0.5):
             states = (near(system, about, linear, s * z, s * z_dot) for s in (h, -h))
             plus, minus = (values_of(system, *state, linear.outputs, given) for state in states)
             slopes.append((plus - minus) / (2 * h))
-        error = np.abs(y - (4 * slopes[1] - slopes[0]) / 3) / (scale + 1e-4 * size)  # of fourth order
+            largest = max(largest, np.abs(plus).max())
+        rounding = 16 * np.finfo(float).eps * largest  # of what is zero, such as the moment about the axis of a hinge
+        of_fourth_order = (4 * slopes[1] - slopes[0]) / 3
+        error = np.abs(y - of_fourth_order) / (scale + 1e-4 * size + rounding / tolerance)
         worst = int(error.argmax())
         assert error[worst] < tolerance, f"{linear.outputs[worst]}: {error[worst]:.2g}"
 

