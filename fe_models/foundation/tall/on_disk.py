@@ -124,7 +124,7 @@ def in_memory(X: Any) -> Array:
     if isinstance(X, SpreadColumns):
         return X.whole()
     if not is_on_disk(X):
-        return X  # type: ignore[no-any-return]
+        return X
     result = np.empty(X.shape)
     for rows in row_slices(len(X), X):
         result[rows] = X[rows]
@@ -133,4 +133,4 @@ def in_memory(X: Any) -> Array:
 
 def of_this_process(X: Any) -> Array:
     """Return an array itself, in memory or on disk, or, of columns on many ranks, a copy in memory."""
-    return X.whole() if isinstance(X, SpreadColumns) else X  # type: ignore[no-any-return]
+    return X.whole() if isinstance(X, SpreadColumns) else X
