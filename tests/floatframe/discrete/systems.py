@@ -130,7 +130,7 @@ POTENTIALS: dict[str, Callable[[], System]] = {
     "gear": geared,
     "rack": lambda: geared(RACK),
     "element between points": lambda: with_element(Spring("law", *ENDS, 30.0)),
-    "element that returns to a point": lambda: with_element(Loop("law", *ENDS, ENDS[0], 2.0, 0.6)),
+    "element that returns to a point": lambda: with_element(Loop("law", *ENDS, ENDS[0], 0.5, 0.6)),
     "element between bodies": lambda: with_element(Mount("law", *ENDS, 2.0, 2.0, 1.0)),
     "element between bodies that bend": lambda: with_element(Mount("law", *ENDS, 2.0, 2.0, 1.0), body=STIFFENED),
 }
