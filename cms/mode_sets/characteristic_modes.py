@@ -15,8 +15,7 @@ from cms.solvers.sparse_product import SymmetricProduct
 from cms.solvers.tall import combine
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.ranks.spread_columns import SpreadColumns
-from fe_models.foundation.tall.on_disk import in_memory, release
+from fe_models.foundation.tall.on_disk import in_memory, of_this_process, release
 
 __all__ = ["with_characteristic_modes"]
 
@@ -81,7 +80,7 @@ def with_characteristic_modes(
     if together:
         parts = [_side_by_side(parts)]
     kept = np.setdiff1d(np.arange(len(modes.labels)), np.concatenate([part.columns for part in parts]))
-    V = in_memory(modes.columns) if isinstance(modes.columns, SpreadColumns) else modes.columns
+    V = of_this_process(modes.columns)
     columns, labels, groups = [V[:, kept]], [modes.labels[k] for k in kept], [modes.groups[k] for k in kept]
     options, data = dict(modes.options), dict(modes.data)
     for part in parts:
