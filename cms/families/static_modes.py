@@ -43,23 +43,23 @@ def constraint_modes(fixed: FixedInterfaceBody, *, to_disk: bool = False) -> Arr
     Array
         (n_dof, n_b), translations per translation [-] or per rotation [m].
     """
-    body, i, b = fixed.body, fixed.i, fixed.b
+    body, n = fixed.body, len(fixed.b)
     if isinstance(body.K, SpreadMatrix):
-        return spread_parts(body.K.layout, len(b), _blocks_of_constraint_modes(fixed))  # type: ignore[return-value]
-    Psi_C = on_disk((body.n_dof, len(b))) if to_disk else np.zeros((body.n_dof, len(b)))
-    Psi_C[b, np.arange(len(b))] = 1.0
-    K_b = body.K[:, b]
-    for first in range(0, len(b), BLOCK):
-        columns = slice(first, min(first + BLOCK, len(b)))
-        Psi_C[i, columns] = fixed.factorization.solve(-K_b[:, columns].toarray()[i])
+        return spread_parts(body.K.layout, n, _blocks_of_constraint_modes(fixed, BLOCK_OF_RANKS))  # type: ignore[return-value]
+    Psi_C, first = on_disk((body.n_dof, n)) if to_disk else np.zeros((body.n_dof, n)), 0
+    for block in _blocks_of_constraint_modes(fixed, BLOCK):
+        last = first + block.shape[1]
+        Psi_C[:, first:last] = block
         release(Psi_C)
+        first = last
     return Psi_C
 
 
-def _blocks_of_constraint_modes(fixed: FixedInterfaceBody) -> Iterator[Array]:
+def _blocks_of_constraint_modes(fixed: FixedInterfaceBody, width: int) -> Iterator[Array]:
+    """Yield constraint modes, at most so many at once, (n_dof, width)."""
     K_b, i, b = fixed.body.K[:, fixed.b], fixed.i, fixed.b
-    for first in range(0, len(b), BLOCK_OF_RANKS):
-        last = min(first + BLOCK_OF_RANKS, len(b))
+    for first in range(0, len(b), width):
+        last = min(first + width, len(b))
         block = np.zeros((fixed.body.n_dof, last - first))
         block[b[first:last], np.arange(last - first)] = 1.0
         block[i] = fixed.factorization.solve(-K_b[:, first:last].toarray()[i])
