@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.discrete.bodies import CentralBody
 from floatframe.discrete.contacts import V_0
-from floatframe.discrete.kernels.records import N_BLOCKS, Discrete, Pattern, StepWork
+from floatframe.discrete.kernels.records import N_BLOCKS, SMALL, Discrete, Pattern, StepWork
 from floatframe.discrete.system import DiscreteSystem
 from floatframe.joints.rows import is_held_length, is_held_velocity
 from floatframe.kernels.model import CONTACT, STIFFNESS, Model
@@ -21,8 +21,6 @@ from floatframe.start.initial import has_normal_friction
 from floatframe.start.newton_equations import modal_matrix, modal_weight
 
 __all__ = ["Kept", "kept_of", "new_step_work"]
-
-SMALL = 1e-7  #: by which unknowns are changed for derivatives, of the size of the system, rad
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +133,7 @@ def discrete_of(ds: DiscreteSystem, scheme: int, h: float, rho_inf: float) -> tu
         delta[own] = SMALL * ds.length * np.sqrt(body.m / weight[own])
         scale[own] = ds.length * np.sqrt(mass / weight[own])
         center[kinds[i]], is_bent[kinds[i]] = body.S, body.K_t is not None
-    held = np.array([k for c in ds.connections for k in c.held], dtype=np.int64)
+    held = ds.held
     is_length = is_held_length(model.rows.kind[held]) | is_held_velocity(model.rows.kind[held])
     of_multipliers = mass * ds.length * np.where(is_length, 1.0, ds.length)
     of_held_rows = of_multipliers / (mass * ds.length**2)
@@ -191,7 +189,7 @@ def new_step_work(model: Model, discrete: Discrete, sizes: dict[str, int]) -> St
     return step
 
 
-REMEMBERED = ("band", "band_pivot", "is_due", "acceleration", "f_kept")  #: of a step, by the next
+REMEMBERED = ("band", "band_pivot", "is_due", "acceleration", "f_kept", "f_size")  #: of a step, by the next
 
 
 @dataclass(eq=False)
@@ -218,6 +216,7 @@ class Kept:
             self.step.is_due[:] = 1
             self.step.acceleration[:] = 0.0
             self.step.f_kept[:] = f
+            self.step.f_size[self.discrete.equation] = np.abs(f[self.discrete.equation])
         self.before, self.known = carry, tuple(array.copy() for array in arrays)
 
 

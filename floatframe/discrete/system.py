@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, IntArray
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.discrete.bodies import BodyStep, CentralBody, central_bodies
 from floatframe.discrete.bushings import bushing_load
@@ -101,6 +101,11 @@ class DiscreteSystem:
     n_states: int
     length: float
     markers: tuple[BodyMarker, ...]  #: all
+
+    @property
+    def held(self) -> IntArray:
+        """The rows that hold something, one for each multiplier."""
+        return np.array([k for c in self.connections for k in c.held], dtype=np.int64)
 
     def own_loads(self, i: int, step: BodyStep, load: Load, span: Span) -> Given:
         """Add gravity, point forces and load cases on body i; gravity has a potential and gives no work."""

@@ -54,12 +54,15 @@ class DiscreteScheme:
         raise NotImplementedError
 
     def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
-        """Return the memory at the beginning, from a state made consistent; `a` holds the multipliers of the joints."""
+        """Return the memory at the beginning, from a state made consistent.
+
+        `a` holds the multipliers: of joints zero, of equations of elements those that fulfil them there.
+        """
         consistent = consistent_motion(system, state, t=t, known=None if before is None else before.w)
-        n_held = discrete_system(system, type(self).__name__).n_held
-        carry = Carry(
-            consistent.state, consistent.u_dot, np.zeros(n_held), 0.0, consistent.w, np.zeros(2), np.zeros(2)
-        )  # fmt: skip
+        held = discrete_system(system, type(self).__name__).held
+        known = np.isin(held, compiled_system(system).model.laws.equation)
+        f = np.where(known, consistent.w[held], 0.0)
+        carry = Carry(consistent.state, consistent.u_dot, f, 0.0, consistent.w, np.zeros(2), np.zeros(2))
         return with_angles(system, t, carry, before)
 
     def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:

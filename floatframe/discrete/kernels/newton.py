@@ -16,6 +16,7 @@ from floatframe.discrete.kernels.deformed_lines import line_steps
 from floatframe.discrete.kernels.held_rows import add_reaction, row_change, row_rate, row_value
 from floatframe.discrete.kernels.loads import body_load, coordinate_load, normal_force, point_load, spring_load
 from floatframe.discrete.kernels.markers import marker_loads, marker_step
+from floatframe.discrete.kernels.records import SMALL
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.model import BUSHING, CONTACT, ELEMENT, JOINT, SPRING, USER_FORCE
 from floatframe.kernels.vector import cross, matrix, norm, put_sum, scaled, sub, turned_back, vector
@@ -148,6 +149,24 @@ def write_state_residual(model, work, step, c):
 
 
 @inner
+def put_changes(model, discrete, step):
+    """Write by how much unknowns are changed for derivatives: by SMALL of their size, so far as it is known.
+
+    A multiplier of an equation of its own, or a state, may be of any size; a change of far less than that is lost in
+    the rounding of what depends on it.
+    """
+    n_u, first_state = step.load.shape[0], step.load.shape[0] + step.f.shape[0]
+    for j in range(step.z.shape[0]):
+        size = 0.0
+        if j >= first_state:
+            size = abs(step.z[j]) + abs(step.known[model.states.row[j - first_state]])
+        elif j >= n_u:
+            size = max(abs(step.z[j]), 0.5 * step.h * step.h * step.f_size[j - n_u])
+        step.center[j] = step.z[j]
+        step.delta[j] = step.z[j] + max(discrete.delta[j], SMALL * size) - step.z[j]  # as it is in the end
+
+
+@inner
 def factorize(model, work, discrete, step, stage):
     """Write the factors of the derivatives of the residual; return whether there are."""
     pattern, A, n = discrete.pattern, step.band[stage], step.z.shape[0]
@@ -156,15 +175,16 @@ def factorize(model, work, discrete, step, stage):
         step.base[i] = step.residual[i]
         for j in range(A.shape[1]):
             A[i, j] = 0.0
+    put_changes(model, discrete, step)
     for color in range(pattern.color0.shape[0] - 1):
         first, last = pattern.color0[color], pattern.color0[color + 1]
         for e in range(first, last):
-            step.z[pattern.column[e]] += discrete.delta[pattern.column[e]]
+            step.z[pattern.column[e]] = step.center[pattern.column[e]] + step.delta[pattern.column[e]]
         write_residual(model, work, discrete, step)
         for e in range(first, last):
             j = pattern.column[e]
-            step.z[j] -= discrete.delta[j]
-            factor = discrete.scale[j] / discrete.delta[j]
+            step.z[j] = step.center[j]
+            factor = discrete.scale[j] / step.delta[j]
             column, block = pattern.place[j], pattern.block[j]
             for r in range(pattern.row0[block], pattern.row0[block + 1]):
                 i = pattern.row[r]
@@ -195,7 +215,7 @@ def correct(model, discrete, step, stage):
             step.state_change = max(step.state_change, abs(change) / size)
     for e in range(discrete.equation.shape[0]):
         i, c = step.load.shape[0] + discrete.equation[e], 0.5 * step.h * step.h
-        size = max(abs(step.z[i]), c * model.laws.equation_size[e])
+        size = max(abs(step.z[i]), c * max(model.laws.equation_size[e], step.f_size[discrete.equation[e]]))
         step.state_change = max(step.state_change, abs(discrete.scale[i] * step.right[pattern.place[i]]) / size)
     return math.sqrt(total)
 

@@ -13,14 +13,15 @@ from floatframe.kernels.records import Size, integer, real
 from floatframe.kernels.work import n_most, n_q, n_u
 
 __all__ = [
-    "BENT", "C1", "C2", "CONSERVING", "DAMPING", "FILTER", "INERTIA", "MASS", "N_BLOCKS", "PRODUCTS", "STIFFNESS",
-    "STIFFNESS_FILTER", "TURNED_PRODUCTS", "VARIATIONAL", "Discrete", "Pattern", "StepWork",
+    "BENT", "C1", "C2", "CONSERVING", "DAMPING", "FILTER", "INERTIA", "MASS", "N_BLOCKS", "PRODUCTS", "SMALL",
+    "STIFFNESS", "STIFFNESS_FILTER", "TURNED_PRODUCTS", "VARIATIONAL", "Discrete", "Pattern", "StepWork",
 ]  # fmt: skip
 
 CONSERVING, VARIATIONAL = range(2)
 #: columns of `Discrete.block0`: those of `discrete.bodies.CentralBody` by name, and the filters of dissipation
 C1, BENT, C2, INERTIA, PRODUCTS, TURNED_PRODUCTS, MASS, STIFFNESS, DAMPING, FILTER, STIFFNESS_FILTER = range(11)
 N_BLOCKS = 11
+SMALL = 1e-7  #: by which unknowns are changed for derivatives, of the size of the system, rad, or of their own size
 
 n_mu, n_z, n_blocks = (Size(name) for name in ("n_mu", "n_z", "blocks of unknowns"))
 
@@ -57,7 +58,7 @@ class Discrete(NamedTuple):
     remembered: IntArray = integer(Size("remembered"))  #: rows of the memory that connections remember
     scale: Array = real(n_z)  #: by which unknowns are scaled in the matrix,
     row_scale: Array = real(n_z)  #: and residuals
-    delta: Array = real(n_z)  #: by which unknowns are changed for derivatives
+    delta: Array = real(n_z)  #: least by which unknowns are changed for derivatives
     equation: IntArray = integer(Size("equations of laws"))  #: multipliers of elements that hold nothing
     is_linear: IntArray = integer()  #: whether the equations of motion are linear in reactions
     weighted: Array = real(Size("numbers of s K"), unit="kg m²")  #: s K of each body, by which velocities are closed
@@ -148,13 +149,16 @@ class StepWork(NamedTuple):
     # unknowns
     z: Array = real(n_z)
     residual: Array = real(n_z)
-    base: Array = real(n_z)  #: residual from which derivatives are taken
+    base: Array = real(n_z)  #: residual from which derivatives are taken,
+    center: Array = real(n_z)  #: unknowns there,
+    delta: Array = real(n_z)  #: by which they are changed
     right: Array = real(n_z)
     f: Array = real(n_mu, unit="N, N m")  #: multipliers
     change: Array = real(n_mu)  #: of rows by the motion over the step
     kept: Array = real(n_mu, unit="N, N m")
     elastic: Array = real(n_u, unit="N m")  #: modal forces of the middle of a variational step
     f_kept: Array = real(n_mu, unit="N, N m")  #: those of the last step
+    f_size: Array = real(n_mu, unit="N, N m")  #: typical sizes of those that hold nothing, by the steps before
     band: Array = real(2, n_z, Size("width"))  #: factors of the matrices of both stages
     band_pivot: IntArray = integer(2, n_z)
     is_due: IntArray = integer(2)  #: whether to factorise at the next iterate

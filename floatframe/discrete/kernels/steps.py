@@ -17,6 +17,8 @@ from floatframe.kernels.vector import add, cross, dot, matrix, put, scaled, sub,
 
 __all__ = ["advance"]
 
+FADING = 0.9  # of the size of a multiplier that holds nothing, a step: one that passes zero keeps its size
+
 
 @inner
 def guess(model, step):
@@ -35,8 +37,8 @@ def guess(model, step):
 
 
 @inner
-def learn(model, step):
-    """Take the change of velocities over the step for the next guess; v in body axes."""
+def learn(model, discrete, step):
+    """Take the change of velocities over the step for the next guess, v in body axes, and sizes of multipliers."""
     for i in range(model.bodies.kind.shape[0]):
         u0, n, R = model.bodies.u0[i], model.bodies.n_q[i], matrix(step.R_0[i])
         dv = turned_back(R, sub(vector(step.w_1[u0:]), vector(step.w_0[u0:])))
@@ -45,6 +47,9 @@ def learn(model, step):
             step.acceleration[k] = (step.w_1[k] - step.w_0[k]) / step.h
     for j in range(step.f.shape[0]):
         step.f_kept[j] = step.f[j]
+    for e in range(discrete.equation.shape[0]):
+        j = discrete.equation[e]
+        step.f_size[j] = max(FADING * step.f_size[j], abs(step.f[j]))
 
 
 @inner
@@ -108,7 +113,7 @@ def conserving_step(model, work, discrete, step, memory, order):
         end_rates(model, discrete, step, i)
     memory.work_given += step.given
     memory.work_taken += step.taken + work_of_dampers(model, discrete, step)
-    learn(model, step)
+    learn(model, discrete, step)
     remember(model, discrete, step)
     keep(discrete, step, memory)
     move_bodies(model, step)
@@ -188,7 +193,7 @@ def variational_step(model, work, discrete, step, memory, order):
             step.w_1[k] = step.z[k] / h
     memory.work_given += 0.5 * given
     memory.work_taken += 0.5 * taken + dampers
-    learn(model, step)
+    learn(model, discrete, step)
     for j in range(step.f.shape[0]):
         step.f_kept[j] = step.kept[j]
     keep(discrete, step, memory)
