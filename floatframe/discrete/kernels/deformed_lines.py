@@ -3,7 +3,7 @@
 import math
 
 from floatframe.discrete.kernels.coordinates import add_pair
-from floatframe.discrete.kernels.markers import deformation, mean_jacobian
+from floatframe.discrete.kernels.markers import deformation, mean_jacobian, put_end_of_forces
 from floatframe.discrete.kernels.rows import add_product, held, mean_direction, product_change
 from floatframe.joints.rows.kinds import LINE_TURN
 from floatframe.kernels.compiler.compilation import inner, loops
@@ -159,11 +159,7 @@ def line_step(model, discrete, step, k):
     end = MEAN
     if step.is_still:
         arm_1, th_1, E_1, s_1, end = arm_0, th_0, E_0, s_0, BEGIN
-        put(step.x_f[m], 0, vector(step.x_0[m]))
-        put_matrix(step.A_f[m], matrix(step.A_0[m]))
-    else:
-        put(step.x_f[m], 0, vector(step.x_1[m]))
-        put_matrix(step.A_f[m], matrix(step.A_1[m]))
+    put_end_of_forces(step, m)
     lever = scaled(0.5, add(arm_0, arm_1))
     put(step.lever[m], 0, lever)
     put_matrix(step.E_mean[m], scaled_matrix(0.5, matrix_sum(E_0, E_1)))

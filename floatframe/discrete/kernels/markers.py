@@ -25,7 +25,7 @@ from floatframe.kernels.vector import (
 )
 
 __all__ = ["add_direction", "add_force", "add_moment", "begin_markers", "change", "ends", "marker_loads", "marker_step",
-           "turning"]  # fmt: skip
+           "put_end_of_forces", "turning"]  # fmt: skip
 
 SMALL = 1e-14  # square of an elastic rotation in a step below which its Cayley vector is T dth to rounding
 NONE = (0.0, 0.0, 0.0)
@@ -125,11 +125,7 @@ def marker_step(model, discrete, step, m):
         put_matrix(step.A_1[m], product(R_1, E_1))
     if step.is_still:
         arm_1, th_1, E_1 = arm_0, th_0, E_0
-        put(step.x_f[m], 0, vector(step.x_0[m]))
-        put_matrix(step.A_f[m], matrix(step.A_0[m]))
-    else:
-        put(step.x_f[m], 0, vector(step.x_1[m]))
-        put_matrix(step.A_f[m], matrix(step.A_1[m]))
+    put_end_of_forces(step, m)
     lever = scaled(0.5, add(arm_0, arm_1))
     put(step.lever[m], 0, lever)
     dx = add(vector(step.d[i]), cross(vector(step.theta_G[i]), lever))
@@ -150,6 +146,17 @@ def marker_step(model, discrete, step, m):
             put_matrix(step.Gamma[m], Gamma)
             put(step.dpsi[m], 0, turned(Gamma, times(psi[3 * n :], n, dq)))
     put(step.dx[m], 0, dx)
+
+
+@inner
+def put_end_of_forces(step, m):
+    """Write where the forces on marker m end to act: at the end of the step, or where it begins."""
+    if step.is_still:
+        put(step.x_f[m], 0, vector(step.x_0[m]))
+        put_matrix(step.A_f[m], matrix(step.A_0[m]))
+        return
+    put(step.x_f[m], 0, vector(step.x_1[m]))
+    put_matrix(step.A_f[m], matrix(step.A_1[m]))
 
 
 @inner
