@@ -8,7 +8,8 @@ A flow that ends in the equilibrium, made implicit with growing steps (pseudo-tr
     (4) states z of elements follow their rates by implicit steps of sqrt(tau), z_new = z + sqrt(tau) g(z_new)
 
 Motions that cost nothing (a wheel on its hinge) stay where they are, since W/tau holds them. Where the flow loses its
-way, as along beams of stiff bushings that bend and twist, loads that grow lead to the equilibrium (`led_equilibrium`).
+way, as along beams of stiff bushings that bend and twist, it is left (`Progress`), and loads that grow lead to the
+equilibrium (`led_equilibrium`).
 """
 
 import logging
@@ -20,7 +21,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.analyses.led_equilibrium import LARGEST, Balance, is_left_by_none, led_equilibrium
+from floatframe.analyses.led_equilibrium import LARGEST, Balance, Led, is_left_by_none, led_equilibrium
 from floatframe.analyses.observed_state import observed_state
 from floatframe.analyses.relative.tree_flow import tree_flow
 from floatframe.analyses.system_matrices import held_rows, turning_matrices
@@ -74,6 +75,9 @@ STANDSTILL = 1e-200  #: of the first residual, below which it is as good as zero
 LONG_STEP = 1e4  #: step of states by the first one at which states that stand are at rest
 LONGEST_STEP = 1e10  #: of them, in units of time
 CLOSED = 1e-10  #: largest gap of a joint, relative to the size of the system
+#: steps in which forces out of balance, gaps or changes of states have to fall to half their least: of all equilibria
+#: of the tests those of a free body that spins and of a beam far above buckling took most, 28 and 29
+PATIENCE = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,11 +153,28 @@ class StatesAtRest:
         return f"; state {self.names[int(self.change.argmax())]!r} of an element does not come to rest"
 
 
+@dataclass(eq=False)
+class Progress:
+    """The least that was seen of what falls on the way to an equilibrium, and when it last fell to half."""
+
+    least: Array = field(default_factory=lambda: np.full(3, np.inf))  #: of forces, gaps and changes of states
+    iteration: int = 0
+
+    def has_ended(self, iteration: int, values: tuple[float, float, float]) -> bool:
+        """Take note of what stands after an iteration: whether none has fallen to half its least for long."""
+        falls = np.array(values) < 0.5 * self.least
+        if falls.any():
+            self.least[falls] = np.array(values)[falls]
+            self.iteration = iteration
+        return iteration - self.iteration >= PATIENCE
+
+
 @dataclass(frozen=True, eq=False)
 class Lost:
     """Where the flow has ended without an equilibrium."""
 
     iteration: int
+    has_stood: bool  #: for as long as it may
     error: float  #: forces out of balance by those at work
     state: State
     W: tuple[Array, ...]
@@ -175,7 +196,8 @@ def static_equilibrium(
     Raises
     ------
     ConvergenceError
-        If there is no equilibrium near by: something is free to fall, or the way there is too far.
+        If there is no equilibrium near by: something is free to fall, or the way there is too far. It is told when
+        the search makes no more progress; the message has what was tried.
     ModelError
         If the joints cannot be closed, or some constraints repeat others.
     """
@@ -210,7 +232,7 @@ def steady_rotation(
     tolerance
         Largest force out of balance, relative to the forces at work.
     max_iterations
-        Steps towards the equilibrium.
+        Steps towards the equilibrium at most; fewer where they lead no nearer.
     formulation
         "absolute", or "relative": along the coordinates of joints, those of the tree closed to rounding.
 
@@ -247,7 +269,7 @@ def steady_rotation(
 
     def followed(state: State, w: Array) -> "Equilibrium | Lost":
         """Follow the flow from a state."""
-        tau, last = 0.0, np.inf
+        tau, last, progress, has_stood = 0.0, np.inf, Progress(), False
         for iteration in range(max_iterations + 1):
             state, u_dot = turning(compiled, state, omega, center)
             set_iterate(work, state, u_dot, w)
@@ -278,7 +300,9 @@ def steady_rotation(
                 notes = notes_at(system, work, state, u_dot, w)
                 told_state, told_u_dot = motion_of_file(compiled, state, u_dot)
                 return Equilibrium(replace(told_state, w=w), told_u_dot, w, omega, error, iteration, notes)
-            if iteration == max_iterations:
+            change = float(states.change.max()) if len(states.sizes) else np.inf
+            has_stood = progress.has_ended(iteration, (size, float(np.abs(gaps).max(initial=0.0)), change))
+            if iteration == max_iterations or has_stood:
                 break
             if tau == 0.0:
                 pulled = forces - parts.J.T @ wrenches_by_law(model, parts, gaps, holds | states.own)
@@ -303,16 +327,17 @@ def steady_rotation(
                 state = displaced(model, state, part * moved)
             w = w + part * dw
             states.follow(w, dw)
-        return Lost(iteration, error, state, tuple(W), forces)
+        return Lost(iteration, has_stood, error, state, tuple(W), forces)
 
-    found = followed(state, w)
+    found, tried = followed(state, w), ""
     if isinstance(found, Lost) and flow is None and not states.own.any():
-        led = led_by_loads(compiled, work, omega, center, state, w)
-        if led is not None:
-            again = followed(*led)
+        led, is_end = led_by_loads(compiled, work, omega, center, state, w)
+        if is_end:
+            again = followed(led.state, led.w)
             if isinstance(again, Equilibrium):
                 log.info("system %r: the equilibrium was found by loads that grow, in small steps", system.name)
                 return replace(again, n_iterations=found.iteration + again.n_iterations)
+        tried = words_of(led, is_end)
     if isinstance(found, Equilibrium):
         return found
     lost = indefinite_masses(system, found.state)
@@ -321,19 +346,29 @@ def steady_rotation(
         if lost
         else f"forces are out of balance by {found.error:.2g} of those at work, most at body "
         f"{worst_body(compiled, found.W, found.forces)!r}{states.words(tolerance)}; hold what can fall or drift, start "
-        "nearer, or add damping and integrate until it rests"
+        "nearer (from the state under a part of the loads), or add damping and integrate until it rests"
     )
-    words = f"no equilibrium found in {found.iteration} steps: {why}"
+    stood = f", the last {PATIENCE} of which led no nearer" if found.has_stood else ""
+    words = f"no equilibrium found in {found.iteration} steps{stood}{tried}: {why}"
     raise ConvergenceError(words, t=0.0, h=0.0, residual=found.error)
+
+
+def words_of(led: Led, is_stable: bool) -> str:
+    """Return in words where loads that grow have led, empty if they were not tried."""
+    if led.n_solves == 0:
+        return ""
+    if led.p == 1.0 and not is_stable:
+        return f", and by loads that grow ({led.n_solves} solves) only one that the least push makes it leave"
+    return f", nor by loads that grow ({led.n_solves} solves, to {100 * led.p:.3g} % of them)"
 
 
 def led_by_loads(
     compiled: CompiledSystem, work: Work, omega: Array, center: Array, state: State, w: Array
-) -> tuple[State, Array] | None:
-    """Return state and wrenches near an equilibrium to which loads lead that grow, None if there is no stable one."""
+) -> tuple[Led, bool]:
+    """Return where loads lead that grow, and whether that is near a stable equilibrium of the system."""
     model, resting = compiled.model, compiled.resting_model
     if len(state.u) + len(w) > LARGEST:
-        return None
+        return Led(state, w, 0.0, 0), False
 
     def tangents(state: State, w: Array) -> tuple[Linearized, tuple[Array, ...]]:
         moving, u_dot = turning(compiled, state, omega, center)
@@ -360,11 +395,11 @@ def led_by_loads(
     led = led_equilibrium(
         state, w, balance, lambda state, way: displaced(model, state, way), lambda way: largest_motion(compiled, way)
     )
-    if led is None:
-        return None
-    parts, K = tangents(*led)
+    if led.p < 1.0:
+        return led, False
+    parts, K = tangents(led.state, led.w)
     W = with_modal_weight(model, linearized(resting, work, 1.0, 0.0, 0.0).H)
-    return led if is_left_by_none(parts, K, W) else None
+    return led, is_left_by_none(parts, K, W)
 
 
 def wrenches_by_law(model: Model, parts: Linearized, gaps: Array, others: NDArray[np.bool_]) -> Array:

@@ -4,15 +4,15 @@ At a state x0 forces f0 are out of balance, and rows g0 open. The equilibria of
 
     (1) f(x, w) = (1 - p) f0,   g(x, w) = (1 - p) g0
 
-lead from x0 at p = 0 to that of the system at p = 1. Each is found by Newton's method from the one before; p takes
-longer steps while that is quick, and half as long ones where it is not found. (Newton homotopy, [1]_.)
+lead from x0 at p = 0 to that of the system at p = 1. Each is found by Newton's method from the one before, roughly on
+the way; p takes longer steps while that is quick, and half as long ones where it is not. (Newton homotopy, [1]_.) Where
+p hardly grows any more, as where the way turns back, it is given up.
 
 .. [1] Allgower & Georg 1990.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import count
 
 import numpy as np
 import scipy.linalg as la
@@ -22,13 +22,17 @@ from fe_models.foundation.arrays import Array
 from floatframe.start.newton_equations import Linearized
 from floatframe.state import State
 
-__all__ = ["LARGEST", "Balance", "is_left_by_none", "led_equilibrium"]
+__all__ = ["LARGEST", "Balance", "Led", "is_left_by_none", "led_equilibrium"]
 
 FIRST, LEAST = 0.25, 1e-3  #: steps of p
 QUICK, MOST = 4, 8  #: iterations of one p: after so few the next step is twice as long; after so many it is given up
+SHRUNK = 0.5  #: an iteration by the one before the last, above which one p is given up
+AFTER_FAILURE = 2  #: steps of p after a failure that are not followed by a longer one
 LONGEST = 0.3  #: rad, and part of the size of the system, in one iteration
-SETTLED = 1e-7  #: the same, of an iteration after which an equilibrium on the way is taken as found
-MOST_SOLVES = 600
+SETTLED = 1e-7  #: the same, of an iteration after which the last equilibrium is taken as found
+ROUGH, OF_FIRST = 1e-2, 0.1  #: of one on the way, and by the first iteration of its p: what is left goes with the next
+PATIENCE, ADVANCE = 40, 0.02  #: solves in which p has to grow by so much
+MOST_SOLVES = 300
 LARGEST = 4000  #: unknowns up to which this is tried: whether the flow leaves an equilibrium takes dense eigenvalues
 LEAVING = 1e-9  #: of the fastest rate of the flow, below which one is rounding
 
@@ -42,14 +46,24 @@ class Balance:
     way: Callable[[Array, Array], tuple[Array, Array]]  #: of forces and gaps to take off: (n_u,) in ground axes, (n_w,)
 
 
+@dataclass(frozen=True, eq=False)
+class Led:
+    """Where loads that grow have led."""
+
+    state: State
+    w: Array  #: wrenches, (n_w,)
+    p: float  #: part of the loads that is balanced there; 1: near an equilibrium of the system
+    n_solves: int
+
+
 def led_equilibrium(
     state: State,
     w: Array,
     balance: Callable[[State, Array], Balance | None],
     displaced: Callable[[State, Array], State],
     length_of: Callable[[Array], float],
-) -> tuple[State, Array] | None:
-    """Return state and wrenches near an equilibrium of the system, None if (1) did not lead to one.
+) -> Led:
+    """Return how far the loads have led, and the state and wrenches there; p = 0 if they did not begin to.
 
     Parameters
     ----------
@@ -64,32 +78,37 @@ def led_equilibrium(
     """
     begun = balance(state, w)
     if begun is None:
-        return None
-    p, step, n_solves = 0.0, FIRST, 0
-    while p < 1.0 and n_solves < MOST_SOLVES:
+        return Led(state, w, 0.0, 0)
+    p, step, n_solves, waiting = 0.0, FIRST, 0, 0
+    seen = [(0, 0.0)]  #: solves and p, the first one more than `PATIENCE` solves ago or at the begin
+    while p < 1.0:
         target = min(1.0, p + step)
         x, y, at = state, w, begun if p == 0.0 else balance(state, w)
-        for iteration in count(1):
-            if at is None or iteration > MOST:
-                break
+        ways: list[float] = []
+        while at is not None:
             n_solves += 1
             moved, dw = at.way(at.forces - (1 - target) * begun.forces, at.gaps - (1 - target) * begun.gaps)
-            length = length_of(moved) if np.isfinite(moved).all() else np.inf
-            if length > LONGEST:
+            ways.append(length_of(moved) if np.isfinite(moved).all() else np.inf)
+            if ways[-1] > LONGEST or len(ways) > MOST or (len(ways) > 2 and ways[-1] > SHRUNK * ways[-3]):
                 at = None
                 break
             x, y = displaced(x, moved), y + dw
-            if length <= SETTLED:
+            if ways[-1] <= (SETTLED if target == 1.0 else min(ROUGH, OF_FIRST * ways[0])):
                 break
             at = balance(x, y)
-        if at is None or iteration > MOST:
-            step = (target - p) / 2
-            if step < LEAST:
-                return None
-            continue
-        state, w, p = x, y, target
-        step *= 2.0 if iteration <= QUICK else 1.0
-    return (state, w) if p == 1.0 else None
+        if at is None:
+            step, waiting = (target - p) / 2, AFTER_FAILURE
+        else:
+            state, w, p = x, y, target
+            seen.append((n_solves, p))
+            step *= 2.0 if len(ways) <= QUICK and not waiting else 1.0
+            waiting = max(waiting - 1, 0)
+        while len(seen) > 1 and seen[1][0] <= n_solves - PATIENCE:
+            seen.pop(0)
+        is_slow = n_solves - seen[0][0] >= PATIENCE and p - seen[0][1] < ADVANCE
+        if step < LEAST or is_slow or n_solves >= MOST_SOLVES:
+            break
+    return Led(state, w, p, n_solves)
 
 
 def is_left_by_none(parts: Linearized, K: tuple[Array, ...], W: tuple[Array, ...]) -> bool:

@@ -1,5 +1,6 @@
 """Equilibrium, steady rotation, linearisation and system modes against closed forms and the motion itself."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -8,10 +9,12 @@ import scipy.linalg as la
 from numpy.testing import assert_allclose
 
 import cms
+from fe_models.body.beam_line import BeamLine
 from floatframe import (
     GROUND,
     Bushing,
     ConvergenceError,
+    FixedJoint,
     FlexibleBody,
     GeneralizedAlpha,
     Gravity,
@@ -24,10 +27,12 @@ from floatframe import (
     SphericalJoint,
     SpringDamper,
     System,
+    finite_segments,
     integrate,
 )
 from floatframe.analyses import (
     campbell,
+    equilibrium,
     linearize,
     root_locus,
     snapshot,
@@ -313,6 +318,57 @@ def test_small_motions_about_a_steady_rotation_are_those_of_the_integrated_syste
 def test_what_falls_is_named():
     with pytest.raises(ConvergenceError, match="body 'rod'"):
         static_equilibrium(System([rod()], [], [Gravity((0, 0, -G))]), max_iterations=40)
+
+
+@pytest.fixture
+def solves(monkeypatch):
+    """Linear systems that equilibria have solved, one entry each."""
+    made, solve = [], equilibrium.solve
+
+    def counted(*args):
+        made.append(args)
+        return solve(*args)
+
+    monkeypatch.setattr(equilibrium, "solve", counted)
+    return made
+
+
+STRIP = BeamLine(0.5, rho_A=0.1, EA=2.8e6, EIy=2.4, EIz=36.0, GJ=3.1, rho_Iy=1e-7, rho_Iz=1e-6, GAy=9e5, GAz=6e5)
+
+
+def strip(force, *, clamped=True):
+    """A thin beam of segments under a force at its end."""
+    beam = finite_segments("beam", STRIP, 9)
+    joints = [FixedJoint("clamp", GROUND, beam.marker("start"))] if clamped else []
+    return System(beam.bodies, joints, [*beam.forces, PointForce("load", beam.marker("end"), force=force)])
+
+
+@pytest.mark.parametrize(
+    ("system", "told"),
+    [
+        (System([rod()], [], [Gravity((0, 0, -G))]), "nor by loads that grow .8 solves, to 0 % of them.*'rod'"),
+        (strip((0, 0, 5.0), clamped=False), "nor by loads that grow .* hold what can fall or drift"),
+    ],
+    ids=["falling", "loose"],
+)
+def test_what_has_no_equilibrium_near_by_is_told_within_a_hundred_solves(solves, system, told):
+    begun = r"no equilibrium found in \d+ steps, the last 40 of which led no nearer"
+    with pytest.raises(ConvergenceError, match=begun) as error:
+        static_equilibrium(system)
+    assert re.search(told, str(error.value))
+    assert len(solves) <= 100
+
+
+@pytest.mark.parametrize("load", [10.0, 60.0])
+def test_an_oblique_load_that_bends_and_twists_a_strip_finds_its_equilibrium_in_few_solves(solves, load):
+    """Brought on in ten parts it comes to the same place, four tenths of its length aside under the larger one."""
+    force, state = load * np.array([0, -np.sqrt(0.5), np.sqrt(0.5)]), None
+    found = static_equilibrium(strip(force)).state
+    assert len(solves) <= (100 if load < 20 else 200)
+    for part in np.linspace(0.1, 1.0, 10):
+        state = static_equilibrium(strip(part * force), state).state
+    assert_allclose(found.r, state.r, rtol=0, atol=1e-8)
+    assert found.r[-1, 2] > (0.1 if load < 20 else 0.3)
 
 
 def test_joint_that_does_not_allow_the_rotation_is_named():

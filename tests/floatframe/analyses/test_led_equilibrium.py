@@ -5,7 +5,8 @@ import pytest
 import scipy.sparse as sp
 from numpy.testing import assert_allclose
 
-from floatframe.analyses.led_equilibrium import Balance, is_left_by_none, led_equilibrium
+from floatframe.analyses.equilibrium import words_of
+from floatframe.analyses.led_equilibrium import Balance, Led, is_left_by_none, led_equilibrium
 from floatframe.start.newton_equations import Linearized
 
 
@@ -18,21 +19,26 @@ def led(f, slope, x0):
     found = led_equilibrium(
         np.array([x0]), np.zeros(0), balance, lambda x, way: x + way, lambda way: float(np.abs(way).max())
     )
-    return None if found is None else float(found[0][0])
+    return found.state[0], found
 
 
 def test_a_root_that_newton_leaves_is_found():
     def f(x):
         return np.arctan(4 * (x - 2.0))
 
-    x = led(f, lambda x: 4 / (1 + 16 * (x - 2.0) ** 2), 0.5)
+    x, found = led(f, lambda x: 4 / (1 + 16 * (x - 2.0) ** 2), 0.5)
+    assert found.p == 1.0
     assert_allclose(x, 2.0, atol=1e-6)
     step = float((f(np.array([0.5])) / (4 / (1 + 16 * 1.5**2)))[0])
     assert abs(0.5 - step - 2.0) > 1.5  # Newton's first step leads further away
 
 
 def test_nothing_is_found_where_there_is_nothing():
-    assert led(lambda x: x**2 + 1.0, lambda x: 2 * x, 1.0) is None
+    """x² + 1 = 2 (1 - p) has a root up to p = 1/2; that is told after few solves."""
+    x, found = led(lambda x: x**2 + 1.0, lambda x: 2 * x, 1.0)
+    assert_allclose(x**2 + 1.0, 2 * (1 - found.p), atol=1e-3)
+    assert 0.45 < found.p <= 0.5
+    assert found.n_solves <= 60
 
 
 @pytest.mark.parametrize(("k", "is_stable"), [(2.0, True), (-2.0, False)])
@@ -43,3 +49,13 @@ def test_an_equilibrium_that_the_flow_leaves_is_told(k, is_stable):
     held = sp.csr_array(np.array([[0.0, 1.0]]))  # the second unknown is held
     parts = Linearized((), held, held, sp.csr_array((1, 1)))
     assert is_left_by_none(parts, (np.diag([1.0, k]),), (np.eye(2),))
+
+
+def test_where_loads_have_led_is_told():
+    def words(p, n_solves, *, is_stable=False):
+        return words_of(Led(np.zeros(1), np.zeros(0), p, n_solves), is_stable)
+
+    assert words(0.0, 0) == ""
+    assert words(0.37, 52) == ", nor by loads that grow (52 solves, to 37 % of them)"
+    assert words(1.0, 9) == ", and by loads that grow (9 solves) only one that the least push makes it leave"
+    assert words(1.0, 9, is_stable=True) == ", nor by loads that grow (9 solves, to 100 % of them)"

@@ -9,6 +9,7 @@ import pytest
 import cms
 from benchmarks.field_beams import UNITS, exact, marker_of, parts, path, segments, superelements
 from floatframe import GeneralizedAlpha, integrate, snapshot, static_equilibrium
+from floatframe.analyses import equilibrium
 from floatframe.errors import ModelError
 from floatframe.flexible_parts import floating_parts
 from floatframe.functions.time_functions import polynomial_of_time
@@ -54,6 +55,19 @@ def test_segments_find_the_oblique_equilibrium_to_second_order():
     errors = [error_of(segments(n), 13.345, 45) for n in (5, 9)]
     assert errors[0] < 1e-2
     assert 0.2 < errors[1] / errors[0] < 0.35
+
+
+@pytest.mark.parametrize(("describe", "most"), [(segments(5), 1e-2), (segments(65), 1e-4), (superelements(32), 2e-4)])
+def test_long_rows_find_the_oblique_equilibrium_at_once_within_a_hundred_solves(describe, most, monkeypatch):
+    made, solve = [], equilibrium.solve
+
+    def counted(*args):
+        made.append(1)
+        return solve(*args)
+
+    monkeypatch.setattr(equilibrium, "solve", counted)
+    assert error_of(describe, 13.345, 45) < most
+    assert len(made) <= 100
 
 
 def test_the_princeton_beam_in_two_parts_is_exact_to_a_thousandth_where_a_part_may_twist_along_its_length():
