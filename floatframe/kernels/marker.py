@@ -30,8 +30,8 @@ from floatframe.kernels.vector import (
 )
 
 __all__ = [
-    "acceleration_columns", "marker_acceleration", "marker_acceleration_bias", "marker_columns", "marker_motion",
-    "marker_stiffness", "pose_on_body", "wrench_to_body",
+    "acceleration_columns", "bent_bias", "marker_acceleration", "marker_acceleration_bias", "marker_columns",
+    "marker_motion", "marker_stiffness", "pose_on_body", "wrench_to_body",
 ]  # fmt: skip
 
 
@@ -134,7 +134,10 @@ def bent_by(model, m, n, factors, out):
 
 @loops
 def bent_bias(model, work, m, i):
-    """Return -q_dotᵀ K_P q_dot of marker m, its parts of displacement and rotation."""
+    """Return -q_dotᵀ K_P q_dot of marker m, displacement and rotation; of a sliding one by its stations."""
+    if model.markers.line[m] >= 0:
+        bent = work.lines.bent[model.markers.line[m]]
+        return vector(bent), vector(bent[3:])
     if model.markers.bend0[m] < 0:
         return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     n, u0 = model.bodies.n_q[i], model.bodies.u0[i] + 6

@@ -107,6 +107,8 @@ class LineWork(NamedTuple):
     kappa: Array = real(n_lines, 3, unit="rad/m")  #: turning of the axes by s
     curve: Array = real(n_lines, 3, unit="1/m")  #: r''
     slope_dot: Array = real(n_lines, 3, unit="1/s")  #: rate of r' at a place
+    turning: Array = real(n_lines, 3, unit="rad/s²")  #: angular acceleration of the axes by s_dot
+    bent: Array = real(n_lines, 6, unit="m/s², rad/s²")  #: `marker.bent_bias` of the line at the place
 
 
 class ConnectionWork(NamedTuple):

@@ -22,8 +22,8 @@ from floatframe.joints.rows.kinds import FORCE, MOMENT
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.joints.held_rows import turned_twice
 from floatframe.kernels.joints.relative_motion import direction, distance, prescribed, relative_velocity
-from floatframe.kernels.marker import pose_on_body
-from floatframe.kernels.rotation import left_jacobian
+from floatframe.kernels.marker import bent_bias, pose_on_body
+from floatframe.kernels.rotation import left_jacobian, left_jacobian_derivative
 from floatframe.kernels.vector import (
     add,
     cross,
@@ -75,8 +75,11 @@ def weights(stations, j, h, s, order):
     if order == 1:
         a = 6 * x * (1 - x) / h
         return -a, a, 1 + x * (3 * x - 4), x * (3 * x - 2)
-    a = (6 - 12 * x) / (h * h)
-    return -a, a, (6 * x - 4) / h, (6 * x - 2) / h
+    if order == 2:
+        a = (6 - 12 * x) / (h * h)
+        return -a, a, (6 * x - 4) / h, (6 * x - 2) / h
+    a = -12 / (h * h * h)
+    return -a, a, 6 / (h * h), 6 / (h * h)
 
 
 @inner
@@ -113,7 +116,7 @@ def station_displacement(model, work, m):
 
 @inner
 def displacement(model, work, k, s, order):
-    """Return D, D' or D'' at s, body axes."""
+    """Return D, D', D'' or D''' at s, body axes."""
     stations = model.stations
     j, h = piece(model.lines, stations, k, s)
     d_1, th_1 = station_displacement(model, work, stations.marker[j])
@@ -170,7 +173,12 @@ def slide_marker(model, work, k):
     put(markers.rho_dot[m], 0, combined(e, value, v_1, o_1, v_2, o_2))
     D_1_dot = combined(e, slopes, v_1, o_1, v_2, o_2)
     angle_dot = add(cross(e, D_1_dot), scaled(dot(e, mean(l_2, o_1, o_2)), e))
-    T = left_jacobian(angle)
+    T, line = left_jacobian(angle), work.lines
+    b_1, c_1 = bent_bias(model, work, m_1, i)
+    b_2, c_2 = bent_bias(model, work, m_2, i)
+    put(line.bent[k], 0, combined(e, value, b_1, c_1, b_2, c_2))
+    bent_slope = cross(e, combined(e, slopes, b_1, c_1, b_2, c_2))
+    put(line.bent[k], 3, add(bent_slope, scaled(dot(e, mean(l_2, c_1, c_2)), e)))
     put(markers.angle[m], 0, angle)
     put(markers.angle_dot[m], 0, angle_dot)
     put_matrix(markers.T_left[m], T)
@@ -178,7 +186,7 @@ def slide_marker(model, work, k):
     shapes(model, work, m, m_1, m_2, e, value, slopes, l_2)
     pose_on_body(model, work, m)
     # the line in ground axes
-    line, R = work.lines, work.state.R[i]
+    R = work.state.R[i]
     tangent = add(e, D_1)
     slope = norm(tangent)
     n_0 = turned(R, scaled(1.0 / slope, tangent))
@@ -190,6 +198,22 @@ def slide_marker(model, work, k):
     put(line.curve[k], 0, turned(R, D_2))
     omega = vector(work.state.u[model.bodies.u0[i] + 3 :])
     put(line.slope_dot[k], 0, turned(R, add(cross(omega, tangent), D_1_dot)))
+    by_place_dot = add(cross(e, combined(e, weights(stations, j, h, s, 2), v_1, o_1, v_2, o_2)),
+                       scaled(by_s * dot(e, sub(o_2, o_1)), e))  # fmt: skip
+    bending = cross(e, displacement(model, work, k, s, 3))  # th''
+    change = turning_change(T, angle, rate, angle_dot, by_place, by_place_dot, bending)
+    put(line.turning[k], 0, turned(R, scaled(rate, add(cross(omega, turned(T, by_place)), change))))
+
+
+@inner
+def turning_change(T, th, s_dot, th_t, th_s, th_st, th_ss):
+    """Return d(T th_s)/dt + d(T th_t)/ds s_dot, both with the place, in a body that stands; _t: at one place.
+
+    What s_dot times it adds to the angular acceleration of axes that turn with T (th_t + th_s s_dot).
+    """
+    of_slope, of_rate = left_jacobian_derivative(th, th_s, 1.0), left_jacobian_derivative(th, th_t, 1.0)
+    own = add(turned(of_slope, add(th_t, scaled(s_dot, th_s))), turned(of_rate, th_s))
+    return add(own, turned(T, add(scaled(2.0, th_st), scaled(s_dot, th_ss))))
 
 
 @inner
@@ -272,7 +296,7 @@ def line_turn_value(model, work, k, a, b):
 
 @inner
 def line_turn_rates(model, work, k, a, b):
-    """LINE_TURN; the change of kappa with time and place is left out."""
+    """LINE_TURN."""
     rows = model.rows
     line, j = work.lines, model.markers.line[a]
     E, D = direction(work.markers, a, rows.x[k]), direction(work.markers, b, rows.y[k])
@@ -280,7 +304,7 @@ def line_turn_rates(model, work, k, a, b):
     rate, second, _ = place_rates(model, work, a)
     omega_a, p = vector(work.markers.omega[a]), vector(work.markers.omega[b])
     o = add(omega_a, scaled(s_dot, kappa))
-    turning = second * dot(m, kappa) + s_dot * dot(m, cross(omega_a, kappa))
+    turning = second * dot(m, kappa) + dot(m, vector(line.turning[j]))
     D_dot = cross(p, D)
     beta = dot(turned_twice(o, E), D) + 2 * dot(cross(o, E), D_dot) + dot(E, cross(p, D_dot))
     return rate * dot(m, kappa), turning + beta

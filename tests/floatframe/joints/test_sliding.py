@@ -26,6 +26,7 @@ from floatframe import (
     SlidingJoint,
     SphericalJoint,
     System,
+    consistent_state,
     integrate,
     mobility,
     static_equilibrium,
@@ -37,8 +38,9 @@ from floatframe.kernels.work import new_work
 from floatframe.results.joint_coordinates import joint_coordinate
 from floatframe.results.place_motion import interface_motion, point_motion
 from floatframe.small_motions.joint_rates import coordinate_rows
-from floatframe.start.newton_equations import linearized, set_iterate
+from floatframe.start.newton_equations import displaced, linearized, set_iterate
 from floatframe.system_file.read_system import read_system
+from tests.floatframe.joints.test_every_joint import held
 
 UNITS = cms.unit_system("m-kg-s")
 LENGTH, RHO_A, EI = 1.0, 1.0, 100.0
@@ -325,3 +327,23 @@ def test_equilibrium_of_a_mass_held_in_the_middle(is_aligned):
     found = static_equilibrium(system).state.r[1]
     exact = 0.1 * LENGTH**3 / EI * (0.5 / 48 + 5 / 384 * RHO_A * LENGTH)
     assert_allclose(found, [0.5 * LENGTH, -exact, 0], rtol=0, atol=1e-4 * exact)
+
+
+@pytest.mark.parametrize("geometric", [False, True])
+@pytest.mark.parametrize("drive", [None, polynomial_of_time([0.35, 1.5, -2.0])])
+def test_second_rates_are_the_derivatives_of_what_is_held_along_a_motion(drive, geometric):
+    """Of an aligned block, from a closed joint on, on a beam that bends and twists: accelerations stand on them."""
+    body = beam(EI=5.0, n_bending=2, geometric=geometric)
+    rng = np.random.default_rng(5)
+    block = slider(0.3, 0.35, (1.5, 0.2, -0.1), omega_B=(0.5, 1.0, -2.0))
+    rod = FlexibleBody("beam", body, omega_B=(0.3, 1.0, 4.0), q=0.03 * rng.normal(size=body.n_q),
+                       q_dot=0.5 * rng.normal(size=body.n_q))  # fmt: skip
+    slide = SlidingJoint("slide", Marker("beam", FIRST), Marker("slider"), line=FURTHER, is_aligned=True,
+                         motions={} if drive is None else {"distance": drive})  # fmt: skip
+    system = System([rod, block], [slide], units=UNITS)
+    model, s = compiled_system(system).model, 2e-5
+    start = consistent_state(system).state
+    _, _, bias = held(system, start, 0.0)
+    before, at, after = (held(system, displaced(model, start, k * s * start.u), k * s)[0] for k in (-1, 0, 1))
+    assert np.abs(bias).max() > 1.0
+    assert_allclose((after - 2 * at + before) / s**2, bias, rtol=0, atol=1e-5 * np.abs(bias).max())
