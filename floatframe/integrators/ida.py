@@ -8,6 +8,7 @@ from fe_models.foundation.arrays import Array
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import FloatframeError, ModelError
 from floatframe.integrators.carry import Carry, Failure, observed, one_step_of, turned_on, with_angles
+from floatframe.integrators.remembered_contacts import require_no_remembered_contacts
 from floatframe.kernels.memory import Rows, new_rows
 from floatframe.kernels.model import COUPLER, USER_FORCE
 from floatframe.kernels.work import Work, new_work
@@ -59,6 +60,7 @@ class Ida:
                     f"Ida: element {each.element.name!r} has states or multipliers of its own, which this scheme does "
                     "not know; use GeneralizedAlpha"
                 )
+        require_no_remembered_contacts(compiled, "Ida")
         made = consistent_motion(system, state, t=t)
         carry = Carry(made.state, made.u_dot, np.zeros(0), 0.0, made.w, np.zeros(2), np.zeros(2))
         return with_angles(system, t, carry, before)

@@ -9,8 +9,10 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest
 from floatframe.compiling.callbacks import raise_errors_of
 from floatframe.compiling.system import CompiledSystem, compiled_system
+from floatframe.discrete.bodies import central_bodies
 from floatframe.errors import FloatframeError, ModelError
 from floatframe.integrators.carry import Carry, Failure, observed, one_step_of, turned_on, with_angles
+from floatframe.integrators.remembered_contacts import require_no_remembered_contacts
 from floatframe.joints.rows import is_held, is_held_length, is_held_position
 from floatframe.kernels.memory import Rows, new_rows
 from floatframe.kernels.work import Work, new_work
@@ -68,6 +70,7 @@ class RelativeOde:
                     f"RelativeOde: element {each.element.name!r} feels accelerations, which this scheme does not know; "
                     "use GeneralizedAlpha"
                 )
+        require_no_remembered_contacts(compiled, "RelativeOde")
         known = None if before is None else before.w
         made = consistent_motion(system, state, t=t, known=known)
         carry = Carry(made.state, made.u_dot, np.zeros(0), 0.0, made.w, np.zeros(2), np.zeros(2))
@@ -236,6 +239,7 @@ class Motion:
             self.work.state.w[self.own] = self.z
         for _ in range(1 if self.is_linear else MOST):
             if not accelerations(self.model, self.work, self.tree, self.joints, self.tangent):
+                central_bodies(self.model, self.compiled.body_names, "RelativeOde")  # names a mode without mass
                 raise ModelError(
                     f"the equations of motion are singular at t = {t:.9g}: a mode or a coordinate without mass, or "
                     "constraints that depend on each other; use GeneralizedAlpha for modes without mass"

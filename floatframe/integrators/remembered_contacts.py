@@ -1,0 +1,18 @@
+"""What integrators of ordinary differential equations cannot follow: forces that depend on more than the present."""
+
+from floatframe.compiling.system import CompiledSystem
+from floatframe.errors import ModelError
+from floatframe.kernels.model import CONTACT
+
+__all__ = ["require_no_remembered_contacts"]
+
+
+def require_no_remembered_contacts(compiled: CompiledSystem, scheme: str) -> None:
+    """Raise `ModelError` naming a contact whose force depends on the speed with which it began."""
+    model = compiled.model
+    for c, name in enumerate(compiled.connection_names):
+        if model.connections.law[c] == CONTACT and model.contacts.dissipation[model.connections.item[c]] > 0:
+            raise ModelError(
+                f"{scheme}: contact {name!r} depends on the speed with which it began, which this scheme does not "
+                "remember; use GeneralizedAlpha, or restitution = 1"
+            )
