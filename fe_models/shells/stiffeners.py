@@ -65,9 +65,10 @@ class StiffenedModel:
         return np.concatenate([self.shell.mass_forces(loads), self.frame.mass_forces(loads)])
 
     def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
-        """Return K u of both, (n_mesh_dof, k) [N, N m], at all nodes."""
+        """Return K u of both, (n_mesh_dof, k) [N, N m]; of the shell that of its cells near `nodes` where given."""
         of_shell, of_frame = self._parts("internal_forces", u)
-        return np.concatenate([self.shell.internal_forces(of_shell), self.frame.internal_forces(of_frame)])
+        on_shell = self.shell.internal_forces(of_shell, nodes=nodes)
+        return np.concatenate([on_shell, self.frame.internal_forces(of_frame)])
 
     def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Array) -> Array:
         """Return the sum of both and of the sections that turn by themselves, (k, n, n)."""

@@ -119,6 +119,19 @@ def test_mass_forces_and_internal_forces_are_those_of_the_matrices():
         assert_allclose(forces, expected, rtol=0, atol=ROUNDOFF * np.abs(body.K).max() * np.abs(u).max())
 
 
+def test_internal_forces_at_some_nodes_of_a_stiffened_shell_are_those_of_all_and_take_the_cells_near_them(monkeypatch):
+    monkeypatch.setattr("fe_models.shells.elements.CHUNK", 2)
+    body = bent_strip(KINDS[0], stiffened=True)
+    model = body.element_model
+    u = body.mesh_displacement(np.random.default_rng(0).normal(size=(body.n_dof, 2)))
+    n, all_forces = 6 * n_shell_nodes(body), model.internal_forces(u)
+    corner = model.internal_forces(u, nodes=np.array([0]))
+    size = np.abs(all_forces).max()
+    assert_allclose(corner[:6], all_forces[:6], rtol=0, atol=ROUNDOFF * size)
+    assert (corner[:n].reshape(-1, 12) == 0).all(axis=1).sum() > n / 24  # far cells are left out
+    assert_array_equal(corner[model.shell.n_mesh_dof :], all_forces[model.shell.n_mesh_dof :])  # of the beam
+
+
 def brick_columns(mesh, t, columns):
     """Nodes of bricks of 27 nodes in the place of the cells of a flat grid, and columns that move them as these."""
     corner, side, middle = [0, 1, 2, 3], [4, 5, 6, 7], [8]
