@@ -30,9 +30,12 @@ def radau(eq: Equations, x: Array, v: Array, times: Array, *, tolerance: float =
 
     Raises
     ------
+    ModelError
+        If an element may end a run (`stops`).
     ConvergenceError
         If Newton's method fails in a step.
     """
+    eq.require_no_stops("radau")
     a, lam = eq.accelerations(times[0], x, v)
     kept = [(x, v, lam)]
     for t, h in zip(times[:-1], np.diff(times), strict=True):

@@ -26,10 +26,12 @@ def rattle(eq: Equations, x: Array, v: Array, times: Array, *, tolerance: float 
     Raises
     ------
     ModelError
-        If the mass matrix changes with the configuration, or forces with the velocity, over the motion.
+        If an element may end a run (`stops`), or the mass matrix changes with the configuration, or forces with the
+        velocity, over the motion.
     ConvergenceError
         If the constraints cannot be closed.
     """
+    eq.require_no_stops("rattle")
     M, group, kept = eq.mass(x), eq.configurations, [(x, v)]
     for t, h in zip(times[:-1], np.diff(times), strict=True):
         G, f, lam = eq.jacobian(t, x), eq.force(t, x, v), np.zeros(eq.n_lam)

@@ -96,6 +96,14 @@ class Equations:
         """Which constraints hold a position, (n_lam,) bool; the others hold a velocity (rolling) alone."""
         return ~is_held_velocity(self.model.rows.kind[self.structure.held])
 
+    def require_no_stops(self, method: str) -> None:
+        """Raise `ModelError` naming an element that may end a run, for methods that look at no outputs."""
+        if self.compiled.stop_words:
+            raise ModelError(
+                f"{method}: {self.compiled.stop_words[0]}: an output that may end a run, which this method does not "
+                "look at; take integrate, or an element without stops"
+            )
+
     # states
 
     def vectors(self, state: State) -> tuple[Array, Array]:

@@ -21,6 +21,8 @@ __all__ = [
     "carry_of_past",
     "memory_of",
     "observed",
+    "observed_unless_stopped",
+    "one_by_one",
     "one_step_of",
     "turned_on",
     "with_angles",
@@ -91,6 +93,30 @@ def one_step_of(method: Integrator, system: System, t: float, h: float, carry: C
         words = f"the step of {h:g} from t = {t:g} failed: {failure.words}"
         raise ConvergenceError(words, t=t, h=h, residual=failure.residual)
     return after
+
+
+def one_by_one(
+    method: Integrator,
+    system: System,
+    carry: Carry,
+    work: Work,
+    *,
+    t0: float,
+    h: float,
+    first: int,
+    n_steps: int,
+    every: int,
+) -> tuple[Carry, list[Rows], int, Failure | None]:
+    """Advance as `Integrator.advance` does, each step by itself: memory, rows, how many were good, why not the next."""
+    rows: list[Rows] = []
+    for k in range(n_steps):
+        carry, row, n_good, failure = method.advance(
+            system, carry, work, t0=t0, h=h, first=first + k, n_steps=1, every=every
+        )
+        rows.append(row)
+        if not n_good:
+            return carry, rows, k, failure
+    return carry, rows, n_steps, None
 
 
 def memory_of(carry: Carry) -> Memory:
@@ -170,6 +196,14 @@ def turned_on(system: System, carry: Carry, h: float) -> Carry:
     memory = memory_of(carry)
     count_angles(model, new_work(model), memory, h)
     return replace(carry, angle=memory.angle, angle_rate=memory.angle_rate)
+
+
+def observed_unless_stopped(system: System, t: float, carry: Carry, work: Work) -> tuple[Array, Rows, Failure | None]:
+    """Return what `observed` does, and why an element ends the run at the carried state; None if none does."""
+    work.counted.stopped[...] = 0
+    power, rows = observed(system, t, carry, work)
+    stop = int(work.counted.stopped)
+    return power, rows, Failure(compiled_system(system).stop_words[stop - 1], 0.0) if stop else None
 
 
 def observed(system: System, t: float, carry: Carry, work: Work) -> tuple[Array, Rows]:

@@ -7,7 +7,15 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import FloatframeError, ModelError
-from floatframe.integrators.carry import Carry, Failure, observed, one_step_of, turned_on, with_angles
+from floatframe.integrators.carry import (
+    Carry,
+    Failure,
+    observed,
+    observed_unless_stopped,
+    one_step_of,
+    turned_on,
+    with_angles,
+)
 from floatframe.integrators.remembered_contacts import require_no_remembered_contacts
 from floatframe.kernels.memory import Rows, new_rows
 from floatframe.kernels.model import COUPLER, USER_FORCE
@@ -30,7 +38,7 @@ class Ida:
     (index one), y' = (v, p * omega / 2, q_dot, u_dot(t, y)). At the end of each batch of steps, and in every output,
     the state is put back on the joints with the least motion, positions first, then velocities. It is for checks of
     the other methods: slow, and its energy falls or rises with the tolerances. Work and dissipation in the results
-    are summed by the trapezoidal rule over the outputs.
+    are summed by the trapezoidal rule over the outputs, and `stops` of elements looked at there.
 
     Needs the extra `ida`: pip install "floatframe[ida]".
 
@@ -89,23 +97,28 @@ class Ida:
         )
         asked = t if n_steps > 1 else np.array([t[0], 0.5 * (t[0] + t[1]), t[1]])  # two times ask for every step
         solution = solver.solve(asked, y_0, made.rates(float(t[0]), y_0))
-        rows, n_good, failure = [new_rows(compiled.model, 0)], 0, None
-        for k, y in enumerate(np.atleast_2d(solution.y)[len(asked) - n_steps :], start=first + 1):
-            if not np.isfinite(y).all() or made.problem:
+        rows, n_good, failure, has_stopped = [new_rows(compiled.model, 0)], 0, None, False
+        reached = zip(np.atleast_1d(solution.t), np.atleast_2d(solution.y), strict=True)
+        for k, (at, y) in enumerate(list(reached)[len(asked) - n_steps :], start=first + 1):
+            if not np.isfinite(y).all() or abs(at - t[k - first]) > 1e-9 * h:  # it may end with where it failed
                 break
             own.state.time[...] = t[k - first]
+            own.counted.no_number[...] = 0  # of a trial beyond
             state = assembled(compiled, own, state_of(compiled, y))
             state = with_compatible_velocities(compiled, own, state)
             u_dot, w = solve_accelerations(compiled, own, state)
-            carry = replace(carry, state=state, u_dot=u_dot, w=w, h=h, n_steps=carry.n_steps + 1)
-            carry = turned_on(system, carry, h)
-            power, row = observed(system, float(t[k - first]), carry, work)
-            carry = replace(carry, power=power, work=carry.work + 0.5 * h * (carry.power + power))
+            after = replace(carry, state=state, u_dot=u_dot, w=w, h=h, n_steps=carry.n_steps + 1)
+            after = turned_on(system, after, h)
+            power, row, failure = observed_unless_stopped(system, float(t[k - first]), after, work)
+            has_stopped = failure is not None
+            if has_stopped:
+                break
+            carry = replace(after, power=power, work=carry.work + 0.5 * h * (carry.power + power))
             row.diagnostics[0, 10:12] = carry.work
             if k % every == 0:
                 rows.append(row)
             n_good += 1
-        if n_good < n_steps:
+        if n_good < n_steps and not has_stopped:
             failure = Failure(f"IDA: {made.problem or solution.message}", np.inf)
         carry = replace(carry, n_iterations=carry.n_iterations + made.n_evaluations)
         joined = Rows(*(np.concatenate([getattr(part, name) for part in rows]) for name in Rows._fields))

@@ -11,7 +11,16 @@ from floatframe.compiling.callbacks import raise_errors_of
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.discrete.bodies import central_bodies
 from floatframe.errors import FloatframeError, ModelError
-from floatframe.integrators.carry import Carry, Failure, observed, one_step_of, turned_on, with_angles
+from floatframe.integrators.carry import (
+    Carry,
+    Failure,
+    observed,
+    observed_unless_stopped,
+    one_by_one,
+    one_step_of,
+    turned_on,
+    with_angles,
+)
 from floatframe.integrators.remembered_contacts import require_no_remembered_contacts
 from floatframe.joints.rows import is_held, is_held_length, is_held_position
 from floatframe.kernels.memory import Rows, new_rows
@@ -45,9 +54,10 @@ class RelativeOde:
 
     so that constraints hold to rounding at any tolerance. Steps and orders are the solver's; `h` of `integrate` is the
     distance of outputs. Rotations are counted from the beginning of a batch of steps, anew after two radians. Work and
-    dissipation are summed by the trapezoidal rule over the outputs. States of elements and user forces are unknowns of
-    the solver beside coordinates and rates; multipliers of elements, and friction by the force in its joint, are found
-    with the reactions by Newton's method. Elements that feel accelerations are for `RelativeGeneralizedAlpha`.
+    dissipation are summed by the trapezoidal rule over the outputs, `stops` of elements looked at there. States of
+    elements and user forces are unknowns of the solver beside coordinates and rates; multipliers of elements, and
+    friction by the force in its joint, are found with the reactions by Newton's method. Elements that feel
+    accelerations are for `RelativeGeneralizedAlpha`.
     """
 
     method: str = "BDF"  #: "BDF", "Radau" or "LSODA" for stiff systems; "DOP853", "RK45" for others
@@ -90,14 +100,17 @@ class RelativeOde:
     ) -> tuple[Carry, Rows, int, Failure | None]:
         """Advance by n_steps output times, the first of them number `first` from t0; see `carry.Integrator`."""
         times: Array = t0 + h * np.arange(first, first + n_steps + 1, dtype=float)
-        rows, n_good, failure = [new_rows(compiled_system(system).model, 0)], 0, None
+        rows, n_good, failure, has_stopped = [new_rows(compiled_system(system).model, 0)], 0, None, False
         motion = Motion(system, carry.state, float(times[0]), carry.w)
         try:
             for t, state, u_dot, w in motion.outputs(self, times):
-                carry = replace(carry, state=state, u_dot=u_dot, w=w, h=h, n_steps=carry.n_steps + 1)
-                carry = turned_on(system, carry, h)
-                power, row = observed(system, t, carry, work)
-                carry = replace(carry, power=power, work=carry.work + 0.5 * h * (carry.power + power))
+                after = replace(carry, state=state, u_dot=u_dot, w=w, h=h, n_steps=carry.n_steps + 1)
+                after = turned_on(system, after, h)
+                power, row, failure = observed_unless_stopped(system, t, after, work)
+                has_stopped = failure is not None
+                if has_stopped:
+                    break
+                carry = replace(after, power=power, work=carry.work + 0.5 * h * (carry.power + power))
                 row.diagnostics[0, 10:12] = carry.work
                 n_good += 1
                 if (first + n_good) % every == 0:
@@ -105,6 +118,12 @@ class RelativeOde:
         except (FloatframeError, np.linalg.LinAlgError) as error:
             failure = Failure(f"{self.method}: {error}", np.inf)
         carry = replace(carry, n_iterations=carry.n_iterations + motion.n_evaluations)
+        if failure is not None and n_steps > 1 and not has_stopped and compiled_system(system).stop_words:
+            begun = first + n_good  # its stop may come before what failed: output by output to there
+            carry, more_rows, more, failure = one_by_one(
+                self, system, carry, work, t0=t0, h=h, first=begun, n_steps=n_steps - n_good, every=every
+            )
+            rows, n_good = [*rows, *more_rows], n_good + more
         joined = Rows(*(np.concatenate([getattr(part, name) for part in rows]) for name in Rows._fields))
         return carry, joined, n_good, failure
 
@@ -275,11 +294,11 @@ class Motion:
                 self.derivative, (self.t_start, times[-1]), y, method=method.method, rtol=method.rtol,
                 atol=atol, t_eval=times[k:], events=self.events(),
             )  # fmt: skip
-            if solution.status < 0:
-                raise ModelError(solution.message)
             for t, y_at in zip(solution.t, np.transpose(solution.y), strict=True) if len(solution.t) else ():
                 yield (float(t), *self.state_at(float(t), y_at))
                 k += 1
+            if solution.status < 0:
+                raise ModelError(solution.message)
             if solution.status == 1:  # rotations went far, or the choice of coordinates is worn out
                 t = float(max(events[-1] for events in solution.t_events if len(events)))
                 y_at = next(found[-1] for found in solution.y_events if len(found))

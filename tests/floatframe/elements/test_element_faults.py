@@ -13,10 +13,12 @@ from floatframe import (
     Element,
     ElementLaw,
     ElementSensor,
+    EnergyDecaying,
     EnergyMomentum,
     Event,
     GeneralizedAlpha,
     Gravity,
+    Ida,
     Marker,
     ModelError,
     PlaceSensor,
@@ -30,12 +32,16 @@ from floatframe import (
     integrate,
     inverse_dynamics,
     kinematics,
+    newmark,
     open_equations,
     resume,
     sensitivities,
 )
 from floatframe.elements import POSITION
+from floatframe.equations import radau, rattle
 from floatframe.functions.time_functions import harmonic
+from floatframe.integrators.relative import RelativeGeneralizedAlpha
+from floatframe.integrators.relative_ode import METHODS, RelativeOde
 from floatframe.integrators.variational import Variational
 from floatframe.results.sensors import measured
 from tests.floatframe.elements.laws import Circuit, Disc, Jack, Spring
@@ -226,6 +232,12 @@ def watched(t, x, z, lam, data, wrench, z_dot, g, seen):
     seen[0] = x[0, 2] - 0.04
 
 
+@njit
+def rooted_and_watched(t, x, z, lam, data, wrench, z_dot, g, seen):
+    seen[0] = x[0, 2] - 0.04
+    wrench[0, 2] = 1e-3 * np.sqrt(0.044 - x[0, 2])
+
+
 def rising(element):
     return System([RigidBody("b", 1.0, np.eye(3), velocity=(0, 0, 1.0))], elements=[element])
 
@@ -235,6 +247,47 @@ def test_an_output_may_end_a_run_with_its_words_and_the_motion_so_far():
     with pytest.raises(ConvergenceError, match="element 'e': it is above its ceiling") as error:
         integrate(rising(element), METHOD, 1.0, 1e-3)
     assert abs(error.value.trajectory.t[-1] - 0.04) < 2e-3
+
+
+EVERY_METHOD = {
+    "alpha": METHOD,
+    "alpha, error control": GeneralizedAlpha(0.9, error_tolerance=1e-5),
+    "newmark": newmark(),
+    "relative": RelativeGeneralizedAlpha(0.9),
+    "conserving": EnergyMomentum(),
+    "decaying": EnergyDecaying(),
+    "variational": Variational(),
+    "ida": Ida(1e-6, 1e-8),
+    **{name: RelativeOde(name) for name in METHODS},
+}
+
+
+@pytest.mark.parametrize("method", EVERY_METHOD)
+@pytest.mark.parametrize("every", [1, 4])
+def test_a_stop_ends_a_run_of_every_method_before_the_output_beyond_it(method, every):
+    """The ceiling is passed at 40 ms, between the steps, or outputs, that end at 36 and 42 ms."""
+    if method == "ida":
+        pytest.importorskip("sksundae", reason="the extra 'ida' is not installed")
+    element = Law(watched, [Marker("b")], outputs=("high",), stops={"high": "it is above its ceiling"})
+    with pytest.raises(ConvergenceError, match="element 'e': it is above its ceiling") as error:
+        integrate(rising(element), EVERY_METHOD[method], 0.096, 6e-3, output_every=every)
+    assert_allclose(error.value.trajectory.t, np.arange(0.0, 0.04, 6e-3 * every), rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("method", ["BDF", "Radau"])
+def test_where_a_law_ends_beyond_its_stop_the_stop_is_told(method):
+    """Under the ceiling at 40 ms the root of the law ends at 44 ms."""
+    element = Law(rooted_and_watched, [Marker("b")], outputs=("high",), stops={"high": "it is above its ceiling"})
+    with pytest.raises(ConvergenceError, match="element 'e': it is above its ceiling"):
+        integrate(rising(element), EVERY_METHOD[method], 0.096, 1e-3)
+
+
+@pytest.mark.parametrize("method", [radau, rattle])
+def test_examples_on_open_equations_refuse_elements_that_may_end_a_run(method):
+    eq = open_equations(rising(Law(watched, [Marker("b")], outputs=("high",), stops={"high": "it is high"})))
+    x, v, _, _ = eq.start()
+    with pytest.raises(ModelError, match=f"{method.__name__}: element 'e': it is high: an output that may end a run"):
+        method(eq, x, v, np.linspace(0.0, 0.1, 11))
 
 
 def test_a_stop_reached_at_the_end_of_a_step_ends_a_run_of_a_conserving_scheme():
