@@ -1,0 +1,27 @@
+"""Every public element, and what laws may ask for, by every scheme, see `test_every_part`."""
+
+from importlib import import_module
+from pkgutil import iter_modules
+
+import pytest
+
+import floatframe
+from tests.floatframe.discrete.compared import assert_runs_or_is_refused
+from tests.floatframe.discrete.element_parts import ELEMENT_PARTS
+from tests.floatframe.discrete.parts import METHODS
+
+
+@pytest.mark.parametrize("part", ELEMENT_PARTS)
+@pytest.mark.parametrize("name", METHODS)
+def test_an_element_acts_as_by_generalized_alpha_or_is_refused_by_name(name, part):
+    assert_runs_or_is_refused(name, part)
+
+
+def test_every_element_has_its_cells():
+    packages = [each.name for each in iter_modules(floatframe.__path__) if each.ispkg]
+    kinds = [
+        f"{package}.{kind}" for package in packages
+        for kind in getattr(import_module(f"floatframe.{package}"), "ELEMENTS", {})
+    ]  # fmt: skip
+    assert "wheels.linear-tyre" in kinds
+    assert set(kinds) <= set(ELEMENT_PARTS)
