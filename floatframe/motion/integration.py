@@ -38,6 +38,7 @@ from floatframe.results.sensors.taken_places import taken_places
 from floatframe.results.trajectory import Trajectory, read_results
 from floatframe.results.validity import ValidityNote, notes_from_json, notes_to_json
 from floatframe.results.writer import ResultsPlace, ResultsWriter, arrays_of, last_restart
+from floatframe.start.begun_drives import words_of_begun_drives
 from floatframe.start.mass_positivity import indefinite_mass_words, indefinite_masses
 from floatframe.state import State
 from floatframe.system import System
@@ -47,6 +48,7 @@ __all__ = ["Progress", "integrate", "resume"]
 log = logging.getLogger(__name__)
 
 BATCH_STEPS = 400  #: steps per call of the compiled loop
+FIRST_STEPS = 100  #: of a run, in which a failure may come from how its drives begin
 LOOK_ROWS, LOOK_SECONDS = 1000, 0.2  #: rows of results are looked at when they are so many, or so much time has gone
 SEGMENT_SECONDS = 2.0  #: a segment of the results is closed after this time
 TIMES = ("t_start", "t_end", "h", "output_every")  #: of the run, in the head
@@ -157,6 +159,7 @@ def integrate(
             watch.begin(rows)
         writer = None if place is None else ResultsWriter(place, head)
         run = Run(system, integrator, head, t_start, t_end, step, n_total, output_every, writer, events=watch)
+        run.words_of_start = lambda: words_of_begun_drives(begun, t_start, state, step)
         run.keep(rows)
         run.close_segment(run.record(carry, 0))
         raise_if_interrupted = held.enter_context(heeded_interrupts())
@@ -264,6 +267,7 @@ class Run:
     seconds_before: float = 0.0  #: that the run has taken before it was interrupted
     began: float = field(default_factory=time.perf_counter)
     events: EventWatch | None = None
+    words_of_start: Callable[[], str] = lambda: ""  #: what may be wrong where the first steps fail
 
     @property
     def seconds(self) -> float:
@@ -395,6 +399,9 @@ class Run:
             raise
         raise_errors_of(compiled_system(self.system).callbacks)
         if failure is not None:
+            begins = self.words_of_start() if n_done < FIRST_STEPS else ""
+            if begins:
+                failure = replace(failure, words=f"{failure.words}; {begins}")
             raise stopped(
                 self.system,
                 self.head,
