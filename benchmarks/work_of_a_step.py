@@ -86,10 +86,11 @@ def counts(cases):
     from floatframe import GeneralizedAlpha
     from floatframe.compiling.system import compiled_system
     from floatframe.kernels import entry
+    from floatframe.kernels.records import filled
     from floatframe.kernels.work import new_work
 
     def call(model, work, memory, rows, **order):
-        records = model, work, memory, rows, entry.filled(entry.Order(), **(entry.NOTHING._asdict() | order))
+        records = model, work, memory, rows, filled(entry.Order(), **(entry.NOTHING._asdict() | order))
         counted = [of_counted(record) for record in records]
         outcome = entry.Outcome(*entry.run(*counted))
         for record, each in zip(records[1:4], counted[1:4], strict=True):

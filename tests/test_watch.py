@@ -1,5 +1,7 @@
 """The watch over benchmarks: what counts as worse, what a page tells, numbers that texts quote from kept results."""
 
+import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -74,6 +76,21 @@ def test_texts_quote_what_was_kept():
 def test_a_benchmark_that_fails_says_why(monkeypatch, tmp_path):
     with pytest.raises(RuntimeError, match=r"No module named .benchmarks\.none."):
         watch.measured("none", short=True, limit=60.0)
+
+
+def test_operations_of_a_step_are_counted_and_grow_with_the_modes():
+    """Beside what a step of more modes must do at least: products of its matrices of modes."""
+    from benchmarks import work_of_a_step
+
+    told = subprocess.run(
+        [sys.executable, "-m", "benchmarks.work_of_a_step", work_of_a_step.COUNTED, "[[1, 2], [1, 6]]"],
+        cwd=Path(__file__).parents[1],
+        env=os.environ | {"NUMBA_DISABLE_JIT": "1", "FLOATFRAME_COMPILER": "plain"},
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    few, many = (case[0] for case in json.loads(told.stdout))
+    assert few > 1000
+    assert many - few > 2 * (6**2 - 2**2) * 3
 
 
 def test_names_are_those_of_benchmarks_that_take_part():
