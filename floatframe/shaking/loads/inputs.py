@@ -2,7 +2,7 @@
 
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
-from floatframe.shaking.structure.model import ShakenModel
+from floatframe.shaking.structure.model import DIRECTIONS, ShakenModel
 
 __all__ = ["band_notes", "input_index", "require_damped"]
 
@@ -11,18 +11,19 @@ MARGIN = 1.5  #: modes up to this multiple of a band shape the response in it
 
 
 def input_index(model: ShakenModel, name: str, where: str) -> int:
-    """Return the place of an input: "base:x", or "x" alone where there is one base.
+    """Return the place of an input: its name such as "base:x" or "load case a", or "x" alone where there is one base.
 
     Raises
     ------
     ModelError
         With the nearest name, if there is none.
     """
-    full = f"{model.bases[0].name}:{name}" if len(model.bases) == 1 and ":" not in name else name
-    if full not in model.inputs:
-        choices = [entry.partition(":")[2] for entry in model.inputs] if len(model.bases) == 1 else list(model.inputs)
-        raise ModelError(f"{where}: no base direction {quoted(name)}{nearest(name, [*choices, *model.inputs])}")
-    return model.inputs.index(full)
+    short = {f"{model.bases[0].name}:{entry}": entry for entry in DIRECTIONS} if len(model.bases) == 1 else {}
+    for k, full in enumerate(model.inputs):
+        if name in (full, short.get(full)):
+            return k
+    choices = [*short.values(), *model.inputs]
+    raise ModelError(f"{where}: no base direction or force {quoted(name)}{nearest(name, choices)}")
 
 
 def require_damped(model: ShakenModel, first: float, last: float, where: str) -> None:

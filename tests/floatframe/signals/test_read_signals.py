@@ -196,3 +196,14 @@ def test_a_gap_of_no_end_is_refused(tmp_path):
     t = [*(k / 1000 for k in range(60)), 1e300]
     with pytest.raises(SignalError, match="line 62: samples are missing"):
         read_signals(written(tmp_path, rows(t, range(61))))
+
+
+def test_the_first_gap_that_is_too_long_is_named_not_a_shorter_one_before_it(tmp_path):
+    t = [f"{k / 1000:.3f}" for k in range(90)]
+    values = [f"{k}.0" for k in range(90)]
+    kept = [*range(20), *range(22, 50), *range(55, 70), *range(80, 90)]  # 2, 5 and 10 samples are lost
+    lost = written(tmp_path, rows([t[k] for k in kept], [values[k] for k in kept]))
+    words = r"line 50: samples are missing between t = 0.049 and 0.055 s.*17 samples in 3 gaps, the longest 0.011 s"
+    with pytest.raises(SignalError, match=words):
+        read_signals(lost, fill=0.003)
+    assert len(read_signals(lost, fill=0.011).time) == 90

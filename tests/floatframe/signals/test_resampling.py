@@ -119,3 +119,10 @@ def test_without_drift_the_record_is_integrated_as_it_is():
     exact = acceleration_table(measured().time, measured().values)
     assert_allclose(motion.pieces, exact.pieces, rtol=0, atol=0)
     assert len(notes) == 1
+
+
+@pytest.mark.parametrize("corner", [2.0, 5.0, 40.0])
+def test_a_low_pass_leaves_a_straight_line_up_to_its_ends(corner):
+    """Odd about its ends a line goes on as one: what the filter swings in has died away over three periods."""
+    line = Signal("ramp", t, 3.0 - 2.0 * t, "m")
+    assert_allclose(filtered(line, low_pass=corner).values, line.values, rtol=0, atol=2e-4)

@@ -175,3 +175,12 @@ def test_samples_too_large_to_be_squared_are_refused():
 def test_impossible_spectra_are_refused(make, words):
     with pytest.raises(SignalError, match=words):
         make(noise(200))
+
+
+@pytest.mark.parametrize("overlap", [0.0, 0.25, 0.5, 0.75])
+def test_eight_segments_fill_the_record_unless_their_length_is_given(overlap):
+    """n + 7 (1 - overlap) n samples are eight segments of n."""
+    n = 4000
+    density = psd(noise(round(n + 7 * (1 - overlap) * n)), RATE, overlap=overlap)
+    assert density.n_averages == 8
+    assert_allclose(density.resolution, RATE / n, rtol=1e-12, atol=0)

@@ -87,3 +87,12 @@ def test_uncertainty_by_band():
     factor, share = Uncertainty(1.1, 0.0, [(15, 30, 1.5, 0.1)]).of(f)
     assert_allclose(factor, [1.1, 1.5, 1.1])
     assert_allclose(share, [0.0, 0.1, 0.0])
+
+
+@pytest.mark.parametrize(("name", "second"), [("m-kg-s", 1.0), ("mm-t-s", 1.0), ("mm-kg-ms", 1e3)])
+def test_one_radian_per_second_squared_in_units_of_a_model(name, second):
+    """1 rad/s² is 1e-6 rad/ms², whatever the unit of length; a density has the square."""
+    level, density = (Level.of([(10, 3.0), (20, 3.0)], unit) for unit in ("rad/s2", "(rad/s2)2/Hz"))
+    f, units = np.array([15.0]), unit_system(name)
+    assert_allclose(level.in_si(f) * in_model(level, "ry", units), 3.0 / second**2, rtol=1e-12)
+    assert_allclose(density.in_si(f) * in_model(density, "ry", units), 3.0 / second**4, rtol=1e-12)

@@ -151,3 +151,21 @@ def test_the_largest_to_expect_is_that_of_simulated_noise():
 def test_tests_that_make_no_sense_are_refused(given, words):
     with pytest.raises(ModelError, match=words):
         RandomTest("r", **given)
+
+
+@pytest.mark.parametrize(
+    ("units", "g", "radian"),
+    [("m-kg-s", G, 1.0), ("mm-t-s", 1e3 * G, 1.0), ("mm-kg-ms", 1e-3 * G, 1e-6), ("in-slinch-s", G / 0.0254, 1.0)],
+)
+def test_the_rms_of_an_input_is_in_units_of_the_model(units, g, radian):
+    """White noise W over the band b has the rms sqrt(W b)."""
+    levels = {
+        "base:z": Level.of([(20, 0.04), (420, 0.04)], "g2/Hz"),
+        "base:x": Level.of([(20, 9.0), (120, 9.0)], "(m/s2)2/Hz"),
+        "base:ry": Level.of([(20, 0.25), (120, 0.25)], "(rad/s2)2/Hz"),
+    }
+    run = random_runs(masses([50.0], 0.02, units=units), RandomTest("r", levels=levels))[0]
+    found = dict(zip(run.inputs, run.input_rms, strict=True))
+    assert_allclose(found["base:z"], 4.0 * g, rtol=1e-12)
+    assert_allclose(found["base:x"], 30.0 * g / G, rtol=1e-12)
+    assert_allclose(found["base:ry"], 5.0 * radian, rtol=1e-12)

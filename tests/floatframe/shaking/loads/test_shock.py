@@ -165,3 +165,30 @@ def test_too_many_samples_are_refused_with_the_remedy():
         TimeTest("s", np.array([0, 1.0]), np.array([0, 1.0]), ("z",), spectra=SpectrumRequest(first=1, last=5)),
     )
     assert len(run[0].t) < 1000
+
+
+@pytest.mark.parametrize(
+    ("units", "acceleration", "turning", "force", "moment"),
+    [
+        ("m-kg-s", 1.0, 1.0, 1.0, 1.0),
+        ("mm-t-s", 1e3, 1.0, 1.0, 1e3),
+        ("mm-kg-ms", 1e-3, 1e-6, 1e-3, 1.0),  # mm/ms², rad/ms², kN, kN mm
+        ("mm-g-ms", 1e-3, 1e-6, 1.0, 1e3),
+        ("in-slinch-s", 1 / 0.0254, 1.0, 1 / 4.4482216152605, 1 / 4.4482216152605 / 0.0254),  # in/s², lbf, lbf in
+    ],
+)
+def test_inputs_in_si_become_units_of_the_model(units, acceleration, turning, force, moment):
+    model = masses([80.0], 0.05, units=units)
+    more = replace(
+        model,
+        inputs=(*model.inputs, "tip:x", "tip:rx", "load case a"),
+        rates=np.array([2] * 6 + [0] * 3),
+        B=np.concatenate([model.B, np.zeros((3, 1, 3))], axis=2),
+        D=np.concatenate([model.D, np.zeros((3, 3, 3))], axis=2),
+    )
+    t, a = pulse("half-sine", 40.0, 0.011)
+    names = ("base:z", "base:ry", "tip:x", "tip:rx", "load case a")
+    run = time_runs(more, TimeTest("s", t, inputs=dict.fromkeys(names, a)))[0]
+    found = dict(zip(run.inputs, np.abs(run.input_values).max(axis=1) / 40.0, strict=True))
+    for name, factor in zip(names, (acceleration, turning, force, moment, 1.0), strict=True):
+        assert_allclose(found[name], factor, rtol=1e-9, err_msg=name)

@@ -170,6 +170,39 @@ def test_own_damping_of_the_body_couples_its_modes_and_changes_the_response():
     assert_allclose(response(model, np.array([77.0]))[0, -6:], tip, rtol=0, atol=1e-8 * np.abs(tip).max())
 
 
+def test_own_damping_acts_through_two_bases_that_move_against_each_other(part):
+    """Oracle: the whole pencil of the free body, both bases held by rows of their own, no elimination."""
+    from cms.quality.reference.free_pencil import whole_pencil, whole_port_rows
+
+    body = cms.reduce(part, cms.guyan(part), damping=cms.ModalDamping(0.2))
+    bases = bases_of_body(body, {"a": ("left",), "b": ("right",)}, {"a": P})
+    middle = Observed("middle", interface="first", quantities=("acceleration", "displacement"))
+    model = shaken_body(body, bases, Damping(own=True), [middle])
+    pencil, w = whole_pencil(body), 2 * np.pi * 77.0
+    n, s = len(pencil.M), np.eye(12) / -(w**2)
+    G = np.vstack([whole_port_rows(body, name) for name in ("left", "right")])
+    T = np.eye(12)
+    T[:6, :6] = carried(-P)
+    S = np.block([[pencil.K - w**2 * pencil.M + 1j * w * pencil.D, -G.T], [G, np.zeros((12, 12))]])
+    x = np.linalg.solve(S, np.vstack([np.zeros((n, 12)), T @ s]))
+    H = response(model, np.array([77.0]))[0]
+    forces, place = T.T @ x[n:], whole_port_rows(body, "first") @ x[:n]
+    assert_allclose(H[:12], forces, rtol=0, atol=1e-8 * np.abs(forces).max())
+    first = model.output_index("middle acceleration x")
+    assert_allclose(H[first : first + 6], -(w**2) * place, rtol=0, atol=1e-8 * w**2 * np.abs(place).max())
+    # displacements are counted from where base a alone would carry the place
+    rigid = np.hstack([carried(np.array([1 / 3, 0, 0]) - P), np.zeros((6, 6))]) @ s
+    first = model.output_index("middle displacement x")
+    assert_allclose(H[first : first + 6], place - rigid, rtol=0, atol=1e-8 * np.abs(place).max())
+
+
+def carried(arm):
+    """Motion of a point of a rigid body at `arm` from another by that of the other: d + theta × arm."""
+    found = np.eye(6)
+    found[:3, 3:] = np.array([np.cross(theta, arm) for theta in np.eye(3)]).T
+    return found
+
+
 @pytest.fixture(scope="module")
 def solid():
     part = cms.couple(bar(nx=3))
