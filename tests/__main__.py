@@ -4,7 +4,7 @@
     python -m tests --long       # studies of minutes, and those of --relative
     python -m tests --relative   # tests of the engine again, in the coordinates of joints
     python -m tests --external   # beside other programs; those that are not there are skipped, visibly
-    python -m tests --campaign   # seeded bad inputs and kills
+    python -m tests --campaign   # seeded bad inputs, kills, random motions
 
 A group is a row of stages. The checks of a stage run side by side, each as its own process, and each report is printed
 as a whole when its check ends; the first stage in which one fails ends the run. The last line says how long the group

@@ -1,4 +1,4 @@
-"""The campaign: a thousand bad inputs and a hundred kills, each with an oracle (`python -m tests --campaign`)."""
+"""The campaign: bad inputs, kills and random motions, each with an oracle (`python -m tests --campaign`)."""
 
 from tests.campaign.campaign import main
 

@@ -1,13 +1,18 @@
 """The campaign runs every case in a worker process with a limit of time, and counts what became of it.
 
-    python -m tests --campaign                     everything: 1400 bad inputs, 100 kills
+    python -m tests --campaign                     everything: 1400 bad inputs, 100 kills, 300 random motions
+    python -m tests --campaign motions jobs        two families
     python -m tests --campaign jobs 147            one case, its verdict in words
+    python -m tests --campaign motions --count 1000 --seed 5      so many cases of each, seeds from 5 on
 
-A hang is a case beyond `LIMIT` seconds; a worker that ends is a traceback of its case. The exit code is 0 if there is
-no traceback, no hang, no wrong acceptance and no unclear message.
+Motions have new seeds in each run, the other families those from 0 on; --seed gives the first. A fault prints its
+family and seed, which repeat it. A hang is a case beyond `LIMIT` seconds; a worker that ends is a traceback of its
+case. The exit code is 0 if there is no traceback, no hang, no wrong acceptance and no unclear message.
 """
 
+import argparse
 import importlib
+import secrets
 import shutil
 import tempfile
 import time
@@ -34,10 +39,13 @@ FAMILIES: dict[str, tuple[str, int]] = {  # what it is -> the function of a case
     "matrices": ("tests.campaign.imports:matrix_case", 150),
     "bodies": ("tests.campaign.imports:body_case", 100),
     "kills": ("tests.campaign.kills:kill_case", 100),
+    "motions": ("tests.campaign.motions:motion_case", 300),
 }
+NEW_SEEDS = ("motions",)  #: families whose seeds are new in each run
 LIMIT = 60.0  #: seconds of a case
 FIRST = 600.0  #: of the first one in a worker, before which it may compile the kernels
 PROCESSES = 2
+SORTS = ("compared", "right", "noted", "chaotic", "no reference")  #: first words of what was accepted, counted
 
 
 def case_of(family: str) -> Any:
@@ -92,35 +100,68 @@ class Worker:
 
 def main(words: list[str] | None = None) -> int:
     """Run the campaign, or the one case that is named; print what was found and the counts in the last line."""
-    words = list(words or ())
-    if len(words) == 2:
+    request = request_of(list(words or ()))
+    if isinstance(request, str):
+        print(f"python -m tests --campaign: {request}")
+        return 2
+    chosen, count, first = request.families or list(FAMILIES), request.count, request.seed
+    if request.case is not None:
+        family = chosen[0]
         with tempfile.TemporaryDirectory() as folder:
             (Path(folder) / "case").mkdir()
-            verdict = case_of(words[0])(int(words[1]), Path(folder) / "case")
-        print(f"{words[0]} {words[1]}: {verdict.kind}: {verdict.words}")
+            verdict = case_of(family)(request.case, Path(folder) / "case")
+        print(f"{family} {request.case}: {verdict.kind}: {verdict.words}")
         return int(verdict.kind not in (REFUSED, ACCEPTED))
-    chosen = words or list(FAMILIES)
-    cases = [(family, seed) for family in chosen for seed in range(FAMILIES[family][1])]
+    cases = []
+    for family in chosen:
+        begin = first if first is not None else secrets.randbelow(10**9) if family in NEW_SEEDS else 0
+        cases += [(family, begin + k) for k in range(count or FAMILIES[family][1])]
+        if family in NEW_SEEDS:
+            print(f"{family}: seeds from {begin} on", flush=True)
     begun = time.monotonic()
     counts: dict[str, Counter[str]] = {family: Counter() for family in chosen}
     with tempfile.TemporaryDirectory(prefix="campaign-") as home:
         for case, verdict in verdicts(cases, Path(home)):
             counts[case[0]][verdict.kind] += 1
-            if verdict.words.startswith("compared"):
-                counts[case[0]]["compared"] += 1
+            kind = verdict.words.partition(":")[0]
+            if verdict.kind == ACCEPTED and kind in SORTS:
+                counts[case[0]][kind] += 1
             if verdict.kind not in (REFUSED, ACCEPTED):
                 print(f"{case[0]} {case[1]}: {verdict.kind}: {' '.join(verdict.words.split())[:500]}", flush=True)
-    for family, count in counts.items():
-        told = ", ".join(f"{kind} {count[kind]}" for kind in (REFUSED, ACCEPTED, TRACEBACK, HANG, WRONG, UNCLEAR))
-        print(f"{family}: {told}")
+    for family, found in counts.items():
+        told = ", ".join(f"{kind} {found[kind]}" for kind in (REFUSED, ACCEPTED, TRACEBACK, HANG, WRONG, UNCLEAR))
+        sorts = ", ".join(f"{kind} {found[kind]}" for kind in SORTS if found[kind])
+        print(f"{family}: {told}" + (f" (of those accepted {sorts})" if sorts else ""))
     total: Counter[str] = sum(counts.values(), Counter())
-    n_kills = sum(counts.get("kills", Counter())[kind] for kind in (ACCEPTED, REFUSED, TRACEBACK, HANG, WRONG, UNCLEAR))
+    n_kills, n_motions = (sum(family == name for family, _ in cases) for name in ("kills", "motions"))
     print(
-        f"campaign: {len(cases) - n_kills} bad inputs, {n_kills} kills in {time.monotonic() - begun:.0f} s: "
-        f"{total[TRACEBACK]} tracebacks, {total[HANG]} hangs, {total[WRONG]} wrong acceptances, "
-        f"{total[UNCLEAR]} unclear messages"
+        f"campaign: {len(cases) - n_kills - n_motions} bad inputs, {n_kills} kills, {n_motions} motions in "
+        f"{time.monotonic() - begun:.0f} s: {total[TRACEBACK]} tracebacks, {total[HANG]} hangs, {total[WRONG]} wrong "
+        f"acceptances, {total[UNCLEAR]} unclear messages"
     )
     return int(any(total[kind] for kind in (TRACEBACK, HANG, WRONG, UNCLEAR)))
+
+
+def request_of(words: list[str]) -> argparse.Namespace | str:
+    """Return families, case, count and seed of the words of the command line; what is wrong with them, in words."""
+    parser = argparse.ArgumentParser(prog="python -m tests --campaign", add_help=False, exit_on_error=False)
+    parser.add_argument("families", nargs="*")
+    parser.add_argument("--count", type=int)
+    parser.add_argument("--seed", type=int)
+    try:
+        request, unknown = parser.parse_known_args(words)
+    except argparse.ArgumentError as error:
+        return str(error)
+    request.case = None
+    if len(request.families) == 2 and request.families[1].isdigit():
+        request.case = int(request.families.pop())
+    for word in [*unknown, *(name for name in request.families if name not in FAMILIES)]:
+        return f"expected families among {', '.join(FAMILIES)}, --count or --seed; got {word!r}"
+    for name in ("count", "seed"):
+        value = getattr(request, name)
+        if value is not None and value < (1 if name == "count" else 0):
+            return f"--{name}: expected a number of at least {1 if name == 'count' else 0}, got {value}"
+    return request
 
 
 def verdicts(cases: list[tuple[str, int]], home: Path) -> Any:

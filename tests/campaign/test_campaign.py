@@ -5,10 +5,13 @@ import tomllib
 import numpy as np
 import pytest
 
-from tests.campaign.campaign import FAMILIES, case_of
+import floatframe as ff
+from tests.campaign.campaign import FAMILIES, case_of, main
 from tests.campaign.expressions import value_of_tape
 from tests.campaign.jobs import JOB, job_case, wrong_body
+from tests.campaign.motions import WRONG_BY, difference, growth_of, motion_verdict, reference_of, run
 from tests.campaign.plain_mesh import FORMATS, bar, read_plain
+from tests.campaign.random_motions import MotionCase, random_motion
 from tests.campaign.systems import SYSTEM, system_case, wrong_motion
 from tests.campaign.verdict import ACCEPTED, REFUSED
 
@@ -82,9 +85,55 @@ def test_a_tape_of_another_expression_has_another_value():
     assert value_of_tape(other, (3.0, 2.0, 4.0)) == 1.0
 
 
-@pytest.mark.parametrize("family", [name for name in FAMILIES if name != "kills"])
+@pytest.mark.parametrize("family", [name for name in FAMILIES if name not in ("kills", "motions")])
 def test_the_first_cases_of_every_family_pass(tmp_path, family):
     for seed in range(3, 7):
         (tmp_path / str(seed)).mkdir()
         verdict = case_of(family)(seed, tmp_path / str(seed))
         assert verdict.kind in (REFUSED, ACCEPTED), verdict.words
+
+
+@pytest.mark.parametrize(("words", "told"), [
+    (["nosuch"], "expected families among jobs, meshes"),
+    (["motions", "--count", "0"], "--count: expected a number of at least 1, got 0"),
+    (["motions", "--seed", "x"], "invalid int value: 'x'"),
+    (["--cuont", "5"], "got '--cuont'"),
+])  # fmt: skip
+def test_a_request_that_is_wrong_is_refused_in_words(capsys, words, told):
+    assert main(words) == 2
+    assert told in capsys.readouterr().out
+
+
+def pendulum(n_links=1, gravity=-9.81, h=0.02, n_steps=100):
+    """Return a case of links that hang from each other, let go from the level."""
+    bodies, joints, last = [], [], ff.Marker("ground", position=np.zeros(3))
+    for k in range(n_links):
+        name = f"link{k}"
+        bodies.append(ff.RigidBody(name, 1.0, 0.01 * np.eye(3), center_of_mass=(1, 0, 0), position=(k, 0, 0)))
+        joints.append(ff.RevoluteJoint(f"j{k}", last, ff.Marker(name, position=np.zeros(3)), axis=(0, 0, 1)))
+        last = ff.Marker(name, position=np.array([1.0, 0, 0]))
+    system = ff.System(bodies, joints, [ff.Gravity((0, gravity, 0))])
+    return MotionCase(system, ff.GeneralizedAlpha(0.8), h, n_steps, 0, "absolute", "pendulum")
+
+
+def test_the_oracle_of_motions_tells_a_right_motion_from_another_one():
+    case = pendulum()
+    reference = reference_of(case)
+    assert difference(run(case, 1)[0], reference) < WRONG_BY < difference(run(pendulum(gravity=-12.0), 1)[0], reference)
+    assert motion_verdict(case).words.startswith("right")
+    in_chunks = run(MotionCase(**{**vars(case), "chunk": 10}), 1)[0]
+    assert difference(in_chunks, reference) < WRONG_BY
+
+
+def test_the_oracle_of_motions_knows_chaos():
+    assert growth_of(pendulum()) < 30
+    chaotic = pendulum(3, n_steps=600)
+    assert growth_of(chaotic) > 30
+
+
+def test_a_seed_gives_the_same_random_motion_again():
+    one, other = random_motion(7), random_motion(7)
+    assert one.words == other.words
+    assert [body.name for body in one.system.bodies] == [body.name for body in other.system.bodies]
+    np.testing.assert_array_equal(one.system.bodies[0].position, other.system.bodies[0].position)
+    assert random_motion(8).words != one.words
