@@ -29,7 +29,7 @@ from floatframe.compiling.pair_forces import add_pair_laws
 from floatframe.compiling.public_elements import PlacedLaw, add_public_elements
 from floatframe.forces import Gravity, PointForce, SpringDamper
 from floatframe.functions.time_functions import TimeFunction
-from floatframe.joints.rows import Row, kind_of
+from floatframe.joints.rows import kind_of
 from floatframe.joints.sliding import SlidingJoint
 from floatframe.kernels.model import Bodies, BodyTypes, Connections, JointRows, Loads, Markers, Model, Springs
 from floatframe.kernels.records import filled
@@ -214,7 +214,7 @@ def compile_system(system: System) -> CompiledSystem:
         elimination=plan_elimination(made.sizes, ends_of, integers(made.connection_of)),
     )
     length = system_length(markers, placed, n_q, model)
-    soft = row_softness(system, rows, model.body_types, kind, length)
+    soft = row_softness(system, made, model.body_types, kind)
     model = model._replace(rows=model.rows._replace(soft=soft), laws=public.record(length))
     return CompiledSystem(
         model=model,
@@ -272,31 +272,37 @@ def marker_record(
     )
 
 
-def row_softness(system: System, rows: list[Row], types: BodyTypes, kind_of_body: IntArray, length: float) -> Array:
-    """Return the compliance of held rows, relative to c_k, for reactions of least norm; zero if none is asked for.
+def row_softness(system: System, made: ConnectionLists, types: BodyTypes, kind_of_body: IntArray) -> Array:
+    """Return the compliance of held rows, relative to c_k, by which they share reactions; zero if none is asked for.
 
-    SOFT/m for distances and SOFT/(m length²) for angles, m the mean mass of the bodies. A body with a small moment J
-    about an axis turns by 1/J, whose rounding the compliance of angles must stand above: it is at least ROUNDING/J, but
-    no more than MOST_SOFT/(m length²).
+    A joint shares by how its two bodies give way: SOFT times the sum of their 1/m for distances, of their 1/J for
+    angles, J the mean of the principal moments of inertia about the centre of mass. A body with a small moment about an
+    axis turns by 1/J_min, whose rounding the compliance of angles must stand above: it is at least ROUNDING/J_min, but
+    no more than MOST_SOFT/J.
     """
-    soft = np.zeros(len(rows))
-    if system.redundant == "minimum-norm":
-        m = float(types.mass[kind_of_body].mean())
-        above = ROUNDING * m * length**2 / max(least_moment(types), np.finfo(float).tiny)
-        of_angles = min(max(SOFT, above), MOST_SOFT) / (m * length**2)
-        for k, row in enumerate(rows):
-            kind = kind_of(row.kind)
-            if kind.can_yield and row.motion is None:
-                soft[k] = SOFT / m if kind.is_length else of_angles
+    soft = np.zeros(len(made.rows))
+    if system.redundant != "minimum-norm":
+        return soft
+    tiny = np.finfo(float).tiny
+    moments = np.maximum(principal_moments(types), tiny)
+    by_force, by_moment = 1 / types.mass, 1 / moments.mean(axis=1)
+    of_angles = np.clip(ROUNDING / moments.min(axis=1), SOFT * by_moment, MOST_SOFT * by_moment)
+    connection = np.repeat(np.arange(len(made.sizes)), made.sizes)
+    for k, row in enumerate(made.rows):
+        kind = kind_of(row.kind)
+        if kind.can_yield and row.motion is None:
+            ends = (made.markers[m[connection[k]]].body for m in (made.a_of, made.b_of))
+            t = kind_of_body[[body for body in ends if body >= 0]]
+            soft[k] = SOFT * by_force[t].sum() if kind.is_length else of_angles[t].sum()
     return soft
 
 
-def least_moment(types: BodyTypes) -> float:
-    """Return the smallest principal moment of inertia of all types of bodies about their centres of mass."""
+def principal_moments(types: BodyTypes) -> Array:
+    """Return the principal moments of inertia of all types of bodies about their centres of mass, (n_types, 3)."""
     moments = []
     for m, S, J0 in zip(types.mass, types.S, types.J0, strict=True):
-        moments.append(np.linalg.eigvalsh(J0 - (S @ S * np.eye(3) - np.outer(S, S)) / m)[0])
-    return float(min(moments))
+        moments.append(np.linalg.eigvalsh(J0 - (S @ S * np.eye(3) - np.outer(S, S)) / m))
+    return np.array(moments)
 
 
 def place(system: System, mean_axes: tuple[MeanAxes | None, ...]) -> State:

@@ -10,7 +10,7 @@ from floatframe.kernels.memory import WORK_GIVEN, WORK_TAKEN
 from floatframe.kernels.model import MASS, STIFFNESS
 from floatframe.kernels.past import keep_past
 from floatframe.kernels.rotation import exp_matrix, matrix_of_euler_parameters, rotate_euler_parameters
-from floatframe.kernels.schur import correction, factorize_bodies
+from floatframe.kernels.schur import correction, factorize_bodies, share_reactions
 from floatframe.kernels.step_start import begin_step
 from floatframe.kernels.turns import count_turns
 from floatframe.kernels.vector import dot, product, put_matrix, put_sum, scaled, turned, vector
@@ -26,6 +26,7 @@ __all__ = [
     "is_resized",
     "keep_iterate",
     "load_state",
+    "shares",
     "time_loop",
     "write_row",
 ]
@@ -343,6 +344,19 @@ def write_row(model, work, memory, t, rows):
     diagnose(model, work, rows.diagnostics[k], rows.drift[k])
     rows.diagnostics[k, WORK_GIVEN] = memory.work_given
     rows.diagnostics[k, WORK_TAKEN] = memory.work_taken
+    if shares(model):
+        work.solver.is_due = 1  # the factors of the step are overwritten
+        if share_reactions(model, work, memory.h * memory.h):
+            copy(work.state.w, rows.w[k])
+
+
+@inner
+def shares(model):
+    """Whether constraints that repeat others share their reactions."""
+    for k in range(model.rows.soft.shape[0]):
+        if model.rows.soft[k] > 0.0:
+            return True
+    return False
 
 
 @inner

@@ -7,13 +7,27 @@ With z = H⁻¹(-c_k residual), X = H⁻¹ J_columnᵀ and Z = J_row X the conne
 and Z do not turn with the body, so that they can serve for many steps; P, R and V are those of the iterate.
 """
 
+import math
+
+from floatframe.joints.rows.kinds import NOTHING
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.connections.connection import connection_derivatives
 from floatframe.kernels.dense import lu_factor, lu_solve, lu_solve_columns
 from floatframe.kernels.evaluation import linearize
+from floatframe.kernels.model import MASS, STIFFNESS
 from floatframe.kernels.vector import add, put, put_sum, scaled, turned, turned_back
 
-__all__ = ["assemble", "correction", "factorize_bodies", "factorize_connections", "factorize_tangents"]
+__all__ = [
+    "assemble",
+    "correction",
+    "factorize_bodies",
+    "factorize_connections",
+    "factorize_tangents",
+    "share_reactions",
+]
+
+SOFTER = 1e3  # s of `share_reactions`: well above the rounding of A
+SWEEPS = 5  # and how often: with soft 1e-9 of A, constraints of a condition of 1e4 share to 1e-10
 
 
 @inner
@@ -216,7 +230,7 @@ def correction(model, work, c_k, is_new):
 
     Return the connection with a singular block, or -1.
     """
-    bodies, markers, connections, solver = model.bodies, model.markers, model.connections, work.solver
+    bodies, connections, solver = model.bodies, model.connections, work.solver
     y, mu = solver.y, solver.mu
     for i in range(bodies.kind.shape[0]):
         n, u0 = 6 + bodies.n_q[i], bodies.u0[i]
@@ -236,7 +250,17 @@ def correction(model, work, c_k, is_new):
             return singular
     for k in range(mu.shape[0]):
         mu[k] = -work.connections.g[k]
-    motion = solver.motion
+    take_motions(model, work)
+    solve_connections(model.elimination, connections, solver)
+    add_wrenches(model, work)
+    return -1
+
+
+@inner
+def take_motions(model, work):
+    """Subtract what the rows of connections make of the motion y of the bodies from mu."""
+    bodies, markers, connections, solver = model.bodies, model.markers, model.connections, work.solver
+    y, mu, motion = solver.y, solver.mu, solver.motion
     for i in range(bodies.kind.shape[0]):
         n, u0, R = 6 + bodies.n_q[i], bodies.u0[i], work.state.R[i]
         for e in range(bodies.end0[i], bodies.end0[i + 1]):
@@ -258,7 +282,13 @@ def correction(model, work, c_k, is_new):
                 mu[w0 + r] -= total
             if markers.accelerated[m] >= 0:
                 take_accelerated(model, work, m, n, y[u0 : u0 + n], mu)
-    solve_connections(model.elimination, connections, solver)
+
+
+@inner
+def add_wrenches(model, work):
+    """Add the motion X mu that wrenches mu give to the bodies to y."""
+    bodies, markers, connections, solver = model.bodies, model.markers, model.connections, work.solver
+    y, mu = solver.y, solver.mu
     for i in range(bodies.kind.shape[0]):
         n, u0, R = 6 + bodies.n_q[i], bodies.u0[i], work.state.R[i]
         for e in range(bodies.end0[i], bodies.end0[i + 1]):
@@ -278,4 +308,72 @@ def correction(model, work, c_k, is_new):
                 for k in range(size):
                     total += solver.X[6 * o + r * 6 + k] * wrench[k]
                 y[u0 + r] += total
-    return -1
+
+
+@inner
+def share_reactions(model, work, c_k):
+    """Share the reactions of the iterate among constraints that repeat others; whether that has an answer.
+
+    Of all wrenches w' that act on the bodies as w does, Jᵀ w' = Jᵀ w, those of the least sum of soft lambda², lambda
+    being the reaction along a row that may give way, `soft` its mobility. With A = G M⁻¹ Jᵀ and S = soft lambda of w,
+    V = -S, they are the limit of the proximal point algorithm
+
+        (A + s S) w'_j = A w + s S w'_(j-1),      w'_0 = 0          (rows that hold nothing: V w'_j = V w):
+
+    all w'_j are reactions to motions of the bodies, which no reactions that balance themselves are part of, and A w'
+    comes nearer to A w in each sweep by the ratio of s S to the least eigenvalue of A. w may hold any sum that balances
+    itself, such as the rounding of positions over c_k. Work arrays are overwritten, factors and y included; modes
+    without mass have c_k times their stiffness.
+    """
+    bodies, rows, connections, solver = model.bodies, model.rows, model.connections, work.solver
+    linearize(model, work, 1.0, 0.0, 0.0)
+    for i in range(bodies.kind.shape[0]):
+        n, t = 6 + bodies.n_q[i], bodies.kind[i]
+        H = solver.H[bodies.h0[i] : bodies.h0[i + 1]].reshape((n, n))
+        step = 1 if model.body_types.is_diagonal[t, STIFFNESS - MASS] else n - 5
+        for k in range(n - 6):
+            if not H[6 + k, 6 + k] > 0.0:
+                H[6 + k, 6 + k] += c_k * model.body_types.blocks[model.body_types.block0[t, STIFFNESS] + k * step]
+    if factorize_tangents(model, work) >= 0:
+        return False
+    assemble(model, work, 0.0)
+    for c in range(connections.size.shape[0]):
+        size, o = connections.size[c], model.elimination.diagonal[c]
+        for r in range(size):
+            if rows.soft[connections.w0[c] + r] > 0.0:
+                for k in range(size):
+                    solver.blocks[o + r * size + k] += (SOFTER - 1.0) * work.connections.V[c, r, k]
+                    work.connections.V[c, r, k] *= SOFTER
+    if factorize_connections(model.elimination, connections, solver) >= 0:
+        return False
+    for k in range(solver.y.shape[0]):
+        solver.y[k] = 0.0
+    for k in range(solver.mu.shape[0]):
+        solver.mu[k] = work.state.w[k]
+    add_wrenches(model, work)  # y = M⁻¹ Jᵀ w
+    for k in range(solver.mu.shape[0]):
+        solver.mu[k] = 0.0
+    for sweep in range(SWEEPS):
+        if sweep > 0:
+            for k in range(solver.mu.shape[0]):
+                work.connections.bias[k], solver.mu[k] = solver.mu[k], 0.0
+        take_motions(model, work)
+        for c in range(connections.size.shape[0]):
+            w0 = connections.w0[c]
+            for r in range(connections.size[c]):
+                total = -solver.mu[w0 + r]
+                for k in range(connections.size[c]):
+                    if rows.holds[w0 + r] == NOTHING:
+                        total += work.connections.V[c, r, k] * work.state.w[w0 + k]
+                    elif sweep > 0:
+                        total += work.connections.V[c, r, k] * work.connections.bias[w0 + k]
+                solver.mu[w0 + r] = total
+        solve_connections(model.elimination, connections, solver)
+    total = 0.0
+    for k in range(solver.mu.shape[0]):
+        total += solver.mu[k]
+    if not math.isfinite(total):
+        return False
+    for k in range(solver.mu.shape[0]):
+        work.state.w[k] = solver.mu[k]
+    return True

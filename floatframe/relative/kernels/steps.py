@@ -21,6 +21,7 @@ from floatframe.kernels.generalized_alpha import (
     keep_iterate,
     load_state,
     roundoff_floor,
+    shares,
     time_loop,
     write_row,
 )
@@ -332,8 +333,10 @@ def try_tree_step(model, work, memory, others, order, t, h):
 @inner
 def write_next_row(model, work, memory, others, t, rows):
     """Write the next row of the results."""
-    tree, joints, _ = others
+    tree, joints, tangent = others
     write_tree_row(model, work, memory, tree, joints, t, rows)
+    if shares(model):
+        tangent.is_kept = 0  # its factors of the bodies are overwritten
 
 
 advance_tree = time_loop(try_tree_step, write_next_row)
