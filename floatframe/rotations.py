@@ -18,6 +18,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array, tilde
 
 __all__ = [
+    "continued_rotation",
     "cross",
     "dot",
     "euler_parameter_product",
@@ -36,6 +37,7 @@ __all__ = [
 ]
 
 SERIES_BELOW = 0.25  #: of the squared angle
+NEAR_FULL_TURN = 1e-6  #: |theta| below which its direction is noise beside that of full turns
 TERMS = 10
 
 
@@ -210,3 +212,19 @@ def rotation_log(R: Array) -> Array:
     if sine == 0.0:
         return np.zeros(3)
     return 2 * np.arctan2(sine, p[0]) * p[1:] / sine
+
+
+def continued_rotation(theta: Array, expected: Array) -> Array:
+    """Return theta + 2 pi n theta/|theta|, |theta| <= pi, nearest to the expected rotation vector, (..., 3).
+
+    Complex numbers too, theta real but for a small change.
+    """
+    real = np.real(theta)
+    t, size = np.linalg.norm(real, axis=-1), np.linalg.norm(expected, axis=-1)
+    is_full = t < NEAR_FULL_TURN
+    n = np.floor(((real * expected).sum(axis=-1) / np.where(is_full, 1.0, t) - t) / (2 * np.pi) + 0.5)
+    length = np.sqrt(np.where(is_full, 1.0, dot(theta, theta)))
+    own = np.where(is_full, 0.0, 2 * np.pi * n / length)
+    n_full = np.floor(size / (2 * np.pi) + 0.5)
+    other = np.where(is_full, 2 * np.pi * n_full / np.maximum(size, 1.0), 0.0)
+    return np.asarray(theta + own[..., None] * theta + other[..., None] * expected)

@@ -1,4 +1,4 @@
-"""Angles whose turns a run counts: those of the joints, and those that sensors of the system ask for."""
+"""Angles whose turns a run counts: of the joints, of sensors of the system that ask for it, of bushings that twist."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,6 +6,8 @@ from typing import Protocol, runtime_checkable
 
 from fe_models.foundation.arrays import Array
 from floatframe.compiling.markers import MarkerData, joint_markers, marker_pose, n_q_of
+from floatframe.compiling.pair_forces import bushing_markers
+from floatframe.forces import Bushing
 from floatframe.functions.time_functions import TimeFunction
 from floatframe.joints.rows import TURN, TURN_B, TWIST_B, RowCoordinate
 from floatframe.joints.sliding import SlidingJoint
@@ -14,7 +16,16 @@ from floatframe.kernels.records import filled
 from floatframe.state import State
 from floatframe.system import System
 
-__all__ = ["AngleOfSensor", "CountedAngle", "angle_of", "angle_records", "counted_angles", "direction"]
+__all__ = [
+    "AngleOfSensor",
+    "CountedAngle",
+    "angle_of",
+    "angle_records",
+    "counted_angles",
+    "direction",
+    "first_angles",
+    "rotation_of",
+]
 
 Direction = tuple[float, float, float]
 SAME = 1e-9  #: difference of directions that are one
@@ -30,10 +41,11 @@ class CountedAngle:
     z: Direction
     y: Direction  #: of the other body, turns from z towards -x
     sign: float = 1.0
+    part: int = -1  #: 0, 1, 2: of the rotation vector of a bushing, of which three follow each other
 
     def is_same(self, angle: "CountedAngle") -> bool:
         """Whether another one measures the same."""
-        own, others = ((a.holder, a.other, a.sign) for a in (self, angle))
+        own, others = ((a.holder, a.other, a.sign, a.part) for a in (self, angle))
         directions = ((*a.x, *a.y, *a.z) for a in (self, angle))
         return own == others and all(abs(p - q) <= SAME for p, q in zip(*directions, strict=True))
 
@@ -83,10 +95,29 @@ def counted_angles(system: System, placed: State) -> list[tuple[CountedAngle, Ti
     for sensor in system.sensors:
         if isinstance(sensor, AngleOfSensor):
             add(sensor.counted_angle(system), None)
+    for force in system.forces:
+        if isinstance(force, Bushing) and force.counts_turns:
+            found += [(angle, None) for angle in rotation_of(*bushing_markers(system, force, placed))]
     return found
+
+
+def rotation_of(a: MarkerData, b: MarkerData) -> list[CountedAngle]:
+    """Return the three parts of the rotation vector of marker b against marker a."""
+    x, _, z = a.shape.triad.T
+    return [
+        CountedAngle(a.body, b.body, direction(x), direction(z), direction(y), part=k)
+        for k, y in enumerate(b.shape.triad.T)
+    ]
+
+
+def first_angles(system: System, n_angles: int) -> list[int]:
+    """Return for each bushing where its rotation vector begins in the angles, -1 for those that count no turns."""
+    counting = [force.counts_turns for force in system.forces if isinstance(force, Bushing)]
+    first = n_angles - 3 * sum(counting)  # they are the last
+    return [first + 3 * sum(counting[:k]) if counts else -1 for k, counts in enumerate(counting)]
 
 
 def angle_records(angles: list[CountedAngle]) -> Angles:
     """Return the angles as the kernels see them."""
-    parts = ("holder", "other", "x", "z", "y", "sign")
+    parts = ("holder", "other", "x", "z", "y", "sign", "part")
     return filled(Angles(), **{name: [getattr(angle, name) for angle in angles] for name in parts})

@@ -8,7 +8,7 @@ from floatframe.compiling.forces import Functions
 from floatframe.compiling.markers import MarkerData, find_marker, marker_pose, marker_with_pose, n_q_of
 from floatframe.errors import ModelError
 from floatframe.forces import Bushing, SphereContact
-from floatframe.forces.bushing import DEFORMATIONS
+from floatframe.forces.bushing import AXES, DEFORMATIONS
 from floatframe.joints.rows import MOMENT, MOMENT_B, PART, Row
 from floatframe.kernels.model import BUSHING, CONTACT, Bushings, Contacts
 from floatframe.kernels.records import filled, of_items
@@ -49,6 +49,8 @@ def add_pair_laws(system: System, made: Connections, functions: Functions) -> Pa
         damping=[bushing.damping for bushing in bushings],
         preload=[bushing.preload for bushing in bushings],
         table=tables,
+        share=[AXES[bushing.axes] for bushing in bushings],
+        angle=[-1] * len(bushings),
     )
     pairs.contacts = of_items(Contacts(), [contact.coefficients for contact in contacts])
     pairs.names = (*(bushing.name for bushing in bushings), *(contact.name for contact in contacts))

@@ -12,7 +12,7 @@ from floatframe.compiling.callbacks import Callback
 from floatframe.compiling.connections import Connections as ConnectionLists
 from floatframe.compiling.connections import add_joint, add_spring
 from floatframe.compiling.coordinate_elements import add_coordinate_elements
-from floatframe.compiling.counted_angles import CountedAngle, angle_records, counted_angles
+from floatframe.compiling.counted_angles import CountedAngle, angle_records, counted_angles, first_angles
 from floatframe.compiling.elimination_order import plan_elimination
 from floatframe.compiling.forces import Functions, body_loads, joint_forces
 from floatframe.compiling.lines import Lines, add_sliding
@@ -196,7 +196,7 @@ def compile_system(system: System) -> CompiledSystem:
         ),
         joint_forces=forces,
         springs=springs,
-        bushings=pairs.bushings,
+        bushings=pairs.bushings._replace(angle=integers(first_angles(system, len(angles)))),
         contacts=pairs.contacts,
         **elements.records(),
         laws=public.record(0.0),

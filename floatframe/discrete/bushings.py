@@ -1,15 +1,16 @@
 """Bushings over a step: the potential of six deformations by its exact discrete derivative, see kernels/bushing.py.
 
-With R = A_Aᵀ A_B = exp(theta), s = A_Aᵀ d and Q = exp(-theta/2) the deformations are xi = (e, theta), e = Q s. Products
-of axes and places change by the product rule with means, and with the Cayley vectors psi and chi of the two rotations
+With R = A_Aᵀ A_B = exp(theta), s = A_Aᵀ d and Q = exp(-share theta) the deformations are xi = (e, theta), e = Q s; the
+share is 0 in axes of A, 1 in axes of B, 1/2 half way. Products of axes and places change by the product rule with
+means, and with the Cayley vectors psi and chi of the two rotations
 
-    R_1 - R_0 = tilde(psi) R_mean,   psi = Gamma dtheta,       Q_1 - Q_0 = tilde(chi) Q_mean,   chi = -1/2 Gamma' dtheta
+    R_1 - R_0 = tilde(psi) R_mean,   psi = Gamma dtheta,     Q_1 - Q_0 = tilde(chi) Q_mean,   chi = -share Gamma' dtheta
     de = Q_mean ds + chi × (Q_mean s_mean)
 
 Gamma and Gamma' by Gonzalez' discrete derivative of exp (discrete/markers.py). So the force f and the moment m of the
 mean deformations, f·de + m·dtheta being the change of a potential of degree two, act by
 
-    f on s:  Q_meanᵀ f,      tau = Gamma⁻ᵀ (m - 1/2 Gamma'ᵀ ((Q_mean s_mean) × f)),
+    f on s:  Q_meanᵀ f,      tau = Gamma⁻ᵀ (m - share Gamma'ᵀ ((Q_mean s_mean) × f)),
     on the products a_i · b_j of the axes:  1/2 tilde(tau) P,  P = (1 + tilde(psi)/2) R_0 = R_mean⁻ᵀ,
 
 because <tilde(tau) P, tilde(psi) R_mean> = 2 tau·psi. They depend on products of directions alone and add no angular
@@ -24,7 +25,7 @@ from floatframe.discrete.functions import along_imaginary
 from floatframe.discrete.markers import MarkerStep, mean_jacobian
 from floatframe.discrete.rotation import relative_cayley
 from floatframe.kernels.model import Model
-from floatframe.rotations import cross, dot, rotation_exp, tilde, turned
+from floatframe.rotations import continued_rotation, cross, dot, rotation_exp, tilde, turned
 
 __all__ = ["bushing_load"]
 
@@ -74,17 +75,21 @@ def bushing_load(model: Model, c: int, pair: Pair, loads: Loads, span: Span) -> 
     A, B, d = 0.5 * (A_0 + A_1), 0.5 * (B_0 + B_1), b.x_mean - a.x_mean
     s_0, s_1 = turned(transposed(A_0), b.x_0 - a.x_0), turned(transposed(A_1), b.x_1 - a.x_1)
     R_0 = transposed(A_0) @ B_0
+    share = float(model.bushings.share[i])
     th_0, th_1 = rotation_vector(R_0), rotation_vector(transposed(A_1) @ B_1)
-    Gamma, half = mean_jacobian(th_0, th_1), mean_jacobian(-0.5 * th_0, -0.5 * th_1)
+    if model.bushings.angle[i] >= 0:
+        expected = span.rotation(int(model.bushings.angle[i]))
+        th_0, th_1 = continued_rotation(th_0, expected), continued_rotation(th_1, expected)
+    Gamma, part = mean_jacobian(th_0, th_1), mean_jacobian(-share * th_0, -share * th_1)
     P = R_0 + 0.5 * tilde(relative_cayley(th_0, th_1)) @ R_0
-    Q_0, Q_1 = rotation_exp(-0.5 * th_0), rotation_exp(-0.5 * th_1)
+    Q_0, Q_1 = rotation_exp(-share * th_0), rotation_exp(-share * th_1)
     Q, arm = 0.5 * (Q_0 + Q_1), turned(0.5 * (Q_0 + Q_1), 0.5 * (s_0 + s_1))
     # the change of the deformations by the motion over the step
     dA, dB = axes_change(a, A), axes_change(b, B)
     psi = axial((transposed(dA) @ B + transposed(A) @ dB) @ transposed(P))
     dtheta = solved(Gamma, psi)
     ds = turned(transposed(dA), d) + turned(transposed(A), b.dx - a.dx)
-    de = turned(Q, ds) + cross(-0.5 * turned(half, dtheta), arm)
+    de = turned(Q, ds) + cross(-share * turned(part, dtheta), arm)
     change = np.concatenate(np.broadcast_arrays(de, dtheta), axis=-1)
     e_mean = 0.5 * (turned(Q_0, s_0) + turned(Q_1, s_1))
     mean = np.concatenate(np.broadcast_arrays(e_mean, 0.5 * (th_0 + th_1)), axis=-1)
@@ -98,7 +103,7 @@ def bushing_load(model: Model, c: int, pair: Pair, loads: Loads, span: Span) -> 
             force = force + value[..., None] * np.eye(6)[r]
             given = given - value * change[..., r]
     f, m = force[..., :3], force[..., 3:]
-    m = m - 0.5 * turned(transposed(half), cross(arm, f))
+    m = m - share * turned(transposed(part), cross(arm, f))
     tau = solved(transposed(Gamma), m)
     G, g = -0.5 * tilde(tau) @ P, -turned(transposed(Q), f)
     on_A, on_B = B @ transposed(G) + d[..., :, None] * g[..., None, :], A @ G

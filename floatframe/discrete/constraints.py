@@ -43,11 +43,28 @@ class Span:
 
     w, (n_w,): in the rows of coordinates their values, angles counted through full turns; of states; of the speeds of
     approach of contacts. Of other rows it is not read.
+    angle, angle_rate, (n_angles,): counted angles where the step begins, and their rates; none: between -pi and pi.
     """
 
-    def __init__(self, t_0: float, t_1: float, t_force: float, w: Array | None = None) -> None:
+    def __init__(
+        self,
+        t_0: float,
+        t_1: float,
+        t_force: float,
+        w: Array | None = None,
+        angle: Array | None = None,
+        angle_rate: Array | None = None,
+    ) -> None:
         self.t_0, self.t_1, self.t_force = t_0, t_1, t_force
         self.w = np.zeros(0) if w is None else w
+        self.angle, self.angle_rate = angle, angle_rate
+
+    def rotation(self, first: int) -> Array:
+        """Return the rotation vector in the counted angles from `first` on where rates lead at t_force, (3,)."""
+        if self.angle is None or self.angle_rate is None:
+            return np.zeros(3)
+        own = slice(first, first + 3)
+        return np.asarray(self.angle[own] + (self.t_force - self.t_0) * self.angle_rate[own])
 
     @property
     def h(self) -> float:

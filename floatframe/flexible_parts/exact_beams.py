@@ -132,7 +132,8 @@ def exact_beams(
             )
             rest = -K @ np.concatenate([L / pieces * E_X, np.zeros(3)])
             called_ = f"{name} element {k + 1}.{j + 1}"
-            springs.append(Bushing(called_, first, second, stiffness=K, damping=damping * K, preload=rest))
+            law = {"stiffness": K, "damping": damping * K, "preload": rest}
+            springs.append(Bushing(called_, first, second, axes="half way", **law))
     for piece in model.pieces[1:]:  # point masses
         for k, node in enumerate(piece.dofs[:, 0] // 6):
             E = piece.axes[k, 0] @ np.diag(piece.moments[k, 0]) @ piece.axes[k, 0].T
@@ -142,7 +143,8 @@ def exact_beams(
         point = model.nodes[list(spring.nodes)].mean(axis=0) if spring.point is None else np.asarray(spring.point)
         first, second = (Marker(called[n], position=point - model.nodes[n], triad=spring.triad) for n in spring.nodes)
         D = np.zeros((6, 6)) if spring.damping is None else spring.damping
-        springs.append(Bushing(f"{name} spring {k + 1}", first, second, stiffness=spring.stiffness, damping=D))
+        law = {"stiffness": spring.stiffness, "damping": D}
+        springs.append(Bushing(f"{name} spring {k + 1}", first, second, axes="half way", **law))
 
     Rot = rotation_matrix(p)
     bodies = [

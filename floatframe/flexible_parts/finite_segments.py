@@ -97,7 +97,7 @@ def finite_segments(
     for k in range(n - 1):
         K = element_stiffness(line, nodes[k], nodes[k + 1])
         ends = (Marker(f"{name} {k + 1}", position=h / 2 * E_X), Marker(f"{name} {k + 2}", position=-h / 2 * E_X))
-        springs.append(Bushing(f"{name} spring {k + 1}", *ends, stiffness=K, damping=damping * K))
+        springs.append(Bushing(f"{name} spring {k + 1}", *ends, stiffness=K, damping=damping * K, axes="half way"))
     places = {"start": 0.0, "end": line.length} if stations is None else stations
     markers = {}
     for station, x in places.items():

@@ -104,7 +104,8 @@ def corotational(
             Marker(f"{name} {node}", position=i.triad.T @ (middle - i.position), triad=i.triad.T)
             for i, node in ((a, number + 1), (b, number + 2))
         )
-        elements.append(Bushing(f"{name} element {number + 1}", first, second, stiffness=K, damping=damping * K))
+        called = f"{name} element {number + 1}"
+        elements.append(Bushing(called, first, second, stiffness=K, damping=damping * K, axes="half way"))
     bodies = []
     for k, ((point, axes), (mass, moment, inertia)) in enumerate(zip(places, inertias, strict=True)):
         center = moment / mass

@@ -12,9 +12,10 @@ from floatframe.checked_values import array_of_shape
 from floatframe.errors import ModelError
 from floatframe.functions.time_functions import TimeFunction
 
-__all__ = ["DEFORMATIONS", "Bushing"]
+__all__ = ["AXES", "DEFORMATIONS", "Bushing"]
 
 DEFORMATIONS = ("x", "y", "z", "rx", "ry", "rz")  #: in the order of the rows of the matrices
+AXES = {"a": 0.0, "b": 1.0, "half way": 0.5}  #: by name, the share of the rotation of B against A that they make
 
 
 @frozen_copies
@@ -22,9 +23,15 @@ DEFORMATIONS = ("x", "y", "z", "rx", "ry", "rz")  #: in the order of the rows of
 class Bushing:
     """Force and torque K xi + D xi_dot + preload + tables(xi) between two markers; derived from a potential.
 
-    The deformation xi: distance of the points (3) and rotation vector (3) of marker B against A, in the axes half way
-    between the two, so that A and B play the same part. Without damping the energy is kept, also far from small
-    rotations; the rotation must stay below half a turn. The deformation is zero where the markers coincide.
+    The deformation xi: distance of the points (3) and rotation vector (3) of marker B against A, in the axes of one of
+    them. Those of the part that does not spin are right for a bearing: a damper in axes that turn with a rotor drives
+    it. Without damping the energy is kept, also far from small rotations. The deformation is zero where the markers
+    coincide. A rotation about one axis is counted beyond half a turn and goes on through full turns; where B also
+    tilts, the rotation vector means little near a full turn.
+
+    Half way between the axes of A and B both play the same part, as in a beam or a sleeve of rubber between two bodies
+    that turn alike. There the rotation must stay below half a turn, and between the ground and a body that spins the
+    axes turn at half of its speed.
 
     A body given in place of a marker is held where, and as, the other marker is placed: zero deformation as placed.
     """
@@ -37,9 +44,12 @@ class Bushing:
     preload: Array = field(default_factory=lambda: np.zeros(6))  #: force and torque on A at zero deformation, (6,)
     #: functions of one deformation ("x", ..., "rz"), such as tables, whose values are added [N, N m]
     characteristics: Mapping[str, TimeFunction] = field(default_factory=dict)
+    axes: str = "a"  #: in which it acts: those of marker "a", of marker "b", or "half way" between them
 
     def __post_init__(self) -> None:
         where = f"force {self.name!r}"
+        if self.axes not in AXES:
+            raise ModelError(f"{where}: axes: expected one of {', '.join(AXES)}, got {self.axes!r}")
         for name in ("stiffness", "damping"):
             object.__setattr__(self, name, six_by_six(f"{where}: {name}", getattr(self, name)))
         object.__setattr__(self, "preload", array_of_shape(f"{where}: preload", self.preload, (6,)))
@@ -64,6 +74,13 @@ class Bushing:
                 )
         if not (self.stiffness.any() or self.damping.any() or self.preload.any() or self.characteristics):
             raise ModelError(f"{where}: expected stiffness, damping or preload other than zero, got none")
+
+    @property
+    def counts_turns(self) -> bool:
+        """Whether rotations beyond half a turn make a difference to it, and are counted."""
+        of_rotations = [self.stiffness[3:], self.damping[3:], self.damping[:, 3:], self.preload[3:]]
+        is_turned = any(part.any() for part in of_rotations) or any(key.startswith("r") for key in self.characteristics)
+        return is_turned and self.axes != "half way"
 
 
 def six_by_six(where: str, values: Array) -> Array:

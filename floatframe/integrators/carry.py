@@ -9,13 +9,16 @@ from fe_models.foundation.arrays import Array
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ConvergenceError
 from floatframe.kernels.memory import Memory, Rows, memory_at
+from floatframe.kernels.model import Model
 from floatframe.kernels.work import Work, new_work
+from floatframe.rotations import continued_rotation, rotation_log
 from floatframe.state import State
 from floatframe.system import System
 
 __all__ = [
     "Carry",
     "Failure",
+    "FollowedRotations",
     "Integrator",
     "carry_of",
     "carry_of_past",
@@ -196,6 +199,47 @@ def turned_on(system: System, carry: Carry, h: float) -> Carry:
     memory = memory_of(carry)
     count_angles(model, new_work(model), memory, h)
     return replace(carry, angle=memory.angle, angle_rate=memory.angle_rate)
+
+
+class FollowedRotations:
+    """Counted rotations of bushings along evaluations of a method with steps of its own; the iterate takes them."""
+
+    def __init__(self, model: Model, work: Work, t: float, carry: Carry) -> None:
+        """Begin where a motion stands at time t."""
+        self.angles, self.u0, self.state = model.angles, model.bodies.u0, work.state
+        self.first = np.flatnonzero(model.angles.part == 0)
+        self.begin(t, carry.angle, carry.angle_rate)
+
+    def begin(self, t: float, angle: Array, rate: Array) -> None:
+        """Take rotations at time t, from where to go on."""
+        self.t, self.angle, self.rate = t, angle.copy(), rate.copy()
+        self.state.angle[: len(angle)] = angle
+
+    def has_changed(self, t: float) -> bool:
+        """Take the rotations of the iterate at time t; return whether they are by full turns off those it was with."""
+        changed = False
+        for k in self.first:
+            parts = slice(k, k + 3)
+            holder, other = int(self.angles.holder[k]), int(self.angles.other[k])
+            x, z = (self.in_ground(holder, each) for each in (self.angles.x[k], self.angles.z[k]))
+            A = np.array([x, np.cross(z, x), z])
+            theta = rotation_log(A @ self.in_ground(other, self.angles.y[parts].T))
+            rate = A @ (self.spin(other) - self.spin(holder))
+            expected = self.angle[parts] + 0.5 * (t - self.t) * (self.rate[parts] + rate)
+            was = continued_rotation(theta, self.state.angle[parts])
+            self.angle[parts], self.rate[parts] = continued_rotation(theta, expected), rate
+            self.state.angle[parts] = self.angle[parts]
+            changed = changed or bool(np.abs(self.angle[parts] - was).max() > np.pi)
+        self.t = t
+        return changed
+
+    def in_ground(self, i: int, x: Array) -> Array:
+        """Return directions of body i, -1 for the ground, in ground axes."""
+        return x if i < 0 else np.asarray(self.state.R[i] @ x)
+
+    def spin(self, i: int) -> Array:
+        """Return the angular velocity of body i in ground axes."""
+        return np.zeros(3) if i < 0 else np.asarray(self.state.R[i] @ self.state.u[self.u0[i] + 3 : self.u0[i] + 6])
 
 
 def observed_unless_stopped(system: System, t: float, carry: Carry, work: Work) -> tuple[Array, Rows, Failure | None]:

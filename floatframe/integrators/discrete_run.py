@@ -58,7 +58,8 @@ class DiscreteScheme:
 
         `a` holds the multipliers: of joints zero, of equations of elements those that fulfil them there.
         """
-        consistent = consistent_motion(system, state, t=t, known=None if before is None else before.w)
+        known, angle = (None, None) if before is None else (before.w, before.angle)
+        consistent = consistent_motion(system, state, t=t, known=known, angle=angle)
         held = discrete_system(system, type(self).__name__).held
         known = np.isin(held, compiled_system(system).model.laws.equation)
         f = np.where(known, consistent.w[held], 0.0)

@@ -100,7 +100,8 @@ class GeneralizedAlpha:
 
     def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
         """Return the memory at the beginning: the state made consistent, its accelerations and their rates."""
-        consistent = consistent_motion(system, state, t=t, known=None if before is None else before.w)
+        known, angle = (None, None) if before is None else (before.w, before.angle)
+        consistent = consistent_motion(system, state, t=t, known=known, angle=angle)
         rates = acceleration_rates(compiled_system(system), consistent, t)
         carry = Carry(consistent.state, consistent.u_dot, rates, 0.0, consistent.w, np.zeros(2), np.zeros(2))
         return with_angles(system, t, carry, before)

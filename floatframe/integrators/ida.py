@@ -10,6 +10,7 @@ from floatframe.errors import FloatframeError, ModelError
 from floatframe.integrators.carry import (
     Carry,
     Failure,
+    FollowedRotations,
     observed,
     observed_unless_stopped,
     one_step_of,
@@ -69,7 +70,7 @@ class Ida:
                     "not know; use GeneralizedAlpha"
                 )
         require_no_remembered_contacts(compiled, "Ida")
-        made = consistent_motion(system, state, t=t)
+        made = consistent_motion(system, state, t=t, angle=None if before is None else before.angle)
         carry = Carry(made.state, made.u_dot, np.zeros(0), 0.0, made.w, np.zeros(2), np.zeros(2))
         return with_angles(system, t, carry, before)
 
@@ -91,6 +92,7 @@ class Ida:
         own = new_work(compiled.model)
         t = t0 + h * np.arange(first, first + n_steps + 1)
         made = Motion(compiled, own)
+        made.rotations = FollowedRotations(compiled.model, own, float(t[0]), carry)
         y_0 = flattened(carry.state)
         solver = solver_class()(
             made.residual, rtol=self.rtol, atol=self.atol, max_num_steps=MOST_STEPS, linsolver="dense"
@@ -98,6 +100,7 @@ class Ida:
         asked = t if n_steps > 1 else np.array([t[0], 0.5 * (t[0] + t[1]), t[1]])  # two times ask for every step
         solution = solver.solve(asked, y_0, made.rates(float(t[0]), y_0))
         rows, n_good, failure, has_stopped = [new_rows(compiled.model, 0)], 0, None, False
+        made.rotations = FollowedRotations(compiled.model, own, float(t[0]), carry)
         reached = zip(np.atleast_1d(solution.t), np.atleast_2d(solution.y), strict=True)
         for k, (at, y) in enumerate(list(reached)[len(asked) - n_steps :], start=first + 1):
             if not np.isfinite(y).all() or abs(at - t[k - first]) > 1e-9 * h:  # it may end with where it failed
@@ -106,7 +109,7 @@ class Ida:
             own.counted.no_number[...] = 0  # of a trial beyond
             state = assembled(compiled, own, state_of(compiled, y))
             state = with_compatible_velocities(compiled, own, state)
-            u_dot, w = solve_accelerations(compiled, own, state)
+            u_dot, w = made.accelerations(t[k - first], state)
             after = replace(carry, state=state, u_dot=u_dot, w=w, h=h, n_steps=carry.n_steps + 1)
             after = turned_on(system, after, h)
             power, row, failure = observed_unless_stopped(system, float(t[k - first]), after, work)
@@ -152,16 +155,23 @@ def state_of(compiled: CompiledSystem, y: Array) -> State:
 class Motion:
     """The rates of a system, counted; what goes wrong is kept, since it cannot leave the solver."""
 
+    rotations: FollowedRotations  #: of bushings
+
     def __init__(self, compiled: CompiledSystem, work: Work) -> None:
         self.compiled, self.work = compiled, work
         self.n_evaluations, self.problem = 0, ""
+
+    def accelerations(self, t: float, state: State) -> tuple[Array, Array]:
+        """Return accelerations and wrenches at a state."""
+        found = solve_accelerations(self.compiled, self.work, state)
+        return solve_accelerations(self.compiled, self.work, state) if self.rotations.has_changed(t) else found
 
     def rates(self, t: float, y: Array) -> Array:
         """Return y'."""
         model = self.compiled.model
         state = state_of(self.compiled, y)
         self.work.state.time[...] = t
-        u_dot, _ = solve_accelerations(self.compiled, self.work, state)
+        u_dot, _ = self.accelerations(t, state)
         self.n_evaluations += 1
         starts = model.bodies.u0[:-1]
         r_dot = [state.u[k : k + 3] for k in starts]

@@ -14,6 +14,7 @@ from floatframe.errors import FloatframeError, ModelError
 from floatframe.integrators.carry import (
     Carry,
     Failure,
+    FollowedRotations,
     observed,
     observed_unless_stopped,
     one_by_one,
@@ -81,8 +82,8 @@ class RelativeOde:
                     "use GeneralizedAlpha"
                 )
         require_no_remembered_contacts(compiled, "RelativeOde")
-        known = None if before is None else before.w
-        made = consistent_motion(system, state, t=t, known=known)
+        known, angle = (None, None) if before is None else (before.w, before.angle)
+        made = consistent_motion(system, state, t=t, known=known, angle=angle)
         carry = Carry(made.state, made.u_dot, np.zeros(0), 0.0, made.w, np.zeros(2), np.zeros(2))
         return with_angles(system, t, carry, before)
 
@@ -101,7 +102,7 @@ class RelativeOde:
         """Advance by n_steps output times, the first of them number `first` from t0; see `carry.Integrator`."""
         times: Array = t0 + h * np.arange(first, first + n_steps + 1, dtype=float)
         rows, n_good, failure, has_stopped = [new_rows(compiled_system(system).model, 0)], 0, None, False
-        motion = Motion(system, carry.state, float(times[0]), carry.w)
+        motion = Motion(system, carry, float(times[0]))
         try:
             for t, state, u_dot, w in motion.outputs(self, times):
                 after = replace(carry, state=state, u_dot=u_dot, w=w, h=h, n_steps=carry.n_steps + 1)
@@ -131,7 +132,8 @@ class RelativeOde:
 class Motion:
     """A system along a motion: y = (independent x, independent rates, states, counted coordinates) and its rates."""
 
-    def __init__(self, system: System, state: State, t: float, w: Array) -> None:
+    def __init__(self, system: System, carry: Carry, t: float) -> None:
+        state, w = carry.state, carry.w
         self.compiled: CompiledSystem = compiled_system(system)
         self.parts: SystemTree = tree_of(system)
         self.model, self.tree = self.compiled.model, self.parts.tree
@@ -153,6 +155,7 @@ class Motion:
         self.z_size = np.concatenate([states.size, np.full(len(self.own) - self.n_states, np.inf)])
         self.work.states.kappa[:], self.work.states.rho[...] = 0.0, 1.0
         own_equations = any(each.law.multipliers for each in self.compiled.laws)
+        self.rotations = FollowedRotations(self.model, self.work, t, carry)
         self.is_linear = not (self.n_states or has_normal_friction(self.model) or own_equations)
         self.begin(state, t)
 
@@ -278,6 +281,8 @@ class Motion:
                     f"reactions, friction and multipliers of elements did not settle at t = {t:.9g}: their equations "
                     "have no solution near by, or several; use GeneralizedAlpha"
                 )
+        if self.rotations.has_changed(t):
+            return self.accelerations(t, x, rates)
         self.w = self.work.state.w.copy()
         return found
 
@@ -290,10 +295,12 @@ class Motion:
             own = self.x[self.of_places.independent], self.rates[self.of_rates.independent]
             y, n_own = np.concatenate([*own, self.z]), len(own[0]) + len(own[1])
             atol = np.minimum(method.atol * np.concatenate([np.ones(n_own), self.z_size]), COUNTED)
+            begun = self.t_start, self.rotations.angle.copy(), self.rotations.rate.copy()
             solution = solve_ivp(
                 self.derivative, (self.t_start, times[-1]), y, method=method.method, rtol=method.rtol,
                 atol=atol, t_eval=times[k:], events=self.events(),
             )  # fmt: skip
+            self.rotations.begin(*begun)
             for t, y_at in zip(solution.t, np.transpose(solution.y), strict=True) if len(solution.t) else ():
                 yield (float(t), *self.state_at(float(t), y_at))
                 k += 1

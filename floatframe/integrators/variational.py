@@ -72,10 +72,11 @@ class Variational(DiscreteScheme):
     def one_step(self, ds: DiscreteSystem, placed: list[Placed], span: Span, f: Array) -> StepResult:
         """(1), (2): return the bodies, multipliers and work after a step."""
         scheme = VariationalScheme()
-        begin = Span(span.t_0, span.t_1, span.t_0, span.w)
+        angles = span.angle, span.angle_rate
+        begin = Span(span.t_0, span.t_1, span.t_0, span.w, *angles)
         solution = solve_step(ds, scheme, placed, begin, f, self.tolerance, self.max_iterations)
         given, taken = work_of(ds, scheme, placed, begin, solution)
-        at_end = Span(span.t_0, span.t_1, span.t_1, remembered(ds, placed, span, solution))
+        at_end = Span(span.t_0, span.t_1, span.t_1, remembered(ds, placed, span, solution), *angles)
         after, f_after = closed_velocities(ds, placed, at_end, solution)
         end = Solution(solution.x, f_after, solution.dz, solution.n_iterations)
         given_after, taken_after = work_of(ds, scheme, after, at_end, end)

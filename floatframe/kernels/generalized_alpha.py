@@ -76,6 +76,7 @@ def load_state(state, memory):
     copy(memory.u, state.u)
     copy(memory.u_dot, state.u_dot)
     copy(memory.w, state.w)
+    copy(memory.angle, state.angle)
     for i in range(memory.p.shape[0]):
         for k in range(3):
             state.theta[i, k] = 0.0

@@ -187,6 +187,8 @@ class Bushings(NamedTuple):
     damping: Array = real(n_bushings, 6, 6, unit="N s/m, N s, N m s")
     preload: Array = real(n_bushings, 6, unit="N, N m")
     table: IntArray = integer(n_bushings, 6)  #: force as a function of each deformation, -1 for none
+    share: Array = real(n_bushings)  #: of the rotation of B against A that its axes make: 0 those of A, 1 of B
+    angle: IntArray = integer(n_bushings)  #: first of the three angles that count its turns, -1 where none do
 
 
 class Contacts(NamedTuple):
@@ -333,6 +335,7 @@ class Angles(NamedTuple):
     z: Array = real(n_angles, 3)  #: direction of the holder, from which y turns towards -x
     y: Array = real(n_angles, 3)  #: direction of the other body
     sign: Array = real(n_angles)  #: -1 where the angle is counted the other way
+    part: IntArray = integer(n_angles)  #: -1; 0, 1, 2: of a rotation vector, y then is the axis of this number
 
 
 class Model(NamedTuple):

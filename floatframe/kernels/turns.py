@@ -9,12 +9,16 @@ and omega = omega_o - omega_h, all in ground axes,
 
 and of all th + 2 pi n the one is taken that is nearest to where the mean rate of the step leads from the angle before.
 Bodies are taken undeformed: elasticity adds less than half a turn.
+
+Three angles in a row may be a rotation vector instead, that of A_hᵀ A_o, axes of o as seen in axes x, z × x, z of h: of
+theta + 2 pi n theta/|theta| the one nearest to where the mean of omega, in axes of h, leads.
 """
 
 import math
 
 from floatframe.kernels.compiler.compilation import inner
-from floatframe.kernels.vector import cross, dot, sub, turned, vector
+from floatframe.kernels.connections.bushing import continued, rotation_vector
+from floatframe.kernels.vector import add, cross, dot, put, scaled, sub, transposed, turned, turned_back, vector
 
 __all__ = ["count_turns"]
 
@@ -48,9 +52,31 @@ def angle_and_rate(angles, bodies, state, k):
 
 
 @inner
+def count_rotation(angles, bodies, state, memory, k, h):
+    """Take the rotation vector of which k is the first part into the memory."""
+    holder, other = angles.holder[k], angles.other[k]
+    x, z = in_ground(state, holder, angles.x[k]), in_ground(state, holder, angles.z[k])
+    A = transposed((x, cross(z, x), z))
+    rows = (
+        in_ground(state, other, angles.y[k]),
+        in_ground(state, other, angles.y[k + 1]),
+        in_ground(state, other, angles.y[k + 2]),
+    )
+    rate = turned_back(A, sub(spin(bodies, state, other), spin(bodies, state, holder)))
+    mean = add(vector(memory.angle_rate[k:]), rate)
+    theta = continued(rotation_vector(A, transposed(rows)), add(vector(memory.angle[k:]), scaled(0.5 * h, mean)))
+    put(memory.angle, k, theta)
+    put(memory.angle_rate, k, rate)
+
+
+@inner
 def count_turns(model, work, memory, h):
     """Take the angles of the iterate into the memory, a step of size h after those that are there."""
     for k in range(memory.angle.shape[0]):
+        if model.angles.part[k] == 0:
+            count_rotation(model.angles, model.bodies, work.state, memory, k, h)
+        if model.angles.part[k] >= 0:
+            continue
         angle, rate = angle_and_rate(model.angles, model.bodies, work.state, k)
         sign = model.angles.sign[k]
         angle, rate = sign * angle, sign * rate

@@ -53,6 +53,7 @@ class Iterate(NamedTuple):
     w: Array = real(n_w, unit="N, N m")  #: wrenches of the connections on their markers A
     w_start: Array = real(n_w, unit="N, N m")  #: the same at the beginning of the step
     time: Array = real(unit="s")
+    angle: Array = real(n_angles, unit="rad")  #: those counted, where their rates lead: rotations are next to it
 
 
 class BodyWork(NamedTuple):
@@ -133,14 +134,14 @@ class PairWork(NamedTuple):
 class BushingWork(NamedTuple):
     """One bushing, see kernels/connections/bushing.py; axes of C."""
 
-    C: Array = real(3, 3)  #: middle axes, in ground axes
+    C: Array = real(3, 3)  #: its axes, in ground axes
     xi: Array = real(6, unit="m, rad")  #: e, theta
     xi_dot: Array = real(6, unit="m/s, rad/s")
     force: Array = real(6, unit="N, N m")  #: f, m
     slope: Array = real(6, unit="N/m, N m")  #: of the tables
     v: Array = real(3, unit="m/s")  #: d_dot
     omega: Array = real(3, unit="rad/s")  #: of B less that of A
-    mean: Array = real(3, unit="rad/s")  #: of A and B
+    mean: Array = real(3, unit="rad/s")  #: of A and B, by their shares in the axes
     gamma: Array = real(3, unit="rad/s")  #: angular velocity of C
     p: Array = real(3, unit="N m")  #: f × e
     alpha: Array = real()
@@ -149,6 +150,7 @@ class BushingWork(NamedTuple):
     beta_1: Array = real()  #: beta'/t
     tau: Array = real()
     tau_1: Array = real()  #: tau'/t
+    sigma: Array = real()
     dxi: Array = real(6, unit="m, rad")  #: changes by a variation
     dxi_dot: Array = real(6, unit="m/s, rad/s")
     dforce: Array = real(6, unit="N, N m")

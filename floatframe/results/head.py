@@ -97,6 +97,7 @@ def angles_of(tables: Any, n_bodies: int) -> tuple[CountedAngle, ...]:
     angles = []
     for k, table in enumerate(tables):
         where = f"angles[{k}]"
+        table = {"part": -1} | table  # older files have none
         require(set(table) == set(keys), where, f"an object with {', '.join(keys)}", table)
         for name in ("holder", "other"):
             is_body = type(table[name]) is int and -1 <= table[name] < n_bodies
@@ -105,8 +106,10 @@ def angles_of(tables: Any, n_bodies: int) -> tuple[CountedAngle, ...]:
             is_direction = isinstance(table[name], list) and len(table[name]) == 3 and all(map(is_number, table[name]))
             require(is_direction, f"{where}.{name}", "three numbers", table[name])
         require(table["sign"] in (-1.0, 1.0), f"{where}.sign", "1 or -1", table["sign"])
+        is_part = type(table["part"]) is int and -1 <= table["part"] < 3
+        require(is_part, f"{where}.part", "a whole number from -1 to 2", table["part"])
         x, z, y = (direction(table[name]) for name in ("x", "z", "y"))
-        angles.append(CountedAngle(table["holder"], table["other"], x, z, y, float(table["sign"])))
+        angles.append(CountedAngle(table["holder"], table["other"], x, z, y, float(table["sign"]), table["part"]))
     return tuple(angles)
 
 

@@ -112,13 +112,19 @@ def consistent_motion(
     *,
     t: float = 0.0,
     known: Array | None = None,
+    angle: Array | None = None,
 ) -> ConsistentState:
-    """Return what `consistent_state` returns, in the frames of the engine; the given state is in those of the files."""
+    """Return what `consistent_state` returns, in the frames of the engine; the given state is in those of the files.
+
+    angle: counted angles of a motion before, (n_angles,), whose turned bushings go on.
+    """
     compiled = compiled_system(system)
     given = compiled.placed if state is None else checked(compiled, state)
     known = known_of(compiled, state) if known is None else known
     work = work_from(compiled.model, known)
     work.state.time[...] = t
+    if angle is not None and len(angle):
+        work.state.angle[:] = angle
     state = assembled(compiled, work, given, known)
     require_placed_near(compiled, given, state)
     require_no_half_turns(compiled, work, state)

@@ -21,7 +21,7 @@ from floatframe.forces import (
     SpringDamper,
     UserForce,
 )
-from floatframe.forces.bushing import DEFORMATIONS
+from floatframe.forces.bushing import AXES, DEFORMATIONS
 from floatframe.forces.sphere_contact import DISSIPATIONS
 from floatframe.system_file.coordinate_section import CoordinateSection, marker_of
 from floatframe.system_file.keys import Name, NotNegative, NotNegativeOrSix, NumberOrSix, Positive
@@ -48,7 +48,7 @@ KEYS_OF_FORCES = {
     ),
     "bushing": (
         "body_a", "marker_a", "triad_a", "body_b", "marker_b", "triad_b",
-        "stiffness", "damping", "preload", "characteristics",
+        "stiffness", "damping", "preload", "characteristics", "axes",
     ),
     "sphere-contact": (
         "body_a", "marker_a", "triad_a", "body_b", "marker_b",
@@ -95,6 +95,9 @@ class ForceSection(Table):
     triad_b: Matrix3 | None = Field(None, description="the axes of marker_b, [x axis, y axis, z axis]")
     characteristics: dict[str, MotionSection] | None = Field(
         None, description=f"tables of the force over one deformation, of {', '.join(DEFORMATIONS)}"
+    )
+    axes: choice("axes", lambda: tuple(AXES)) | None = Field(  # type: ignore[valid-type]
+        None, description='in which a bushing acts: those of marker "a" (default) or "b", or "half way" between them'
     )
     radius_a: Positive | None = Field(None, description="a number above 0, the radius of the sphere at marker_a")
     radius_b: Positive | None = Field(None, description="a number above 0, the radius of the sphere at marker_b")
@@ -149,7 +152,7 @@ def bushing_of(name: str, section: ForceSection) -> Bushing:
     given = {"stiffness": section.stiffness, "damping": section.damping, "preload": section.preload}
     options = {key: np.array(value) for key, value in given.items() if value is not None}
     tables = {key: table.function() for key, table in (section.characteristics or {}).items()}
-    return Bushing(name, ends[0], ends[1], characteristics=tables, **options)
+    return Bushing(name, ends[0], ends[1], characteristics=tables, axes=section.axes or "a", **options)
 
 
 def contact_of(name: str, section: ForceSection) -> SphereContact:

@@ -9,7 +9,7 @@ from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.connections.contact import V_0
 from floatframe.kernels.model import CONTACT
 
-__all__ = ["keep", "recall", "remember"]
+__all__ = ["expect_angles", "keep", "recall", "remember"]
 
 
 @inner
@@ -17,6 +17,13 @@ def recall(memory, step):
     """Take what is remembered where the step begins."""
     for k in range(step.known.shape[0]):
         step.known[k] = memory.w[k]
+
+
+@inner
+def expect_angles(memory, step):
+    """Take counted angles to where their rates lead at the time of the forces."""
+    for k in range(memory.angle.shape[0]):
+        step.angle[k] = memory.angle[k] + (step.t_force - step.t_0) * memory.angle_rate[k]
 
 
 @inner

@@ -8,7 +8,7 @@ connections with multipliers or states.
 from typing import NamedTuple
 
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.kernels.model import n_b, n_c, n_lines, n_m, n_stations, n_t, n_w
+from floatframe.kernels.model import n_angles, n_b, n_c, n_lines, n_m, n_stations, n_t, n_w
 from floatframe.kernels.records import Size, integer, real
 from floatframe.kernels.work import n_most, n_q, n_u
 
@@ -143,6 +143,7 @@ class StepWork(NamedTuple):
     way: Array = real(n_m, 6, unit="m, m² rad")  #: along which the potential is made up for
     # connections
     known: Array = real(n_w)  #: what they remember, in its rows of the memory
+    angle: Array = real(n_angles, unit="rad")  #: counted angles where rates lead at t_force: rotations are next to it
     xi: Array = real(6, unit="m, rad")  #: mean deformations of a bushing,
     dxi: Array = real(6, unit="m, rad")  #: their changes,
     xi_force: Array = real(6, unit="N, N m")  #: and the forces that belong to them

@@ -4,7 +4,7 @@ from floatframe.discrete.kernels.bodies import begin_bodies, end_rates, interval
 from floatframe.discrete.kernels.deformed_lines import begin_lines
 from floatframe.discrete.kernels.held_rows import row_change
 from floatframe.discrete.kernels.markers import begin_markers, marker_loads
-from floatframe.discrete.kernels.memory import keep, recall, remember
+from floatframe.discrete.kernels.memory import expect_angles, keep, recall, remember
 from floatframe.discrete.kernels.newton import CONVERGED, NO_ACCELERATION, STOPPED, add_loads, move, solve
 from floatframe.discrete.kernels.observation import observe
 from floatframe.discrete.kernels.records import CONSERVING, DAMPING
@@ -78,6 +78,7 @@ def add_drives(model, discrete, step):
 def begin(model, discrete, step, memory):
     """Write what is known where the step begins."""
     recall(memory, step)
+    expect_angles(memory, step)
     begin_bodies(model, discrete, step, memory)
     begin_markers(model, discrete, step)
     begin_lines(model, step)
@@ -152,6 +153,7 @@ def variational_step(model, work, discrete, step, memory, order):
         put_elastic(model, step, i)
     move_bodies(model, step)
     step.t_force = step.t_1
+    expect_angles(memory, step)
     step.is_closing = 1
     begin_markers(model, discrete, step)
     begin_lines(model, step)

@@ -1,11 +1,13 @@
-"""The sensor of a bushing: its six deformations and their rates, in the axes half way between its markers.
+"""The sensor of a bushing: its six deformations and their rates, in the axes in which it acts.
 
 The formulas are those of the force (`floatframe/kernels/connections/bushing.py`): with A, B the axes of the markers, d
-the distance of their points, theta the rotation vector of A^T B, C half way between them and t = |theta|,
+the distance of their points, theta the rotation vector of A^T B, turns counted, t = |theta|, and C the axes of A turned
+by a share of theta,
 
     e = C^T d,  e' = C^T d' + e × gamma,  theta' = S u,   u = C^T (omega_B - omega_A)
-    gamma = C^T (omega_A + omega_B) / 2 - tau theta × u,  tau = tan(t/4) / (2 t),
-    S = alpha 1 + beta theta theta^T,  alpha = (t/2) / sin(t/2),  beta = (1 - alpha) / t²
+    gamma = C^T ((1 - share) omega_A + share omega_B) - tau theta × u
+    S = alpha 1 + beta theta theta^T + (share - 1/2) tilde(theta),   beta = (1 - alpha) / t²
+    alpha = (t/2) cot(t/2), tau = 0;   half way: alpha = (t/2) / sin(t/2), tau = tan(t/4) / (2 t)
 """
 
 from dataclasses import dataclass
@@ -15,17 +17,18 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.words import nearest, quoted
+from floatframe.compiling.counted_angles import CountedAngle, rotation_of
 from floatframe.compiling.markers import MarkerData
 from floatframe.compiling.pair_forces import bushing_markers
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
 from floatframe.forces import Bushing
-from floatframe.forces.bushing import DEFORMATIONS
+from floatframe.forces.bushing import AXES, DEFORMATIONS
 from floatframe.results.joint_coordinates import end_motion
 from floatframe.results.sensors.linear_columns import scalar_columns
 from floatframe.results.sensors.measurement import Measurement, unit_words
 from floatframe.results.trajectory import Trajectory
-from floatframe.rotations import tilde
+from floatframe.rotations import continued_rotation, tilde
 from floatframe.small_motions.rows import LinearColumns
 from floatframe.small_motions.small_motions import SmallMotions
 from floatframe.system import System
@@ -48,16 +51,20 @@ class BushingSensor:
         """Return deformations and rates over time."""
         from scipy.spatial.transform import Rotation  # late: what moves a system does without scipy.spatial
 
-        a, b = (end_motion(system, trajectory, end) for end in self.ends(system))
+        ends, share = self.ends(system), AXES[self.bushing(system).axes]
+        a, b = (end_motion(system, trajectory, end) for end in ends)
         theta = Rotation.from_matrix(np.swapaxes(a.axes, -1, -2) @ b.axes).as_rotvec()
-        C = a.axes @ Rotation.from_rotvec(theta / 2).as_matrix()
+        if self.bushing(system).counts_turns:
+            theta = counted(trajectory, rotation_of(*ends), theta)
+        C = a.axes @ Rotation.from_rotvec(share * theta).as_matrix()
         e = np.einsum("tba,tb->ta", C, b.position - a.position)
         u = np.einsum("tba,tb->ta", C, b.omega - a.omega)
-        mean = np.einsum("tba,tb->ta", C, (a.omega + b.omega) / 2)
-        alpha, beta, tau = (x[:, None] for x in scalars(np.einsum("ta,ta->t", theta, theta)))
+        mean = np.einsum("tba,tb->ta", C, (1 - share) * a.omega + share * b.omega)
+        alpha, beta, tau = (x[:, None] for x in scalars(np.einsum("ta,ta->t", theta, theta), share))
         gamma = mean - tau * np.cross(theta, u)
         e_rate = np.einsum("tba,tb->ta", C, b.velocity - a.velocity) + np.cross(e, gamma)
         turning = alpha * u + beta * np.einsum("ta,ta->t", theta, u)[:, None] * theta
+        turning = turning + (share - 0.5) * np.cross(theta, u)
         columns = np.hstack([e, theta, e_rate, turning]).T
         return Measurement(self.name, trajectory.t, dict(zip(NAMES, columns, strict=True)), self.units(system))
 
@@ -65,26 +72,31 @@ class BushingSensor:
         """Return de = Cᵀ dd + e × dc and dtheta = S u, rates as theirs."""
         from scipy.spatial.transform import Rotation  # late: what moves a system does without scipy.spatial
 
+        share = AXES[self.bushing(small.system).axes]
         a, b = (small.place(end, self.of) for end in self.ends(small.system))
         theta = Rotation.from_matrix(a.axes.T @ b.axes).as_rotvec()
-        C = a.axes @ Rotation.from_rotvec(theta / 2).as_matrix()
+        C = a.axes @ Rotation.from_rotvec(share * theta).as_matrix()
         e = C.T @ (b.position - a.position)
-        alpha, beta, tau = (float(x[0]) for x in scalars(np.array([theta @ theta])))
+        alpha, beta, tau = (float(x[0]) for x in scalars(np.array([theta @ theta]), share))
         u = (b.turned - a.turned).turned(C.T)
-        dc = (a.turned + b.turned).turned(C.T / 2) - u.turned(tau * tilde(theta))
+        dc = a.turned.turned((1 - share) * C.T) + b.turned.turned(share * C.T) - u.turned(tau * tilde(theta))
         de = (b.moved - a.moved).turned(C.T) + dc.turned(tilde(e))
-        turning = u.turned(alpha * np.eye(3) + beta * np.outer(theta, theta))
+        turning = u.turned(alpha * np.eye(3) + beta * np.outer(theta, theta) + (share - 0.5) * tilde(theta))
         rows = [*(de[k] for k in range(3)), *(turning[k] for k in range(3))]
         rows += [row.rate for row in rows]
         return scalar_columns(dict(zip(NAMES, rows, strict=True)), self.units(small.system))
 
     def ends(self, system: System) -> tuple[MarkerData, MarkerData]:
-        """Return both markers; `ModelError` with the nearest name if there is no such bushing."""
+        """Return both markers."""
+        a, b = bushing_markers(system, self.bushing(system), compiled_system(system).placed)
+        return a, b
+
+    def bushing(self, system: System) -> Bushing:
+        """Return the bushing; `ModelError` with the nearest name if there is none."""
         bushings = {force.name: force for force in system.forces if isinstance(force, Bushing)}
         if self.of not in bushings:
             raise ModelError(f"sensor {self.name!r}: no bushing {quoted(self.of)}{nearest(self.of, list(bushings))}")
-        a, b = bushing_markers(system, bushings[self.of], compiled_system(system).placed)
-        return a, b
+        return bushings[self.of]
 
     def units(self, system: System) -> dict[str, str]:
         """Return the units of the columns."""
@@ -92,10 +104,23 @@ class BushingSensor:
         return {name: unit_words(system.units, kinds[k // 3]) for k, name in enumerate(NAMES)}
 
 
-def scalars(t2: Array) -> tuple[Array, Array, Array]:
+def counted(trajectory: Trajectory, angles: list[CountedAngle], theta: Array) -> Array:
+    """Return rotation vectors with the turns that the run has counted, (n_t, 3); as they are if it has not."""
+    known = list(trajectory.head.angles or ())
+    first = next((k for k, each in enumerate(known) if each.is_same(angles[0])), None)
+    if first is None:
+        return theta
+    return continued_rotation(theta, trajectory.source.read("angle")[:, first : first + 3])
+
+
+def scalars(t2: Array, share: float) -> tuple[Array, Array, Array]:
     """Return alpha, beta, tau of t², (n,) each; series for small ones, to t⁶."""
     near = t2 < SERIES_BELOW
     t = np.sqrt(np.where(near, 1.0, t2))
+    if share != 0.5:
+        alpha = (t / 2) / np.tan(t / 2)
+        low = 1 / 12 + t2 * (1 / 720 + t2 * (1 / 30240 + t2 / 1209600))
+        return np.where(near, 1 - t2 * low, alpha), np.where(near, low, (1 - alpha) / t**2), np.zeros_like(t2)
     alpha = (t / 2) / np.sin(t / 2)
     beta, tau = (1 - alpha) / t**2, np.tan(t / 4) / (2 * t)
     low = -(1 / 24 + t2 * (7 / 5760 + t2 * (31 / 967680 + t2 * 127 / 154828800)))

@@ -126,6 +126,7 @@ TABLE = table_function([-4.0, -1.0, 1.0, 4.0], [-0.2, -0.03, 0.02, 0.1])
 #: what has a potential or holds something: energy is kept
 POTENTIALS: dict[str, Callable[[], System]] = {
     "bushing": lambda: mounted(preload=np.array([0.1, 0.2, 0, 0.05, 0, 0.1])),
+    "bushing half way": lambda: mounted(preload=np.array([0.1, 0.2, 0, 0.05, 0, 0.1]), axes="half way"),
     "constant velocity": constant_velocity,
     "gear": geared,
     "rack": lambda: geared(RACK),
@@ -136,7 +137,9 @@ POTENTIALS: dict[str, Callable[[], System]] = {
 }
 #: what gives or takes energy beside
 FORCED: dict[str, Callable[[], System]] = {
-    "damped bushing": lambda: mounted("spherical", damping=2e-3 * K, characteristics={"x": TABLE, "rz": TABLE}),
+    "damped bushing": lambda: mounted(
+        "spherical", damping=2e-3 * K, characteristics={"x": TABLE, "rz": TABLE}, axes="b"
+    ),
     "driven gear": lambda: geared(constant=harmonic(0.2, 5.0)),
     "damped element": lambda: with_element(Mount("law", *ENDS, 2.0, 2.0, 1.0, 2.0), "revolute"),
     "element with a state": lambda: with_element(Creeping("law", *ENDS, 30.0, 0.2)),

@@ -1,5 +1,7 @@
 """Deformations of bushings: the law of the force from them, their rates as slopes, and small motions."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -36,12 +38,16 @@ def motion():
     return system, integrate(system, GeneralizedAlpha(0.9), 0.5, 5e-4)
 
 
-def test_the_law_of_the_force_follows_from_them(motion):
+@pytest.mark.parametrize(("axes", "share"), [("a", 0.0), ("b", 1.0), ("half way", 0.5)])
+def test_the_law_of_the_force_follows_from_them(motion, axes, share):
     system, run = motion
+    if axes != "a":
+        system = System(system.bodies, [], [replace(system.forces[0], axes=axes)])
+        run = integrate(system, GeneralizedAlpha(0.9), 0.2, 5e-4)
     columns = np.array(list(measured(system, run, [BushingSensor("s", "mount")])["s"].columns.values()))
     assert np.linalg.norm(columns[3:6], axis=0).max() > np.pi / 2
     law = K @ columns[:6] + D @ columns[6:]
-    A = TURN @ Rotation.from_rotvec(columns[3:6].T / 2).as_matrix()
+    A = TURN @ Rotation.from_rotvec(share * columns[3:6].T).as_matrix()
     force = np.einsum("tab,bt->ta", A, law[:3])
     found = run.reaction("mount").force
     assert_allclose(force, found, rtol=0, atol=1e-9 * np.abs(found).max())
@@ -55,18 +61,24 @@ def test_rates_are_slopes(motion):
         assert_allclose(slope, rate, rtol=0, atol=3e-4 * np.abs(rate).max())
 
 
-@pytest.mark.parametrize("is_turning", [False, True])
-def test_small_motions(is_turning):
+@pytest.mark.parametrize(("axes", "is_turning"), [("a", False), ("b", False), ("half way", False), ("half way", True)])
+def test_small_motions(axes, is_turning):
     sensor = [BushingSensor("s", "cage" if is_turning else "mount")]
     if is_turning:
-        system = rotor()
+        system = with_axes(rotor(), axes)
         about = steady_rotation(system, (0, 0, 2.0), tolerance=1e-12)
     else:
-        system = machine()
+        system = with_axes(machine(), axes)
         about = static_equilibrium(system, tolerance=1e-12)
     linear = linearize(system, about, outputs=sensor)
     assert len(linear.outputs) == 12
     compare(system, about, linear, sensor, tolerance=2e-6)
+
+
+def with_axes(system, axes):
+    """Return the system with all bushings in these axes."""
+    forces = [replace(force, axes=axes) if isinstance(force, Bushing) else force for force in system.forces]
+    return replace(system, forces=forces)
 
 
 def test_a_bushing_that_is_not_there(motion):

@@ -4,7 +4,7 @@ from floatframe.discrete.kernels.coordinates import add_pair
 from floatframe.discrete.kernels.markers import add_direction, change, mean_jacobian, relative_cayley
 from floatframe.discrete.kernels.rows import mean_distance
 from floatframe.kernels.compiler.compilation import inner
-from floatframe.kernels.connections.bushing import law, rotation_vector
+from floatframe.kernels.connections.bushing import continued, law, rotation_vector
 from floatframe.kernels.rotation import exp_matrix
 from floatframe.kernels.time_function import time_function
 from floatframe.kernels.vector import (
@@ -66,12 +66,16 @@ def bushing_load(model, discrete, step, c):
     A, B, d = mean_axes(step, a), mean_axes(step, b), mean_distance(step, a, b)
     s_0 = turned_back(step.A_0[a], sub(vector(step.x_0[b]), vector(step.x_0[a])))
     s_1 = turned_back(step.A_f[a], sub(vector(step.x_f[b]), vector(step.x_f[a])))
+    share, angle = model.bushings.share[i], model.bushings.angle[i]
     R_0 = product(transposed(step.A_0[a]), matrix(step.A_0[b]))
     th_0, th_1 = rotation_vector(step.A_0[a], step.A_0[b]), rotation_vector(step.A_f[a], step.A_f[b])
-    half_0, half_1 = scaled(-0.5, th_0), scaled(-0.5, th_1)
-    Gamma, half = mean_jacobian(th_0, th_1), mean_jacobian(half_0, half_1)
+    if angle >= 0:
+        expected = vector(step.angle[angle:])
+        th_0, th_1 = continued(th_0, expected), continued(th_1, expected)
+    part_0, part_1 = scaled(-share, th_0), scaled(-share, th_1)
+    Gamma, part = mean_jacobian(th_0, th_1), mean_jacobian(part_0, part_1)
     P = matrix_sum(R_0, product(tilde(scaled(0.5, relative_cayley(th_0, th_1))), R_0))
-    Q_0, Q_1 = exp_matrix(half_0), exp_matrix(half_1)
+    Q_0, Q_1 = exp_matrix(part_0), exp_matrix(part_1)
     Q = scaled_matrix(0.5, matrix_sum(Q_0, Q_1))
     arm = turned(Q, scaled(0.5, add(s_0, s_1)))
     # the change of the deformations by the motion over the step
@@ -79,7 +83,7 @@ def bushing_load(model, discrete, step, c):
     turning = matrix_sum(product(transposed(dA), B), product(transposed(A), dB))
     dtheta = solved(Gamma, axial(product(turning, transposed(P))))
     ds = add(turned_back(dA, d), turned_back(A, sub(vector(step.dx[b]), vector(step.dx[a]))))
-    put(step.dxi, 0, add(turned(Q, ds), cross(scaled(-0.5, turned(half, dtheta)), arm)))
+    put(step.dxi, 0, add(turned(Q, ds), cross(scaled(-share, turned(part, dtheta)), arm)))
     put(step.dxi, 3, dtheta)
     put(step.xi, 0, scaled(0.5, add(turned(Q_0, s_0), turned(Q_1, s_1))))
     put(step.xi, 3, scaled(0.5, add(th_0, th_1)))
@@ -94,7 +98,7 @@ def bushing_load(model, discrete, step, c):
             step.xi_force[r] += value
             given -= value * step.dxi[r]
     f = vector(step.xi_force)
-    m = sub(vector(step.xi_force[3:]), scaled(0.5, turned_back(half, cross(arm, f))))
+    m = sub(vector(step.xi_force[3:]), scaled(share, turned_back(part, cross(arm, f))))
     tau = solved(transposed(Gamma), m)
     G, g = product(tilde(scaled(-0.5, tau)), P), scaled(-1.0, turned_back(Q, f))
     on_A, on_B = transposed(product(B, transposed(G))), transposed(product(A, G))
