@@ -94,6 +94,14 @@ def test_contents_change_by_what_supplies_bring_alone():
     assert_allclose(rate, flow, rtol=1e-11, atol=0)
 
 
+def test_pressures_along_a_pipe_begin_on_the_line_between_those_of_its_ends():
+    law = every_component().law(placed(motion()))
+    start = dict(zip(law.states, law.start, strict=True))
+    supply = 1e7 + 1e6 * np.sin(0.2)
+    found = [start["pressure pipe 1"], start["pressure pipe 2"], start["flow pipe 3"]]
+    assert_allclose(found, [supply + (9e6 - supply) / 3, supply + (9e6 - supply) * 2 / 3, 1e-4], rtol=1e-14)
+
+
 def test_wrenches_of_a_circuit_balance():
     law = every_component().law(placed(motion()))
     x = motion()
