@@ -6,6 +6,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.elements import ElementLaw, Placed
+from floatframe.elements.unit_names import in_units
 from floatframe.errors import ModelError
 from floatframe.wheels.contact import COMMON, RADIUS, ROAD
 from floatframe.wheels.outputs import OUTPUTS
@@ -72,10 +73,10 @@ def tyre_law(
         acts=("none" if placed.on_ground[0] else "wrench", "wrench"),
         states=states,
         start=(0.0,) * len(states),
-        state_units=("m",) * len(states),
+        state_units=in_units(placed.units, ["m"] * len(states)),
         state_sizes=(TREAD * float(data[RADIUS]),) * len(states),
         outputs=tuple(OUTPUTS),
-        output_units=tuple(OUTPUTS.values()),
+        output_units=in_units(placed.units, list(OUTPUTS.values())),
         energy="energy",
         power_lost="power_lost",
         stops={} if data[int(data[ROAD])] == FLAT else {"off_road": "the wheel is beyond the end of its road"},

@@ -111,6 +111,13 @@ def test_the_file_is_what_python_says(file, folder, amplitude):
     assert (made.result.damage[made.result.worst(3)] == np.sort(made.result.damage)[::-1][:3]).all()
 
 
+def test_numbers_that_a_file_does_not_give_are_those_of_python(file):
+    """Of the page: Findley's k 0.3, 18 angles; in the file and in Python alike."""
+    changed(file, "[criterion]", '[criterion]\nname = "findley"')
+    section, plain = read_fatigue(file).criterion, Criterion("findley")
+    assert (section.findley_k, section.planes) == (plain.findley_k, plain.n_planes) == (0.3, 18)
+
+
 @pytest.mark.parametrize("unit", ["Pa", "psi", "ksi", "N/mm^2", "GPa"])
 def test_the_unit_of_the_curve_does_not_change_the_damage(file, amplitude, unit):
     before = assess(read_fatigue(file)).result.damage

@@ -1,5 +1,7 @@
 """Coordinate couplers: gears, racks, differentials."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -29,6 +31,7 @@ from floatframe import (
 from floatframe.compiling.system import compiled_system
 from floatframe.functions.time_functions import harmonic, polynomial_of_time
 from floatframe.results.coordinate_elements import coupler_motion
+from floatframe.start.initial import consistent_motion
 from tests.floatframe.finite_differences import assert_tangent_is_exact
 from tests.floatframe.joints.test_every_joint import AXIS
 from tests.floatframe.kernels.test_tangent import turned_triad
@@ -152,6 +155,23 @@ def test_work_of_a_coupler_that_moves_stands_in_the_balance():
     motion = integrate(System(system.bodies, [*system.joints, gear], system.forces), METHOD, 1.0, 1e-3)
     balance = motion.energies.balance
     assert np.abs(balance - balance[0]).max() < 1e-5 * motion.energies.kinetic.max()
+
+
+@pytest.mark.parametrize("rate", [0.0, 0.6])
+def test_a_coupler_whose_constant_moves_starts_with_the_force_of_its_acceleration(rate):
+    """phi_a + r phi_b = c(t): J_a phi_a'' = T + lam, J_b phi_b'' = r lam, so that lam = (c'' - T/J_a)/(1/J_a + r²/J_b)."""
+    r, T, J_a, J_b = -0.5, 0.7, 0.7, 0.3
+    c = polynomial_of_time([0.0, rate, 0.4, 0.3])
+    system = wheels(r, torque=T)
+    bodies = [replace(system.bodies[0], omega_B=(0, 0, rate)), system.bodies[1]]
+    gear = CoordinateCoupler("gear", system.couplers[0].terms, c)
+    system = System(bodies, [*system.joints, gear], system.forces)
+    motion = integrate(system, METHOD, 4e-3, 1e-3)
+    lam = (c(0.0, 2) - T / J_a) / (1 / J_a + r**2 / J_b)
+    assert_allclose(coupler_motion(system, motion, "gear").force[0], [lam, r * lam], rtol=1e-9)
+    start = consistent_motion(system)
+    found = start.u_dot[[5, 11]]
+    assert_allclose(found, [(T + lam) / J_a, r * lam / J_b], rtol=1e-9)
 
 
 def test_a_coupler_that_repeats_joints_is_named():

@@ -211,6 +211,25 @@ def test_a_pendulum_has_the_torque_and_the_reaction_of_the_textbook():
     assert model.names == model.rate_names == ("hinge/angle",)
 
 
+@pytest.mark.parametrize("is_reversed", [False, True])
+def test_a_block_that_slides_on_a_turning_carrier_has_the_force_of_coriolis(is_reversed):
+    """m (a + 2 ω × v + α × (p + r) + ω × (ω × (p + r))), axes of the carrier; the joint may be told from either end."""
+    axis, p, m = np.array([0.36, -0.48, 0.8]), np.array([0.3, -0.2, 0.5]), 1.7
+    carrier = ff.RigidBody("carrier", 3.0, np.diag([0.4, 0.5, 0.6]))
+    block = ff.RigidBody("block", m, np.diag([0.1, 0.2, 0.25]), position=p)
+    ends = ff.Marker("carrier", position=p), ff.Marker("block")
+    slide = ff.ConstantOrientation("slide", *(ends[::-1] if is_reversed else ends))
+    hinge = ff.RevoluteJoint("hinge", ff.GROUND, ff.Marker("carrier"), axis=axis)
+    model = ff.relative_model(ff.System([carrier, block], [hinge, slide]))
+    assert [name.partition("/")[0] for name in model.names] == ["hinge", "slide", "slide", "slide"]
+    (angle, w, acceleration), sign = (0.4, 2.3, -1.1), -1 if is_reversed else 1
+    r, v, a = np.array([0.2, 0.1, -0.3]), np.array([0.5, -0.8, 0.7]), np.array([1.5, 0.3, -0.4])
+    forces = model.inverse_dynamics([angle, *sign * r], [w, *sign * v], [acceleration, *sign * a])
+    omega, alpha, arm = w * axis, acceleration * axis, p + r
+    wanted = a + 2 * np.cross(omega, v) + np.cross(alpha, arm) + np.cross(omega, np.cross(omega, arm))
+    assert_allclose(forces[1:], sign * m * wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())
+
+
 def test_reactions_balance_the_wrenches_of_a_chain_at_rest():
     """Held still, the joint at the base carries the weight of all bodies and a load at the tip."""
     links = random_tree(5, np.random.default_rng(7), kinds=("revolute", "universal"), branching=0.0)

@@ -9,9 +9,11 @@ from numpy.testing import assert_allclose
 from fe_models.foundation.units import unit_system
 from floatframe import wheels
 from floatframe.errors import ModelError
+from floatframe.signals.signal_units import unit_factor
 from floatframe.wheels import magic_formula
 from floatframe.wheels.coefficients import COEFFICIENTS, ONLY_52, ONLY_61, SCALES
 from floatframe.wheels.magic_formula import SIDE, SIGN, forces_and_moments
+from floatframe.wheels.outputs import OUTPUTS
 from tests.floatframe.wheels.magic_formula_oracle import version_52, version_61
 from tests.floatframe.wheels.rig import ROAD, WHEEL, answer, motion, placed, turn
 
@@ -220,6 +222,35 @@ def test_the_same_tyre_in_millimetres(tyres):
     seen = answer(in_mm, motion(300.0, v=(20e3, 1e3, 0), omega=(0, 66, 0)), [10.0, 20.0])[0]
     for key, factor in (("Fx", 1), ("Fy", 1), ("Fz", 1), ("Mx", 1e3), ("My", 1e3), ("Mz", 1e3), ("energy", 1e3)):
         assert_allclose(seen[key], factor * si[key], rtol=1e-9, err_msg=key)
+
+
+@pytest.mark.parametrize("name", ["mm-t-s", "mm-kg-ms", "in-slinch-s"])
+@pytest.mark.parametrize("version", [52, 61])
+def test_the_file_is_converted_into_units_of_the_system(tyres, version, name):
+    """Sinking, leaning, near a standstill: damping and the low speed count; outputs are in the units they say."""
+    units = unit_system(name)
+    m, s, kg = 1 / units.length, 1 / units.time, 1 / units.mass
+    lean = turn(0, 0.1)
+
+    def seen_and_rates(m, s, units):
+        own = {"settling_time": 0.02 * s} | ({"pressure": 2.4e5 * kg / m / s**2} if version == 61 and m != 1 else {})
+        own |= {"pressure": 2.4e5} if version == 61 and m == 1 else {}
+        law = element(tyres[version], **own).law(placed(HEIGHT * m, lean, units))
+        x = motion(HEIGHT * m, v=(0.6 * m / s, 0.1 * m / s, -0.3 * m / s), omega=(0, 1.4 / s, 0.2 / s), A=lean)
+        seen, _, rates = answer(law, x, [0.01 * m, 0.02 * m])
+        return seen, rates, law
+
+    si, rates_si, _ = seen_and_rates(1.0, 1.0, unit_system("m-kg-s"))
+    seen, rates, law = seen_and_rates(m, s, units)
+    assert si["Fz"] > 3000
+    dimension = {"N": kg * m / s**2, "N m": kg * m**2 / s**2, "J": kg * m**2 / s**2, "W": kg * m**2 / s**3, "m": m,
+                 "m/s": m / s, "rad": 1.0, "1": 1.0}  # fmt: skip
+    for (key, unit), stated in zip(OUTPUTS.items(), law.output_units, strict=True):
+        if key not in ("road_left", "off_road"):  # a flat road has no end
+            assert_allclose(seen[key], dimension[unit] * si[key], rtol=1e-9, atol=1e-12, err_msg=key)
+            expected = unit_factor(unit, stated) if unit not in ("rad", "1") else 1.0
+            assert_allclose(dimension[unit], expected, rtol=1e-9, err_msg=key)
+    assert_allclose(rates, rates_si * m / s, rtol=1e-9)
 
 
 @pytest.mark.parametrize(
