@@ -159,7 +159,7 @@ def test_work_of_a_coupler_that_moves_stands_in_the_balance():
 
 @pytest.mark.parametrize("rate", [0.0, 0.6])
 def test_a_coupler_whose_constant_moves_starts_with_the_force_of_its_acceleration(rate):
-    """phi_a + r phi_b = c(t): J_a phi_a'' = T + lam, J_b phi_b'' = r lam, so that lam = (c'' - T/J_a)/(1/J_a + r²/J_b)."""
+    """phi_a + r phi_b = c(t), J_a phi_a'' = T + lam, J_b phi_b'' = r lam: lam = (c'' - T/J_a)/(1/J_a + r²/J_b)."""
     r, T, J_a, J_b = -0.5, 0.7, 0.7, 0.3
     c = polynomial_of_time([0.0, rate, 0.4, 0.3])
     system = wheels(r, torque=T)
