@@ -47,6 +47,14 @@ def run_command(
         str | None,
         typer.Option("--formulation", help="absolute or relative (joint) coordinates; default: as in [run]."),
     ] = None,
+    watch: Annotated[
+        str | None,
+        typer.Option(
+            "--watch",
+            help="stop, tell or off: what a run does whose steps put its motion off or add energy to it; default: as "
+            "in [run], else stop.",
+        ),
+    ] = None,
 ) -> None:
     """Compute the motion of a system.
 
@@ -78,7 +86,7 @@ def run_command(
             if model.fmus
             else integrate(
                 model, integrator, options.t_end, options.h, output=path, output_every=options.output_every,
-                progress=on_progress,
+                progress=on_progress, watch=options.watch if watch is None else watch,
             )
         ),
     )  # fmt: skip
@@ -187,15 +195,20 @@ def print_run(trajectory: "Trajectory") -> None:
         ("", "start>", "end>"),
         [(name, *(f"{v:.6g}" for v in pair)) for name, pair in record["energy"].items() if pair and any(pair)],
     )
-    if trajectory.validity:
-        print_table(
-            "Bodies that left the range of their linear frame",
-            ("body", "what", "limit>", "largest>", f"from [{second}]>", "what to do"),
-            [
-                (note.body, note.kind, f"{note.limit:g}", f"{note.largest:.3g}", f"{note.t_first:.6g}", note.action)
-                for note in trajectory.validity
-            ],
-        )
+    for title, is_of_a_frame in (
+        ("What the run says of its steps", False),
+        ("Bodies that left the range of their linear frame", True),
+    ):
+        notes = [note for note in trajectory.validity if note.is_of_a_frame == is_of_a_frame]
+        if notes:
+            print_table(
+                title,
+                ("body", "what", "limit>", "largest>", f"from [{second}]>", "what to do"),
+                [
+                    (note.body, note.kind, f"{note.limit:g}", f"{note.largest:.3g}", f"{note.t_first:.6g}", note.action)
+                    for note in notes
+                ],
+            )
     if record["drift"]:
         print_table(
             "Joints: largest drift",
@@ -256,6 +269,7 @@ def integrator_words(run: dict[str, Any]) -> str:
         "gravity",
         "system_file",
         "system_file_digest",
+        "watch",
     }
     options = ", ".join(f"{key} = {value}" for key, value in run.items() if key not in known and value is not None)
     return f"{run.get('integrator', '')} ({options})"

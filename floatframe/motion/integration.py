@@ -14,6 +14,7 @@ import numpy as np
 
 from fe_models.foundation.digest import file_digest
 from fe_models.foundation.tasks.interrupts import heeded_interrupts
+from fe_models.foundation.words import nearest
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.checked_values import number
 from floatframe.compiling.callbacks import raise_errors_of
@@ -30,6 +31,7 @@ from floatframe.motion.jumps import jumps_of_steps, over_jumps
 from floatframe.motion.knots import knot_words
 from floatframe.motion.restart import RESTART_STEPS, carry_of_record, restart_record, system_digest
 from floatframe.motion.step_advice import step_advice
+from floatframe.motion.step_watch import WATCHES, EnergyWatch, StepWatch, has_steps_of_one_size
 from floatframe.motion.validity_watch import ValidityWatch
 from floatframe.results.head import BodyEntry, Head
 from floatframe.results.results_file import MemorySource, validity_text
@@ -64,7 +66,7 @@ class Progress:
     n_steps: int  #: done
     n_total: int
     n_iterations: int  #: of Newton's method, so far
-    notes: tuple[ValidityNote, ...] = ()  #: bodies that left the range of their linear frame, so far
+    notes: tuple[ValidityNote, ...] = ()  #: of the run about itself, so far
     n_rejected: int = 0  #: steps that were tried in vain, so far
 
 
@@ -81,6 +83,7 @@ def integrate(
     batch_steps: int = BATCH_STEPS,
     progress: Callable[[Progress], None] | None = None,
     formulation: str | None = None,
+    watch: str = "stop",
 ) -> Trajectory:
     """Compute a motion from t_start to t_end.
 
@@ -110,6 +113,10 @@ def integrate(
     formulation
         "absolute", or "relative": in the coordinates of joints (docs/relative.md), with results of the same form; None:
         that of the integrator.
+    watch
+        Where the steps put the motion off by more than 5 %, or add as much energy, the motion says so (`validity`) and
+        the log too. "stop": a run ends where half of its energy comes from its steps; "tell": it goes on; "off":
+        neither is looked for.
 
     Returns
     -------
@@ -121,10 +128,14 @@ def integrate(
     ModelError
         If an argument or the system is impossible.
     ConvergenceError
-        If a step fails; it carries the trajectory so far.
+        If a step fails, or half of the energy comes from the steps; it carries the trajectory so far.
     ResultsError
         If the results cannot be written.
     """
+    if watch not in WATCHES:
+        raise ModelError(
+            f"integrate: watch: expected one of {', '.join(WATCHES)}, got {watch!r}{nearest(watch, WATCHES)}"
+        )
     t_start, t_end = number("integrate: t_start", t_start), number("integrate: t_end", t_end)
     h = number("integrate: h", h, above=0.0)
     integrator = in_formulation(integrator, formulation)
@@ -145,21 +156,23 @@ def integrate(
     for words in knot_words(system, t_start, step, n_total):
         log.warning("system %r: %s", system.name, words)
     head = head_of(system, integrator, t_start, t_end, step, output_every)
-    head = replace(head, angles=compiled_system(system).angles)
-    watch = EventWatch(system, head) if has_events(system) else None
+    head = replace(head, angles=compiled_system(system).angles, run=head.run | {"watch": watch})
+    events = EventWatch(system, head) if has_events(system) else None
     require_times_of_events(system, t_start)
-    begun = system if watch is None else watch.system
+    begun = system if events is None else events.system
     with ExitStack() as held:  # the place of the results, from before the work until its end
         place = None if output is None else held.enter_context(ResultsPlace(output, inputs=system.files))
         carry = integrator.start(begun, t_start, state)
         work = new_work(compiled_system(begun).model)
         carry, rows = integrator.observe(begun, t_start, carry, work)
         require_sensors(system, head, rows)
-        if watch is not None:
-            watch.begin(rows)
+        if events is not None:
+            events.begin(rows)
         writer = None if place is None else ResultsWriter(place, head)
-        run = Run(system, integrator, head, t_start, t_end, step, n_total, output_every, writer, events=watch)
+        run = Run(system, integrator, head, t_start, t_end, step, n_total, output_every, writer, events=events)
         run.words_of_start = lambda: words_of_begun_drives(begun, t_start, state, step)
+        run.steps.begin(carry.state)
+        run.energy.observe(system, rows, is_switched=False)
         run.keep(rows)
         run.close_segment(run.record(carry, 0))
         raise_if_interrupted = held.enter_context(heeded_interrupts())
@@ -245,6 +258,8 @@ def resume(
             seconds_before=float(record.get("seconds", 0.0)),
             events=watch,
         )  # fmt: skip
+        again.steps.restore(record, again.notes)
+        again.energy.restore(record, again.notes)
         with heeded_interrupts() as raise_if_interrupted:
             return again.advance(carry, n_done, BATCH_STEPS, progress, raise_if_interrupted)
 
@@ -277,7 +292,8 @@ class Run:
     def record(self, carry: Carry, n_done: int) -> dict[str, np.ndarray]:
         """Return what is needed to go on from here."""
         events = {} if self.events is None else self.events.record()
-        return restart_record(carry, n_done) | {"seconds": np.array(self.seconds)} | events
+        watches = self.steps.record() | self.energy.record()
+        return restart_record(carry, n_done) | {"seconds": np.array(self.seconds)} | events | watches
 
     def record_where_due(self, carry: Carry, n_done: int) -> dict[str, np.ndarray] | None:
         """Return what is needed to go on from here, None where a run does not go on."""
@@ -295,6 +311,9 @@ class Run:
 
     def __post_init__(self) -> None:
         self.watch = ValidityWatch(self.system, self.notes)
+        self.watching = str(self.head.run.get("watch", "off"))
+        self.steps = StepWatch(self.integrator, is_on=self.watching != "off" and has_steps_of_one_size(self.integrator))
+        self.energy = EnergyWatch(self.output_every)
         self.closed = self.looked = time.monotonic()  # when the last segment was, and rows were looked at
         self.waiting: list[Rows] = []
 
@@ -328,6 +347,14 @@ class Run:
             self.writer.validity = notes_to_json(self.watch.notes)
             self.writer.append(told)
 
+    def tell(self, note: ValidityNote | None) -> None:
+        """Keep what the watches of steps and energy have found; log a note that is new."""
+        for found in (self.steps.note, self.energy.note):
+            if found is not None:
+                self.watch.found[found.body, found.kind] = found
+        if note is not None:
+            log.warning("system %r: %s", self.system.name, note.words)
+
     def close_segment(self, record: dict[str, np.ndarray] | None = None) -> None:
         """Close a segment of the results, if they go to a file, with a record to go on from."""
         self.look()
@@ -351,16 +378,19 @@ class Run:
         if self.events is not None:
             self.events.begin(row)
         jumps = jumps_of_steps(self.system, self.t_start, self.h, self.n_total)
-        failure, has_stopped = None, False
+        failure, has_stopped, is_beyond, n_told = None, False, False, n_done
         safe = self.record_where_due(carry, n_done)  # while a block runs its events are ahead of its memory
         try:
-            while n_done < self.n_total and failure is None and not has_stopped:
+            while n_done < self.n_total and failure is None and not has_stopped and not is_beyond:
                 raise_if_interrupted()
                 if n_done % RESTART_STEPS == 0:
                     work.solver.c_k[...] = 0.0  # factors are made anew, as after a resumption
                     if n_done and time.monotonic() - self.closed > SEGMENT_SECONDS:
                         self.close_segment(self.record(carry, n_done))
-                n_batch = min(batch_steps, self.n_total - n_done, RESTART_STEPS - n_done % RESTART_STEPS)
+                is_window = self.steps.is_window(n_done)
+                n_batch = self.steps.room(n_done, batch_steps)
+                n_batch = min(n_batch, self.n_total - n_done, RESTART_STEPS - n_done % RESTART_STEPS)
+                begin, n_happened = carry, self.n_happened
                 n_smooth = min((k - n_done for k in jumps if k >= n_done), default=n_batch)
                 if n_smooth == 0:
                     acting = self.system if self.events is None else self.events.system
@@ -386,18 +416,33 @@ class Run:
                 if self.events is not None:
                     rows = in_order([*self.events.taken(), rows])
                 self.keep(rows)
+                is_switched = self.n_happened > n_happened
+                if self.watching != "off":
+                    self.tell(self.energy.observe(self.system, rows, is_switched=is_switched))
+                    is_beyond = self.energy.is_beyond and self.watching == "stop"
+                if is_window and n_smooth and n_good and failure is None and not is_switched:
+                    acting = self.system if self.events is None else self.events.system
+                    span = {"t0": self.t_start, "h": self.h, "first": n_done, "n_steps": n_good}
+                    self.tell(self.steps.take(acting, begin, carry, **span))
+                elif self.steps.opened:
+                    self.steps.opened = []
                 n_done += n_good
                 safe = self.record_where_due(carry, n_done)
-                if n_done == self.n_total or failure is not None or has_stopped:
+                if n_done == self.n_total or failure is not None or has_stopped or is_beyond:
+                    self.tell(self.steps.conclude(self.system, n_done, self.t_start + n_done * self.h, self.h))
                     self.look()
-                if progress is not None:
-                    t = self.t_start + n_done * self.h
+                is_batch = n_done % RESTART_STEPS == 0 or n_done - n_told >= batch_steps or n_done == self.n_total
+                if progress is not None and (is_batch or not n_good or self.events is not None):
+                    t, n_told = self.t_start + n_done * self.h, n_done
                     counts = carry.n_iterations, self.watch.notes, carry.n_rejected
                     progress(Progress(t, self.t_end, n_done, self.n_total, *counts))
         except BaseException:
             self.close_segment(safe)
             raise
         raise_errors_of(compiled_system(self.system).callbacks)
+        if is_beyond and failure is None:
+            assert self.energy.note is not None
+            raise energetic(self, self.t_start + n_done * self.h)
         if failure is not None:
             begins = self.words_of_start() if n_done < FIRST_STEPS else ""
             if begins:
@@ -414,6 +459,11 @@ class Run:
                 carry.state,
             )
         return self.finished(carry)
+
+    @property
+    def n_happened(self) -> int:
+        """How many events have happened."""
+        return 0 if self.events is None else len(self.events.happened)
 
     def close_segment_when_due(self) -> None:
         """Close a segment of the results without a record to go on from, when the last one is old enough."""
@@ -451,6 +501,17 @@ def stopped(system, head, kept, writer, failure, t: float, h: float, notes, stat
     words += f"; {lost}" if lost else ""
     trajectory, where = motion_so_far(system, head, kept, writer, notes)
     return ConvergenceError(words + where, t=t, h=h, residual=failure.residual, trajectory=trajectory)
+
+
+def energetic(run: Run, t: float) -> ConvergenceError:
+    """Return the error of a run that ends because its energy comes from its steps, with the motion so far."""
+    assert run.energy.note is not None
+    words = (
+        f"system {run.system.name!r}: stopped at t = {t:.9g} with steps of {run.h:g}: {run.energy.note.words}; "
+        'watch = "tell" goes on in spite of it'
+    )
+    trajectory, where = motion_so_far(run.system, run.head, run.kept, run.writer, run.watch.notes)
+    return ConvergenceError(words + where, t=t, h=run.h, residual=float("inf"), trajectory=trajectory)
 
 
 def motion_so_far(

@@ -39,7 +39,7 @@ FORMAT = "floatframe-results"
 VERSION = 2  #: of the format; 1 had neither seal nor checksums
 KIND = Kind("results-file", VERSION, ResultsError, "`floatframe run` or `integrate`")
 SEGMENTS = ".segments"  #: added to the name of the results file
-VALIDITY = "validity"  #: attribute with the notes on the range of the linear frames
+VALIDITY = "validity"  #: attribute with the notes of a run about itself
 ROWS_CHECKED = 1000  #: at once
 RESTART = "restart"  #: group in a segment with the memory of the integrator at its end
 
@@ -223,7 +223,7 @@ def open_results(path: str | os.PathLike[str]) -> tuple[Head, FileSource, bool]:
 
 
 def validity_text(path: Path) -> str:
-    """Return the notes on the range of the linear frames in a results file, or in its last segment, as text."""
+    """Return the notes of a run about itself in a results file, or in its last segment, as text."""
     paths = [path] if path.is_file() else segment_paths(path if path.is_dir() else segments_folder(path))
     if not paths:
         return "[]"

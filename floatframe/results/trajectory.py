@@ -89,7 +89,7 @@ class Trajectory:
     source: ArraySource
     is_complete: bool  #: False for a run that was interrupted
     path: Path | None = None  #: results file, or None for a motion in memory
-    validity: tuple[ValidityNote, ...] = ()  #: bodies that left the range of their linear frame
+    validity: tuple[ValidityNote, ...] = ()  #: what the run says about itself: see `ValidityNote`
 
     @cached_property
     def t(self) -> Array:

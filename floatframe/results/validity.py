@@ -1,4 +1,4 @@
-"""Notes that a body has left the range of its linear frame: what is too large, and what to do."""
+"""Notes of a run about itself: bodies beyond the range of their linear frame, steps that err, energy from nothing."""
 
 import json
 from collections.abc import Iterable
@@ -7,26 +7,49 @@ from typing import Any
 
 __all__ = ["ValidityNote", "notes_from_json", "notes_to_json"]
 
-KINDS = ("rotation", "load", "speed", "inertia")
+OF_FRAMES = ("rotation", "load", "speed", "inertia")  #: kinds of notes about the linear frame of a body
+KINDS = (*OF_FRAMES, "steps", "energy")
 
 
 @dataclass(frozen=True)
 class ValidityNote:
-    """A body has left the range of its linear frame; one per body and kind."""
+    """What a run says about itself: a limit that is passed, and what to do.
+
+    One per body and kind where a body has left the range of its linear frame ("rotation", "load", "speed" or
+    "inertia", the field of `cms.reduced_body.linear_range.Limits`); one for the steps of the run ("steps": their
+    estimated error over the way of the motion) and one for its energy ("energy": what the steps have added, over what
+    moves about), with the body that is most concerned.
+    """
 
     body: str
-    kind: str  #: "rotation", "load", "speed" or "inertia", the field of `cms.reduced_body.linear_range.Limits`
+    kind: str  #: "rotation", "load", "speed", "inertia", "steps" or "energy"
     limit: float
     largest: float  #: so far; rotation in rad, else a ratio
     t_first: float  #: when the limit was passed [s]
     t_largest: float  #: [s]
-    is_stiffened: bool
-    has_matrices: bool  #: whether the reduced body holds geometric stiffness
+    is_stiffened: bool = False
+    has_matrices: bool = False  #: whether the reduced body holds geometric stiffness
     in_mean_axes: float = -1.0  #: the same rotation against mean axes, where the body has another frame; -1: not known
+    advice: str = ""  #: what to do about steps or energy
+
+    @property
+    def is_of_a_frame(self) -> bool:
+        """Whether it is about the linear frame of a body, which shorter steps do not change."""
+        return self.kind in OF_FRAMES
 
     @property
     def what(self) -> str:
         """Say what is too large."""
+        if self.kind == "steps":
+            return (
+                f"the steps put it off by about {100 * self.largest:.2g} % of the motion (limit {100 * self.limit:g} "
+                "%), as some of them taken again in halves tell"
+            )
+        if self.kind == "energy":
+            return (
+                f"{100 * self.largest:.2g} % of the energy in the motion comes from the steps, not from forces (limit "
+                f"{100 * self.limit:g} %)"
+            )
         if self.kind == "rotation":
             return f"an interface turns by {self.largest:.3g} rad against the body frame (limit {self.limit:g})"
         if self.kind == "inertia":
@@ -47,6 +70,8 @@ class ValidityNote:
     @property
     def action(self) -> str:
         """Say what to do."""
+        if not self.is_of_a_frame:
+            return self.advice
         if self.kind == "inertia":
             return "import it with its full mass matrix, nodal masses, or mesh and density beside (cms import)"
         if self.kind == "rotation" and 0 <= self.in_mean_axes < self.largest:
@@ -69,6 +94,8 @@ class ValidityNote:
     @property
     def words(self) -> str:
         """Say it in one sentence, in the units of the system."""
+        if not self.is_of_a_frame:
+            return f"body {self.body!r}, t = {self.t_first:.6g}: {self.what}; {self.action}"
         return (
             f"body {self.body!r} left the range of its {'stiffened' if self.is_stiffened else 'linear'} frame at t = "
             f"{self.t_first:.6g}: {self.what}; {self.action}"
@@ -93,6 +120,7 @@ def notes_from_json(text: str) -> tuple[ValidityNote, ...]:
         notes = json.loads(text)
         for note in notes:
             note.setdefault("in_mean_axes", -1.0)  # of older files
+            note.setdefault("advice", "")
             if set(note) != set(kinds) or note["kind"] not in KINDS:
                 raise ValueError
             if any(not isinstance(value, float | int if kinds[name] is float else kinds[name])
@@ -100,4 +128,4 @@ def notes_from_json(text: str) -> tuple[ValidityNote, ...]:
                 raise ValueError
         return tuple(ValidityNote(**note) for note in notes)
     except (TypeError, ValueError, RecursionError):
-        raise ValueError("expected the notes on the range of linear frames as JSON text") from None
+        raise ValueError("expected the notes of a run as JSON text") from None

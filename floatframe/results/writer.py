@@ -144,7 +144,7 @@ class ResultsWriter:
         self.n_segments = 0
         self.n_rows = 0  #: in closed segments
         self.open_rows: list[Rows] = []
-        self.validity = "[]"  #: notes on the range of the linear frames, see results/validity.py
+        self.validity = "[]"  #: notes of the run about itself, see results/validity.py
         self.guarded(self.go_on if goes_on else self.begin)
 
     def begin(self) -> None:

@@ -17,12 +17,13 @@ from floatframe.integrators.carry import Integrator
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha, hht, newmark, trapezoidal
 from floatframe.integrators.relative import RelativeGeneralizedAlpha, in_formulation
 from floatframe.motion.foreign_units import Coupling
+from floatframe.motion.step_watch import WATCHES
 from floatframe.relative.formulation import FORMULATIONS
 
 __all__ = ["RunOptions", "RunSection", "formulation_of", "required_run"]
 
 MOST_TIMES = 1e8  #: at which a driven motion is computed
-NOT_OF_A_METHOD = ("t_end", "h", "output_every", "scheme", "formulation")
+NOT_OF_A_METHOD = ("t_end", "h", "output_every", "scheme", "formulation", "watch")
 #: schemes that also know joint coordinates
 OF_BOTH_FORMULATIONS = (GeneralizedAlpha, hht, newmark, trapezoidal)
 
@@ -76,6 +77,11 @@ class RunSection(Table):
         None, description="a number above 0, the least step to which one that fails is divided"
     )
 
+    watch: choice("watch", lambda: WATCHES) = Field(  # type: ignore[valid-type]
+        "stop",
+        description="stop, tell or off: what a run does whose steps put its motion off or add energy to it",
+    )
+
     @model_validator(mode="after")
     def _fits_the_scheme(self) -> "RunSection":
         allowed = keys_of(self.scheme)
@@ -92,7 +98,7 @@ class RunSection(Table):
             key: getattr(self, key) for key in keys_of(self.scheme) if getattr(self, key, None) is not None
         }
         integrator = in_formulation(INTEGRATORS[self.scheme](**parameters), self.formulation)
-        return RunOptions(self.t_end, self.h, self.output_every, integrator)
+        return RunOptions(self.t_end, self.h, self.output_every, integrator, watch=self.watch)
 
 
 @dataclass(frozen=True)
@@ -104,6 +110,7 @@ class RunOptions:
     output_every: int
     integrator: Integrator
     coupling: Coupling | None = None  #: of units of other programs; None: explicit, in steps of h
+    watch: str = "stop"  #: what a run does whose steps put its motion off, see `integrate`
 
     def output_times(self) -> Array:
         """Return the times of the results of a run, (n_t,) [s]; `SystemFileError` if no memory would hold them."""

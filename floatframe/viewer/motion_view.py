@@ -304,7 +304,11 @@ def notes_of(shown: Shown, kept: Timeline, surfaces: Sequence[FlexibleSurface]) 
         )
     notes += surface_notes(trajectory.body_names, surfaces)
     for note in trajectory.validity:
-        notes.append(f"{note.body} left the range of its linear frame: {note.action}.")
+        notes.append(
+            f"{note.body} left the range of its linear frame: {note.action}."
+            if note.is_of_a_frame
+            else f"{note.words}."
+        )
     return notes
 
 
