@@ -8,7 +8,7 @@ Error of the steps, for methods of second order with steps of one size:
 (4) the error of the motion is estimated by the sums over all steps; between two windows a step has the mean of theirs
 (5) errors of place are measured by the farthest way of a body from its start, those of speed by twice the largest
     speed (a vibration goes two amplitudes away), and both make one number, sqrt(a² + b²), as they turn into one
-    another in a vibration; rotations likewise
+    another in a vibration; rotations likewise, or by the way over the length of the system where that is more
 
 Speeds are those between the middle and the end, so that vibrations which a step does not resolve count for little. What
 errors become in a motion that forgets them (damping) or magnifies them (chaos) the sum does not know.
@@ -148,8 +148,10 @@ class StepWatch:
         """Return the note of the error so far if it is new."""
         compiled = compiled_system(system)
         least = np.array([LEAST_WAY * compiled.length, LEAST_TURN])
-        moves = self.size[:, 0] > least
-        parts = self.total / np.where(self.size > 0.0, self.size, np.inf)
+        size = self.size.copy()
+        size[1] = np.maximum(size[1], size[0] / compiled.length)
+        moves = size[:, 0] > least
+        parts = self.total / np.where(size > 0.0, size, np.inf)
         share = np.where(moves, np.linalg.norm(parts, axis=2), 0.0)  # (n_b, 2)
         i = int(np.argmax(share.max(axis=1)))
         largest = float(share[i].max())
