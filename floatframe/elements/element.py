@@ -84,6 +84,7 @@ class ElementLaw:
     power_lost: str | None = None  #: output that is the power it takes from the system
     #: outputs that end a run where they are above zero after a step, with what is then said
     stops: Mapping[str, str] = field(default_factory=dict)
+    knots: Sequence[float] = ()  #: times at which the law jumps, where steps of a run end [s]
 
     def __post_init__(self) -> None:
         if not callable(self.function):
@@ -122,6 +123,7 @@ class ElementLaw:
         for key in self.stops:
             if key not in self.outputs:
                 raise ModelError(f"law: stops: expected names of its outputs, got {key!r}")
+        object.__setattr__(self, "knots", tuple(number("law: knots", each) for each in self.knots))
         if self.length is not None:
             object.__setattr__(self, "length", number("law: length", self.length, above=0.0))
 

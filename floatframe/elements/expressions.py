@@ -27,7 +27,8 @@ from floatframe.elements.smooth import atan2
 from floatframe.elements.tapes import tape_at, tape_numbers
 from floatframe.errors import ModelError
 from floatframe.functions.expressions import CONSTANTS, FUNCTIONS, compile_expression
-from floatframe.functions.time_functions import TimeFunction
+from floatframe.functions.time_functions import NOT_OF_TIME, TimeFunction
+from floatframe.functions.time_switches import OfTime, Switch, switches_of_tape
 
 __all__ = ["ExpressionElement"]
 
@@ -130,7 +131,7 @@ class ExpressionElement(Element):
     outputs: Mapping[str, str] = field(default_factory=dict)  #: expressions of what is seen
     output_units: Mapping[str, str] = field(default_factory=dict)
     parameters: Mapping[str, float] = field(default_factory=dict)
-    functions: Mapping[str, TimeFunction] = field(default_factory=dict)  #: of one number
+    functions: Mapping[str, TimeFunction] = field(default_factory=dict, metadata=NOT_OF_TIME)  #: of one number
     energy: str | None = None  #: output that is the energy it stores
     power_lost: str | None = None  #: output that is the power it takes
 
@@ -165,6 +166,23 @@ class ExpressionElement(Element):
         """Names of the numbers that expressions are made of, in their order."""
         seen = [f"{place}_{each}" for place in list(self.places)[1:] for each in SEEN]
         return ["t", *seen, *self.states]
+
+    def switches_of_time(self) -> list[Switch]:
+        """Return what switches the expressions by time alone; terms may be functions of time."""
+        switches: list[Switch] = []
+        numbers, known = {key: k for k, key in enumerate(self.functions)}, self.inputs
+        of_time: dict[int, OfTime] = {0: np.asarray}
+        last = (*self.forces.values(), *self.rates.values())
+        for key, text in (*self.terms.items(), *(("", each) for each in last)):
+            where = f"element {self.name!r}"
+            tape = compile_expression(where, text, known, parameters=self.parameters, functions=numbers)
+            found, value = switches_of_tape(tape, of_time, list(self.functions.values()))
+            switches += found
+            if key:
+                if value is not None:
+                    of_time[len(known)] = value
+                known = [*known, key]
+        return switches
 
     def law(self, placed: Placed) -> ElementLaw:
         """Return the law: tapes and functions in its data."""

@@ -10,7 +10,7 @@ from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.markers import Place
 from floatframe.checked_values import array_of_shape
 from floatframe.errors import ModelError
-from floatframe.functions.time_functions import TimeFunction
+from floatframe.functions.time_functions import NOT_OF_TIME, TimeFunction
 
 __all__ = ["AXES", "DEFORMATIONS", "Bushing"]
 
@@ -43,7 +43,7 @@ class Bushing:
     damping: Array = field(default_factory=lambda: np.zeros((6, 6)))  #: D, (6, 6), or its diagonal (6,)
     preload: Array = field(default_factory=lambda: np.zeros(6))  #: force and torque on A at zero deformation, (6,)
     #: functions of one deformation ("x", ..., "rz"), such as tables, whose values are added [N, N m]
-    characteristics: Mapping[str, TimeFunction] = field(default_factory=dict)
+    characteristics: Mapping[str, TimeFunction] = field(default_factory=dict, metadata=NOT_OF_TIME)
     axes: str = "a"  #: in which it acts: those of marker "a", of marker "b", or "half way" between them
 
     def __post_init__(self) -> None:

@@ -1,11 +1,11 @@
 """Forces along the coordinate of a joint: torsional springs, dampers, motors, friction."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from fe_models.foundation.copies import frozen_copies
 from floatframe.checked_values import number
 from floatframe.errors import ModelError
-from floatframe.functions.time_functions import TimeFunction
+from floatframe.functions.time_functions import NOT_OF_TIME, TimeFunction
 
 __all__ = ["JointForce"]
 
@@ -29,7 +29,8 @@ class JointForce:
     damping: float = 0.0  #: c [N s/m, N m s/rad]
     preload: float = 0.0  #: [N, N m]
     motor: TimeFunction | None = None  #: a function of time [N, N m]
-    characteristic: TimeFunction | None = None  #: a function of x - x_0, such as a table [N, N m]
+    #: a function of x - x_0, such as a table [N, N m]
+    characteristic: TimeFunction | None = field(default=None, metadata=NOT_OF_TIME)
     friction: float = 0.0  #: T, of Coulomb [N, N m]
     friction_coefficient: float = 0.0  #: mu; for an angle mu times the radius of the bearing [1, m]
     friction_speed: float = 1e-3  #: v_0, where friction is at tanh(1) of its value [m/s, rad/s]

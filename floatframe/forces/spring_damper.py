@@ -1,12 +1,12 @@
 """A spring and a damper in parallel along the line between two markers."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.markers import Marker
 from floatframe.checked_values import number
 from floatframe.errors import ModelError
-from floatframe.functions.time_functions import TimeFunction
+from floatframe.functions.time_functions import NOT_OF_TIME, TimeFunction
 
 __all__ = ["SpringDamper"]
 
@@ -27,7 +27,8 @@ class SpringDamper:
     damping: float = 0.0  #: c [N s/m]
     free_length: float | None = None  #: l_0 [m]; None: the distance as placed
     preload: float = 0.0  #: constant part of the tension [N]
-    characteristic: TimeFunction | None = None  #: a function of l - l_0, such as a table [N]
+    #: a function of l - l_0, such as a table [N]
+    characteristic: TimeFunction | None = field(default=None, metadata=NOT_OF_TIME)
 
     def __post_init__(self) -> None:
         where = f"force {self.name!r}"

@@ -3,12 +3,15 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.coordinates import Coordinate, coordinate_words
 from floatframe.checked_values import number
 from floatframe.errors import ModelError
-from floatframe.functions.expressions import CONSTANTS, FUNCTIONS
-from floatframe.functions.time_functions import TimeFunction
+from floatframe.functions.expressions import CONSTANTS, FUNCTIONS, compile_expression
+from floatframe.functions.time_functions import NOT_OF_TIME, TimeFunction
+from floatframe.functions.time_switches import Switch, switches_of_tape
 
 __all__ = ["UserForce"]
 
@@ -38,8 +41,10 @@ class UserForce:
     rates: Mapping[str, str] = field(default_factory=dict)  #: expressions of the rates of the states
     states: Mapping[str, float] = field(default_factory=dict)  #: values of the states at the start
     parameters: Mapping[str, float] = field(default_factory=dict)  #: numbers of expressions
-    functions: Mapping[str, TimeFunction] = field(default_factory=dict)  #: functions of one number of expressions
+    #: functions of one number of expressions
+    functions: Mapping[str, TimeFunction] = field(default_factory=dict, metadata=NOT_OF_TIME)
     function: Callable[..., None] | None = None  #: instead of expressions
+    knots: Sequence[float] = ()  #: times at which the function jumps, where steps of a run end [s]
 
     def __post_init__(self) -> None:
         where = f"force {self.name!r}"
@@ -53,6 +58,7 @@ class UserForce:
         for part in ("states", "parameters"):
             values = {k: number(f"{where}: {part}: {k}", v) for k, v in getattr(self, part).items()}
             object.__setattr__(self, part, values)
+        object.__setattr__(self, "knots", tuple(number(f"{where}: knots", each) for each in self.knots))
         for key, function in self.functions.items():
             if not isinstance(function, TimeFunction):
                 raise ModelError(
@@ -89,6 +95,18 @@ class UserForce:
         """Names of the inputs of expressions in their order: t, coordinates, their rates, states."""
         names = list(self.coordinates)
         return ["t", *names, *(f"{name}_dot" for name in names), *self.states]
+
+    def switches_of_time(self) -> list[Switch]:
+        """Return what switches the expressions by time alone."""
+        switches: list[Switch] = []
+        if self.function is not None or not isinstance(self.forces, Mapping):
+            return switches
+        numbers = {key: k for k, key in enumerate(self.functions)}
+        for text in (*self.forces.values(), *self.rates.values()):
+            where = f"force {self.name!r}"
+            tape = compile_expression(where, text, self.inputs, parameters=self.parameters, functions=numbers)
+            switches += switches_of_tape(tape, {0: np.asarray}, list(self.functions.values()))[0]
+        return switches
 
 
 def require_words(where: str, names: Sequence[str]) -> None:

@@ -15,6 +15,7 @@ from floatframe.checked_values import number
 from floatframe.errors import ModelError
 
 __all__ = [
+    "NOT_OF_TIME",
     "TimeFunction",
     "constant",
     "cycloidal_spin_up",
@@ -28,6 +29,9 @@ __all__ = [
 
 N_COEFFICIENTS = 9  #: of a piece: six of the polynomial in t - t_k, then amplitude, angular frequency, phase
 MOST_PIECES = 20000
+
+#: metadata of fields of forces and elements whose functions have another argument than the time
+NOT_OF_TIME = {"of_time": False}
 
 
 @frozen_copies

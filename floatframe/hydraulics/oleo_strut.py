@@ -3,7 +3,7 @@
 The forces are those of Milwitzky & Cook (1953), with compressible oil if asked for.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import pi, sqrt
 from typing import Any
 
@@ -17,7 +17,7 @@ from floatframe.elements import Element, ElementLaw, Placed
 from floatframe.elements.curves import function_numbers
 from floatframe.elements.unit_names import in_units
 from floatframe.errors import ModelError
-from floatframe.functions.time_functions import TimeFunction, constant
+from floatframe.functions.time_functions import NOT_OF_TIME, TimeFunction, constant
 from floatframe.hydraulics.fluid import Fluid
 from floatframe.shapes.drawn import Stretched
 
@@ -61,11 +61,13 @@ class OleoStrut(Element):
     charge: float  #: absolute pressure of the gas, extended [Pa]
     gas_area: float  #: A_g, of the piston rod: what displaces gas [m²]
     oil_area: float  #: A_o, of the chamber that the orifice empties [m²]
-    area: TimeFunction | float  #: of the orifice over the stroke, a number or a function of s [m²]
+    #: of the orifice over the stroke, a number or a function of s [m²]
+    area: TimeFunction | float = field(metadata=NOT_OF_TIME)
     stroke: float  #: at which the strut bottoms [m]
     extended_length: float  #: distance of the markers along the axis at s = 0 [m]
     stop_stiffness: float  #: k [N/m]
-    recoil_area: TimeFunction | float | None = None  #: of the orifice when the strut extends [m²]; None: as `area`
+    #: of the orifice when the strut extends [m²]; None: as `area`
+    recoil_area: TimeFunction | float | None = field(default=None, metadata=NOT_OF_TIME)
     exponent: float = 1.3  #: n of the gas
     discharge: float = 0.9
     oil_volume: float | None = None  #: of the oil chamber [m³]; None: incompressible oil

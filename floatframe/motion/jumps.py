@@ -12,26 +12,48 @@ import numpy as np
 
 from floatframe.compiling.file_frames import state_of_file
 from floatframe.compiling.system import compiled_system
-from floatframe.functions.time_functions import TimeFunction
+from floatframe.compiling.time_laws import functions_of_time
+from floatframe.functions.time_switches import switch_times
 from floatframe.integrators.carry import Carry, Failure, Integrator
 from floatframe.kernels.memory import Rows
 from floatframe.kernels.work import Work
 from floatframe.motion.event_steps import EventWatch
 from floatframe.system import System
 
-__all__ = ["begun_anew", "jumps_of_steps", "over_jumps"]
+__all__ = ["begun_anew", "jump_times", "jumps_of_steps", "over_jumps"]
 
+PER_STEP = 4  #: places in a step between which expressions of t are compared
+MOST_PLACES = 1_000_000  #: in a run
 SHORT = 1e-9  #: of a step: what is left out before a jump, and a rest that is none
+
+
+def jump_times(system: System, t_start: float, h: float, n_steps: int) -> list[float]:
+    """Return the times after the start of a run, to its end, at which a force or the law of an element jumps, rising.
+
+    (1) jumps of the values of functions of time
+    (2) switches of expressions, found between places in the steps
+    (3) knots that user forces and laws declare
+    """
+    times = {
+        float(t) for each in functions_of_time(system) if not each.is_motion for t in each.function.jumps(0)[0]
+    }  # (1)
+    switches = [
+        switch for part in (*system.forces, *system.elements) for switch in getattr(part, "switches_of_time", list)()
+    ]
+    if switches:  # (2)
+        n_places = min(PER_STEP * n_steps, MOST_PLACES) + 1
+        times |= set(switch_times(switches, np.linspace(t_start, t_start + n_steps * h, n_places)))
+    times |= {float(t) for force in system.forces for t in getattr(force, "knots", ())}  # (3)
+    times |= {float(t) for placed in compiled_system(system).laws for t in placed.law.knots}
+    return sorted(t for t in times if t_start < t <= t_start + n_steps * h * (1 + 1e-12))
 
 
 def jumps_of_steps(system: System, t_start: float, h: float, n_steps: int) -> dict[int, list[float]]:
     """Return the times of jumps in each step k, from t_start + k h (not there) to t_start + (k + 1) h (there too)."""
-    functions = [getattr(force, name, None) for force in system.forces for name in ("amplitude", "motor")]
-    times = {float(t) for f in functions if isinstance(f, TimeFunction) for t in f.jumps(0)[0]}
     found: dict[int, list[float]] = {}
-    for t in sorted(times):
-        k = ceil((t - t_start) / h - SHORT) - 1
-        if 0 <= k < n_steps:
+    for t in jump_times(system, t_start, h, n_steps):
+        k = max(ceil((t - t_start) / h - SHORT) - 1, 0)  # next to the start: the motion begins anew at once
+        if k < n_steps:
             found.setdefault(k, []).append(t)
     return found
 

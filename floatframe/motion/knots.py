@@ -1,10 +1,9 @@
 """Knots of tables and the steps of a run: where steps pass over samples, or over jumps of a driven acceleration."""
 
-from collections.abc import Iterator
-
 import numpy as np
 
-from floatframe.functions.time_functions import TimeFunction
+from floatframe.compiling.time_laws import functions_of_time
+from floatframe.motion.jumps import jump_times
 from floatframe.system import System
 
 __all__ = ["knot_words"]
@@ -12,33 +11,20 @@ __all__ = ["knot_words"]
 ON_A_STEP = 1e-6  #: of a step, by which a knot may miss its end
 
 
-def functions_of_time(system: System) -> Iterator[tuple[str, TimeFunction, bool]]:
-    """Yield every function of time that acts in a system: where it stands, itself, whether it is a motion."""
-    for force in system.forces:
-        for key in ("amplitude", "motor"):
-            function = getattr(force, key, None)
-            if isinstance(function, TimeFunction):
-                yield f"forces.{getattr(force, 'name', '')}.{key}", function, False
-    for joint in system.joints:
-        for coordinate, function in getattr(joint, "motions", {}).items():
-            yield f"joints.{joint.name}.motions.{coordinate}", function, True
-    for coupler in system.couplers:
-        if isinstance(coupler.constant, TimeFunction):
-            yield f"couplers.{coupler.name}.constant", coupler.constant, True
-
-
 def knot_words(system: System, t_start: float, h: float, n_steps: int) -> tuple[str, ...]:
     """Return in words where the steps of a run miss what a table says.
 
-    (1) Several knots in one step: what lies between them is not seen.
+    (1) Several knots in one step: what lies between them is not seen. Where a force jumps a step ends.
     (2) A jump of a driven acceleration inside a step: the step takes it for a ramp. Jumps at the ends of steps are met.
     """
     words = []
-    for where, function, is_motion in functions_of_time(system):
+    cuts = np.array(jump_times(system, t_start, h, n_steps))
+    for where, function, is_motion, _, _ in functions_of_time(system):
         inside = (function.begins > t_start) & (function.begins < t_start + n_steps * h * (1 - 1e-12))
         knots = function.begins[inside]
         steps = np.ceil((knots - t_start) / h - ON_A_STEP)
-        passed = len(knots) - len(np.unique(steps))
+        parts = steps + np.searchsorted(cuts, knots - ON_A_STEP * h)  # of the steps, which jumps cut
+        passed = len(knots) - len(np.unique(parts))
         if passed:
             shortest = float(np.diff(knots).min())
             words.append(

@@ -370,7 +370,7 @@ def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState, t:
     """Return d(u_dot)/dt at a consistent state, (n_u,), by a difference along the motion.
 
     The step is a thousandth of the shortest time in the system, so that its error is 1e-6 of the fastest rate. The
-    difference is central, but forward in time where motions are prescribed, since they may begin at t.
+    difference is central, but forward in time where something may depend on it, since that may begin or jump at t.
     """
     model, state, u_dot = compiled.model, consistent.state, consistent.u_dot
     work = work_from(model, consistent.w)
@@ -378,6 +378,7 @@ def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState, t:
     falling = max(float(np.linalg.norm(u_dot[k : k + 3])) / compiled.length for k in model.bodies.u0[:-1])
     swinging = max(float(np.linalg.norm(u_dot[k + 3 : k + 6])) for k in model.bodies.u0[:-1])
     fastest = max(highest_frequency(model), turning, np.sqrt(falling), np.sqrt(swinging), fastest_motion(model))
+    fastest = max(fastest, compiled.time_rate)
     if fastest == 0.0:
         return np.zeros_like(u_dot)
     s = 1e-3 / fastest
@@ -388,7 +389,7 @@ def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState, t:
         after = State(moved.r, moved.p, moved.q, state.u + step * u_dot)
         return solve_accelerations(compiled, work, after, consistent.w)[0]
 
-    if len(model.functions.begin):
+    if len(model.functions.begin) or compiled.laws or len(model.users.n_forces):
         return (-3 * u_dot_after(0.0) + 4 * u_dot_after(s) - u_dot_after(2 * s)) / (2 * s)
     return (u_dot_after(s) - u_dot_after(-s)) / (2 * s)
 
