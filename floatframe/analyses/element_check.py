@@ -189,15 +189,16 @@ def own_slopes(placed: PlacedLaw, inputs: Array) -> Array:
     """Return the derivatives that the engine takes, (n_out, n_columns)."""
     n_columns = placed.columns_of_marker * len(placed.markers) + len(placed.states) + len(placed.multipliers)
     address = placed.slopes.address
-    slopes = called_law(address, placed.head, np.asarray(placed.law.data), inputs[None], placed.n_out * n_columns)
+    data = np.concatenate([placed.law.data, placed.sizes])
+    slopes = called_law(address, placed.head, data, inputs[None], placed.n_out * n_columns)
     raise_errors_of([placed.slopes])
     return without_ground(placed, slopes.reshape(placed.n_out, n_columns))
 
 
 def differences(placed: PlacedLaw, inputs: Array) -> Array:
     """Return the same by differences; markers on the ground do not move."""
-    slopes = difference_slopes(placed.value.address, placed.head, placed.law.data, inputs)[: placed.n_out]
-    return without_ground(placed, slopes)
+    slopes = difference_slopes(placed.value.address, placed.head, placed.law.data, inputs, placed.sizes)
+    return without_ground(placed, slopes[: placed.n_out])
 
 
 def without_ground(placed: PlacedLaw, slopes: Array) -> Array:

@@ -6,13 +6,15 @@ from typing import Any
 
 import numpy as np
 
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 from floatframe.bodies.coordinates import AxialAngle, AxialDistance, Coordinate, JointCoordinate
 from floatframe.compiling.bodies import integers, offsets
 from floatframe.compiling.callbacks import Callback, callback_of
 from floatframe.compiling.connections import Connections, End
 from floatframe.compiling.forces import Functions
-from floatframe.compiling.markers import MarkerData, find_marker, joint_markers, marker_pose
+from floatframe.compiling.markers import MarkerData, find_marker, joint_markers, least_size, marker_pose
 from floatframe.errors import ModelError
 from floatframe.forces import UserForce
 from floatframe.functions.expressions import Tape, compile_expression
@@ -81,6 +83,20 @@ class CoordinateElements:
     states: list[dict[str, float]] = field(default_factory=list)
     tapes: list[Tape] = field(default_factory=list)
     callbacks: list[Callback] = field(default_factory=list)
+    placed: list[PlacedCoordinate] = field(default_factory=list)
+    lengths: list[float | None] = field(default_factory=list)  #: that forces say of themselves, of each coordinate
+
+    def give_lengths(self, radii: Array, length: float, units: Units) -> None:
+        """Set over which coordinates and their rates a law changes, from the radii of gyration of bodies, (n_b,).
+
+        A distance by the length that a force says, or the size of the smaller body, in a second, 1 m/s at most; angles
+        by 1 rad.
+        """
+        second = 1 / units.time
+        for record, each, own in zip(self.coordinates, self.placed, self.lengths, strict=True):
+            size = 1.0 if each.coordinate.is_angle else own or least_size((each.a, each.b), radii) or length
+            most = 1.0 / second if each.coordinate.is_angle else 1 / (units.length * second)
+            record["size"], record["speed"] = size, min(size / second, most)
 
     def records(self) -> dict[str, Any]:
         """Return the parts of the model."""
@@ -135,7 +151,8 @@ def add_user_force(
     coordinates = [find_coordinate(system, f"{where}: coordinates: {k}", c, made) for k, c in force.coordinates.items()]
     rows = [Row(PART)] * (len(acting) + 3 * len(force.states))
     act = [name in acting for name in names]
-    first = add_coordinates(made, elements, force.name, USER_FORCE, coordinates, [1.0] * len(names), act, rows)
+    factors = [1.0] * len(names)
+    first = add_coordinates(made, elements, force.name, USER_FORCE, coordinates, factors, act, rows, force.length)
     for record, name in zip(elements.coordinates[-len(coordinates) :], names, strict=True):
         record["core"] = first + acting.index(name) if name in acting else first
     starts = enumerate(force.states.values())
@@ -169,6 +186,7 @@ def add_coordinates(
     factors: list[float],
     has_force: list[bool],
     core: list[Row],
+    length: float | None = None,
 ) -> int:
     """Add a connection: rows of its coordinates, then of its core; return the number of the first of these."""
     rows: list[Row] = []
@@ -190,6 +208,8 @@ def add_coordinates(
         else:
             ends += [End(placed.a, 1.0, force, arm), End(placed.b, -1.0, force)]
     marker, w0 = made.add(name, law, ends, [*rows, *core], has_rates=True)
+    elements.placed += coordinates
+    elements.lengths += [length] * len(coordinates)
     for k, (value, force, arm) in enumerate(starts):
         elements.coordinates.append(
             {

@@ -1,5 +1,6 @@
 """Markers found in their bodies, and where they are at the start."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +25,7 @@ __all__ = [
     "find_body",
     "find_marker",
     "joint_markers",
+    "least_size",
     "marker_bending",
     "marker_pose",
     "marker_shapes",
@@ -42,6 +44,16 @@ class MarkerData:
 
     body: int  #: index, -1 for the ground
     shape: MarkerShape
+
+
+def least_size(markers: Sequence[MarkerData], radii: Array) -> float:
+    """Return the size of the smallest of the bodies of markers: its radius of gyration, or the arm of a marker."""
+    arms: dict[int, float] = {}
+    for marker in markers:
+        if marker.body >= 0:
+            arm = float(np.linalg.norm(marker.shape.position))
+            arms[marker.body] = max(arm, arms.get(marker.body, float(radii[marker.body])))
+    return min((arm for arm in arms.values() if arm > 0.0), default=0.0)
 
 
 def n_q_of(system: System) -> IntArray:

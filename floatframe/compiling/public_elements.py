@@ -1,17 +1,20 @@
 """Public elements as the kernels see them: the ends and rows of their connections, their functions and numbers."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from fe_models.foundation.arrays import Array
 from floatframe.compiling.bodies import integers, offsets
 from floatframe.compiling.callbacks import Callback
 from floatframe.compiling.callbacks.law_functions import law_callbacks
 from floatframe.compiling.callbacks.law_source import digest_of
 from floatframe.compiling.connections import Connections, End
 from floatframe.compiling.coordinate_elements import LEAST_SIZE
-from floatframe.compiling.markers import MarkerData, find_marker, marker_pose
+from floatframe.compiling.markers import MarkerData, find_marker, least_size, marker_pose
+from floatframe.compiling.time_laws import functions_in, rate_of_functions
 from floatframe.elements.element import ACTS, Element, ElementLaw, Placed, markers_of
 from floatframe.errors import ModelError
 from floatframe.joints.rows import LAW_ANGLE, LAW_LENGTH, LAW_RATE, NO_MOMENT, NOTHING, PART, VELOCITY, Row
@@ -40,12 +43,30 @@ class PlacedLaw:
     value: Callback  #: its function
     slopes: Callback  #: of derivatives
     rest: tuple[Callback, Callback]  #: the same of what holds in equilibrium
+    length: float = 0.0  #: over which the law changes
+    speed: float = 0.0  #: of 1 m/s, in the units of the system
+    time: float = 0.0  #: of 1 s
+    own_time: float = 0.0  #: over which the law changes by the time alone; 0: not known
 
     @property
     def digest(self) -> tuple[int | str | None, ...]:
         """What its functions are, whatever their addresses."""
         functions = (self.law.function, self.law.tangent, self.law.rest)
         return tuple(digest_of(each) or words_of(each) if callable(each) else each for each in functions)
+
+    @property
+    def sizes(self) -> list[float]:
+        """By which its inputs are measured, see `compiling.callbacks.law_templates`.
+
+        Without a time of its own velocities are measured by 1 m/s, or by its length in a second where that is less.
+        """
+        states, multipliers = list(self.law.state_sizes), list(self.law.multiplier_sizes)
+        time = self.law.time
+        if time is None or math.isinf(time):
+            time, speed = self.time, min(self.speed, self.length / self.time)
+        else:
+            speed = self.length / time
+        return [self.length, speed, 1 / time, speed / time, 1 / time**2, *states, *multipliers]
 
     @property
     def columns_of_marker(self) -> int:
@@ -80,8 +101,14 @@ class PublicElements:
         """Names of the elements."""
         return tuple(each.element.name for each in self.placed)
 
-    def record(self, length: float) -> Laws:
-        """Return the laws as the kernels see them, in a system of a size."""
+    def give_lengths(self, radii: Array, length: float) -> None:
+        """Set the lengths over which laws change that do not say it, from the radii of gyration of bodies, (n_b,)."""
+        for k, each in enumerate(self.placed):
+            own = each.law.length or least_size(each.markers, radii) or length
+            self.placed[k] = replace(each, length=own)
+
+    def record(self) -> Laws:
+        """Return the laws as the kernels see them."""
         laws = [each.law for each in self.placed]
         sources = [each for group in self.sources for each in group]
         equations = [
@@ -99,15 +126,16 @@ class PublicElements:
             address=[value for value, _ in self.addresses],
             tangent=[slopes for _, slopes in self.addresses],
             head=self.heads,
-            data0=offsets(integers([len(law.data) for law in laws])),
-            data=flat([np.asarray(law.data) for law in laws]),
+            data0=offsets(integers([len(each.law.data) + len(each.sizes) for each in self.placed])),
+            data=flat([np.concatenate([each.law.data, each.sizes]) for each in self.placed]),
             row0=offsets(integers([len(group) for group in self.sources])),
             source=[source for source, _ in sources],
             factor=[factor for _, factor in sources],
             state0=self.state0,
             equation=[row for row, _ in equations],
             equation_size=[size for _, size in equations],
-            length=[law.length or length for law in laws],
+            length=[each.length for each in self.placed],
+            time=[each.own_time for each in self.placed],
             energy=[number_of(law.energy, law) for law in laws],
             given=[number_of(law.power_in, law) for law in laws],
             lost=[number_of(law.power_lost, law) for law in laws],
@@ -154,11 +182,15 @@ def add_element(system: System, made: Connections, elements: PublicElements, ele
         rest = law_callbacks(where, replace(law, function=law.rest, tangent=tangent), head)
         elements.callbacks += rest
     multipliers = tuple(range(first, first + len(law.multipliers)))
+    rate = rate_of_functions(functions_in(element, "", False, element, ""))
+    own_time = law.time or (1 / rate if rate > 0.0 else 0.0)
+    second = 1 / system.units.time
     elements.placed.append(
         PlacedLaw(
-            element, law, len(made.sizes) - 1, tuple(states), multipliers, tuple(markers), head, value, slopes, rest
+            element, law, len(made.sizes) - 1, tuple(states), multipliers, tuple(markers), head, value, slopes, rest,
+            speed=1 / (system.units.length * second), time=second, own_time=own_time,
         )
-    )
+    )  # fmt: skip
     elements.callbacks += [value, slopes]
     elements.addresses.append((value.address, slopes.address))
 

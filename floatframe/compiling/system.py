@@ -27,7 +27,7 @@ from floatframe.compiling.markers import (
 from floatframe.compiling.mass_checks import require_inertia
 from floatframe.compiling.pair_forces import add_pair_laws
 from floatframe.compiling.public_elements import PlacedLaw, add_public_elements
-from floatframe.compiling.time_laws import rate_of_functions
+from floatframe.compiling.time_laws import functions_of_time, rate_of_functions
 from floatframe.forces import Gravity, PointForce, SpringDamper
 from floatframe.functions.time_functions import TimeFunction
 from floatframe.joints.rows import kind_of
@@ -158,6 +158,11 @@ def compile_system(system: System) -> CompiledSystem:
     angles = counted_angles(system, placed)
     row_motion = [functions.index(row.motion) for row in rows]
     forces, force0 = joint_forces(system, rows, made.owner, functions)
+    arrays = type_arrays(types)
+    radii = np.sqrt(np.maximum(np.trace(arrays.J0, axis1=1, axis2=2), 0.0) / (2 * arrays.mass))
+    length = system_length(markers, placed, n_q, float(radii.max()))
+    public.give_lengths(radii[kind], length)
+    elements.give_lengths(radii[kind], length, system.units)
     model = Model(
         gravity=gravity,
         bodies=filled(
@@ -172,7 +177,7 @@ def compile_system(system: System) -> CompiledSystem:
             load0=offsets(integers([len(group) for group in loaded_of])),
             loaded=integers([m for group in loaded_of for m in group]),
         ),
-        body_types=type_arrays(types),
+        body_types=arrays,
         markers=marker_record(made, ends_of, lines, load_marker, [load.is_follower for load in loads]),
         connections=filled(
             Connections(),
@@ -201,7 +206,7 @@ def compile_system(system: System) -> CompiledSystem:
         bushings=pairs.bushings._replace(angle=integers(first_angles(system, len(angles)))),
         contacts=pairs.contacts,
         **elements.records(),
-        laws=public.record(0.0),
+        laws=public.record(),
         **lines.records(),
         loads=filled(
             Loads(),
@@ -215,9 +220,8 @@ def compile_system(system: System) -> CompiledSystem:
         angles=angle_records([angle for angle, _ in angles]),
         elimination=plan_elimination(made.sizes, ends_of, integers(made.connection_of)),
     )
-    length = system_length(markers, placed, n_q, model)
     soft = row_softness(system, made, model.body_types, kind)
-    model = model._replace(rows=model.rows._replace(soft=soft), laws=public.record(length))
+    model = model._replace(rows=model.rows._replace(soft=soft))
     return CompiledSystem(
         model=model,
         body_names=tuple(body.name for body in system.bodies),
@@ -233,7 +237,7 @@ def compile_system(system: System) -> CompiledSystem:
         length=length,
         angles=tuple(angle for angle, _ in angles),
         angle_motions=tuple(motion for _, motion in angles),
-        time_rate=rate_of_functions(system),
+        time_rate=rate_of_functions(functions_of_time(system)),
     )
 
 
@@ -339,9 +343,11 @@ def motion_at_start(body: FlexibleBody) -> FrameMotion:
     )  # fmt: skip
 
 
-def system_length(markers: list[MarkerData], placed: State, n_q: IntArray, model: Model) -> float:
-    """Return the largest arm of a marker or radius of gyration in a body, or the size of the system; 1 if all are 0."""
+def system_length(markers: list[MarkerData], placed: State, n_q: IntArray, radius: float) -> float:
+    """Return the largest arm of a marker in a body, the size of the system or the largest radius of gyration.
+
+    1 if all are 0.
+    """
     arms = [float(np.linalg.norm(marker.shape.position)) for marker in markers if marker.body >= 0]
-    radii = np.sqrt(np.maximum(np.trace(model.body_types.J0, axis1=1, axis2=2), 0.0) / (2 * model.body_types.mass))
     points = [marker_pose(marker, placed, n_q)[0] for marker in markers] + list(placed.r)
-    return max([*arms, float(radii.max()), float(np.linalg.norm(np.ptp(np.array(points), axis=0)))]) or 1.0
+    return max([*arms, radius, float(np.linalg.norm(np.ptp(np.array(points), axis=0)))]) or 1.0

@@ -4,7 +4,7 @@ They are found in the fields of forces, joints, couplers and elements, and of wh
 components of circuits), unless a field says that its functions have another argument (`NOT_OF_TIME`).
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any, NamedTuple
 
@@ -13,7 +13,7 @@ import numpy as np
 from floatframe.functions.time_functions import TimeFunction
 from floatframe.system import System
 
-__all__ = ["FunctionOfTime", "functions_of_time", "rate_of_functions"]
+__all__ = ["FunctionOfTime", "functions_in", "functions_of_time", "rate_of_functions"]
 
 
 class FunctionOfTime(NamedTuple):
@@ -53,10 +53,10 @@ def functions_in(value: Any, where: str, is_motion: bool, holder: Any, field: st
                 yield from functions_in(each, f"{where}.{name}", is_motion, holder, field)
 
 
-def rate_of_functions(system: System) -> float:
-    """Return the highest rate of the functions of time: of their sines, or one over the shortest piece [1/s]."""
+def rate_of_functions(functions: Iterable[FunctionOfTime]) -> float:
+    """Return the highest rate of functions of time: of their sines, or one over the shortest piece [1/s]."""
     fastest = 0.0
-    for each in functions_of_time(system):
+    for each in functions:
         lengths = np.diff(each.function.begins)
         fastest = max(fastest, float(np.abs(each.function.pieces[:, 7]).max()))
         fastest = max(fastest, 1 / float(lengths.min()) if len(lengths) else 0.0)

@@ -13,6 +13,7 @@ Made by `numba.njit` it runs at the speed of the kernels, a plain Python functio
 arguments alone: it is called several times a step, also for motions that are not reached in the end.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import TYPE_CHECKING, Any
@@ -77,7 +78,10 @@ class ElementLaw:
     rest: Callable[..., None] | None = None  #: what statics take instead of `function`; default: the same
     acts: Sequence[str] | None = None  #: on each marker: "wrench" (default), "force", "moment" or "none"
     is_opposite: bool = False  #: of two markers: the force on the second is minus that on the first
-    length: float | None = None  #: over which the law changes [m]; default: the size of the system
+    length: float | None = None  #: over which the law changes [m]; default: the size of its smallest body
+    #: over which it changes by the time alone and with velocities [s], `math.inf` if the time does not enter; default:
+    #: not known
+    time: float | None = None
     accelerations: bool = False  #: whether accelerations are inputs
     energy: str | None = None  #: output that is the energy it stores
     power_in: str | None = None  #: output that is the power it gives to the system from outside
@@ -126,6 +130,8 @@ class ElementLaw:
         object.__setattr__(self, "knots", tuple(number("law: knots", each) for each in self.knots))
         if self.length is not None:
             object.__setattr__(self, "length", number("law: length", self.length, above=0.0))
+        if self.time is not None and self.time != math.inf:
+            object.__setattr__(self, "time", number("law: time", self.time, above=0.0))
 
     def _held(self) -> None:
         """Check what the multipliers hold."""

@@ -45,6 +45,7 @@ class UserForce:
     functions: Mapping[str, TimeFunction] = field(default_factory=dict, metadata=NOT_OF_TIME)
     function: Callable[..., None] | None = None  #: instead of expressions
     knots: Sequence[float] = ()  #: times at which the function jumps, where steps of a run end [s]
+    length: float | None = None  #: over which the function changes [m]; None: the size of the smaller body
 
     def __post_init__(self) -> None:
         where = f"force {self.name!r}"
@@ -59,6 +60,8 @@ class UserForce:
             values = {k: number(f"{where}: {part}: {k}", v) for k, v in getattr(self, part).items()}
             object.__setattr__(self, part, values)
         object.__setattr__(self, "knots", tuple(number(f"{where}: knots", each) for each in self.knots))
+        if self.length is not None:
+            object.__setattr__(self, "length", number(f"{where}: length", self.length, above=0.0))
         for key, function in self.functions.items():
             if not isinstance(function, TimeFunction):
                 raise ModelError(

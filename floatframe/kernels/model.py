@@ -222,6 +222,8 @@ class Coordinates(NamedTuple):
     arm: IntArray = integer(n_x)  #: first of its three rows of moment on A, -1 for none
     factor: Array = real(n_x, unit="that of the coupler by that of the coordinate")  #: coefficient in a coupler
     core: IntArray = integer(n_x)  #: row of the unknown that is its force, or of the multiplier
+    size: Array = real(n_x, unit="m, rad")  #: over which the function of a user force changes
+    speed: Array = real(n_x, unit="m/s, rad/s")  #: the same of its rate
 
 
 class Lines(NamedTuple):
@@ -258,7 +260,7 @@ class Laws(NamedTuple):
     tangent: IntArray = integer(n_laws)  #: of the function of their derivatives
     head: IntArray = integer(n_laws, 8)  #: markers, numbers of each, states, multipliers, outputs, data, which move, 0
     data0: IntArray = integer(n_laws + 1)  #: first number of its data
-    data: Array = real(Size("numbers of laws"))
+    data: Array = real(Size("numbers of laws"))  #: of each, then the sizes of its inputs, see law_templates.py
     row0: IntArray = integer(n_laws + 1)  #: first of its rows of wrenches in `source` and `factor`
     source: IntArray = integer(Size("wrench rows of laws"))  #: number of the wrench as the function writes it
     factor: Array = real(Size("wrench rows of laws"))  #: by which it becomes the unknown of the row, 1 or -1
@@ -266,6 +268,7 @@ class Laws(NamedTuple):
     equation: IntArray = integer(Size("equations of laws"))  #: rows of multipliers that hold nothing
     equation_size: Array = real(Size("equations of laws"), unit="that of the multiplier")  #: typical
     length: Array = real(n_laws, unit="m")  #: over which the law changes
+    time: Array = real(n_laws, unit="s")  #: over which it changes by the time alone; 0: not known
     energy: IntArray = integer(n_laws)  #: outputs that are stored energy, power given and power lost, -1 for none
     given: IntArray = integer(n_laws)
     lost: IntArray = integer(n_laws)

@@ -1,5 +1,6 @@
 """The elements `rails.wheelset`, two wheels on one axle, and `rails.wheel-on-rail`, one wheel that turns by itself."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -146,6 +147,7 @@ def law_of_wheels(element: Wheelset | WheelOnRail, placed: Placed, wheels: tuple
         output_units=units,
         tangent="complex",
         length=1e-3,  # shifts of a millimetre change the contact
+        time=math.inf,
         energy="energy",
         power_lost="power_lost",
         stops={"off_track": OFF_TRACK},

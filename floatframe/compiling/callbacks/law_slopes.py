@@ -12,6 +12,7 @@ __all__ = ["difference_slopes"]
 
 STEP = 1e-4  #: of differences, relative
 LEAST = 1e-3  #: size of a state or multiplier near zero
+N_MOTIONS = 5  #: sizes of motions, before those of states
 STENCIL = ((-2, 1 / 12), (-1, -8 / 12), (1, 8 / 12), (2, -1 / 12))  #: of fourth order
 
 
@@ -33,26 +34,29 @@ def varied(inputs: Array, n: int, width: int, k: int, step: float) -> Array:
     return y
 
 
-def size_of(inputs: Array, n: int, width: int, k: int) -> float:
-    """Return the size by which variation k is measured."""
+def size_of(sizes: Sequence[float], inputs: Array, n: int, width: int, k: int) -> float:
+    """Return the size by which variation k is measured, of the sizes that `PlacedLaw.sizes` gives."""
     per = width - 6
     if k >= per * n:
-        return max(abs(float(inputs[1 + width * n + k - per * n])), LEAST)
-    j = k % per
-    if 3 <= j < 6:
-        return 1.0
-    return max(1.0, abs(float(inputs[1 + width * (k // per) + j + (6 if j >= 6 else 0)])))
+        own = sizes[N_MOTIONS + k - per * n]
+        return own or max(abs(float(inputs[1 + width * n + k - per * n])), LEAST)
+    part = k % per // 3
+    return 1.0 if part == 1 else sizes[max(part - 1, 0)]
 
 
 def difference_slopes(
-    address: int, head: tuple[int, ...], data: Array | Sequence[float], inputs: Array, step: float = STEP
-) -> Array:
-    """Return d(wrenches, rates, held, outputs) by all variations at inputs, (6 n + n_z + n_lam + n_seen, n_columns)."""
+    address: int, head: tuple[int, ...], data: Array | Sequence[float], inputs: Array, sizes: Sequence[float],
+    step: float = STEP,
+) -> Array:  # fmt: skip
+    """Return d(wrenches, rates, held, outputs) by all variations at inputs, (6 n + n_z + n_lam + n_seen, n_columns).
+
+    sizes: by which inputs are measured, see `PlacedLaw.sizes`.
+    """
     n, width, n_z, n_lam, n_seen = head[:5]
     n_out, n_columns = 6 * n + n_z + n_lam + n_seen, (width - 6) * n + n_z + n_lam
     slopes = np.zeros((n_out, n_columns))
     for k in range(n_columns):
-        h = step * size_of(inputs, n, width, k)
+        h = step * size_of(sizes, inputs, n, width, k)
         rows = np.array([varied(inputs, n, width, k, steps * h) for steps, _ in STENCIL])
         values = called_law(address, head, np.asarray(data), rows, n_out)
         slopes[:, k] = np.array([factor for _, factor in STENCIL]) @ values / h

@@ -3,9 +3,11 @@
     void f(const int64 *head, const double *inputs, const double *data, double *outputs)
 
 head: numbers of markers n, of the motion of each, of states, multipliers, outputs and data, the markers that move as
-bits, 0. inputs: t, motions, states, multipliers. outputs: wrenches, rates of states, what is held, what is seen; or the
-derivatives of these but for the last, row by row, by dr, dphi, dv, domega of each marker, states, multipliers. Of a
-law that asks for accelerations, da and dalpha follow on domega.
+bits, 0. inputs: t, motions, states, multipliers. data: numbers of the law; for derivatives by differences, after them
+the sizes by which its inputs are measured: of places, velocities, angular velocities, accelerations, angular
+accelerations, of each state and each multiplier (0: not known). outputs: wrenches, rates of states, what is held, what
+is seen; or the derivatives of these but for the last, row by row, by dr, dphi, dv, domega of each marker, states,
+multipliers. Of a law that asks for accelerations, da and dalpha follow on domega.
 
 The templates are filled in by `law_functions`: `law` stands for the function of the user.
 """
@@ -17,8 +19,10 @@ __all__ = ["complex_template", "difference_template", "given_template", "value_t
 
 HEAD = 8
 TINY = 1e-30  # step along the imaginary axis
-STEP = 1e-6  # of central differences, relative
-LEAST = 1e-9  # of states and multipliers near zero
+STEP = 1e-6  # of central differences, relative to the sizes of inputs
+SIZES = 5  # of motions, before those of states
+LEAST = 1e-3  # size of states and multipliers where nothing else is known
+ROUNDING = 2e-15  # of a number, below which a step is lost in it
 
 
 def law(*arguments):
@@ -125,7 +129,8 @@ def difference_template(digest):
         n_columns = per * n + n_z + n_lam
         own = carray(slopes_at, (n_out, n_columns))
         own[:, :] = 0.0 if digest else 1.0
-        data = carray(data_at, n_data)
+        known = carray(data_at, n_data + SIZES + n_z + n_lam)
+        data, sizes = known[:n_data], known[n_data:]
         y = inputs[1:].copy()
         out = np.empty(n_out + n_seen)
         x = y[: o - 1].reshape((n, width))
@@ -136,36 +141,41 @@ def difference_template(digest):
             if m < n and not (moving >> m) & 1:
                 continue
             first = 1 + m * width
-            if m >= n:
-                h = STEP * abs(y[o - 1 + k - per * n]) + LEAST
-            elif 3 <= j < 6:
-                h = STEP
+            at = o + k - per * n  # of what moves, among the inputs
+            if m < n and j < 3:
+                at, size = first + j, sizes[0]
+            elif m < n and j < 6:
+                size = 1.0
+            elif m < n:
+                at, size = first + 6 + j, sizes[j // 3 - 1]
             else:
-                at = first + j if j < 3 else first + 6 + j
-                h = STEP * max(1.0, abs(inputs[at]))
+                size = sizes[SIZES + k - per * n]
+                if size == 0.0:
+                    size = max(abs(inputs[at]), LEAST)
+            h = STEP * size
+            if m >= n or j < 3 or j >= 6:
+                h = max(h, ROUNDING * abs(inputs[at]))
+            way = 2 * h
             for side in range(2):
                 s = h if side == 0 else -h
-                if m >= n:
-                    y[o - 1 + k - per * n] = inputs[o + k - per * n] + s
-                elif j < 3:
-                    x[m, j] = inputs[first + j] + s
-                elif j >= 6:
-                    x[m, 6 + j] = inputs[first + 6 + j] + s
-                else:  # A turned by the rotation vector s e
+                if m < n and 3 <= j < 6:  # A turned by the rotation vector s e
                     b, c = (j - 2) % 3, (j - 1) % 3
                     sin, cos = np.sin(s), np.cos(s)
                     for i in range(3):
                         A_b, A_c = inputs[first + 3 + 3 * b + i], inputs[first + 3 + 3 * c + i]
                         x[m, 3 + 3 * b + i] = cos * A_b - sin * A_c
                         x[m, 3 + 3 * c + i] = sin * A_b + cos * A_c
+                else:
+                    y[at - 1] = inputs[at] + s
+                    way = y[at - 1] - inputs[at] if side == 0 else way - (y[at - 1] - inputs[at])  # as it was rounded
                 out[:] = 0.0
                 law(inputs[0], x, z, lam, data, wrench, z_dot, g, out[n_out:])
                 for i in range(n_out):
-                    own[i, k] += out[i] / (2 * s)
+                    own[i, k] = out[i] if side == 0 else (own[i, k] - out[i]) / way
             if m < n:
                 for i in range(width):
                     x[m, i] = inputs[first + i]
             else:
-                y[o - 1 + k - per * n] = inputs[o + k - per * n]
+                y[at - 1] = inputs[at]
 
     return slopes

@@ -27,9 +27,13 @@ from floatframe.kernels.vector import add, dot, matrix, norm, product, put, put_
 
 __all__ = ["law_derivatives", "law_power", "law_rates", "law_rows", "law_values"]
 
+MOST_LEVELS, SHORTEST, LONGER = 22, 2.0**-20, 4.0  #: of steps where the time over which a law changes is not known
+ROUNDING = 1e-15  #: of places, in differences
 REACH = 5e-3  #: way along the motion on which rates are taken, as a part of the length over which the law changes
 #: of differences of sixth order at -3 to 3
 FIRST = (-1 / 60, 9 / 60, -45 / 60, 0.0, 45 / 60, -9 / 60, 1 / 60)
+FOURTH_FIRST = (0.0, 1 / 12, -8 / 12, 0.0, 8 / 12, -1 / 12, 0.0)  #: the same of fourth order
+FOURTH_SECOND = (0.0, -1 / 12, 16 / 12, -30 / 12, 16 / 12, -1 / 12, 0.0)
 SECOND = (2 / 180, -27 / 180, 270 / 180, -490 / 180, 270 / 180, -27 / 180, 2 / 180)
 
 
@@ -213,25 +217,56 @@ def held_slopes(work, V, a, n, n_z, n_lam, per, states, r, holds, c_k, own):
 def law_rates(model, work, c, rate, bias):
     """Write the rates of what element c holds, and the second rates at zero u_dot, of its rows of multipliers.
 
-    From the values along the motion with the accelerations of `work.markers.bias`: differences of sixth order.
+    From the values along the motion with the accelerations of `work.markers.bias`: differences of sixth order, by
+    steps in which neither the motion nor the time changes the law much. Where the time over which it changes is not
+    known, steps grow from short ones to those that rounding and the order of the differences disturb least.
     """
     i, a, w0 = model.connections.item[c], model.connections.a[c], model.connections.w0[c]
     size = model.connections.size[c]
     laws = model.laws
-    n, n_z, n_lam = laws.head[i, 0], laws.head[i, 2], laws.head[i, 3]
+    n, n_lam = laws.head[i, 0], laws.head[i, 3]
     is_held = False
     for k in range(w0 + size - n_lam, w0 + size):
         rate[k], bias[k] = 0.0, 0.0
         is_held = is_held or model.rows.holds[k] != NOTHING
     if not is_held:
         return
-    law_values(model, work, c)
     fastest = 0.0
     for m in range(a, a + n):
         b = work.markers.bias[m]
         fastest = max(fastest, norm(vector(work.markers.v[m])) / laws.length[i], norm(vector(work.markers.omega[m])))
         fastest = max(fastest, (norm(vector(b)) / laws.length[i]) ** 0.5, norm(vector(b[3:])) ** 0.5)
-    h = REACH / max(fastest, 1.0)
+    if laws.time[i] > 0.0:
+        fastest = max(fastest, 1.0 / laws.time[i])
+        rates_by_steps(model, work, c, REACH / (fastest if fastest > 0.0 else 1.0), rate, bias)
+        return
+    far = laws.length[i]
+    for m in range(a, a + n):
+        far = max(far, norm(vector(work.markers.r[m])))
+    h = SHORTEST * REACH / max(fastest, 1.0)
+    best, h_best = math.inf, h
+    for _ in range(MOST_LEVELS):
+        if h * fastest > REACH:
+            break
+        error = rates_by_steps(model, work, c, h, rate, bias) + ROUNDING * far / (h * h)
+        if error > best:
+            break
+        best, h_best = error, h
+        h *= LONGER
+    rates_by_steps(model, work, c, h_best, rate, bias)
+
+
+@inner
+def rates_by_steps(model, work, c, h, rate, bias):
+    """Write the differences of `law_rates` by steps of h; return how far those of fourth order are from them [g/s²]."""
+    i, a, w0 = model.connections.item[c], model.connections.a[c], model.connections.w0[c]
+    size = model.connections.size[c]
+    laws, fourth = model.laws, work.laws.slopes  # which derivatives overwrite
+    n, n_z, n_lam = laws.head[i, 0], laws.head[i, 2], laws.head[i, 3]
+    for j in range(n_lam):
+        rate[w0 + size - n_lam + j], bias[w0 + size - n_lam + j] = 0.0, 0.0
+        fourth[2 * j], fourth[2 * j + 1] = 0.0, 0.0
+    law_values(model, work, c)
     first_state = 1 + n * laws.head[i, 1]
     for p in range(7):
         e = (p - 3) * h
@@ -253,13 +288,23 @@ def law_rates(model, work, c, rate, bias):
         law_call(model, work, i, work.laws.trial)
         for j in range(n_lam):
             k, value = w0 + size - n_lam + j, work.laws.trial[6 * n + n_z + j]
+            fourth[2 * j] += FOURTH_FIRST[p] * value / h
             if model.rows.holds[k] == POSITION:
                 rate[k] += FIRST[p] * value / h
                 bias[k] += SECOND[p] * value / (h * h)
+                fourth[2 * j + 1] += FOURTH_SECOND[p] * value / (h * h)
             elif model.rows.holds[k] == VELOCITY:
                 bias[k] += FIRST[p] * value / h
                 if p == 3:
                     rate[k] = value
+    error = 0.0
+    for j in range(n_lam):
+        k = w0 + size - n_lam + j
+        if model.rows.holds[k] == POSITION:
+            error = max(error, abs(fourth[2 * j] - rate[k]) / h, abs(fourth[2 * j + 1] - bias[k]))
+        elif model.rows.holds[k] == VELOCITY:
+            error = max(error, abs(fourth[2 * j] - bias[k]))
+    return error
 
 
 @inner

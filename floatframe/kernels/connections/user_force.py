@@ -22,8 +22,9 @@ __all__ = [
     "user_outputs",
 ]  # fmt: skip
 
-STEP = 1e-7  # of differences of users' functions, relative
-LEAST_STEP = 1e-9
+STEP = 1e-7  # of differences of users' functions, relative to the sizes of coordinates and states
+LEAST_STEP = 1e-9  # of states
+ROUNDING = 2e-15  # of a number, below which a step is lost in it
 
 
 @inner
@@ -80,18 +81,27 @@ def user_gradients(model, work, c):
             f, gradient = model.users.tape0[u] + j, work.users.gradients[j * n_in : (j + 1) * n_in]
             tape_gradient(model.tapes, model.functions, f, work.users.inputs, work.tapes, gradient)
         return n, n_in, n_out
-    for k in range(n_in):
+    first = model.elements.coordinate0[element_of(model, c)]
+    for k in range(1, n_in):  # nothing takes those by the time
         here = work.users.inputs[k]
-        step = max(STEP * abs(here), LEAST_STEP)
-        work.users.inputs[k] = here + step
+        if k <= n:
+            step = STEP * model.coordinates.size[first + k - 1]
+        elif k <= 2 * n:
+            step = STEP * model.coordinates.speed[first + k - 1 - n]
+        else:
+            step = max(STEP * abs(here), LEAST_STEP)
+        step = max(step, ROUNDING * abs(here))
+        above, below = here + step, here - step
+        work.users.inputs[k] = above
         call_user_function(model.users.address[u], work.users.inputs, work.users.trial)
-        work.users.inputs[k] = here - step
+        work.users.inputs[k] = below
         for j in range(n_out):
             work.users.gradients[j * n_in + k] = work.users.trial[j]
         call_user_function(model.users.address[u], work.users.inputs, work.users.trial)
         work.users.inputs[k] = here
         for j in range(n_out):
-            work.users.gradients[j * n_in + k] = (work.users.gradients[j * n_in + k] - work.users.trial[j]) / (2 * step)
+            change = work.users.gradients[j * n_in + k] - work.users.trial[j]
+            work.users.gradients[j * n_in + k] = change / (above - below)
     return n, n_in, n_out
 
 

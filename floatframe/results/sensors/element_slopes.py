@@ -24,7 +24,8 @@ def output_rows(placed: PlacedLaw, small: SmallMotions) -> Rows:
             motion.append(markers.acceleration[model.markers.accelerated[m]])
     unknown = [*placed.states, *placed.multipliers]
     inputs = np.concatenate([[float(work.state.time)], *motion, work.state.w[unknown]])
-    slopes = difference_slopes(placed.value.address, placed.head, placed.law.data, inputs)[placed.n_out :]
+    slopes = difference_slopes(placed.value.address, placed.head, placed.law.data, inputs, placed.sizes)
+    slopes = slopes[placed.n_out :]
     raise_errors_of([placed.value])
     parts = []
     for marker in placed.markers:

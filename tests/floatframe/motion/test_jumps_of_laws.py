@@ -200,7 +200,7 @@ def test_a_square_wave_is_cut_at_every_edge():
     system = user_force("7*sign(sin(w*t))", parameters={"w": 50 * np.pi})
     times = jump_times(system, 0.001, 0.0073, 96)
     assert_allclose(times, 0.02 * np.arange(1, 36), rtol=1e-12)
-    assert 0.0 < jump_times(system, 0.0, 0.0073, 96)[0] < 1e-300  # the sign of the sine is 0 at t = 0 alone
+    assert 0.0 < jump_times(system, 0.0, 0.0073, 96)[0] < 1e-30  # the sign of the sine is 0 at t = 0 alone
     motion = integrate(system, GeneralizedAlpha(0.8), 0.69, 0.0073)
     assert_allclose(speed_along(motion), 7 * 0.01 / MASS, rtol=1e-5)
 
