@@ -141,6 +141,7 @@ def _sections(deck: Deck) -> dict[str, Any]:
         else:
             row |= {"material": shell.material, "thickness": shell.thickness}
         row |= {"offset": shell.offset} if shell.offset else {}
+        row |= {key: value for key in ("bending_ratio", "shear_ratio") if (value := getattr(shell, key)) != 1.0}
         row |= {"added_mass": shell.added_mass} if shell.added_mass else {}
         tables["shells"][_free(tables["shells"], shell.group)] = row
     for line in deck.lines:
@@ -171,6 +172,7 @@ def _attached(deck: Deck) -> dict[str, Any]:
         row = {"nodes": list(spring.nodes), "stiffness": list(spring.stiffness)}
         row |= {"damping": list(spring.damping)} if spring.damping else {}
         row |= {"triad": [list(axis) for axis in spring.triad]} if spring.triad else {}
+        row |= {"point": list(spring.point)} if spring.point else {}
         tables["springs"][f"spring_{k}"] = row
     for link in deck.rigid:
         row = {"node": link.node, "followers": link.followers}

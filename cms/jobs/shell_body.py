@@ -83,7 +83,10 @@ def shell_properties_of(job: Job) -> "dict[str, AnyShellProperty]":
         name = shell.material or next(iter(job.materials))
         table = job.materials[name]
         material = isotropic_of(name, table, "shells of one thickness (not of layers)")
-        item = ShellProperty(shell.thickness, material, offset=shell.offset, added_mass=shell.added_mass)
+        item = ShellProperty(
+            shell.thickness, material, offset=shell.offset, added_mass=shell.added_mass,
+            bending_ratio=shell.bending_ratio, shear_ratio=shell.shear_ratio,
+        )  # fmt: skip
         made |= dict.fromkeys(shell.cells, item)
     return made
 
@@ -97,7 +100,10 @@ def _laminate_of(job: Job, shell: ShellSection) -> "AnyShellProperty":
         layers.append(Layer(material_of(name, job.materials[name]), layer.thickness, layer.angle))
     assert shell.direction is not None  # the job has checked it
     stack = symmetric(layers) if shell.symmetric else tuple(layers)
-    return LaminateProperty(stack, shell.direction, offset=shell.offset, added_mass=shell.added_mass)
+    return LaminateProperty(
+        stack, shell.direction, offset=shell.offset, added_mass=shell.added_mass,
+        bending_ratio=shell.bending_ratio, shear_ratio=shell.shear_ratio,
+    )  # fmt: skip
 
 
 def shell_interface_of(name: str, section: InterfaceSection, mesh: "ShellMesh") -> Interface:

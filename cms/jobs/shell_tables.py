@@ -39,6 +39,12 @@ class ShellSection(Table):
     material: Name | None = Field(None, description="the name of a material; default: the only one")
     offset: float = Field(0.0, description="a number, of the middle surface from the nodes along the normal")
     added_mass: Annotated[float, Field(ge=0)] = Field(0.0, description="a number, 0 or more [mass / length^2]")
+    bending_ratio: Annotated[float, Field(gt=0)] = Field(
+        1.0, description="a number above 0: stiffness in bending over that of a plate of this thickness"
+    )
+    shear_ratio: Annotated[float, Field(gt=0)] = Field(
+        1.0, description="a number above 0: stiffness in transverse shear over that of a plate of this thickness"
+    )
 
 
 def check_shells(

@@ -118,7 +118,8 @@ def shell_law(item: AnyShellProperty) -> ShellLaw:
         for x, w in zip(points, weights, strict=True):
             F = flow(c + h / 2 * x, k)
             flexibility += w * h / 2 * F.T @ G_inv @ F
-    H = np.linalg.inv(flexibility)
+    H = item.shear_ratio * np.linalg.inv(flexibility)
+    D, third = item.bending_ratio * D, item.bending_ratio * third
     rho_t = np.array([layer.material.rho for layer in layers]) * t
     mass = float(rho_t.sum()) + item.added_mass
     centre = float(rho_t @ middle) / mass

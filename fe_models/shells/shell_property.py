@@ -28,10 +28,13 @@ class ShellProperty:
     material: Material
     offset: float = 0.0  #: of the middle surface from the nodes, along the normal of the cell [m]
     added_mass: float = 0.0  #: per area, without stiffness, spread through the thickness [kg/m²]
+    bending_ratio: float = 1.0  #: stiffness in bending over that of a plate of this thickness (ribs, honeycomb)
+    shear_ratio: float = 1.0  #: stiffness in transverse shear over that of a plate of this thickness
 
     def __post_init__(self) -> None:
         require_isotropic("shell property", self.material)
         _require_numbers("shell property", self, ("thickness", "offset", "added_mass"))
+        _require_ratios("shell property", self)
         if not self.thickness > 0:
             raise ShellError(f"shell property: thickness: expected a length above zero, got {self.thickness}")
         if self.added_mass < 0:
@@ -90,6 +93,8 @@ class LaminateProperty:
     direction: tuple[float, float, float]  #: mesh axes; projected on a cell it is the first axis of the layup
     offset: float = 0.0  #: of the middle surface from the nodes, along the normal of the cell [m]
     added_mass: float = 0.0  #: per area, without stiffness, spread through the thickness [kg/m²]
+    bending_ratio: float = 1.0  #: stiffness in bending over that of the layer; 1 where there are several
+    shear_ratio: float = 1.0  #: stiffness in transverse shear over that of the layers
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "layers", tuple(self.layers))
@@ -102,6 +107,12 @@ class LaminateProperty:
             raise ShellError("laminate: direction: expected a vector that is not zero, such as (1, 0, 0)")
         object.__setattr__(self, "direction", tuple(float(x) for x in direction))
         _require_numbers("laminate", self, ("offset", "added_mass"))
+        _require_ratios("laminate", self)
+        if self.bending_ratio != 1 and len(self.layers) > 1:
+            raise ShellError(
+                f"laminate: bending_ratio: expected 1 with several layers, got {self.bending_ratio}; it does not say "
+                "how they couple membrane and bending"
+            )
         if self.added_mass < 0:
             raise ShellError(f"laminate: added_mass: expected zero or more, got {self.added_mass}")
 
@@ -129,6 +140,13 @@ def _require_numbers(where: str, item: object, names: tuple[str, ...]) -> None:
         value = getattr(item, name)
         if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
             raise ShellError(f"{where}: {name}: expected a finite number, got {value!r}")
+
+
+def _require_ratios(where: str, item: object) -> None:
+    for name in ("bending_ratio", "shear_ratio"):
+        _require_numbers(where, item, (name,))
+        if not getattr(item, name) > 0:
+            raise ShellError(f"{where}: {name}: expected a number above zero, got {getattr(item, name)}")
 
 
 def assign_shell_properties(

@@ -1,4 +1,4 @@
-"""Cards of Nastran's bulk data: free, small and large fields, continuations joined."""
+"""Cards of Nastran's bulk data: free, small and large fields, continuations joined, replicated cards written out."""
 
 import re
 from collections.abc import Iterator
@@ -9,6 +9,9 @@ from fe_models.errors import MeshError
 __all__ = ["Card", "read_cards"]
 
 SMALL, LARGE = (8, 8), (16, 4)  #: width and number of the data fields of a line
+MOST_REPEATED = 1_000_000  #: cards that one line may stand for
+INCREMENT = re.compile(r"\*\(?([^()]+)\)?$")  #: of a replicated field, *(2) or *2
+REPEATED = re.compile(r"=\(?(\d+)\)?$")  #: how many more cards, =(8) or =8
 EXPONENT = re.compile(r"(?<=[\d.])([+-]\d+)$")  #: of a real without its letter, 1.5-3
 
 
@@ -73,20 +76,35 @@ def read_cards(where: str, text: str) -> Iterator[Card]:
     ------
     MeshError
         If a continuation has no card before it, or does not carry the mark that its card asks for, a line has too many
-        fields, or cards are replicated.
+        fields, or a replicated card has none before it.
     """
     lines = text.splitlines()
     begin = next((k for k, line in enumerate(lines) if line.lstrip()[:5].upper() == "BEGIN"), -1)
     name, here, mark = "", "", ""
     fields: list[str] = []
+    steps: list[str] = []  # fields of the last replicated card, which =(n) applies again
     for number, raw in enumerate(lines[begin + 1 :], start=begin + 2):
         line = raw.partition("$")[0].rstrip()
         if not line:
             continue
         if line.lstrip()[:7].upper() == "ENDDATA":
             break
+        if line.lstrip()[:6].upper() == "DEQATN" or (name == "DEQATN" and line[0] in " +*,"):  # text, not fields
+            if name and name != "DEQATN":
+                yield Card(name, tuple(fields), here)
+            name, here, fields, mark = "DEQATN", f"{where}, line {number}: DEQATN", [], ""
+            continue
         if line[0] == "=":
-            raise MeshError(f"{where}, line {number}: replicated cards (=) are not read; write them out")
+            here = f"{where}, line {number}"
+            first, data, mark, _ = _fields(line)
+            again = REPEATED.fullmatch(first) if first != "=" else None
+            if not name or (again and not steps) or (again and int(again[1]) > MOST_REPEATED):
+                raise MeshError(f"{here}: expected a card before what is replicated, and at most {MOST_REPEATED} of it")
+            steps = steps if again else data
+            for _ in range(int(again[1]) if again else 1):
+                yield Card(name, tuple(fields), here)
+                fields = _replicated(here, fields, steps)
+            continue
         first, data, following, beyond = _fields(line)
         if beyond:
             raise MeshError(
@@ -96,7 +114,7 @@ def read_cards(where: str, text: str) -> Iterator[Card]:
             if not name:
                 raise MeshError(f"{where}, line {number}: a continuation without a card before it: {line[:40]!r}")
             own, asked = first.strip("+* "), mark.strip("+* ")
-            if own and asked and own != asked:
+            if own and asked and own not in (asked, mark[1:]):  # the first letter of a mark does not count
                 raise MeshError(
                     f"{here}: asks for the continuation {asked!r}, but line {number} has {own!r}; write continuations "
                     "in sequence"
@@ -105,12 +123,34 @@ def read_cards(where: str, text: str) -> Iterator[Card]:
         else:
             if name:
                 yield Card(name, tuple(fields), here)
-            name = first.rstrip("*").upper()
+            name = first.rstrip("* ").upper()
             here = f"{where}, line {number}: {name}"
             fields = data
         mark = following
     if name:
         yield Card(name, tuple(fields), here)
+
+
+def _replicated(here: str, fields: list[str], steps: list[str]) -> list[str]:
+    """Return the fields of the next card: = takes that of the card before, == also all behind it, *(x) adds x."""
+    made: list[str] = []
+    for k, word in enumerate(steps):
+        before = fields[k] if k < len(fields) else ""
+        if word == "==":
+            return [*made, *fields[k:]]
+        step = INCREMENT.fullmatch(word)
+        if word == "=":
+            made.append(before)
+        elif step is None:
+            made.append(word)
+        else:
+            try:
+                is_whole = before.lstrip("+-").isdigit() and step[1].lstrip("+-").isdigit()
+                value = int(before) + int(step[1]) if is_whole else real_of(before or "0") + real_of(step[1])
+            except ValueError:
+                raise MeshError(f"{here}: {word}: expected a number in the card before, got {before!r}") from None
+            made.append(repr(value))
+    return made
 
 
 def _fields(line: str) -> tuple[str, list[str], str, str]:

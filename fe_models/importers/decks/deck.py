@@ -78,6 +78,8 @@ class ShellSection:
     layers: tuple[DeckLayer, ...] = ()  #: bottom to top
     direction: Vector = (1.0, 0.0, 0.0)  #: projected on the shell, angle 0 of layers
     orientation: str = ""  #: name of the axes of its material; while a deck is read
+    bending_ratio: float = 1.0  #: stiffness in bending over that of the material and thickness
+    shear_ratio: float = 1.0  #: stiffness in transverse shear, likewise
 
     @property
     def materials(self) -> tuple[str, ...]:
@@ -126,6 +128,7 @@ class DeckSpring:
     stiffness: tuple[float, ...]  #: along and about x, y, z of the triad
     damping: tuple[float, ...] | None = None
     triad: tuple[Vector, Vector, Vector] | None = None  #: rows: its axes in basic axes; None: basic axes
+    point: Vector | None = None  #: where it acts; None: midway between its nodes
 
 
 @dataclass(frozen=True)

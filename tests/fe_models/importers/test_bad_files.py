@@ -529,7 +529,7 @@ CONM2,77,4,,3.5
         ("CTETRA,1", "CTETRX,1", "unknown solid element"),
         ("GRID,2,,1.,0.,0.", "GRID,2,,1.,x,0.", "field 5: expected a real number, got 'x'"),
         ("GRID,2", "GRID,two", "field 2: expected an integer, got 'two'"),
-        ("GRID,1", "=,*1\nGRID,1", "replicated cards"),
+        ("GRID,1", "=,*1\nGRID,1", "expected a card before what is replicated"),
         ("BEGIN BULK\n", "BEGIN BULK\n+,1,2\n", "continuation without a card"),
         ("ENDDATA", "BEGIN SUPER=2\nENDDATA", "a deck of several superelements"),
         ("CTETRA,1,1,1,2,3,4", "CTETRA,1,1,1,2,3,4,,,+A\n+B,", "asks for the continuation 'A', but line 7 has 'B'"),

@@ -28,8 +28,32 @@ SOLIDS = {
 }
 _DOFS = {"UX": 0, "UY": 1, "UZ": 2, "ROTX": 3, "ROTY": 4, "ROTZ": 5}
 _FORCES = {"FX": 0, "FY": 1, "FZ": 2, "MX": 3, "MY": 4, "MZ": 5}
-_BODY = ("CP", "CE", "CERIG", "RBE3", "TB", "TBDATA", "SECTYPE", "SECDATA", "RLBLOCK", "R", "EDGE", "SFE")
-_SILENT = re.compile(r"(/|\*|N$|NUMOFF|ET$|KEYOP|DOF|MPTEMP|EXTOPT|SHPP|FINISH|TREF|BFUNIF|ALPHAD|BETAD|DMPRAT|CRPLIM)")
+#: element -> number of KEYOPT -> its values, and the integration that each means; "": as without it
+KEYOPTS: dict[int, dict[int, dict[int, str]]] = {
+    185: {2: {0: "", 2: "", 3: ""}},
+    186: {2: {0: "reduced", 1: "full"}},
+    187: {},
+}
+OUTPUT_KEYOPTS = (4, 5, 8, 9, 10, 15)  #: output, layers, boundary layers of waves: they change no mass or stiffness
+#: commands that say nothing about the body: structure of the file, loads and controls of an analysis
+HARMLESS = frozenset(
+    "ACEL ACELL ANTYPE AUTOTS BF BFE BFBLOCK BFEBLOCK BFUNIF CGLOC CGOMEGA CGOMGA CLOCAL CLWRITE CM CMDELE CMGRP "
+    "CMOMEGA CMSEL CNVTOL CRPLIM CS CSCIR CSDELE CSYS DCGOMG DELTIM DOF DOMEGA DSYS EBLOCK EMODIF EPLOT EQSLV "
+    "ERESX ERNORM ESEL ESYS ETCONTROL EXPASS EXTOPT FINI FINISH FREQ HARFRQ HROPT IC ICROTB INISTATE IRLF KBC "
+    "KUSE LOCAL LSCLEAR LSWRITE LVSCALE MAT MODCONTROL MODOPT MPTEMP MPTRES MXPAND N NBLOCK NCNV NEQIT NLGEOM "
+    "NLHIST NROPT NSEL NSUBST NUMOFF OMEGA OUTPR OUTRES PRED PSTRES QRDOPT RESCONTROL REAL SAVE SECNUM SHPP "
+    "SOLCONTROL SOLUTION SOLVE SSTIF SYNCHRO TIME TIMINT TINTP TOFFST TREF TRNOPT TUNIF TYPE USRCAL VSWEEP".split()
+)
+DAMPING = ("ALPHAD", "BETAD", "DMPRAT", "DMPSTR", "DMPSTRUCT", "MDAMP")
+DAMPING_LABELS = ("DMPR", "DMPS", "ALPD", "BETD")
+ISOTROPIC = ("EX", "PRXY", "NUXY", "DENS")
+ORTHOTROPIC = ("EY", "EZ", "PRXZ", "PRYZ", "NUXZ", "NUYZ", "GXY", "GXZ", "GYZ")
+#: labels of MP that change no mass or stiffness: thermal expansion, friction, heat, electromagnetics
+OTHER_LABELS = (
+    "ALPX", "ALPY", "ALPZ", "CTEX", "CTEY", "CTEZ", "THSX", "THSY", "THSZ", "REFT", "MU", "KXX", "KYY", "KZZ", "C",
+    "ENTH", "HF", "EMIS", "QRATE", "VISC", "SONC", "RSVX", "RSVY", "RSVZ", "PERX", "PERY", "PERZ", "MURX", "MURY",
+    "MURZ", "LSST", "LSSM", "MGXX", "MGYY", "MGZZ",
+)  # fmt: skip
 
 
 @dataclass
@@ -42,7 +66,9 @@ class _Draft:
     elements: list[list[int]] = field(default_factory=list)  #: columns of each, then its nodes
     kinds: dict[int, int] = field(default_factory=dict)  #: number of the type -> element of ANSYS
     components: dict[str, tuple[str, IntArray]] = field(default_factory=dict)
-    constants: dict[int, dict[str, float]] = field(default_factory=dict)  #: material -> label -> value
+    #: material -> label -> values by their place in the table of temperatures
+    constants: dict[int, dict[str, dict[int, float]]] = field(default_factory=dict)
+    keyopts: dict[int, dict[int, int]] = field(default_factory=dict)  #: number of the type -> KEYOPT -> value
     held: dict[int, set[int]] = field(default_factory=dict)
     forces: dict[int, Array] = field(default_factory=dict)
 
@@ -137,21 +163,41 @@ def _command(name: str, words: list[str], draft: _Draft, line: int) -> None:
     """Take one command, or count it."""
     if name == "ET" and len(words) > 2 and words[1].isdigit():
         draft.kinds[int(words[1])] = int(re.sub(r"\D", "", words[2]))
-    elif name == "MPDATA" and len(words) > 6:  # MPDATA,R5.0, 1,EX  ,       1, 1, value
-        draft.constants.setdefault(int(words[4]), {})[words[3].upper()] = float(words[6])
+    elif name == "MPDATA" and len(words) > 6:  # MPDATA,R5.0, 1,EX  ,       1, 1, value, value, value
+        table = draft.constants.setdefault(int(words[4]), {}).setdefault(words[3].upper(), {})
+        table |= {int(words[5]) + k: float(word) for k, word in enumerate(words[6:]) if word}
     elif name == "MP" and len(words) > 3:
-        draft.constants.setdefault(int(words[2]), {})[words[1].upper()] = float(words[3])
+        draft.constants.setdefault(int(words[2]), {})[words[1].upper()] = {1: float(words[3])}
+        if any(float(word) for word in words[4:] if word):
+            draft.ledger.refuse("MP", f"{words[1]} is a polynomial of the temperature", line=line)
+    elif name in ("KEYOP", "KEYOPT") and len(words) > 3 and words[1].isdigit():
+        draft.keyopts.setdefault(int(words[1]), {})[int(words[2])] = int(float(words[3] or 0))
+    elif name in DAMPING:
+        if len(words) > 1 and any(float(word) for word in words[1:] if _is_number(word)):
+            why = f"damping ({', '.join(words[1:])}) is left out: give the job a table [damping]"
+            draft.ledger.note(name, why, line=line)
+    elif name == "LUMPM":
+        if len(words) > 1 and words[1].upper() not in ("", "0", "OFF"):
+            draft.ledger.refuse(name, "lumped mass: here it is consistent", line=line)
+    elif name == "SFE" and len(words) > 3 and words[3].upper() == "PRES":
+        draft.ledger.note(name, "pressure on faces: no load case of a deck has it", line=line)
     elif name == "D" and words[1].isdigit():
         labels = list(_DOFS) if words[2].upper() == "ALL" else [words[2].upper()]
         draft.held.setdefault(int(words[1]), set()).update(_DOFS[label] for label in labels if label in _DOFS)
     elif name == "F" and words[1].isdigit() and words[2].upper() in _FORCES:
         draft.forces.setdefault(int(words[1]), np.zeros(6))[_FORCES[words[2].upper()]] += float(words[3])
-    elif name in _BODY:
-        draft.ledger.refuse(
-            name, "couplings, tables of materials, sections and real constants are not known here", line=line
-        )
-    elif not _SILENT.match(name) and not name.startswith(("_", "(")) and name.isalnum():
+    elif name in HARMLESS:
         draft.ledger.note(name, "belongs to the analysis, not to the body", line=line)
+    elif not name.startswith(("/", "*", "_", "(", "-")) and name.isalnum() and not name[0].isdigit():
+        draft.ledger.refuse(name, "this command is not known here", line=line)
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
 
 
 def _deck(path: Path, draft: _Draft) -> Deck:
@@ -170,10 +216,14 @@ def _deck(path: Path, draft: _Draft) -> Deck:
             draft.ledger.refuse(f"element {kind or 'of type ' + str(row[1])}", "this element is not known here")
             continue
         shape, nodes = _shape(draft.where, kind, row)
-        group = f"mat_{row[0]}_solid{kind}"
+        group = f"mat_{row[0]}_solid{kind}" + ("" if _plain_type(draft, row[1]) else f"_type_{row[1]}")
         integration, mass, different = SOLIDS[kind]
+        integration = _integration(draft, row[1], kind) or integration
         if different:
             draft.ledger.note(f"SOLID{kind}", different)
+        if row[4] and any(label in draft.constants.get(row[0], {}) for label in ORTHOTROPIC):
+            why = f"orthotropic material {row[0]} along element system {row[4]} (ESYS): only along basic axes"
+            draft.ledger.refuse(f"SOLID{kind}", why)
         sections[group] = SolidSection(group, str(row[0]), integration, mass)
         listed = cells.setdefault((shape, group), ([], []))
         listed[0].append(row[10])
@@ -204,7 +254,11 @@ def _deck(path: Path, draft: _Draft) -> Deck:
             sets[f"node_{number}"] = _rows(numbers, order, np.array([number]))
             given[f"node_{number}"] = tuple(force.tolist())
         loads.append(Load("forces", forces=given))
-    materials = {str(number): _material(draft, number, labels) for number, labels in draft.constants.items()}
+    used_materials = {row[0] for row in draft.elements}
+    materials = {
+        str(number): _material(draft, number, labels, number in used_materials)
+        for number, labels in draft.constants.items()
+    }
     return Deck(
         path,
         "ansys",
@@ -217,11 +271,53 @@ def _deck(path: Path, draft: _Draft) -> Deck:
     )
 
 
-def _material(draft: _Draft, number: int, labels: dict[str, float]) -> DeckMaterial:
+def _plain_type(draft: _Draft, number: int) -> bool:
+    """Whether the element type has no KEYOPT that chooses its integration."""
+    return not any(key == 2 and value for key, value in draft.keyopts.get(number, {}).items())
+
+
+def _integration(draft: _Draft, number: int, kind: int) -> str:
+    """Return the integration that KEYOPT of an element type chooses, empty for the usual one; others are refused."""
+    chosen = ""
+    for key, value in draft.keyopts.get(number, {}).items():
+        known = KEYOPTS[kind].get(key, {0: ""})
+        if value in known:
+            chosen = known[value] or chosen
+        elif key not in OUTPUT_KEYOPTS:
+            draft.ledger.refuse(f"KEYOPT({key}) = {value} of SOLID{kind}", "this formulation is not known here")
+    return chosen
+
+
+def _material(draft: _Draft, number: int, tables: dict[str, dict[int, float]], is_used: bool) -> DeckMaterial:
+    """Return a material at the first temperature of its tables.
+
+    ANSYS takes EY, EZ = EX, PRXY = 0.3, PRXZ, PRYZ = PRXY and G = E/(2 (1 + nu)) where they are not given; PR are the
+    major ratios, nu_xy/E_x = nu_yx/E_y, and NU the minor ones, PR_xy = NU_xy E_x/E_y.
+    """
+    labels = {label: table[min(table)] for label, table in tables.items() if table}
+    for label, table in tables.items() if is_used else ():
+        if label in (*ISOTROPIC, *ORTHOTROPIC) and len(set(table.values())) > 1:
+            why = f"material {number} depends on temperature, {len(table)} values: the first is taken"
+            draft.ledger.note(f"MPDATA, {label}", why)
+        elif label in DAMPING_LABELS and any(table.values()):
+            draft.ledger.note(f"MPDATA, {label}", f"damping of material {number} is left out: give a table [damping]")
+        elif label not in (*ISOTROPIC, *ORTHOTROPIC, *DAMPING_LABELS, *OTHER_LABELS):
+            draft.ledger.refuse(f"MPDATA, {label}", f"material {number}: this property is not known here")
     young = labels.get("EX")
-    if any(labels.get(label, young) != young for label in ("EY", "EZ")):
-        draft.ledger.refuse("MPDATA, EY", f"material {number} is orthotropic: only isotropic materials")
-    return DeckMaterial(str(number), young, labels.get("PRXY", labels.get("NUXY", 0.3)), labels.get("DENS"))
+    if young is not None and is_used and not {"PRXY", "NUXY"} & set(labels):
+        draft.ledger.note("MPDATA, PRXY", f"material {number} has none: 0.3, as ANSYS takes it")
+    if young is None or not any(label in labels for label in ORTHOTROPIC):
+        return DeckMaterial(str(number), young, labels.get("PRXY", labels.get("NUXY", 0.3)), labels.get("DENS"))
+    E = (young, labels.get("EY", young), labels.get("EZ", young))
+    pairs = {"XY": (0, 1), "XZ": (0, 2), "YZ": (1, 2)}
+    nu, G = [], []
+    for pair, (a, b) in pairs.items():
+        major = labels.get(f"PR{pair}")
+        if major is None and f"NU{pair}" in labels:
+            major = labels[f"NU{pair}"] * E[a] / E[b]
+        nu.append(nu[0] if major is None and nu else 0.3 if major is None else major)
+        G.append(labels.get(f"G{pair}", E[a] / (2 * (1 + nu[-1]))))
+    return DeckMaterial(str(number), E, (nu[0], nu[1], nu[2]), labels.get("DENS"), (G[0], G[1], G[2]))
 
 
 def _shape(where: str, kind: int, row: list[int]) -> tuple[str, list[int]]:
@@ -238,8 +334,9 @@ def _shape(where: str, kind: int, row: list[int]) -> tuple[str, list[int]]:
         return ("tetra10", [*n[:3], n[4], n[8], n[9], n[11], *n[16:19]]) if is_quadratic else ("tetra", [*n[:3], n[4]])
     if n[2] == n[3] and n[6] == n[7]:
         corners = [*n[:3], *n[4:7]]
-        middles = [n[8], n[9], n[11], n[12], n[13], n[15], *n[16:19]]
-        return ("wedge15", [*corners, *middles]) if is_quadratic else ("wedge", corners)
+        if not is_quadratic:
+            return "wedge", corners
+        return "wedge15", [*corners, n[8], n[9], n[11], n[12], n[13], n[15], *n[16:19]]
     return ("hexahedron20", n[:20]) if is_quadratic else ("hexahedron", n[:8])
 
 

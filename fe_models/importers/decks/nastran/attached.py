@@ -4,8 +4,9 @@ import numpy as np
 
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.components import MOTION_COMPONENTS
 from fe_models.importers.bulk_data.cards import Card, real_of
-from fe_models.importers.decks.deck import Coupling, DeckMass, DeckSpring, Equation, Load, RigidGroup, Support
+from fe_models.importers.decks.deck import Coupling, DeckMass, DeckSpring, Equation, Load, RigidGroup, Support, Vector
 from fe_models.importers.decks.nastran.model import NastranModel, components_of, numbers_of
 from fe_models.meshes.cell_shapes import CELL_SHAPES
 
@@ -20,17 +21,18 @@ def read_attached(model: NastranModel) -> None:
     """Take what is attached to grid points, what couples them, what holds and what loads them."""
     for card in model.of("CONM2"):
         _mass(model, card)
+    _scalar_masses(model)
     for card in model.of("CBUSH"):
         _bush(model, card)
-    for card in model.of("CELAS1", "CELAS2"):
+    for card in model.of("CELAS1", "CELAS2", "CDAMP1", "CDAMP2"):
         _scalar_spring(model, card)
-    model.of("PBUSH", "PELAS")
+    for card in model.of("CVISC"):
+        _axial_damper(model, card)
     for card in model.of("RBE2", "RBAR"):
         _rigid(model, card)
     for card in model.of("RBE3"):
         _mean(model, card)
-    for card in model.of("MPC"):
-        _equation(model, card)
+    _equations(model)
     _supports(model)
     _loads(model)
 
@@ -48,25 +50,101 @@ def _mass(model: NastranModel, card: Card) -> None:
     model.masses.append(DeckMass(model.group(card, [node]), card.real(4, 0.0) * model.wtmass, rows, where))
 
 
+def _scalar_masses(model: NastranModel) -> None:
+    """CMASS1 and CMASS2 of one grid point: the same mass along all three axes is a point mass; others are refused."""
+    along: dict[int, list[float]] = {}
+    counts: dict[int, int] = {}
+    for card in model.of("CMASS1", "CMASS2"):
+        m = card.real(2, 0.0) if card.name == "CMASS2" else model.property_value(card, "PMASS", 2)
+        if m is None:
+            model.ledger.refuse(card.name, f"names PMASS {card.text(2)}, which is not defined")
+            continue
+        ends = _scalar_ends(model, card)
+        grids = [end for end in ends if end is not None] if ends is not None else []
+        if len(grids) != 1 or grids[0][1] > 2:
+            why = "between two points, at a scalar point, or about an axis: no mass that moves with a body frame"
+            model.ledger.refuse(card.name, why)
+            continue
+        node, component = grids[0]
+        along.setdefault(node, [0.0, 0.0, 0.0])[component] += m * model.wtmass
+        counts[node] = counts.get(node, 0) + 1
+    for node, masses in along.items():
+        if len(set(masses)) > 1:
+            why = f"grid point {node} has another mass along each axis, {masses}: no body frame can move with it"
+            model.ledger.refuse("CMASS", why, count=counts[node])
+        else:
+            card = next(card for card in model.cards["GRID"] if card.integer(1) == node)
+            model.masses.append(DeckMass(model.group(card, [node]), masses[0]))
+
+
+def _scalar_ends(model: NastranModel, card: Card) -> list[tuple[int, int] | None] | None:
+    """Return (grid point, component) of both ends of a scalar element, None for the ground.
+
+    None in place of the list if a point is scalar.
+    """
+    ends: list[tuple[int, int] | None] = []
+    for k in (3, 5):
+        number, word = card.integer(k, 0), card.text(k + 1) or "0"
+        if number == 0:
+            ends.append(None)
+        elif number in model.points.positions and word in set("123456"):
+            ends.append((number, int(word) - 1))
+        else:
+            return None
+    return ends
+
+
+def _ground(model: NastranModel, card: Card, node: int, components: tuple[int, ...], what: str) -> None:
+    """Note an element to the ground: a body is free here, and gets an interface where it would be attached."""
+    words = ", ".join(MOTION_COMPONENTS[c] for c in components)
+    why = f"ties {words} of grid point {node} to the ground{what}; the body is free here: put it into the system file"
+    model.ledger.note(card.name, why)
+    model.grounded.setdefault(node, set()).update(components)
+
+
+def _axial_damper(model: NastranModel, card: Card) -> None:
+    """CVISC: a damper along and about the line between its grid points."""
+    number = card.integer(2, card.integer(1))
+    for known in model.of("PVISC"):
+        for k in (1, 5):
+            if known.text(k) and known.integer(k) == number:
+                along, about = known.real(k + 1, 0.0), known.real(k + 2, 0.0)
+                ends = [model.point(card, card.integer(n)) for n in (3, 4)]
+                R = _any_axes(ends[1] - ends[0])
+                names = [model.group(card, [card.integer(n)]) for n in (3, 4)]
+                damping = (along, 0.0, 0.0, about, 0.0, 0.0)
+                model.springs.append(DeckSpring((names[0], names[1]), (0.0,) * 6, damping, _rows(R)))
+                return
+    model.ledger.refuse("CVISC", f"names PVISC {number}, which is not defined")
+
+
+def _rows(axes: Array) -> tuple[Vector, Vector, Vector]:
+    """Return axes, (3, 3) columns, as rows of a deck."""
+    rows = [(float(a[0]), float(a[1]), float(a[2])) for a in axes.T]
+    return rows[0], rows[1], rows[2]
+
+
 def _bush(model: NastranModel, card: Card) -> None:
-    known = next(
-        (each for each in model.cards.get("PBUSH", ()) if each.integer(1) == card.integer(2, card.integer(1))), None
-    )
-    if known is None or not card.text(4) or card.text(4) == "0":
-        model.ledger.refuse("CBUSH", "without PBUSH, or to the ground: put it into the system file")
+    known = model.property_of(card, "PBUSH")
+    if known is None:
+        model.ledger.refuse("CBUSH", f"names PBUSH {card.text(2) or card.text(1)}, which is not defined")
         return
-    if card.text(10) or card.real(9, 0.5) != 0.5:
-        model.ledger.refuse("CBUSH", "acting elsewhere than midway between its grid points (S, OCID)")
+    if not card.integer(4, 0):
+        _ground(model, card, card.integer(3), ALL, f" by PBUSH {known.text(1)}")
         return
     k, b = [0.0] * 6, [0.0] * 6
     keys = {"K": k, "B": b}
     words = list(known.fields)
     for place in range(1, len(words), 8):
         key = words[place].upper()
-        if key in keys:
+        if key == "GE" and any(known.real(place + 2 + j, 0.0) for j in range(6)):
+            model.ledger.note("PBUSH", "structural damping GE is left out: give the job a table [damping]")
+        elif key == "M" and known.real(place + 2, 0.0):
+            model.ledger.refuse("PBUSH", f"M = {known.text(place + 2)}: mass of a bushing")
+        elif key in keys:
             keys[key][:] = [known.real(place + 2 + j, 0.0) for j in range(6)]
-        elif key:
-            model.ledger.note(f"PBUSH, {key}", "not taken over")
+        elif key not in ("", "GE", "M", "RCV", "T", "ALPHA"):
+            model.ledger.refuse("PBUSH", f"{key}: expected K, B, GE, M, RCV")
     ends = [model.point(card, card.integer(n)) for n in (3, 4)]
     has_length = bool(np.linalg.norm(ends[1] - ends[0]))
     is_round = all(row[1] == row[2] and row[4] == row[5] for row in (k, b))
@@ -83,8 +161,11 @@ def _bush(model: NastranModel, card: Card) -> None:
         return
     names = [model.group(card, [card.integer(n)]) for n in (3, 4)]
     damping = tuple(b) if any(b) else None
-    rows = tuple((float(a[0]), float(a[1]), float(a[2])) for a in triad.T)
-    model.springs.append(DeckSpring((names[0], names[1]), tuple(k), damping, (rows[0], rows[1], rows[2])))
+    point = None
+    if card.real(9, 0.5) != 0.5 and has_length:
+        at = ends[0] + card.real(9) * (ends[1] - ends[0])
+        point = (float(at[0]), float(at[1]), float(at[2]))
+    model.springs.append(DeckSpring((names[0], names[1]), tuple(k), damping, _rows(triad), point))
 
 
 def _bush_axes(model: NastranModel, card: Card, ends: list[Array]) -> Array | None:
@@ -117,28 +198,46 @@ def _any_axes(x: Array) -> Array:
 
 
 def _scalar_spring(model: NastranModel, card: Card) -> None:
-    """A spring between the same component of two grid points at one place."""
-    if card.name == "CELAS2":
-        k, (a, ca, b, cb) = card.real(2), (card.text(n) for n in (3, 4, 5, 6))
+    """A spring or damper between the same component of two grid points.
+
+    Two forces along an axis balance only on one line: the points must lie at one place, or apart along this axis. Two
+    moments always balance.
+    """
+    if card.name in ("CELAS2", "CDAMP2"):
+        value: float | None = card.real(2)
     else:
-        known = next(
-            (e for e in model.cards.get("PELAS", ()) if e.integer(1) == card.integer(2, card.integer(1))), None
+        value = model.property_value(
+            card, "PELAS" if card.name == "CELAS1" else "PDAMP", 4 if card.name == "CELAS1" else 2
         )
-        k = 0.0 if known is None else known.real(2)
-        a, ca, b, cb = (card.text(n) for n in (3, 4, 5, 6))
-    is_pair = a.isdigit() and b.isdigit() and int(a) in model.points.positions and int(b) in model.points.positions
-    if not is_pair or ca != cb or not ca.isdigit() or not 1 <= int(ca) <= 6:
-        model.ledger.refuse(card.name, "to the ground, to a scalar point, or between different components")
+    if value is None:
+        kind = card.name.replace("C", "P", 1).rstrip("1")
+        model.ledger.refuse(card.name, f"names {kind} {card.text(2)}, which is not defined")
         return
-    axes = [model.axes(int(n)) for n in (a, b)]
-    apart = np.abs(model.point(card, int(a)) - model.point(card, int(b))).max()
-    if apart > 0 or np.abs(axes[0] - axes[1]).max() > 1e-9:
-        model.ledger.refuse(card.name, "between grid points at different places, or of different axes")
+    ends = _scalar_ends(model, card)
+    if ends is None:
+        model.ledger.refuse(card.name, "to a scalar point")
         return
-    names = [model.group(card, [int(n)]) for n in (a, b)]
-    stiffness = tuple(k if c == int(ca) - 1 else 0.0 for c in range(6))
-    rows = tuple((float(v[0]), float(v[1]), float(v[2])) for v in axes[0].T)
-    model.springs.append(DeckSpring((names[0], names[1]), stiffness, triad=(rows[0], rows[1], rows[2])))
+    grids = [end for end in ends if end is not None]
+    if len(grids) < 2:
+        if grids:
+            _ground(model, card, grids[0][0], (grids[0][1],), f" with {value:g}")
+        return
+    (a, c), (b, c_b) = grids
+    if c != c_b:
+        model.ledger.refuse(card.name, "between different components, whose forces do not balance")
+        return
+    axes = [model.axes(node) for node in (a, b)]
+    apart = model.point(card, b) - model.point(card, a)
+    across = apart - (apart @ axes[0][:, c % 3]) * axes[0][:, c % 3]
+    if np.abs(axes[0] - axes[1]).max() > ALONG or (c < 3 and np.abs(across).max() > ALONG * np.abs(apart).max()):
+        model.ledger.refuse(
+            card.name, "between grid points of different axes, or apart across its direction: its forces do not balance"
+        )
+        return
+    names = [model.group(card, [node]) for node in (a, b)]
+    six, none = tuple(value if k == c else 0.0 for k in range(6)), (0.0,) * 6
+    stiffness, damping = (six, None) if card.name.startswith("CELAS") else (none, six)
+    model.springs.append(DeckSpring((names[0], names[1]), stiffness, damping, _rows(axes[0])))
 
 
 def _in_basic(model: NastranModel, nodes: list[int], components: tuple[int, ...]) -> bool:
@@ -156,13 +255,13 @@ def _rigid(model: NastranModel, card: Card) -> None:
         leader, components = card.integer(2), components_of(card, card.text(3))
         followers = [int(word) for word in _written_out(words)]
     else:
-        leader, followers = card.integer(2), [card.integer(3)]
-        independent = components_of(card, card.text(4) or "0")
-        dependent = components_of(card, card.text(7) or ("123456" if independent == ALL else "0"))
-        if independent != ALL or not dependent:
-            model.ledger.refuse("RBAR", "only with all six components of its first grid point independent")
+        independent = [components_of(card, card.text(k) or "0") for k in (4, 5)]
+        first = 0 if independent[0] else 1  # the end that leads
+        leader, followers = card.integer(2 + first), [card.integer(3 - first)]
+        if independent[first] != ALL or independent[1 - first] or components_of(card, card.text(6 + first) or "0"):
+            model.ledger.refuse("RBAR", "only with all six components of one grid point independent")
             return
-        components = dependent
+        components = components_of(card, card.text(7 - first) or "123456")
     if not _in_basic(model, followers, components):
         model.ledger.refuse(card.name, "single components of grid points with axes of their own (CD)")
         return
@@ -240,10 +339,39 @@ def _weights(card: Card, words: list[str]) -> dict[int, Array]:
     return weights
 
 
+def _equations(model: NastranModel) -> None:
+    """MPC of the sets that the case control selects; of all sets where there is no case control."""
+    chosen = _selected(model, "MPC")
+    for card in model.of("MPC"):
+        if chosen is not None and card.integer(1) not in chosen:
+            model.ledger.note("MPC", "of a set that the case control does not select")
+        else:
+            _equation(model, card)
+
+
+def _selected(model: NastranModel, kind: str) -> set[int] | None:
+    """Return the sets of SPC or MPC that the case control selects, those of SPCADD and MPCADD written out.
+
+    None: the deck has no case control, and all sets count. A body has one set of equations: subcases that select
+    different ones, or some none, are refused.
+    """
+    if model.chosen is None:
+        return None
+    by_subcase = model.chosen[kind]
+    if len(by_subcase) > 1:
+        words = ", ".join(str(number or "none") for number in sorted(by_subcase))
+        if kind == "MPC":
+            model.ledger.refuse(kind, f"subcases select different sets ({words}): keep one in the case control")
+        else:
+            model.ledger.note(kind, f"subcases select different sets ({words}): all of them make interfaces")
+    chosen = {number for number in by_subcase if number}
+    for card in model.of(f"{kind}ADD"):
+        if card.integer(1) in chosen:
+            chosen |= set(numbers_of(card, 2))
+    return chosen
+
+
 def _equation(model: NastranModel, card: Card) -> None:
-    if "MPC" in model.chosen and card.integer(1) != model.chosen["MPC"]:
-        model.ledger.note("MPC", "of a set that the case control does not select")
-        return
     terms, nodes = [], []
     for first in range(2, len(card.fields), 8):
         for k in (first, first + 3):
@@ -260,13 +388,10 @@ def _equation(model: NastranModel, card: Card) -> None:
 def _supports(model: NastranModel) -> None:
     """SPC, SPC1 and permanent constraints of grid points; BSET and ASET as interfaces."""
     held: dict[int, set[int]] = {}
-    chosen = {model.chosen["SPC"]} if "SPC" in model.chosen else set()
-    for card in model.of("SPCADD"):
-        if card.integer(1) in chosen:
-            chosen |= set(numbers_of(card, 2))
+    chosen = _selected(model, "SPC")
     last: Card | None = None
     for card in model.of("SPC1", "SPC"):
-        if chosen and card.integer(1) not in chosen:
+        if chosen is not None and card.integer(1) not in chosen:
             model.ledger.note(card.name, "of a set that the case control does not select")
             continue
         last = card
@@ -297,6 +422,9 @@ def _supports(model: NastranModel) -> None:
         last = card
     if boundary and last is not None:
         _groups_of(model, last, {n: c for n, c in boundary.items() if n not in held}, "boundary")
+    grounded = {n: c for n, c in model.grounded.items() if n not in held and n not in boundary}
+    if grounded:
+        _groups_of(model, model.cards["GRID"][0], grounded, "grounded")
 
 
 def _groups_of(model: NastranModel, card: Card, held: dict[int, set[int]], what: str) -> None:
@@ -313,7 +441,7 @@ def _groups_of(model: NastranModel, card: Card, held: dict[int, set[int]], what:
     for same, nodes in by.items():
         name = f"{what}_{''.join(str(c + 1) for c in same)}"
         group = model.group(card, nodes, name)
-        model.supports.append(Support(name, group, same, what == "boundary"))
+        model.supports.append(Support(name, group, same, what != "support"))
 
 
 def _loads(model: NastranModel) -> None:

@@ -9,7 +9,7 @@ from fe_models.importers.bulk_data.cards import Card
 from fe_models.importers.decks.deck import DeckLayer, DeckMaterial, ShellSection
 from fe_models.importers.decks.nastran.model import NastranModel
 
-__all__ = ["layered_shells", "layers_of_card", "sheet_material"]
+__all__ = ["layered_shells", "layers_of_card", "orthotropic_shells", "sheet_material"]
 
 ANGLE_FIELD = {"CTRIA3": 6, "CTRIAR": 6, "CTRIA6": 9, "CQUAD4": 7, "CQUADR": 7, "CQUAD8": 15}  #: THETA or MCID
 MOST_DIRECTIONS = 200  #: of one property, each a table of the job
@@ -32,13 +32,17 @@ def sheet_material(model: NastranModel, card: Card) -> None:
 
 
 def layers_of_card(card: Card) -> tuple[DeckLayer, ...] | str:
-    """Return the layers of a PCOMP, bottom to top; a text says why they cannot be taken."""
+    """Return the layers of a PCOMP or PCOMPG, bottom to top; a text says why they cannot be taken."""
     kind = card.text(8).upper()
+    if card.name == "PCOMPG":  # a number and four fields for each ply, in lines of eight
+        first, step = 10, 8
+    else:
+        first, step = 9, 4
     if kind not in ("", "SYM"):
         return f"LAM = {kind}: only layers as they lie, or SYM"
     layers: list[DeckLayer] = []
     material, thickness = "", 0.0
-    for k in range(9, len(card.fields) + 1, 4):
+    for k in range(first, len(card.fields) + 1, step):
         if not any(card.text(k + j) for j in range(4)):
             continue
         material = card.text(k) or material
@@ -60,11 +64,26 @@ def layered_shells(model: NastranModel, known: Card, cards: list[Card], offset_f
     pid = known.text(1)
     layers = layers_of_card(known)
     if isinstance(layers, str):
-        model.ledger.refuse("PCOMP", f"property {pid}: {layers}", count=len(cards))
+        model.ledger.refuse(known.name, f"property {pid}: {layers}", count=len(cards))
         return
     thickness = sum(layer.thickness for layer in layers)
     bottom = known.real(2, -thickness / 2)
     section = ShellSection("", "", thickness, bottom + thickness / 2, known.real(3, 0.0) * model.wtmass, layers=layers)
+    _laid_shells(model, known, cards, offset_field, section)
+
+
+def orthotropic_shells(
+    model: NastranModel, known: Card, cards: list[Card], offset_field: dict[str, int], section: ShellSection
+) -> None:
+    """Take shells of a PSHELL of MAT8: one layer of its material, laid as that of a PCOMP."""
+    layers = (DeckLayer(section.material, section.thickness),)
+    _laid_shells(model, known, cards, offset_field, replace(section, material="", layers=layers))
+
+
+def _laid_shells(
+    model: NastranModel, known: Card, cards: list[Card], offset_field: dict[str, int], section: ShellSection
+) -> None:
+    pid = known.text(1)
     groups: dict[tuple[float, tuple[float, ...]], list[Card]] = {}
     for card in cards:
         direction = _direction(model, card)
@@ -72,7 +91,7 @@ def layered_shells(model: NastranModel, known: Card, cards: list[Card], offset_f
         groups.setdefault((card.real(offset_field[card.name], 0.0), key), []).append(card)
     if len(groups) > MOST_DIRECTIONS:
         why = f"property {pid}: more than {MOST_DIRECTIONS} directions of angle 0; give them by MCID"
-        model.ledger.refuse("PCOMP", why, count=len(cards))
+        model.ledger.refuse(known.name, why, count=len(cards))
         return
     for k, ((offset, _), mine) in enumerate(groups.items(), start=1):
         x, y, z = (float(v) for v in _direction(model, mine[0]))

@@ -35,7 +35,9 @@ class NastranModel:
     cards: dict[str, list[Card]]  #: by name
     points: GridPoints
     ledger: Ledger
-    chosen: dict[str, int]  #: what the case control selects: "SPC", "MPC", "LOAD" -> set
+    #: "SPC", "MPC" -> the sets that subcases select, 0 for a subcase without one; None: there is no case control
+    chosen: dict[str, set[int]] | None
+    has_temperature: bool | None = None  #: whether the case control selects one for materials; None: there is none
     wtmass: float = 1.0  #: PARAM,WTMASS: all masses are multiplied by it
     is_lumped: bool = True  #: unless PARAM,COUPMASS
     materials: dict[str, DeckMaterial] = field(default_factory=dict)
@@ -52,11 +54,13 @@ class NastranModel:
     groups: dict[str, tuple[int, ...]] = field(default_factory=dict)  #: of nodes, by their numbers
     faces: dict[str, list[tuple[int, ...]]] = field(default_factory=dict)  #: group -> corner grids of faces
     elements: dict[int, tuple[str, str]] = field(default_factory=dict)  #: number -> card, group of cells
-    done: set[str] = field(default_factory=set)  #: names of cards that are taken over or counted
+    grounded: dict[int, set[int]] = field(default_factory=dict)  #: grid point -> components that elements hold
+    last_point: int = 0  #: number of the last grid point that was made here
+    properties: dict[str, dict[int, Card]] = field(default_factory=dict)  #: by kind and number, made when asked for
+    ends: dict[tuple[int, int], int] = field(default_factory=dict)  #: element, end 0 or 1 -> a node of its own
 
     def of(self, *names: str) -> list[Card]:
-        """Return the cards of these names, in their order by name, and mark them as taken."""
-        self.done.update(names)
+        """Return the cards of these names, in their order by name."""
         return [card for name in names for card in self.cards.get(name, ())]
 
     def point(self, card: Card, number: int) -> Array:
@@ -64,6 +68,29 @@ class NastranModel:
         if number not in self.points.positions:
             raise MeshError(f"{card.where} {card.text(1)}: names grid point {number}, which is not defined")
         return self.points.positions[number]
+
+    def new_point(self, position: Array) -> int:
+        """Return the number of a new grid point at a position in basic axes, (3,)."""
+        self.last_point = max(self.last_point, *self.points.positions) if not self.last_point else self.last_point
+        self.last_point += 1
+        self.points.positions[self.last_point] = np.asarray(position)
+        return self.last_point
+
+    def property_of(self, card: Card, *names: str) -> Card | None:
+        """Return the property card that an element names in its field 2, its own number where that is blank."""
+        key = " ".join(names)
+        if key not in self.properties:
+            self.properties[key] = {each.integer(1): each for each in self.of(*names)}
+        return self.properties[key].get(card.integer(2, card.integer(1)))
+
+    def property_value(self, card: Card, name: str, size: int) -> float | None:
+        """Return the value of the property that an element names, of cards that hold several, each in `size` fields."""
+        number = card.integer(2, card.integer(1))
+        for each in self.cards.get(name, ()):
+            for k in range(1, len(each.fields) + 1, size):
+                if each.text(k) and each.integer(k) == number:
+                    return each.real(k + 1, 0.0)
+        return None
 
     def axes(self, number: int) -> Array:
         """Return the displacement axes of a grid point, (3, 3), columns in basic axes."""

@@ -1,6 +1,5 @@
 """Whole decks of Nastran: bulk data with their includes, by the cards of `fe_models.importers.bulk_data`."""
 
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,22 +7,20 @@ import numpy as np
 
 from fe_models.errors import MeshError
 from fe_models.importers.bulk_data.cards import Card, read_cards
-from fe_models.importers.bulk_data.coordinate_systems import SYSTEM_CARDS, read_grid_points
+from fe_models.importers.bulk_data.coordinate_systems import read_grid_points
 from fe_models.importers.bulk_data.includes import bulk_text
 from fe_models.importers.decks.deck import Deck
 from fe_models.importers.decks.ledger import Ledger
 from fe_models.importers.decks.nastran.attached import read_attached
+from fe_models.importers.decks.nastran.bars import BARS
+from fe_models.importers.decks.nastran.card_fields import check_cards
+from fe_models.importers.decks.nastran.case_control import case_control, read_parameters
 from fe_models.importers.decks.nastran.model import NastranModel
-from fe_models.importers.decks.nastran.sections import BARS, SHELLS, SOLIDS, read_sections
+from fe_models.importers.decks.nastran.sections import SHELLS, SOLIDS, read_sections
 from fe_models.importers.nastran import ELEMENT_TYPES, nodes_of
 from fe_models.importers.raw_mesh import RawBlock, RawMesh
 
 __all__ = ["read_nastran_deck"]
-
-_BODY = re.compile(
-    r"(C(?!ORD)[A-Z]|RBE|RBAR|RROD|RTRPLT|RJOINT|RSPLINE|MPC|DMIG|GENEL|PLOTEL|NSM|SLOAD|MAT[2-9]|P(?!ARAM|LOAD))"
-)
-_HARMLESS = ("CORD", "CSET", "CREEP", "CHACAB", "PLOTEL", "CAMPBLL", "CYJOIN")
 
 
 def read_nastran_deck(path: Path, data: bytes) -> Deck:
@@ -43,36 +40,22 @@ def read_nastran_deck(path: Path, data: bytes) -> Deck:
     if "GRID" not in cards:
         raise MeshError(f"{where}: expected grid points (GRID), got none; is this a Nastran bulk data file?")
     points = read_grid_points([card for found in cards.values() for card in found])
-    parameters = {card.text(1).upper(): card.text(2) for card in cards.get("PARAM", ())}
-    model = NastranModel(where, cards, points, Ledger(where), _chosen(text))
-    model.wtmass = next((card.real(2) for card in cards.get("PARAM", ()) if card.text(1).upper() == "WTMASS"), 1.0)
-    model.is_lumped = parameters.get("COUPMASS", "-1").startswith("-")
-    model.of("PARAM", *SYSTEM_CARDS)
+    head = case_control(text)
+    model = NastranModel(where, cards, points, Ledger(where), None if head is None else head.chosen)
+    model.has_temperature = None if head is None else head.has_temperature
+    parameters = [*([] if head is None else head.parameters), *cards.get("PARAM", ())]
+    read_parameters(model, parameters)
     read_sections(model)
     read_attached(model)
-    for name, found in cards.items():
-        if name in model.done:
-            continue
-        if _BODY.match(name) and not name.startswith(_HARMLESS):
-            model.ledger.refuse(name, "this card is not known here", count=len(found))
-        else:
-            model.ledger.note(name, "belongs to the analysis, not to the body", count=len(found))
+    check_cards(model)
+    if head is not None:
+        head.check(model.ledger)
     mesh = replace(_mesh(model), included=included)
     return Deck(
         path, "nastran", mesh, model.ledger, model.materials, tuple(model.solids), tuple(model.shells),
         tuple(model.lines), tuple(model.masses), tuple(model.springs), tuple(model.rigid), tuple(model.couplings),
         tuple(model.equations), tuple(model.supports), tuple(model.loads),
     )  # fmt: skip
-
-
-def _chosen(text: str) -> dict[str, int]:
-    """Return the sets that the case control selects once and for all: SPC, MPC."""
-    head = re.split(r"(?im)^\s*BEGIN", text, maxsplit=1)
-    found: dict[str, set[int]] = {}
-    if len(head) > 1:
-        for key, number in re.findall(r"(?im)^\s*(SPC|MPC)\s*=\s*(\d+)", head[0]):
-            found.setdefault(key.upper(), set()).add(int(number))
-    return {key: numbers.pop() for key, numbers in found.items() if len(numbers) == 1}
 
 
 def _mesh(model: NastranModel) -> RawMesh:
@@ -87,6 +70,9 @@ def _mesh(model: NastranModel) -> RawMesh:
             group = model.elements.get(number, (name, ""))[1]
             widest = max(ELEMENT_TYPES[name])
             given = [card.text(k) for k in range(3, 3 + widest)]
+            for end in (0, 1):
+                if (number, end) in model.ends:
+                    given[end] = str(model.ends[number, end])
             if name in SHELLS and widest == 4:
                 given = given[:4]
             count, words = nodes_of(card.where, name, given)
