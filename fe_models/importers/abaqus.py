@@ -7,7 +7,7 @@ that are not understood here, are refused.
 """
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -45,7 +45,10 @@ _LINES = {
     "B22": 3,
     "R2D2": 2,
 }
-_IGNORED = ("MASS", "ROTARYI", "SPRING", "DASHPOT", "CONN3D", "DCOUP3D", "GAPUNI", "JOINTC")
+_IGNORED = (
+    "MASS", "ROTARYI", "SPRING", "DASHPOT", "CONN3D", "DCOUP3D", "GAPUNI", "JOINTC",
+    "B23", "B31OS", "B32OS", "B31H", "B32H", "B33H", "PIPE", "ELBOW", "FRAME", "ITS", "SC6R", "SC8R",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -101,6 +104,7 @@ class _Content:
     coordinates: list[Array] = field(default_factory=list)
     elements: list[tuple[str, str, IntArray]] = field(default_factory=list)  #: type, kind, rows of number and nodes
     ignored: dict[str, int] = field(default_factory=dict)  #: element type -> how many
+    orienting: dict[int, int] = field(default_factory=dict)  #: number of a line -> a node behind those of its ends
     notes: list[str] = field(default_factory=list)
 
 
@@ -117,6 +121,7 @@ class DeckMesh:
     spelling: dict[str, str]  #: of sets, as they first appear: by "NSET name" and "ELSET name"
     ignored: dict[str, int]  #: element type -> how many
     notes: tuple[str, ...] = ()
+    orienting: Mapping[int, int] = field(default_factory=dict)  #: number of a line -> a node behind those of its ends
     instances: tuple[str, ...] = ()  #: whose numbers were moved, the k-th by k `instance_step`
     instance_step: int = 0
 
@@ -209,6 +214,7 @@ def deck_mesh(where: str, blocks: list[DeckBlock]) -> DeckMesh:
         spelling,
         content.ignored,
         tuple(notes),
+        content.orienting,
     )
 
 
@@ -256,7 +262,8 @@ def _take(here: str, block: DeckBlock, content: _Content, node_sets: _Sets, elem
             numbers = np.array([int(word) for word in first if word.isdigit()], dtype=np.int64)
             element_sets.add(block.parameters.get("ELSET"), numbers)
             return
-        table = _elements(here, block, kind, n_nodes, content.notes)
+        orienting = content.orienting if kind in ("line", "line3") else {}
+        table = _elements(here, block, kind, n_nodes, content.notes, orienting)
         if kind == "line3":  # the middle node stands between the ends, here as in meshio it comes last
             table = table[:, [0, 1, 3, 2]]
         content.elements.append((name, kind, table))
@@ -304,8 +311,13 @@ def _element_type(name: str) -> tuple[str, int]:
     return upper, 0
 
 
-def _elements(here: str, block: DeckBlock, kind: str, n_nodes: int, notes: list[str]) -> IntArray:
-    """Return rows of number and nodes; numbers that follow an element on its line are dropped, as CalculiX does."""
+def _elements(
+    here: str, block: DeckBlock, kind: str, n_nodes: int, notes: list[str], orienting: dict[int, int]
+) -> IntArray:
+    """Return rows of number and nodes; numbers that follow an element on its line are dropped, as CalculiX does.
+
+    One number more is kept in `orienting`: Abaqus orients beams by a further node.
+    """
     if n_nodes == 0:  # unknown type: counted by its lines, and refused by name later
         return np.zeros((len(block.lines), 2), dtype=np.int64)
     try:
@@ -319,6 +331,8 @@ def _elements(here: str, block: DeckBlock, kind: str, n_nodes: int, notes: list[
             rows.append(row[: n_nodes + 1])
             row = row[n_nodes + 1 :]
             if 0 < row.size <= n_nodes:
+                if row.size == 1:
+                    orienting[int(rows[-1][0])] = int(row[0])
                 surplus, row = surplus + 1, row[:0]
     if row.size:
         raise MeshError(

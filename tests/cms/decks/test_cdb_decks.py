@@ -176,8 +176,9 @@ def test_orthotropic_constants_are_those_of_the_compliance_of_ansys(tmp_path):
 
 
 def test_keyopt_2_of_solid186_is_full_integration(tmp_path):
-    by_points = body_of(deck_of(tmp_path, beam_text()))
-    full = body_of(deck_of(tmp_path, beam_text().replace("EXTOPT,ATTR", "KEYOP,    1,  2,     1\nEXTOPT,ATTR", 1)))
+    by_points = body_of(deck_of(tmp_path, beam_text()), "m-kg-s")
+    text = beam_text().replace("EXTOPT,ATTR", "KEYOP,    1,  2,     1\nEXTOPT,ATTR", 1)
+    full = body_of(deck_of(tmp_path, text), "m-kg-s")
     difference = (full.K - by_points.K).toarray()
     assert np.abs(difference).max() > 1e-3 * abs(full.K).max()
     assert la.eigvalsh(difference).min() > -1e-9 * abs(full.K).max()  # the full rule adds energy to every motion

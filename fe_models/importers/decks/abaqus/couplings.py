@@ -144,6 +144,13 @@ def _coupling(here: str, block: DeckBlock, draft: Draft) -> None:
     given = draft.pending
     leader = int(draft.nodes_of(here, given.get("REF NODE", ""))[0])
     members = surface_nodes(here, draft, given.get("SURFACE", ""))
+    if "INFLUENCE RADIUS" in given:
+        members = _within(here, draft, leader, members, float(given["INFLUENCE RADIUS"]))
+    weighting = block.parameters.get("WEIGHTING METHOD", "UNIFORM").upper()
+    if weighting != "UNIFORM":
+        why = f"weights that fall with the distance ({weighting}): only UNIFORM"
+        draft.ledger.refuse("*DISTRIBUTING, WEIGHTING METHOD", why, line=block.line_number)
+        return
     if block.keyword == "KINEMATIC":
         components = tuple(sorted(_limits(block))) or (0, 1, 2, 3, 4, 5)
         whole = all(set(part) <= set(components) or not set(part) & set(components) for part in ((0, 1, 2), (3, 4, 5)))
@@ -160,6 +167,15 @@ def _coupling(here: str, block: DeckBlock, draft: Draft) -> None:
     draft.ledger.note("*DISTRIBUTING", "every node of the surface has the same weight", line=block.line_number)
     group = draft.node_group(here, np.setdiff1d(members, [leader]), f"{name}_nodes")
     draft.couplings.append(Coupling(name, draft.node_group(here, [leader]), ((group, 1.0),)))
+
+
+def _within(here: str, draft: Draft, leader: int, members: IntArray, radius: float) -> IntArray:
+    """Return the nodes within a distance of a node (INFLUENCE RADIUS)."""
+    at = draft.mesh.coordinates[draft.mesh.rows_of(np.array([leader]))][0]
+    away = np.linalg.norm(draft.mesh.coordinates[draft.mesh.rows_of(members)] - at, axis=1)
+    if not (away <= radius).any():
+        raise ValueError(f"no node of the surface within INFLUENCE RADIUS = {radius:g} of node {leader}")
+    return members[away <= radius]
 
 
 def _limits(block: DeckBlock) -> set[int]:

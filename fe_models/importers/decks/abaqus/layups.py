@@ -28,7 +28,7 @@ def layers_of_block(here: str, block: DeckBlock) -> tuple[DeckLayer, ...]:
         layers.append(DeckLayer(words[2], numbers(words[0])[0], orientation=words[3]))
     if not layers:
         raise MeshError(f"{here}, COMPOSITE: expected a line for each layer, got none")
-    return tuple(layers)
+    return tuple(layers + layers[::-1] if "SYMMETRIC" in block.parameters else layers)
 
 
 def layups_in_axes(draft: Draft) -> None:

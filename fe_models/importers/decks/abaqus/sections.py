@@ -8,6 +8,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import IntArray
 from fe_models.importers.abaqus_deck import DeckBlock
+from fe_models.importers.decks.abaqus.assembly import TURNED
 from fe_models.importers.decks.abaqus.draft import Draft, PointElements
 from fe_models.importers.decks.abaqus.elements import PLANE, SOLID_RULES
 from fe_models.importers.decks.abaqus.layups import layers_of_block
@@ -114,6 +115,7 @@ def _shell_section(here: str, block: DeckBlock, draft: Draft) -> None:
             -share * thickness + 0.0,
             layers=layers,
             orientation=block.parameters.get("ORIENTATION", "").strip('"'),
+            added_mass=float(block.parameters.get("DENSITY", 0.0)),
         )
         draft.shells.append(made)
         if is_nodal:
@@ -122,6 +124,10 @@ def _shell_section(here: str, block: DeckBlock, draft: Draft) -> None:
 
 def _beam_section(here: str, block: DeckBlock, draft: Draft) -> None:
     name, types = _of_set(here, block, draft)
+    for unknown in [key for key in types if key[0].startswith("B") and not key[0].startswith(("B31", "B32", "B33"))]:
+        why = "planar beams: they move in a plane alone"
+        draft.ledger.refuse(unknown[0], why, count=len(types.pop(unknown)), line=block.line_number)
+    slender = [elements for (kind_name, _), elements in types.items() if kind_name.startswith("B33")]
     kept = _known(draft, types, _LINES, "B", block)
     kind = block.parameters.get("SECTION", "").upper()
     size = numbers(block.lines[0])
@@ -150,9 +156,28 @@ def _beam_section(here: str, block: DeckBlock, draft: Draft) -> None:
     offset = (-offsets[0] * float(scale[0]) + 0.0, -offsets[1] * float(scale[1]) + 0.0)
     if uneven is not None:
         shape, offset = uneven.shape, (offset[0] + uneven.centroid[0], offset[1] + uneven.centroid[1])
-    if kept.size:
-        group = draft.cell_group(name, kept)
-        draft.lines.append(LineSection(group, _material_of(block, draft), shape, (n1[0], n1[1], n1[2]), offset))
+    # Euler-Bernoulli beams (B33) apart from the others, and those that a node of their own orients; groups are the same
+    # whichever program reads the deck
+    is_slender = np.isin(kept, np.concatenate(slender)) if slender else np.zeros(len(kept), dtype=bool)
+    parts: dict[tuple[bool, tuple[float, float, float]], list[int]] = {}
+    for element, has_no_shear in zip(kept.tolist(), is_slender.tolist(), strict=True):
+        parts.setdefault((has_no_shear, _first_axis(draft, element, (n1[0], n1[1], n1[2]))), []).append(element)
+    for k, ((has_no_shear, axis), elements) in enumerate(parts.items(), start=1):
+        own = name if len(parts) == 1 else f"{name}_{k}"
+        group = draft.cell_group(own, np.array(elements))
+        axis = axis if draft.program == "abaqus" else (n1[0], n1[1], n1[2])
+        line = LineSection(group, _material_of(block, draft), shape, axis, offset, shear=not has_no_shear)
+        draft.lines.append(line)
+
+
+def _first_axis(draft: Draft, element: int, given: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Return n1 of a beam: from its first node to the node that orients it, or as the section says."""
+    if element not in draft.mesh.orienting:
+        return given
+    row = next(row for _, _, table in draft.mesh.elements for row in table[table[:, 0] == element])
+    first, other = draft.mesh.coordinates[draft.mesh.rows_of(np.array([row[1], draft.mesh.orienting[element]]))]
+    x, y, z = (float(value) for value in np.round(other - first, 12))
+    return x, y, z
 
 
 def _is_uneven(kind: str, walls: tuple[float, ...]) -> bool:
@@ -230,8 +255,10 @@ def _springs(here: str, block: DeckBlock, draft: Draft) -> None:
     if "NONLINEAR" in block.parameters:
         draft.ledger.refuse("*SPRING, NONLINEAR", "springs here are linear", count=n, line=block.line_number)
         return
+    if len(block.lines) > (1 if of_set.kind == "SPRINGA" and numbers(block.lines[0])[0] else 2):
+        draft.ledger.note("*SPRING", "of several temperatures the first line is taken", line=block.line_number)
     if of_set.kind == "SPRINGA":
-        k = numbers(block.lines[-1])[0]
+        k = numbers(block.lines[1 if len(block.lines) > 1 and not numbers(block.lines[0])[0] else 0])[0]
         for row in of_set.rows.values():
             draft.springs.append(_axial(here, draft, row, k))
     elif of_set.kind == "SPRING1":
@@ -244,7 +271,10 @@ def _springs(here: str, block: DeckBlock, draft: Draft) -> None:
 def _component_springs(here: str, block: DeckBlock, draft: Draft, of_set: PointElements) -> None:
     """Take SPRING2 between the same component of two nodes at one place; others would turn the body by their force."""
     first, second = (int(number) for number in (numbers(block.lines[0]) * 2)[:2])
-    k = numbers(block.lines[-1])[0]
+    k = numbers(block.lines[1])[0]
+    turn = block.parameters.get(TURNED)
+    axes = None if turn is None else np.array(turn.split(), dtype=float).reshape(3, 3).T
+    triad = None if axes is None else tuple((float(x), float(y), float(z)) for x, y, z in axes)
     for row in of_set.rows.values():
         ends = draft.mesh.coordinates[draft.mesh.rows_of(np.array(row))]
         if first != second or not 1 <= first <= 6 or np.abs(ends[1] - ends[0]).max() > 0:
@@ -256,7 +286,8 @@ def _component_springs(here: str, block: DeckBlock, draft: Draft, of_set: PointE
             along = [0.0] * 6
             along[first - 1] = k
             names = [draft.node_group(here, [number]) for number in row]
-            draft.springs.append(DeckSpring((names[0], names[1]), tuple(along)))
+            rows = None if triad is None else (triad[0], triad[1], triad[2])
+            draft.springs.append(DeckSpring((names[0], names[1]), tuple(along), triad=rows))
 
 
 def _axial(here: str, draft: Draft, row: tuple[int, ...], k: float) -> DeckSpring:

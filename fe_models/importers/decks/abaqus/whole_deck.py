@@ -12,6 +12,7 @@ from fe_models.importers.decks.abaqus.assembly import flat_assembly
 from fe_models.importers.decks.abaqus.couplings import equations_in_basic_axes, read_coupling
 from fe_models.importers.decks.abaqus.draft import Draft
 from fe_models.importers.decks.abaqus.elements import read_element
+from fe_models.importers.decks.abaqus.keywords import HARMLESS
 from fe_models.importers.decks.abaqus.layups import layups_in_axes
 from fe_models.importers.decks.abaqus.loads import read_boundary, read_load
 from fe_models.importers.decks.abaqus.materials import materials_in_axes, read_material
@@ -90,6 +91,8 @@ def read_abaqus_deck(path: Path, data: bytes, *, program: str = "calculix") -> D
     mesh = replace(deck_mesh(where, blocks), instances=flat.instances, instance_step=flat.step)
     draft = Draft(where, program, mesh, Ledger(where))
     for note in (*notes, *mesh.notes):
+        if program == "abaqus" and " line" in note and "more numbers on their line" in note:
+            continue  # nodes that orient beams
         word = note.split()[0]
         draft.ledger.note(
             f"*{word}" if word in ("NSET", "ELSET") else "*ELEMENT" if "elements" in note else "*PART", note
@@ -135,8 +138,13 @@ def _take(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
         draft.ledger.refuse(f"*{keyword}", _NONLINEAR[keyword], line=block.line_number)
     elif keyword == "INITIAL CONDITIONS":
         draft.ledger.note(f"*{keyword}", "the body starts free of stress and at the temperature of its material")
-    elif keyword not in _MESH and keyword not in _SILENT and keyword not in _SURFACES:
+    elif keyword == "MODAL DAMPING" or keyword == "GLOBAL DAMPING":
+        why = "damping is left out: give the job a table [damping]"
+        draft.ledger.note(f"*{keyword}", why, line=block.line_number)
+    elif keyword in HARMLESS:
         draft.ledger.note(f"*{keyword}", "belongs to the analysis, not to the body", line=block.line_number)
+    elif keyword not in _MESH and keyword not in _SILENT and keyword not in _SURFACES:
+        draft.ledger.refuse(f"*{keyword}", "this keyword is not known here", line=block.line_number)
 
 
 def _finished(path: Path, draft: Draft) -> Deck:
