@@ -20,8 +20,9 @@ from floatframe.functions.time_functions import TimeFunction
 
 __all__ = ["DcMotor"]
 
-CONTROLLED = ("speed", "angle", "current")
+CONTROLLED = {"speed": "rad/s", "angle": "rad", "current": "A"}  #: what a controller may see, and its unit
 BY_FUNCTION, SPEED, ANGLE, CURRENT = range(4)
+SUPPLY = 18  #: where the voltage or the controller begins in the data
 OUTPUTS = (
     ("current", "A"), ("voltage", "V"), ("torque", "N m"), ("speed", "rad/s"), ("angle", "rad"), ("power in", "W"),
     ("power lost", "W"), ("power out", "W"), ("energy", "J"),
@@ -68,7 +69,7 @@ class DcMotor(Element):
         if self.ratio == 0:
             raise ModelError(f"element {self.name!r}: ratio: expected a number other than 0")
         time_functions(self, "voltage")
-        check_controller(self, CONTROLLED)
+        check_controller(self, tuple(CONTROLLED))
         if (self.voltage is None) == (self.controller is None):
             given = "neither: missing supply" if self.voltage is None else "both"
             raise ModelError(f"element {self.name!r}: expected a voltage or a controller, got {given}")
@@ -76,7 +77,10 @@ class DcMotor(Element):
     def law(self, placed: Placed) -> ElementLaw:
         """Return the law of the motor."""
         numbers = [self.resistance, self.inductance, self.constant, self.ratio, self.friction, self.friction_speed]
-        numbers += [self.damping, BY_FUNCTION if self.controller is None else 1 + CONTROLLED.index(self.controlled)]
+        numbers += [
+            self.damping,
+            BY_FUNCTION if self.controller is None else 1 + tuple(CONTROLLED).index(self.controlled),
+        ]
         states = [("current", "A", self.current)]
         if self.controller is None:
             assert isinstance(self.voltage, TimeFunction)  # by __post_init__
@@ -85,8 +89,8 @@ class DcMotor(Element):
             supply = self.controller.numbers
             if self.controlled == "angle":
                 states.append(("counted angle", "rad", 0.0))
-            starts = self.controller.start(self.current if self.controlled == "current" else 0.0)
-            states += [(name, "1", start) for name, start in zip(self.controller.states, starts, strict=True)]
+            value = self.current if self.controlled == "current" else 0.0
+            states += self.controller.start(value, CONTROLLED[self.controlled], "V")
         return ElementLaw(
             function=dc_motor_law,
             data=[*numbers, *shaft_numbers(self.axis, placed), *supply],
@@ -111,12 +115,12 @@ def dc_motor_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     speed = turning_speed(x, 0, 1, e)
     omega, i, angle = ratio * speed, z[0], 0.0 * speed
     if mode == BY_FUNCTION:
-        u = function_at(data, 17, t) + 0.0 * i
+        u = function_at(data, SUPPLY, t) + 0.0 * i
     elif mode == ANGLE:
         angle = turned_angle(x, data, 8, speed, z, z_dot, 1)
-        u = pid_law(t, angle, data, 17, z, z_dot, 2)
+        u = pid_law(t, angle, data, SUPPLY, z, z_dot, 2)
     else:
-        u = pid_law(t, speed if mode == SPEED else i, data, 17, z, z_dot, 1)
+        u = pid_law(t, speed if mode == SPEED else i, data, SUPPLY, z, z_dot, 1)
     z_dot[0] = (u - R * i - k * omega) / L
     friction = data[4] * omega / np.sqrt(omega * omega + data[5] * data[5]) + data[6] * omega
     torque = ratio * (k * i - friction)

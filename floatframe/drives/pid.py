@@ -70,11 +70,14 @@ class Pid:
         """Names of its states: I where there is ki, x where there is kd."""
         return [name for name, factor in (("integral", self.ki), ("filtered error", self.kd)) if factor != 0]
 
-    def start(self, value: float) -> list[float]:
-        """Return its states at the start, where the value is as given: no jump of the derivative."""
+    def start(self, value: float, seen: str, output: str) -> list[tuple[str, str, float]]:
+        """Return name, unit and start of each state, where the value is as given: no jump of the derivative.
+
+        seen, output: units in SI of what it sees and of what it gives.
+        """
         assert isinstance(self.target, TimeFunction)  # by __post_init__
-        starts = {"integral": self.integral, "filtered error": self.target(0.0) - value}
-        return [starts[name] for name in self.states]
+        starts = {"integral": (output, self.integral), "filtered error": (seen, self.target(0.0) - value)}
+        return [(name, *starts[name]) for name in self.states]
 
     @property
     def numbers(self) -> list[float]:

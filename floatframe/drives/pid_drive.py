@@ -20,6 +20,7 @@ __all__ = ["PidDrive"]
 CONTROLLED = ("angle", "speed", "distance", "rate")
 ANGLE, SPEED, DISTANCE, RATE = range(4)
 UNITS = ("rad", "rad/s", "m", "m/s")
+CONTROLLER = 12  #: where the controller begins in the data
 
 
 @frozen_copies
@@ -57,8 +58,7 @@ class PidDrive(Element):
         states = [("counted angle", "rad", 0.0)] if mode == ANGLE else []
         if self.time_constant > 0:
             states.append((*acting, 0.0))
-        starts = self.controller.start(value)
-        states += [(name, "1", start) for name, start in zip(self.controller.states, starts, strict=True)]
+        states += self.controller.start(value, UNITS[mode], acting[1])
         outputs = [(self.controlled, UNITS[mode]), acting, ("power in", "W"), ("error", UNITS[mode])]
         return ElementLaw(
             function=pid_drive_law,
@@ -92,7 +92,7 @@ def pid_drive_law(t, x, z, lam, data, wrench, z_dot, g, seen):
         if mode == RATE:
             value = rate
     first = state + 1 if lag > 0.0 else state
-    u = pid_law(t, value, data, 11, z, z_dot, first)
+    u = pid_law(t, value, data, CONTROLLER, z, z_dot, first)
     if lag > 0.0:
         z_dot[state] = (u - z[state]) / lag
         u = z[state]
@@ -101,4 +101,4 @@ def pid_drive_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     else:
         add_axial_force(wrench, x, 0, 1, u, e)
     seen[0], seen[1], seen[2] = value, u, u * rate
-    seen[3] = target_of(t, data, 11) - value
+    seen[3] = target_of(t, data, CONTROLLER) - value

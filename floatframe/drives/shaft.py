@@ -58,5 +58,5 @@ def check_controller(element: Any, quantities: tuple[str, ...]) -> None:
 
 
 def shaft_numbers(axis: Array, placed: Placed) -> list[float]:
-    """Return axis and normals of the shaft between the two markers as placed, see `elements.pairs.angle_numbers`."""
-    return angle_numbers(axis, placed.A[0], placed.A[1])
+    """Return what `turns.turned_angle` reads: axis and normals of the shaft as placed, the rate 1/s of its state."""
+    return [*angle_numbers(axis, placed.A[0], placed.A[1]), placed.units.time]

@@ -101,8 +101,7 @@ class TorqueMap(Element):
         head += [at, at_efficiency if efficiency else 0, at_efficiency + len(efficiency), 0, 0]
         states = [("motor torque", "N m", 0.0)] if self.time_constant > 0 else []
         if self.controller is not None:
-            starts = self.controller.start(0.0)
-            states += [(name, "1", start) for name, start in zip(self.controller.states, starts, strict=True)]
+            states += self.controller.start(0.0, "rad/s", "1")
         return ElementLaw(
             function=torque_map_law,
             data=[*head, *torque, *efficiency, *supply],

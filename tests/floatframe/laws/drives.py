@@ -56,7 +56,7 @@ def pid_states(pid, x, value, more=()):
 def normals(at):
     """Return the numbers of the normals of an axis at a place of the data, where no angle is asked for."""
     normal = np.cross(AXIS, np.eye(3)[int(np.argmin(np.abs(AXIS)))])
-    return {at + 3 + k: "normals: for an angle alone" for k in range(6) if k > 2 or normal[k] != 0}
+    return {at + 3 + k: "normals and rate: for an angle alone" for k in range(7) if k > 2 or normal[k] != 0}
 
 
 def pid_silent(pid, at):
@@ -99,7 +99,7 @@ def dc_motor(controlled_by):
     x = pair(1, **TURNED)
     counted = {"counted angle": TURNED["angle"] + 2 * pi * FULL + 0.3, "current": 4.0}
     value = {"speed": Pair(x).turning, "angle": TURNED["angle"] + 2 * pi * FULL, "current": 4.0}[controlled_by]
-    silent = pid_silent(pid, 17) | ({} if controlled_by == "angle" else normals(8))
+    silent = pid_silent(pid, 18) | ({} if controlled_by == "angle" else normals(8))
     if controlled_by == "current":
         silent[7] = "the last of the modes, as any number beyond them"
     return Form(motor, START, pid_states(pid, x, value, counted), closed, silent, (pid.target,))
@@ -230,7 +230,7 @@ def pid_drive(by):
 
     x = pair(1, **TURNED)
     z = {acting: 8.0, "counted angle": TURNED["angle"] + 2 * pi * FULL - 0.4}
-    silent = pid_silent(pid, 11) | ({} if by == "angle" else normals(2))
+    silent = pid_silent(pid, 12) | ({} if by == "angle" else normals(2))
     if by == "distance":
         silent[0] = "neither an angle, a speed nor a rate, as any other number says"
     return Form(drive, START, pid_states(pid, x, value_of(Pair(x)), z), closed, silent, (pid.target,))
