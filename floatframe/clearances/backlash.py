@@ -9,7 +9,7 @@ from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.markers import Marker
 from floatframe.checked_values import unit_vector
 from floatframe.clearances.contact import Range, depth_force, require_numbers
-from floatframe.elements import Element, ElementLaw, Placed
+from floatframe.elements import Element, ElementLaw, GapSpring, Placed
 from floatframe.elements.pairs import (
     add_axial_force,
     add_torque,
@@ -65,7 +65,7 @@ class Backlash(Element):
     def law(self, placed: Placed) -> ElementLaw:
         """Return the law of the backlash."""
         force, way = MOTIONS[self.motion]
-        outputs = {"way": way, "force": force, "energy": "J", "power lost": "W"}
+        outputs = {"way": way, "force": force, "energy": "J", "power lost": "W", "gap": way}
         data = [self.stiffness, self.exponent, self.damping, self.lower, self.upper, float(self.motion == "about")]
         data += angle_numbers(self.axis, placed.A[0], placed.A[1])
         return ElementLaw(
@@ -77,6 +77,7 @@ class Backlash(Element):
             acts=("moment", "moment") if self.motion == "about" else ("wrench", "force"),
             energy="energy",
             power_lost="power lost",
+            gaps={"gap": GapSpring(self.stiffness, self.exponent)},
         )
 
 
@@ -97,3 +98,4 @@ def backlash_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     else:
         add_axial_force(wrench, x, 0, 1, -side * N, e)
     seen[0], seen[1], seen[2], seen[3] = way, side * N, energy, (N - spring) * side * speed
+    seen[4] = side * (end - way)

@@ -8,12 +8,12 @@ from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.markers import Marker
 from floatframe.clearances.contact import NUMBERS, Range, add_contact, contact_numbers, require_numbers
 from floatframe.clearances.hinge import length_of
-from floatframe.elements import Element, ElementLaw, Placed
+from floatframe.elements import Element, ElementLaw, GapSpring, Placed
 from floatframe.elements.unit_names import in_units
 
 __all__ = ["BallWithPlay"]
 
-OUTPUTS = {"eccentricity": "m", "force": "N", "energy": "J", "power lost": "W"}
+OUTPUTS = {"eccentricity": "m", "force": "N", "energy": "J", "power lost": "W", "gap": "m"}
 
 
 @frozen_copies
@@ -55,6 +55,7 @@ class BallWithPlay(Element):
             is_opposite=True,
             energy="energy",
             power_lost="power lost",
+            gaps={"gap": GapSpring(self.stiffness, self.exponent)},
         )
 
 
@@ -64,4 +65,5 @@ def ball_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     p = x[1, 0], x[1, 1], x[1, 2]
     out = p[0] - x[0, 0], p[1] - x[0, 1], p[2] - x[0, 2]
     seen[0] = length_of(out)
+    seen[4] = data[NUMBERS] - seen[0]
     seen[1], seen[2], seen[3] = add_contact(wrench, x, p, out, seen[0], data[NUMBERS], data, 0)

@@ -17,7 +17,7 @@ from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.markers import Marker
 from floatframe.checked_values import unit_vector
 from floatframe.clearances.contact import NUMBERS, Range, add_contact, contact_numbers, depth_force, require_numbers
-from floatframe.elements import Element, ElementLaw, Placed
+from floatframe.elements import Element, ElementLaw, GapSpring, Placed
 from floatframe.elements.pairs import (
     add_axial_force,
     add_torque,
@@ -35,7 +35,7 @@ __all__ = ["HingeWithPlay"]
 
 OUTPUTS = {
     "angle": "rad", "eccentricity": "m", "axial": "m", "tilt": "rad", "force": "N", "contacts": "1", "energy": "J",
-    "power lost": "W",
+    "power lost": "W", "gap": "m", "other gap": "m", "axial gap": "m",
 }  # fmt: skip
 
 
@@ -91,6 +91,11 @@ class HingeWithPlay(Element):
     def law(self, placed: Placed) -> ElementLaw:
         """Return the law of the hinge; its axes coincide as placed."""
         axial = self.stiffness if self.axial_stiffness is None else self.axial_stiffness
+        gaps = {"gap": GapSpring(self.stiffness, self.exponent)}
+        if self.length > 0.0:
+            gaps["other gap"] = gaps["gap"]
+        if not self.slides:
+            gaps["axial gap"] = GapSpring(axial, self.exponent)
         along = placed.A[1].T @ placed.A[0] @ self.axis
         data = [*contact_numbers(self), self.radial_play, self.length, axial, self.exponent, self.damping]
         data += [-1.0 if self.slides else self.axial_play, *along]
@@ -106,6 +111,7 @@ class HingeWithPlay(Element):
             is_opposite=True,
             energy="energy",
             power_lost="power lost",
+            gaps=gaps,
         )
 
 
@@ -122,6 +128,7 @@ def hinge_law(t, x, z, lam, data, wrench, z_dot, g, seen):
         s = 0.0 if n_planes == 1 else (k - 0.5) * data[LENGTH]
         p = x[1, 0] + s * pin[0], x[1, 1] + s * pin[1], x[1, 2] + s * pin[2]
         way, out = off_axis(x, p, e)
+        seen[8 + k] = data[PLAY] - way
         N, energy, lost = add_contact(wrench, x, p, out, way, data[PLAY], data, 0)
         if N.real > 0.0:
             seen[5] += 1.0
@@ -130,6 +137,7 @@ def hinge_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     along, rate = axial_motion(x, 0, 1, e)
     if data[AXIAL_PLAY] >= 0.0:
         side = 1.0 if along.real >= 0.0 else -1.0
+        seen[10] = data[AXIAL_PLAY] - side * along
         N, spring, energy = depth_force(side * along - data[AXIAL_PLAY], side * rate, data, AXIAL)
         add_axial_force(wrench, x, 0, 1, -side * N, e)
         seen[6] += energy

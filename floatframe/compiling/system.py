@@ -15,6 +15,7 @@ from floatframe.compiling.coordinate_elements import add_coordinate_elements
 from floatframe.compiling.counted_angles import CountedAngle, angle_records, counted_angles, first_angles
 from floatframe.compiling.elimination_order import plan_elimination
 from floatframe.compiling.forces import Functions, body_loads, joint_forces
+from floatframe.compiling.gaps import gap_record
 from floatframe.compiling.lines import Lines, add_sliding
 from floatframe.compiling.markers import (
     MarkerData,
@@ -205,6 +206,7 @@ def compile_system(system: System) -> CompiledSystem:
         springs=springs,
         bushings=pairs.bushings._replace(angle=integers(first_angles(system, len(angles)))),
         contacts=pairs.contacts,
+        gaps=gap_record(made, pairs.contacts, public.placed),
         **elements.records(),
         laws=public.record(),
         **lines.records(),

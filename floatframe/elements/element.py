@@ -29,7 +29,9 @@ from floatframe.errors import ModelError
 from floatframe.joints.rows import NOTHING, POSITION, VELOCITY
 from floatframe.shapes.drawn import Arrow, Drawn, Stretched
 
-__all__ = ["ACTS", "NOTHING", "POSITION", "TANGENTS", "VELOCITY", "Element", "ElementLaw", "Placed", "markers_of"]
+__all__ = [
+    "ACTS", "NOTHING", "POSITION", "TANGENTS", "VELOCITY", "Element", "ElementLaw", "GapSpring", "Placed", "markers_of",
+]  # fmt: skip
 
 TANGENTS = ("differences", "complex")
 ACTS = {"wrench": (0, 1, 2, 3, 4, 5), "force": (0, 1, 2), "moment": (3, 4, 5), "none": ()}  #: parts of a wrench
@@ -43,6 +45,18 @@ class Placed:
     A: Array  #: axes as columns, (n, 3, 3)
     on_ground: tuple[bool, ...]  #: of each marker
     units: Units  #: of the system
+
+
+@dataclass(frozen=True)
+class GapSpring:
+    """The spring k xⁿ of a contact, x its depth."""
+
+    stiffness: float  #: k [N/mⁿ], of an angle [N m/radⁿ]
+    exponent: float = 1.0  #: n
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "stiffness", number("law: gaps: stiffness", self.stiffness, above=0.0))
+        object.__setattr__(self, "exponent", number("law: gaps: exponent", self.exponent, at_least=1.0))
 
 
 @frozen_copies
@@ -89,6 +103,8 @@ class ElementLaw:
     #: outputs that end a run where they are above zero after a step, with what is then said
     stops: Mapping[str, str] = field(default_factory=dict)
     knots: Sequence[float] = ()  #: times at which the law jumps, where steps of a run end [s]
+    #: outputs that are gaps, below zero minus the depth of a contact, with the spring of it: steps become short near it
+    gaps: Mapping[str, GapSpring] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not callable(self.function):
@@ -124,6 +140,11 @@ class ElementLaw:
         for key in ("energy", "power_in", "power_lost"):
             if getattr(self, key) is not None and getattr(self, key) not in self.outputs:
                 raise ModelError(f"law: {key}: expected one of its outputs, got {getattr(self, key)!r}")
+        for key, spring in self.gaps.items():
+            if key not in self.outputs or not isinstance(spring, GapSpring):
+                raise ModelError(
+                    f"law: gaps: expected names of its outputs with a GapSpring each, got {key!r}: {spring!r}"
+                )
         for key in self.stops:
             if key not in self.outputs:
                 raise ModelError(f"law: stops: expected names of its outputs, got {key!r}")

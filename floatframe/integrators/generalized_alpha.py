@@ -64,7 +64,8 @@ class GeneralizedAlpha:
     tolerance: float = 1e-8  #: largest last correction over the one that the accelerations of the step amount to
     max_iterations: int = 25
     error_tolerance: float | None = None  #: largest local error of a step over the size of the system; None: fixed step
-    #: least step, to which one that fails is divided [s]; None: a millionth of h, and no division of fixed steps
+    #: least step, to which one that fails or meets a contact is divided [s]; None: a millionth of h, and no division of
+    #: fixed steps in systems without contacts
     h_min: float | None = None
     #: alpha_m, alpha_f, beta, gamma in place of those that follow from rho_inf (see `newmark`, `hht`)
     parameters: tuple[float, float, float, float] | None = None
@@ -152,18 +153,19 @@ class GeneralizedAlpha:
             max_iterations=self.max_iterations,
             length=compiled.length,
             most_error=self.error_tolerance or 0.0,
-            h_min=self.least_step(h),
+            h_min=self.least_step(h, compiled),
         )
         after = carry_of(memory, carry.n_iterations + int(work.counted.iterations) - iterations)
         rows = Rows(*(array[: outcome.n_rows] for array in rows))
-        failure = None if outcome.status == 0 else self.explain(system, work, outcome, self.least_step(h))
+        failure = None if outcome.status == 0 else self.explain(system, work, outcome, self.least_step(h, compiled))
         return after, rows, outcome.n_steps, failure
 
-    def least_step(self, h: float) -> float:
+    def least_step(self, h: float, compiled: CompiledSystem) -> float:
         """Return the least part into which a step of size h may be divided; 0 if it may not."""
         if self.h_min is not None:
             return min(self.h_min, h)
-        return 0.0 if self.error_tolerance is None else LEAST_STEP * h
+        is_fixed = self.error_tolerance is None and not len(compiled.model.gaps.connection)
+        return 0.0 if is_fixed else LEAST_STEP * h
 
     def first_step(self, compiled: CompiledSystem, h: float, rates: Array) -> float:
         """Return the size of the first step: what its estimated error allows, an equal part of h."""
@@ -175,7 +177,7 @@ class GeneralizedAlpha:
         resolved = rates / (1 + h**2 * squared_frequencies(model))
         error = abs(gamma / 2 - beta - 1 / 12) * np.sqrt(weight @ resolved**2 / mass) / compiled.length
         fitting = (self.error_tolerance / error) ** (1 / 3) if error > 0 else h
-        return h / ceil(h / max(0.5 * fitting, self.least_step(h), 1e-3 * h) * (1 - 1e-9))
+        return h / ceil(h / max(0.5 * fitting, self.least_step(h, compiled), 1e-3 * h) * (1 - 1e-9))
 
     def prepared(self, system: System, carry: Carry, h: float, t: float) -> Carry:
         """Return the memory with its algorithmic accelerations for steps of size h.
@@ -183,12 +185,12 @@ class GeneralizedAlpha:
         At the start: a = u_dot + (alpha_m - alpha_f) h d(u_dot)/dt, where rates of modes that h does not resolve are
         left out smoothly, and the velocities are shifted. After a change of the step size: scaled likewise.
         """
-        is_divided = self.least_step(h) > 0.0
+        compiled = compiled_system(system)
+        is_divided = self.least_step(h, compiled) > 0.0
         if carry.h == h or (carry.h != 0.0 and is_divided):
             return replace(carry, h_next=min(carry.h_next or h, h) if is_divided else h)
         if carry.h != 0.0:
             return replace(carry, a=carry.u_dot + h / carry.h * (carry.a - carry.u_dot), h=h, h_next=h)
-        compiled = compiled_system(system)
         h = self.first_step(compiled, h, carry.a)
         alpha_m, alpha_f, beta, _ = self.coefficients
         rates = carry.a / (1 + h**2 * squared_frequencies(compiled.model))
@@ -200,7 +202,13 @@ class GeneralizedAlpha:
 
     def explain(self, system: System, work: Work, outcome: tuple, least: float) -> Failure:
         """Say why a step failed."""
-        from floatframe.kernels.generalized_alpha import INACCURATE, SINGULAR_BODY, SINGULAR_CONNECTION, STOPPED
+        from floatframe.kernels.generalized_alpha import (
+            INACCURATE,
+            SINGULAR_BODY,
+            SINGULAR_CONNECTION,
+            STOPPED,
+            UNRESOLVED,
+        )
 
         compiled = compiled_system(system)
         status, _, _, index, excess = outcome
@@ -221,6 +229,8 @@ class GeneralizedAlpha:
             return Failure(f"the constraints of joint {name!r} depend on others here (a singular position)", excess)
         if status == STOPPED:
             return Failure(compiled.stop_words[index], excess)
+        if status == UNRESOLVED:
+            return Failure(words_of_contact(compiled, work, least), excess)
         if status == INACCURATE:
             words = (
                 f"its error stays above error_tolerance = {self.error_tolerance} down to the least step, "
@@ -285,6 +295,17 @@ def hht(alpha: float = -0.1, **options: float) -> GeneralizedAlpha:
         raise ModelError(f"hht: alpha: expected -1/3 <= alpha <= 0, got {alpha}")
     parameters = (0.0, -alpha, 0.25 * (1 - alpha) ** 2, 0.5 - alpha)
     return GeneralizedAlpha(parameters=parameters, **options)  # type: ignore[arg-type]
+
+
+def words_of_contact(compiled: CompiledSystem, work: Work, least: float) -> str:
+    """Say which contact a step of the least size is too long for."""
+    gap = int(work.gaps.shortest)
+    c = int(compiled.model.gaps.connection[gap])
+    return (
+        f"contact {compiled.connection_names[c]!r} takes steps of {float(work.gaps.step):.3g} s, expected no shorter "
+        f"ones than h_min = {least:.3g}: in longer ones it would gain energy; give a smaller h_min or h, or a softer "
+        "contact"
+    )
 
 
 def mass_weights(model: Model) -> Array:

@@ -101,7 +101,7 @@ class RelativeGeneralizedAlpha:
             model, work, tree, kept.joints, kept.tangent, memory, rows,
             coefficients=self.absolute.coefficients, t0=t0, h=h, first=first, n_steps=n_steps, every=every,
             tolerance=self.tolerance, max_iterations=self.max_iterations, length=compiled.length,
-            most_error=self.error_tolerance or 0.0, h_min=self.absolute.least_step(h),
+            most_error=self.error_tolerance or 0.0, h_min=self.absolute.least_step(h, compiled),
         )  # fmt: skip
         after = carry_of(memory, carry.n_iterations + int(work.counted.iterations) - iterations)
         kept.after = after
@@ -114,10 +114,11 @@ class RelativeGeneralizedAlpha:
         At the start: a = s_ddot + (alpha_m - alpha_f) h d(s_ddot)/dt, where rates of modes that h does not resolve are
         left out smoothly, and velocities are shifted so that the first step closes the loops without a kick.
         """
-        is_divided = self.absolute.least_step(h) > 0.0
+        compiled = compiled_system(system)
+        is_divided = self.absolute.least_step(h, compiled) > 0.0
         if carry.h != 0.0:
             return replace(carry, h_next=min(carry.h_next or h, h) if is_divided else h)
-        compiled, tree = compiled_system(system), tree_of(system).tree
+        tree = tree_of(system).tree
         h = self.absolute.first_step(compiled, h, carry.a)
         alpha_m, alpha_f, beta, _ = self.absolute.coefficients
         now, rates = joint_accelerations(compiled, tree, carry, h)
@@ -133,7 +134,7 @@ class RelativeGeneralizedAlpha:
         if outcome[0] == 0:
             return None
         if outcome[0] != SINGULAR or int(work.counted.no_number):
-            return self.absolute.explain(system, work, outcome, self.absolute.least_step(h))
+            return self.absolute.explain(system, work, outcome, self.absolute.least_step(h, compiled_system(system)))
         parts = tree_of(system)
         held = [*parts.cut, *parts.constrained]
         words = "the Newton matrix in relative coordinates is singular here: "

@@ -3,6 +3,7 @@
 import math
 
 from floatframe.kernels.compiler.compilation import inner
+from floatframe.kernels.connections.gap import next_step, step_before_contact
 from floatframe.kernels.connections.user_force import resize_states
 from floatframe.kernels.diagnostics import diagnose, power
 from floatframe.kernels.evaluation import evaluate
@@ -11,7 +12,7 @@ from floatframe.kernels.model import MASS, STIFFNESS
 from floatframe.kernels.past import keep_past
 from floatframe.kernels.rotation import exp_matrix, matrix_of_euler_parameters, rotate_euler_parameters
 from floatframe.kernels.schur import correction, factorize_bodies, share_reactions
-from floatframe.kernels.step_start import begin_step
+from floatframe.kernels.step_start import accelerate, begin_step
 from floatframe.kernels.turns import count_turns
 from floatframe.kernels.vector import dot, product, put_matrix, put_sum, scaled, turned, vector
 
@@ -22,16 +23,20 @@ __all__ = [
     "SINGULAR_BODY",
     "SINGULAR_CONNECTION",
     "STOPPED",
+    "UNRESOLVED",
     "advance",
     "is_resized",
+    "is_too_long",
     "keep_iterate",
     "load_state",
+    "ratio_of_steps",
     "shares",
     "time_loop",
     "write_row",
 ]
 
 DONE, DIVERGED, SINGULAR_BODY, SINGULAR_CONNECTION, INACCURATE, STOPPED = 0, 1, 2, 3, 4, 5
+UNRESOLVED = 7  # a step is too long for a contact; 6 is `relative.kernels.steps.SINGULAR`
 SLOW = 0.2  # ratio of corrections above which the factors are made anew
 OF_MOTION = 1e-5  # of the way of a step counts beside what accelerations move in it
 FAST = 0.1  # corrections that shrink this fast end a step where the next one is expected to be small enough:
@@ -284,6 +289,8 @@ def one_step(model, work, memory, order, h):
         if is_small and (of_states <= 1.0 or (of_states <= 1e3 and of_states > 0.5 * last_of_states and iteration > 2)):
             take_age(work.solver, iteration + 1)
             error = -1.0
+            if is_too_long(model, work, h):
+                return UNRESOLVED, -1, excess, error
             if order.most_error > 0.0:
                 error = local_error(model, work, memory, order, h)
                 if not error <= order.most_error:
@@ -296,6 +303,12 @@ def one_step(model, work, memory, order, h):
         excess = max(excess, of_states)
     work.solver.is_due = 1
     return DIVERGED, -1, excess, -1.0
+
+
+@inner
+def is_too_long(model, work, h):
+    """Whether a step of size h that has converged is too long for a contact, see `connections.gap`."""
+    return model.gaps.connection.shape[0] > 0 and next_step(model, work, work.state.time, h) < h
 
 
 @inner
@@ -361,9 +374,27 @@ def shares(model):
 
 
 @inner
-def resize(model, memory, h):
-    """Turn the algorithmic accelerations into those of steps of size h: their distance from u_dot is of first order."""
-    ratio = h / memory.h
+def ratio_of_steps(model, memory, h):
+    """Return h over the size of the steps before, by which what `a` and u_dot differ by changes.
+
+    Zero where steps grow in a system with contacts. What they differ by is then of the contact, and in the directions
+    of joints of the scheme: it would grow with the step. So u_dot and a begin anew, from the equations of motion.
+    """
+    if model.gaps.connection.shape[0] > 0 and h > memory.h:
+        return 0.0
+    return h / memory.h
+
+
+@inner
+def resize(model, work, memory, t, h):
+    """Turn the algorithmic accelerations into those of a step of size h to t.
+
+    Their distance from u_dot is of first order. The iterate is the state of the memory where steps may begin anew.
+    """
+    ratio = ratio_of_steps(model, memory, h)
+    if ratio == 0.0:
+        work.state.time = t - h
+        accelerate(model, work, memory)
     for k in range(memory.a.shape[0]):
         memory.a[k] = memory.u_dot[k] + ratio * (memory.a[k] - memory.u_dot[k])
     resize_states(model.states.row, memory, ratio)
@@ -400,14 +431,15 @@ def time_loop(try_step, write):
 
         The order is an `entry.Order`. With h_min above 0 each of these is divided into equal parts of at most the size
         that is wanted: one that fails, or whose error is above `most_error` (if above 0), is tried again, shorter, down
-        to h_min; then parts grow again.
+        to h_min; then parts grow again. In systems with contacts parts are as short as these want them.
 
         Return (status, steps done, rows written, index of what is singular, last correction by the allowed one).
         """
         h, first, h_min, most_error = order.h, order.first, order.h_min, order.most_error
         put_weights(model, work, order.beta * memory.h**2)
         work.counted.rows = 0
-        excess = 0.0
+        work.gaps.step = math.inf
+        excess, has_gaps = 0.0, model.gaps.connection.shape[0] > 0
         for k in range(order.n_steps):
             end = order.t0 + (first + k + 1) * h
             left = h
@@ -417,6 +449,11 @@ def time_loop(try_step, write):
                 if h_min > 0.0:
                     n_parts = max(1.0, math.ceil(left / memory.h_wanted * (1.0 - 1e-9)))
                 part = left / n_parts
+                if has_gaps:
+                    load_state(work.state, memory)
+                    shorter = max(step_before_contact(model, work, end - left, part), h_min)
+                    if shorter < part:
+                        part, n_parts = shorter, 2.0
                 status, index, excess, error = try_step(model, work, memory, others, order, end - (left - part), part)
                 if status == DONE:
                     memory.n_accepted += 1
@@ -424,7 +461,10 @@ def time_loop(try_step, write):
                         return STOPPED, k, work.counted.rows, work.counted.stopped - 1, excess
                     left = left - part if n_parts > 1.0 else 0.0
                     if h_min > 0.0:
-                        memory.h_wanted = min(step_after(part, error, most_error, has_failed), h)
+                        wanted = step_after(part, error, most_error, has_failed)
+                        if has_gaps and most_error <= 0.0 and work.gaps.n_closed == 0:
+                            wanted = h  # a contact that is ahead is seen
+                        memory.h_wanted = min(wanted, h, work.gaps.step)
                     has_failed = False
                     continue
                 if h_min <= 0.0 or part <= h_min:
@@ -433,6 +473,8 @@ def time_loop(try_step, write):
                 shorter = 0.5 * part
                 if status == INACCURATE:
                     shorter = min(max(SAFETY * (most_error / error) ** (1.0 / 3.0), LEAST), SAFETY) * part
+                elif status == UNRESOLVED:
+                    shorter = work.gaps.step
                 memory.h_wanted = max(shorter, h_min)
                 has_failed = True
             if (first + k + 1) % order.every == 0:
@@ -456,7 +498,7 @@ def is_resized(model, work, memory, order, h):
 def try_absolute_step(model, work, memory, others, order, t, h):
     """Advance the memory to t by a step of size h, see `time_loop`."""
     if is_resized(model, work, memory, order, h):
-        resize(model, memory, h)
+        resize(model, work, memory, t, h)
     work.state.time = t
     return one_step(model, work, memory, order, memory.h)
 

@@ -41,6 +41,7 @@ __all__ = [
     "Elements",
     "Elimination",
     "Functions",
+    "Gaps",
     "JointForces",
     "JointRows",
     "Laws",
@@ -64,7 +65,7 @@ n_functions, n_pieces, n_springs, n_bushings = (Size(name) for name in ("functio
 n_contacts, n_forces, n_elements, n_x = (Size(name) for name in ("contacts", "joint forces", "elements", "coordinates"))
 n_lines, n_stations, n_users, n_states = (Size(name) for name in ("lines", "stations", "user forces", "states"))
 n_tapes, n_operations, n_loads, n_body_loads = (Size(name) for name in ("tapes", "operations", "loads", "body loads"))
-n_angles, n_laws = Size("angles"), Size("laws")
+n_angles, n_laws, n_gaps = Size("angles"), Size("laws"), Size("gaps")
 
 
 class Bodies(NamedTuple):
@@ -203,6 +204,15 @@ class Contacts(NamedTuple):
     friction: Array = real(n_contacts)  #: mu
     slip_speed: Array = real(n_contacts, unit="m/s")  #: v_s
     slow: Array = real(n_contacts, unit="m/s")  #: least speed of approach
+
+
+class Gaps(NamedTuple):
+    """Gaps between bodies that meet, see kernels/connections/gap.py."""
+
+    connection: IntArray = integer(n_gaps)  #: a contact or an element
+    output: IntArray = integer(n_gaps)  #: of the element that is the gap, -1 of a contact
+    stiffness: Array = real(n_gaps, unit="N/m^n, N m/rad^n")  #: k of the contact
+    exponent: Array = real(n_gaps)  #: n
 
 
 class Elements(NamedTuple):
@@ -355,6 +365,7 @@ class Model(NamedTuple):
     springs: Springs = Springs()
     bushings: Bushings = Bushings()
     contacts: Contacts = Contacts()
+    gaps: Gaps = Gaps()
     elements: Elements = Elements()
     coordinates: Coordinates = Coordinates()
     lines: Lines = Lines()

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.kernels.model import Model, n_angles, n_b, n_c, n_lines, n_m, n_pairs, n_states, n_w
+from floatframe.kernels.model import Model, n_angles, n_b, n_c, n_gaps, n_lines, n_m, n_pairs, n_states, n_w
 from floatframe.kernels.records import Size, integer, measured, real, zeros
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "ConnectionWork",
     "ContactWork",
     "Counted",
+    "GapWork",
     "Iterate",
     "LawWork",
     "LineWork",
@@ -174,6 +175,16 @@ class ContactWork(NamedTuple):
     v_0_by_rate: Array = real()
 
 
+class GapWork(NamedTuple):
+    """Gaps over a step, see kernels/connections/gap.py."""
+
+    start: Array = real(n_gaps, unit="m, rad")  #: at its beginning
+    wrench: Array = real(n_m, 6)  #: on markers, whose work is the change of a gap
+    step: Array = real(unit="s")  #: the next may be as long, or the one that is too long should be
+    shortest: IntArray = integer()  #: which of them says so, -1 for none
+    n_closed: IntArray = integer()  #: how many are closed at its end
+
+
 class UserWork(NamedTuple):
     """One user force."""
 
@@ -278,6 +289,7 @@ class Work(NamedTuple):
     pair: PairWork = PairWork()
     bushing: BushingWork = BushingWork()
     contact: ContactWork = ContactWork()
+    gaps: GapWork = GapWork()
     users: UserWork = UserWork()
     laws: LawWork = LawWork()
     states: StateWork = StateWork()

@@ -74,7 +74,7 @@ class RunSection(Table):
         None, description="a number above 0, the error of a step over the size of the system; none: fixed steps"
     )
     h_min: Annotated[float, Field(gt=0)] | None = Field(
-        None, description="a number above 0, the least step to which one that fails is divided"
+        None, description="a number above 0, the least step to which one that fails or meets a contact is divided"
     )
 
     watch: choice("watch", lambda: WATCHES) = Field(  # type: ignore[valid-type]

@@ -14,17 +14,22 @@ from floatframe.kernels.generalized_alpha import (
     INACCURATE,
     OF_MOTION,
     SLOW,
+    UNRESOLVED,
     copy,
     correction_of_states,
     is_enough,
     is_resized,
+    is_too_long,
     keep_iterate,
     load_state,
+    ratio_of_steps,
     roundoff_floor,
     shares,
     time_loop,
     write_row,
 )
+from floatframe.kernels.step_start import hold_states
+from floatframe.relative.kernels.accelerations import accelerate
 from floatframe.relative.kernels.evaluation import evaluate_placed, evaluate_tree
 from floatframe.relative.kernels.kept_factors import factorize_poses, keep_bodies, solve_kept
 from floatframe.relative.kernels.kinematics import joint_motion, move_joints, place_bodies
@@ -67,15 +72,28 @@ def start_here(tree, joints):
 
 
 @inner
-def resize(model, tree, joints, memory, h):
-    """Turn the algorithmic accelerations into those of steps of size h; joints are those of the memory."""
-    ratio = h / memory.h
+def resize(model, work, tree, joints, tangent, memory, t, h):
+    """Turn the algorithmic accelerations into those of a step of size h to t; iterate and joints are of the memory."""
+    ratio = ratio_of_steps(model, memory, h)
+    if ratio == 0.0:
+        begin_anew(model, work, tree, joints, tangent, memory, t - h)
     for s in range(tree.slot.shape[0]):
         k = tree.slot[s]
         now = memory.u_dot[k] if tree.mode[s] >= 0 else joints.acceleration_start[tree.column[s]]
         memory.a[k] = now + ratio * (memory.a[k] - now)
     resize_states(model.states.row, memory, ratio)
     memory.h = h
+
+
+@inner
+def begin_anew(model, work, tree, joints, tangent, memory, t):
+    """Take the accelerations of the equations of motion at the state in the memory, where there are some."""
+    work.state.time = t
+    hold_states(model, work, memory)
+    if accelerate(model, work, tree, joints, tangent):
+        copy(joints.acceleration, joints.acceleration_start)
+        copy(work.state.u_dot, memory.u_dot)
+    begin(model, work, tree, joints, memory)
 
 
 @inner
@@ -247,6 +265,8 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
             if iteration >= MANY:
                 work.solver.is_due = 1
             error = -1.0
+            if is_too_long(model, work, h):
+                return UNRESOLVED, excess, error
             if order.most_error > 0.0:
                 error = local_error(model, work, tree, joints, tangent, memory, order, h)
                 if not error <= order.most_error:
@@ -321,7 +341,7 @@ def try_tree_step(model, work, memory, others, order, t, h):
     tree, joints, tangent = others
     begin(model, work, tree, joints, memory)
     if is_resized(model, work, memory, order, h):
-        resize(model, tree, joints, memory, h)
+        resize(model, work, tree, joints, tangent, memory, t, h)
         tangent.n_known = 0
     work.state.time = t
     status, excess, error = one_step(model, work, memory, tree, joints, tangent, order, memory.h)

@@ -104,12 +104,13 @@ def test_tilt_of_a_loaded_pin_is_that_of_its_lever():
     x[1, 1] = middle
     c, s = np.cos(-tilt), np.sin(-tilt)
     x[1, 3:12] = [1, 0, 0, 0, c, -s, 0, s, c]
-    wrench, seen = np.zeros((2, 6)), np.zeros(8)
+    wrench, seen = np.zeros((2, 6)), np.zeros(len(law.outputs))
     law.function.py_func(0.0, x, np.zeros(0), np.zeros(0), law.data, wrench, np.zeros(0), np.zeros(0), seen)
     assert_allclose(wrench[1, 1], W, rtol=1e-9)
     assert_allclose(wrench[1, 3], -W * a * c, rtol=1e-9)  # the tilted pin has a shorter lever
     assert_allclose(seen[3], abs(tilt), rtol=1e-9)
     assert seen[5] == 2
+    assert_allclose(seen[8:10], PLAY - np.abs(ways), rtol=1e-9)  # gaps in both planes
 
 
 def test_a_dead_band_turns_a_shaft_back_with_the_speed_that_its_stops_leave():
