@@ -32,6 +32,7 @@ from floatframe import (
 )
 from floatframe.aerodynamics import LiftingSurface
 from floatframe.bodies.ground import GROUND
+from floatframe.bodies.markers import body_name
 from floatframe.cables import Cable
 from floatframe.clearances import Backlash, BallWithPlay, HingeWithPlay
 from floatframe.drives import AntiSkidBrake, DcMotor, InductionMotor, PidDrive, SpeedControl, TorqueMap
@@ -52,7 +53,18 @@ from floatframe.hydraulics import (
     Resistance,
     Supply,
 )
-from floatframe.rotations import euler_parameter_product, euler_parameters
+from floatframe.results.sensors import (
+    AngleSensor,
+    Channel,
+    CoordinateChannel,
+    ElongationSensor,
+    ModeSensor,
+    StrainGauge,
+    StressChannel,
+    StressSensor,
+    VonMisesSensor,
+)
+from floatframe.rotations import euler_parameter_product, euler_parameters, rotation_matrix
 from floatframe.wheels import BrushTyre, LinearTyre, MagicFormulaTyre
 from floatframe.wheels.roads.road import Grip
 from floatframe.wheels.tyre_file import TyreProperties
@@ -202,6 +214,16 @@ FIELDS = {
     ScrewJoint: {"lead": "m", "axis": "1", "axis_b": "1"},
     AxialDistance: {"axis": "1"},
     PointDistance: {},
+    # sensors
+    AngleSensor: {"axis": "1"},
+    Channel: {"direction": "1", "rate": "1"},
+    CoordinateChannel: {"rate": "1"},
+    ElongationSensor: {"position_a": "m", "position_b": "m", "tolerance": "1"},
+    ModeSensor: {"mode": "1"},
+    StrainGauge: {"direction": "1", "young": PRESSURE, "poisson": "1", "position": "m", "tolerance": "1"},
+    StressChannel: {"position": "m"},
+    StressSensor: {"position": "m", "tolerance": "1"},
+    VonMisesSensor: {"tolerance": "1"},
 }  # fmt: skip
 JOINT = {"axis": "1", "axis_b": "1", "normal": "1", "rotation": "1", "distance": "m"}  #: of all joints
 
@@ -322,15 +344,24 @@ def moved(system, R, place):
     """Return a system that as a whole is turned and moved: bodies, markers on the ground, what has ground axes."""
 
     def marker(each):
-        if not isinstance(each, Marker) or each.body != GROUND.name:
+        if body_name(each.body) != GROUND.name:
             return each
         triad = np.eye(3) if each.triad is None else each.triad
         position = np.zeros(3) if each.position is None else each.position
         return Marker(GROUND, position=R @ position + place, triad=R @ triad)
 
+    def on_ground(joint):
+        """Return a joint whose marker A is the ground, without a place, with that place."""
+        body = system.body(body_name(joint.marker_b.body))
+        where = np.zeros(3) if joint.marker_b.position is None else joint.marker_b.position
+        found = body.position + rotation_matrix(body.orientation) @ where
+        return replace(joint, marker_a=Marker(GROUND, position=found))
+
     def part(each):
         if isinstance(each, Marker):
             return marker(each)
+        if getattr(each, "marker_a", None) in (GROUND, GROUND.name):
+            return part(on_ground(each))
         if isinstance(each, tuple | list):
             return type(each)(part(one) for one in each)
         if isinstance(each, Gravity):
