@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.quantities import Quantity
 from fe_models.foundation.words import quoted
 from floatframe.errors import ModelError
 
@@ -28,9 +29,9 @@ def array_of_shape(where: str, values: Any, shape: tuple[int, ...]) -> Array:
 
 
 def number(where: str, value: Any, *, at_least: float | None = None, above: float | None = None) -> float:
-    """Return a finite float; `ModelError` naming `where` if it is none or out of bounds."""
+    """Return a finite float, a default as it is; `ModelError` naming `where` if it is none or out of bounds."""
     try:
-        result = float(value)
+        result = value if isinstance(value, Quantity) else float(value)
     except (TypeError, ValueError, OverflowError):
         raise ModelError(f"{where}: expected a number, got {quoted(value)}") from None
     if not np.isfinite(result):

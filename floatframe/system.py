@@ -1,7 +1,7 @@
 """A system: bodies, joints and forces in one coherent set of units."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, is_dataclass
 from typing import Protocol
 
 from fe_models.foundation.copies import frozen_copies
@@ -10,6 +10,7 @@ from fe_models.foundation.words import nearest, quoted
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.bodies.ground import GROUND
 from floatframe.bodies.rigid_body import RigidBody
+from floatframe.default_units import in_units_of
 from floatframe.elements.element import Element
 from floatframe.errors import ModelError
 from floatframe.forces import Force, Gravity
@@ -67,6 +68,10 @@ class System:
             "data_files",
         ):  # fmt: skip
             object.__setattr__(self, part, tuple(getattr(self, part)))
+        if self.units.name != "m-kg-s":
+            for part in ("joints", "forces", "couplers", "elements"):
+                known = (in_units_of(self.units, each) if is_dataclass(each) else each for each in getattr(self, part))
+                object.__setattr__(self, part, tuple(known))
         among = tuple(joint for joint in self.joints if isinstance(joint, CoordinateCoupler))
         object.__setattr__(self, "couplers", (*self.couplers, *among))
         object.__setattr__(self, "joints", tuple(joint for joint in self.joints if joint not in among))

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from numba import njit
 
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.quantities import SPEED, Quantity
 from floatframe.bodies.markers import Marker
 from floatframe.clearances.contact import NUMBERS, Range, add_contact, contact_numbers, require_numbers
 from floatframe.clearances.hinge import length_of
@@ -13,6 +14,7 @@ from floatframe.elements.unit_names import in_units
 
 __all__ = ["BallWithPlay"]
 
+FRICTION_SPEED = Quantity(1e-3, SPEED)
 OUTPUTS = {"eccentricity": "m", "force": "N", "energy": "J", "power lost": "W", "gap": "m"}
 
 
@@ -37,7 +39,7 @@ class BallWithPlay(Element):
     exponent: float = 1.0  #: n
     damping: float = 0.0  #: chi, loss by the speed of the approach [s/m]
     friction: float = 0.0  #: mu
-    friction_speed: float = 1e-3  #: v_s, slip at which friction is 0.71 of its value [m/s]
+    friction_speed: float = FRICTION_SPEED  #: v_s, slip at which friction is 0.71 of its value [m/s]
     radius: float = 0.0  #: of the ball, arm of the friction [m]
 
     def __post_init__(self) -> None:

@@ -14,6 +14,7 @@ from numba.extending import register_jitable
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.quantities import SPEED, Quantity
 from floatframe.bodies.markers import Marker
 from floatframe.checked_values import unit_vector
 from floatframe.clearances.contact import NUMBERS, Range, add_contact, contact_numbers, depth_force, require_numbers
@@ -32,6 +33,8 @@ from floatframe.elements.smooth import absolute
 from floatframe.elements.unit_names import in_units
 
 __all__ = ["HingeWithPlay"]
+
+FRICTION_SPEED = Quantity(1e-3, SPEED)
 
 OUTPUTS = {
     "angle": "rad", "eccentricity": "m", "axial": "m", "tilt": "rad", "force": "N", "contacts": "1", "energy": "J",
@@ -66,7 +69,7 @@ class HingeWithPlay(Element):
     exponent: float = 1.0  #: n
     damping: float = 0.0  #: chi, loss by the speed of the approach [s/m]
     friction: float = 0.0  #: mu
-    friction_speed: float = 1e-3  #: v_s, slip at which friction is 0.71 of its value [m/s]
+    friction_speed: float = FRICTION_SPEED  #: v_s, slip at which friction is 0.71 of its value [m/s]
     radius: float = 0.0  #: of the pin, arm of the friction [m]
     turn_stiffness: float = 0.0  #: k_t about the axis [N m/rad]
     turn_damping: float = 0.0  #: d_t [N m s/rad]

@@ -8,6 +8,7 @@ from numba.extending import register_jitable
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.quantities import RATE, TIME, Quantity
 from floatframe.bodies.markers import Marker
 from floatframe.checked_values import number
 from floatframe.drives.shaft import check_shaft, required, time_functions
@@ -20,6 +21,10 @@ from floatframe.errors import ModelError
 from floatframe.functions.time_functions import TimeFunction
 
 __all__ = ["AntiSkidBrake"]
+
+LAG = Quantity(0.02, TIME)
+SENSOR_TIME = Quantity(5e-3, TIME)
+FRICTION_SPEED = Quantity(0.5, RATE)
 
 Y_AXIS = (0.0, 1.0, 0.0)
 OUTPUTS = (
@@ -63,10 +68,10 @@ class AntiSkidBrake(Element):
     drop_out: float  #: reference speed below which there is no anti-skid [m/s]
     deceleration: float | None = None  #: threshold of the rim's deceleration [m/s²]; None: slip alone counts
     deceleration_band: float | None = None  #: needed with it [m/s²]
-    reference_time: float = 0.02  #: in which the reference speed follows a wheel that is faster [s]
-    sensor_time: float = 5e-3  #: [s]
-    time_constant: float = 0.02  #: of valve and brake [s]
-    friction_speed: float = 0.5  #: of the disc [rad/s]: a locked wheel creeps, below it
+    reference_time: float = LAG  #: in which the reference speed follows a wheel that is faster [s]
+    sensor_time: float = SENSOR_TIME  #: [s]
+    time_constant: float = LAG  #: of valve and brake [s]
+    friction_speed: float = FRICTION_SPEED  #: of the disc [rad/s]: a locked wheel creeps, below it
     speed: float = 0.0  #: of the wheel at the start [rad/s]
     anti_skid: bool = True
     axis: Array = Y_AXIS  # type: ignore[assignment]  #: in the axes of marker a, (3,)

@@ -7,6 +7,7 @@ from numba import njit
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.quantities import RATE, Quantity
 from floatframe.bodies.markers import Marker
 from floatframe.drives.pid import Pid, pid_law
 from floatframe.drives.shaft import Z_AXIS, check_controller, check_shaft, required, shaft_numbers, time_functions
@@ -19,6 +20,8 @@ from floatframe.errors import ModelError
 from floatframe.functions.time_functions import TimeFunction
 
 __all__ = ["DcMotor"]
+
+FRICTION_SPEED = Quantity(1.0, RATE)
 
 CONTROLLED = {"speed": "rad/s", "angle": "rad", "current": "A"}  #: what a controller may see, and its unit
 BY_FUNCTION, SPEED, ANGLE, CURRENT = range(4)
@@ -56,7 +59,7 @@ class DcMotor(Element):
     axis: Array = Z_AXIS  #: in the axes of marker a, (3,)
     ratio: float = 1.0  #: of the gear: speed of the motor over omega
     friction: float = 0.0  #: dry friction of the motor [N m]
-    friction_speed: float = 1.0  #: w in friction ω/√(ω² + w²), ω of the motor [rad/s]
+    friction_speed: float = FRICTION_SPEED  #: w in friction ω/√(ω² + w²), ω of the motor [rad/s]
     damping: float = 0.0  #: of the motor, torque over speed [N m s]
     current: float = 0.0  #: at the start [A]
 

@@ -3,11 +3,14 @@
 from dataclasses import dataclass, field
 
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.quantities import SPEED, Quantity
 from floatframe.checked_values import number
 from floatframe.errors import ModelError
 from floatframe.functions.time_functions import NOT_OF_TIME, TimeFunction
 
 __all__ = ["JointForce"]
+
+FRICTION_SPEED = Quantity(1e-3, SPEED)
 
 
 @frozen_copies
@@ -33,7 +36,12 @@ class JointForce:
     characteristic: TimeFunction | None = field(default=None, metadata=NOT_OF_TIME)
     friction: float = 0.0  #: T, of Coulomb [N, N m]
     friction_coefficient: float = 0.0  #: mu; for an angle mu times the radius of the bearing [1, m]
-    friction_speed: float = 1e-3  #: v_0, where friction is at tanh(1) of its value [m/s, rad/s]
+    friction_speed: float = FRICTION_SPEED  #: v_0, where friction is at tanh(1) of its value [m/s, rad/s]
+
+    @property
+    def is_angular(self) -> bool:
+        """Whether its coordinate is an angle: joints name them so."""
+        return self.coordinate.startswith("angle")
 
     def __post_init__(self) -> None:
         where = f"force {self.name!r}"

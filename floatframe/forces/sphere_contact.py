@@ -6,11 +6,14 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.quantities import SPEED, Quantity
 from floatframe.bodies.markers import Marker
 from floatframe.checked_values import number, unit_vector
 from floatframe.errors import ModelError
 
 __all__ = ["DISSIPATIONS", "SphereContact", "exact_dissipation", "hertz_stiffness"]
+
+SLOW = Quantity(1e-3, SPEED)
 
 
 def exact_dissipation(e: float) -> float:
@@ -83,8 +86,8 @@ class SphereContact:
     restitution: float = 1.0  #: coefficient e of restitution, above 0
     dissipation: str = "exact"  #: law of h(e): exact, hunt-crossley, lankarani-nikravesh or flores
     friction: float = 0.0  #: mu
-    friction_speed: float = 1e-3  #: v_s, slip at which friction is 0.71 of its value [m/s]
-    slow: float = 1e-3  #: least v_0 [m/s]
+    friction_speed: float = SLOW  #: v_s, slip at which friction is 0.71 of its value [m/s]
+    slow: float = SLOW  #: least v_0 [m/s]
 
     def __post_init__(self) -> None:
         where = f"force {self.name!r}"

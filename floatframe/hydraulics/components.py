@@ -5,6 +5,7 @@ from typing import Any
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.quantities import SPEED, Quantity
 from floatframe.bodies.markers import Marker
 from floatframe.checked_values import number, unit_vector
 from floatframe.errors import ModelError
@@ -27,6 +28,8 @@ __all__ = [
     "Supply",
     "Tank",
 ]
+
+FRICTION_SPEED = Quantity(1e-3, SPEED)
 
 
 def checked(
@@ -83,7 +86,7 @@ class Cylinder:
     rod_dead_volume: float = 0.0  #: of the chamber at full stroke [m³]
     leakage: float = 0.0  #: of the piston, flow over pressure difference [m³/(s Pa)]
     friction: float = 0.0  #: of the seals [N]
-    friction_speed: float = 1e-3  #: v_s in friction v/√(v² + v_s²) [m/s]
+    friction_speed: float = FRICTION_SPEED  #: v_s in friction v/√(v² + v_s²) [m/s]
     damping: float = 0.0  #: [N s/m]
     stop_stiffness: float = 0.0  #: k of both stops; 0: none [N/m]
     stop_damping: float = 0.0  #: d of both stops [s/m]

@@ -11,6 +11,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.quantities import SPEED, Quantity
 from floatframe.bodies.markers import Marker
 from floatframe.checked_values import number, unit_vector
 from floatframe.elements import Element, ElementLaw, Placed
@@ -22,6 +23,8 @@ from floatframe.hydraulics.fluid import Fluid
 from floatframe.shapes.drawn import Stretched
 
 __all__ = ["OleoStrut"]
+
+FRICTION_SPEED = Quantity(0.01, SPEED)
 
 Z_AXIS: Any = (0.0, 0.0, 1.0)
 LEAST_GAS = 0.02  #: of the gas volume when extended: below it its pressure goes on along its tangent
@@ -73,7 +76,7 @@ class OleoStrut(Element):
     oil_volume: float | None = None  #: of the oil chamber [m³]; None: incompressible oil
     friction: float = 0.0  #: of the seals [N]
     friction_area: float = 0.0  #: friction over gas pressure [m²]
-    friction_speed: float = 0.01  #: [m/s]
+    friction_speed: float = FRICTION_SPEED  #: [m/s]
     stop_damping: float = 0.0  #: d [s/m]
     axis: Array = Z_AXIS  #: from marker a towards marker b, in the axes of marker a, (3,)
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.quantities import LENGTH, Quantity
 from floatframe.bodies.markers import Marker, Place, body_name
 from floatframe.checked_values import number
 from floatframe.errors import ModelError
@@ -13,6 +14,8 @@ from floatframe.joints.axis_frame import checked_axes, normals_of
 from floatframe.joints.rows import MOMENT_B, RIM, RIM_HEIGHT, ROLL, Row, arm_rows
 
 __all__ = ["RollingDisc"]
+
+METRE = Quantity(1.0, LENGTH)
 
 
 @frozen_copies
@@ -28,7 +31,7 @@ class RollingDisc:
     name: str
     marker_a: Place  #: a Marker: a point of the plane
     marker_b: Place  #: a Marker: the centre of the disc
-    radius: float = 1.0  #: of the disc [m]
+    radius: float = METRE  #: of the disc [m]
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: normal of the plane, axes of marker A
     axis_b: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  #: of the disc, in the axes of marker B
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.quantities import LENGTH, Quantity
 from floatframe.bodies.markers import Place
 from floatframe.checked_values import number
 from floatframe.errors import ModelError
@@ -29,6 +30,8 @@ from floatframe.joints.rows import (
 
 __all__ = ["ScrewJoint"]
 
+METRE = Quantity(1.0, LENGTH)
+
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
@@ -44,7 +47,7 @@ class ScrewJoint:
     marker_b: Place
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
     axis_b: Array | None = None  #: in the axes of marker B, (3,); None: as placed
-    lead: float = 1.0  #: distance along the axis for one turn, above zero for a right-handed screw [m]
+    lead: float = METRE  #: distance along the axis for one turn, above zero for a right-handed screw [m]
     motions: Mapping[str, TimeFunction] = field(default_factory=dict)  #: prescribed, by coordinate; a number: held
 
     size = 9  #: components of the unknown wrench

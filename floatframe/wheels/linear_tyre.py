@@ -8,6 +8,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.quantities import SPEED, TIME, Quantity
 from floatframe.bodies.markers import Marker
 from floatframe.elements import Element, ElementLaw, Placed
 from floatframe.shapes import Arrow, Drawn
@@ -19,6 +20,9 @@ from floatframe.wheels.roads.road import FlatRoad, Road
 from floatframe.wheels.tyre_fields import check_common, common_numbers
 
 __all__ = ["LinearTyre"]
+
+LOW_SPEED = Quantity(1.0, SPEED)
+SETTLING_TIME = Quantity(0.02, TIME)
 
 
 @frozen_copies
@@ -45,8 +49,8 @@ class LinearTyre(Element):
     relaxation_y: float = 0.0  #: relaxation length along y [m]
     rolling_resistance: float = 0.0  #: f_r: M_y = -f_r R_0 F_z
     flattening: float = 1 / 3  #: q: effective rolling radius R_0 - q d
-    low_speed: float = 1.0  #: below it the wheel counts as coming to a standstill [m/s]
-    settling_time: float = 0.02  #: tau, damping of the tread at a standstill [s]
+    low_speed: float = LOW_SPEED  #: below it the wheel counts as coming to a standstill [m/s]
+    settling_time: float = SETTLING_TIME  #: tau, damping of the tread at a standstill [s]
     landing_depth: float | None = None  #: deflection over which damping and tread set in [m]; None: radius/500
     axis: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  #: spin axis to the left, axes of marker B
     road: Road = field(default_factory=FlatRoad)  #: in axes of marker A

@@ -8,6 +8,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.quantities import TIME, Quantity
 from fe_models.foundation.units import UNIT_SYSTEMS, Dimensions, Units
 from floatframe.bodies.markers import Marker
 from floatframe.checked_values import number, unit_vector
@@ -24,6 +25,8 @@ from floatframe.wheels.tyre_fields import check_road, landing_depth
 from floatframe.wheels.tyre_file import TyreProperties
 
 __all__ = ["MagicFormulaTyre"]
+
+SETTLING_TIME = Quantity(0.02, TIME)
 
 CONVENTIONS = {"iso": 1.0, "adapted-sae": -1.0}
 SIDES = ("left", "right")
@@ -58,7 +61,7 @@ class MagicFormulaTyre(Element):
     low_speed: float | None = (
         None  #: below it the wheel counts as coming to a standstill; None: VXLOW of the file, or 1 m/s
     )
-    settling_time: float = 0.02  #: tau, damping of the tread at a standstill [s]
+    settling_time: float = SETTLING_TIME  #: tau, damping of the tread at a standstill [s]
     landing_depth: float | None = None  #: deflection over which damping and tread set in; None: radius/500
     axis: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  #: spin axis to the left, axes of marker B
     road: Road = field(default_factory=FlatRoad)  #: in axes of marker A

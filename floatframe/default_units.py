@@ -1,0 +1,38 @@
+"""The defaults of joints, forces and elements in the units of a system; what a user gives stays as it is."""
+
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass, replace
+from typing import Any
+
+from fe_models.foundation.quantities import Quantity
+from fe_models.foundation.units import Units
+from floatframe.bodies.markers import Marker
+
+__all__ = ["in_units_of"]
+
+
+def in_units_of(units: Units, part: Any) -> Any:
+    """Return a part of a system, a dataclass, with its defaults, and those of what it holds, in units of the system."""
+    of_angle = bool(getattr(part, "is_angular", False))
+    changed = {}
+    for each in fields(part):
+        value = getattr(part, each.name)
+        found = value.in_units(units, of_angle=of_angle) if isinstance(value, Quantity) else held_in_units(units, value)
+        if found is not value:
+            changed[each.name] = found
+    return replace(part, **changed) if changed else part
+
+
+def held_in_units(units: Units, value: Any) -> Any:
+    """Return what a field holds with its defaults in units of the system; itself if there are none."""
+    if isinstance(value, Marker):
+        return value
+    if is_dataclass(value) and not isinstance(value, type):
+        return in_units_of(units, value)
+    if isinstance(value, list | tuple) and any(is_dataclass(each) for each in value):
+        items = [held_in_units(units, each) for each in value]
+        return type(value)(items) if any(a is not b for a, b in zip(items, value, strict=True)) else value
+    if isinstance(value, Mapping) and any(is_dataclass(each) for each in value.values()):
+        held = {key: held_in_units(units, each) for key, each in value.items()}
+        return held if any(held[key] is not each for key, each in value.items()) else value
+    return value
