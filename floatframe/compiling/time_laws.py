@@ -13,7 +13,7 @@ import numpy as np
 from floatframe.functions.time_functions import TimeFunction
 from floatframe.system import System
 
-__all__ = ["FunctionOfTime", "functions_in", "functions_of_time", "rate_of_functions"]
+__all__ = ["FunctionOfTime", "functions_in", "functions_of_time", "parts_of_time", "rate_of_functions"]
 
 
 class FunctionOfTime(NamedTuple):
@@ -51,6 +51,14 @@ def functions_in(value: Any, where: str, is_motion: bool, holder: Any, field: st
             if is_dataclass(each):
                 name = getattr(each, "name", "") or k + 1
                 yield from functions_in(each, f"{where}.{name}", is_motion, holder, field)
+
+
+def parts_of_time(system: System) -> Iterator[tuple[str, Any]]:
+    """Yield the forces and elements made of expressions, and where they stand."""
+    for group in ("forces", "elements"):
+        for part in getattr(system, group):
+            if hasattr(part, "parts_of_time"):
+                yield f"{group}.{part.name}", part
 
 
 def rate_of_functions(functions: Iterable[FunctionOfTime]) -> float:

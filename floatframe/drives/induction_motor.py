@@ -100,6 +100,12 @@ class InductionMotor(Element):
         object.__setattr__(self, "harmonics", array_of_shape(f"{where}: harmonics", table, table.shape))
         object.__setattr__(self, "fluxes", array_of_shape(f"{where}: fluxes", self.fluxes, (4,)))
 
+    def frequencies(self, t: Array) -> Array:
+        """Return the highest frequency of the supply at times t, (n_t,): its own, or that of a harmonic [Hz]."""
+        assert isinstance(self.frequency, TimeFunction)  # by __post_init__
+        orders = np.abs(np.asarray(self.harmonics)[:, 0])
+        return np.abs(self.frequency.at(t)) * max([1.0, *orders])
+
     def law(self, placed: Placed) -> ElementLaw:
         """Return the law of the motor."""
         L_s, L_r = self.stator_leakage + self.magnetizing, self.rotor_leakage + self.magnetizing

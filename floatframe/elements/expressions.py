@@ -28,7 +28,7 @@ from floatframe.elements.tapes import tape_at, tape_numbers
 from floatframe.errors import ModelError
 from floatframe.functions.expressions import CONSTANTS, FUNCTIONS, compile_expression
 from floatframe.functions.time_functions import NOT_OF_TIME, TimeFunction
-from floatframe.functions.time_switches import OfTime, Switch, switches_of_tape
+from floatframe.functions.time_switches import OfTime, TimeParts, time_parts
 
 __all__ = ["ExpressionElement"]
 
@@ -167,22 +167,21 @@ class ExpressionElement(Element):
         seen = [f"{place}_{each}" for place in list(self.places)[1:] for each in SEEN]
         return ["t", *seen, *self.states]
 
-    def switches_of_time(self) -> list[Switch]:
-        """Return what switches the expressions by time alone; terms may be functions of time."""
-        switches: list[Switch] = []
+    def parts_of_time(self) -> TimeParts:
+        """Return what of the expressions depends on time alone; terms may be functions of time."""
+        parts = TimeParts()
         numbers, known = {key: k for k, key in enumerate(self.functions)}, self.inputs
         of_time: dict[int, OfTime] = {0: np.asarray}
         last = (*self.forces.values(), *self.rates.values())
         for key, text in (*self.terms.items(), *(("", each) for each in last)):
             where = f"element {self.name!r}"
             tape = compile_expression(where, text, known, parameters=self.parameters, functions=numbers)
-            found, value = switches_of_tape(tape, of_time, list(self.functions.values()))
-            switches += found
+            parts += time_parts(tape, of_time, list(self.functions.values()))
             if key:
-                if value is not None:
-                    of_time[len(known)] = value
+                if parts.value is not None:
+                    of_time[len(known)] = parts.value
                 known = [*known, key]
-        return switches
+        return parts
 
     def law(self, placed: Placed) -> ElementLaw:
         """Return the law: tapes and functions in its data."""

@@ -11,7 +11,7 @@ from floatframe.checked_values import number
 from floatframe.errors import ModelError
 from floatframe.functions.expressions import CONSTANTS, FUNCTIONS, compile_expression
 from floatframe.functions.time_functions import NOT_OF_TIME, TimeFunction
-from floatframe.functions.time_switches import Switch, switches_of_tape
+from floatframe.functions.time_switches import TimeParts, time_parts
 
 __all__ = ["UserForce"]
 
@@ -99,17 +99,17 @@ class UserForce:
         names = list(self.coordinates)
         return ["t", *names, *(f"{name}_dot" for name in names), *self.states]
 
-    def switches_of_time(self) -> list[Switch]:
-        """Return what switches the expressions by time alone."""
-        switches: list[Switch] = []
+    def parts_of_time(self) -> TimeParts:
+        """Return what of the expressions depends on time alone."""
+        parts = TimeParts()
         if self.function is not None or not isinstance(self.forces, Mapping):
-            return switches
+            return parts
         numbers = {key: k for k, key in enumerate(self.functions)}
         for text in (*self.forces.values(), *self.rates.values()):
             where = f"force {self.name!r}"
             tape = compile_expression(where, text, self.inputs, parameters=self.parameters, functions=numbers)
-            switches += switches_of_tape(tape, {0: np.asarray}, list(self.functions.values()))[0]
-        return switches
+            parts += time_parts(tape, {0: np.asarray}, list(self.functions.values()))
+        return parts
 
 
 def require_words(where: str, names: Sequence[str]) -> None:

@@ -7,6 +7,7 @@ bisected. What a comparison of coordinates switches depends on the motion and is
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +46,7 @@ from floatframe.functions.expressions import (
 )
 from floatframe.functions.time_functions import TimeFunction
 
-__all__ = ["OfTime", "Switch", "switch_times", "switches_of_tape"]
+__all__ = ["OfTime", "Switch", "TimeParts", "switch_times", "time_parts"]
 
 OfTime = Callable[[Array], Array]  #: values at times, (n_t,)
 Switch = Callable[[Array], NDArray[np.bool_]]  #: true or false at times, (n_t,)
@@ -59,10 +60,20 @@ OPERATIONS: dict[int, Callable[..., Array]] = {
 MOST_HALVINGS = 120
 
 
-def switches_of_tape(
-    tape: Tape, inputs: Mapping[int, OfTime], functions: Sequence[TimeFunction]
-) -> tuple[list[Switch], OfTime | None]:
-    """Return the switches of an expression, and its value over time; None for the value if that depends on more.
+class TimeParts(NamedTuple):
+    """What of expressions depends on time alone."""
+
+    switches: tuple[Switch, ...] = ()
+    phases: tuple[OfTime, ...] = ()  #: arguments of sines and cosines [rad]
+    value: OfTime | None = None  #: of the last expression; None if it depends on more
+
+    def __add__(self, other: "TimeParts") -> "TimeParts":  # type: ignore[override]
+        """Return the parts of both, with the value of the other."""
+        return TimeParts(self.switches + other.switches, self.phases + other.phases, other.value)
+
+
+def time_parts(tape: Tape, inputs: Mapping[int, OfTime], functions: Sequence[TimeFunction]) -> TimeParts:
+    """Return what of an expression depends on time alone.
 
     Parameters
     ----------
@@ -74,6 +85,7 @@ def switches_of_tape(
         The tables that it calls.
     """
     switches: list[Switch] = []
+    phases: list[OfTime] = []
     values: list[OfTime | None] = []
     for k, (op, a, b, c) in enumerate(zip(tape.op, tape.a, tape.b, tape.c, strict=True)):
         value: OfTime | None = None
@@ -95,12 +107,14 @@ def switches_of_tape(
             known = [each for each in operands if each is not None]
             if len(known) == len(operands):
                 value = partial(applied, OPERATIONS[op], known)
-                if op == LESS:
+                if op in (SIN, COS):
+                    phases.append(known[0])
+                elif op == LESS:
                     switches.append(partial(is_true, value))
                 elif op == SIGN:
                     switches += [partial(is_beyond, known[0], 0.0), partial(is_below, known[0])]
         values.append(value)
-    return switches, values[-1]
+    return TimeParts(tuple(switches), tuple(phases), values[-1])
 
 
 def constant_at(c: float, t: Array) -> Array:

@@ -30,7 +30,7 @@ from floatframe.motion.events import has_events, require_times_of_events
 from floatframe.motion.jumps import jumps_of_steps, over_jumps
 from floatframe.motion.knots import knot_words
 from floatframe.motion.restart import RESTART_STEPS, carry_of_record, restart_record, system_digest
-from floatframe.motion.step_advice import step_advice
+from floatframe.motion.step_advice import frequency_words, step_advice
 from floatframe.motion.step_watch import WATCHES, EnergyWatch, StepWatch, has_steps_of_one_size
 from floatframe.motion.validity_watch import ValidityWatch
 from floatframe.results.head import BodyEntry, Head
@@ -153,7 +153,9 @@ def integrate(
     advice = step_advice(system, step)
     if advice is not None and advice.n_followed == 0:
         log.warning("system %r: %s", system.name, advice.words)
-    for words in knot_words(system, t_start, step, n_total):
+    is_fixed = has_steps_of_one_size(integrator)
+    frequencies = frequency_words(system, t_start, step, n_total, has_steps_of_one_size=is_fixed)
+    for words in (*knot_words(system, t_start, step, n_total), *frequencies):
         log.warning("system %r: %s", system.name, words)
     head = head_of(system, integrator, t_start, t_end, step, output_every)
     head = replace(head, angles=compiled_system(system).angles, run=head.run | {"watch": watch})

@@ -12,7 +12,7 @@ import numpy as np
 
 from floatframe.compiling.file_frames import state_of_file
 from floatframe.compiling.system import compiled_system
-from floatframe.compiling.time_laws import functions_of_time
+from floatframe.compiling.time_laws import functions_of_time, parts_of_time
 from floatframe.functions.time_switches import switch_times
 from floatframe.integrators.carry import Carry, Failure, Integrator
 from floatframe.kernels.memory import Rows
@@ -37,9 +37,7 @@ def jump_times(system: System, t_start: float, h: float, n_steps: int) -> list[f
     times = {
         float(t) for each in functions_of_time(system) if not each.is_motion for t in each.function.jumps(0)[0]
     }  # (1)
-    switches = [
-        switch for part in (*system.forces, *system.elements) for switch in getattr(part, "switches_of_time", list)()
-    ]
+    switches = [switch for _, each in parts_of_time(system) for switch in each.parts_of_time().switches]
     if switches:  # (2)
         n_places = min(PER_STEP * n_steps, MOST_PLACES) + 1
         times |= set(switch_times(switches, np.linspace(t_start, t_start + n_steps * h, n_places)))
