@@ -63,7 +63,8 @@ def tyre(kind, **numbers):
 
 def cylinder(**given):
     part = hydraulics.Cylinder(
-        "c", A, B, head_area=1e-3, head="p", stroke=1.0, retracted_length=0.1, head_dead_volume=1e-4, friction=3.0, **given
+        "c", A, B, head_area=1e-3, head="p", stroke=1.0, retracted_length=0.1, head_dead_volume=1e-4, friction=3.0,
+        **given,
     )  # fmt: skip
     return {"elements": [hydraulics.Circuit("k", OIL, [part, hydraulics.Supply("s", "p", pressure=2e5)])]}
 
