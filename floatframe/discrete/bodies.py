@@ -260,9 +260,14 @@ def step_of(place: Placed, x: Array) -> BodyStep:
 
 
 def still(place: Placed, x: Array) -> BodyStep:
-    """Return the configuration of a placed body as both ends of a step, with increments x, (..., 6 + n)."""
+    """Return the configuration of a placed body as both ends of a step, with increments x, (..., 6 + n).
+
+    Its angular velocity is that of the momentum of the interval, (1 + theta²/4) theta/h (exactly, for turns about a
+    principal axis).
+    """
     d, theta, dq = x[..., :3], x[..., 3:6], x[..., 6:]
-    return BodyStep(place.c, place.c, place.R, place.R, place.q, place.q, place.R, d, theta @ place.R.T, dq)
+    turn = (1 + 0.25 * dot(theta, theta))[..., None] * theta
+    return BodyStep(place.c, place.c, place.R, place.R, place.q, place.q, place.R, d, turn @ place.R.T, dq)
 
 
 def moved(place: Placed, x: Array, v: Array, omega: Array, q_dot: Array) -> Placed:

@@ -189,7 +189,7 @@ def new_step_work(model: Model, discrete: Discrete, sizes: dict[str, int]) -> St
     return step
 
 
-REMEMBERED = ("band", "band_pivot", "is_due", "acceleration", "f_kept", "f_size")  #: of a step, by the next
+REMEMBERED = ("h", "band", "band_pivot", "is_due", "acceleration", "f_kept", "f_size")  #: of a step, by the next
 
 
 @dataclass(eq=False)

@@ -12,7 +12,13 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.discrete.bodies import BodyStep, CentralBody
 from floatframe.discrete.constraints import Loads, Pair, Span
-from floatframe.discrete.coordinates import add_coordinate_force, add_pair, coordinate_change, coordinate_ends
+from floatframe.discrete.coordinates import (
+    add_coordinate_force,
+    add_impulsive_force,
+    add_pair,
+    coordinate_ends,
+    coordinate_rate,
+)
 from floatframe.discrete.functions import along_imaginary, value_of
 from floatframe.discrete.markers import Load, MarkerStep
 from floatframe.joints.rows import kind_of
@@ -93,10 +99,9 @@ def body_load(model: Model, k: int, body: CentralBody, step: BodyStep, load: Loa
 def coordinate_load(model: Model, k: int, pair: Pair, loads: Loads, span: Span, normal: Array) -> Given:
     """Add the forces along the coordinate of row k (PUSH, TWIST, TWIST_B); normal: force in the joint across it."""
     is_angle = kind_of(model.rows.kind[k]).is_angle
-    change = coordinate_change(model, k, pair)
     begin, end = coordinate_ends(model, k, pair)
-    rate = change / span.h
-    Q, given, taken = 0.0 * rate, 0.0 * rate, 0.0 * rate
+    rate = coordinate_rate(model, k, pair, span.h)
+    Q, spring, given, taken = 0.0 * rate, 0.0 * rate, 0.0 * rate, 0.0 * rate
     for i in range(int(model.rows.force0[k]), int(model.rows.force1[k])):
         f = model.joint_forces
         mean = 0.5 * (begin + end) - f.free[i]
@@ -110,8 +115,10 @@ def coordinate_load(model: Model, k: int, pair: Pair, loads: Loads, span: Span, 
         resisting = f.damping[i] * rate
         if f.friction[i] > 0 or f.coefficient[i] > 0:
             resisting = resisting + (f.friction[i] + f.coefficient[i] * normal) * np.tanh(rate / f.speed[i])
-        Q = Q + entering - f.stiffness[i] * mean - resisting
-        given = given + entering * change
-        taken = taken + resisting * change
-    add_coordinate_force(model, k, pair, loads, Q)
+        Q = Q + entering - resisting
+        spring = spring - f.stiffness[i] * mean
+        given = given + entering * rate * span.h
+        taken = taken + resisting * rate * span.h
+    add_impulsive_force(model, k, pair, loads, Q)
+    add_coordinate_force(model, k, pair, loads, spring)
     return Given(given, taken)

@@ -127,7 +127,7 @@ def connection_residual(
         values = [np.broadcast_to(value, mu.shape[:-1]) for value in values]
         out.append(np.stack(values, axis=-1) + ds.model.rows.soft[list(connection.held)] * mu)
     if connection.states:
-        out.append(ds.state_residual(connection, ends, span, dz, 2 * mu / span.h**2))
+        out.append(ds.state_residual(connection, ends, span, dz, 2 * mu / span.h**2, is_along=scheme.acts_along))
     return np.concatenate(out, axis=-1)
 
 

@@ -195,12 +195,17 @@ class DiscreteSystem:
         driven = connection.line is not None and connection.line.row >= 0
         return driven or bool(self.model.rows.motion[k] >= 0)
 
-    def state_residual(self, connection: Connection, ends: Ends, span: Span, dz: Array, f: Array) -> Array:
-        """Return the equations of the states of a connection for their changes, (..., n_states of it)."""
+    def state_residual(
+        self, connection: Connection, ends: Ends, span: Span, dz: Array, f: Array, *, is_along: bool
+    ) -> Array:
+        """Return the equations of the states of a connection for their changes, (..., n_states of it).
+
+        is_along: whether forces act along the step, with the mean angular velocities.
+        """
         if self.model.connections.law[connection.number] == ELEMENT:
             rates = element_rates(self.model, connection.number, ends.markers, span, dz, f)
         else:
-            rates = user_state_rates(self.model, connection.number, ends.pairs, span, dz)
+            rates = user_state_rates(self.model, connection.number, ends.pairs, span, dz, is_along=is_along)
         return dz - span.h * rates
 
     def remembered(self, ends: list[Ends], span: Span, dz: Array) -> Array:

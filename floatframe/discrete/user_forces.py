@@ -13,7 +13,13 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.compiling.callbacks.user_forces import C_FUNCTION
 from floatframe.discrete.constraints import Loads, Pair, Span
-from floatframe.discrete.coordinates import add_coordinate_force, coordinate_change, coordinate_ends, counted
+from floatframe.discrete.coordinates import (
+    add_impulsive_force,
+    coordinate_change,
+    coordinate_ends,
+    coordinate_rate,
+    counted,
+)
 from floatframe.discrete.couplers import coordinates_of
 from floatframe.discrete.functions import value_of
 from floatframe.functions import expressions as ex
@@ -99,12 +105,12 @@ def inputs_of(
     x, v, changes = [], [], []
     for p, pair in zip(coordinates_of(model, c, element_of(model, c)), pairs, strict=True):
         k = int(model.coordinates.row[p])
-        change = coordinate_change(model, k, pair)
+        rate = coordinate_rate(model, k, pair, span.h)
         begin, end = coordinate_ends(model, k, pair)
         value = counted(model, k, end, span.w[k])
         x.append(value - 0.5 * (end - begin) if is_middle else value)
-        v.append(change / span.h)
-        changes.append(change)
+        v.append(rate)
+        changes.append(rate * span.h)
     states = [z[..., s] for s in range(z.shape[-1])]
     return np.stack(np.broadcast_arrays(t, *x, *v, *states), axis=-1), changes
 
@@ -121,14 +127,18 @@ def user_force_load(
     for p, pair, load, change in zip(coordinates_of(model, c, i), pairs, loads, changes, strict=True):
         if model.coordinates.force[p] >= 0:
             Q = values[..., int(model.coordinates.core[p] - model.elements.core[i])]
-            add_coordinate_force(model, int(model.coordinates.row[p]), pair, load, Q)
+            add_impulsive_force(model, int(model.coordinates.row[p]), pair, load, Q)
             given = given + Q * change
     return given
 
 
-def user_state_rates(model: Model, c: int, pairs: list[Pair], span: Span, dz: Array) -> Array:
+def user_state_rates(model: Model, c: int, pairs: list[Pair], span: Span, dz: Array, *, is_along: bool) -> Array:
     """Return the rates of the states of user force c in the middle of the step, (..., n_states)."""
     z = span.w[list(state_rows(model, c))] + 0.5 * dz
     inputs, _ = inputs_of(model, c, pairs, 0.5 * (span.t_0 + span.t_1), span, z, is_middle=True)
+    if not is_along:
+        for p, pair in enumerate(pairs):
+            k = int(model.coordinates.row[model.elements.coordinate0[element_of(model, c)] + p])
+            inputs[..., 1 + len(pairs) + p] = coordinate_change(model, k, pair) / span.h
     u = int(model.connections.item[c])
     return user_values(model, u, inputs)[..., int(model.users.n_forces[u]) :]

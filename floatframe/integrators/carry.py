@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.compiling.system import compiled_system
+from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ConvergenceError
 from floatframe.kernels.memory import Memory, Rows, memory_at
 from floatframe.kernels.model import Model
@@ -16,6 +16,7 @@ from floatframe.state import State
 from floatframe.system import System
 
 __all__ = [
+    "LEAST_STEP",
     "Carry",
     "Failure",
     "FollowedRotations",
@@ -29,7 +30,10 @@ __all__ = [
     "one_step_of",
     "turned_on",
     "with_angles",
+    "words_of_contact",
 ]
+
+LEAST_STEP = 1e-6  #: of the largest, where a step may be divided and no least one is given
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,3 +261,13 @@ def observed(system: System, t: float, carry: Carry, work: Work) -> tuple[Array,
     memory = memory_of(carry)
     rows = observe_state(compiled_system(system).model, work, memory, t)
     return np.array([memory.power_given, memory.power_taken]), rows
+
+
+def words_of_contact(compiled: CompiledSystem, work: Work, least: float, smaller: str) -> str:
+    """Say which contact a step of the least size is too long for, and what may be made smaller."""
+    c = int(compiled.model.gaps.connection[int(work.gaps.shortest)])
+    return (
+        f"contact {compiled.connection_names[c]!r} takes steps of {float(work.gaps.step):.3g} s, expected no shorter "
+        f"ones than h_min = {least:.3g}: in longer ones it would gain energy; give a smaller {smaller}, or a softer "
+        "contact"
+    )

@@ -11,7 +11,17 @@ from floatframe.discrete.compiled import kept_of
 from floatframe.discrete.constraints import Span
 from floatframe.discrete.system import DiscreteSystem, discrete_system
 from floatframe.errors import ModelError
-from floatframe.integrators.carry import Carry, Failure, carry_of, memory_of, observed, one_step_of, with_angles
+from floatframe.integrators.carry import (
+    LEAST_STEP,
+    Carry,
+    Failure,
+    carry_of,
+    memory_of,
+    observed,
+    one_step_of,
+    with_angles,
+    words_of_contact,
+)
 from floatframe.kernels.entry import Outcome
 from floatframe.kernels.memory import Rows, new_rows
 from floatframe.kernels.work import Work
@@ -89,7 +99,7 @@ class DiscreteScheme:
         from floatframe.discrete.kernels.entry import advance_discrete_steps
         from floatframe.discrete.kernels.newton import NO_ACCELERATION
 
-        compiled = compiled_system(system)
+        compiled, least = compiled_system(system), LEAST_STEP * h
         model = compiled.model
         ds = discrete_system(system, type(self).__name__)
         kept = kept_of(work, ds, self.equations, h, self.damping)
@@ -102,9 +112,12 @@ class DiscreteScheme:
         outcome = advance_discrete_steps(
             model, work, kept.discrete, step, memory, rows, t0=t0, h=h, first=first, n_steps=n_steps, every=every,
             tolerance=self.tolerance, max_iterations=self.max_iterations, length=ds.length,
+            h_min=least,
         )  # fmt: skip
         if outcome.status == NO_ACCELERATION:  # the memory has gone on to where there is none: the good steps again
-            failure = explained(compiled, work, outcome, self.max_iterations)  # of what they would forget
+            failure = explained(
+                compiled, work, outcome, self.max_iterations, LEAST_STEP * h
+            )  # of what they would forget
             work.past.n[...] = 0
             again = self.advance(system, carry, work, t0=t0, h=h, first=first, n_steps=outcome.n_steps, every=every)
             return *again[:3], failure
@@ -113,17 +126,21 @@ class DiscreteScheme:
         after = replace(carry_of(memory, n_iterations), a=step.f_kept.copy(), power=carry.power)
         kept.after = after
         rows = Rows(*(array[: outcome.n_rows] for array in rows))
-        return after, rows, outcome.n_steps, explained(compiled, work, outcome, self.max_iterations)
+        return after, rows, outcome.n_steps, explained(compiled, work, outcome, self.max_iterations, least)
 
 
-def explained(compiled: CompiledSystem, work: Work, outcome: Outcome, max_iterations: int) -> Failure | None:
+def explained(
+    compiled: CompiledSystem, work: Work, outcome: Outcome, max_iterations: int, least: float
+) -> Failure | None:
     """Say why a step failed; None if none did."""
-    from floatframe.discrete.kernels.newton import CONVERGED, NO_ACCELERATION, SINGULAR, STOPPED
+    from floatframe.discrete.kernels.newton import CONVERGED, NO_ACCELERATION, SINGULAR, STOPPED, UNRESOLVED
 
     if outcome.status == CONVERGED:
         return None
     if outcome.status == STOPPED:
         return Failure(compiled.stop_words[int(work.counted.stopped) - 1], outcome.excess)
+    if outcome.status == UNRESOLVED:
+        return Failure(words_of_contact(compiled, work, least, "h"), outcome.excess)
     if int(work.counted.no_number):
         name = compiled.connection_names[int(work.counted.no_number) - 1]
         words = (

@@ -8,7 +8,17 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ModelError
-from floatframe.integrators.carry import Carry, Failure, carry_of, memory_of, observed, one_step_of, with_angles
+from floatframe.integrators.carry import (
+    LEAST_STEP,
+    Carry,
+    Failure,
+    carry_of,
+    memory_of,
+    observed,
+    one_step_of,
+    with_angles,
+    words_of_contact,
+)
 from floatframe.kernels.memory import Rows, new_rows
 from floatframe.kernels.model import MASS, STIFFNESS, Model
 from floatframe.kernels.work import Work
@@ -19,8 +29,6 @@ from floatframe.state import State
 from floatframe.system import System
 
 __all__ = ["GeneralizedAlpha", "hht", "newmark", "trapezoidal"]
-
-LEAST_STEP = 1e-6  #: of the largest, where the step is controlled and no least one is given
 
 
 @dataclass(frozen=True)
@@ -230,7 +238,7 @@ class GeneralizedAlpha:
         if status == STOPPED:
             return Failure(compiled.stop_words[index], excess)
         if status == UNRESOLVED:
-            return Failure(words_of_contact(compiled, work, least), excess)
+            return Failure(words_of_contact(compiled, work, least, "h_min or h"), excess)
         if status == INACCURATE:
             words = (
                 f"its error stays above error_tolerance = {self.error_tolerance} down to the least step, "
@@ -295,17 +303,6 @@ def hht(alpha: float = -0.1, **options: float) -> GeneralizedAlpha:
         raise ModelError(f"hht: alpha: expected -1/3 <= alpha <= 0, got {alpha}")
     parameters = (0.0, -alpha, 0.25 * (1 - alpha) ** 2, 0.5 - alpha)
     return GeneralizedAlpha(parameters=parameters, **options)  # type: ignore[arg-type]
-
-
-def words_of_contact(compiled: CompiledSystem, work: Work, least: float) -> str:
-    """Say which contact a step of the least size is too long for."""
-    gap = int(work.gaps.shortest)
-    c = int(compiled.model.gaps.connection[gap])
-    return (
-        f"contact {compiled.connection_names[c]!r} takes steps of {float(work.gaps.step):.3g} s, expected no shorter "
-        f"ones than h_min = {least:.3g}: in longer ones it would gain energy; give a smaller h_min or h, or a softer "
-        "contact"
-    )
 
 
 def mass_weights(model: Model) -> Array:

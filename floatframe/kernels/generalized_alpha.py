@@ -3,7 +3,7 @@
 import math
 
 from floatframe.kernels.compiler.compilation import inner
-from floatframe.kernels.connections.gap import next_step, step_before_contact
+from floatframe.kernels.connections.gap import next_step, step_before_contact, take_ends
 from floatframe.kernels.connections.user_force import resize_states
 from floatframe.kernels.diagnostics import diagnose, power
 from floatframe.kernels.evaluation import evaluate
@@ -308,7 +308,10 @@ def one_step(model, work, memory, order, h):
 @inner
 def is_too_long(model, work, h):
     """Whether a step of size h that has converged is too long for a contact, see `connections.gap`."""
-    return model.gaps.connection.shape[0] > 0 and next_step(model, work, work.state.time, h) < h
+    if model.gaps.connection.shape[0] == 0:
+        return False
+    take_ends(model, work)
+    return next_step(model, work, work.state.time, h) < h
 
 
 @inner

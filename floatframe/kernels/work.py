@@ -179,6 +179,7 @@ class GapWork(NamedTuple):
     """Gaps over a step, see kernels/connections/gap.py."""
 
     start: Array = real(n_gaps, unit="m, rad")  #: at its beginning
+    end: Array = real(n_gaps, unit="m, rad")  #: at its end
     wrench: Array = real(n_m, 6)  #: on markers, whose work is the change of a gap
     step: Array = real(unit="s")  #: the next may be as long, or the one that is too long should be
     shortest: IntArray = integer()  #: which of them says so, -1 for none

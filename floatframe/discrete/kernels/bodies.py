@@ -241,11 +241,17 @@ def keep_bodies(model, discrete, step, memory):
 
 @inner
 def body_step(model, discrete, step, i):
-    """Write how body i moves over the step by its unknowns."""
+    """Write how body i moves over the step by its unknowns.
+
+    Forces of the variational scheme act at one configuration. The angular velocity there that belongs to the momentum
+    of the interval is (1 + theta²/4) theta/h (exactly, for turns about a principal axis).
+    """
     t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
     R, theta = matrix(step.R_0[i]), vector(step.z[u0 + 3 :])
     put(step.d[i], 0, turned(R, vector(step.z[u0:])))
-    put(step.theta_G[i], 0, turned(R, theta))
+    is_interval = step.is_still and step.is_closing < 2
+    turn = scaled(1.0 + 0.25 * dot(theta, theta), theta) if is_interval else theta
+    put(step.theta_G[i], 0, turned(R, turn))
     if not step.is_closing:
         put_matrix(step.R_1[i], product(R, cayley(theta)))
     if step.is_still:

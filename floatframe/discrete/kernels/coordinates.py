@@ -2,14 +2,21 @@
 
 import math
 
-from floatframe.discrete.kernels.markers import add_direction, add_force
-from floatframe.discrete.kernels.rows import angle_change, angle_loads, angle_of, mean_distance, slip_change
+from floatframe.discrete.kernels.markers import add_direction, add_force, add_moment, turning
+from floatframe.discrete.kernels.rows import (
+    angle_change,
+    angle_loads,
+    angle_of,
+    mean_direction,
+    mean_distance,
+    slip_change,
+)
 from floatframe.joints.rows.kinds import PUSH, SPAN, TWIST_B
 from floatframe.kernels.compiler.compilation import inner
-from floatframe.kernels.vector import dot, norm, scaled, sub, turned, vector
+from floatframe.kernels.vector import cross, dot, norm, scaled, sub, turned, vector
 
-__all__ = ["add_coordinate_force", "add_pair", "coordinate_at", "coordinate_change", "coordinate_ends", "counted",
-           "ends_of_step", "span_lengths"]  # fmt: skip
+__all__ = ["add_coordinate_force", "add_impulsive_force", "add_pair", "coordinate_at", "coordinate_change",
+           "coordinate_ends", "coordinate_rate", "counted", "ends_of_step", "span_lengths"]  # fmt: skip
 
 
 @inner
@@ -95,3 +102,33 @@ def add_coordinate_force(model, discrete, step, k, a, b, Q):
         angle_loads(model, discrete, step, k, b, a, -Q)
     else:
         angle_loads(model, discrete, step, k, a, b, Q)
+
+
+@inner
+def angle_axis(model, step, k, a):
+    """Return the unit axis of the angle of row k, fixed in marker a, by the mean of its directions."""
+    axis = mean_direction(step, a, cross(vector(model.rows.x[k]), vector(model.rows.z[k])))
+    length = norm(axis)
+    return scaled(1.0 / length, axis) if length > 0.0 else axis
+
+
+@inner
+def coordinate_rate(model, discrete, step, k, a, b):
+    """Return the mean rate of the coordinate of row k: of an angle that of the angular velocities about its axis."""
+    kind = model.rows.kind[k]
+    if kind == PUSH or kind == SPAN:
+        return coordinate_change(model, discrete, step, k, a, b) / step.h
+    axis = angle_axis(model, step, k, b if kind == TWIST_B else a)
+    return dot(axis, sub(turning(model, step, b), turning(model, step, a))) / step.h
+
+
+@inner
+def add_impulsive_force(model, discrete, step, k, a, b, Q):
+    """Add the loads of a force or torque Q along the coordinate of row k: impulse h Q and work h Q times its rate."""
+    kind = model.rows.kind[k]
+    if kind == PUSH or kind == SPAN:
+        add_coordinate_force(model, discrete, step, k, a, b, Q)
+        return
+    T = scaled(Q, angle_axis(model, step, k, b if kind == TWIST_B else a))
+    add_moment(model, step, b, T)
+    add_moment(model, step, a, scaled(-1.0, T))

@@ -4,9 +4,11 @@ import math
 
 from floatframe.discrete.kernels.coordinates import (
     add_coordinate_force,
+    add_impulsive_force,
     add_pair,
     coordinate_change,
     coordinate_ends,
+    coordinate_rate,
 )
 from floatframe.discrete.kernels.markers import add_force, add_moment, ends, turning
 from floatframe.discrete.kernels.rows import force_of_row
@@ -111,12 +113,15 @@ def normal_force(model, discrete, step, c, k):
 
 @inner
 def coordinate_load(model, discrete, step, k, a, b, normal):
-    """Add the forces along the coordinate of row k (PUSH, TWIST, TWIST_B); normal: force in the joint across it."""
+    """Add the forces along the coordinate of row k (PUSH, TWIST, TWIST_B); normal: force in the joint across it.
+
+    Springs do the work of the change of their potential; the impulse of all others is h times their force.
+    """
     is_angle = model.rows.is_angle[k]
     change = coordinate_change(model, discrete, step, k, a, b)
     begin, end = coordinate_ends(model, step, k, a, b, change)
-    rate, f = change / step.h, model.joint_forces
-    Q, given, taken = 0.0, 0.0, 0.0
+    rate, f = coordinate_rate(model, discrete, step, k, a, b), model.joint_forces
+    Q, spring, given, taken = 0.0, 0.0, 0.0, 0.0
     for i in range(model.rows.force0[k], model.rows.force1[k]):
         mean = 0.5 * (begin + end) - f.free[i]
         if is_angle:
@@ -131,8 +136,11 @@ def coordinate_load(model, discrete, step, k, a, b, normal):
         resisting = f.damping[i] * rate
         if f.friction[i] > 0.0 or f.coefficient[i] > 0.0:
             resisting += (f.friction[i] + f.coefficient[i] * normal) * math.tanh(rate / f.speed[i])
-        Q += entering - f.stiffness[i] * mean - resisting
-        given += entering * change
-        taken += resisting * change
-    add_coordinate_force(model, discrete, step, k, a, b, Q)
+        Q += entering - resisting
+        spring -= f.stiffness[i] * mean
+        given += entering * rate * step.h
+        taken += resisting * rate * step.h
+    add_impulsive_force(model, discrete, step, k, a, b, Q)
+    if spring != 0.0:
+        add_coordinate_force(model, discrete, step, k, a, b, spring)
     return given, taken

@@ -21,13 +21,14 @@ from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.model import BUSHING, CONTACT, ELEMENT, JOINT, SPRING, USER_FORCE
 from floatframe.kernels.vector import cross, matrix, norm, put_sum, scaled, sub, turned_back, vector
 
-__all__ = ["CONVERGED", "NOT_CONVERGED", "NO_ACCELERATION", "SINGULAR", "STOPPED", "add_loads", "move", "solve"]
+__all__ = ["CONVERGED", "NOT_CONVERGED", "NO_ACCELERATION", "SINGULAR", "STOPPED", "UNRESOLVED", "add_loads", "move",
+           "solve"]  # fmt: skip
 
 SLOW = 0.25  # ratio of corrections above which the derivatives are made anew
 MANY = 7  # iterations of a step after which the next one starts with new factors
 LEFT = 1e-2  # of what a correction may be, what is left after it may be: the factors are not those of the iterate
 ROUNDOFF = 2e-15  # of a position
-CONVERGED, NOT_CONVERGED, SINGULAR, NO_ACCELERATION, STOPPED = range(5)
+CONVERGED, NOT_CONVERGED, SINGULAR, NO_ACCELERATION, STOPPED, UNRESOLVED = range(6)
 
 
 @inner
@@ -121,7 +122,7 @@ def write_residual(model, work, discrete, step):
             else:
                 step.residual[n_u + j] = row_value(model, step, connection, k) + soft
         if model.connections.law[connection] == USER_FORCE:
-            write_state_residual(model, work, step, connection)
+            write_state_residual(model, work, discrete, step, connection)
     for m in range(model.markers.body.shape[0]):
         marker_loads(model, discrete, step, m)
     for i in range(model.bodies.kind.shape[0]):
@@ -137,10 +138,10 @@ def write_residual(model, work, discrete, step):
 
 
 @inner
-def write_state_residual(model, work, step, c):
+def write_state_residual(model, work, discrete, step, c):
     """Write the equations of the states of connection c; while velocities are closed they do not change."""
     if not step.is_closing:
-        user_state_residual(model, work, step, c)
+        user_state_residual(model, work, discrete, step, c)
         return
     u = model.connections.item[c]
     first = step.load.shape[0] + step.f.shape[0]

@@ -74,7 +74,7 @@ class StepWork(NamedTuple):
     t_1: Array = real(unit="s")
     t_force: Array = real(unit="s")  #: at which forces are taken
     is_still: IntArray = integer()  #: whether forces act at one configuration
-    is_closing: IntArray = integer()  #: whether velocities are closed, else positions
+    is_closing: IntArray = integer()  #: 0 while positions are closed, 1 for forces at the end, 2 for velocities
     given: Array = real(unit="J")  #: work over the step
     taken: Array = real(unit="J")
     # bodies

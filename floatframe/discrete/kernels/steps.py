@@ -1,15 +1,20 @@
 """The steps of the conserving and variational schemes in a compiled loop; formulas in `floatframe.integrators`."""
 
+import math
+
 from floatframe.discrete.kernels.bodies import begin_bodies, end_rates, interval, keep_bodies, move_bodies
+from floatframe.discrete.kernels.connections.contacts import gap_at
+from floatframe.discrete.kernels.connections.public_elements import element_gap
 from floatframe.discrete.kernels.deformed_lines import begin_lines
 from floatframe.discrete.kernels.held_rows import row_change
 from floatframe.discrete.kernels.markers import begin_markers, marker_loads
 from floatframe.discrete.kernels.memory import expect_angles, keep, recall, remember
-from floatframe.discrete.kernels.newton import CONVERGED, NO_ACCELERATION, STOPPED, add_loads, move, solve
+from floatframe.discrete.kernels.newton import CONVERGED, NO_ACCELERATION, STOPPED, UNRESOLVED, add_loads, move, solve
 from floatframe.discrete.kernels.observation import observe
 from floatframe.discrete.kernels.records import CONSERVING, DAMPING
 from floatframe.kernels.body import block
 from floatframe.kernels.compiler.compilation import inner
+from floatframe.kernels.connections.gap import next_step, step_before_contact
 from floatframe.kernels.generalized_alpha import load_state
 from floatframe.kernels.past import keep_past
 from floatframe.kernels.turns import count_turns
@@ -105,6 +110,8 @@ def conserving_step(model, work, discrete, step, memory, order):
         return status
     take_multipliers(step)
     move(model, discrete, step)
+    if is_too_long(model, work, discrete, step):
+        return UNRESOLVED
     step.given, step.taken = 0.0, 0.0
     work.counted.stopped = 0
     if discrete.is_loaded:
@@ -141,6 +148,8 @@ def variational_step(model, work, discrete, step, memory, order):
         return status
     take_multipliers(step)
     move(model, discrete, step)
+    if is_too_long(model, work, discrete, step):
+        return UNRESOLVED
     work.counted.stopped = 0
     add_loads(model, work, discrete, step)
     add_drives(model, discrete, step)
@@ -177,6 +186,7 @@ def variational_step(model, work, discrete, step, memory, order):
         put(step.P_0, u0 + 3, add(turning, scaled(0.5 * h, torque)))
         for k in range(u0 + 6, u0 + 6 + n):
             step.P_0[k] = step.P_1[k] + 0.5 * h * (step.elastic[k] + step.load[k])
+    step.is_closing = 2
     status = solve(model, work, discrete, step, order, 1, False)
     if status != CONVERGED:
         for k in range(step.z.shape[0]):
@@ -219,6 +229,85 @@ def put_elastic(model, step, i):
 
 
 @inner
+def is_too_long(model, work, discrete, step):
+    """Whether the step, whose unknowns are found, is too long for a contact; see `kernels.connections.gap`."""
+    if model.gaps.connection.shape[0] == 0:
+        return False
+    for g in range(model.gaps.connection.shape[0]):
+        if model.gaps.output[g] < 0:
+            work.gaps.end[g] = gap_at(model, step.x_1, step.A_1, model.gaps.connection[g])
+        else:
+            work.gaps.end[g] = element_gap(model, work, discrete, step, g)
+    return next_step(model, work, step.t_0, step.h) < step.h
+
+
+@inner
+def begin_iterate(model, work, step, memory):
+    """Take the state of the memory for the iterate, with the mean accelerations of the step before.
+
+    Not those of the memory, which are those of the last output: outputs do not change a motion.
+    """
+    load_state(work.state, memory)
+    for i in range(model.bodies.kind.shape[0]):
+        t, n, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.u0[i]
+        s, omega = scaled(1.0 / model.body_types.mass[t], vector(model.body_types.S[t])), vector(memory.u[u0 + 3 :])
+        of_center = add(cross(vector(step.acceleration[u0 + 3 :]), s), cross(omega, cross(omega, s)))
+        put(work.state.u_dot, u0, turned(work.state.R[i], sub(vector(step.acceleration[u0:]), of_center)))
+        for k in range(u0 + 3, u0 + 6 + n):
+            work.state.u_dot[k] = step.acceleration[k]
+
+
+@inner
+def take_size(step, h):
+    """Take a size of the step."""
+    if step.h != h:
+        step.h = h
+        step.is_due[0], step.is_due[1] = 1, 1
+
+
+@inner
+def take_parts(model, work, discrete, step, memory, order, t_0, t_1):
+    """Advance the memory from t_0 to t_1 by one step, with contacts by parts that these want; return the status.
+
+    A part that fails is tried again, shorter, down to h_min.
+    """
+    h, has_gaps, left, has_failed = order.h, model.gaps.connection.shape[0] > 0, order.h, False
+    if memory.h_wanted <= 0.0 or memory.h_wanted > h:
+        memory.h_wanted = h
+    while left > 0.0:
+        part, is_last = left, True
+        if has_gaps:
+            n_parts = max(1.0, math.ceil(left / memory.h_wanted * (1.0 - 1e-9)))
+            begin_iterate(model, work, step, memory)
+            part = max(min(step_before_contact(model, work, t_1 - left, left / n_parts), left), order.h_min)
+            is_last = part >= left
+            part = min(part, left)
+        step.t_0, step.t_1 = t_0 if left == h else t_1 - left, t_1 if is_last else t_1 - (left - part)
+        take_size(step, part)
+        if discrete.scheme == CONSERVING:
+            status = conserving_step(model, work, discrete, step, memory, order)
+        else:
+            status = variational_step(model, work, discrete, step, memory, order)
+        if status == CONVERGED:
+            count_angles(model, work, memory, part)
+            memory.n_accepted += 1
+            left = 0.0 if is_last else left - part
+            if has_gaps:
+                wanted = h if work.gaps.n_closed == 0 else part if has_failed else 2.0 * part
+                memory.h_wanted = min(wanted, h, work.gaps.step)
+            has_failed = False
+            if work.counted.stopped > 0:
+                return STOPPED
+            continue
+        if not has_gaps or part <= order.h_min:
+            return status
+        memory.n_rejected += 1
+        memory.h_wanted = max(work.gaps.step if status == UNRESOLVED else 0.5 * part, order.h_min)
+        has_failed = True
+    return CONVERGED
+
+
+@inner
 def advance(model, work, discrete, step, memory, rows, order):
     """Advance by n_steps of size h, the first of them number `first` from t0; keep the state after every `every`-th.
 
@@ -226,23 +315,15 @@ def advance(model, work, discrete, step, memory, rows, order):
     memory has gone one step further.
     """
     h = order.h
-    step.h = h
     work.counted.rows = 0
     for k in range(order.n_steps):
         work.counted.no_number = 0
-        step.t_0, step.t_1 = order.t0 + (order.first + k) * h, order.t0 + (order.first + k + 1) * h
-        if discrete.scheme == CONSERVING:
-            status = conserving_step(model, work, discrete, step, memory, order)
-        else:
-            status = variational_step(model, work, discrete, step, memory, order)
+        t_0, t_1 = order.t0 + (order.first + k) * h, order.t0 + (order.first + k + 1) * h
+        status = take_parts(model, work, discrete, step, memory, order, t_0, t_1)
         if status != CONVERGED:
             return status, k, work.counted.rows
-        count_angles(model, work, memory, h)
-        memory.n_accepted += 1
-        if work.counted.stopped > 0:
-            return STOPPED, k, work.counted.rows
         if (order.first + k + 1) % order.every == 0:
-            if not observe(model, work, discrete, step, memory, step.t_1, rows):
+            if not observe(model, work, discrete, step, memory, t_1, rows):
                 return NO_ACCELERATION, k, work.counted.rows
             if work.counted.stopped > 0:  # at the end of the step, whose row goes as the step does
                 return STOPPED, k, work.counted.rows - 1

@@ -40,7 +40,7 @@ from floatframe.kernels.vector import (
     vector,
 )
 
-__all__ = ["gap_of_markers", "next_step", "step_before_contact", "step_of_gap", "take_gap"]
+__all__ = ["gap_of_markers", "next_step", "step_before_contact", "step_of_gap", "take_ends"]
 
 FINE = 30.0  # fine steps in a contact
 CALM = 0.1  # change of the depth of a contact in a step, by its depth, that any step may make
@@ -359,15 +359,21 @@ def step_after_gap(model, work, g, end, t, h):
 
 
 @inner
+def take_ends(model, work):
+    """Keep all gaps for the motion of the markers in `work`: the end of a step."""
+    for g in range(model.gaps.connection.shape[0]):
+        work.gaps.end[g] = gap_of_markers(model, work, g)
+
+
+@inner
 def next_step(model, work, t, h):
-    """Return the longest step that all gaps allow after one of size h to the iterate at t; below h: it is too long."""
+    """Return the longest step that all gaps allow after one of size h; below h: it is too long. The iterate is at t."""
     longest = math.inf
     work.gaps.shortest, work.gaps.n_closed = -1, 0
     for g in range(model.gaps.connection.shape[0]):
-        end = gap_of_markers(model, work, g)
-        if end < 0.0:
+        if work.gaps.end[g] < 0.0:
             work.gaps.n_closed += 1
-        wanted = step_after_gap(model, work, g, end, t, h)
+        wanted = step_after_gap(model, work, g, work.gaps.end[g], t, h)
         if wanted < longest:
             longest = wanted
             work.gaps.shortest = g

@@ -26,7 +26,7 @@ from floatframe import (
     Variational,
     integrate,
 )
-from floatframe.compiling.system import compiled_system
+from floatframe.compiling.system import KEPT, compiled_system
 from floatframe.discrete.bodies import placed_bodies, state_of
 from floatframe.discrete.constraints import Span
 from floatframe.discrete.contacts import V_0
@@ -102,7 +102,15 @@ def test_compiled_steps_are_those_of_the_python_version(kind, name):
 @pytest.mark.parametrize("name", SCHEMES)
 def test_connections_in_compiled_steps_are_those_of_the_python_version(kind, name):
     n_steps, h = (6, 0.06) if kind in CONTACTS else (4, 0.04)
-    assert_steps_are_those_of_python(CONNECTED[kind](), SCHEMES[name], name, n_steps, h)
+    assert_steps_are_those_of_python(undivided(CONNECTED[kind]()), SCHEMES[name], name, n_steps, h)
+
+
+def undivided(system):
+    """Return a system whose compiled steps are not divided near contacts, as those of the Python version are not."""
+    compiled = compiled_system(system)
+    gaps = type(compiled.model.gaps)(*(array[:0] for array in compiled.model.gaps))
+    vars(system)[KEPT] = replace(compiled, model=compiled.model._replace(gaps=gaps))
+    return system
 
 
 @pytest.mark.parametrize("name", ["momentum", "decaying"])

@@ -16,6 +16,7 @@ from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_e
 GROUND, BODY = Marker("ground", position=np.zeros(3)), Marker("b", position=np.zeros(3))
 OF_CONTACT = 0.01  #: relative error of a speed after a contact
 FORMULATIONS = ["absolute", "relative"]
+SCHEMES = [ff.EnergyMomentum(), ff.EnergyDecaying(), ff.Variational()]
 
 
 def ball_and_plane(gap, *, speed=3.0, scale=1.0, **numbers):
@@ -63,6 +64,23 @@ def test_balls_meet_on_a_tilted_carrier_that_moves_far_from_the_origin():
     assert_allclose(v - (v @ n) * n, 0.0, atol=1e-6)
     momentum = 3.0 * motion.body("heavy").v[-1] + motion.body("light").v[-1]
     assert_allclose(momentum, 4.0 * drift - 20.0 * n, rtol=1e-9)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_schemes_from_body_to_body_resolve_contacts(scheme):
+    """Restitution of a ball, a fast sphere on a sphere, stops of a slide."""
+    for gap in (0.05, 0.06, 0.07):
+        motion = ff.integrate(ball_and_plane(gap, restitution=0.5), scheme, 0.2, 0.01, watch="off")
+        assert_allclose(motion.body("b").v[-1, 2], 1.5, rtol=OF_CONTACT)
+        body = RigidBody("b", 1.0, 0.004 * np.eye(3), position=(0, 0, 15 * gap), velocity=(0, 0, -100))
+        contact = ff.SphereContact("c", GROUND, BODY, radius_b=0.05, radius_a=0.05, stiffness=1e7)
+        motion = ff.integrate(System([body], [], [contact]), scheme, 0.05, 0.01, watch="off")
+        assert_allclose(motion.body("b").v[-1, 2], 100.0, rtol=OF_CONTACT)
+    lash = clearances.Backlash("lash", GROUND, BODY, lower=-0.01, upper=0.01, stiffness=1e6, axis=(0, 0, 1))
+    body, slide = RigidBody("b", 1.0, np.eye(3), velocity=(0, 0, 1)), ff.PrismaticJoint("p", GROUND, BODY)
+    motion = ff.integrate(System([body], [slide], elements=[lash]), scheme, 0.21, 5e-3, watch="off")
+    assert motion.energies.total.max() < 0.5 * (1 + OF_CONTACT)
+    assert_allclose(motion.energies.total[-1], 0.5, rtol=10 * 6e-3)
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)

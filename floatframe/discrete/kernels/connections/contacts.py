@@ -9,7 +9,7 @@ from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.connections.contact import V_0
 from floatframe.kernels.vector import add, cross, dot, norm, scaled, sub, turned, vector
 
-__all__ = ["contact_load", "speed_of_approach"]
+__all__ = ["contact_load", "gap_at", "speed_of_approach"]
 
 ALIKE = 0.02  # difference of depths over their sum below which the quotient is a mean of forces
 POINT = math.sqrt(0.6)  # of Gauss, exact to degree five

@@ -27,7 +27,7 @@ from floatframe.kernels.vector import (
     vector,
 )
 
-__all__ = ["element_load", "element_residual", "first_row_of_multipliers"]
+__all__ = ["element_gap", "element_load", "element_residual", "first_row_of_multipliers"]
 
 WAY = 1.0 / 64.0  # of the step, on which the gradient of the potential is taken
 FIRST = (-1 / 60, 9 / 60, -45 / 60, 0.0, 45 / 60, -9 / 60, 1 / 60)  # of differences of sixth order at -3 to 3
@@ -94,6 +94,18 @@ def put_inputs(model, work, discrete, step, c, t, where, s, part):
     o += model.laws.head[i, 2]
     for j in range(model.laws.head[i, 3]):
         x[o + j] = step.f[discrete.first[c] + j]
+
+
+@inner
+def element_gap(model, work, discrete, step, g):
+    """Return gap g of an element at the end of the step."""
+    c = model.gaps.connection[g]
+    i = model.connections.item[c]
+    head = model.laws.head[i]
+    begin_motion(model, discrete, step, c)
+    put_inputs(model, work, discrete, step, c, step.t_1, END, 0.0, 1.0)
+    law_call(model, work, i, work.laws.trial)
+    return work.laws.trial[6 * head[0] + head[2] + head[3] + model.gaps.output[g]]
 
 
 @inner

@@ -1,9 +1,10 @@
 """User forces over a step, see `floatframe.discrete.user_forces` for the formulas."""
 
 from floatframe.discrete.kernels.coordinates import (
-    add_coordinate_force,
+    add_impulsive_force,
     coordinate_change,
     coordinate_ends,
+    coordinate_rate,
     counted,
     ends_of_step,
 )
@@ -35,7 +36,7 @@ def user_force_load(model, work, discrete, step, c):
         change = coordinate_change(model, discrete, step, k, a, b)
         begin, end = coordinate_ends(model, step, k, a, b, change)
         inputs[1 + p - first] = counted(model, k, end, step.known[k]) - 0.5 * (end - begin)
-        inputs[1 + n + p - first] = change / step.h
+        inputs[1 + n + p - first] = coordinate_rate(model, discrete, step, k, a, b)
     put_states(model, work, step, c, 1 + 2 * n, 0.0 if step.is_still else 0.5)
     user_outputs(model, work, c)
     given = 0.0
@@ -43,13 +44,13 @@ def user_force_load(model, work, discrete, step, c):
         if model.coordinates.force[p] >= 0:
             Q = work.users.outputs[model.coordinates.core[p] - model.elements.core[i]]
             k, a, b = model.coordinates.row[p], model.coordinates.a[p], model.coordinates.b[p]
-            add_coordinate_force(model, discrete, step, k, a, b, Q)
+            add_impulsive_force(model, discrete, step, k, a, b, Q)
             given += Q * inputs[1 + n + p - first] * step.h
     return given
 
 
 @inner
-def user_state_residual(model, work, step, c):
+def user_state_residual(model, work, discrete, step, c):
     """Write the equations of the states of user force c for their changes: dz - h g in the middle of the step."""
     i, u = element_of(model, c), model.connections.item[c]
     first, last = model.elements.coordinate0[i], model.elements.coordinate0[i + 1]
@@ -59,7 +60,10 @@ def user_state_residual(model, work, step, c):
         k, a, b = model.coordinates.row[p], model.coordinates.a[p], model.coordinates.b[p]
         begin, end = ends_of_step(model, step, k, a, b)
         inputs[1 + p - first] = 0.5 * (begin + end)
-        inputs[1 + n + p - first] = (end - begin) / step.h
+        rate = (end - begin) / step.h
+        if model.rows.is_angle[k] and not step.is_still:
+            rate = coordinate_rate(model, discrete, step, k, a, b)
+        inputs[1 + n + p - first] = rate
     put_states(model, work, step, c, 1 + 2 * n, 0.5)
     user_outputs(model, work, c)
     change0 = step.load.shape[0] + step.f.shape[0] + model.users.state0[u]
