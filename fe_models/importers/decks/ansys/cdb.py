@@ -310,7 +310,8 @@ def _material(draft: _Draft, number: int, tables: dict[str, dict[int, float]], i
         return DeckMaterial(str(number), young, labels.get("PRXY", labels.get("NUXY", 0.3)), labels.get("DENS"))
     E = (young, labels.get("EY", young), labels.get("EZ", young))
     pairs = {"XY": (0, 1), "XZ": (0, 2), "YZ": (1, 2)}
-    nu, G = [], []
+    nu: list[float] = []
+    G: list[float] = []
     for pair, (a, b) in pairs.items():
         major = labels.get(f"PR{pair}")
         if major is None and f"NU{pair}" in labels:
