@@ -154,7 +154,8 @@ def eigenmodes(
         k = wanted.count if wanted.omega2 is None else int((modes.omega2[: modes.n_wanted] <= wanted.omega2).sum())
         residuals, method = modes.residuals, search.description
         n_solves, solver = operator.n_solves, factorization.description
-        omega2 = _zero_rigid(modes.omega2, zero=max(ZERO * scale, 1e-9 * abs(shift)))
+        # where K itself is factorised there is no rigid-body mode, however far the mesh's omega² lie above the modes'
+        omega2 = _zero_rigid(modes.omega2, zero=max(ZERO * scale, 1e-9 * abs(shift)) if shift else 0.0)
         columns, whole = modes.expand(), modes.space.whole
         del search, modes, operator  # the basis, before the modes are copied
         if space is not None:

@@ -132,7 +132,8 @@ def improved_modes(lanczos: BlockLanczos, ritz: RitzPairs, k: int, shift: float)
 class DenseSearch:
     """All modes of a small pencil at once.
 
-    (1) M = B Bᵀ by its eigenvectors, massless directions left out
+    (1) M = B Bᵀ by the eigenvectors of S M S, S_kk = M_kk^(-1/2), massless directions left out; so what has no mass does
+        not depend on the units of rotations and translations, or on a heavy point beside a light beam
     (2) Bᵀ (K - sigma M)⁻¹ B q = theta q;  x = (K - sigma M)⁻¹ B q / theta has xᵀ M x = 1
     """
 
@@ -140,11 +141,13 @@ class DenseSearch:
 
     def __init__(self, operator: ShiftInverted, wanted: Wanted) -> None:
         self.operator = operator
-        d, U = la.eigh(operator.M_product @ np.eye(operator.n))
+        M = operator.M_product @ np.eye(operator.n)
+        size = np.sqrt(np.where(M.diagonal() > 0, M.diagonal(), 1.0))
+        d, U = la.eigh(M / size / size[:, None])
         if d[0] < -1e-10 * d[-1]:
             raise EigenError("eigenmodes: M has a negative eigenvalue; expected a mass matrix")
         has_mass = d > MASSLESS * d[-1]
-        B = U[:, has_mass] * np.sqrt(d[has_mass])
+        B = size[:, None] * U[:, has_mass] * np.sqrt(d[has_mass])
         self._A_inv_B = operator.solve(B)
         projected = B.T @ self._A_inv_B
         theta, Q = la.eigh((projected + projected.T) / 2)
