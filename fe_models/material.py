@@ -32,7 +32,7 @@ class Material:
     Raises
     ------
     MaterialError
-        Unless E > 0, rho > 0 and -1 < nu < 0.5, all finite.
+        Unless E > 0, rho >= 0 and -1 < nu < 0.5, all finite.
     """
 
     name: str
@@ -51,8 +51,8 @@ class Material:
                 raise MaterialError(f"{where}: {key}: expected a finite number, got {value}")
         if self.E <= 0:
             raise MaterialError(f"{where}: E: expected a modulus above zero, got {self.E:g}")
-        if self.rho <= 0:
-            raise MaterialError(f"{where}: rho: expected a density above zero, got {self.rho:g}")
+        if self.rho < 0:
+            raise MaterialError(f"{where}: rho: expected a density of zero or more, got {self.rho:g}")
         if not -1 < self.nu < 0.5:
             raise MaterialError(
                 f"{where}: nu: expected -1 < nu < 0.5, got {self.nu:g}; an incompressible material "
@@ -85,8 +85,8 @@ class OrthotropicMaterial:
     Raises
     ------
     MaterialError
-        Unless all numbers are finite, moduli and density above zero, the axes orthonormal and right-handed, and the
-        stiffness positive definite.
+        Unless all numbers are finite, moduli above zero, the density not below, the axes orthonormal and right-handed,
+        and the stiffness positive definite.
     """
 
     name: str
@@ -144,8 +144,8 @@ class AnisotropicMaterial:
     Raises
     ------
     MaterialError
-        Unless all numbers are finite, the density above zero, the axes orthonormal and right-handed, and the elasticity
-        symmetric and positive definite.
+        Unless all numbers are finite, the density not below zero, the axes orthonormal and right-handed, and the
+        elasticity symmetric and positive definite.
     """
 
     name: str
@@ -191,8 +191,8 @@ def _set_axes_and_density(where: str, material: "OrthotropicMaterial | Anisotrop
     """Take axes and density as numbers, or refuse them."""
     object.__setattr__(material, "axes", tuple(_three(f"{where}: axes", row) for row in material.axes))
     rho = material.rho
-    if isinstance(rho, bool) or not isinstance(rho, int | float | np.number) or not rho > 0:
-        raise MaterialError(f"{where}: rho: expected a density above zero, got {rho!r}")
+    if isinstance(rho, bool) or not isinstance(rho, int | float | np.number) or not rho >= 0:
+        raise MaterialError(f"{where}: rho: expected a density of zero or more, got {rho!r}")
     object.__setattr__(material, "rho", float(rho))
     axes = np.array(material.axes)
     is_triad = axes.shape == (3, 3) and np.abs(axes @ axes.T - np.eye(3)).max() < 1e-6 and np.linalg.det(axes) > 0

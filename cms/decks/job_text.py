@@ -91,7 +91,11 @@ def materials_in(section: SolidSection | ShellSection | LineSection | RodSection
 
 
 def _materials(deck: Deck, request: JobRequest) -> dict[str, Any]:
-    """Return the materials in use; a density that the deck lacks comes from the request."""
+    """Return the materials in use; a density that the deck lacks comes from the request.
+
+    Nastran and ANSYS take a density that is not given as zero. So does the job where the deck has other masses, as
+    frames of light beams between point masses; where nothing has mass, the density is asked for.
+    """
     used = dict.fromkeys(name for each in sections_of(deck) for name in materials_in(each))
     for name in request.densities:
         if name and name not in used:
@@ -104,10 +108,14 @@ def _materials(deck: Deck, request: JobRequest) -> dict[str, Any]:
             raise JobError(
                 f"deck {deck.path}: a section names the material {quoted(name)}{nearest(name, deck.materials)}"
             )
-        density = material.density or request.densities.get(name, request.densities.get(""))
+        density = material.density or request.densities.get(name, request.densities.get("")) or None
         if material.elasticity is None and (material.young is None or material.poisson is None):
             raise JobError(f"deck {deck.path}: material {quoted(name)} has no elastic constants (linear)")
-        if not density:
+        if not density and deck.program in ("nastran", "ansys") and _has_mass(deck, used):
+            density = 0.0
+            why = f"material {name} has none: massless, as {deck.program} takes it; --density {name}=... gives it one"
+            deck.ledger.note("density", why)
+        if density is None:
             without.append(name)
             continue
         if material.elasticity is not None:
@@ -122,6 +130,15 @@ def _materials(deck: Deck, request: JobRequest) -> dict[str, Any]:
             f"--density {without[0]}=7.85e-9"
         )
     return made
+
+
+def _has_mass(deck: Deck, used: Iterable[str]) -> bool:
+    """Whether something of a deck has mass: points, other materials, or sections beside their materials."""
+    return (
+        any(mass.mass for mass in deck.masses)
+        or any(deck.materials[name].density for name in used if name in deck.materials)
+        or any(section.added_mass for section in (*deck.shells, *deck.lines))
+    )
 
 
 def _sections(deck: Deck) -> dict[str, Any]:

@@ -132,8 +132,8 @@ def improved_modes(lanczos: BlockLanczos, ritz: RitzPairs, k: int, shift: float)
 class DenseSearch:
     """All modes of a small pencil at once.
 
-    (1) M = B Bᵀ by the eigenvectors of S M S, S_kk = M_kk^(-1/2), massless directions left out; so what has no mass does
-        not depend on the units of rotations and translations, or on a heavy point beside a light beam
+    (1) M = B Bᵀ by the eigenvectors of S M S, S_kk = M_kk^(-1/2), massless directions left out; so what has no mass
+        depends neither on the units of rotations and translations nor on a heavy point beside a light beam
     (2) Bᵀ (K - sigma M)⁻¹ B q = theta q;  x = (K - sigma M)⁻¹ B q / theta has xᵀ M x = 1
     """
 
@@ -168,6 +168,10 @@ class DenseSearch:
             )
         n_kept = leading_count(theta, k, min(k + GUARDS, n_finite))
         modes = refined_modes(operator, self._A_inv_B @ (self._Q[:, :n_kept] / theta[:n_kept]), theta[:n_kept], k)
+        for _ in range(MOST_REFINEMENTS):
+            if modes.residuals.max(initial=0.0) <= operator.tolerance:
+                break
+            modes = refined_modes(operator, modes.expand(), 1 / (modes.omega2 - operator.shift), k)
         if modes.residuals.max(initial=0.0) > operator.tolerance:
             raise EigenError(
                 f"eigenmodes: residuals are {modes.residuals.max():.1e}, expected {operator.tolerance:.1e}; "

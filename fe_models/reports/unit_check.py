@@ -52,7 +52,7 @@ def implausible_units(units: Units, size: float, materials: Iterable[_Elastic]) 
     for material in materials:
         rho = material.rho * units.to_si(mass=1, length=-3)
         E = material.E * units.to_si(mass=1, length=-1, time=-2)
-        if not DENSITY[0] <= rho <= DENSITY[1]:
+        if rho and not DENSITY[0] <= rho <= DENSITY[1]:  # none is said: springs with a shape
             steel = STEEL / units.to_si(mass=1, length=-3)
             texts.append(
                 (
@@ -189,6 +189,8 @@ def _fits(units: Units, size: float, materials: list[_Elastic]) -> bool:
     for material in materials:
         rho = material.rho * units.to_si(mass=1, length=-3)
         E = material.E * units.to_si(mass=1, length=-1, time=-2)
-        is_plausible &= DENSITY[0] <= rho <= DENSITY[1] and MODULUS[0] <= E <= MODULUS[1]
-        is_plausible &= WAVE_SPEED[0] <= (E / rho) ** 0.5 <= WAVE_SPEED[1]
+        is_plausible &= MODULUS[0] <= E <= MODULUS[1]
+        if rho:
+            is_plausible &= DENSITY[0] <= rho <= DENSITY[1]
+            is_plausible &= WAVE_SPEED[0] <= (E / rho) ** 0.5 <= WAVE_SPEED[1]
     return is_plausible

@@ -122,7 +122,7 @@ def shell_law(item: AnyShellProperty) -> ShellLaw:
     D, third = item.bending_ratio * D, item.bending_ratio * third
     rho_t = np.array([layer.material.rho for layer in layers]) * t
     mass = float(rho_t.sum()) + item.added_mass
-    centre = float(rho_t @ middle) / mass
+    centre = float(rho_t @ middle) / mass if mass else 0.0
     second = float(rho_t @ (t**2 / 12 + middle**2)) + item.added_mass * item.thickness**2 / 12
     return ShellLaw(
         layers,
@@ -134,7 +134,7 @@ def shell_law(item: AnyShellProperty) -> ShellLaw:
         frozen((H + H.T) / 2),
         mass=mass,
         centre=centre,
-        spread=second / mass - centre**2,
+        spread=second / mass - centre**2 if mass else item.thickness**2 / 12,
     )
 
 

@@ -15,7 +15,7 @@ from tests.bodies import ALUMINIUM, STEEL, box_mesh
     [
         ({"E": 0.0}, "E: expected a modulus above zero, got 0"),
         ({"E": -2e11}, "E: expected a modulus above zero"),
-        ({"rho": 0.0}, "rho: expected a density above zero, got 0"),
+        ({"rho": -1.0}, "rho: expected a density of zero or more, got -1"),
         ({"nu": 0.5}, r"nu: expected -1 < nu < 0.5, got 0.5"),
         ({"nu": -1.0}, r"nu: expected -1 < nu < 0.5, got -1"),
         ({"nu": float("nan")}, "nu: expected a finite number, got nan"),

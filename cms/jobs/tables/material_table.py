@@ -67,7 +67,7 @@ class MaterialSection(Table):
     axes: Matrix3 | None = Field(
         None, description="the axes 1, 2, 3 of the material in mesh axes, three rows; default: the mesh axes"
     )
-    density: Annotated[float, Field(gt=0)] = Field(description="a number above 0, the density [mass / length^3]")
+    density: Annotated[float, Field(ge=0)] = Field(description="a number, 0 or more, the density [mass / length^3]")
     cells: Annotated[tuple[str, ...], BeforeValidator(names)] = Field(
         ("all",), description='"all", the name of a group of cells, or a list of names'
     )

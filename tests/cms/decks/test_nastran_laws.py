@@ -355,3 +355,14 @@ def test_a_deck_with_equations_of_several_arguments(tmp_path):
     text = GRIDS + f"{ORIENTED}\nDEQATN  301     Z(A,B,C,D,E,F,G,H,I,J)=SUM(A,B,C,D,E,F,G,H,I,J)\n+       ;Y=2\n"
     _, deck = body_of(tmp_path, text + SECTION + MATERIAL)
     assert ("DEQATN", "1", "belongs to the analysis, not to the body") in deck.ledger.rows()
+
+
+def test_light_beams_between_point_masses_need_no_density(tmp_path):
+    """Nastran takes RHO that is not given as zero; a deck without any mass asks for it."""
+    text = GRIDS + f"{ORIENTED}\n" + SECTION + "MAT1,1,2.+11,,.3\n"
+    with pytest.raises(ValueError, match="1 materials have no density"):
+        body_of(tmp_path, text)
+    body, deck = body_of(tmp_path, text + "CONM2,7,2,,3.\n")
+    up = (body.dofs[:, 1] == 2).astype(float)
+    assert_allclose(up @ body.M @ up, 3.0, rtol=1e-14)
+    assert any(row[0] == "density" and "massless" in row[2] for row in deck.ledger.rows())

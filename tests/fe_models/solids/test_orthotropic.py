@@ -170,7 +170,7 @@ WRONG = [
     ({"shear": (np.nan, 1e9, 1e9)}, "shear: expected three finite numbers"),
     ({"poisson": (0.4, 0.45, 1.5)}, "some strains would have negative energy"),
     ({"axes": ((1, 0, 0), (0, 1, 0), (0, 0, -1))}, "axes: expected three rows, orthonormal and right-handed"),
-    ({"rho": 0.0}, "rho: expected a density above zero"),
+    ({"rho": -1.0}, "rho: expected a density of zero or more"),
 ]
 
 
