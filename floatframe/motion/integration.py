@@ -29,6 +29,7 @@ from floatframe.motion.event_steps import EventWatch
 from floatframe.motion.events import has_events, require_times_of_events
 from floatframe.motion.jumps import jumps_of_steps, over_jumps
 from floatframe.motion.knots import knot_words
+from floatframe.motion.law_watch import LawWatch
 from floatframe.motion.restart import RESTART_STEPS, carry_of_record, restart_record, system_digest
 from floatframe.motion.step_advice import frequency_words, step_advice
 from floatframe.motion.step_watch import WATCHES, EnergyWatch, StepWatch, has_steps_of_one_size
@@ -380,6 +381,7 @@ class Run:
         if self.events is not None:
             self.events.begin(row)
         jumps = jumps_of_steps(self.system, self.t_start, self.h, self.n_total)
+        laws = LawWatch(self.system, self.t_start, self.h, jumps, n_done)
         failure, has_stopped, is_beyond, n_told = None, False, False, n_done
         safe = self.record_where_due(carry, n_done)  # while a block runs its events are ahead of its memory
         try:
@@ -429,6 +431,9 @@ class Run:
                 elif self.steps.opened:
                     self.steps.opened = []
                 n_done += n_good
+                if self.watching != "off" and failure is None:
+                    for words in laws.observe(carry, n_done, is_last=n_done == self.n_total or has_stopped):
+                        log.warning("system %r: %s", self.system.name, words)
                 safe = self.record_where_due(carry, n_done)
                 if n_done == self.n_total or failure is not None or has_stopped or is_beyond:
                     self.tell(self.steps.conclude(self.system, n_done, self.t_start + n_done * self.h, self.h))

@@ -1,5 +1,6 @@
 """Jumps inside elements, controllers and user forces: every step that one lies in is cut there, by every method."""
 
+import logging
 from dataclasses import dataclass
 
 import numpy as np
@@ -225,3 +226,52 @@ def test_a_run_from_a_jump_takes_the_value_after_it():
 def test_a_smooth_supply_is_not_cut():
     system = user_force("f(t)", functions={"f": harmonic(1.0, 3.0)})
     assert jump_times(system, 0.0, 0.1, 10) == []
+
+
+def unsaid_function(t, x, v, z, Q, z_dot):
+    Q[0] = (1.0 + x[0] ** 2) * (SIZE if t >= 0.0131 else 0.0)
+
+
+def smooth_function(t, x, v, z, Q, z_dot):
+    Q[0] = SIZE * np.sin(2 * np.pi * t / 0.1) * (1 + t)
+
+
+def by_function(function, **given):
+    return on_rail([UserForce("push", {"x": JointCoordinate("rail", "distance")}, ["x"], function=function, **given)])
+
+
+UNSAID = {
+    "function": (lambda: by_function(unsaid_function), "forces.push"),
+    "compiled function": (lambda: by_function(njit(unsaid_function)), "forces.push"),
+    "law": (
+        lambda: on_rail(elements=[Thruster("push", Marker("box", position=np.zeros(3)), says_when=False)]),
+        "elements.push",
+    ),
+}
+
+
+@pytest.mark.parametrize(("make", "where"), UNSAID.values(), ids=UNSAID)
+@pytest.mark.parametrize(("method", "formulation"), [METHODS["default"], METHODS["ode"]], ids=["default", "ode"])
+def test_a_jump_that_no_law_declares_is_told_once(make, where, method, formulation, caplog):
+    """The jump at 13.1 ms lies in the step from 10 ms, in the second of its halves."""
+    with caplog.at_level(logging.WARNING):
+        integrate(make(), method, END, 5e-3, formulation=formulation)
+    told = [record.getMessage() for record in caplog.records if "jumps with time" in record.getMessage()]
+    assert len(told) == 1
+    assert f"{where}: its function jumps with time, or varies fast, inside the step of 0.005 from t = 0.01," in told[0]
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: by_function(unsaid_function, knots=(0.0131,)),
+        lambda: by_function(smooth_function),
+        thruster,
+        lambda: user_force("f(t)", functions={"f": pulse()}),
+    ],
+    ids=["knots of a function", "smooth", "knots of a law", "table"],
+)
+def test_what_is_declared_or_smooth_is_not_told(make, caplog):
+    with caplog.at_level(logging.WARNING):
+        integrate(make(), GeneralizedAlpha(0.8), END, 5e-3)
+    assert not [record for record in caplog.records if "jumps with time" in record.getMessage()]
