@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.quantities import Quantity
+from fe_models.foundation.units import Quantity
 from fe_models.foundation.words import quoted
 from floatframe.errors import ModelError
 

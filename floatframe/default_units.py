@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
-from fe_models.foundation.quantities import Quantity
-from fe_models.foundation.units import Units
+from fe_models.foundation.units import Quantity, Units
 from floatframe.bodies.markers import Marker
 
 __all__ = ["in_units_of"]

@@ -1,11 +1,15 @@
 """Coherent unit systems: numbers are stored as the model has them, the system is named beside them."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 from fe_models.foundation.errors import UnitsError
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["UNIT_SYSTEMS", "Dimensions", "Units", "unit_system", "unit_text", "unit_words"]
+__all__ = [
+    "LENGTH", "RATE", "SPEED", "TIME", "UNIT_SYSTEMS", "Dimensions", "Quantity", "Units", "unit_system", "unit_text",
+    "unit_words",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -88,3 +92,28 @@ def unit_words(units: Units, dimensions: Dimensions) -> str:
         return units.stress_symbol
     rest = unit_text(units, Dimensions(0.0, dimensions.length - 1, 0.0))
     return units.force_symbol if rest == "1" else f"{units.force_symbol} {rest}"
+
+
+SI = unit_system("m-kg-s")
+LENGTH, TIME = Dimensions(length=1), Dimensions(time=1)
+SPEED, RATE = Dimensions(length=1, time=-1), Dimensions(time=-1)  #: of places, of angles
+
+
+class Quantity(float):
+    """A number in SI units with its dimensions."""
+
+    dimensions: Dimensions
+
+    def __new__(cls, value: float, dimensions: Dimensions) -> "Quantity":
+        """Make a quantity of a value in SI units."""
+        made = super().__new__(cls, value)
+        made.dimensions = dimensions
+        return made
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Quantity, (float(self), self.dimensions)
+
+    def in_units(self, units: Units, *, of_angle: bool = False) -> float:
+        """Return the number in the units of a system; of an angle, its length is one radian."""
+        dimensions = replace(self.dimensions, length=0) if of_angle else self.dimensions
+        return float(self) * dimensions.factor(SI, units)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from numba import njit
 
 from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.quantities import SPEED, Quantity
+from fe_models.foundation.units import SPEED, Quantity
 from floatframe.bodies.markers import Marker
 from floatframe.clearances.contact import NUMBERS, Range, add_contact, contact_numbers, require_numbers
 from floatframe.clearances.hinge import length_of

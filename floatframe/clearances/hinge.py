@@ -14,7 +14,7 @@ from numba.extending import register_jitable
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.quantities import SPEED, Quantity
+from fe_models.foundation.units import SPEED, Quantity
 from floatframe.bodies.markers import Marker
 from floatframe.checked_values import unit_vector
 from floatframe.clearances.contact import NUMBERS, Range, add_contact, contact_numbers, depth_force, require_numbers

@@ -8,7 +8,7 @@ from numba.extending import register_jitable
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.quantities import RATE, TIME, Quantity
+from fe_models.foundation.units import RATE, TIME, Quantity
 from floatframe.bodies.markers import Marker
 from floatframe.checked_values import number
 from floatframe.drives.shaft import check_shaft, required, time_functions

@@ -7,7 +7,7 @@ from numba import njit
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.quantities import RATE, Quantity
+from fe_models.foundation.units import RATE, Quantity
 from floatframe.bodies.markers import Marker
 from floatframe.drives.pid import Pid, pid_law
 from floatframe.drives.shaft import Z_AXIS, check_controller, check_shaft, required, shaft_numbers, time_functions

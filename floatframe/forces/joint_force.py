@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.quantities import SPEED, Quantity
+from fe_models.foundation.units import SPEED, Quantity
 from floatframe.checked_values import number
 from floatframe.errors import ModelError
 from floatframe.functions.time_functions import NOT_OF_TIME, TimeFunction

@@ -5,7 +5,7 @@ from typing import Any
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.quantities import SPEED, Quantity
+from fe_models.foundation.units import SPEED, Quantity
 from floatframe.bodies.markers import Marker
 from floatframe.checked_values import number, unit_vector
 from floatframe.errors import ModelError

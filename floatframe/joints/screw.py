@@ -7,7 +7,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.quantities import LENGTH, Quantity
+from fe_models.foundation.units import LENGTH, Quantity
 from floatframe.bodies.markers import Place
 from floatframe.checked_values import number
 from floatframe.errors import ModelError

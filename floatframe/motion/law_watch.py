@@ -69,7 +69,7 @@ class LawWatch:
         set_iterate(self.work, carry.state, w=carry.w)
         self.work.state.time[...] = self.t_start + n_done * self.h
         linearized(model, self.work, 0.0, 0.0, 1.0)
-        t = self.t_start + self.h * (first + 0.5 * np.arange(2 * (n_done - first) + 1))
+        t: Array = self.t_start + self.h * (first + 0.5 * np.arange(2 * (n_done - first) + 1, dtype=float))
         t[-1] -= 1e-9 * self.h  # the run may end where a law jumps
         words = []
         for law in self.laws:

@@ -8,7 +8,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.quantities import SPEED, TIME, Quantity
+from fe_models.foundation.units import SPEED, TIME, Quantity
 from floatframe.bodies.markers import Marker
 from floatframe.elements import Element, ElementLaw, Placed
 from floatframe.shapes import Arrow, Drawn

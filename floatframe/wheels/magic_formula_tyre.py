@@ -8,8 +8,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.quantities import TIME, Quantity
-from fe_models.foundation.units import UNIT_SYSTEMS, Dimensions, Units
+from fe_models.foundation.units import TIME, UNIT_SYSTEMS, Dimensions, Quantity, Units
 from floatframe.bodies.markers import Marker
 from floatframe.checked_values import number, unit_vector
 from floatframe.elements import Element, ElementLaw, Placed

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fe_models.foundation.quantities import LENGTH, RATE, SPEED, TIME, Quantity
-from fe_models.foundation.units import Dimensions, unit_system
+from fe_models.foundation.units import LENGTH, RATE, SPEED, TIME, Dimensions, Quantity, unit_system
 from floatframe import (
     GROUND,
     ConstantOrientation,
