@@ -28,7 +28,6 @@ from floatframe.compiling.markers import (
 from floatframe.compiling.mass_checks import require_inertia
 from floatframe.compiling.pair_forces import add_pair_laws
 from floatframe.compiling.public_elements import PlacedLaw, add_public_elements
-from floatframe.compiling.time_laws import functions_of_time, rate_of_functions
 from floatframe.forces import Gravity, PointForce, SpringDamper
 from floatframe.functions.time_functions import TimeFunction
 from floatframe.joints.rows import kind_of
@@ -66,7 +65,6 @@ class CompiledSystem:
     length: float  #: size of the system as placed [m]; scales rotations against translations
     angles: tuple[CountedAngle, ...]  #: between bodies whose turns are counted
     angle_motions: tuple[TimeFunction | None, ...]  #: that prescribe them
-    time_rate: float  #: highest rate of functions of time [1/s]
 
     @property
     def resting_model(self) -> Model:
@@ -239,7 +237,6 @@ def compile_system(system: System) -> CompiledSystem:
         length=length,
         angles=tuple(angle for angle, _ in angles),
         angle_motions=tuple(motion for _, motion in angles),
-        time_rate=rate_of_functions(functions_of_time(system)),
     )
 
 

@@ -18,7 +18,7 @@ from floatframe.kernels.memory import Rows
 from floatframe.kernels.work import Work, new_work
 from floatframe.motion.events import events_of
 from floatframe.motion.integration import head_of, number_of_steps
-from floatframe.motion.jumps import begun_anew, jumps_of_steps, over_jumps
+from floatframe.motion.jumps import jumps_of_steps, over_jumps
 from floatframe.motion.restart import carry_of_record, restart_record
 from floatframe.motion.validity_watch import ValidityWatch
 from floatframe.results.results_file import MemorySource
@@ -192,7 +192,7 @@ class Unit:
             write_function(compiled_system(self.system), number, t, coefficients)
 
     def settle(self) -> None:
-        """Let the force inputs act that have changed: where one jumps, the motion begins anew from the state."""
+        """Let the force inputs act that have changed: where one jumps, the motion goes on with it from the state."""
         assert self.carry is not None
         jumps = False
         for each in self.held:
@@ -203,7 +203,7 @@ class Unit:
             self.acting[each.name] = new
             self.write(each, self.t, np.array([new]))
         if jumps:
-            self.carry, self.row = begun_anew(self.integrator, self.system, self.carry, self.work, self.t)
+            self.carry, self.row = self.integrator.after_jump(self.system, self.t, self.carry, self.work)
 
     def step(self, t: float, size: float) -> None:
         """Take a communication step from t to t + size with the inputs held, in equal steps of up to h.

@@ -24,12 +24,11 @@ from floatframe.gradients.outputs import vector_of
 from floatframe.gradients.parameters import Family, Neighbour
 from floatframe.gradients.tangents import Point, PointTangents, in_blocks, tangents_at
 from floatframe.integrators.carry import Carry
-from floatframe.integrators.generalized_alpha import GeneralizedAlpha
+from floatframe.integrators.generalized_alpha import GeneralizedAlpha, begun_carry
 from floatframe.kernels.work import new_work
 from floatframe.rotations import rotation_exp
 from floatframe.start.initial import (
     ConsistentState,
-    acceleration_rates,
     assembled,
     checked,
     solve_accelerations,
@@ -114,8 +113,7 @@ def begun_beside(each: Neighbour, t: float, state: State | None) -> Carry:
     work.state.time[...] = t
     closed = with_compatible_velocities(compiled, work, assembled(compiled, work, given))
     made = ConsistentState(closed, *solve_accelerations(compiled, work, closed))
-    rates = acceleration_rates(compiled, made, t)
-    return Carry(made.state, made.u_dot, rates, 0.0, made.w, np.zeros(2), np.zeros(2))
+    return begun_carry(made)
 
 
 class ScaledSolver:

@@ -6,6 +6,7 @@ from typing import Protocol
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from floatframe.compiling.file_frames import state_of_file
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ConvergenceError
 from floatframe.kernels.memory import Memory, Rows, memory_at
@@ -23,11 +24,13 @@ __all__ = [
     "Integrator",
     "carry_of",
     "carry_of_past",
+    "counted_on",
     "memory_of",
     "observed",
     "observed_unless_stopped",
     "one_by_one",
     "one_step_of",
+    "started_anew",
     "turned_on",
     "with_angles",
     "words_of_contact",
@@ -73,6 +76,9 @@ class Integrator(Protocol):
         Counted angles, angles of couplers and states of user forces go on from those of a memory `before`.
         """
 
+    def after_jump(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
+        """Return the memory after a jump of forces at t, and the results there; positions and velocities go on."""
+
     def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
         """Return the memory one step of size h later; `ConvergenceError` if it fails."""
 
@@ -90,6 +96,20 @@ class Integrator(Protocol):
             The memory after the last good step; the rows of results; how many steps were good; why the next was not,
             or None.
         """
+
+
+def started_anew(method: Integrator, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
+    """Return the memory of a motion that begins at t from the state of another memory, and the results there."""
+    fresh = method.start(system, t, state_of_file(compiled_system(system), carry.state), before=carry)
+    return method.observe(system, t, counted_on(fresh, carry), work)
+
+
+def counted_on(fresh: Carry, carry: Carry) -> Carry:
+    """Return the memory of a new start with work and counts of the one before."""
+    return replace(
+        fresh, work=carry.work, n_iterations=carry.n_iterations, n_steps=carry.n_steps, n_rejected=carry.n_rejected,
+        h_next=0.0,
+    )  # fmt: skip
 
 
 def one_step_of(method: Integrator, system: System, t: float, h: float, carry: Carry) -> Carry:

@@ -19,6 +19,7 @@ from floatframe.integrators.carry import (
     memory_of,
     observed,
     one_step_of,
+    started_anew,
     with_angles,
     words_of_contact,
 )
@@ -75,6 +76,10 @@ class DiscreteScheme:
         f = np.where(known, consistent.w[held], 0.0)
         carry = Carry(consistent.state, consistent.u_dot, f, 0.0, consistent.w, np.zeros(2), np.zeros(2))
         return with_angles(system, t, carry, before)
+
+    def after_jump(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
+        """Return the memory after a jump of forces at t, and the results there."""
+        return started_anew(self, system, t, carry, work)
 
     def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
         """Return the memory one step of size h later; `ConvergenceError` if it fails."""

@@ -16,19 +16,24 @@ from floatframe.integrators.carry import (
     memory_of,
     observed,
     one_step_of,
+    started_anew,
     with_angles,
     words_of_contact,
 )
+from floatframe.joints.rows import is_held_position
 from floatframe.kernels.memory import Rows, new_rows
-from floatframe.kernels.model import MASS, STIFFNESS, Model
+from floatframe.kernels.model import MASS, Model
 from floatframe.kernels.work import Work
 from floatframe.start.constraint_words import open_joints
-from floatframe.start.initial import acceleration_rates, consistent_motion, velocity_correction
+from floatframe.start.initial import ConsistentState, consistent_motion, solve_accelerations, work_from
 from floatframe.start.newton_equations import displaced, modal_diagonals
+from floatframe.start.step_filter import Beginning, StepFilter, beginning_of, closing_velocities, step_filter
 from floatframe.state import State
 from floatframe.system import System
 
 __all__ = ["GeneralizedAlpha", "hht", "newmark", "trapezoidal"]
+
+LONGER = 1 + 1e-6  #: ratio of two step sizes that are one
 
 
 @dataclass(frozen=True)
@@ -42,9 +47,10 @@ class GeneralizedAlpha:
     (3) (1 - alpha_m) a_new + alpha_m a = (1 - alpha_f) u_dot_new + alpha_f u_dot
 
     Unknowns of Newton's method are x and beta h² w, the equations of motion are multiplied by beta h², so that the
-    matrix stays well-conditioned as h falls. The start uses a = u_dot(t + (alpha_m - alpha_f) h) and shifts the
-    velocities by O(h²) such that the first step closes the joints without a kick; without both, reactions begin with
-    an error of first order.
+    matrix stays well-conditioned as h falls. The start uses a = u_dot(t + (alpha_m - alpha_f) h) without what h does
+    not follow, and shifts the velocities by O(h²) such that the first step closes the joints without a kick
+    (`start.step_filter`); without both, reactions begin with an error of first order. Where forces jump, a changes by
+    what u_dot does, filtered likewise.
 
     Energy: in linear systems no mode gains any, and modes that h does not resolve lose all but rho_inf of their
     amplitude in a step; in nonlinear ones its error is of second order.
@@ -108,12 +114,31 @@ class GeneralizedAlpha:
         return alpha_m, alpha_f, 0.25 * (gamma + 0.5) ** 2, gamma
 
     def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
-        """Return the memory at the beginning: the state made consistent, its accelerations and their rates."""
+        """Return the memory at the beginning: the state made consistent and its accelerations."""
         known, angle = (None, None) if before is None else (before.w, before.angle)
         consistent = consistent_motion(system, state, t=t, known=known, angle=angle)
-        rates = acceleration_rates(compiled_system(system), consistent, t)
-        carry = Carry(consistent.state, consistent.u_dot, rates, 0.0, consistent.w, np.zeros(2), np.zeros(2))
-        return with_angles(system, t, carry, before)
+        return with_angles(system, t, begun_carry(consistent), before)
+
+    def after_jump(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
+        """Return the memory after a jump of forces at t, and the results there.
+
+        The state stays; u_dot and a change by what the filter of `start.step_filter` with s = 1 lets of the jump.
+        """
+        if carry.h == 0.0:
+            return started_anew(self, system, t, carry, work)
+        exact, change = self.jump(compiled_system(system), carry, t)
+        after, rows = self.observe(system, t, exact, work)
+        return replace(after, u_dot=carry.u_dot + change, a=carry.a + change), rows
+
+    def jump(self, compiled: CompiledSystem, carry: Carry, t: float) -> tuple[Carry, Array]:
+        """Return the memory with u_dot and w after a jump of forces at t, and the change of u_dot, filtered."""
+        work = work_from(compiled.model, carry.w)
+        work.state.time[...] = t
+        u_dot, w = solve_accelerations(compiled, work, carry.state, carry.w)
+        after = replace(carry, u_dot=u_dot, w=w, h_next=0.0)
+        z = self.filter_at(compiled, after, carry.h, t, full=True)
+        assert z is not None
+        return after, z.twice(u_dot - carry.u_dot)
 
     def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
         """Return the memory one step of size h later.
@@ -175,38 +200,54 @@ class GeneralizedAlpha:
         is_fixed = self.error_tolerance is None and not len(compiled.model.gaps.connection)
         return 0.0 if is_fixed else LEAST_STEP * h
 
-    def first_step(self, compiled: CompiledSystem, h: float, rates: Array) -> float:
+    def filter_at(self, compiled: CompiledSystem, carry: Carry, h: float, t: float, *, full: bool) -> StepFilter | None:
+        """Return the filter of `start.step_filter` for steps of size h, full: with s = 1; None for s = 0."""
+        _, _, beta, gamma = self.coefficients
+        s = 1.0 if full else min(gamma - 0.5, 1.0)
+        if s <= 0.0:
+            return None
+        return step_filter(compiled, consistent_of(carry), t, c_d=s * gamma * h, c_k=s * beta * h**2)
+
+    def filtered(self, compiled: CompiledSystem, carry: Carry, h: float, t: float, *, full: bool) -> Beginning:
+        """Return accelerations and their rates with which a motion begins, by the filter of `filter_at`."""
+        return beginning_of(compiled, consistent_of(carry), t, h, self.filter_at(compiled, carry, h, t, full=full))
+
+    def first_step(self, compiled: CompiledSystem, carry: Carry, h: float, t: float) -> float:
         """Return the size of the first step: what its estimated error allows, an equal part of h."""
         if self.error_tolerance is None:
             return h
         model = compiled.model
         _, _, beta, gamma = self.coefficients
         weight, mass = mass_weights(model), model.body_types.mass[model.bodies.kind].sum()
-        resolved = rates / (1 + h**2 * squared_frequencies(model))
-        error = abs(gamma / 2 - beta - 1 / 12) * np.sqrt(weight @ resolved**2 / mass) / compiled.length
+        rates = self.filtered(compiled, carry, h, t, full=True).rates
+        error = abs(gamma / 2 - beta - 1 / 12) * np.sqrt(weight @ rates**2 / mass) / compiled.length
         fitting = (self.error_tolerance / error) ** (1 / 3) if error > 0 else h
         return h / ceil(h / max(0.5 * fitting, self.least_step(h, compiled), 1e-3 * h) * (1 - 1e-9))
 
     def prepared(self, system: System, carry: Carry, h: float, t: float) -> Carry:
-        """Return the memory with its algorithmic accelerations for steps of size h.
+        """Return the memory with its algorithmic accelerations for steps of size h from t.
 
-        At the start: a = u_dot + (alpha_m - alpha_f) h d(u_dot)/dt, where rates of modes that h does not resolve are
-        left out smoothly, and the velocities are shifted. After a change of the step size: scaled likewise.
+        At the start, and where longer steps follow: as `start.step_filter` says. Shorter steps: a nearer to u_dot.
         """
         compiled = compiled_system(system)
         is_divided = self.least_step(h, compiled) > 0.0
         if carry.h == h or (carry.h != 0.0 and is_divided):
             return replace(carry, h_next=min(carry.h_next or h, h) if is_divided else h)
-        if carry.h != 0.0:
+        if h <= LONGER * carry.h:
             return replace(carry, a=carry.u_dot + h / carry.h * (carry.a - carry.u_dot), h=h, h_next=h)
-        h = self.first_step(compiled, h, carry.a)
+        if carry.h == 0.0:
+            h = self.first_step(compiled, carry, h, t)
         alpha_m, alpha_f, beta, _ = self.coefficients
-        rates = carry.a / (1 + h**2 * squared_frequencies(compiled.model))
-        a = carry.u_dot + (alpha_m - alpha_f) * h * rates
-        x = h * carry.state.u + h**2 * (0.5 * a + beta * h * rates)
-        after = displaced(compiled.model, carry.state, x)
-        shift = velocity_correction(compiled, carry.state, after, h, beta, t, known=carry.w)
-        return replace(carry, state=replace(carry.state, u=carry.state.u + shift), a=a, h=h, h_next=h)
+        begun = self.filtered(compiled, carry, h, t, full=False)
+        u_dot, a = begun.u_dot, begun.u_dot + (alpha_m - alpha_f) * h * begun.rates
+        state = carry.state
+        if is_held_position(compiled.model.rows.kind).any():
+            z = self.filter_at(compiled, carry, h, t, full=True)
+            begun = beginning_of(compiled, consistent_of(carry), t, h, z)
+            x = h * state.u + h**2 * (0.5 * begun.u_dot + ((alpha_m - alpha_f) / 2 + beta) * h * begun.rates)
+            after = displaced(compiled.model, state, x)
+            state = replace(state, u=state.u + closing_velocities(z, after, carry.w, t, h))
+        return replace(carry, state=state, u_dot=u_dot, a=a, h=h, h_next=h)
 
     def explain(self, system: System, work: Work, outcome: tuple, least: float) -> Failure:
         """Say why a step failed."""
@@ -314,11 +355,13 @@ def mass_weights(model: Model) -> Array:
     return result
 
 
-def squared_frequencies(model: Model) -> Array:
-    """Return K_kk/M_kk for modal velocities (infinite without mass), 0 for the others, (n_u,) [1/s²]."""
-    result = np.zeros(int(model.bodies.u0[-1]))
-    for i in range(len(model.bodies.kind)):
-        M, K = modal_diagonals(model, i, MASS), modal_diagonals(model, i, STIFFNESS)
-        ratio = np.divide(K, M, out=np.full(len(M), np.inf), where=M > 0)
-        result[model.bodies.u0[i] + 6 : model.bodies.u0[i + 1]] = np.maximum(ratio, 0.0)
-    return result
+def consistent_of(carry: Carry) -> ConsistentState:
+    """Return the state in a memory with its accelerations and wrenches."""
+    return ConsistentState(carry.state, carry.u_dot, carry.w)
+
+
+def begun_carry(consistent: ConsistentState) -> Carry:
+    """Return the memory before the first step at a consistent state; its angles are not counted yet."""
+    return Carry(
+        consistent.state, consistent.u_dot, consistent.u_dot, 0.0, consistent.w, np.zeros(2), np.zeros(2)
+    )  # fmt: skip

@@ -14,6 +14,7 @@ from floatframe.integrators.carry import (
     observed,
     observed_unless_stopped,
     one_step_of,
+    started_anew,
     turned_on,
     with_angles,
 )
@@ -73,6 +74,10 @@ class Ida:
         made = consistent_motion(system, state, t=t, angle=None if before is None else before.angle)
         carry = Carry(made.state, made.u_dot, np.zeros(0), 0.0, made.w, np.zeros(2), np.zeros(2))
         return with_angles(system, t, carry, before)
+
+    def after_jump(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
+        """Return the memory after a jump of forces at t, and the results there."""
+        return started_anew(self, system, t, carry, work)
 
     def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
         """Return the memory a time h later; `ConvergenceError` if it fails."""

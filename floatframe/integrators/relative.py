@@ -8,8 +8,8 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ModelError
-from floatframe.integrators.carry import Carry, Failure, Integrator, carry_of, memory_of, one_step_of, with_angles
-from floatframe.integrators.generalized_alpha import GeneralizedAlpha, squared_frequencies
+from floatframe.integrators.carry import Carry, Failure, Integrator, carry_of, memory_of, one_step_of, started_anew
+from floatframe.integrators.generalized_alpha import LONGER, GeneralizedAlpha
 from floatframe.integrators.relative_ode import RelativeOde
 from floatframe.joints.rows import is_held_position
 from floatframe.kernels.memory import Rows, new_rows
@@ -18,8 +18,9 @@ from floatframe.kernels.work import Work, new_work
 from floatframe.relative.formulation import is_relative
 from floatframe.relative.kernels.tree import JointWork, TangentWork, Tree, new_joint_work, new_tangent_work
 from floatframe.relative.topology import tree_of
-from floatframe.start.initial import acceleration_rates, consistent_motion, work_from
+from floatframe.start.initial import work_from
 from floatframe.start.newton_equations import displaced, set_iterate
+from floatframe.start.step_filter import Beginning
 from floatframe.state import State
 from floatframe.system import System
 
@@ -61,12 +62,21 @@ class RelativeGeneralizedAlpha:
         return GeneralizedAlpha(**asdict(self))
 
     def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
-        """Return the memory at the beginning: the state made consistent, its accelerations and their rates."""
-        known, angle = (None, None) if before is None else (before.w, before.angle)
-        consistent = consistent_motion(system, state, t=t, known=known, angle=angle)
-        rates = acceleration_rates(compiled_system(system), consistent, t)
-        carry = Carry(consistent.state, consistent.u_dot, rates, 0.0, consistent.w, np.zeros(2), np.zeros(2))
-        return with_angles(system, t, carry, before)
+        """Return the memory at the beginning: the state made consistent and its accelerations."""
+        return self.absolute.start(system, t, state, before)
+
+    def after_jump(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
+        """Return the memory after a jump of forces at t, and the results there; as `GeneralizedAlpha`."""
+        if carry.h == 0.0:
+            return started_anew(self, system, t, carry, work)
+        compiled, tree = compiled_system(system), tree_of(system).tree
+        exact, change = self.absolute.jump(compiled, carry, t)
+        after, rows = self.observe(system, t, exact, work)
+        a, u_dot = carry.a.copy(), carry.u_dot + change
+        for sign, each in ((1.0, u_dot), (-1.0, carry.u_dot)):
+            _, joints = joint_iterate(compiled, tree, carry.state, each)
+            a += sign * in_slots(tree, joints, each, joints.acceleration)
+        return replace(after, u_dot=u_dot, a=a), rows
 
     def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
         """Return the memory one step of size h later; `ConvergenceError` if Newton's method fails."""
@@ -109,23 +119,27 @@ class RelativeGeneralizedAlpha:
         return after, rows, outcome.n_steps, self.explain(system, work, outcome, h)
 
     def prepared(self, system: System, carry: Carry, h: float, t: float) -> Carry:
-        """Return the memory with algorithmic accelerations of the unknowns for steps of size h.
+        """Return the memory with algorithmic accelerations of the unknowns for steps of size h from t.
 
-        At the start: a = s_ddot + (alpha_m - alpha_f) h d(s_ddot)/dt, where rates of modes that h does not resolve are
-        left out smoothly, and velocities are shifted so that the first step closes the loops without a kick.
+        At the start, and where longer steps follow: as `start.step_filter` says, in the coordinates of the joints.
         """
-        compiled = compiled_system(system)
-        is_divided = self.absolute.least_step(h, compiled) > 0.0
-        if carry.h != 0.0:
+        compiled, method = compiled_system(system), self.absolute
+        is_divided = method.least_step(h, compiled) > 0.0
+        if carry.h != 0.0 and (is_divided or h <= LONGER * carry.h):
             return replace(carry, h_next=min(carry.h_next or h, h) if is_divided else h)
         tree = tree_of(system).tree
-        h = self.absolute.first_step(compiled, h, carry.a)
-        alpha_m, alpha_f, beta, _ = self.absolute.coefficients
-        now, rates = joint_accelerations(compiled, tree, carry, h)
-        rates = rates / (1 + h**2 * squared_frequencies(compiled.model))
-        a = now + (alpha_m - alpha_f) * h * rates
-        carry = shifted(system, carry, 0.5 * a + beta * h * rates, h, beta, t)
-        return replace(carry, a=a, h=h, h_next=h)
+        if carry.h == 0.0:
+            h = method.first_step(compiled, carry, h, t)
+        alpha_m, alpha_f, beta, _ = method.coefficients
+        begun = method.filtered(compiled, carry, h, t, full=False)
+        a, rates = joint_accelerations(compiled, tree, carry, begun, h)
+        a, u_dot = a + (alpha_m - alpha_f) * h * rates, begun.u_dot
+        if is_held_position(compiled.model.rows.kind)[tree.kept_row >= 0].any():
+            begun = method.filtered(compiled, carry, h, t, full=True)
+            now, rates = joint_accelerations(compiled, tree, carry, begun, h)
+            way = 0.5 * now + ((alpha_m - alpha_f) / 2 + beta) * h * rates
+            carry = shifted(system, carry, way, h, method.coefficients, t)
+        return replace(carry, u_dot=u_dot, a=a, h=h, h_next=h)
 
     def explain(self, system: System, work: Work, outcome: tuple, h: float) -> Failure | None:
         """Say why a step failed; None if none did."""
@@ -212,9 +226,11 @@ def in_slots(tree: Tree, joints: JointWork, of_bodies: Array, of_columns: Array)
     return result
 
 
-def joint_accelerations(compiled: CompiledSystem, tree: Tree, carry: Carry, h: float) -> tuple[Array, Array]:
-    """Return s_ddot and its rate in the slots of the unknowns, (n_u,), of the start of a motion."""
-    state, u_dot, jerk, s = carry.state, carry.u_dot, carry.a, NEAR_BY * h
+def joint_accelerations(
+    compiled: CompiledSystem, tree: Tree, carry: Carry, begun: Beginning, h: float
+) -> tuple[Array, Array]:
+    """Return s_ddot and its rate in the slots of the unknowns, (n_u,), of a motion that begins so."""
+    state, u_dot, jerk, s = carry.state, begun.u_dot, begun.rates, NEAR_BY * h
 
     def at(t: float) -> Array:
         place = displaced(compiled.model, state, t * state.u + 0.5 * t**2 * u_dot + t**3 / 6 * jerk)
@@ -225,10 +241,12 @@ def joint_accelerations(compiled: CompiledSystem, tree: Tree, carry: Carry, h: f
     return at(0.0), (at(s) - at(-s)) / (2 * s)
 
 
-def shifted(system: System, carry: Carry, a: Array, h: float, beta: float, t: float) -> Carry:
-    """Return the memory with velocities changed by O(h²), so that x = h s_dot + h² a closes the loops.
+def shifted(
+    system: System, carry: Carry, way: Array, h: float, coefficients: tuple[float, float, float, float], t: float
+) -> Carry:
+    """Return the memory with velocities changed by O(h²), so that x = h s_dot + h² way closes the loops.
 
-    G ds = -g(after)/h with the weights of one step, M + beta h² K, as `velocity_correction` of the absolute start.
+    G ds = -g(after)/h with the matrix of a step, M + gamma h D + beta h² K, as (3) of `start.step_filter`.
     """
     from floatframe.relative.kernels.entry import motion_of_bodies, moved, newton_matrix, projected
 
@@ -236,15 +254,13 @@ def shifted(system: System, carry: Carry, a: Array, h: float, beta: float, t: fl
     model = compiled.model
     kept = tree.kept_row >= 0
     holds = is_held_position(model.rows.kind)[kept]
-    if not holds.any():
-        return carry
-    state = carry.state
+    state, (_, _, beta, gamma) = carry.state, coefficients
     work, joints = joint_iterate(compiled, tree, state, carry.u_dot)
     work.states.base[:] = work_from(model, carry.w).states.base
     joints.d_start[:], joints.Q_start[:] = joints.d, joints.Q
     rate, is_column = joints.rate.copy(), tree.column >= 0
     s_dot = in_slots(tree, joints, state.u, rate)[tree.slot]
-    x = h * s_dot + h**2 * a[tree.slot]
+    x = h * s_dot + h**2 * way[tree.slot]
     increments = np.zeros_like(rate)
     increments[tree.column[is_column]] = x[is_column]
     for k in np.flatnonzero(tree.motion >= 0):
@@ -256,16 +272,14 @@ def shifted(system: System, carry: Carry, a: Array, h: float, beta: float, t: fl
     work.state.w[:] = carry.w
     work.state.w[model.coordinates.row] += h * carry.w[model.coordinates.row + 1]
     moved(model, work, tree, joints, increments)
-    projected(model, work, tree, joints)
+    projected(model, work, tree, joints, beta * h**2)
     gap = np.where(holds, work.connections.g[kept], 0.0)
     set_iterate(work, state, None, carry.w)
     work.state.time[...] = t
     joints.x[:] = 0.0
     joints.d[:], joints.Q[:], joints.acceleration[:] = joints.d_start, joints.Q_start, 0.0
     n_s = len(tree.slot)
-    K = newton_matrix(model, work, tree, joints, 1.0, 0.0, 0.0)
-    weight = beta * h**2 * squared_frequencies(model)[tree.slot]
-    K[:n_s, :n_s] += np.diag(np.where(is_column, 0.0, weight * np.diag(K)[:n_s]))
+    K = newton_matrix(model, work, tree, joints, 1.0, gamma * h, beta * h**2)
     change = np.linalg.lstsq(K, np.concatenate([np.zeros(n_s), -gap / h]), rcond=1e-12)[0][:n_s]
     joints.rate[tree.column[is_column]] += change[is_column]
     work.state.u[tree.slot[~is_column]] += change[~is_column]

@@ -19,6 +19,7 @@ from floatframe.integrators.carry import (
     observed_unless_stopped,
     one_by_one,
     one_step_of,
+    started_anew,
     turned_on,
     with_angles,
 )
@@ -86,6 +87,10 @@ class RelativeOde:
         made = consistent_motion(system, state, t=t, known=known, angle=angle)
         carry = Carry(made.state, made.u_dot, np.zeros(0), 0.0, made.w, np.zeros(2), np.zeros(2))
         return with_angles(system, t, carry, before)
+
+    def after_jump(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
+        """Return the memory after a jump of forces at t, and the results there."""
+        return started_anew(self, system, t, carry, work)
 
     def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
         """Return the memory a time h later; `ConvergenceError` if it fails."""

@@ -18,7 +18,7 @@ from floatframe.compiling.file_frames import rows_of_file, state_of_file
 from floatframe.compiling.public_elements import PlacedLaw
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
-from floatframe.integrators.carry import Carry, Failure, Integrator, carry_of_past
+from floatframe.integrators.carry import Carry, Failure, Integrator, carry_of_past, counted_on
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha
 from floatframe.integrators.ida import Ida
 from floatframe.integrators.relative_ode import RelativeOde
@@ -377,6 +377,7 @@ class EventWatch:
                 if place.j != acting.j and events[place.j].is_active and place.part <= acting.part:
                     reached[place.j] = self.values[place.j]
             self.values, self.row = reached, row
+            before = self.system
             if isinstance(event, StopEvent):
                 state = self.strike(carry, event, t, h)
             else:
@@ -387,7 +388,7 @@ class EventWatch:
                     self.has_stopped = True
                     return carry, row, work, None
                 state = self.engage(event, carry, t)
-            begin, row, work = self.begun_anew(integrator, carry, state, row, t)
+            begin, row, work = self.begun_anew(integrator, before, carry, state, row, t)
             self.row = row
             self.take_inside()
             size, neighbours = t_end - t, None
@@ -404,22 +405,22 @@ class EventWatch:
         return carry, row, work, Failure(words, np.inf)
 
     def begun_anew(
-        self, integrator: Integrator, carry: Carry, state: State, row: Rows, t: float
+        self, integrator: Integrator, system: System, carry: Carry, state: State, row: Rows, t: float
     ) -> tuple[Carry, Rows, Work]:
-        """Return memory, results and working arrays of the motion that begins at t from a state of the engine.
+        """Return memory, results and working arrays of the motion that goes on at t from a state of the engine.
 
-        The energy that springs bring or take with them is work given; what an impact takes is work taken.
+        system: as it was switched before t. The motion begins anew where velocities or what is held have changed, and
+        goes on where forces alone have. The energy that springs bring or take with them is work given; what an impact
+        takes is work taken.
         """
         is_struck = state is not carry.state
-        told = state_of_file(compiled_system(self.full), state)
-        fresh = integrator.start(self.system, t, told, before=carry)
-        before, work_done = row.diagnostics[-1], carry.work
-        carry = replace(
-            fresh, work=work_done, n_iterations=carry.n_iterations, n_steps=carry.n_steps,
-            n_rejected=carry.n_rejected, h_next=0.0,
-        )  # fmt: skip
-        work = self.new_work()
-        carry, row = integrator.observe(self.system, t, carry, work)
+        before, work_done, work = row.diagnostics[-1], carry.work, self.new_work()
+        if is_struck or not holds_alike(system, self.system):
+            told = state_of_file(compiled_system(self.full), state)
+            fresh = counted_on(integrator.start(self.system, t, told, before=carry), carry)
+            carry, row = integrator.observe(self.system, t, fresh, work)
+        else:
+            carry, row = integrator.after_jump(self.system, t, carry, work)
         after = row.diagnostics[-1]
         taken = float(before[KINETIC] - after[KINETIC]) if is_struck else 0.0
         change = np.array([float(after[SPRINGS] - before[SPRINGS]), taken])
@@ -579,6 +580,11 @@ class EventWatch:
         self.switch(frozenset(data["off"]))
         self.happened = data["happened"]
         self.values = np.array(record["event_values"], dtype=float)
+
+
+def holds_alike(a: System, b: System) -> bool:
+    """Whether two systems that differ in what is switched hold the same positions and velocities."""
+    return np.array_equal(compiled_system(a).model.rows.kind, compiled_system(b).model.rows.kind)
 
 
 def require_shut(event: Event, placed: PlacedLaw, gap: Array, t: float, length: float) -> None:

@@ -2,15 +2,13 @@
 
 A method of steps takes a force from both ends of a step; a jump between them, or at one of them, would count for too
 much or too little of the step (an error of the impulse of order h). So the step is cut just before the jump, and the
-motion begins anew from the state at it, with the accelerations of the force after it.
+motion goes on from the state at it with the accelerations of the force after it.
 """
 
-from dataclasses import replace
 from math import ceil
 
 import numpy as np
 
-from floatframe.compiling.file_frames import state_of_file
 from floatframe.compiling.system import compiled_system
 from floatframe.compiling.time_laws import functions_of_time, parts_of_time
 from floatframe.functions.time_switches import switch_times
@@ -20,7 +18,7 @@ from floatframe.kernels.work import Work
 from floatframe.motion.event_steps import EventWatch
 from floatframe.system import System
 
-__all__ = ["begun_anew", "jump_times", "jumps_of_steps", "over_jumps"]
+__all__ = ["jump_times", "jumps_of_steps", "over_jumps"]
 
 PER_STEP = 4  #: places in a step between which expressions of t are compared
 MOST_PLACES = 1_000_000  #: in a run
@@ -86,17 +84,7 @@ def over_jumps(
             if events is not None and events.has_stopped:
                 return carry, rows, work, None
         if not is_last:
-            carry, rows = begun_anew(integrator, system, carry, work, until)
+            carry, rows = integrator.after_jump(system, until, carry, work)
         where = until
     assert rows is not None
     return carry, rows._replace(t=np.full_like(rows.t, end)), work, None
-
-
-def begun_anew(integrator: Integrator, system: System, carry: Carry, work: Work, t: float) -> tuple[Carry, Rows]:
-    """Return the memory of a motion that begins at t from the state of another memory, and the results there."""
-    fresh = integrator.start(system, t, state_of_file(compiled_system(system), carry.state), before=carry)
-    carry = replace(
-        fresh, work=carry.work, n_iterations=carry.n_iterations, n_steps=carry.n_steps, n_rejected=carry.n_rejected,
-        h_next=0.0,
-    )  # fmt: skip
-    return integrator.observe(system, t, carry, work)

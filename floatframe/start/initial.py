@@ -23,7 +23,7 @@ from floatframe.compiling.file_frames import motion_of_file, state_of_engine
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ModelError
 from floatframe.joints.rows import is_held, is_held_length, is_held_position
-from floatframe.kernels.model import STIFFNESS, Model
+from floatframe.kernels.model import Model
 from floatframe.kernels.work import Work, new_work
 from floatframe.relative.kernels.tree import Tree
 from floatframe.relative.topology import tree_of
@@ -33,10 +33,8 @@ from floatframe.start.freedoms import Mobility, constraint_mobility, scaled_cons
 from floatframe.start.half_turns import require_no_half_turns
 from floatframe.start.newton_equations import (
     displaced,
-    highest_frequency,
     in_ground_axes,
     linearized,
-    modal_matrix,
     set_iterate,
     solve,
     with_mass_for_all,
@@ -57,12 +55,12 @@ __all__ = [
     "require_numbers",
     "solve_accelerations",
     "start_unknowns",
-    "velocity_correction",
     "work_from",
 ]
 
 ASSEMBLED = 1e-12  #: largest |g| of an assembled system, points relative to its size
 MOST_ITERATIONS = 30
+OF_STEP = 0.1  #: of a step: over which rates of accelerations are differences
 NEAR_BY = 1e-3  #: rad, and part of the size of the system: a small way from a position
 ALLOWED = 1e-10  #: singular value of what rigid bodies are held by, relative to the largest, of a motion that is free
 
@@ -366,22 +364,14 @@ def has_normal_friction(model: Model) -> bool:
     return bool((model.joint_forces.coefficient > 0).any())
 
 
-def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState, t: float = 0.0) -> Array:
-    """Return d(u_dot)/dt at a consistent state, (n_u,), by a difference along the motion.
+def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState, t: float, h: float) -> Array:
+    """Return d(u_dot)/dt at a consistent state, (n_u,), by a difference along the motion over a tenth of a step h.
 
-    The step is a thousandth of the shortest time in the system, so that its error is 1e-6 of the fastest rate. The
-    difference is central, but forward in time where something may depend on it, since that may begin or jump at t.
+    Its error is of second order in h. The difference is central, but forward in time where something may depend on it,
+    since that may begin or jump at t.
     """
     model, state, u_dot = compiled.model, consistent.state, consistent.u_dot
-    work = work_from(model, consistent.w)
-    turning = max((float(np.linalg.norm(state.u[k + 3 : k + 6])) for k in model.bodies.u0[:-1]), default=0.0)
-    falling = max(float(np.linalg.norm(u_dot[k : k + 3])) / compiled.length for k in model.bodies.u0[:-1])
-    swinging = max(float(np.linalg.norm(u_dot[k + 3 : k + 6])) for k in model.bodies.u0[:-1])
-    fastest = max(highest_frequency(model), turning, np.sqrt(falling), np.sqrt(swinging), fastest_motion(model))
-    fastest = max(fastest, compiled.time_rate)
-    if fastest == 0.0:
-        return np.zeros_like(u_dot)
-    s = 1e-3 / fastest
+    work, s = work_from(model, consistent.w), OF_STEP * h
 
     def u_dot_after(step: float) -> Array:
         moved = displaced(model, state, step * state.u + 0.5 * step**2 * u_dot)
@@ -392,54 +382,3 @@ def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState, t:
     if len(model.functions.begin) or compiled.laws or len(model.users.n_forces):
         return (-3 * u_dot_after(0.0) + 4 * u_dot_after(s) - u_dot_after(2 * s)) / (2 * s)
     return (u_dot_after(s) - u_dot_after(-s)) / (2 * s)
-
-
-def fastest_motion(model: Model) -> float:
-    """Return the highest rate of prescribed motions: of their sines, or one over the shortest piece [1/s]."""
-    fastest = float(np.abs(model.functions.piece[:, 7]).max(initial=0.0))
-    for first, last in zip(model.functions.piece0[:-1], model.functions.piece0[1:], strict=True):
-        lengths = np.diff(model.functions.begin[first:last])
-        fastest = max(fastest, 1 / float(lengths.min()) if len(lengths) else 1.0)
-    return fastest
-
-
-def velocity_correction(
-    compiled: CompiledSystem,
-    state: State,
-    after: State,
-    h: float,
-    beta: float,
-    t: float = 0.0,
-    known: Array | None = None,
-) -> Array:
-    """Return the change of u, (n_u,), with which a step of size h from `state` at t closes the joints open in `after`.
-
-    G du = -g(after)/h, with the weights of one step, M + beta h² K.
-    """
-    model = compiled.model
-    work = work_from(model, known)
-    holds = is_held_position(model.rows.kind)
-    if not holds.any():
-        return np.zeros(len(work.state.u))
-    w = start_unknowns(model, known)
-    if len(model.coordinates.row):  # angles of couplers and user forces are those next to where their rates lead
-        work.state.time[...] = t
-        set_iterate(work, state, w=w)
-        linearized(model, work, 1.0, 0.0, 0.0)
-        g = work.connections.g
-        w[model.coordinates.row] -= g[model.coordinates.row]
-        w[model.coordinates.row] += h * (w[model.coordinates.row + 1] - g[model.coordinates.row + 1])
-    work.state.time[...] = t + h
-    set_iterate(work, after, w=w)
-    linearized(model, work, 1.0, 0.0, 0.0)
-    gap = np.where(holds, work.connections.g, 0.0)
-    work.state.time[...] = t
-    set_iterate(work, state, w=start_unknowns(model, known))
-    parts = linearized(model, work, 1.0, 0.0, 0.0)
-    H = []
-    for i, block in enumerate(parts.H):
-        block = block.copy()
-        block[6:, 6:] += beta * h**2 * modal_matrix(model, i, STIFFNESS)
-        H.append(block)
-    y, _ = solve(tuple(H), parts, np.zeros(len(work.state.u)), -gap / h)
-    return in_ground_axes(model, state, y)

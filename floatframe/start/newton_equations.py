@@ -16,6 +16,7 @@ __all__ = [
     "Linearized",
     "displaced",
     "highest_frequency",
+    "in_body_axes",
     "in_ground_axes",
     "linearized",
     "modal_diagonals",
@@ -27,7 +28,8 @@ __all__ = [
     "with_modal_weight",
 ]
 
-STIFF = 1e3  #: the stiffness in W is scaled so that the softest mode weighs this much more than its mass
+#: the stiffness in W is scaled so that the softest mode weighs this much more than its mass: what closes hardly rings
+STIFF = 1e6
 MASSLESS = 10.0  #: a mode without mass gets one that puts it at this multiple of the highest frequency
 
 
@@ -197,3 +199,12 @@ def in_ground_axes(model: Model, state: State, y: Array) -> Array:
         u0 = model.bodies.u0[i]
         x[u0 : u0 + 3] = rotation_matrix(p) @ y[u0 : u0 + 3]
     return x
+
+
+def in_body_axes(model: Model, state: State, x: Array) -> Array:
+    """Return body unknowns with their translation turned from ground to body axes, (n_u,)."""
+    y = x.copy()
+    for i, p in enumerate(state.p):
+        u0 = model.bodies.u0[i]
+        y[u0 : u0 + 3] = x[u0 : u0 + 3] @ rotation_matrix(p)
+    return y

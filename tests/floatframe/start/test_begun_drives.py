@@ -24,17 +24,30 @@ def test_bodies_begin_with_velocities_that_fit_a_drive_that_begins_with_a_rate(d
 
 
 def test_a_run_that_a_drive_begins_with_a_blow_tells_so_with_its_rate_and_what_to_do():
-    """Rigid segments on stiff springs: the first one is at 0.6 rad/s at once, the others wait for the wave."""
+    """Rigid segments on stiff springs: the first one is at 0.6 rad/s at once, the others wait for the wave.
+
+    Steps follow them for all that; Newton's method without room for its iterations does not.
+    """
     system = misaligned_four_bar(segments(5), turn=AT_ONCE)
     told = (
         r"the drive of 'angle' of joint 'A' begins at t = 0 with 0\.6 rad/s, 0\.6 rad/s from what its bodies as given "
         r"have: .* begin it softly \(cycloidal_spin_up\)"
     )
     with pytest.raises(ConvergenceError, match=told) as error:
-        integrate(system, GeneralizedAlpha(0.3), 0.2, H)
+        integrate(system, GeneralizedAlpha(0.3, max_iterations=2), 0.2, H)
     assert str(error.value).count("begins at t = 0") == 1
     softly = misaligned_four_bar(segments(5), turn=cycloidal_spin_up(-0.6, 0.1))
     assert integrate(softly, GeneralizedAlpha(0.3), 0.2, H).is_complete
+
+
+def test_steps_that_do_not_follow_the_blow_lead_where_shorter_ones_do():
+    """To a thousandth of a millimetre of 7 cm: unresolved springs between the segments are not kicked by the start."""
+    ends = []
+    system = misaligned_four_bar(segments(5), turn=AT_ONCE)
+    for h in (H, H / 2):
+        motion = integrate(system, GeneralizedAlpha(0.3), 0.1, h, watch="off")
+        ends.append(np.concatenate([motion.body(body.name).r[-1] for body in system.bodies]))
+    assert_allclose(ends[0], ends[1], rtol=0, atol=1e-6)
 
 
 def test_what_fits_is_not_told():

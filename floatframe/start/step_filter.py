@@ -1,0 +1,160 @@
+"""Accelerations at the start of a motion, without what a step of the given size cannot follow.
+
+A start knows the accelerations u_dot of the equations of motion alone. Where a mode, a spring or a damper is far
+faster than the step, they throw the body on which it acts. The matrix of a Newton step tells fast from slow:
+
+    (1) z = Z y:  (M + s gamma h D + s beta h² K) z - Jᵀ mu = M y,   G z = G y
+    (2) u_dot becomes (2 Z - Z²) u_dot,   a = u_dot + (alpha_m - alpha_f) h Z d(u_dot)/dt
+
+for all unknowns alike: modes, bodies on springs, rates of joints. G z = G y keeps the accelerations those of closed
+joints. What the step follows well stays, since 2 Z - Z² = 1 - (1 - Z)²: the change is of second order in h. What the
+step does not follow goes: h² a stays of the size of what is displaced, where h² u_dot grows with (omega h)².
+
+s = gamma - 1/2, at most 1, is the numerical damping of the method. With it no restart makes a mode grow, whatever
+omega h and rho_inf are, and however often the motion begins anew; with s = 1 a mode that the method hardly damps can
+grow, by 2.5 % a restart for rho_inf = 0.98. Methods without numerical damping need no filter: the trapezoidal rule
+has a = u_dot in every step, and for rho_inf = 1 the motion of a linear system does not depend on a
+(`tests/floatframe/start/test_step_filter.py`).
+
+The velocities are changed by
+
+    (3) (M + gamma h D + beta h² K) du - Jᵀ mu = 0,   G du = -g(after)/h
+
+where `after` is where the first step leads with accelerations that are filtered with s = 1: so it closes the joints
+without a kick. The change is O(h²).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.linalg import SuperLU, splu
+
+from fe_models.foundation.arrays import Array
+from floatframe.compiling.system import CompiledSystem
+from floatframe.joints.rows import is_held, is_held_position
+from floatframe.kernels.model import Model
+from floatframe.start.initial import ConsistentState, acceleration_rates, start_unknowns, work_from
+from floatframe.start.newton_equations import (
+    in_body_axes,
+    in_ground_axes,
+    linearized,
+    set_iterate,
+    with_mass_for_all,
+)
+from floatframe.state import State
+
+__all__ = ["Beginning", "StepFilter", "beginning_of", "closing_velocities", "step_filter"]
+
+
+@dataclass(frozen=True, eq=False)
+class StepFilter:
+    """Z of the module docstring at a state, with the factors of its matrix."""
+
+    compiled: CompiledSystem
+    state: State
+    mass: sp.csr_array  #: M and, below, what rows feel of accelerations, (n_u + n_w, n_u)
+    factors: SuperLU  #: of the matrix of (1)
+
+    def __call__(self, y: Array) -> Array:
+        """Return Z y, (n_u,), of accelerations or their rates, translations in ground axes."""
+        return self.solved(y)[0]
+
+    def solved(self, y: Array) -> tuple[Array, Array]:
+        """Return Z y, and mu, (n_w,)."""
+        model = self.compiled.model
+        z = self.factors.solve(self.mass @ in_body_axes(model, self.state, y))
+        return in_ground_axes(model, self.state, z[: len(y)]), z[len(y) :]
+
+    def twice(self, y: Array) -> Array:
+        """Return (2 Z - Z²) y."""
+        z = self(y)
+        return z + self(y - z)
+
+    def closing(self, gap: Array) -> Array:
+        """Return du of (3), (n_u,), for what g(after)/h is of the rows that hold positions, (n_w,)."""
+        model, n_u = self.compiled.model, self.mass.shape[1]
+        right = np.concatenate([np.zeros(n_u), np.where(is_held_position(model.rows.kind), -gap, 0.0)])
+        return in_ground_axes(model, self.state, self.factors.solve(right)[:n_u])
+
+
+def step_filter(
+    compiled: CompiledSystem, consistent: ConsistentState, t: float, *, c_d: float, c_k: float
+) -> StepFilter:
+    """Return the filter with the matrix M + c_d D + c_k K at a state with its accelerations and wrenches, at time t.
+
+    K holds what forces do as they turn with the bodies. Those of modes that the step does not follow are no part of it:
+    a first filter, without any forces, tells which stay.
+    """
+    y, w = consistent.u_dot, consistent.w
+    if len(w):
+        first = filter_by(compiled, consistent, np.zeros_like(y), np.zeros_like(w), t, c_d, c_k)
+        y, change = first.solved(y)
+        w = w + np.where(is_wrench(compiled.model), change, 0.0)
+    return filter_by(compiled, consistent, y, w, t, c_d, c_k)
+
+
+def filter_by(
+    compiled: CompiledSystem, consistent: ConsistentState, u_dot: Array, w: Array, t: float, c_d: float, c_k: float
+) -> StepFilter:
+    """Return the filter with the matrix of a consistent state, but other accelerations and wrenches."""
+    model, state = compiled.model, consistent.state
+    work = work_from(model, consistent.w)
+    work.state.time[...] = t
+    set_iterate(work, state, u_dot, np.where(is_wrench(model), w, consistent.w))
+    inertia = linearized(model, work, 1.0, 0.0, 0.0)
+    step = linearized(model, work, 1.0, c_d, c_k)
+    M = sp.block_diag(with_mass_for_all(model, inertia.H))
+    top = sp.block_diag(with_mass_for_all(model, step.H))
+    if not len(w):
+        return StepFilter(compiled, state, sp.csr_array(M), splu(sp.csc_array(top)))
+    held = sp.diags_array(is_held(model.rows.kind).astype(float))
+    G = held @ inertia.G + (sp.eye_array(len(w)) - held) @ step.G
+    matrix = sp.csc_array(sp.block_array([[top, -step.J.T], [G, step.V]]))
+    return StepFilter(compiled, state, sp.csr_array(sp.vstack([M, inertia.G])), splu(matrix))
+
+
+def is_wrench(model: Model) -> NDArray[np.bool_]:
+    """Return which unknowns of connections are forces, moments or multipliers, and no states or coordinates, (n_w,)."""
+    result = np.ones(int(model.connections.w0[-1]), dtype=bool)
+    for k in range(3):
+        result[model.states.row + k] = False
+    for k in range(2):
+        result[model.coordinates.row + k] = False
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class Beginning:
+    """Accelerations with which a motion begins, and their rates, filtered with one s."""
+
+    u_dot: Array  #: (2 Z - Z²) u_dot, (n_u,)
+    rates: Array  #: Z d(u_dot)/dt along the motion with these, (n_u,)
+
+
+def beginning_of(
+    compiled: CompiledSystem, consistent: ConsistentState, t: float, h: float, z: StepFilter | None
+) -> Beginning:
+    """Return accelerations and rates at a state at time t for steps of size h; None: as the equations of motion say."""
+    u_dot = consistent.u_dot if z is None else z.twice(consistent.u_dot)
+    rates = acceleration_rates(compiled, ConsistentState(consistent.state, u_dot, consistent.w), t, h)
+    return Beginning(u_dot, rates if z is None else z(rates))
+
+
+def closing_velocities(z: StepFilter, after: State, w: Array, t: float, h: float) -> Array:
+    """Return du of (3), (n_u,), for a step of size h from t that leads to `after`; z: with s = 1."""
+    model = z.compiled.model
+    work, unknowns = work_from(model, w), start_unknowns(model, w)
+    if len(model.coordinates.row):  # angles of couplers and user forces are those next to where their rates lead
+        row = model.coordinates.row
+        work.state.time[...] = t
+        set_iterate(work, z.state, w=unknowns)
+        linearized(model, work, 1.0, 0.0, 0.0)
+        g = work.connections.g
+        unknowns[row] -= g[row]
+        unknowns[row] += h * (unknowns[row + 1] - g[row + 1])
+    work.state.time[...] = t + h
+    set_iterate(work, after, w=unknowns)
+    linearized(model, work, 1.0, 0.0, 0.0)
+    return z.closing(work.connections.g / h)
