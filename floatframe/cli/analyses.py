@@ -396,9 +396,9 @@ def damping_words(mode: dict[str, Any]) -> str:
     """Return the damping ratio of a mode in percent, or what else it does."""
     ratio = mode["damping_ratio"]
     if ratio < -1e-9:
-        return "grows"
+        return f"grows, {mode['eigenvalue'][0]:.4g} /s"
     if mode["frequency_hz"] == 0:
-        return "decays" if ratio > 0 else ""
+        return f"decays, {-mode['eigenvalue'][0]:.4g} /s" if ratio > 0 else ""
     return f"{100 * ratio:.3g} %" if ratio > 1e-9 else ""
 
 

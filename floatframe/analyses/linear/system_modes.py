@@ -10,14 +10,19 @@ from floatframe.analyses.linear.linearization import LinearSystem
 
 __all__ = ["SystemModes", "system_modes"]
 
-ZERO = 1e-7  #: |lambda| by the highest one below which a mode is a motion that costs nothing
+ROUNDING = 1e-13  #: of the terms that make an entry of a matrix: what their sum does not tell from zero
+MODEL = 1e-10  #: of an entry, by which it is known: motions are steady and equilibria balanced to about so much
+LOW = 1e-10  #: omega² by the highest one below which modes are solved for again among themselves
+FREE = 1e-7  #: rate of a unit motion by the highest, below which it costs nothing
 STILL = 1e-9  #: motion of bodies by that of states below which a mode is one of states alone
-UNSTABLE = 1e-6  #: growth rate by the highest |lambda| that rounding explains: a double eigenvalue moves by its root
 
 
 @dataclass(frozen=True, eq=False)
 class SystemModes:
-    """Modes exp(lambda t): one of each conjugate pair, by ascending |lambda|."""
+    """Modes exp(lambda t): one of each conjugate pair, by ascending |lambda|.
+
+    A motion that costs nothing is one mode with lambda = 0, though two eigenvalues belong to it: place and velocity.
+    """
 
     eigenvalues: Array  #: lambda, imaginary part >= 0, (n_modes,) complex [1/s]
     shapes: Array  #: motions of the bodies (body axes), the largest entry 1, (n_u, n_modes) complex
@@ -25,6 +30,7 @@ class SystemModes:
     bodies: tuple[str, ...]  #: their names
     states: tuple[str, ...] = ()  #: of elements and user forces
     state_shapes: Array = field(default_factory=lambda: np.zeros((0, 0)))  #: by the same factor, (n_states, n_modes)
+    errors: Array = field(default_factory=lambda: np.zeros(0))  #: by which lambda may be off, (n_modes,) [1/s]
 
     @property
     def frequencies(self) -> Array:
@@ -44,8 +50,9 @@ class SystemModes:
 
     @property
     def is_stable(self) -> bool:
-        """Whether no mode grows."""
-        return bool((self.eigenvalues.real <= UNSTABLE * np.abs(self.eigenvalues).max(initial=0.0)).all())
+        """Whether no mode grows, each judged by how well its own eigenvalue is known."""
+        errors = self.errors if len(self.errors) else 0.0
+        return bool((self.eigenvalues.real <= errors).all())
 
 
 def system_modes(linear: LinearSystem) -> SystemModes:
@@ -57,36 +64,28 @@ def system_modes(linear: LinearSystem) -> SystemModes:
     system, _ = linear.with_mass()
     n = system.n_z
     M, C, K = (np.asarray(a)[:n, :n] for a in (system.M, system.C, system.K))
-    omega2, Z = la.eigh((K + K.T) / 2, (M + M.T) / 2)
-    highest = float(np.sqrt(np.abs(omega2).max())) or 1.0  # 1: nothing is sprung but by states
+    omega2, Z = undamped_modes((K + K.T) / 2, (M + M.T) / 2)
+    highest = float(np.sqrt(np.abs(omega2).max(initial=0.0))) or 1.0  # 1: nothing is sprung but by states
     modal_C = Z.T @ C @ Z
     is_conservative = not system.states and (
-        np.abs(modal_C).max() <= 1e-12 * highest and np.abs(Z.T @ (K - K.T) @ Z).max() <= 1e-10 * highest**2
+        np.abs(modal_C).max(initial=0.0) <= 1e-12 * highest
+        and np.abs(Z.T @ (K - K.T) @ Z).max(initial=0.0) <= 1e-10 * highest**2
     )
     if is_conservative:
+        noise = ROUNDING * np.einsum("zk,zk->k", np.abs(Z), np.abs(K) @ np.abs(Z)) + MODEL * np.abs(omega2)
+        omega2 = np.where(np.abs(omega2) <= noise, 0.0, omega2)
         root = np.sqrt(omega2.astype(complex))
-        eigenvalues = np.where(omega2 >= 0, 1j * root.real, root.imag)
-        shapes = Z.astype(complex)
-        for k in np.flatnonzero(omega2 < -((ZERO * highest) ** 2)):  # an unstable one has a decaying twin
-            eigenvalues = np.append(eigenvalues, -eigenvalues[k])
+        eigenvalues, shapes = np.where(omega2 >= 0, 1j * root.real, root.imag), Z.astype(complex)
+        errors = np.divide(noise, 2 * np.abs(root), out=np.zeros(len(noise)), where=omega2 != 0)
+        for k in np.flatnonzero(omega2 < 0):  # an unstable one has a decaying twin
+            eigenvalues, errors = np.append(eigenvalues, -eigenvalues[k]), np.append(errors, errors[k])
             shapes = np.column_stack([shapes, shapes[:, k]])
     else:
-        # in the coordinates of the undamped modes, scaled by their frequencies: a well-scaled state matrix
-        rates, states = slice(n, 2 * n), slice(2 * n, 2 * n + len(system.states))
-        A = np.zeros((states.stop, states.stop))
-        A[:n, rates] = highest * np.eye(n)
-        A[rates, :n] = -Z.T @ K @ Z / highest
-        A[rates, rates] = -modal_C
-        A[rates, states] = -Z.T @ system.K[:n, n:] / highest
-        A[states, :n] = -system.K[n:, :n] @ Z
-        A[states, rates] = -system.C[n:, :n] @ Z * highest
-        A[states, states] = -system.K[n:, n:]
-        A[states] -= system.M[n:, :n] @ Z @ A[rates] * highest
-        of_z = np.r_[:n, states]
-        eigenvalues, vectors = la.eig(A)
-        keep = eigenvalues.imag >= 0
-        eigenvalues, shapes = eigenvalues[keep], la.block_diag(Z, np.eye(len(system.states))) @ vectors[of_z][:, keep]
-    eigenvalues = np.where(np.abs(eigenvalues) <= ZERO * highest, 0.0, eigenvalues)
+        A, of_terms = state_matrix(system, Z, highest)
+        eigenvalues, vectors, errors = eigenvalues_with_errors(A, of_terms)
+        eigenvalues, vectors, errors = with_motions_that_cost_nothing(A, eigenvalues, vectors, errors)
+        of_z = np.r_[:n, 2 * n : len(A)]
+        shapes = la.block_diag(Z, np.eye(len(system.states))) @ vectors[of_z]
     order = np.lexsort((eigenvalues.imag, np.abs(eigenvalues)))
     of_states = np.pad(shapes, ((0, len(system.M) - len(shapes)), (0, 0)))[n:, order]
     shapes = (system.N[:, : len(shapes)] @ shapes)[:, order]
@@ -98,5 +97,98 @@ def system_modes(linear: LinearSystem) -> SystemModes:
     total = energies.sum(axis=0)
     shares = np.divide(energies, total, out=np.zeros_like(energies), where=total > 0).T
     return SystemModes(
-        eigenvalues[order], shapes / largest, shares, linear.body_names, system.states, of_states / largest
+        eigenvalues[order],
+        shapes / largest,
+        shares,
+        linear.body_names,
+        system.states,
+        of_states / largest,
+        errors[order],
+    )
+
+
+def undamped_modes(K: Array, M: Array) -> tuple[Array, Array]:
+    """Return omega², ascending, and the modes of a symmetric pencil, low ones as well known as high ones.
+
+    An error of the solver goes with the highest omega²: modes far below are solved for again among themselves.
+    """
+    omega2, Z = la.eigh(K, M)
+    n = len(omega2)
+    while True:
+        n_low = int((np.abs(omega2[:n]) < LOW * np.abs(omega2[:n]).max(initial=0.0)).sum())
+        if n_low == 0:
+            break
+        low = np.argsort(np.abs(omega2[:n]))[:n_low]
+        rest = np.setdiff1d(np.arange(n), low)
+        Z[:, :n] = Z[:, np.concatenate([low, rest])]
+        omega2[:n] = omega2[np.concatenate([low, rest])]
+        Q, n = Z[:, :n_low], n_low
+        omega2[:n], y = la.eigh(Q.T @ K @ Q, Q.T @ M @ Q)
+        Z[:, :n] = Q @ y
+    order = np.argsort(omega2)
+    return omega2[order], Z[:, order]
+
+
+def state_matrix(system: LinearSystem, Z: Array, highest: float) -> tuple[Array, Array]:
+    """Return A of the first-order equations in the coordinates of undamped modes, and the sizes of its terms.
+
+    Velocities are scaled by the highest frequency, so that the matrix is well scaled.
+    """
+    n, m = system.n_z, len(system.states)
+    rates, states = slice(n, 2 * n), slice(2 * n, 2 * n + m)
+    made = []
+    for M, C, K, Y, sign in (
+        (system.M, system.C, system.K, Z, -1.0),
+        (*(np.abs(a) for a in (system.M, system.C, system.K, Z)), 1.0),
+    ):
+        A = np.zeros((states.stop, states.stop))
+        A[:n, rates] = highest * np.eye(n) if sign < 0 else 0.0
+        A[rates, :n] = sign * Y.T @ K[:n, :n] @ Y / highest
+        A[rates, rates] = sign * Y.T @ C[:n, :n] @ Y
+        A[rates, states] = sign * Y.T @ K[:n, n:] / highest
+        A[states, :n] = sign * K[n:, :n] @ Y
+        A[states, rates] = sign * C[n:, :n] @ Y * highest
+        A[states, states] = sign * K[n:, n:]
+        A[states] += sign * M[n:, :n] @ Y @ A[rates] * highest
+        made.append(A)
+    return made[0], made[1]
+
+
+def eigenvalues_with_errors(A: Array, of_terms: Array) -> tuple[Array, Array, Array]:
+    """Return all eigenvalues, their unit vectors, and by how much each may be off.
+
+    The two-sided Rayleigh quotient takes away what the solver adds, which goes with the size of the whole matrix. What
+    is not known of the matrix moves lambda by |w|ᵀ |dA| |v| / |wᴴ v|: little for a mode to which only small entries
+    belong, much where eigenvectors are nearly parallel.
+    """
+    _, W, V = la.eig(A, left=True, right=True)
+    overlap = np.einsum("xk,xk->k", W.conj(), V)
+    is_regular = np.abs(overlap) > np.finfo(float).eps
+    safe = np.where(is_regular, overlap, 1.0)
+    values = np.einsum("xk,xk->k", W.conj(), A @ V) / safe
+    dA = ROUNDING * of_terms + MODEL * np.abs(A)
+    errors = np.einsum("xk,xk->k", np.abs(W), dA @ np.abs(V)) / np.abs(safe)
+    plain = np.einsum("xk,xk->k", V.conj(), A @ V)  # of a defective one, which is as it is
+    return np.where(is_regular, values, plain), V, np.where(is_regular, errors, np.inf)
+
+
+def with_motions_that_cost_nothing(
+    A: Array, eigenvalues: Array, V: Array, errors: Array
+) -> tuple[Array, Array, Array]:
+    """Return one of each conjugate pair, and as many modes with lambda = 0 as there are motions that cost nothing.
+
+    Q spans what belongs to zero; motions that cost nothing are what A takes to zero within it, and not their velocities.
+    """
+    is_zero = np.abs(eigenvalues) <= errors
+    kept = ~is_zero & (eigenvalues.imag >= 0)
+    both = np.concatenate([V[:, is_zero].real, V[:, is_zero].imag], axis=1)
+    Q, values, _ = np.linalg.svd(both, full_matrices=False)
+    Q = Q[:, np.argsort(-values)[: int(is_zero.sum())]]
+    _, values, right = np.linalg.svd(Q.T @ A @ Q)
+    free = Q @ right[values <= FREE * np.abs(A).max(initial=0.0)].T
+    zeros = np.zeros(free.shape[1])
+    return (
+        np.concatenate([zeros, eigenvalues[kept]]),
+        np.concatenate([free, V[:, kept]], axis=1),
+        np.concatenate([zeros, errors[kept]]),
     )

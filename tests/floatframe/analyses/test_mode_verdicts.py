@@ -1,0 +1,109 @@
+"""Verdicts about modes: each by its own frequency, one for each motion that costs nothing, rates of what decays."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from floatframe import (
+    GROUND,
+    Bushing,
+    Marker,
+    PlanarJoint,
+    PrismaticJoint,
+    RevoluteJoint,
+    RigidBody,
+    SpringDamper,
+    System,
+    linearize,
+    static_equilibrium,
+    steady_rotation,
+    system_modes,
+)
+from floatframe.rotations import euler_parameters, rotation_exp
+
+A = rotation_exp(np.array([0.4, -0.7, 0.3]))
+PLACE = np.array([3.0, -2.0, 5.0])
+
+
+def stiff(k):
+    """Return a small body on stiff springs, far from the others."""
+    K = np.diag([k, k, k, 1e-3 * k, 1e-3 * k, 1e-3 * k])
+    body = RigidBody("small", 0.1, 1e-3 * np.eye(3), position=PLACE + 2.0)
+    return body, Bushing("stiff", Marker(GROUND, position=PLACE + 2.0), Marker("small"), stiffness=K)
+
+
+def rotor(axes, k_stiff):
+    """Return a disc of 10 kg in bearings of 1e5 N/m and 1 N s/m, and a small body on its axis on stiff round springs."""
+    body = RigidBody("rotor", 10.0, np.diag([0.1, 0.1, 0.2]), position=PLACE, orientation=euler_parameters(A))
+    plane = PlanarJoint("plane", GROUND, Marker("rotor"), axis=A[:, 2])
+    bearing = Bushing("bearing", Marker(GROUND, position=PLACE, triad=A), Marker("rotor"), axes=axes,
+                      stiffness=np.array([1e5, 1e5, 0, 0, 0, 0]), damping=np.array([1.0, 1.0, 0, 0, 0, 0]))  # fmt: skip
+    small = RigidBody("small", 0.1, 1e-3 * np.eye(3), position=PLACE, orientation=euler_parameters(A))
+    springs = Bushing("stiff", Marker(GROUND, position=PLACE, triad=A), Marker("small"),
+                      stiffness=k_stiff * np.array([1.0, 1, 1, 0, 0, 0]))  # fmt: skip
+    return System([body, small], [plane], [bearing, springs])
+
+
+def modes_at(system, speed):
+    """Return the modes about a steady rotation."""
+    about = steady_rotation(system, speed * A[:, 2], center=PLACE)
+    return system_modes(linearize(system, about, inputs=(), outputs=()))
+
+
+@pytest.mark.parametrize("k_stiff", [1e3, 1e9, 1e13])
+def test_a_whirl_that_grows_below_a_stiff_mode_is_told(k_stiff):
+    """m z'' + d (z' - i W/2 z) + k z = 0 half way, at rest of the rotor's own turning in axes that turn with W."""
+    W = 500.0
+    modes = modes_at(rotor("half way", k_stiff), W)
+    roots = np.roots([10.0, 1.0, 1e5 - 0.5j * W])
+    grows = roots[roots.real > 0][0]
+    assert not modes.is_stable
+    found = modes.eigenvalues[modes.eigenvalues.real > modes.errors]
+    assert len(found) == 1
+    assert_allclose(found[0].real, grows.real, rtol=1e-6)
+    assert_allclose(abs(found[0].imag), abs(grows.imag - W), rtol=1e-8)
+
+
+@pytest.mark.parametrize("k_stiff", [1e3, 1e9, 1e13])
+def test_a_damped_whirl_below_a_stiff_mode_is_stable(k_stiff):
+    assert modes_at(rotor("a", k_stiff), 500.0).is_stable
+
+
+@pytest.mark.parametrize("has_damper", [False, True])
+def test_a_free_body_has_six_motions_that_cost_nothing(has_damper):
+    """Beside a sledge that makes the system one with damping or not."""
+    body = RigidBody("free", 2.0, np.diag([1.0, 1.5, 2.0]), position=PLACE, center_of_mass=(0.1, 0.2, -0.3))
+    sledge = RigidBody("sledge", 1.0, np.eye(3), position=(0, 0, 0))
+    rail = PrismaticJoint("rail", GROUND, Marker("sledge"), axis=(1, 0, 0))
+    spring = SpringDamper("spring", Marker(GROUND, position=(-1, 0, 0)), Marker("sledge"), 1e6, 3.0 * has_damper)
+    system = System([body, sledge], [rail], [spring])
+    modes = system_modes(linearize(system, static_equilibrium(system), inputs=(), outputs=()))
+    assert np.count_nonzero(modes.eigenvalues == 0) == 6
+    assert len(modes.eigenvalues) == 7
+    assert np.linalg.matrix_rank(modes.shapes[:, :6], tol=1e-6) == 6
+    assert modes.is_stable
+
+
+def test_what_is_overdamped_has_its_two_rates():
+    """m x'' + d x' + k x = 0 with d far above critical; and a wheel that only a damper holds: 0 and -d/J."""
+    sledge = RigidBody("sledge", 2.0, np.eye(3))
+    rail = PrismaticJoint("rail", GROUND, Marker("sledge"), axis=(1, 0, 0))
+    spring = SpringDamper("spring", Marker(GROUND, position=(-1, 0, 0)), Marker("sledge"), 50.0, 400.0, free_length=1.0)
+    wheel = RigidBody("wheel", 1.0, 0.5 * np.eye(3), position=PLACE)
+    hinge = RevoluteJoint("hinge", GROUND, Marker("wheel"), axis=(0, 0, 1))
+    brake = Bushing("brake", Marker(GROUND, position=PLACE), Marker("wheel"), damping=np.array([0, 0, 0, 0, 0, 6.0]))
+    system = System([sledge, wheel], [rail, hinge], [spring, brake])
+    modes = system_modes(linearize(system, static_equilibrium(system), inputs=(), outputs=()))
+    expected = [0.0, *sorted([*np.roots([2.0, 400.0, 50.0]).real, -12.0], key=abs)]
+    assert_allclose(modes.eigenvalues, expected, rtol=1e-9, atol=0)
+
+
+def test_a_slow_mode_beside_a_very_stiff_one_keeps_its_frequency():
+    """A pendulum of a minute on a hinge beside springs of 1e13 N/m: 1e-8 of the highest frequency."""
+    small, springs = stiff(1e13)
+    slow = RigidBody("slow", 1.0, np.eye(3), position=(0, 0, 0))
+    hinge = RevoluteJoint("hinge", GROUND, Marker("slow"), axis=(0, 0, 1))
+    spring = Bushing("soft", Marker(GROUND), Marker("slow"), stiffness=np.array([0, 0, 0, 0, 0, 1e-2]))
+    system = System([slow, small], [hinge], [spring, springs])
+    modes = system_modes(linearize(system, static_equilibrium(system), inputs=(), outputs=()))
+    assert_allclose(modes.eigenvalues[0], 0.1j, rtol=1e-9)
