@@ -9,7 +9,8 @@ A flow that ends in the equilibrium, made implicit with growing steps (pseudo-tr
 
 Motions that cost nothing (a wheel on its hinge) stay where they are, since W/tau holds them. Where the flow loses its
 way, as along beams of stiff bushings that bend and twist, it is left (`Progress`), and loads that grow lead to the
-equilibrium (`led_equilibrium`).
+equilibrium (`led_equilibrium`). Where elements have states, as a controller with an observer has, the flow need not lead
+to an equilibrium even if the motion does, for it leaves velocities out: Newton's method alone is tried then.
 """
 
 import logging
@@ -30,7 +31,7 @@ from floatframe.compiling.callbacks import raise_errors_of
 from floatframe.compiling.file_frames import motion_of_file
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ConvergenceError, ModelError
-from floatframe.joints.rows import is_held_velocity
+from floatframe.joints.rows import is_held_length, is_held_velocity
 from floatframe.kernels.model import STIFFNESS, Model
 from floatframe.kernels.work import Work, new_work
 from floatframe.motion.stop_events import require_off_stops
@@ -74,6 +75,8 @@ ROUNDING = 32 * np.finfo(float).eps  #: of a position or rotation, as springs se
 STANDSTILL = 1e-200  #: of the first residual, below which it is as good as zero
 LONG_STEP = 1e4  #: step of states by the first one at which states that stand are at rest
 LONGEST_STEP = 1e10  #: of them, in units of time
+SLOWER = 1e-6  #: part of its speed by which a rotation that is steady may slow in a turn
+HELD = 1e-6  #: rate of what a joint holds, by that of the rotation and its reach, above which it does not allow it
 CLOSED = 1e-10  #: largest gap of a joint, relative to the size of the system
 #: steps in which forces out of balance, gaps or changes of states have to fall to half their least: of all equilibria
 #: of the tests those of a free body that spins and of a beam far above buckling took most, 28 and 29
@@ -267,9 +270,9 @@ def steady_rotation(
     require_independent_constraints(compiled, work, tree_of(system).tree, state)
     holds = held_rows(model)
 
-    def followed(state: State, w: Array) -> "Equilibrium | Lost":
-        """Follow the flow from a state."""
-        tau, last, progress, has_stood = 0.0, np.inf, Progress(), False
+    def followed(state: State, w: Array, *, by_newton: bool = False, runs_down: bool = False) -> "Equilibrium | Lost":
+        """Follow the flow from a state, or Newton's method alone; runs_down: forces may slow the rotation a little."""
+        tau, last, progress, has_stood = np.inf if by_newton else 0.0, np.inf, Progress(), False
         for iteration in range(max_iterations + 1):
             state, u_dot = turning(compiled, state, omega, center)
             set_iterate(work, state, u_dot, w)
@@ -281,6 +284,9 @@ def steady_rotation(
             require_numbers(compiled, work)
             W = with_modal_weight(model, linearized(resting, work, 1.0, 0.0, 0.0).H)
             forces, gaps = work.bodies.residual.copy(), work.connections.g.copy()
+            slows = 0.0
+            if runs_down:
+                forces, slows = without_slowing(compiled, work, W, parts, forces)
             size = size_of(W, forces)
             scale_of_forces = forces_at_work(compiled, work, parts, W)
             if not np.isfinite(size + scale_of_forces):  # a stiffened body beyond the second order
@@ -294,7 +300,8 @@ def steady_rotation(
             is_closed = np.abs(gaps[holds]).max(initial=0.0) <= CLOSED * max(compiled.length, 1.0)
             told = tolerance * np.abs(w[~states.own]).max(initial=0.0) + noise
             is_told = bool((np.abs(gaps) <= told)[~holds & ~states.own].all())
-            if error <= tolerance and is_closed and is_told and states.are_at_rest(tolerance):
+            is_steady = slows <= SLOWER * float(np.linalg.norm(omega)) / (2 * np.pi)
+            if error <= tolerance and is_closed and is_told and is_steady and states.are_at_rest(tolerance):
                 _require_rotation(compiled, work, omega)
                 require_off_stops(system, w)
                 notes = notes_at(system, work, state, u_dot, w)
@@ -308,7 +315,7 @@ def steady_rotation(
                 pulled = forces - parts.J.T @ wrenches_by_law(model, parts, gaps, holds | states.own)
                 at_first = size if size > STANDING_SPRINGS * size_of(W, pulled) else size_of(W, pulled)
                 tau = 0.1 * compiled.length / max(at_first / np.sqrt(_total_mass(W)), STANDSTILL)
-            else:
+            elif not by_newton:
                 fall = last / max(size, np.finfo(float).tiny) if error > tolerance else np.inf  # below, it is rounding
                 tau *= min(max(fall, LEAST_GROWTH), FASTEST_GROWTH) if fall > STANDING else max(fall, 0.1)
             last = size
@@ -316,11 +323,17 @@ def steady_rotation(
             if flow is not None:
                 ds, moved, dw = flow.step(work, state, u_dot, w, tau)
             if ds is None or not np.abs(moved).max() > ROUNDING:  # so little is noise of coordinates: bodies one by one
-                y, dw = solve(tuple(k + m / tau for k, m in zip(K, W, strict=True)), parts, -forces, -gaps)
+                try:
+                    y, dw = solve(tuple(k + m / tau for k, m in zip(K, W, strict=True)), parts, -forces, -gaps)
+                except RuntimeError:  # exactly singular: something is free to move
+                    if not by_newton:
+                        raise
+                    break
                 ds, moved = None, in_ground_axes(model, state, y)
             if not np.isfinite(moved).all():
                 break
-            part = min(1.0, LARGEST_TURN / max(largest_motion(compiled, moved), 1e-300))
+            far = largest_motion(compiled, moved, only_turns=by_newton)
+            part = min(1.0, LARGEST_TURN / max(far, 1e-300))
             if flow is not None and ds is not None:
                 state = flow.displaced(work, state, part * ds)
             else:
@@ -338,6 +351,14 @@ def steady_rotation(
                 log.info("system %r: the equilibrium was found by loads that grow, in small steps", system.name)
                 return replace(again, n_iterations=found.iteration + again.n_iterations)
         tried = words_of(led, is_end)
+    if isinstance(found, Lost) and omega.any():
+        again = followed(found.state, w, runs_down=True)
+        if isinstance(again, Equilibrium):
+            return replace(again, n_iterations=found.iteration + again.n_iterations)
+    if isinstance(found, Lost) and states.own.any():
+        again = followed(state, w, by_newton=True)
+        if isinstance(again, Equilibrium):
+            return replace(again, n_iterations=found.iteration + again.n_iterations)
     if isinstance(found, Equilibrium):
         return found
     lost = indefinite_masses(system, found.state)
@@ -351,6 +372,33 @@ def steady_rotation(
     stood = f", the last {PATIENCE} of which led no nearer" if found.has_stood else ""
     words = f"no equilibrium found in {found.iteration} steps{stood}{tried}: {why}"
     raise ConvergenceError(words, t=0.0, h=0.0, residual=found.error)
+
+
+def without_slowing(
+    compiled: CompiledSystem, work: Work, W: tuple[Array, ...], parts: Linearized, forces: Array
+) -> tuple[Array, float]:
+    """Return forces out of balance without those that slow the rotation, and the rate of it, by the speed [1/s].
+
+    A rotor that spins freely runs down by what its bearings damp, and no steady motion balances that. With s the
+    velocities of the rotation, forces f = f' + c M s, f'·s = 0, slow it by the rate c. As they are where it is held.
+    """
+    s, momentum, first = work.state.u.copy(), np.zeros_like(forces), 0
+    for i, block in enumerate(W):
+        u = slice(first, first + len(block))
+        s[first : first + 3] = work.state.R[i].T @ s[first : first + 3]
+        momentum[u] = block @ s[u]  # no mode moves, whose stiffness W holds as well
+        first += len(block)
+    held = np.abs(parts.G @ s)[is_driven_turn(compiled.model)]
+    energy = float(momentum @ s)
+    if not energy > 0.0 or held.max(initial=0.0) > HELD * float(np.linalg.norm(s[3:6])):
+        return forces, 0.0
+    c = float(forces @ s) / energy
+    return forces - c * momentum, abs(c)
+
+
+def is_driven_turn(model: Model) -> NDArray[np.bool_]:
+    """Return which rows prescribe an angle, (n_w,)."""
+    return np.asarray((model.rows.motion >= 0) & ~is_held_length(model.rows.kind))
 
 
 def words_of(led: Led, is_stable: bool) -> str:
@@ -489,15 +537,12 @@ def _total_mass(W: tuple[Array, ...]) -> float:
     return float(sum(block[0, 0] for block in W))
 
 
-def largest_motion(compiled: CompiledSystem, y: Array) -> float:
+def largest_motion(compiled: CompiledSystem, y: Array, *, only_turns: bool = False) -> float:
     """Return the largest translation, relative to the size of the system, or rotation of a body."""
     largest = 0.0
     for u0 in compiled.model.bodies.u0[:-1]:
-        largest = max(
-            largest,
-            float(np.linalg.norm(y[u0 : u0 + 3])) / compiled.length,
-            float(np.linalg.norm(y[u0 + 3 : u0 + 6])),
-        )
+        way = 0.0 if only_turns else float(np.linalg.norm(y[u0 : u0 + 3])) / compiled.length
+        largest = max(largest, way, float(np.linalg.norm(y[u0 + 3 : u0 + 6])))
     return largest
 
 
@@ -514,11 +559,19 @@ def _require_rotation(compiled: CompiledSystem, work: Work, omega: Array) -> Non
     if not omega.any() or not len(work.state.w):
         return
     rate, _ = rates_of_constraints(compiled.model, work)
-    speed = float(np.linalg.norm(omega)) * max(compiled.length, 1.0)
-    worst = int(np.argmax(np.abs(rate)))
-    if abs(rate[worst]) > 1e-6 * speed:
+    speed, kinds = float(np.linalg.norm(omega)), compiled.model.rows.kind
+    rate = np.where(held_rows(compiled.model), np.abs(rate), 0.0)
+    rate /= np.where(is_held_length(kinds), compiled.length + np.abs(work.state.r).max(), 1.0) * speed
+    worst = int(np.argmax(rate))
+    if rate[worst] > HELD:
         joint = int(np.searchsorted(compiled.model.connections.w0, worst, side="right")) - 1
+        name = compiled.connection_names[joint]
+        if compiled.model.rows.motion[worst] >= 0:
+            raise ModelError(
+                f"steady_rotation: a motion drives joint {name!r} at another speed than {speed:g}, off by "
+                f"{rate[worst] * speed:.4g}; give it that speed, or remove it"
+            )
         raise ModelError(
-            f"steady_rotation: joint {compiled.joint_names[joint]!r} does not allow a rotation with omega = "
+            f"steady_rotation: joint {name!r} does not allow a rotation with omega = "
             f"{omega.tolist()}; give the axis of the joint, and its place as center"
         )

@@ -305,9 +305,11 @@ def linearized(
     import numpy as np
 
     from floatframe.analyses import linearize, steady_rotation
+    from floatframe.analyses.steady.turning_drives import turning_with
     from floatframe.checked_values import unit_vector
 
     omega = speed * np.asarray(unit_vector("--axis", vector(axis, "--axis")))
+    system = turning_with(system, omega)
     about = steady_rotation(system, omega, center=vector(center, "--center"), formulation=formulation)
     return linearize(system, about, inputs=inputs, outputs=outputs, formulation=formulation)
 

@@ -26,6 +26,7 @@ __all__ = ["size_beside", "value_at", "with_value"]
 
 LISTS = ("bodies", "joints", "forces", "couplers")
 TURN = "turn"
+SYMMETRIC = 1e-9  #: defect of a matrix by its largest entry, as `RigidBody` allows it
 
 
 def value_at(system: System, path: str) -> float:

@@ -68,6 +68,7 @@ if TYPE_CHECKING:
 __all__ = ["LinearSystem", "NamedMotions", "linearize"]
 
 RANK = 1e-10  #: singular value of the scaled rows below which one repeats others
+NOISE = 1e-10  #: of the largest of a motion, that is rounding
 STEADY = 1e-6  #: of its size, that a state which stands is from its rest, or moves in a unit of time
 TINY = float(np.finfo(float).tiny)
 MASSLESS = 1e-12  #: eigenvalue of the scaled mass matrix below which a motion has no mass
@@ -549,8 +550,8 @@ def named_motions(
     length, found = system.units.length_symbol, []
     for name, row in of_joints.items():
         unit = "rad" if name.rpartition(".")[2].startswith("angle") else length
-        found.append((name, unit, row @ N, 0))
-    first = 0
+        found.append((name, unit, settled(row @ N, (row, N)), 0))
+    first, by_bodies = 0, without_noise(system, by_bodies)
     for body in system.bodies:
         n_q = body.reduced.n_q if isinstance(body, FlexibleBody) else 0
         rows = by_bodies[first : first + 6 + n_q]
@@ -562,6 +563,16 @@ def named_motions(
     names, units, over_z, ranks = zip(*found, strict=True)
     rows = np.pad(np.array(over_z), ((0, 0), (0, n_states)))
     return NamedMotions(names, units, rows, ranks, system.units.time_symbol)
+
+
+def without_noise(system: System, by_bodies: Array) -> Array:
+    """Return motions of bodies over z with zeros for what is rounding beside the largest of each column, as lengths."""
+    scale, first = np.ones(len(by_bodies)), 0
+    for body in system.bodies:
+        scale[first + 3 : first + 6] = compiled_system(system).length
+        first += 6 + (body.reduced.n_q if isinstance(body, FlexibleBody) else 0)
+    size = np.abs(by_bodies) * scale[:, None]
+    return np.where(size <= NOISE * size.max(axis=0, initial=0.0), 0.0, by_bodies)
 
 
 def seen_from(T: Array, mass: Array) -> Array:

@@ -19,6 +19,7 @@ from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.extras import extra_module
 from fe_models.foundation.paths import replace_file
 from floatframe.analyses.linear.linearization import LinearSystem, NamedMotions
+from floatframe.analyses.system_matrices import settled
 from floatframe.errors import ModelError
 
 if TYPE_CHECKING:
@@ -90,7 +91,7 @@ def named_state_space(linear: LinearSystem) -> NamedStateSpace:
         )
     system, T_mass = linear.with_mass()
     motions = linear.motions
-    n_z, rows = system.n_z, motions.rows @ T_mass  # (1)
+    n_z, rows = system.n_z, settled(motions.rows @ T_mass, (motions.rows, T_mass))  # (1)
     chosen = independent_rows(rows[:, :n_z], system.M[:n_z, :n_z], motions)  # (2)
     R = rows[chosen, :n_z]
     space, n = linear.state_space(), len(chosen)

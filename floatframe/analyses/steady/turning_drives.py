@@ -1,0 +1,48 @@
+"""Drives that turn a system against the ground, at the speed of a steady rotation that is looked at."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.compiling.markers import joint_markers, marker_pose, n_q_of
+from floatframe.compiling.system import compiled_system
+from floatframe.functions.time_functions import polynomial_of_time
+from floatframe.joints.rows import RelativePlace
+from floatframe.joints.sliding import SlidingJoint
+from floatframe.system import System
+
+__all__ = ["turning_with"]
+
+SAME = 1e-9  #: difference of rates, relative to the speed, that are one
+
+
+def turning_with(system: System, omega: Array) -> System:
+    """Return a system whose drives of angles against the ground turn with omega, ground axes, (3,), from t = 0 on.
+
+    Each keeps its angle of t = 0. The system itself, where all do or nothing turns.
+    """
+    speed = float(np.linalg.norm(omega))
+    if speed == 0.0:
+        return system
+    placed, n_q, joints = compiled_system(system).placed, n_q_of(system), []
+    for joint in system.joints:
+        motions = dict(getattr(joint, "motions", {}))
+        if motions and not isinstance(joint, SlidingJoint):
+            a, b = joint_markers(system, joint, placed)
+            of_b = (b.body >= 0) * omega - (a.body >= 0) * omega
+            (r_a, A_a), (r_b, A_b) = (marker_pose(end, placed, n_q) for end in (a, b))
+            for row in joint.rows(A_a, A_b, r_b - r_a):
+                own = row.coordinate
+                if own is None or not own.is_angle or own.name not in motions or not of_b.any():
+                    continue
+                axis = own.direction(RelativePlace(A_a, A_b, r_b - r_a))
+                rate, motion = float(axis @ of_b), motions[own.name]
+                if abs(motion(0.0, 1) - rate) > SAME * speed or abs(motion(0.0, 2)) > SAME * speed**2:
+                    motions[own.name] = polynomial_of_time([float(motion(0.0)), rate])
+            if motions != dict(joint.motions):
+                joint = replace(joint, motions=motions)  # noqa: PLW2901
+        joints.append(joint)
+    if all(one is other for one, other in zip(joints, system.joints, strict=True)):
+        return system
+    return replace(system, joints=joints)

@@ -1,0 +1,155 @@
+"""Rotors: drives at other speeds, free spin that runs down, Campbell diagrams of one mode a line; states and statics."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from floatframe import (
+    GROUND,
+    Bushing,
+    ConvergenceError,
+    Gravity,
+    Marker,
+    ModelError,
+    PlanarJoint,
+    PrismaticJoint,
+    RevoluteJoint,
+    RigidBody,
+    System,
+    campbell,
+    linearize,
+    named_state_space,
+    static_equilibrium,
+    steady_rotation,
+)
+from floatframe.elements.expressions import ExpressionElement
+from floatframe.functions.time_functions import polynomial_of_time
+from floatframe.gradients.paths import value_at, with_value
+from floatframe.rotations import rotation_exp
+
+OMEGA = 100.0  #: of the disc in its bearings
+
+
+def disc(offset=0.0, damping=0.0, mm=1.0, drive=None):
+    """Return a disc in round bearings, and a shaft that turns it by a stiff coupling; mm: unit of length by m."""
+    J = np.diag([0.1, 0.1, 0.2]) / mm**2
+    body = RigidBody("disc", 10.0, J, center_of_mass=(offset / mm, 0, 0))
+    shaft = RigidBody("shaft", 1.0, 0.01 * np.eye(3) / mm**2)
+    plane = PlanarJoint("plane", GROUND, Marker("disc"), axis=(0, 0, 1))
+    motions = {} if drive is None else {"angle": polynomial_of_time([0.0, drive])}
+    hinge = RevoluteJoint("motor", GROUND, Marker("shaft"), axis=(0, 0, 1), motions=motions)
+    across = np.array([1.0, 1, 0, 0, 0, 0])
+    bearing = Bushing("bearing", Marker(GROUND), Marker("disc"), 10.0 * OMEGA**2 * across, damping * across)
+    coupling = Bushing("coupling", Marker("shaft"), Marker("disc"), stiffness=np.array([0, 0, 0, 0, 0, 1e5]) / mm**2)
+    return System([body, shaft], [plane, hinge], [bearing, coupling])
+
+
+@pytest.mark.parametrize("mm", [1.0, 1e-3])
+@pytest.mark.parametrize("drive", [None, 7.0])
+def test_a_campbell_diagram_has_a_line_for_each_mode(drive, mm):
+    """Whirls of OMEGA, seen from axes that turn with W, have OMEGA ± W; the torsion stays, and crosses one of them."""
+    speeds = np.linspace(0.0, 80.0, 9)
+    torsion = np.sqrt(1e5 * (1 / 0.2 + (0.0 if drive else 1 / 0.01)))
+    locus = campbell(disc(mm=mm, drive=drive), speeds)
+    lines = [np.abs(OMEGA + speeds), np.abs(OMEGA - speeds), np.full(9, torsion)] + ([] if drive else [np.zeros(9)])
+    found = 2 * np.pi * locus.frequencies
+    assert found.shape[1] == len(lines)
+    apart = [min(np.abs(column - line).max() for line in lines) for column in found.T]
+    assert_allclose(apart, 0.0, rtol=0, atol=1e-6 * OMEGA)
+
+
+def test_a_mode_that_is_not_met_again_ends_its_line():
+    """A mode of one body at one value, of another body at the next: two lines, each with a gap."""
+    from floatframe import root_locus
+
+    def build(value):
+        stiff = np.array([1.0, 0, 0, 0, 0, 0]) * 100.0
+        bodies = [RigidBody(name, 1.0, np.eye(3), position=(0, 2.0 * k, 0)) for k, name in enumerate("ab")]
+        held = "a" if value < 1.5 else "b"
+        fixed = {name: {} if name == held else {"distance": 0.0} for name in "ab"}
+        rails = [PrismaticJoint(f"rail {n}", GROUND, Marker(n), axis=(1, 0, 0), motions=fixed[n]) for n in "ab"]
+        springs = [Bushing(f"spring {n}", Marker(GROUND, position=(0, 2.0 * k, 0)), Marker(n), stiffness=stiff)
+                   for k, n in enumerate("ab")]  # fmt: skip
+        system = System(bodies, rails, springs)
+        return linearize(system, static_equilibrium(system), inputs=(), outputs=())
+
+    locus = root_locus(build, [1.0, 2.0])
+    assert locus.eigenvalues.shape == (2, 2)
+    assert_allclose(locus.eigenvalues[[0, 1], [0, 1]].imag, 10.0, rtol=1e-9)
+    assert np.isnan(locus.eigenvalues[[0, 1], [1, 0]]).all()
+    assert np.isnan(locus.frequencies[0, 1])
+
+
+@pytest.mark.parametrize("mm", [1.0, 1e-3])
+def test_a_drive_at_another_speed_is_named(mm):
+    system = disc(mm=mm, drive=80.0)
+    steady_rotation(system, (0, 0, 80.0))
+    for speed in (80.01, 81.0, 79.0):
+        with pytest.raises(ModelError, match="a motion drives joint 'motor' at another speed"):
+            steady_rotation(system, (0, 0, speed))
+
+
+def test_a_rotor_that_runs_down_slowly_turns_steadily():
+    """Unbalance e = 1 µm in damped bearings slows it by the torque d W |x|², x = m e W²/(k - m W² + i d W): 1e-12 a turn.
+
+    An unbalance of a decimetre slows it by more than is steady, and is refused.
+    """
+    system = disc(offset=1e-6, damping=20.0)
+    about = steady_rotation(system, (0, 0, 60.0))
+    x = 10.0 * 1e-6 * 60.0**2 / abs(10.0 * OMEGA**2 - 10.0 * 60.0**2 + 20.0j * 60.0)
+    assert_allclose(np.linalg.norm(about.state.r[0, :2]), x, rtol=1e-6)
+    assert about.residual <= 1e-9
+    with pytest.raises(ConvergenceError, match="no equilibrium found"):
+        steady_rotation(disc(offset=1e-1, damping=20.0), (0, 0, 60.0))
+
+
+@pytest.mark.parametrize("formulation", ["absolute", "relative"])
+def test_a_mass_held_by_an_observer_and_its_feedback_comes_to_rest(formulation):
+    """m x'' = u + f, u = -K z, z' = (A - B K - L C) z + L x: the flow without velocities leads away from the rest."""
+    m, f = 2.0, 30.0
+    A, B, C = np.array([[0, 1.0], [0, 0]]), np.array([[0], [1 / m]]), np.array([[1.0, 0]])
+    K, L = np.array([[10.0, 6.4]]), np.array([[1.73], [1.0]])
+    own = A - B @ K - L @ C
+    assert np.linalg.eigvals(np.block([[A, -B @ K], [L @ C, own]])).real.max() < 0
+    expected = np.linalg.solve(np.block([[A, -B @ K], [L @ C, own]]), [0, -f / m, 0, 0])
+    rates = {f"z{i}": f"({own[i, 0]!r})*z0 + ({own[i, 1]!r})*z1 + ({L[i, 0]!r})*b_x".replace("np.float64", "")
+             for i in range(2)}  # fmt: skip
+    feedback = ExpressionElement("feedback", {"g": Marker(GROUND), "b": Marker("b")}, {"b_Fx": "-10.0*z0 - 6.4*z1"},
+                                 {"z0": 0.0, "z1": 0.0}, rates)  # fmt: skip
+    rail = PrismaticJoint("rail", Marker(GROUND), Marker("b"), axis=(1, 0, 0))
+    system = System([RigidBody("b", m, np.eye(3))], [rail], [Gravity((f / m, 0, 0))], elements=[feedback])
+    found = static_equilibrium(system, formulation=formulation)
+    assert_allclose(found.state.r[0, 0], expected[0], rtol=1e-7)
+
+
+def test_a_number_of_a_tensor_that_was_turned_may_vary():
+    """Symmetric but for the last bits, as a product of matrices leaves it: both entries of a pair change."""
+    R = rotation_exp(np.array([0.4, -0.7, 0.3]))
+    J = R @ np.diag([1.0, 1.2, 1.5]) @ R.T
+    J[0, 1] = np.nextafter(J[1, 0], 1.0)
+    system = System([RigidBody("b", 1.0, J)], [], [])
+    changed = with_value(system, "bodies.b.inertia.0.1", J[0, 1] + 0.01)
+    assert changed.bodies[0].inertia[1, 0] == changed.bodies[0].inertia[0, 1]
+    assert value_at(changed, "bodies.b.inertia.1.0") == J[0, 1] + 0.01
+
+
+def test_states_are_no_rounding_of_motions_that_joints_hold():
+    """A sledge on a rail that lies anyhow, seen without its joint coordinate: its state is a way along the rail."""
+    R = rotation_exp(np.array([0.4, -0.7, 0.3]))
+    body = RigidBody("b", 1.0, 0.1 * np.eye(3), position=(300.0, -200.0, 500.0), orientation=(0.5, 0.5, 0.5, 0.5))
+    rail = PrismaticJoint("rail", GROUND, Marker("b"), axis=R[:, 0])
+    spring = Bushing("spring", GROUND, Marker("b"), stiffness=np.full(6, 100.0))
+    system = System([body], [rail], [spring])
+    linear = linearize(system, static_equilibrium(system), inputs=(), outputs=())
+    motions = linear.motions
+    held = [k for k, unit in enumerate(motions.units) if unit == "rad"]
+    assert held
+    assert not motions.rows[held].any()
+    kept = [k for k, rank in enumerate(motions.ranks) if rank == 2]
+    own = replace(motions, names=tuple(motions.names[k] for k in kept), units=tuple(motions.units[k] for k in kept),
+                  rows=motions.rows[kept], ranks=(2,) * len(kept))  # fmt: skip
+    space = named_state_space(replace(linear, motions=own))
+    assert np.abs(space.A).max() < 101.0
+    assert space.states[0] in ("b x", "b y", "b z")
