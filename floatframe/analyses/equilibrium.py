@@ -9,8 +9,8 @@ A flow that ends in the equilibrium, made implicit with growing steps (pseudo-tr
 
 Motions that cost nothing (a wheel on its hinge) stay where they are, since W/tau holds them. Where the flow loses its
 way, as along beams of stiff bushings that bend and twist, it is left (`Progress`), and loads that grow lead to the
-equilibrium (`led_equilibrium`). Where elements have states, as a controller with an observer has, the flow need not lead
-to an equilibrium even if the motion does, for it leaves velocities out: Newton's method alone is tried then.
+equilibrium (`led_equilibrium`). Where elements have states, as a controller with an observer has, the flow need not
+lead to an equilibrium even if the motion does, for it leaves velocities out: Newton's method alone is tried then.
 """
 
 import logging

@@ -177,7 +177,7 @@ def with_motions_that_cost_nothing(
 ) -> tuple[Array, Array, Array]:
     """Return one of each conjugate pair, and as many modes with lambda = 0 as there are motions that cost nothing.
 
-    Q spans what belongs to zero; motions that cost nothing are what A takes to zero within it, and not their velocities.
+    Q spans what belongs to zero; motions that cost nothing are what A takes to zero within it, without velocities.
     """
     is_zero = np.abs(eigenvalues) <= errors
     kept = ~is_zero & (eigenvalues.imag >= 0)

@@ -33,7 +33,7 @@ def stiff(k):
 
 
 def rotor(axes, k_stiff):
-    """Return a disc of 10 kg in bearings of 1e5 N/m and 1 N s/m, and a small body on its axis on stiff round springs."""
+    """Return a disc of 10 kg in bearings of 1e5 N/m and 1 N s/m, and a small body on its axis on round springs."""
     body = RigidBody("rotor", 10.0, np.diag([0.1, 0.1, 0.2]), position=PLACE, orientation=euler_parameters(A))
     plane = PlanarJoint("plane", GROUND, Marker("rotor"), axis=A[:, 2])
     bearing = Bushing("bearing", Marker(GROUND, position=PLACE, triad=A), Marker("rotor"), axes=axes,

@@ -1,4 +1,4 @@
-"""Rotors: drives at other speeds, free spin that runs down, Campbell diagrams of one mode a line; states and statics."""
+"""Rotors: drives at other speeds, free spin that runs down, Campbell diagrams; states and statics."""
 
 from dataclasses import replace
 
@@ -92,7 +92,7 @@ def test_a_drive_at_another_speed_is_named(mm):
 
 
 def test_a_rotor_that_runs_down_slowly_turns_steadily():
-    """Unbalance e = 1 µm in damped bearings slows it by the torque d W |x|², x = m e W²/(k - m W² + i d W): 1e-12 a turn.
+    """Unbalance e = 1 µm in damped bearings slows it by the torque d W |x|², x = m e W²/(k - m W² + i d W).
 
     An unbalance of a decimetre slows it by more than is steady, and is refused.
     """
