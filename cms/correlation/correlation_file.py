@@ -24,7 +24,7 @@ from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.stages import Stages
 from fe_models.foundation.toml_file import Table, Vector3, changed, read_toml, validated
-from fe_models.foundation.units import unit_system
+from fe_models.foundation.units import Units, unit_system
 from fe_models.meshes.mesh import Mesh
 
 __all__ = ["CorrelationFile", "CorrelationResult", "read_correlation", "run_correlation"]
@@ -172,12 +172,13 @@ def run_correlation(asked: CorrelationFile, stages: Stages | None = None) -> Cor
         measured = measured_modes(asked.test, reduced.units.length)
         with stages("compare"):
             found = correlate(measured, modes_of_file(reduced), placement=placement, pairing=pairing)
-        return CorrelationResult(found, None, damping_of(measured), None)
+        return CorrelationResult(found, None, damping_of(measured, reduced.units), None)
     assert asked.model.job is not None
     path = asked.model.job
     content = read_toml(path, CorrelationError)
     job = validated(Job, content, path, CorrelationError, context=path.parent)
-    measured = measured_modes(asked.test, unit_system(job.body.units).length)
+    units = unit_system(job.body.units)
+    measured = measured_modes(asked.test, units.length)
     if asked.update is None:
         with stages("full model"):
             body = job_body(named(job, path))
@@ -185,7 +186,7 @@ def run_correlation(asked: CorrelationFile, stages: Stages | None = None) -> Cor
         with stages("compare"):
             model = modes_of_body(body, top, held=asked.model.held)
             found = correlate(measured, model, placement=placement, pairing=pairing)
-        return CorrelationResult(found, None, damping_of(measured), None)
+        return CorrelationResult(found, None, damping_of(measured, units), None)
     parameters = tuple(parameter_of(name, table, content, path) for name, table in asked.update.parameters.items())
     with stages("update"):
         update = update_model(
@@ -194,7 +195,7 @@ def run_correlation(asked: CorrelationFile, stages: Stages | None = None) -> Cor
         )  # fmt: skip
     values = {p.path: float(v) for p, v in zip(parameters, update.values, strict=True)}
     document = changed(content, values, str(path), CorrelationError)
-    return CorrelationResult(update.before, update, damping_of(measured), document)
+    return CorrelationResult(update.before, update, damping_of(measured, units), document)
 
 
 def body_maker(content: dict[str, Any], path: Path, parameters: tuple[Parameter, ...]) -> Callable[[Array], FEBody]:
@@ -281,9 +282,9 @@ def replaced(document: Any, content: Any, probe: object) -> Any:
     return None
 
 
-def damping_of(measured: MeasuredModes) -> tuple[DampingFit, ...]:
-    """Return fits to the measured damping, where two or more ratios are known."""
+def damping_of(measured: MeasuredModes, units: Units) -> tuple[DampingFit, ...]:
+    """Return fits to the measured damping, where two or more ratios are known, for a job in these units."""
     is_known = measured.damping > 0 if measured.damping.size else np.zeros(0, bool)
     if is_known.sum() < 2:
         return ()
-    return fit_damping(measured.frequencies[is_known], measured.damping[is_known])
+    return fit_damping(measured.frequencies[is_known], measured.damping[is_known], time=units.time)

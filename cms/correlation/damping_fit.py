@@ -18,15 +18,19 @@ class DampingFit:
     values: Array  #: ratio; or alpha [1/s] and beta [s]
     spread: Array  #: standard deviation of each
     misfit: float  #: root mean square of measured less fitted ratio
+    time: float = 1.0  #: unit of time of the job that takes the table [s]
 
     def table(self) -> str:
-        """Return the table [damping] of a job."""
-        names = ("ratio",) if self.kind == "ratio" else ("alpha", "beta")
-        return "\n".join(["[damping]", *(f"{n} = {v:.6g}" for n, v in zip(names, self.values, strict=True))])
+        """Return the table [damping] of a job, in its units: alpha per unit of time, beta in units of time."""
+        factors = {"ratio": 1.0} if self.kind == "ratio" else {"alpha": self.time, "beta": 1 / self.time}
+        rows = (f"{name} = {v * factor:.6g}" for (name, factor), v in zip(factors.items(), self.values, strict=True))
+        return "\n".join(["[damping]", *rows])
 
 
-def fit_damping(frequencies: Array, ratios: Array) -> tuple[DampingFit, ...]:
-    """Fit zeta = const, and zeta = alpha / (4 pi f) + beta pi f, to measured ratios.
+def fit_damping(frequencies: Array, ratios: Array, *, time: float = 1.0) -> tuple[DampingFit, ...]:
+    """Fit zeta = const, and zeta = alpha / (4 pi f) + beta pi f, to measured ratios at frequencies [Hz].
+
+    time: unit of time of the job for which the fits write their table [s].
 
     The spread is that of the misfit: residuals over (n - number of constants). Rayleigh's constants are those of D =
     alpha M + beta K; one that comes out negative is set to zero, since a job takes none.
@@ -51,5 +55,5 @@ def fit_damping(frequencies: Array, ratios: Array) -> tuple[DampingFit, ...]:
         freedom = max(len(f) - len(active), 1)
         spread = np.zeros(A.shape[1])
         spread[active] = np.sqrt(np.diag(np.linalg.inv(A[:, active].T @ A[:, active])) * (left @ left) / freedom)
-        fits.append(DampingFit(kind, x, spread, float(np.sqrt(np.mean(left**2)))))
+        fits.append(DampingFit(kind, x, spread, float(np.sqrt(np.mean(left**2))), time))
     return tuple(fits)

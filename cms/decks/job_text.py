@@ -137,7 +137,8 @@ def _has_mass(deck: Deck, used: Iterable[str]) -> bool:
     return (
         any(mass.mass for mass in deck.masses)
         or any(deck.materials[name].density for name in used if name in deck.materials)
-        or any(section.added_mass for section in (*deck.shells, *deck.lines))
+        or any(shell.added_mass for shell in deck.shells)
+        or any(line.added_mass for line in deck.lines)
     )
 
 

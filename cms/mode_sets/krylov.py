@@ -241,7 +241,7 @@ def _shifted_expansion(families: Families, shift: float, F_extra: Array, stack: 
         x[order] = factor.solve(F[order])
         return x
 
-    return _Expansion(f"{shift:g} Hz", first_block, solve)
+    return _Expansion(f"{shift / body.units.time:g} Hz", first_block, solve)
 
 
 def _check(

@@ -311,6 +311,8 @@ def test_damping_by_both_laws():
     assert_allclose(rayleigh.values, [alpha, beta], rtol=1e-9)
     assert rayleigh.misfit < 1e-12 < constant.misfit
     assert "alpha = 3" in rayleigh.table()
+    in_ms = fit_damping(f, alpha / (4 * np.pi * f) + beta * np.pi * f, time=1e-3)[1]  # a job in mm-kg-ms
+    assert f"alpha = {alpha * 1e-3:.6g}\nbeta = {beta * 1e3:.6g}" in in_ms.table()
     constant, rayleigh = fit_damping(f, 1 / f)  # beta comes out negative or nothing: no job takes it
     assert (rayleigh.values >= 0).all()
     with pytest.raises(CorrelationError, match="two or more"):

@@ -14,6 +14,7 @@ from cms.mode_sets.krylov import krylov
 from cms.reduction import reduce
 from fe_models.body.couplings import couple
 from fe_models.body.load_cases import LoadCase
+from fe_models.foundation.units import unit_system
 from tests.bodies import bar, chain
 
 ROUNDOFF = 1e-12
@@ -230,3 +231,10 @@ def test_a_shift_at_a_natural_frequency_is_refused():
     resonance = np.sqrt(1000.0 / 2.0) * 2 * np.sin(np.pi / 12) / (2 * np.pi)
     with pytest.raises(ModeSetError, match="natural frequency of the free body; move the shift"):
         krylov(body, n_blocks=1, shifts=[resonance])
+
+
+def test_labels_say_hertz_whatever_the_unit_of_time(body):
+    """A shift is given per unit of time of the body; 0.8 per millisecond are 800 Hz."""
+    modes = krylov(replace(body, units=unit_system("mm-kg-ms")), n_blocks=1, shifts=(0.8,))
+    assert modes.options["shifts"] == "800 Hz"
+    assert modes.labels[-1].startswith("krylov 800 Hz block 1")
