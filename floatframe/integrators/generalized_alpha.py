@@ -243,6 +243,7 @@ class GeneralizedAlpha:
         state = carry.state
         if is_held_position(compiled.model.rows.kind).any():
             z = self.filter_at(compiled, carry, h, t, full=True)
+            assert z is not None
             begun = beginning_of(compiled, consistent_of(carry), t, h, z)
             x = h * state.u + h**2 * (0.5 * begun.u_dot + ((alpha_m - alpha_f) / 2 + beta) * h * begun.rates)
             after = displaced(compiled.model, state, x)
