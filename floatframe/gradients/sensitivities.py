@@ -214,6 +214,11 @@ def require_no_memory(system: System) -> None:
                 "those of elements without are; else vary its parameter by floatframe sweep"
             )
     compiled = compiled_system(system)
+    if len(gaps := compiled.model.gaps.connection):
+        raise ModelError(
+            f"sensitivities: contact {compiled.connection_names[gaps[0]]!r} divides steps where it closes, which is "
+            "not differentiated; vary its parameter by floatframe sweep"
+        )
     if len(rows := compiled.model.states.row):
         owner = int(np.searchsorted(compiled.model.connections.w0, rows[0], side="right")) - 1
         raise ModelError(

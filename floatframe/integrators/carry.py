@@ -25,6 +25,7 @@ __all__ = [
     "carry_of",
     "carry_of_past",
     "counted_on",
+    "has_divided_steps",
     "memory_of",
     "observed",
     "observed_unless_stopped",
@@ -291,3 +292,9 @@ def words_of_contact(compiled: CompiledSystem, work: Work, least: float, smaller
         f"ones than h_min = {least:.3g}: in longer ones it would gain energy; give a smaller {smaller}, or a softer "
         "contact"
     )
+
+
+def has_divided_steps(model: Model) -> bool:
+    """Whether fixed steps of a system may be divided: where contacts close, or dry friction comes to rest."""
+    forces = model.joint_forces
+    return len(model.gaps.connection) > 0 or bool((forces.friction > 0).any() or (forces.coefficient > 0).any())

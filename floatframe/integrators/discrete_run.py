@@ -16,6 +16,7 @@ from floatframe.integrators.carry import (
     Carry,
     Failure,
     carry_of,
+    has_divided_steps,
     memory_of,
     observed,
     one_step_of,
@@ -72,8 +73,8 @@ class DiscreteScheme:
         known, angle = (None, None) if before is None else (before.w, before.angle)
         consistent = consistent_motion(system, state, t=t, known=known, angle=angle)
         held = discrete_system(system, type(self).__name__).held
-        known = np.isin(held, compiled_system(system).model.laws.equation)
-        f = np.where(known, consistent.w[held], 0.0)
+        is_of_law = np.isin(held, compiled_system(system).model.laws.equation)
+        f = np.where(is_of_law, consistent.w[held], 0.0)
         carry = Carry(consistent.state, consistent.u_dot, f, 0.0, consistent.w, np.zeros(2), np.zeros(2))
         return with_angles(system, t, carry, before)
 
@@ -104,8 +105,9 @@ class DiscreteScheme:
         from floatframe.discrete.kernels.entry import advance_discrete_steps
         from floatframe.discrete.kernels.newton import NO_ACCELERATION
 
-        compiled, least = compiled_system(system), LEAST_STEP * h
+        compiled = compiled_system(system)
         model = compiled.model
+        least = LEAST_STEP * h if has_divided_steps(model) else 0.0
         ds = discrete_system(system, type(self).__name__)
         kept = kept_of(work, ds, self.equations, h, self.damping)
         step = kept.step

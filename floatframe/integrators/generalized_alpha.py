@@ -13,6 +13,7 @@ from floatframe.integrators.carry import (
     Carry,
     Failure,
     carry_of,
+    has_divided_steps,
     memory_of,
     observed,
     one_step_of,
@@ -79,7 +80,7 @@ class GeneralizedAlpha:
     max_iterations: int = 25
     error_tolerance: float | None = None  #: largest local error of a step over the size of the system; None: fixed step
     #: least step, to which one that fails or meets a contact is divided [s]; None: a millionth of h, and no division of
-    #: fixed steps in systems without contacts
+    #: fixed steps in systems without contacts and dry friction
     h_min: float | None = None
     #: alpha_m, alpha_f, beta, gamma in place of those that follow from rho_inf (see `newmark`, `hht`)
     parameters: tuple[float, float, float, float] | None = None
@@ -197,7 +198,7 @@ class GeneralizedAlpha:
         """Return the least part into which a step of size h may be divided; 0 if it may not."""
         if self.h_min is not None:
             return min(self.h_min, h)
-        is_fixed = self.error_tolerance is None and not len(compiled.model.gaps.connection)
+        is_fixed = self.error_tolerance is None and not has_divided_steps(compiled.model)
         return 0.0 if is_fixed else LEAST_STEP * h
 
     def filter_at(self, compiled: CompiledSystem, carry: Carry, h: float, t: float, *, full: bool) -> StepFilter | None:

@@ -269,17 +269,18 @@ def take_size(step, h):
 def take_parts(model, work, discrete, step, memory, order, t_0, t_1):
     """Advance the memory from t_0 to t_1 by one step, with contacts by parts that these want; return the status.
 
-    A part that fails is tried again, shorter, down to h_min.
+    With h_min above 0 a part that fails is tried again, shorter, down to it.
     """
     h, has_gaps, left, has_failed = order.h, model.gaps.connection.shape[0] > 0, order.h, False
     if memory.h_wanted <= 0.0 or memory.h_wanted > h:
         memory.h_wanted = h
     while left > 0.0:
         part, is_last = left, True
-        if has_gaps:
-            n_parts = max(1.0, math.ceil(left / memory.h_wanted * (1.0 - 1e-9)))
-            begin_iterate(model, work, step, memory)
-            part = max(min(step_before_contact(model, work, t_1 - left, left / n_parts), left), order.h_min)
+        if order.h_min > 0.0:
+            part = left / max(1.0, math.ceil(left / memory.h_wanted * (1.0 - 1e-9)))
+            if has_gaps:
+                begin_iterate(model, work, step, memory)
+                part = max(step_before_contact(model, work, t_1 - left, part), order.h_min)
             is_last = part >= left
             part = min(part, left)
         step.t_0, step.t_1 = t_0 if left == h else t_1 - left, t_1 if is_last else t_1 - (left - part)
@@ -292,14 +293,15 @@ def take_parts(model, work, discrete, step, memory, order, t_0, t_1):
             count_angles(model, work, memory, part)
             memory.n_accepted += 1
             left = 0.0 if is_last else left - part
+            wanted = part if has_failed else 2.0 * part
             if has_gaps:
-                wanted = h if work.gaps.n_closed == 0 else part if has_failed else 2.0 * part
-                memory.h_wanted = min(wanted, h, work.gaps.step)
+                wanted = min(h if work.gaps.n_closed == 0 else wanted, work.gaps.step)
+            memory.h_wanted = min(wanted, h)
             has_failed = False
             if work.counted.stopped > 0:
                 return STOPPED
             continue
-        if not has_gaps or part <= order.h_min:
+        if part <= order.h_min or order.h_min <= 0.0:
             return status
         memory.n_rejected += 1
         memory.h_wanted = max(work.gaps.step if status == UNRESOLVED else 0.5 * part, order.h_min)

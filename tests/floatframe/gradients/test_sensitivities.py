@@ -400,3 +400,12 @@ def test_what_a_turn_changes_has_no_derivative():
 def test_elements_with_states_of_their_own_are_refused():
     with pytest.raises(ff.ModelError, match="'jack' has states of its own, which are not differentiated"):
         ff.sensitivities(lifted(), ["rail.distance value"], ["bodies.b.mass"], t_end=0.02, h=1e-3)
+
+
+def test_contacts_whose_steps_are_divided_are_refused():
+    ground, body = ff.Marker("ground"), ff.Marker("b")
+    foot = ff.SphereContact("foot", ground, body, radius_b=0.1, stiffness=1e5)
+    rail = ff.PrismaticJoint("rail", ground, body, axis=(0, 0, 1))
+    system = ff.System([ff.RigidBody("b", 1.0, np.eye(3))], [rail], [foot])
+    with pytest.raises(ff.ModelError, match="contact 'foot' divides steps where it closes, which is not"):
+        ff.sensitivities(system, ["rail.distance value"], ["bodies.b.mass"], t_end=0.02, h=1e-3)
