@@ -1,5 +1,6 @@
 """Drives that turn a system against the ground, at the speed of a steady rotation that is looked at."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.compiling.markers import joint_markers, marker_pose, n_q_of
 from floatframe.compiling.system import compiled_system
-from floatframe.functions.time_functions import polynomial_of_time
+from floatframe.functions.time_functions import TimeFunction, polynomial_of_time
 from floatframe.joints.rows import RelativePlace
 from floatframe.joints.sliding import SlidingJoint
 from floatframe.system import System
@@ -27,7 +28,8 @@ def turning_with(system: System, omega: Array) -> System:
         return system
     placed, n_q, joints = compiled_system(system).placed, n_q_of(system), []
     for joint in system.joints:
-        motions = dict(getattr(joint, "motions", {}))
+        given: Mapping[str, TimeFunction] = getattr(joint, "motions", {})
+        motions = dict(given)
         if motions and not isinstance(joint, SlidingJoint):
             a, b = joint_markers(system, joint, placed)
             of_b = (b.body >= 0) * omega - (a.body >= 0) * omega
@@ -40,8 +42,8 @@ def turning_with(system: System, omega: Array) -> System:
                 rate, motion = float(axis @ of_b), motions[own.name]
                 if abs(motion(0.0, 1) - rate) > SAME * speed or abs(motion(0.0, 2)) > SAME * speed**2:
                     motions[own.name] = polynomial_of_time([float(motion(0.0)), rate])
-            if motions != dict(joint.motions):
-                joint = replace(joint, motions=motions)
+            if motions != dict(given):
+                joint = replace(joint, motions=motions)  # type: ignore[arg-type]
         joints.append(joint)
     if all(one is other for one, other in zip(joints, system.joints, strict=True)):
         return system
