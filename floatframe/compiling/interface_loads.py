@@ -4,12 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from floatframe.compiling.system import compiled_system
 from floatframe.forces import PointForce
 from floatframe.system import System
 
-__all__ = ["Load", "Wrench", "amplitudes", "in_body", "loads_on_interfaces"]
+__all__ = ["Load", "Wrench", "amplitudes", "in_body", "interface_number", "loads_on_interfaces"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +30,7 @@ class Load:
     interface: int
     force: PointForce
     triad: Array  #: undeformed axes of the marker in the body frame, (3, 3)
+    number: int = -1  #: among the point forces of the system
 
 
 def loads_on_interfaces(system: System, body: int) -> tuple[list[Wrench], list[Load]]:
@@ -36,15 +38,13 @@ def loads_on_interfaces(system: System, body: int) -> tuple[list[Wrench], list[L
     model, reduced = compiled_system(system).model, system.bodies[body].moved  # type: ignore[union-attr]
     n = reduced.n_q
     forces = [force for force in system.forces if isinstance(force, PointForce)]
-    load_of = {int(m): force for m, force in zip(model.loads.marker, forces, strict=True)}
+    load_of = {int(m): k for k, m in enumerate(model.loads.marker)}
     wrenches, loads = [], []
     for m in np.flatnonzero((model.markers.body == body) & (model.markers.psi0 >= 0)):
         o = int(model.markers.psi0[m])
         own = model.markers.psi[o : o + 6 * n].reshape(6, n)
-        place = model.markers.position[m]
-        same = [np.array_equal(i.Psi, own) and np.array_equal(i.position, place) for i in reduced.interfaces]
-        interface = same.index(True) if any(same) else None
-        if interface is None:  # the place where something slides along a line
+        interface = interface_number(reduced, own, model.markers.position[m])
+        if interface < 0:  # the place where something slides along a line
             continue
         c = int(model.markers.connection[m])
         if c >= 0:
@@ -52,8 +52,15 @@ def loads_on_interfaces(system: System, body: int) -> tuple[list[Wrench], list[L
             first = [w0 + int(part[m]) if part[m] >= 0 else -1 for part in (model.markers.force, model.markers.moment)]
             wrenches.append(Wrench(interface, float(model.markers.sign[m]), *first))
         elif int(m) in load_of:
-            loads.append(Load(interface, load_of[int(m)], np.asarray(model.markers.triad[m])))
+            k = load_of[int(m)]
+            loads.append(Load(interface, forces[k], np.asarray(model.markers.triad[m]), k))
     return wrenches, loads
+
+
+def interface_number(reduced: ReducedBody, psi: Array, position: Array) -> int:
+    """Return the number of the interface that moves and lies so, -1 for none."""
+    same = [np.array_equal(each.Psi, psi) and np.array_equal(each.position, position) for each in reduced.interfaces]
+    return same.index(True) if any(same) else -1
 
 
 def amplitudes(load: Load, t: Array, R: Array) -> Array:

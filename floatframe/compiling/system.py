@@ -18,7 +18,6 @@ from floatframe.compiling.forces import Functions, body_loads, joint_forces
 from floatframe.compiling.gaps import gap_record
 from floatframe.compiling.lines import Lines, add_sliding
 from floatframe.compiling.markers import (
-    MarkerData,
     find_marker,
     marker_bending,
     marker_pose,
@@ -158,10 +157,12 @@ def compile_system(system: System) -> CompiledSystem:
     row_motion = [functions.index(row.motion) for row in rows]
     forces, force0 = joint_forces(system, rows, made.owner, functions)
     arrays = type_arrays(types)
-    radii = np.sqrt(np.maximum(np.trace(arrays.J0, axis1=1, axis2=2), 0.0) / (2 * arrays.mass))
-    length = system_length(markers, placed, n_q, float(radii.max()))
-    public.give_lengths(radii[kind], length)
-    elements.give_lengths(radii[kind], length, system.units)
+    radii = np.sqrt(np.maximum(np.trace(arrays.J0, axis1=1, axis2=2), 0.0) / (2 * arrays.mass))[kind]
+    places = [marker_pose(marker, placed, n_q)[0] for marker in markers]
+    sizes = body_sizes(made, places, placed, radii)
+    length = system_length(sizes, places, placed)
+    public.give_lengths(radii, length)
+    elements.give_lengths(radii, length, system.units)
     model = Model(
         gravity=gravity,
         bodies=filled(
@@ -171,6 +172,7 @@ def compile_system(system: System) -> CompiledSystem:
             q0=offsets(n_q),
             u0=offsets(n_q + 6),
             h0=offsets((n_q + 6) ** 2),
+            size=np.where(sizes > 0, sizes, 1.0),
             end0=offsets(integers([len(group) for group in ends_of])),
             ends=[m for group in ends_of for m in group],
             load0=offsets(integers([len(group) for group in loaded_of])),
@@ -342,11 +344,44 @@ def motion_at_start(body: FlexibleBody) -> FrameMotion:
     )  # fmt: skip
 
 
-def system_length(markers: list[MarkerData], placed: State, n_q: IntArray, radius: float) -> float:
-    """Return the largest arm of a marker in a body, the size of the system or the largest radius of gyration.
+def body_sizes(made: ConnectionLists, places: list[Array], placed: State, radii: Array) -> Array:
+    """Return the size of all that hangs together with each body, the ground left out, (n_b,).
 
-    1 if all are 0.
+    The largest arm of a marker or radius of gyration (radii, (n_b,)), or the extent of their points and of those that
+    hold them.
     """
-    arms = [float(np.linalg.norm(marker.shape.position)) for marker in markers if marker.body >= 0]
-    points = [marker_pose(marker, placed, n_q)[0] for marker in markers] + list(placed.r)
-    return max([*arms, radius, float(np.linalg.norm(np.ptp(np.array(points), axis=0)))]) or 1.0
+    n_b = len(radii)
+    together = np.arange(n_b)
+
+    def head(i: int) -> int:
+        while together[i] != i:
+            together[i] = together[together[i]]
+            i = int(together[i])
+        return i
+
+    bodies = [marker.body for marker in made.markers]
+    first: dict[int, int] = {}  # a body of each connection
+    for c, i in zip(made.connection_of, bodies, strict=True):
+        if c >= 0 and i >= 0:
+            together[head(i)] = head(first.setdefault(c, i))
+    size, low, high = np.zeros(n_b), np.full((n_b, 3), np.inf), np.full((n_b, 3), -np.inf)
+    for i in range(n_b):
+        k = head(i)
+        size[k] = max(size[k], radii[i])
+        low[k], high[k] = np.minimum(low[k], placed.r[i]), np.maximum(high[k], placed.r[i])
+    for marker, c, place in zip(made.markers, made.connection_of, places, strict=True):
+        i = marker.body if marker.body >= 0 else first.get(c, -1)
+        if i < 0:
+            continue
+        k = head(i)
+        if marker.body >= 0:
+            size[k] = max(size[k], float(np.linalg.norm(marker.shape.position)))
+        low[k], high[k] = np.minimum(low[k], place), np.maximum(high[k], place)
+    heads = [head(i) for i in range(n_b)]
+    return np.maximum(size, np.linalg.norm(high - low, axis=1))[heads]
+
+
+def system_length(sizes: Array, places: list[Array], placed: State) -> float:
+    """Return the largest size of what hangs together, or the extent of the whole system; 1 if all are 0."""
+    points = np.array([*places, *placed.r])
+    return max(float(sizes.max()), float(np.linalg.norm(np.ptp(points, axis=0)))) or 1.0

@@ -61,9 +61,11 @@ class GeneralizedAlpha:
         e = (gamma/2 - beta - 1/12) h² (a_new - a) + O(h⁴),
 
     because a = u_dot + (1/2 - gamma) h u_ddot to first order, so that x has h³ u_ddot ((1/2 - gamma)/2 + beta) in the
-    place of h³ u_ddot / 6. A step whose e, as root mean square over the mass, divided by the size of the system, is
-    above the tolerance, or in which Newton's method fails, is tried again, shorter. The `h` of `integrate` is then the
-    distance of output times and the longest step; output times are met exactly, by equal steps from one to the next.
+    place of h³ u_ddot / 6. A step whose e is above the tolerance, or in which Newton's method fails, is tried again,
+    shorter. e is that of the worst body: root mean square over its own mass, divided by the size of all that hangs
+    together with it by joints and forces (the ground left out), so that no heavy or far body hides the error of
+    another. The `h` of `integrate` is then the distance of output times and the longest step; output times are met
+    exactly, by equal steps from one to the next.
 
     References
     ----------
@@ -78,7 +80,8 @@ class GeneralizedAlpha:
     rho_inf: float = 0.8
     tolerance: float = 1e-8  #: largest last correction over the one that the accelerations of the step amount to
     max_iterations: int = 25
-    error_tolerance: float | None = None  #: largest local error of a step over the size of the system; None: fixed step
+    #: largest local error of a body in a step over the size of what hangs together with it; None: fixed step
+    error_tolerance: float | None = None
     #: least step, to which one that fails or meets a contact is divided [s]; None: a millionth of h, and no division of
     #: fixed steps in systems without contacts and dry friction
     h_min: float | None = None
@@ -219,9 +222,10 @@ class GeneralizedAlpha:
             return h
         model = compiled.model
         _, _, beta, gamma = self.coefficients
-        weight, mass = mass_weights(model), model.body_types.mass[model.bodies.kind].sum()
         rates = self.filtered(compiled, carry, h, t, full=True).rates
-        error = abs(gamma / 2 - beta - 1 / 12) * np.sqrt(weight @ rates**2 / mass) / compiled.length
+        squares = np.add.reduceat(mass_weights(model) * rates**2, model.bodies.u0[:-1])
+        largest = np.sqrt(squares / model.body_types.mass[model.bodies.kind]) / model.bodies.size
+        error = abs(gamma / 2 - beta - 1 / 12) * largest.max()
         fitting = (self.error_tolerance / error) ** (1 / 3) if error > 0 else h
         return h / ceil(h / max(0.5 * fitting, self.least_step(h, compiled), 1e-3 * h) * (1 - 1e-9))
 

@@ -42,13 +42,13 @@ class RelativeGeneralizedAlpha:
 
     Trees have no constraints: joints stay closed to rounding, positions, velocities and accelerations alike. Loops are
     closed by the constraints of their cut joints, of index 3, and begin as those of `GeneralizedAlpha` do. The error
-    that steers the step is measured with the mass that a coordinate moves.
+    that steers the step is that of the unknowns, measured by how it moves the bodies, as there.
     """
 
     rho_inf: float = 0.8  #: spectral radius at infinite frequency, 0 <= rho_inf <= 1
     tolerance: float = 1e-8  #: largest last correction over the one that the accelerations of the step amount to
     max_iterations: int = 25
-    error_tolerance: float | None = None  #: largest local error of a step over the size of the system; None: fixed step
+    error_tolerance: float | None = None  #: largest local error of a body in a step, as in `GeneralizedAlpha`
     h_min: float | None = None  #: least step, to which one that fails is divided [s]; None as in `GeneralizedAlpha`
     #: alpha_m, alpha_f, beta, gamma in place of those that follow from rho_inf
     parameters: tuple[float, float, float, float] | None = None

@@ -128,7 +128,7 @@ run = make_entry(source_digest(__name__, "lean" if is_lean else "plain"))
 
 SIGNATURE = (types.Array(types.int64, 1, "C"),) * 5
 
-NO_SIZES = dict.fromkeys(("n_t", "n_b", "n_c", "n_q", "n_u", "n_w", "angles"), 0)
+NO_SIZES = dict.fromkeys(("n_t", "n_b", "n_c", "n_q", "n_u", "n_w", "angles", "loads", "body loads"), 0)
 ORDER, NOTHING = Order(), zeros(Order(), {})
 NO_ROWS = zeros(Rows(), NO_SIZES)
 

@@ -2,6 +2,8 @@
 
 import math
 
+from floatframe.joints.rows.kinds import NOTHING
+from floatframe.kernels.body import body_mass_product
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.connections.gap import next_step, step_before_contact, take_ends
 from floatframe.kernels.connections.user_force import resize_states
@@ -11,10 +13,11 @@ from floatframe.kernels.memory import WORK_GIVEN, WORK_TAKEN
 from floatframe.kernels.model import MASS, STIFFNESS
 from floatframe.kernels.past import keep_past
 from floatframe.kernels.rotation import exp_matrix, matrix_of_euler_parameters, rotate_euler_parameters
-from floatframe.kernels.schur import correction, factorize_bodies, share_reactions
+from floatframe.kernels.schur import correction, factorize_bodies, settle_accelerations, share_reactions
 from floatframe.kernels.step_start import accelerate, begin_step
+from floatframe.kernels.time_function import time_function
 from floatframe.kernels.turns import count_turns
-from floatframe.kernels.vector import dot, product, put_matrix, put_sum, scaled, turned, vector
+from floatframe.kernels.vector import dot, product, put, put_matrix, put_sum, scaled, turned, turned_back, vector
 
 __all__ = [
     "DIVERGED",
@@ -25,10 +28,12 @@ __all__ = [
     "STOPPED",
     "UNRESOLVED",
     "advance",
+    "error_factor",
     "is_resized",
     "is_too_long",
     "keep_iterate",
     "load_state",
+    "mean_square",
     "ratio_of_steps",
     "shares",
     "time_loop",
@@ -43,6 +48,7 @@ FAST = 0.1  # corrections that shrink this fast end a step where the next one is
 SAFE = 0.5  # this much of the one that is wanted
 OF_ROUNDOFF = 0.1  # and of roundoff
 ROUNDOFF = 2e-15  # of a position
+NOISE = 1e-7  # accelerations by rounding of positions, over those of the motion, that reach results
 SAFETY = 0.9  # of the step that would just meet the error that is allowed
 LEAST, MOST, WORTH = 0.2, 2.0, 1.2  # a step becomes this much shorter, longer at most; longer only if by this much
 SAME = 1e-12  # relative difference of step sizes that are one
@@ -206,25 +212,39 @@ def roundoff_floor(model, work, length):
 
 @inner
 def local_error(model, work, memory, order, h):
-    """Return the estimated error of the increment of a step that has converged: rms over the mass, by the length."""
-    alpha_m, alpha_f, beta, gamma = order.alpha_m, order.alpha_f, order.beta, order.gamma
-    total, mass = 0.0, 0.0
+    """Return the estimated error of the increment of a step that has converged: that of the worst body."""
+    alpha_m, alpha_f = order.alpha_m, order.alpha_f
+    largest = 0.0
     for i in range(model.bodies.kind.shape[0]):
-        t, u0, n = model.bodies.kind[i], model.bodies.u0[i], model.bodies.n_q[i]
-        mass += model.body_types.mass[t]
+        u0, n = model.bodies.u0[i], model.bodies.n_q[i]
+        jump = work.bodies.velocity[: 6 + n]
         for k in range(6 + n):
             mean = (1 - alpha_f) * work.state.u_dot[u0 + k] + alpha_f * memory.u_dot[u0 + k]
-            jump = (mean - alpha_m * memory.a[u0 + k]) / (1 - alpha_m) - memory.a[u0 + k]
-            if k < 3:
-                weight = model.body_types.mass[t]
-            elif k < 6:
-                weight = model.body_types.J0[t, k - 3, k - 3]
-            else:
-                step = 1 if model.body_types.is_diagonal[t, 0] else n + 1
-                weight = model.body_types.blocks[model.body_types.block0[t, MASS] + (k - 6) * step]
-            total += weight * jump * jump
-    factor = abs(0.5 * gamma - beta - 1.0 / 12.0) * h * h  # 1/6 - (1/2 - gamma)/2 - beta
-    return factor * math.sqrt(total / mass) / order.length
+            jump[k] = (mean - alpha_m * memory.a[u0 + k]) / (1 - alpha_m) - memory.a[u0 + k]
+        largest = max(largest, mean_square(model, work, i, jump))
+    return error_factor(order, h) * math.sqrt(largest)
+
+
+@inner
+def error_factor(order, h):
+    """Return by what a change of the algorithmic acceleration in a step becomes the error of its increment."""
+    return abs(0.5 * order.gamma - order.beta - 1.0 / 12.0) * h * h  # 1/6 - (1/2 - gamma)/2 - beta
+
+
+@inner
+def mean_square(model, work, i, jump):
+    """Return jumpᵀ M jump of body i by its mass and the square of its size: that of its points in the mean.
+
+    A body is measured alone, so that a heavy one, or one far away, hides nothing. jump, (6 + n_q,), translation in
+    ground axes, is turned to body axes.
+    """
+    n, moved = model.bodies.n_q[i], work.bodies.momentum[: 6 + model.bodies.n_q[i]]
+    put(jump, 0, turned_back(work.state.R[i], jump))
+    body_mass_product(model, work, i, jump, moved)
+    total = 0.0
+    for k in range(6 + n):
+        total += jump[k] * moved[k]
+    return total / (model.body_types.mass[model.bodies.kind[i]] * model.bodies.size[i] ** 2)
 
 
 @inner
@@ -361,10 +381,53 @@ def write_row(model, work, memory, t, rows):
     diagnose(model, work, rows.diagnostics[k], rows.drift[k])
     rows.diagnostics[k, WORK_GIVEN] = memory.work_given
     rows.diagnostics[k, WORK_TAKEN] = memory.work_taken
+    for j in range(model.loads.marker.shape[0]):
+        copy(work.markers.wrench[model.loads.marker[j]], rows.load[k, j])
+    for j in range(model.body_loads.body.shape[0]):
+        rows.load_case[k, j], _, _ = time_function(model.functions, model.body_loads.factor[j], t)
     if shares(model):
         work.solver.is_due = 1  # the factors of the step are overwritten
         if share_reactions(model, work, memory.h * memory.h):
             copy(work.state.w, rows.w[k])
+
+
+@inner
+def settle_row(model, work, memory, rows):
+    """Write accelerations and reactions of the row that was written last as they follow from positions and velocities.
+
+    In steps so short that they are noise otherwise: reactions of a step close its joints, whose gaps are known to
+    rounding alone, and that by h² counts beside the accelerations. Rounding of velocities does not.
+    """
+    k = work.counted.rows - 1
+    if not is_noise(model, work, memory.h):
+        return
+    load_state(work.state, memory)
+    for s in range(model.states.row.shape[0]):
+        work.states.base[s], work.states.rate_base[s] = memory.w[model.states.row[s]], 0.0
+        work.states.kappa[s] = 0.0
+    work.states.rho = 1.0
+    copy(memory.w, work.state.w_start)
+    evaluate(model, work, 1.0)
+    work.solver.is_due = 1  # the factors of the step are overwritten
+    if settle_accelerations(model, work, memory.h * memory.h):
+        copy(work.state.u_dot, rows.u_dot[k])
+        if not shares(model) or share_reactions(model, work, memory.h * memory.h):
+            copy(work.state.w, rows.w[k])
+
+
+@inner
+def is_noise(model, work, h):
+    """Whether rounding of positions by h² counts beside the accelerations."""
+    is_held, noise, size = False, 0.0, math.sqrt(dot(model.gravity, model.gravity))
+    for k in range(model.rows.holds.shape[0]):
+        is_held = is_held or model.rows.holds[k] != NOTHING
+    for i in range(model.bodies.kind.shape[0]):
+        r, u, u_dot = work.state.r[i], work.state.u[model.bodies.u0[i] :], work.state.u_dot[model.bodies.u0[i] :]
+        length, omega = model.bodies.size[i], vector(u[3:])
+        noise = max(noise, length + abs(r[0]) + abs(r[1]) + abs(r[2]))
+        turning = length * (dot(omega, omega) + math.sqrt(dot(u_dot[3:], u_dot[3:])))
+        size = max(size, turning, math.sqrt(dot(u_dot, u_dot)))
+    return is_held and ROUNDOFF * noise > NOISE * size * h * h
 
 
 @inner
@@ -510,6 +573,7 @@ def try_absolute_step(model, work, memory, others, order, t, h):
 def write_absolute_row(model, work, memory, others, t, rows):
     """Write the next row of the results."""
     write_row(model, work, memory, t, rows)
+    settle_row(model, work, memory, rows)
 
 
 advance = time_loop(try_absolute_step, write_absolute_row)

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.kernels.model import Model, n_angles, n_b, n_c, n_w
+from floatframe.kernels.model import Model, n_angles, n_b, n_body_loads, n_c, n_loads, n_w
 from floatframe.kernels.records import Size, integer, real, zeros
 from floatframe.kernels.work import n_q, n_u, state_sizes
 from floatframe.state import State
@@ -73,6 +73,8 @@ class Rows(NamedTuple):
     diagnostics: Array = real(n_t, N_DIAGNOSTICS, unit="J, kg m/s, kg m²/s, J")
     drift: Array = real(n_t, n_c, N_DRIFTS, unit="m, rad, m/s, rad/s")
     angle: Array = real(n_t, n_angles, unit="rad")
+    load: Array = real(n_t, n_loads, 6, unit="N, N m")  #: on the markers of loads, ground axes
+    load_case: Array = real(n_t, n_body_loads)  #: factors of load cases
 
 
 def memory_at(state: State, u_dot: Array, w: Array, *, n_angles: int = 0) -> Memory:
@@ -92,5 +94,11 @@ def memory_at(state: State, u_dot: Array, w: Array, *, n_angles: int = 0) -> Mem
 
 def new_rows(model: Model, n_t: int) -> Rows:
     """Return room for the results of n_t output times."""
-    sizes = {"n_c": len(model.connections.size), "n_t": n_t, "angles": len(model.angles.sign)}
+    sizes = {
+        "n_c": len(model.connections.size),
+        "n_t": n_t,
+        "angles": len(model.angles.sign),
+        "loads": len(model.loads.marker),
+        "body loads": len(model.body_loads.body),
+    }
     return zeros(Rows(), state_sizes(model) | sizes)

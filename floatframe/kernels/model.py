@@ -76,6 +76,7 @@ class Bodies(NamedTuple):
     q0: IntArray = integer(n_b + 1)  #: in q
     u0: IntArray = integer(n_b + 1)  #: in u
     h0: IntArray = integer(n_b + 1)  #: of its matrix in the store of matrices
+    size: Array = real(n_b, unit="m")  #: of all that hangs together with the body, by which its errors are measured
     end0: IntArray = integer(n_b + 1)  #: in `ends`
     ends: IntArray = integer(n_ends)  #: markers of the bodies that are ends of connections
     load0: IntArray = integer(n_b + 1)  #: in `loaded`

@@ -11,7 +11,7 @@ import math
 
 from floatframe.joints.rows.kinds import NOTHING
 from floatframe.kernels.compiler.compilation import inner
-from floatframe.kernels.connections.connection import connection_derivatives
+from floatframe.kernels.connections.connection import connection_derivatives, constraint_rates
 from floatframe.kernels.dense import lu_factor, lu_solve, lu_solve_columns
 from floatframe.kernels.evaluation import linearize
 from floatframe.kernels.model import MASS, STIFFNESS
@@ -23,6 +23,7 @@ __all__ = [
     "factorize_bodies",
     "factorize_connections",
     "factorize_tangents",
+    "settle_accelerations",
     "share_reactions",
 ]
 
@@ -311,6 +312,65 @@ def add_wrenches(model, work):
 
 
 @inner
+def assemble_masses(model, work, c_k):
+    """Factorise the masses of bodies and assemble the connections as accelerations feel them; whether that goes.
+
+    Modes without mass have c_k times their stiffness.
+    """
+    bodies, types = model.bodies, model.body_types
+    linearize(model, work, 1.0, 0.0, 0.0)
+    for i in range(bodies.kind.shape[0]):
+        n, t = 6 + bodies.n_q[i], bodies.kind[i]
+        H = work.solver.H[bodies.h0[i] : bodies.h0[i + 1]].reshape((n, n))
+        step = 1 if types.is_diagonal[t, STIFFNESS - MASS] else n - 5
+        for k in range(n - 6):
+            if not H[6 + k, 6 + k] > 0.0:
+                H[6 + k, 6 + k] += c_k * types.blocks[types.block0[t, STIFFNESS] + k * step]
+    if factorize_tangents(model, work) >= 0:
+        return False
+    assemble(model, work, 0.0)
+    return True
+
+
+@inner
+def settle_accelerations(model, work, c_k):
+    """Correct accelerations and wrenches of the iterate to those of its positions and velocities; whether there are.
+
+    M u_dot - Jᵀ w = f, G u_dot = -d(G)/dt u, by one step of Newton's method from those of a step, whose accelerations
+    fulfil the second only as far as they are known by differences. `evaluate` has been called with c_k = 1.
+    """
+    solver, g = work.solver, work.connections.g
+    constraint_rates(model, work)
+    if not assemble_masses(model, work, c_k):
+        return False
+    if factorize_connections(model.elimination, model.connections, solver) >= 0:
+        return False
+    for i in range(model.bodies.kind.shape[0]):
+        u0 = model.bodies.u0[i]
+        for k in range(u0, u0 + 6 + model.bodies.n_q[i]):
+            solver.y[k] = work.state.u_dot[k]
+        put(solver.y, u0, turned_back(work.state.R[i], work.state.u_dot[u0:]))
+    for k in range(g.shape[0]):
+        solver.mu[k] = 0.0
+    take_motions(model, work)
+    total = 0.0
+    for k in range(g.shape[0]):
+        if model.rows.holds[k] != NOTHING:
+            g[k] = work.connections.bias[k] - solver.mu[k]
+    correction(model, work, 1.0, False)
+    for i in range(model.bodies.kind.shape[0]):
+        u0 = model.bodies.u0[i]
+        put_sum(work.state.u_dot, u0, turned(work.state.R[i], solver.y[u0:]))
+        for k in range(u0 + 3, u0 + 6 + model.bodies.n_q[i]):
+            work.state.u_dot[k] += solver.y[k]
+            total += solver.y[k]
+    for k in range(g.shape[0]):
+        work.state.w[k] += solver.mu[k]
+        total += solver.mu[k]
+    return math.isfinite(total)
+
+
+@inner
 def share_reactions(model, work, c_k):
     """Share the reactions of the iterate among constraints that repeat others; whether that has an answer.
 
@@ -322,21 +382,11 @@ def share_reactions(model, work, c_k):
 
     all w'_j are reactions to motions of the bodies, which no reactions that balance themselves are part of, and A w'
     comes nearer to A w in each sweep by the ratio of s S to the least eigenvalue of A. w may hold any sum that balances
-    itself, such as the rounding of positions over c_k. Work arrays are overwritten, factors and y included; modes
-    without mass have c_k times their stiffness.
+    itself, such as the rounding of positions over c_k. Work arrays are overwritten, factors and y included.
     """
-    bodies, rows, connections, solver = model.bodies, model.rows, model.connections, work.solver
-    linearize(model, work, 1.0, 0.0, 0.0)
-    for i in range(bodies.kind.shape[0]):
-        n, t = 6 + bodies.n_q[i], bodies.kind[i]
-        H = solver.H[bodies.h0[i] : bodies.h0[i + 1]].reshape((n, n))
-        step = 1 if model.body_types.is_diagonal[t, STIFFNESS - MASS] else n - 5
-        for k in range(n - 6):
-            if not H[6 + k, 6 + k] > 0.0:
-                H[6 + k, 6 + k] += c_k * model.body_types.blocks[model.body_types.block0[t, STIFFNESS] + k * step]
-    if factorize_tangents(model, work) >= 0:
+    rows, connections, solver = model.rows, model.connections, work.solver
+    if not assemble_masses(model, work, c_k):
         return False
-    assemble(model, work, 0.0)
     for c in range(connections.size.shape[0]):
         size, o = connections.size[c], model.elimination.diagonal[c]
         for r in range(size):

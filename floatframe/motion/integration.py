@@ -21,6 +21,7 @@ from floatframe.compiling.callbacks import raise_errors_of
 from floatframe.compiling.file_frames import rows_of_file
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ConvergenceError, ModelError, ResultsError
+from floatframe.forces import BodyLoad, PointForce
 from floatframe.integrators import CLASSES, in_formulation
 from floatframe.integrators.carry import Carry, Integrator
 from floatframe.kernels.memory import Rows
@@ -582,6 +583,8 @@ def head_of(system: System, integrator: Integrator, t_start: float, t_end: float
         tuple(int(k) for k in compiled.model.connections.w0),
         run,
         places=taken_places(system),
+        loads=tuple(force.name for force in system.forces if isinstance(force, PointForce)),
+        load_cases=tuple(force.name for force in system.forces if isinstance(force, BodyLoad)),
     )
 
 

@@ -12,7 +12,7 @@ from floatframe.compiling.counted_angles import CountedAngle, direction
 
 __all__ = ["BodyEntry", "Head", "head_of_text", "text_of_head"]
 
-OPTIONAL = {"summary", "angles", "places"}
+OPTIONAL = {"summary", "angles", "places", "loads", "load_cases"}
 NUMBERS_OF_RUN = ("t_start", "t_end", "h")
 
 
@@ -45,6 +45,8 @@ class Head:
     angles: tuple[CountedAngle, ...] | None = None  #: of the columns of `angle`; None: not counted
     #: sensor -> in words, the places on flexible bodies that it takes and how far they are from those asked for
     places: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    loads: tuple[str, ...] | None = None  #: point forces, in the order of `load`; None: not written
+    load_cases: tuple[str, ...] | None = None  #: forces that are load cases, in the order of `load_case`
 
 
 def text_of_head(head: Head) -> str:
@@ -86,8 +88,15 @@ def head_of_text(text: Any) -> Head:
     places = data.get("places", {})
     is_words = isinstance(places, dict) and all(is_list(words, str) for words in places.values())
     require(is_words, "places", "an object of lists of words", places)
+    loads: list[tuple[str, ...] | None] = []
+    for name in ("loads", "load_cases"):
+        names = data.get(name)
+        require(names is None or is_list(names, str), name, "a list of names", names)
+        loads.append(None if names is None else tuple(names))
+    require((loads[0] is None) == (loads[1] is None), "load_cases", "a list of names with that of loads", loads[1])
     return Head(data["system"], data["units"], bodies, tuple(data["joints"]), tuple(data["springs"]), tuple(w0),
-                data["run"], summary, angles, {name: tuple(words) for name, words in places.items()})  # fmt: skip
+                data["run"], summary, angles, {name: tuple(words) for name, words in places.items()},
+                *loads)  # fmt: skip
 
 
 def angles_of(tables: Any, n_bodies: int) -> tuple[CountedAngle, ...]:

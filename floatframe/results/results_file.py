@@ -58,6 +58,8 @@ DATASETS = {  # name in the file -> field of Rows, what it is
     ),
     "drift": ("drift", "of each joint: distance, angle, their rates, (n_t, n_joints, 4)"),
     "angle": ("angle", "between the frames of bodies, counted through full turns, (n_t, n_angles)"),
+    "load": ("load", "force and moment of each point force on its marker, ground axes, (n_t, n_loads, 6)"),
+    "load_case": ("load_case", "factor of each force that is a load case, (n_t, n_load_cases)"),
 }
 
 
@@ -115,7 +117,11 @@ def row_shapes(head: Head) -> dict[str, tuple[int, ...]]:
         "diagnostics": (12,),
         "drift": (len(head.joints), N_DRIFTS),
     }
-    return shapes if head.angles is None else shapes | {"angle": (len(head.angles),)}
+    if head.angles is not None:
+        shapes["angle"] = (len(head.angles),)
+    if head.loads is not None and head.load_cases is not None:
+        shapes |= {"load": (len(head.loads), 6), "load_case": (len(head.load_cases),)}
+    return shapes
 
 
 def segments_folder(path: str | os.PathLike[str]) -> Path:

@@ -71,7 +71,7 @@ class RunSection(Table):
         None, description="a whole number above 0, the most iterations of Newton's method in a step"
     )
     error_tolerance: Annotated[float, Field(gt=0)] | None = Field(
-        None, description="a number above 0, the error of a step over the size of the system; none: fixed steps"
+        None, description="a number above 0, error of a body in a step by the size of its assembly; none: fixed steps"
     )
     h_min: Annotated[float, Field(gt=0)] | None = Field(
         None, description="a number above 0, the least step to which one that fails or meets a contact is divided"

@@ -17,11 +17,13 @@ from floatframe.kernels.generalized_alpha import (
     UNRESOLVED,
     copy,
     correction_of_states,
+    error_factor,
     is_enough,
     is_resized,
     is_too_long,
     keep_iterate,
     load_state,
+    mean_square,
     ratio_of_steps,
     roundoff_floor,
     shares,
@@ -153,19 +155,44 @@ def update(model, work, tree, joints, tangent, by_rate, by_acceleration, c_k):
 
 @inner
 def local_error(model, work, tree, joints, tangent, memory, order, h):
-    """Return the estimated error of the increment of a step that has converged, as the absolute method does."""
-    alpha_m, alpha_f, beta, gamma = order.alpha_m, order.alpha_f, order.beta, order.gamma
-    total, mass = 0.0, 0.0
+    """Return the estimated error of the increment of a step that has converged, as the absolute method does.
+
+    Accelerations of bodies are affine in those of the unknowns, so that the change of these in a step, added to them,
+    gives that of the bodies; then they are as before.
+    """
+    alpha_m, alpha_f, u_dot = order.alpha_m, order.alpha_f, work.state.u_dot
+    for i in range(tree.parent.shape[0]):
+        for k in range(6):
+            tangent.X[i, k] = u_dot[model.bodies.u0[i] + k]
     for s in range(tree.slot.shape[0]):
         now, before = accelerations(work, tree, joints, memory, s)
         a = memory.a[tree.slot[s]]
         jump = ((1 - alpha_f) * now + alpha_f * before - alpha_m * a) / (1 - alpha_m) - a
-        weight = tangent.weight[s]
-        total += weight * jump * jump
-    for i in range(model.bodies.kind.shape[0]):
-        mass += model.body_types.mass[model.bodies.kind[i]]
-    factor = abs(0.5 * gamma - beta - 1.0 / 12.0) * h * h
-    return factor * math.sqrt(total / mass) / order.length
+        tangent.step[s] = now
+        put_acceleration(work, tree, joints, s, now + jump)
+    place_bodies(model, work, tree, joints)
+    largest = 0.0
+    for i in range(tree.parent.shape[0]):
+        u0, n = model.bodies.u0[i], model.bodies.n_q[i]
+        change = work.bodies.velocity[: 6 + n]
+        for k in range(6):
+            change[k] = u_dot[u0 + k] - tangent.X[i, k]
+        for k in range(n):
+            change[6 + k] = u_dot[u0 + 6 + k] - tangent.step[tree.m0[i] + k]
+        largest = max(largest, mean_square(model, work, i, change))
+    for s in range(tree.slot.shape[0]):
+        put_acceleration(work, tree, joints, s, tangent.step[s])
+    place_bodies(model, work, tree, joints)
+    return error_factor(order, h) * math.sqrt(largest)
+
+
+@inner
+def put_acceleration(work, tree, joints, s, value):
+    """Write the acceleration of an unknown."""
+    if tree.column[s] >= 0:
+        joints.acceleration[tree.column[s]] = value
+    else:
+        work.state.u_dot[tree.slot[s]] = value
 
 
 @inner

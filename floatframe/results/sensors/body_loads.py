@@ -1,7 +1,8 @@
 """Sensors of what acts on bodies: the whole force on an interface, springs along their line, recovery rows."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,10 +12,11 @@ from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.words import nearest, quoted
 from floatframe.bodies.flexible_body import FlexibleBody
-from floatframe.compiling.interface_loads import Load, amplitudes, in_body, loads_on_interfaces
+from floatframe.compiling.interface_loads import Load, amplitudes, in_body, interface_number, loads_on_interfaces
 from floatframe.compiling.markers import MarkerData, find_marker
-from floatframe.errors import ModelError
-from floatframe.forces import BodyLoad, Gravity, SpringDamper
+from floatframe.elements.switched_off import times_off
+from floatframe.errors import ModelError, ResultsError
+from floatframe.forces import BodyLoad, Gravity, PointForce, SpringDamper
 from floatframe.functions.time_functions import TimeFunction
 from floatframe.results.joint_coordinates import end_motion
 from floatframe.results.recovery import require_same_modes
@@ -34,7 +36,11 @@ NOTHING = 1e-12  #: of the largest wrench: rounding
 
 
 def interface_loads(system: System, trajectory: Trajectory, body: FlexibleBody) -> Array:
-    """Return force and moment on each interface at its point, axes of the body frame, (n_interfaces, n_t, 6)."""
+    """Return force and moment on each interface at its point, axes of the body frame, (n_interfaces, n_t, 6).
+
+    Point forces are those that acted, as the motion has them on record, switched by events or led from outside. Motions
+    of older files have no record: their forces are those of the system, off while events have them off.
+    """
     i = list(trajectory.body_names).index(body.name)
     wrenches, loads = loads_on_interfaces(system, i)
     R, w = rotation_matrix(trajectory.body(body.name).p), trajectory.source.read("w")
@@ -43,9 +49,62 @@ def interface_loads(system: System, trajectory: Trajectory, body: FlexibleBody) 
         for part, first in ((0, wrench.force), (3, wrench.moment)):
             if first >= 0:
                 total[wrench.interface, :, part : part + 3] += wrench.sign * in_body(R, w[:, first : first + 3])
-    for load in loads:
-        total[load.interface] += amplitudes(in_file(body, load), trajectory.t, R)
+    if trajectory.head.loads is None:
+        for load in loads:
+            acts = ~times_off(events_of(system), happened(trajectory), trajectory.t, load.force.name)
+            total[load.interface] += acts[:, None] * amplitudes(in_file(body, load), trajectory.t, R)
+        return total
+    on_record = require_loads(system, trajectory, PointForce, trajectory.head.loads)
+    acted = trajectory.source.read("load")
+    places = [(load.interface, load.number) for load in loads]
+    places += [(led_interface(system, body, i, name), k) for k, name in on_record]
+    for interface, k in places:
+        if interface >= 0:
+            for part in (slice(0, 3), slice(3, 6)):
+                total[interface, :, part] += in_body(R, acted[:, k, part])
     return total
+
+
+def require_loads(
+    system: System, trajectory: Trajectory, kind: type[PointForce | BodyLoad], names: tuple[str, ...]
+) -> list[tuple[int, str]]:
+    """Return number and name of forces on record that a program beside the system led, which come after its own.
+
+    Raises
+    ------
+    ResultsError
+        If the others are not the forces of the system.
+    """
+    own = tuple(force.name for force in system.forces if isinstance(force, kind))
+    if names[: len(own)] != own:
+        raise ResultsError(
+            f"the motion of {trajectory.head.system!r} is not one of the system {system.name!r}: it was moved by "
+            f"{', '.join(names) or 'no forces'}, expected {', '.join(own)}; give the system that was run"
+        )
+    return list(enumerate(names))[len(own) :]
+
+
+def led_interface(system: System, body: FlexibleBody, i: int, name: str) -> int:
+    """Return the interface of body i on which an input of the system acts as a force on record, -1 for none."""
+    for channel in system.inputs:
+        ends = {f"inputs.{channel.name}": "marker", f"inputs.{channel.name}.against": "relative_to"}
+        marker = getattr(channel, ends[name], None) if name in ends else None
+        if marker is not None:
+            found = find_marker(system, f"input {channel.name!r}", marker)
+            if found.body != i or found.shape.psi is None:
+                return -1
+            return interface_number(body.moved, found.shape.psi, found.shape.position)
+    return -1
+
+
+def events_of(system: System) -> tuple[Any, ...]:
+    """Return the events of a system and of its elements, whose names alone it knows."""
+    return (*system.events, *(event for each in system.elements for event in each.events()))
+
+
+def happened(trajectory: Trajectory) -> Sequence[Mapping[str, Any]]:
+    """Return the events that have happened in a motion."""
+    return trajectory.head.summary.get("events", ())
 
 
 def in_file(body: FlexibleBody, load: Load) -> Load:
@@ -72,11 +131,11 @@ def interface_load_rows(small: SmallMotions, body: FlexibleBody) -> list[Rows]:
                 x[:, small.n_u + k] = push.wrench
                 own = interface_names(body).index(push.interface)
                 found[own] = found[own] + small.by_motion(x)
-    frame = small.frame_place(body.name)
     for load in loads:
-        if load.force.is_follower:  # it turns with the undeformed marker, as `amplitudes` has it
-            six = amplitudes(in_file(body, load), np.zeros(1), frame.axes[None])[0]
-            turned = [frame.turned.turned(-tilde(frame.axes @ part)) for part in (six[:3], six[3:])]
+        if load.force.is_follower:  # it turns with its marker
+            six = small.now.source.read("load")[0, load.number]
+            place = small.place(find_marker(small.system, f"force {load.force.name!r}", load.force.marker))
+            turned = [place.turned.turned(-tilde(part)) for part in (six[:3], six[3:])]
             found[load.interface] = found[load.interface] + joined(turned)
     return found
 
@@ -288,11 +347,24 @@ class RecoverySensor:
                 p[:, column] = on_interfaces[interface_names(body).index(name), :, SIX.index(component)]
             elif load.startswith("load case "):
                 cases = [force for force in system.forces if isinstance(force, BodyLoad)]
-                for force in cases:
+                for force, acted in zip(cases, load_cases(system, trajectory).T, strict=True):
                     if load == f"load case {force.load_case}" and named(force.body) == body.name:
-                        assert isinstance(force.amplitude, TimeFunction)  # a load case makes one of a number
-                        p[:, column] += [force.amplitude(t) for t in motion.t]
+                        p[:, column] += acted
         return p
+
+
+def load_cases(system: System, trajectory: Trajectory) -> Array:
+    """Return the factors by which the load cases of a system acted, (n_t, n_cases), as `interface_loads` has forces."""
+    if trajectory.head.load_cases is not None:
+        require_loads(system, trajectory, BodyLoad, trajectory.head.load_cases)
+        return trajectory.source.read("load_case")
+    factors = []
+    for force in system.forces:
+        if isinstance(force, BodyLoad):
+            assert isinstance(force.amplitude, TimeFunction)  # a load case makes one of a number
+            acts = ~times_off(events_of(system), happened(trajectory), trajectory.t, force.name)
+            factors.append(acts * np.array([force.amplitude(t) for t in trajectory.t]))
+    return np.array(factors).reshape(-1, len(trajectory.t)).T
 
 
 SIX = ("fx", "fy", "fz", "mx", "my", "mz")

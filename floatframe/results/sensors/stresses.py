@@ -278,7 +278,12 @@ class StrainGauge:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ElongationSensor:
-    """Change of the distance between two nodes of a body over that distance: an extensometer; needs no stress modes."""
+    """Change of the distance between two nodes of a body over that distance: an extensometer; needs no stress modes.
+
+    To first order, as the strains of the body are: e · (u_b - u_a) / |d| along the undeformed line d = |d| e. A turn of
+    the place by theta moves b across the line, by |d| theta, and back along it by |d| theta²/2, which displacements of
+    first order lack and quadratic modes have; the distance of displaced nodes would count it as strain.
+    """
 
     name: str
     body: str
@@ -309,11 +314,8 @@ class ElongationSensor:
         body = flexible_body(system, self.name, self.body)
         require_same_modes(trajectory, self.body, body.reduced)
         d, by_q = self.line(body)
-        change = trajectory.body(self.body).q @ by_q.T
-        length = np.linalg.norm(d)
-        # |d + c| - |d| without the loss of digits of the difference
-        grown = (2 * change @ d + (change**2).sum(axis=1)) / (np.linalg.norm(d + change, axis=1) + length)
-        return Measurement(self.name, trajectory.t, {"strain": grown / length}, {"strain": "-"})
+        strain = trajectory.body(self.body).q @ (d @ by_q) / (d @ d)
+        return Measurement(self.name, trajectory.t, {"strain": strain}, {"strain": "-"})
 
     def line(self, body: FlexibleBody) -> tuple[Array, Array]:
         """Return the line from node to node, undeformed, (3,), and its change by the modal coordinates, (3, n_q)."""
@@ -325,9 +327,8 @@ class ElongationSensor:
         return np.asarray(reduced.nodes[b].mean(axis=0) - reduced.nodes[a].mean(axis=0)), by_q
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the strain by small motions, about the line as it is now."""
+        """Return the strain by small motions."""
         body = flexible_body(small.system, self.name, self.body)
         d, by_q = self.line(body)
-        now = d + by_q @ small.now.body(self.body).q[0]
-        row = small.coordinates(self.body).turned(now @ by_q / (np.linalg.norm(now) * np.linalg.norm(d)))
+        row = small.coordinates(self.body).turned(d @ by_q / (d @ d))
         return scalar_columns({"strain": row}, {"strain": "-"})

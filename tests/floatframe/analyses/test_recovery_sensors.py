@@ -1,5 +1,7 @@
 """Recovery rows as sensors and outputs: against states near by, and against the forces of the joints on the body."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -18,6 +20,7 @@ from floatframe import (
     PointForce,
     RecoverySensor,
     RevoluteJoint,
+    SphericalJoint,
     SpringDamper,
     System,
     consistent_state,
@@ -68,7 +71,8 @@ def test_recovered_interface_forces_and_accelerations_are_those_of_joints_and_pl
     ]
     found = measured(system, now, sensors)
     table, rows = bar.recovery["instruments"], found["rows"].columns
-    frame = bar.frame.axes
+    frame, place = bar.frame.axes, [found["place"].columns[x][0] for x in "xyz"]
+    assert np.abs(place).max() > 1.0
     checked = 0
     for label, quantity, component in zip(table.labels, table.quantities, table.components, strict=True):
         for interface in bar.interfaces:
@@ -78,7 +82,30 @@ def test_recovered_interface_forces_and_accelerations_are_those_of_joints_and_pl
                 expected = dict(zip(("fx", "fy", "fz", "mx", "my", "mz"), [*force, *moment], strict=True))
                 assert_allclose(rows[label][0], expected[component], rtol=1e-6, atol=1e-6 * np.abs(force).max())
                 checked += 1
-    assert checked == 12
+        if quantity == "acceleration" and component in ("ux", "uy", "uz"):  # mesh axes are those of the ground here
+            expected = place["xyz".index(component[1])]
+            assert_allclose(rows[label][0], expected, rtol=0, atol=1e-6 * np.abs(place).max(), err_msg=label)
+            checked += 1
+    assert checked == 15
+
+
+def test_interface_forces_of_a_body_that_spins_about_a_skew_axis_are_those_of_its_joint(bar):
+    """Products of angular velocities about different axes count twice: each of them is a load on the body."""
+    root, tip = (interface.name for interface in bar.interfaces)
+    system = held(bar)
+    joint = SphericalJoint("ball", GROUND, Marker("bar", root))
+    turning = replace(system.bodies[0], omega_B=(20.0, 7.0, -11.0))
+    made = consistent_state(replace(system, bodies=[turning], joints=[joint]))
+    system = replace(system, bodies=[turning], joints=[joint])
+    now = snapshot(system, made.state, made.u_dot, made.w)
+    found = measured(system, now, [
+        RecoverySensor("rows", "bar", "instruments"), *(InterfaceForceSensor(x, "bar", x, "body") for x in (root, tip))
+    ])  # fmt: skip
+    rows = found["rows"].columns
+    for each in (root, tip):
+        expected = [found[each].columns[f"{key} {x}"][0] for key in ("force", "moment") for x in "xyz"]
+        got = [rows[f"interface force {each} {x}"][0] for x in ("fx", "fy", "fz", "mx", "my", "mz")]
+        assert_allclose(got, expected, rtol=0, atol=1e-5 * np.abs(expected[:3]).max())
 
 
 def test_what_is_not_there_is_refused_by_name(bar):

@@ -11,7 +11,11 @@ from floatframe import (
     GeneralizedAlpha,
     Gravity,
     JointForce,
+    Marker,
     ModelError,
+    PrismaticJoint,
+    RevoluteJoint,
+    RigidBody,
     System,
     hht,
     integrate,
@@ -184,3 +188,37 @@ def test_restart_record_of_the_summary(tmp_path):
     motion = integrate(pendulum(), GeneralizedAlpha(), 0.01, 1e-3, output=tmp_path / "run.h5")
     assert motion.head.summary["n_steps"] == 10
     assert_array_equal(motion.head.summary["n_rejected"], 0)
+
+
+def hinged(body, x=0.0):
+    return Marker(body, position=(x, 0.0, 0.0))
+
+
+def links_beside(*beside, cart=0.0):
+    """A double pendulum of links of 1 kg and 1 m, and bodies beside it; on the ground, or on a cart of this mass."""
+    links = [RigidBody(n, 1.0, 0.01 * np.eye(3), (1, 0, 0), (x, 0, 0)) for n, x in (("a", 0.0), ("b", 1.0))]
+    joints = [RevoluteJoint("2", hinged("a", 1.0), hinged("b"), axis=(0, 0, 1))]
+    if cart:
+        links.append(RigidBody("cart", cart, 0.5 * cart * np.eye(3)))
+        joints.append(PrismaticJoint("rail", hinged("ground"), hinged("cart"), axis=(1, 0, 0)))
+    joints.append(RevoluteJoint("1", hinged("cart" if cart else "ground"), hinged("a"), axis=(0, 0, 1)))
+    return System([*links, *beside], joints, [Gravity((0.0, -9.81, 0.0))])
+
+
+@pytest.mark.parametrize("formulation", ["absolute", "relative"])
+def test_no_heavy_or_far_body_hides_the_error_of_a_light_one(formulation):
+    """Four tonnes beside made 764 steps 65, and the error a hundred times as large; on a cart of a tonne likewise."""
+
+    def run(system):
+        motion = integrate(system, GeneralizedAlpha(0.8, error_tolerance=1e-5), 1.0, 0.05, formulation=formulation)
+        return motion.head.summary["n_steps"], motion.body("b").r
+
+    n_alone, alone = run(links_beside())
+    assert n_alone > 60
+    for mass, place in ((4e3, (0, 50, 0)), (1e-3, (1e5, 0, 0))):
+        n_steps, r = run(links_beside(RigidBody("beside", mass, mass * np.eye(3), position=place)))
+        assert abs(n_steps - n_alone) <= 1
+        assert_allclose(r, alone, rtol=0, atol=1e-6)
+    n_steps, r = run(links_beside(cart=1e6))
+    assert n_steps >= 0.9 * n_alone
+    assert_allclose(r, alone, rtol=0, atol=1e-4)
