@@ -45,7 +45,14 @@ NEW_SEEDS = ("motions",)  #: families whose seeds are new in each run
 LIMIT = 60.0  #: seconds of a case
 FIRST = 600.0  #: of the first one in a worker, before which it may compile the kernels
 PROCESSES = 2
-SORTS = ("compared", "right", "noted", "chaotic", "no reference")  #: first words of what was accepted, counted
+SORTS = (
+    "compared",
+    "right",
+    "noted",
+    "noted though right",
+    "chaotic",
+    "no reference",
+)  #: first words of what was accepted, counted
 
 
 def case_of(family: str) -> Any:
