@@ -116,8 +116,8 @@ def integrate(
         "absolute", or "relative": in the coordinates of joints (docs/relative.md), with results of the same form; None:
         that of the integrator.
     watch
-        Where the steps put the motion off by more than 5 %, or add as much energy, the motion says so (`validity`) and
-        the log too. "stop": a run ends where half of its energy comes from its steps; "tell": it goes on; "off":
+        Where the steps put the motion off by 3 %, or add 5 % of its energy, the motion says so (`validity`) and the log
+        too. "stop": a run ends where half of its energy comes from its steps; "tell": it goes on; "off":
         neither is looked for.
 
     Returns
@@ -437,7 +437,8 @@ class Run:
                         log.warning("system %r: %s", self.system.name, words)
                 safe = self.record_where_due(carry, n_done)
                 if n_done == self.n_total or failure is not None or has_stopped or is_beyond:
-                    self.tell(self.steps.conclude(self.system, n_done, self.t_start + n_done * self.h, self.h))
+                    acting = self.system if self.events is None else self.events.system
+                    self.tell(self.steps.conclude(acting, carry, n_done, self.t_start, self.h))
                     self.look()
                 is_batch = n_done % RESTART_STEPS == 0 or n_done - n_told >= batch_steps or n_done == self.n_total
                 if progress is not None and (is_batch or not n_good or self.events is not None):

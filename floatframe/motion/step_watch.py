@@ -41,9 +41,9 @@ __all__ = ["WATCHES", "EnergyWatch", "StepWatch", "has_steps_of_one_size"]
 #: what is done with what is found: end a run half of whose energy comes from its steps; tell alone; do not look for it
 WATCHES = ("stop", "tell", "off")
 WINDOW = 4  #: steps that are taken again in halves, an even number
-FARTHEST = 1020  #: most steps between two windows
+FARTHEST = 4092  #: most steps between two windows
 FIRST_VERDICT = 20  #: steps before which a motion has gone too short a way to measure errors by
-STEP_LIMIT = 0.05  #: estimated error of the motion above which a run tells
+STEP_LIMIT = 0.03  #: estimated error of the motion above which a run tells
 ENERGY_LIMIT = 0.05  #: gain over the energy that moves about, above which a run tells
 ENERGY_STOP = 0.5  #: and above which it stops
 LEAST_WAY = 1e-7  #: of the length of the system: shorter ones are rest
@@ -97,20 +97,25 @@ class StepWatch:
         if not self.opened:
             self.opened = [(first, begin), (first + n_steps, end)]
             return None
+        return self.closed(system, end, first + n_steps, t0, h)
+
+    def closed(self, system: System, end: Carry, last: int, t0: float, h: float) -> ValidityNote | None:
+        """Take the steps of the window that is open again, up to a memory; return a note that is new with them."""
         (start, before), (middle, half) = self.opened
-        self.opened, last = [], first + n_steps
+        self.opened = []
         self.gap = min(2 * self.gap + WINDOW, FARTHEST)
         self.next = last + self.gap
         if self.again is None or self.again[0] is not system:
             self.again = system, new_work(compiled_system(system).model)
         work = self.again[1]
         work.solver.c_k[...] = 0.0  # factors of another window, which would not be the same after a resumption
-        apart, finer, at = [], before, start
+        apart, finer, at = [np.zeros((len(self.total), 2, 3))], before, start
         for number, coarse in ((middle, half), (last, end)):
-            n = 2 * (number - at)
+            if number == at:
+                continue
             try:
                 finer, _, _, failure = self.integrator.advance(
-                    system, finer, work, t0=t0, h=h / 2, first=2 * at, n_steps=n, every=2 * (last + 1)
+                    system, finer, work, t0=t0, h=h / 2, first=2 * at, n_steps=2 * (number - at), every=2 * (last + 1)
                 )
             except FloatframeError:
                 return None
@@ -118,26 +123,33 @@ class StepWatch:
                 return None
             apart.append(difference(coarse.state, finer.state))
             at = number
-        speed = (apart[1] - apart[0]) / (h * (last - middle))
-        rate = ERROR_OF_HALVES / (last - start) * np.linalg.norm(np.stack([apart[1], speed], axis=2), axis=3)
+        seconds = h * (last - middle if last > middle else last - start)
+        speed = (apart[-1] - apart[-2]) / seconds
+        size = np.sqrt((np.stack([apart[-1], speed], axis=2) ** 2).sum(axis=3))
+        rate = ERROR_OF_HALVES / (last - start) * size
         mean = rate if self.rate is None else (self.rate + rate) / 2
         self.total = self.total + max(0, start - self.watched) * mean + (last - start) * rate
         self.rate, self.watched = rate, last
         self.turn = np.maximum(self.turn, turns_in_a_step(system, end.state, h))
-        self.measure(half.state, end.state, h * (last - middle))
+        self.measure(half.state if last > middle else before.state, end.state, seconds)
         return self.judged(system, t0 + last * h, h) if last >= FIRST_VERDICT else None
 
     def measure(self, half: State, end: State, seconds: float) -> None:
         """Take two states of the motion, so many seconds apart, into its way and speed."""
         assert self.begun is not None
-        way = np.linalg.norm(difference(end, self.begun), axis=2).max(axis=0)
+        way = lengths(difference(end, self.begun)).max(axis=0)
         if way[1] > FULL_TURN:
             way[1] = 2 * np.pi
-        speed = np.linalg.norm(difference(end, half), axis=2).max(axis=0) / seconds
+        speed = lengths(difference(end, half)).max(axis=0) / seconds
         self.size = np.maximum(self.size, np.stack([way, 2 * speed], axis=1))
 
-    def conclude(self, system: System, n_done: int, t: float, h: float) -> ValidityNote | None:
+    def conclude(self, system: System, end: Carry, n_done: int, t0: float, h: float) -> ValidityNote | None:
         """Sum the error up to the end of a run; return a note that is new with it."""
+        t = t0 + n_done * h
+        if self.opened and self.opened[1][0] == n_done:
+            note = self.closed(system, end, n_done, t0, h)
+            if note is not None:
+                return note
         if self.rate is None:
             return None
         self.total = self.total + max(0, n_done - self.watched) * self.rate
@@ -284,9 +296,16 @@ def has_steps_of_one_size(integrator: Integrator) -> bool:
     return not isinstance(integrator, Ida | RelativeOde) and getattr(integrator, "error_tolerance", None) is None
 
 
+def lengths(vectors: Array) -> Array:
+    """Return the lengths of vectors in the last axis."""
+    return np.sqrt((vectors**2).sum(axis=-1))
+
+
 def difference(state: State, other: State) -> Array:
     """Return the differences of places and the rotation vectors between orientations, (n_b, 2, 3) [m, rad]."""
-    return np.stack([state.r - other.r, rotations_between(state.p, other.p)], axis=1)
+    apart = np.empty((len(state.r), 2, 3))
+    apart[:, 0], apart[:, 1] = state.r - other.r, rotations_between(state.p, other.p)
+    return apart
 
 
 def rotations_between(p: Array, other: Array) -> Array:
@@ -294,12 +313,15 @@ def rotations_between(p: Array, other: Array) -> Array:
 
     conj(other) p = (cos(angle/2), sin(angle/2) axis); of the two signs, that of the smaller angle.
     """
-    w, v = other[:, :1], -other[:, 1:]
-    scalar = w * p[:, :1] - (v * p[:, 1:]).sum(axis=1, keepdims=True)
-    vector = w * p[:, 1:] + p[:, :1] * v + np.cross(v, p[:, 1:])
-    sine = np.linalg.norm(vector, axis=1, keepdims=True)
+    w, x, y, z = p.T
+    a, b, c, d = other.T
+    scalar = a * w + b * x + c * y + d * z
+    vector = np.stack(
+        [a * x - b * w - c * z + d * y, a * y + b * z - c * w - d * x, a * z - b * y + c * x - d * w], axis=1
+    )
+    sine = lengths(vector)
     angle = 2 * np.arctan2(sine, np.abs(scalar)) * np.where(scalar < 0, -1.0, 1.0)
-    return np.asarray(vector * angle / np.where(sine > 0.0, sine, 1.0))
+    return np.asarray(vector * (angle / np.where(sine > 0.0, sine, 1.0))[:, None])
 
 
 def turns_in_a_step(system: System, state: State, h: float) -> Array:
