@@ -427,8 +427,10 @@ class Run:
                     is_beyond = self.energy.is_beyond and self.watching == "stop"
                 if is_window and n_smooth and n_good and failure is None and not is_switched:
                     acting = self.system if self.events is None else self.events.system
-                    span = {"t0": self.t_start, "h": self.h, "first": n_done, "n_steps": n_good}
-                    self.tell(self.steps.take(acting, begin, carry, **span))
+                    note = self.steps.take(
+                        acting, begin, carry, t0=self.t_start, h=self.h, first=n_done, n_steps=n_good
+                    )
+                    self.tell(note)
                 elif self.steps.opened:
                     self.steps.opened = []
                 n_done += n_good
