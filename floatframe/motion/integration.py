@@ -423,7 +423,9 @@ class Run:
                 self.keep(rows)
                 is_switched = self.n_happened > n_happened
                 if self.watching != "off":
-                    self.tell(self.energy.observe(self.system, rows, is_switched=is_switched))
+                    is_last = n_done + n_good >= self.n_total or failure is not None or has_stopped
+                    note = self.energy.observe(self.system, rows, is_switched=is_switched, is_last=is_last)
+                    self.tell(note)
                     is_beyond = self.energy.is_beyond and self.watching == "stop"
                 if is_window and n_smooth and n_good and failure is None and not is_switched:
                     acting = self.system if self.events is None else self.events.system

@@ -213,6 +213,7 @@ class EnergyWatch:
     """The energy that the steps of a run have added to its motion, from its rows of results."""
 
     every: int  #: steps between rows
+    n_seen: int = 0  #: rows after the first one
     last: Array | None = None  #: energy, work given and taken at the last row, (3,)
     change: Array | None = None  #: of the work in the interval before it, (2,)
     potential: Array | None = None  #: least and largest of gravity
@@ -222,8 +223,11 @@ class EnergyWatch:
     note: ValidityNote | None = None
     is_beyond: bool = False  #: whether the run has to stop
 
-    def observe(self, system: System, rows: Rows, *, is_switched: bool) -> ValidityNote | None:
-        """Take rows of results; return a note that is new with them. is_switched: something else acts in them."""
+    def observe(self, system: System, rows: Rows, *, is_switched: bool, is_last: bool = False) -> ValidityNote | None:
+        """Take rows of results; return a note that is new with them. is_switched: something else acts in them.
+
+        The first steps, in which little moves yet, are judged at the end of a run alone (is_last).
+        """
         if len(rows.t) == 0:
             return None
         d = rows.diagnostics
@@ -231,6 +235,8 @@ class EnergyWatch:
         now = np.stack([energy, d[:, WORK_GIVEN], d[:, WORK_TAKEN]], axis=1)
         self.measure(d)
         last, self.last = self.last, now[-1]
+        number = self.n_seen + 1 + np.arange(len(rows.t))
+        self.n_seen += 0 if last is None else len(rows.t)
         if last is None or is_switched:
             self.change = None
             return None
@@ -245,6 +251,9 @@ class EnergyWatch:
         unsure = self.unsure + np.cumsum(swing.sum(axis=1))
         self.gain, self.unsure = float(gains[-1]), float(unsure[-1])
         share = (gains - unsure) / self.scale if self.scale > 0.0 else np.zeros(len(gains))
+        is_judged = number * self.every >= FIRST_VERDICT
+        is_judged[-1] = is_judged[-1] or is_last
+        share = np.where(is_judged, share, 0.0)
         largest = float(share.max())
         if not largest > ENERGY_LIMIT:
             return None
@@ -277,6 +286,7 @@ class EnergyWatch:
             return
         numbers = np.array(record["energy_sums"], dtype=float)
         self.gain, self.unsure, self.scale = (float(x) for x in numbers[:3])
+        self.n_seen = FIRST_VERDICT  # a restart comes later
         self.last, change, self.potential = numbers[3:6], numbers[6:8], numbers[8:10]
         self.change = None if np.isnan(change).any() else change
         self.note = next((note for note in notes if note.kind == "energy"), None)

@@ -144,10 +144,10 @@ def test_energy_of_forces_and_dampers_is_no_gain_of_the_steps():
 @pytest.mark.parametrize(("kinetic", "gain"), [((1.0, 1.0, 1.0), 0.0), ((1.0, 1.2, 1.5), 0.5 / 1.5), ((1.0, 0.4), 0.0)])
 def test_a_gain_of_energy_is_measured_by_the_energy_that_moves(scale, kinetic, gain):
     watch, model = EnergyWatch(1), compiled_system(oscillator()).model
-    for energy in kinetic:
+    for number, energy in enumerate(kinetic):
         rows = new_rows(model, 1)
         rows.diagnostics[:, KINETIC] = scale * energy
-        watch.observe(oscillator(), rows, is_switched=False)
+        watch.observe(oscillator(), rows, is_switched=False, is_last=number == len(kinetic) - 1)
     assert_allclose(0.0 if watch.note is None else watch.note.largest, gain, rtol=1e-12)
 
 
