@@ -160,7 +160,7 @@ def integrate(
     for words in (*knot_words(system, t_start, step, n_total), *frequencies):
         log.warning("system %r: %s", system.name, words)
     head = head_of(system, integrator, t_start, t_end, step, output_every)
-    head = replace(head, angles=compiled_system(system).angles, run=head.run | {"watch": watch})
+    head = replace(head, angles=compiled_system(system).angles, run=dict(head.run) | {"watch": watch})
     events = EventWatch(system, head) if has_events(system) else None
     require_times_of_events(system, t_start)
     begun = system if events is None else events.system
