@@ -136,11 +136,9 @@ def state_matrix(system: LinearSystem, Z: Array, highest: float) -> tuple[Array,
     """
     n, m = system.n_z, len(system.states)
     rates, states = slice(n, 2 * n), slice(2 * n, 2 * n + m)
+    terms = (system.M, system.C, system.K, Z)
     made = []
-    for M, C, K, Y, sign in (
-        (system.M, system.C, system.K, Z, -1.0),
-        (*(np.abs(a) for a in (system.M, system.C, system.K, Z)), 1.0),
-    ):
+    for (M, C, K, Y), sign in ((terms, -1.0), ([np.abs(a) for a in terms], 1.0)):
         A = np.zeros((states.stop, states.stop))
         A[:n, rates] = highest * np.eye(n) if sign < 0 else 0.0
         A[rates, :n] = sign * Y.T @ K[:n, :n] @ Y / highest

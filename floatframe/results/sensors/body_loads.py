@@ -60,8 +60,8 @@ def interface_loads(system: System, trajectory: Trajectory, body: FlexibleBody) 
     places += [(led_interface(system, body, i, name), k) for k, name in on_record]
     for interface, k in places:
         if interface >= 0:
-            for part in (slice(0, 3), slice(3, 6)):
-                total[interface, :, part] += in_body(R, acted[:, k, part])
+            for first in (0, 3):
+                total[interface, :, first : first + 3] += in_body(R, acted[:, k, first : first + 3])
     return total
 
 
