@@ -13,8 +13,8 @@ from tests.root import ROOT
 
 #: rooms of tests/floatframe that run a system as a whole
 ROOMS = (
-    "analyses", "bodies", "cables", "clearances", "compiling", "elements", "forces", "friction", "integrators",
-    "joints", "motion", "results", "start",
+    "analyses", "bearings", "bodies", "cables", "clearances", "compiling", "elements", "forces", "friction",
+    "integrators", "joints", "motion", "results", "start",
 )  # fmt: skip
 
 #: of their files, those that every change runs again: forces in joints and by users, couplers, events, stops, sensors

@@ -31,6 +31,7 @@ from floatframe import (
     System,
 )
 from floatframe.aerodynamics import LiftingSurface
+from floatframe.bearings import Bearing
 from floatframe.bodies.ground import GROUND
 from floatframe.bodies.markers import body_name
 from floatframe.cables import Cable
@@ -140,6 +141,8 @@ FIELDS = {
     Backlash: {"lower": by_way("rad", "m"), "upper": by_way("rad", "m"), "stiffness": stop_stiffness, "exponent": "1",
                "damping": by_way("s/rad", "s/m"), "axis": "1"},
     BallWithPlay: CONTACT | {"play": "m"},
+    Bearing: {"stiffness": "N/m", "damping": "N s/m", "axial_stiffness": "N/m", "axial_damping": "N s/m",
+              "tilt_stiffness": "N m", "tilt_damping": "N m s", "axis": "1", "x_axis": "1", "shaft_axis": "1"},
     BristleFriction: {"coulomb": by_way("N m", "N"), "stiffness": by_way("N m", "N/m"), "static": by_way("N m", "N"),
                       "stribeck_speed": by_way("rad/s", "m/s"), "damping": by_way("N m s", "N s/m"),
                       "viscous": by_way("N m s", "N s/m"), "elastic": "1", "speed": by_way("rad/s", "m/s"),

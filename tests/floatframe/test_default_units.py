@@ -161,8 +161,8 @@ def parts():
     import floatframe
 
     for info in pkgutil.walk_packages(floatframe.__path__, "floatframe."):
-        rooms = ("forces", "elements", "drives", "wheels", "clearances", "hydraulics", "aerodynamics", "cables",
-                 "friction", "joints", "flexible_parts", "rails")  # fmt: skip
+        rooms = ("forces", "elements", "drives", "wheels", "clearances", "hydraulics", "aerodynamics", "bearings",
+                 "cables", "friction", "joints", "flexible_parts", "rails")  # fmt: skip
         if info.name.split(".")[1] in rooms and not info.name.startswith(OF_SI_ALONE):
             module = importlib.import_module(info.name)
             for kind in list(vars(module).values()):

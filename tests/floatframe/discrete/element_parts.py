@@ -14,6 +14,7 @@ from floatframe import (
     rails,
     wheels,
 )
+from floatframe.bearings import Bearing
 from floatframe.clearances import Backlash, BallWithPlay
 from floatframe.drives import Pid, PidDrive
 from floatframe.functions.time_functions import harmonic
@@ -101,6 +102,14 @@ def with_play(kind):
     return turned(stops, omega=3.0)
 
 
+def in_bearing():
+    """Return a rotor in a bearing whose cross terms are not those of a spring."""
+    body = RigidBody("rotor", 2.0, np.diag([0.02, 0.02, 0.03]), velocity=(0.02, 0, 0.01), omega_B=(0.3, 0, 20.0))
+    bearing = Bearing("bearing", Marker(GROUND), Marker("rotor", position=(0, 0, 0.05)), [[5e3, 800.0], [-900.0, 4e3]],
+                      [[30.0, 4.0], [3.0, 20.0]], 2e3, 15.0, 40.0, 0.3)  # fmt: skip
+    return System([body], elements=[bearing])
+
+
 def held_ball():
     """Return a rigid pendulum that three reactions of an element hold."""
     spin = np.array([0.3, 0.5, 2.0])
@@ -113,6 +122,7 @@ def held_ball():
 ENDS = systems.ENDS
 ELEMENT_PARTS = {
     "aerodynamics.lifting-surface": Part(glider, 0.02),
+    "bearings.bearing": Part(in_bearing, 1e-3),
     "cables.cable": Part(lambda: jumper(length=0.45), 5e-3),
     "clearances.backlash": Part(lambda: with_play("backlash"), 2e-3, 52, 1e-2, is_smooth=False),
     "clearances.ball": Part(lambda: with_play("ball"), 1e-3, 40, 1e-2, is_smooth=False),

@@ -1,10 +1,11 @@
-"""Play, friction and tyres in closed form, from the text of their classes."""
+"""Play, bearings, friction and tyres in closed form, from the text of their classes."""
 
 from math import atan, exp, hypot, pi, sqrt
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from floatframe.bearings import Bearing
 from floatframe.clearances import Backlash, BallWithPlay, HingeWithPlay
 from floatframe.friction import BristleFriction
 from floatframe.wheels import BrushTyre, LinearTyre
@@ -146,6 +147,43 @@ def hinge(slides, length=0.3):
     if slides:
         silent = {8: "nothing acts along the axis", 9: "the same", 10: "the same", 11: "any number below 0"}
     return Form(element, START, tuple(states), closed, silent)
+
+
+def bearing():
+    """Return a bearing with all its coefficients, and the axis of the shaft elsewhere in its marker."""
+    K, D = np.array([[2e4, 3e3], [-5e3, 1.4e4]]), np.array([[70.0, 11.0], [6.0, 50.0]])
+    k_a, d_a, k_t, d_t = 9e3, 40.0, 600.0, 3.0
+    X = 0.8 * NORMAL + 0.6 * np.cross(AXIS, NORMAL)
+    shaft = Pair(START).axes[1].T @ Pair(START).axes[0] @ AXIS
+    element = Bearing("b", A, B, K, D, k_a, d_a, k_t, d_t, AXIS, X + 0.3 * AXIS, shaft)
+    C = np.column_stack([X, np.cross(AXIS, X), AXIS])
+
+    def closed(state):
+        two = Pair(state.x)
+        axes = two.axes[0] @ C
+        d = axes.T @ two.line
+        d_dot = axes.T @ (state.x[1, 12:15] - state.x[0, 12:15] - np.cross(state.x[0, 15:], two.line))
+        w = axes.T @ (state.x[1, 15:] - state.x[0, 15:])
+        s = axes.T @ two.axes[1] @ shaft
+        F = np.append(-K @ d[:2] - D @ d_dot[:2], -k_a * d[2] - d_a * d_dot[2])
+        tilt = np.array([-s[1], s[0], 0.0])
+        wrench = two.force_at(axes @ F, state.x[1, :3])
+        M = axes @ (-k_t * tilt - d_t * (w - (s @ w) * s))
+        wrench[1, 3:] += M
+        wrench[0, 3:] -= M
+        K_s = (K + K.T) / 2
+        energy = (d[:2] @ K_s @ d[:2] + k_a * d[2] ** 2) / 2 + k_t * (1 - s[2])
+        lost = d_dot[:2] @ ((K - K_s) @ d[:2] + D @ d_dot[:2]) + d_a * d_dot[2] ** 2 + d_t * (w @ w - (s @ w) ** 2)
+        names = ("x", "y", "axial", "tilt x", "tilt y", "force x", "force y", "axial force", "energy", "power lost")
+        return wrench, {}, dict(zip(names, (*d, *tilt[:2], *F, energy, lost), strict=True))
+
+    states = []
+    for seed, lean in ((1, 0.05), (2, 0.4)):
+        x = pair(seed, offset=C @ [0.02, -0.013, 0.01], start=START, angle=2.0)
+        A_a, A_b = Pair(x).axes
+        x[1, 3:12] = (Rotation.from_rotvec(A_a @ C @ [lean, 0.7 * lean, 0]).as_matrix() @ A_b).ravel()
+        states.append(State(x))
+    return Form(element, START, tuple(states), closed)
 
 
 def bristles(motion, creeps):
@@ -360,6 +398,7 @@ def tyre(kind):
 
 
 FORMS = {
+    "bearing": bearing(),
     "backlash along": backlash("along"),
     "backlash about": backlash("about"),
     "ball with play": ball(),

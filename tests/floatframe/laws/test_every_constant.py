@@ -9,6 +9,7 @@ from numpy.testing import assert_array_equal
 
 import floatframe
 from floatframe.aerodynamics import LiftingSurface
+from floatframe.bearings import Bearing
 from floatframe.cables import Cable
 from floatframe.clearances import Backlash, BallWithPlay, HingeWithPlay
 from floatframe.drives import AntiSkidBrake, DcMotor, InductionMotor, Pid, PidDrive, SpeedControl, TorqueMap
@@ -47,6 +48,7 @@ DEFAULTS = {
                     "speed": 0.0},
     Backlash: {"exponent": 1.0, "damping": 0.0},
     BallWithPlay: CONTACT,
+    Bearing: {"damping": 0.0, "axial_stiffness": 0.0, "axial_damping": 0.0, "tilt_stiffness": 0.0, "tilt_damping": 0.0},
     BristleFriction: {"damping": 0.0, "viscous": 0.0, "elastic": 0.7, "speed": 0.0},
     BrushTyre: TYRE,
     Cable: {"damping": 0.0},
