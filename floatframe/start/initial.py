@@ -32,6 +32,7 @@ from floatframe.start.far_drives import driven_angles, led_by, stages, way_of_dr
 from floatframe.start.freedoms import Mobility, constraint_mobility, scaled_constraints
 from floatframe.start.half_turns import require_no_half_turns
 from floatframe.start.newton_equations import (
+    STIFF_START,
     displaced,
     in_ground_axes,
     linearized,
@@ -199,7 +200,7 @@ def closed(compiled: CompiledSystem, model: Model, work: Work, state: State, w: 
         if np.abs(error / scale).max() <= ASSEMBLED:
             return state, np.zeros_like(error)
         try:
-            y, _ = solve(with_modal_weight(model, parts.H), parts, np.zeros(len(work.state.u)), -error)
+            y, _ = solve(with_modal_weight(model, parts.H, STIFF_START), parts, np.zeros(len(work.state.u)), -error)
         except RuntimeError:
             break
         if not np.isfinite(y).all():
@@ -293,7 +294,7 @@ def with_compatible_velocities(compiled: CompiledSystem, work: Work, state: Stat
     rate, _ = rates_of_constraints(model, work)
     if not np.any(rate):
         return state
-    y, _ = solve(with_modal_weight(model, parts.H), parts, np.zeros(len(work.state.u)), -rate)
+    y, _ = solve(with_modal_weight(model, parts.H, STIFF_START), parts, np.zeros(len(work.state.u)), -rate)
     return State(state.r, state.p, state.q, state.u + in_ground_axes(model, state, y))
 
 

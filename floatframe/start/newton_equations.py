@@ -28,8 +28,8 @@ __all__ = [
     "with_modal_weight",
 ]
 
-#: the stiffness in W is scaled so that the softest mode weighs this much more than its mass: what closes hardly rings
-STIFF = 1e6
+STIFF = 1e3  #: the stiffness in W is scaled so that the softest mode weighs this much more than its mass
+STIFF_START = 1e6  #: the same where a placement is closed: modes that hardly give way hardly ring after it
 MASSLESS = 10.0  #: a mode without mass gets one that puts it at this multiple of the highest frequency
 
 
@@ -151,12 +151,12 @@ def modal_weight(model: Model, i: int) -> float:
     return float(STIFF / softest)
 
 
-def with_modal_weight(model: Model, H: tuple[Array, ...]) -> tuple[Array, ...]:
-    """Return mass matrices with the modal stiffness added, scaled (W of the module docstring)."""
+def with_modal_weight(model: Model, H: tuple[Array, ...], stiff: float = STIFF) -> tuple[Array, ...]:
+    """Return mass matrices with the modal stiffness added, scaled by `stiff` (W of the module docstring)."""
     weighted = []
     for i, block in enumerate(H):
         block = block.copy()
-        block[6:, 6:] += modal_weight(model, i) * modal_matrix(model, i, STIFFNESS)
+        block[6:, 6:] += stiff / STIFF * modal_weight(model, i) * modal_matrix(model, i, STIFFNESS)
         weighted.append(block)
     return tuple(weighted)
 

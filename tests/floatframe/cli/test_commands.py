@@ -270,7 +270,7 @@ def test_an_interrupted_run_can_be_read_and_leaves_the_old_results(folder, resul
     (folder / "swing.h5").write_bytes(b"the old results")
     (folder / "swing.toml").write_text(RIGID.replace("t_end = 0.5", "t_end = 1e5"))
     with subprocess.Popen(
-        [*PROGRAM, "run", "swing.toml"],
+        [*PROGRAM, "run", "swing.toml", "--watch", "off"],
         cwd=folder,
         env=ENVIRONMENT,
         preexec_fn=heed_interrupts,

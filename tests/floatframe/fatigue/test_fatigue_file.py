@@ -179,10 +179,10 @@ def test_spectra_of_a_file(file, folder, amplitude):
     spectra = spectra_of_history("noise", t, rng.standard_normal((4096, BODY.n_q)), n_segment=256)
     np.savez(folder / "noise.npz", frequencies=spectra.frequencies, spectra=spectra.spectra)
     text = file.read_text().partition("[[blocks]]")[0]
-    (folder / "noise.toml").write_text(text + '[[spectra]]\nfile = "noise.npz"\nduration = 60.0\nscale = 1e-4\n')
+    (folder / "noise.toml").write_text(text + '[[spectra]]\nfile = "noise.npz"\nduration = 60.0\nscale = 1e-5\n')
     made = assess(read_fatigue(folder / "noise.toml"))
     curve = basquin_curve(amplitude, 1e6, 5, least_cycles=1)
-    expected = spectral_damage(BODY, [replace(spectra, duration=60.0, scale=1e-4, mean=None)], curve, extrapolate=True)
+    expected = spectral_damage(BODY, [replace(spectra, duration=60.0, scale=1e-5, mean=None)], curve, extrapolate=True)
     assert_allclose(made.result.damage, expected.damage, rtol=1e-12)
     assert "spectral, dirlik" in run("fatigue", folder / "noise.toml", "--json")
     (folder / "noise.toml").write_text(text + '[[spectra]]\nfile = "noise.npz"\n')
