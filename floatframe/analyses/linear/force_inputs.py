@@ -22,7 +22,7 @@ from floatframe.forces import BodyLoad, JointForce, PointForce
 from floatframe.functions.time_functions import TimeFunction, constant
 from floatframe.kernels.work import new_work
 from floatframe.results.trajectory import Trajectory
-from floatframe.rotations import rotation_matrix
+from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_matrix
 from floatframe.small_motions.small_motions import InputForce, SmallMotions
 from floatframe.start.newton_equations import linearized, set_iterate
 from floatframe.system import System
@@ -110,6 +110,9 @@ def forces_of_amplitude(system: System, now: Trajectory, channel: ForceInput) ->
         if load.force is force:
             one = replace(load, force=replace(force, amplitude=None))
             six = amplitudes(one, np.zeros(1), R)[0]
-            interface = system.bodies[i].reduced.interfaces[load.interface].name  # type: ignore[union-attr]
-            found.append(InputForce(name, interface, np.concatenate([R[0] @ six[:3], R[0] @ six[3:]])))
+            interface = system.bodies[i].reduced.interfaces[load.interface]  # type: ignore[union-attr]
+            # a follower turns with its marker, and that with the interface
+            turn = interface.Psi[3:] @ now.body(name).q[0] if force.is_follower else np.zeros(3)
+            turned = R[0] @ rotation_matrix(euler_parameters_of_rotation_vector(turn))
+            found.append(InputForce(name, interface.name, np.concatenate([turned @ six[:3], turned @ six[3:]])))
     return tuple(found)
