@@ -366,3 +366,11 @@ def test_light_beams_between_point_masses_need_no_density(tmp_path):
     up = (body.dofs[:, 1] == 2).astype(float)
     assert_allclose(up @ body.M @ up, 3.0, rtol=1e-14)
     assert any(row[0] == "density" and "massless" in row[2] for row in deck.ledger.rows())
+
+
+@pytest.mark.parametrize(("control", "names"), [("METHOD=1", {1, 2}), ("SPC=3", {1}), ("SPC=4", {2})])
+def test_supports_make_interfaces_of_the_set_that_is_selected_or_of_all(tmp_path, control, names):
+    text = GRIDS + f"{ORIENTED}\n" + SECTION + MATERIAL + "SPC1,3,123456,1\nSPC1,4,123456,2\n"
+    _, deck = body_of(tmp_path, text, head=f"SOL 103\nCEND\n{control}\nBEGIN BULK\n")
+    held = {int(number) for each in deck.supports for number in deck.mesh.node_numbers[deck.mesh.node_sets[each.nodes]]}
+    assert held == names

@@ -389,6 +389,9 @@ def _supports(model: NastranModel) -> None:
     """SPC, SPC1 and permanent constraints of grid points; BSET and ASET as interfaces."""
     held: dict[int, set[int]] = {}
     chosen = _selected(model, "SPC")
+    if chosen == set() and any(name in model.cards for name in ("SPC", "SPC1")):
+        model.ledger.note("SPC", "the case control selects none: those of all sets make interfaces")
+        chosen = None
     last: Card | None = None
     for card in model.of("SPC1", "SPC"):
         if chosen is not None and card.integer(1) not in chosen:
