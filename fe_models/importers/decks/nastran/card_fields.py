@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from fe_models.importers.bulk_data.cards import real_of
 from fe_models.importers.decks.nastran.model import NastranModel
 
-__all__ = ["CARDS", "CardField", "check_cards", "fields_of", "is_harmless"]
+__all__ = ["CARDS", "CardField", "check_cards", "fields_of"]
 
 _SHELL_3 = "EID PID G1 G2 G3 THETA ZOFFS - - TFLAG=0 T1 T2 T3"
 _SHELL_4 = "EID PID G1 G2 G3 G4 THETA ZOFFS - TFLAG=0 T1 T2 T3 T4"
@@ -138,11 +138,6 @@ def fields_of(name: str) -> tuple[CardField, ...]:
     return tuple(found)
 
 
-def is_harmless(name: str) -> bool:
-    """Whether a card belongs to an analysis and says nothing about mass, stiffness or damping."""
-    return name in HARMLESS
-
-
 def check_cards(model: NastranModel) -> None:
     """Put into the ledger every card and every field that is not taken over.
 
@@ -152,7 +147,7 @@ def check_cards(model: NastranModel) -> None:
     """
     for name, cards in model.cards.items():
         if name not in CARDS:
-            if is_harmless(name):
+            if name in HARMLESS:
                 model.ledger.note(name, "belongs to the analysis, not to the body", count=len(cards))
             elif name in UNNAMED:
                 model.ledger.note(name, "no element that is read names it", count=len(cards))
