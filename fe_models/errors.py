@@ -1,4 +1,4 @@
-"""Errors of this package: one root, leaves that are also the built-in kind a caller would expect."""
+"""Errors of this package: one root class, and leaves that also derive from `ValueError` or `RuntimeError`."""
 
 from fe_models.foundation.errors import BodyError, FeModelsError, UnitsError
 
@@ -19,11 +19,11 @@ __all__ = [
 
 
 class MeshError(FeModelsError, ValueError):
-    """A mesh cannot be read truthfully, or is not fit for a finite element model."""
+    """A mesh cannot be read without guessing, or cannot serve as a finite element model."""
 
 
 class MatrixError(FeModelsError, ValueError):
-    """Matrices of another program cannot be read truthfully, or lack what a body needs."""
+    """The matrices of another program cannot be read without guessing, or do not make a body."""
 
 
 class MeshingError(FeModelsError, RuntimeError):
@@ -31,24 +31,24 @@ class MeshingError(FeModelsError, RuntimeError):
 
 
 class MaterialError(FeModelsError, ValueError):
-    """A material is impossible, or cells have none or two."""
+    """A material is impossible, or cells have no material or two materials."""
 
 
 class SectionError(FeModelsError, ValueError):
-    """A cross-section of a beam is impossible, or lines have none or two."""
+    """The cross-section of a beam is impossible, or lines have no section or two sections."""
 
 
 class BeamError(FeModelsError, ValueError):
-    """A beam model is impossible: a line without length or direction, a follower of two nodes, an unknown node."""
+    """A beam model is impossible: a line has no length or direction, a node follows two nodes, or a node is unknown."""
 
 
 class ShellError(FeModelsError, ValueError):
-    """A shell model is impossible: cells without thickness or area, warped beyond the limit, an unknown node."""
+    """A shell model is impossible: a cell has no thickness or area or is warped too much, or a node is unknown."""
 
 
 class InterfaceError(FeModelsError, ValueError):
-    """An interface selects nothing, too little, or what another interface has."""
+    """An interface selects no nodes, too few nodes, or nodes of another interface."""
 
 
 class LoadError(FeModelsError, ValueError):
-    """A load case is impossible on this body: no such node, no dof to carry it, no face to press on."""
+    """A load case is impossible on this body: the node, its dof or the loaded face does not exist."""

@@ -1,8 +1,8 @@
 """Load cases of a body: pressure, gravity, forces at nodes, force and torque at an interface or on a selection.
 
-Every load is consistent: its work on any displacement of the elements is that of the load itself, so its resultant
-force and moment are exact. All functions take a body before or after coupling; loads on members of a rigid interface
-then act on its reference node.
+Every load is consistent: its virtual work equals the work of the given load on any displacement field of the elements,
+so its resultant force and moment are exact. All functions accept a body before or after coupling. After coupling, a
+load on the members of a rigid interface acts on its reference node.
 """
 
 from collections.abc import Mapping
@@ -23,34 +23,35 @@ from fe_models.meshes.selections import AnyMesh, Selection, selected_facets
 
 __all__ = ["gravity_load", "interface_load", "nodal_load", "pressure_load", "selection_load"]
 
-UNREACHED = 1e-9  #: share of a force or torque that the nodes fail to carry, above which it is refused
+UNREACHED = 1e-9  #: largest share of a force or torque that the nodes may fail to carry; above it the load is rejected
 
 
 def pressure_load(body: FEBody, mesh: AnyMesh, name: str, selection: Selection, pressure: float) -> LoadCase:
     """Make the load case of a uniform pressure on facets of the surface.
 
-    f_n = -p ∫ N_n n dA with n dA = ∂x/∂xi × ∂x/∂eta: polynomial for every face, so the quadrature is exact; the
-    resultant is -p times the area vector of the facets.
+    f_n = -p ∫ N_n n dA with n dA = ∂x/∂xi × ∂x/∂eta. The integrand is a polynomial on every face, so the quadrature is
+    exact. The resultant is -p times the area vector of the facets.
 
     Parameters
     ----------
     body
-        The body of that mesh, its nodes first.
+        The body that was made of the mesh, with the nodes of the mesh first.
     mesh
-        Of a solid or of a shell; lines have no faces.
+        Mesh of a solid or of a shell; lines have no faces.
     name
-        Of the load case.
+        Name of the load case.
     selection
-        Facets of the surface; cells of a shell.
+        Facets of the surface of a solid, or cells of a shell.
     pressure
-        Positive pushes on the surface; on the top of a shell, against the normal of its cells [Pa].
+        Pressure [Pa]. A positive value pushes on the surface; on a shell it pushes on the top, against the cell
+        normals.
 
     Raises
     ------
     LoadError
-        If the pressure is not finite, or the selection holds no facet of the surface or others.
+        If the pressure is not finite, or the selection holds no facet of the surface or also other faces.
     InterfaceError
-        If nothing is selected.
+        If the selection is empty.
     """
     where = f"load case {name!r}"
     value = float(_finite(f"{where}: pressure", pressure, ()))
@@ -73,16 +74,16 @@ def pressure_load(body: FEBody, mesh: AnyMesh, name: str, selection: Selection, 
 
 
 def gravity_load(body: FEBody, name: str, acceleration: ArrayLike) -> LoadCase:
-    """Make the load case of gravity: f = M Psi_t g, with Psi_t the unit translations.
+    """Make the load case of gravity: f = M Psi_t g, where Psi_t holds the three unit translations.
 
     Parameters
     ----------
     body
         Any body with mass.
     name
-        Of the load case.
+        Name of the load case.
     acceleration
-        Of free fall, g, mesh axes, (3,) [m/s²].
+        Acceleration g of free fall, mesh axes, (3,) [m/s²].
     """
     g = _finite(f"load case {name!r}: acceleration", acceleration, (3,))
     component = body.dofs[:, 1]
@@ -91,21 +92,21 @@ def gravity_load(body: FEBody, name: str, acceleration: ArrayLike) -> LoadCase:
 
 
 def nodal_load(body: FEBody, name: str, loads: Mapping[int, ArrayLike]) -> LoadCase:
-    """Make the load case of forces at nodes.
+    """Make the load case of given forces and moments at nodes.
 
     Parameters
     ----------
     body
         Any body.
     name
-        Of the load case.
+        Name of the load case.
     loads
-        Node -> force, (3,) [N], or force and moment, (6,) [N, N m], mesh axes.
+        For each node its force, (3,) [N], or force and moment, (6,) [N, N m], mesh axes.
 
     Raises
     ------
     LoadError
-        If there is no such node, or it lacks the dof of a component that is not zero.
+        If a node does not exist, or lacks the dof of a non-zero component.
     """
     where = f"load case {name!r}"
     table = np.zeros((len(body.nodes), 6))
@@ -123,26 +124,27 @@ def interface_load(
 ) -> LoadCase:
     """Make the load case of a force and a torque at the reference point of an interface.
 
-    On members they act as a distributing coupling spreads them, f = W G (Gᵀ W G)⁻¹ F with G the rigid motions of the
-    members: the same work as F on the reference node, for rigid and distributing interfaces alike.
+    On a distributing interface the members carry f = W G (Gᵀ W G)⁻¹ F, where G holds the rigid motions of the members
+    and W their weights. This does the same work as F at the reference node, for rigid and distributing interfaces
+    alike.
 
     Parameters
     ----------
     body
-        Body with that interface.
+        Body that has the interface.
     name
-        Of the load case.
+        Name of the load case.
     interface
-        Its name.
+        Name of the interface.
     force, torque
-        Mesh axes, (3,) [N] and [N m].
+        Force, (3,) [N], and torque, (3,) [N m], at the reference point, mesh axes.
 
     Raises
     ------
     LoadError
-        If the members cannot carry it: a torque at one node without rotations.
+        If the members cannot carry the load, such as a torque at a single node without rotations.
     BodyError
-        If there is no such interface.
+        If the body has no such interface.
     """
     where, at = f"load case {name!r}", body.interface(interface)
     wrench = _wrench(where, force, torque)
@@ -165,27 +167,28 @@ def selection_load(
     torque: ArrayLike = (0, 0, 0),
     reference: ArrayLike | None = None,
 ) -> LoadCase:
-    """Make the load case of a total force and torque on selected nodes, spread as a distributing coupling does.
+    """Make the load case of a total force and torque that is distributed over selected nodes.
 
-    Nodes weigh by their area where the selection is made of facets, else equally.
+    The nodes are weighted as in a distributing coupling: by their area if the selection consists of facets, else
+    equally.
 
     Parameters
     ----------
     body, mesh, name
-        As in `pressure_load`.
+        As for `pressure_load`.
     selection
-        Which nodes.
+        The loaded nodes.
     force, torque
-        Resultant about the reference point, mesh axes, (3,) [N] and [N m].
+        Resultant force, (3,) [N], and torque about the reference point, (3,) [N m], mesh axes.
     reference
-        Point the force acts at, (3,) [m]; None: the weighted centre of the nodes.
+        Point at which the force acts, (3,) [m]; None: the weighted mean of the nodes.
 
     Raises
     ------
     LoadError
-        If the nodes cannot carry it.
+        If the nodes cannot carry the load.
     InterfaceError
-        If nothing is selected.
+        If the selection is empty.
     """
     where = f"load case {name!r}"
     _require_mesh_of(body, mesh, where)
@@ -200,9 +203,9 @@ def selection_load(
 
 
 def _spread(body: FEBody, nodes: IntArray, weights: Array, reference: Array, wrench: Array, where: str) -> Array:
-    """Forces and moments at nodes with the resultant wrench about the reference point, (n_nodes, 6).
+    """Return forces and moments at nodes with the resultant wrench about the reference point, (n_nodes, 6).
 
-    Translations alone first; moments at the nodes join in where these cannot carry it and the nodes have rotations.
+    Translations carry the wrench where they can. Otherwise moments are added at nodes that have rotations.
     """
     dofs = body.dofs if body.recovery is None else np.concatenate([body.recovery.dofs, body.dofs])
     has_rotation = np.isin(nodes, dofs[dofs[:, 1] >= 3, 0])
@@ -210,7 +213,7 @@ def _spread(body: FEBody, nodes: IntArray, weights: Array, reference: Array, wre
     G[:, :3] = rigid_motion_of_points(body.nodes[nodes], reference)
     G[has_rotation, 3:, 3:] = np.eye(3)
     arms = np.linalg.norm(body.nodes[nodes] - reference, axis=1)
-    length = float(arms.max()) or 1.0  # makes force and torque comparable
+    length = float(arms.max()) or 1.0  # makes force and torque comparable in size
     unit = np.repeat([1.0, length], 3)
     for moments in (0.0, length**2):
         W = weights[:, None] * np.repeat([1.0, moments], 3)
@@ -229,7 +232,7 @@ def _spread(body: FEBody, nodes: IntArray, weights: Array, reference: Array, wre
 
 
 def _generalised(body: FEBody, table: Array, where: str) -> Array:
-    """Forces and moments at nodes, (n_nodes, 6), as generalised forces over the dofs, (n_dof,)."""
+    """Convert forces and moments at nodes, (n_nodes, 6), to generalised forces over the dofs, (n_dof,)."""
     on_body = _scattered(body.dofs, table)
     if body.recovery is None:
         is_known = _known(body.dofs, table.shape)
@@ -257,7 +260,7 @@ def _known(dofs: IntArray, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def _require_outward(mesh: Mesh, where: str, kind: str, rows: IntArray) -> None:
-    """Raise unless every face is a facet of the boundary, which is oriented outward."""
+    """Raise `LoadError` unless every face is a facet of the boundary, where facets point outward."""
     facets = boundary_facets(mesh).get(kind, np.zeros((0, rows.shape[1]), np.int64))
     classes, _ = first_of_equal_rows(np.concatenate([facets, rows]))
     inside = ~np.isin(classes[len(facets) :], classes[: len(facets)])

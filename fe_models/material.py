@@ -1,4 +1,4 @@
-"""Linear elastic materials, isotropic, orthotropic and anisotropic, and which cell has which."""
+"""Linear elastic materials (isotropic, orthotropic, anisotropic) and their assignment to cells."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -22,17 +22,18 @@ __all__ = [
     "require_isotropic",
 ]
 
-SYMMETRY = 1e-9  #: of an elasticity, of its largest entry: what digits of a file leave
+#: largest asymmetry of an elasticity matrix, relative to its largest entry; covers the rounding of printed digits
+SYMMETRY = 1e-9
 
 
 @dataclass(frozen=True)
 class Material:
-    """Isotropic, linear elastic.
+    """Isotropic, linear elastic material.
 
     Raises
     ------
     MaterialError
-        Unless E > 0, rho >= 0 and -1 < nu < 0.5, all finite.
+        Unless E > 0, rho >= 0 and -1 < nu < 0.5, and all three are finite.
     """
 
     name: str
@@ -71,22 +72,22 @@ class Material:
 
     @property
     def stiffness(self) -> Array:
-        """Stress by strain, (6, 6) [Pa], rows xx yy zz yz xz xy, shear strains doubled."""
+        """Matrix that maps strain to stress, (6, 6) [Pa], rows xx yy zz yz xz xy, engineering shear strains."""
         return isotropic_tensor(self.lam, self.mu)
 
 
 @dataclass(frozen=True)
 class OrthotropicMaterial:
-    """Orthotropic, linear elastic: three planes of symmetry across its axes 1, 2, 3.
+    """Orthotropic, linear elastic material: three planes of symmetry normal to its axes 1, 2, 3.
 
-    Pairs are in the order 12, 13, 23. nu_12 is the contraction along 2 under stress along 1, so that
-    nu_12 / E_1 = nu_21 / E_2.
+    Pairs have the order 12, 13, 23. nu_12 is the contraction along 2 under stress along 1, so that nu_12 / E_1 = nu_21
+    / E_2.
 
     Raises
     ------
     MaterialError
-        Unless all numbers are finite, moduli above zero, the density not below, the axes orthonormal and right-handed,
-        and the stiffness positive definite.
+        Unless all numbers are finite, the moduli are positive, the density is not negative, the axes are orthonormal
+        and right-handed, and the stiffness is positive definite.
     """
 
     name: str
@@ -115,12 +116,12 @@ class OrthotropicMaterial:
 
     @property
     def E(self) -> float:
-        """The largest Young's modulus [Pa]."""
+        """Largest Young's modulus [Pa]."""
         return max(self.young)
 
     @property
     def compliance(self) -> Array:
-        """Strain by stress in its own axes, (6, 6) [1/Pa], rows 11 22 33 23 13 12, shear strains doubled."""
+        """Matrix that maps stress to strain in material axes, (6, 6) [1/Pa], rows 11 22 33 23 13 12, shear doubled."""
         (E_1, E_2, E_3), (nu_12, nu_13, nu_23) = self.young, self.poisson
         S = np.diag([1 / E_1, 1 / E_2, 1 / E_3, 1 / self.shear[2], 1 / self.shear[1], 1 / self.shear[0]])
         S[0, 1] = S[1, 0] = -nu_12 / E_1
@@ -130,7 +131,7 @@ class OrthotropicMaterial:
 
     @property
     def stiffness(self) -> Array:
-        """Stress by strain in mesh axes, (6, 6) [Pa], rows xx yy zz yz xz xy, shear strains doubled."""
+        """Matrix that maps strain to stress in mesh axes, (6, 6) [Pa], rows xx yy zz yz xz xy, engineering shear."""
         C = np.linalg.inv(self.compliance)
         T = _stress_turn(np.array(self.axes).T)
         C = T @ ((C + C.T) / 2) @ T.T
@@ -139,19 +140,19 @@ class OrthotropicMaterial:
 
 @dataclass(frozen=True)
 class AnisotropicMaterial:
-    """Linear elastic without any symmetry: 21 constants.
+    """Linear elastic material without any symmetry: 21 constants.
 
     Raises
     ------
     MaterialError
-        Unless all numbers are finite, the density not below zero, the axes orthonormal and right-handed, and the
-        elasticity symmetric and positive definite.
+        Unless all numbers are finite, the density is not negative, the axes are orthonormal and right-handed, and the
+        elasticity is symmetric and positive definite.
     """
 
     name: str
     elasticity: tuple[
         tuple[float, ...], ...
-    ]  #: stress by strain in its axes, rows 11 22 33 23 13 12, shear doubled [Pa]
+    ]  #: maps strain to stress in the material axes, rows 11 22 33 23 13 12, engineering shear strains [Pa]
     rho: float  #: density [kg/m³]
     axes: tuple[tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  #: rows 1, 2, 3
 
@@ -170,25 +171,25 @@ class AnisotropicMaterial:
             )
         if np.diag(C).min() <= 0 or not np.linalg.eigvalsh(_normalised(C)).min() > 0:
             raise MaterialError(
-                f"{where}: elasticity: some strains would have no energy or a negative one (it is not positive "
+                f"{where}: elasticity: some strains would have no energy or less (it is not positive "
                 "definite). Is the order of rows and columns 11 22 33 23 13 12?"
             )
 
     @property
     def E(self) -> float:
-        """The largest Young's modulus along its axes [Pa]."""
+        """Largest Young's modulus along the material axes [Pa]."""
         return float(1 / np.diag(np.linalg.inv(np.array(self.elasticity)))[:3].min())
 
     @property
     def stiffness(self) -> Array:
-        """Stress by strain in mesh axes, (6, 6) [Pa], rows xx yy zz yz xz xy, shear strains doubled."""
+        """Matrix that maps strain to stress in mesh axes, (6, 6) [Pa], rows xx yy zz yz xz xy, engineering shear."""
         T = _stress_turn(np.array(self.axes).T)
         C = T @ np.array(self.elasticity) @ T.T
         return np.asarray((C + C.T) / 2)
 
 
 def _set_axes_and_density(where: str, material: "OrthotropicMaterial | AnisotropicMaterial") -> None:
-    """Take axes and density as numbers, or refuse them."""
+    """Convert axes and density to numbers; raise `MaterialError` if they are invalid."""
     object.__setattr__(material, "axes", tuple(_three(f"{where}: axes", row) for row in material.axes))
     rho = material.rho
     if isinstance(rho, bool) or not isinstance(rho, int | float | np.number) or not rho >= 0:
@@ -205,14 +206,14 @@ AnyMaterial = Material | OrthotropicMaterial | AnisotropicMaterial
 
 
 def isotropic_tensor(lam: float, mu: float) -> Array:
-    """Return stress by strain, (6, 6) [Pa], rows xx yy zz yz xz xy, shear strains doubled."""
+    """Return the matrix that maps strain to stress, (6, 6) [Pa], rows xx yy zz yz xz xy, engineering shear strains."""
     C = np.diag([2 * mu, 2 * mu, 2 * mu, mu, mu, mu])
     C[:3, :3] += lam
     return np.asarray(C)
 
 
 def material_words(material: AnyMaterial) -> str:
-    """Return the numbers of a material as a line of a provenance."""
+    """Return the constants of a material as one line of the provenance."""
     if isinstance(material, Material):
         return f"E = {material.E!r}, nu = {material.nu!r}, rho = {material.rho!r}"
     axes = f"axes {[list(row) for row in material.axes]}"
@@ -226,7 +227,7 @@ def material_words(material: AnyMaterial) -> str:
 
 
 def require_isotropic(where: str, material: object) -> None:
-    """Raise `MaterialError` for a material with directions: what is here has no stiffness for it."""
+    """Raise `MaterialError` unless the material is isotropic; the caller has no elements for other materials."""
     if isinstance(material, OrthotropicMaterial | AnisotropicMaterial):
         kind = "orthotropic" if isinstance(material, OrthotropicMaterial) else "anisotropic"
         raise MaterialError(f"{where}: material {material.name!r} is {kind}; expected an isotropic one (Material)")
@@ -245,15 +246,15 @@ def _listed(values: tuple[float, ...]) -> str:
 
 
 def _normalised(S: Array) -> Array:
-    """Return a symmetric matrix scaled to ones on the diagonal."""
+    """Return a symmetric matrix scaled to a unit diagonal."""
     d = np.sqrt(np.diag(S))
     return np.asarray(S / np.outer(d, d))
 
 
 def _stress_turn(R: Array) -> Array:
-    """Return T, (6, 6): stress in mesh axes by stress in the axes that are the columns of R, rows xx yy zz yz xz xy.
+    """Return T, (6, 6), which maps stress in the axes R (columns) to stress in mesh axes, rows xx yy zz yz xz xy.
 
-    sigma_ij = R_ik R_jl s_kl; the strain energy then gives C in mesh axes as T C Tᵀ.
+    sigma_ij = R_ik R_jl s_kl. Equal strain energy then gives the stiffness in mesh axes as T C Tᵀ.
     """
     pairs = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
     T = np.empty((6, 6))
@@ -266,24 +267,25 @@ def _stress_turn(R: Array) -> Array:
 def assign_materials(
     mesh: Mesh, materials: AnyMaterial | Mapping[str, AnyMaterial]
 ) -> tuple[tuple[AnyMaterial, ...], dict[str, IntArray]]:
-    """Return the materials in use and, by cell type, the number of the material of every cell.
+    """Return the materials in use and, for each cell type, the index of the material of every cell.
 
     Parameters
     ----------
     mesh
-        Its `cell_sets` name the groups.
+        The mesh; its `cell_sets` name the groups.
     materials
-        One material for all cells, or group name -> material. Groups may overlap where they agree.
+        One material for all cells, or one material for each group name. Groups may overlap if they have the same
+        material.
 
     Returns
     -------
     tuple
-        (materials), and cell type -> index into them, (n_cells,).
+        The materials, and for each cell type the indices into them, (n_cells,).
 
     Raises
     ------
     MaterialError
-        If a group is unknown, or cells have no material or two.
+        If a group is unknown, or cells have no material or two materials.
     """
     if isinstance(materials, AnyMaterial):
         return (materials,), {kind: np.zeros(len(cells), np.int64) for kind, cells in mesh.cells.items()}
@@ -314,7 +316,7 @@ def assign_materials(
 
 
 def groups_of(mesh: Mesh, missing: Mapping[str, IntArray]) -> str:
-    """Say in which groups the cells without a material are."""
+    """Say to which groups the cells without a material belong."""
     groups = [
         group
         for group, by_type in mesh.cell_sets.items()

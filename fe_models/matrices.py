@@ -1,4 +1,4 @@
-"""Bodies from the matrices of another program: plain arrays, or an .npz file."""
+"""Bodies made of the mass and stiffness matrices of another program, given as arrays or as an .npz file."""
 
 import logging
 import zipfile
@@ -31,13 +31,13 @@ __all__ = ["ScalarMassModel", "body_from_matrices", "body_from_npz", "scalar_mas
 
 log = logging.getLogger(__name__)
 
-PATTERN_TOLERANCE = 1e-10  #: largest |M - M_s ⊗ 1₃| / |M| that is taken for rounding of the other program
+PATTERN_TOLERANCE = 1e-10  #: largest |M - M_s ⊗ 1₃| / |M| that counts as rounding of the other program
 INTERFACE_KEYS = ("kind", "nodes", "reference", "triad", "weights")
 
 
 @dataclass(frozen=True, eq=False)
 class ScalarMassModel:
-    """Exact integrals over mass of a body whose mass matrix is M_s ⊗ 1₃ (`fe_models.body.fe_body.ElementModel`)."""
+    """Exact mass integrals of a body with M = M_s ⊗ 1₃; an `fe_models.body.fe_body.ElementModel`."""
 
     name: str
     M_s: sp.csr_array  #: scalar mass, (n_nodes, n_nodes) [kg]
@@ -46,41 +46,41 @@ class ScalarMassModel:
 
     @property
     def has_nodal_stress(self) -> bool:
-        """False: matrices do not know the elements."""
+        """False, because bare matrices do not know the elements."""
         return False
 
     def mass_gram(self, u: Array) -> Array:
-        """Return ∫ a aᵀ over mass, a = [1, c, u_x, u_y, u_z], (4 + 3 k, 4 + 3 k); u is (n_dof, k)."""
+        """Return ∫ a aᵀ dm with a = [1, c, u_x, u_y, u_z], (4 + 3 k, 4 + 3 k); u is (n_dof, k)."""
         translations = np.zeros((len(self.nodes), 3, u.shape[1]))
         put_translations(translations, self.dofs, u)
         return scalar_mass_gram(self.M_s, self.nodes, translations)
 
     def nodal_stress(self, u: Array, *, nodes: IntArray | None = None) -> Array:
-        """Refuse: matrices do not know the elements."""
+        """Raise `BodyError`, because bare matrices do not know the elements."""
         raise BodyError(
             f"body {self.name!r}: it came as bare matrices, which know no stress; build it from its mesh "
             f"(fe_models.solids.body.solid_body) for stresses"
         )
 
     def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
-        """Return NaN, (n, 3, k): matrices do not know the elements."""
+        """Return NaN, (n, 3, k), because bare matrices do not know the elements."""
         return np.full((len(nodes), 3, np.shape(u)[1]), np.nan)
 
     @property
     def has_geometric_stiffness(self) -> bool:
-        """False: matrices do not know the elements."""
+        """False, because bare matrices do not know the elements."""
         return False
 
     def mass_forces(self, loads: MassLoads) -> Array:
-        """Refuse: only an element model with geometric stiffness is asked."""
+        """Raise `BodyError`; callers must check `has_geometric_stiffness` first."""
         raise self._no_elements()
 
     def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
-        """Refuse: matrices do not know the elements."""
+        """Raise `BodyError`, because bare matrices do not know the elements."""
         raise self._no_elements()
 
     def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Array) -> Array:
-        """Refuse: matrices do not know the elements."""
+        """Raise `BodyError`, because bare matrices do not know the elements."""
         raise self._no_elements()
 
     def _no_elements(self) -> BodyError:
@@ -107,36 +107,38 @@ def body_from_matrices(
     accept: Iterable[str] = (),
     numbering: Numbering | None = None,
 ) -> FEBody:
-    """Make a body of mass and stiffness from any program.
+    """Make a body of the mass and stiffness matrices of any program.
 
-    Where M is M_s ⊗ 1₃ on the translations and nothing else (solid elements, lumped masses), the body gets an element
-    model that gives every mass moment exactly; else it has none, and what then is approximate is labelled so.
+    If M is M_s ⊗ 1₃ on the translations and zero elsewhere (solid elements, lumped masses), the body gets an element
+    model that gives every mass integral exactly. Otherwise it has no element model, and approximate results are
+    labelled as such.
 
     Parameters
     ----------
     M, K, D
-        Mass, stiffness and optional viscous damping, dense or sparse, both triangles, (n_dof, n_dof).
+        Mass, stiffness and optional viscous damping, dense or sparse, with both triangles, (n_dof, n_dof).
     nodes
-        Positions, (n_nodes, 3) [m].
+        Positions of the nodes, (n_nodes, 3) [m].
     dofs
-        Node and component (0-2 translation, 3-5 rotation, mesh axes) of every row, in any order, (n_dof, 2).
+        Node and component (0-2 translation, 3-5 rotation, mesh axes) of every row of the matrices, in any order,
+        (n_dof, 2).
     name, units, interfaces, surface, provenance
         As in `FEBody`.
     held
-        Whether the body is meant to be held to the ground, by springs, supports or rows that were taken out. It is
-        labelled so (`FEBody.is_held`): it can be checked, reduced, compared and exported, a floating frame refuses it.
+        Whether the body is intentionally held to the ground, by springs, supports or removed rows. The body is then
+        labelled (`FEBody.is_held`). It can be checked, reduced, compared and exported, but a floating frame rejects it.
     mend_mass
-        Whether slightly negative eigenvalues of M, as some programs write them, are set to zero (`positive_mass`).
+        Whether to set slightly negative eigenvalues of M, as some programs write them, to zero (`positive_mass`).
     accept
-        Findings to accept: "units", that size, density or wave speed are implausible.
+        Findings to accept: "units" accepts an implausible size, density or wave speed.
 
     Raises
     ------
     BodyError
         If shapes do not fit, a matrix is not symmetric or finite, a component is not 0 to 5, or two rows are the same
-        dof; if K answers rigid-body motion and the body is not said to be held, or a mistake explains it (rows in
-        another order, exchanged nodes, a penalty on the diagonal); if it is said to be held and is free; if M is
-        indefinite; if no body in these units has such a size, density or wave speed.
+        dof; if K resists rigid-body motion although `held` is false; if K does so because of a mistake (rows in another
+        order, exchanged nodes, a penalty on the diagonal); if `held` is true but the body is free; if M is indefinite;
+        or if the size, density or wave speed is implausible in these units.
     """
     where = f"body {name!r}"
     nodes, dofs = np.asarray(nodes, dtype=float), np.asarray(dofs)
@@ -149,7 +151,7 @@ def body_from_matrices(
     if dofs.ndim == 2 and dofs.shape[1] == 2 and len(dofs) and (dofs[:, 1] < 0).any():
         raise BodyError(
             f"{where}: dofs: expected components 0 to 5, got {int(dofs[:, 1].min())} in row "
-            f"{int(np.argmin(dofs[:, 1]))}; multipliers and other dofs without displacement are no part of a body"
+            f"{int(np.argmin(dofs[:, 1]))}; remove the rows of multipliers and of other dofs without displacement"
         )
     record = dict(provenance or {}) | {"mesh": (provenance or {}).get("mesh", "matrices")}
     body = FEBody(
@@ -184,7 +186,7 @@ def body_from_matrices(
 
 
 def require_freedom(body: FEBody, *, held: bool) -> None:
-    """Raise `BodyError` unless the body is free, or held as it is said to be and by no mistake."""
+    """Raise `BodyError` unless the body is free, or held as declared and not by a mistake."""
     where = f"body {body.name!r}"
     forces = rigid_forces(body.K, body.M, body.nodes, body.dofs)
     mass = np.diag(forces.mass)[:3]
@@ -214,7 +216,7 @@ def require_freedom(body: FEBody, *, held: bool) -> None:
 
 
 def require_positive_mass(body: FEBody) -> None:
-    """Raise `BodyError` if M is indefinite by more than rounding; large matrices are left to the eigensolver."""
+    """Raise `BodyError` if M is indefinite beyond rounding; large matrices are left to the eigensolver."""
     if body.n_dof > DENSE:
         return
     values, _ = negative_mass(body.M, body.dofs)
@@ -229,7 +231,7 @@ def require_positive_mass(body: FEBody) -> None:
 
 
 def require_units(body: FEBody, *, accept: tuple[str, ...]) -> None:
-    """Raise `BodyError` if no body in these units has such a size, density or wave speed; warn of what is doubtful."""
+    """Raise `BodyError` if size, density or wave speed is impossible in these units; warn if one is doubtful."""
     if unknown := set(accept) - {"units"}:
         raise BodyError(f"body {body.name!r}: accept: unknown {unknown.pop()!r}; expected 'units'")
     mass = float(np.diag(rigid_forces(body.K, body.M, body.nodes, body.dofs).mass)[:3].max())
@@ -240,9 +242,9 @@ def require_units(body: FEBody, *, accept: tuple[str, ...]) -> None:
 
 
 def wave_speeds(body: FEBody) -> Array:
-    """Return sqrt(K_kk / M_kk) times the distance to the nearest node, of translations with mass, (k,).
+    """Return sqrt(K_kk / M_kk) times the distance to the nearest node, for translations with mass, (k,).
 
-    In a fine mesh that is the speed of waves times a number between 1 and 10.
+    In a fine mesh this is the wave speed times a factor between 1 and 10.
     """
     used = np.unique(body.dofs[:, 0])
     if len(used) < 2:
@@ -256,9 +258,9 @@ def wave_speeds(body: FEBody) -> Array:
 
 
 def scalar_mass_of(body: FEBody) -> sp.csr_array | None:
-    """Return M_s, (n_nodes, n_nodes), if the mass of the body is M_s ⊗ 1₃ on its translations and zero elsewhere.
+    """Return M_s, (n_nodes, n_nodes), if M is M_s ⊗ 1₃ on the translations and zero elsewhere; else None.
 
-    None if it is not: rotations carry mass, directions differ or are coupled, or a node lacks a direction.
+    None means that rotations carry mass, that directions differ or are coupled, or that a node lacks a direction.
     """
     M = sp.coo_array(body.M)
     node, component = body.dofs[M.row, 0], body.dofs[M.row, 1]
@@ -280,9 +282,9 @@ def scalar_mass_of(body: FEBody) -> sp.csr_array | None:
 
 
 def require_both_triangles(where: str, matrix: sp.csc_array) -> None:
-    """Raise `BodyError` if the matrix is square and holds one triangle only."""
+    """Raise `BodyError` if the matrix is square and holds only one triangle."""
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
-        return  # `FEBody` says what it expects
+        return  # `FEBody` raises the error with the expected shape
     column = np.repeat(np.arange(matrix.shape[1]), np.diff(matrix.indptr))
     below = np.count_nonzero(matrix.data[matrix.indices > column])
     above = np.count_nonzero(matrix.data[matrix.indices < column])
@@ -302,14 +304,14 @@ def body_from_npz(
     mend_mass: bool = False,
     accept: Iterable[str] = (),
 ) -> FEBody:
-    """Read a body from an .npz archive of plain arrays (`numpy.savez`); pickled objects are refused.
+    """Read a body from an .npz archive of plain arrays (`numpy.savez`); pickled objects are rejected.
 
     =================================  ==============================================================================
     key                                array
     =================================  ==============================================================================
-    M, K, D (optional)                 dense, (n_dof, n_dof); or in its place the parts of a sparse matrix:
+    M, K, D (optional)                 dense, (n_dof, n_dof); or instead the parts of a sparse matrix:
     M_row, M_col, M_data               triplets, numbered from 0, duplicates added; or
-    M_indptr, M_indices, M_data        compressed columns or rows, which is the same for a symmetric matrix
+    M_indptr, M_indices, M_data        compressed columns or rows (equal, because the matrix is symmetric)
     nodes                              (n_nodes, 3)
     dofs                               (n_dof, 2): node, from 0, and component, 0-2 translation and 3-5 rotation
     units (or the argument `units`)    name of the unit system, such as "mm-t-s"
@@ -324,15 +326,21 @@ def body_from_npz(
 
     Parameters
     ----------
+    path
+        The archive.
+    name
+        Name of the body; None: the name of the file without its suffix.
+    units
+        Unit system of the arrays; None: the one that the file names.
     held, mend_mass, accept
-        As for `body_from_matrices`; held also by the key of the file.
+        As for `body_from_matrices`. The key `held` of the file also declares the body held.
 
     Raises
     ------
     MeshError
-        If the file is missing, is no such archive, lacks a key, has unknown ones, or names no units.
+        If the file is missing, is not such an archive, lacks a key, has unknown keys, or names no unit system.
     BodyError
-        If the arrays do not make a body.
+        If the arrays do not make a valid body.
     """
     path = Path(path)
     arrays = read_arrays(path)
@@ -366,7 +374,7 @@ def body_from_npz(
 
 
 def is_held(path: Path, arrays: Mapping[str, np.ndarray]) -> bool:
-    """Return what the key `held` says; False where there is none."""
+    """Return the value of the key `held`; False if the file has no such key."""
     if "held" not in arrays:
         return False
     value = arrays["held"]
@@ -380,7 +388,8 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
     if not path.is_file():
         raise MeshError(f"{path}: no such file; expected an .npz archive of matrices")
     try:
-        with path.open("rb") as stream:  # ours to close: np.load leaves it open when the archive is broken
+        # np.load leaves the file open if the archive is broken, so the file is opened and closed here
+        with path.open("rb") as stream:
             archive = np.load(stream, allow_pickle=False)
             arrays = {} if isinstance(archive, np.ndarray) else {key: archive[key] for key in archive.files}
     except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error, NotImplementedError) as error:
@@ -394,13 +403,13 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
 
 
 def require_key(path: Path, arrays: Mapping[str, np.ndarray], key: str) -> None:
-    """Raise `MeshError` unless the key is there."""
+    """Raise `MeshError` unless the archive has the key."""
     if key not in arrays:
         raise MeshError(f"{path}: the array {key!r} is missing; got {', '.join(arrays) or 'none'}")
 
 
 def sparse_of(path: Path, arrays: Mapping[str, np.ndarray], key: str, n_dof: int) -> sp.csc_array:
-    """Return a matrix from its dense array, its triplets or its compressed parts."""
+    """Return a matrix from its dense array, its triplets or its compressed columns."""
     parts = [part for part in ("data", "row", "col", "indptr", "indices") if f"{key}_{part}" in arrays]
     forms = {"triplets": {"data", "row", "col"}, "compressed": {"data", "indptr", "indices"}}
     form = next((form for form, needed in forms.items() if set(parts) == needed), "dense" if not parts else "")
@@ -425,7 +434,7 @@ def sparse_of(path: Path, arrays: Mapping[str, np.ndarray], key: str, n_dof: int
 
 
 def units_of(path: Path, arrays: Mapping[str, np.ndarray], units: Units | None) -> Units:
-    """Return the units asked for, or those the file names; refuse none and two that differ."""
+    """Return the unit system passed, or the one in the file; raise `MeshError` if there is none or they differ."""
     if "units" not in arrays:
         if units is None:
             raise MeshError(f"{path}: the file names no units; pass units=unit_system(...) or add a key 'units'")
@@ -437,7 +446,7 @@ def units_of(path: Path, arrays: Mapping[str, np.ndarray], units: Units | None) 
 
 
 def interfaces_of(path: Path, arrays: Mapping[str, np.ndarray]) -> list[Interface]:
-    """Return the interfaces of the archive in the order of its keys."""
+    """Return the interfaces of the archive, in the order of its keys."""
     groups: dict[str, dict[str, np.ndarray]] = {}
     for key in arrays:
         if key.startswith("interface/"):

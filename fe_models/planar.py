@@ -1,4 +1,4 @@
-"""A planar body: elastic in one plane, rigid out of it, and still a body in space with six rigid-body motions."""
+"""Planar bodies: elastic in one plane and rigid out of it, with all six rigid-body motions of a body in space."""
 
 from dataclasses import replace
 
@@ -14,23 +14,23 @@ __all__ = ["planar"]
 
 
 def planar(body: FEBody, *, normal: int = 2) -> FEBody:
-    """Return the body with all deformation across a plane taken away.
+    """Return the body without any deformation out of a plane.
 
-    In-plane dofs stay (two translations and the rotation about the normal: three per node). Out of the plane every
-    node follows one reference node rigidly: its translation along the normal and the rotations about the two in-plane
-    axes are the only three such dofs of the body. So mass, inertia and invariants stay those of the body in space, K
-    costs nothing for all six rigid-body motions, and frames, mode sets and multibody systems work as they do in space;
-    a body that moves in its plane moves as a planar model does.
+    Each node keeps its in-plane dofs: two translations and the rotation about the normal. Out of the plane every node
+    follows one reference node rigidly. The body therefore has only three out-of-plane dofs: the translation of that
+    node along the normal and its rotations about the two in-plane axes. Mass, inertia and invariants remain those of
+    the body in space, and K has no strain energy for all six rigid-body motions. Frames, mode sets and multibody
+    systems work as they do in space, and a body that moves in its plane moves as a planar model does.
 
-    The reference node is that of the first interface: its boundary dofs are six, those of the others lose the three
-    out of plane.
+    The reference node is the node of the first interface, which keeps six boundary dofs. The other interfaces lose
+    their three out-of-plane dofs.
 
     Parameters
     ----------
     body
-        A coupled body, without distributing interfaces.
+        A coupled body without distributing interfaces.
     normal
-        Mesh axis across the plane: 0, 1 or 2 for x, y or z.
+        Mesh axis normal to the plane: 0, 1 or 2 for x, y or z.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def planar(body: FEBody, *, normal: int = 2) -> FEBody:
 
 
 def _reference_node(body: FEBody, where: str) -> int:
-    """Return the node of the first boundary dofs, else the first with six dofs."""
+    """Return the node of the first boundary dofs, or else the first node with six dofs."""
     candidates = [np.asarray(i.dofs) for i in body.interfaces if i.dofs is not None]
     nodes = np.concatenate([*[body.dofs[dofs, 0] for dofs in candidates], body.dofs[:, 0]])
     count = np.bincount(body.dofs[:, 0], minlength=len(body.nodes))

@@ -1,4 +1,4 @@
-"""A body from scikit-fem: a vector basis with the stiffness and mass that its user assembled."""
+"""Bodies made of a vector basis of scikit-fem and the stiffness and mass that its user assembled."""
 
 from collections.abc import Iterable
 from importlib.metadata import version
@@ -31,34 +31,34 @@ def body_from_skfem(
     held: bool = False,
     accept: Iterable[str] = (),
 ) -> FEBody:
-    """Make a body of matrices over a vector basis of scikit-fem, from whatever forms they were assembled.
+    """Make a body of matrices that the user assembled over a vector basis of scikit-fem, from any forms.
 
-    The basis may be of any element whose dofs are values of a component at a point (`ElementVector` of P1, P2, Q1, Q2,
-    serendipity, wedges, Crouzeix-Raviart, higher orders): this is checked by its shape functions. Where
-    M is M_s ⊗ 1₃, as a density makes it, all inertia invariants are exact. The matrices have no stress and no
-    geometric stiffness; `solid_body(basis, material)` has both, with orthotropic materials too.
+    The basis may use any element whose dofs are the values of a component at a point (`ElementVector` of P1, P2, Q1,
+    Q2, serendipity, wedges, Crouzeix-Raviart, higher orders). The shape functions are checked for this property. If M
+    is M_s ⊗ 1₃, as a density makes it, all inertia invariants are exact. The matrices give no stress and no geometric
+    stiffness. `solid_body(basis, material)` gives both, also for orthotropic materials.
 
     Parameters
     ----------
     basis
-        `skfem.Basis` of all cells of a mesh in space.
+        `skfem.Basis` over all cells of a three-dimensional mesh.
     K, M, D
-        Stiffness, mass and optional damping over the dofs of the basis, before any boundary condition, (N, N).
+        Stiffness, mass and optional damping over the dofs of the basis, without boundary conditions, (N, N).
     name
-        Of the body.
+        Name of the body.
     units
-        In which mesh and matrices are.
+        Unit system of the mesh and the matrices.
     interfaces
-        Made on the same basis: `rigid_interface(basis, "end", Plane(...))`.
+        Interfaces made on the same basis: `rigid_interface(basis, "end", Plane(...))`.
     held, accept
         As for `body_from_matrices`.
 
     Raises
     ------
     MeshError
-        If the basis is none of space, or its dofs are not values at points.
+        If the basis is not three-dimensional, or its dofs are not values at points.
     BodyError
-        If matrices do not fit, or are not those of a free body (`body_from_matrices`).
+        If the matrices do not fit, or are not those of a free body (see `body_from_matrices`).
 
     Examples
     --------
@@ -89,7 +89,7 @@ def body_from_skfem(
 
 
 def _surface(basis: Any) -> IntArray:
-    """Return triangles for drawing; none where no cell type here has the nodes of the element."""
+    """Return triangles for drawing; none if no cell type of this package has the nodes of the element."""
     try:
         return boundary_triangles(as_mesh(basis))
     except MeshError:

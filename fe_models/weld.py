@@ -1,4 +1,4 @@
-"""Weld: several bodies become one, joined where their interfaces meet; solids and frames alike."""
+"""Weld several bodies into one body, joined at their interfaces; solids and frames alike."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -24,15 +24,15 @@ Place = tuple[str, str]  #: name of a body, name of its interface
 
 @dataclass(frozen=True, eq=False)
 class WeldedModel:
-    """The element models of the parts side by side (`fe_models.body.fe_body.ElementModel`)."""
+    """The element models of the parts side by side; an `fe_models.body.fe_body.ElementModel`."""
 
     parts: tuple[ElementModel, ...]
-    n_mesh_dof: tuple[int, ...]  #: of each part
-    n_nodes: tuple[int, ...]  #: of each part, reference nodes included
+    n_mesh_dof: tuple[int, ...]  #: number of mesh dofs of each part
+    n_nodes: tuple[int, ...]  #: number of nodes of each part, including reference nodes
 
     @property
     def has_nodal_stress(self) -> bool:
-        """Whether any part knows its stress; the others show zero."""
+        """Whether any part knows its stress; the other parts report zero."""
         return any(part.has_nodal_stress for part in self.parts)
 
     def mass_gram(self, u: Array) -> Array:
@@ -44,7 +44,7 @@ class WeldedModel:
         return gram
 
     def nodal_stress(self, u: Array, *, nodes: IntArray | None = None) -> Array:
-        """Return the stress at the nodes of all parts, (n_nodes, 6, k); zero at reference nodes."""
+        """Return the stress at the nodes of all parts, (n_nodes, 6, k) [Pa]; zero at reference nodes."""
         stresses = []
         first = np.cumsum([0, *self.n_nodes])
         for part, rows, begin, n_nodes in zip(self.parts, self._rows(), first[:-1], self.n_nodes, strict=True):
@@ -57,7 +57,7 @@ class WeldedModel:
         return np.concatenate(stresses)
 
     def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
-        """Return the rotations that the parts know at nodes of all, (n, 3, k); NaN at others."""
+        """Return rotations at the given nodes, (n, 3, k); NaN where the part does not know them."""
         rotation = np.full((len(nodes), 3, np.shape(u)[1]), np.nan)
         first = np.cumsum([0, *self.n_nodes])
         for part, rows, begin, n_nodes in zip(self.parts, self._rows(), first[:-1], self.n_nodes, strict=True):
@@ -68,15 +68,15 @@ class WeldedModel:
 
     @property
     def has_geometric_stiffness(self) -> bool:
-        """Whether all parts know it: without one of them the stiffness of the whole would be wrong."""
+        """Whether all parts know their geometric stiffness; a missing part would make the sum wrong."""
         return all(part.has_geometric_stiffness for part in self.parts)
 
     def mass_forces(self, loads: MassLoads) -> Array:
-        """Return the consistent nodal forces of loads per mass, (n_mesh_dof, k)."""
+        """Return the consistent nodal forces of loads per unit mass, (n_mesh_dof, k) [N, N m]."""
         return np.concatenate([part.mass_forces(loads) for part in self.parts])
 
     def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
-        """Return the nodal forces of columns u, (n_mesh_dof, k)."""
+        """Return the nodal forces of the displacement columns u, (n_mesh_dof, k) [N, N m]."""
         first = np.cumsum([0, *self.n_nodes])
         inside = [
             None if nodes is None else nodes[(nodes >= begin) & (nodes < begin + n)] - begin
@@ -102,34 +102,36 @@ class WeldedModel:
 
 @dataclass(frozen=True, eq=False)
 class WeldedPoints:
-    """The stress points of the parts that have some (`fe_models.body.fe_body.StressPointModel`)."""
+    """The stress points of all parts that have stress points; a `fe_models.body.fe_body.StressPointModel`."""
 
-    parts: tuple[tuple[str, StressPointModel, slice], ...]  #: name of the part, its points, its rows of the mesh dofs
+    #: name of the part, its stress points, and its rows among the mesh dofs
+    parts: tuple[tuple[str, StressPointModel, slice], ...]
 
     @property
     def names(self) -> tuple[str, ...]:
-        """One per point: "frame: line 3 end point 5"."""
+        """Name of each point, such as "frame: line 3 end point 5"."""
         return tuple(f"{body}: {name}" for body, points, _ in self.parts for name in points.names)
 
     @property
     def positions(self) -> Array:
-        """Undeformed, mesh axes, (n_points, 3) [m]."""
+        """Undeformed positions in mesh axes, (n_points, 3) [m]."""
         return np.concatenate([points.positions for _, points, _ in self.parts])
 
     def stress(self, u: Array) -> Array:
-        """Return the stress, (n_points, 6, k) [Pa], of columns over the mesh dofs."""
+        """Return the stress of displacement columns over the mesh dofs, (n_points, 6, k) [Pa]."""
         return np.concatenate([points.stress(u[rows]) for _, points, rows in self.parts])
 
 
 def weld(bodies: Sequence[FEBody], joints: Iterable[tuple[Place, Place]], *, name: str) -> FEBody:
-    """Join coupled bodies into one.
+    """Join coupled bodies into one body.
 
-    (1) matrices, nodes, dofs, surfaces and load cases side by side
-    (2) at each joint the six dofs of the second interface follow those of the first rigidly: u_2 = u_1 + theta_1 × r
-    (3) interfaces that are joined are boundary no more; the others stay as they are
+    (1) place matrices, nodes, dofs, surfaces and load cases side by side
+    (2) at each joint, let the six dofs of the second interface follow the first rigidly: u_2 = u_1 + theta_1 × r
+    (3) remove the joined interfaces from the boundary; the other interfaces stay as they are
 
-    A beam meets a solid by an interface on the solid's faces, rigid (RBE2) or distributing (RBE3), and one at the
-    beam's end node. Joined interfaces need not lie at one point: the distance is a rigid arm.
+    To join a beam to a solid, give the solid an interface on its faces, rigid (RBE2) or distributing (RBE3), and the
+    beam an interface at its end node. The two interfaces need not lie at one point: the distance between them is a
+    rigid arm.
 
     Parameters
     ----------
@@ -138,18 +140,19 @@ def weld(bodies: Sequence[FEBody], joints: Iterable[tuple[Place, Place]], *, nam
     joints
         Pairs of (body name, interface name).
     name
-        Of the whole. Interfaces keep their names where these are unique, else they become "body.interface".
+        Name of the welded body. Interfaces keep their names if these are unique; otherwise they become
+        "body.interface".
 
     Returns
     -------
     FEBody
-        Coupled; its element model is `WeldedModel` where every part has one.
+        Coupled. Its element model is a `WeldedModel` if every part has an element model.
 
     Raises
     ------
     BodyError
-        If names are unknown or repeated, units differ, a body is not coupled, an interface has not six dofs at one
-        node, or a joint closes a ring of followers.
+        If names are unknown or repeated, units differ, a body is not coupled, an interface does not have six dofs at
+        one node, or the joints form a closed loop.
     """
     where = f"weld {name!r}"
     bodies, joints = tuple(bodies), tuple(joints)
@@ -164,7 +167,7 @@ def weld(bodies: Sequence[FEBody], joints: Iterable[tuple[Place, Place]], *, nam
 
 
 def mesh_rows(n_mesh_dof: tuple[int, ...]) -> list[slice]:
-    """Return the rows of each part among the mesh dofs of all."""
+    """Return the rows of each part among the mesh dofs of all parts."""
     return [slice(begin, end) for begin, end in pairwise(np.cumsum([0, *n_mesh_dof]).tolist())]
 
 
@@ -188,7 +191,7 @@ def _joined_dofs(
     first_dof: IntArray,
     joints: tuple[tuple[Place, Place], ...],
 ) -> tuple[set[Place], list[tuple[IntArray, IntArray]]]:
-    """Return the interfaces that are joined, and the dofs of both sides of each joint."""
+    """Return the joined interfaces, and the dofs on both sides of each joint."""
     joined: set[Place] = set()
     pairs = []
     for joint in joints:
@@ -289,7 +292,7 @@ def _block_damping(bodies: tuple[FEBody, ...]) -> Any:
 
 
 def _followers(where: str, body: FEBody, pairs: list[tuple[IntArray, IntArray]]) -> tuple[IntArray, sp.csr_array]:
-    """Return the dofs that follow and their rows over all dofs; chains are resolved to the leader of all."""
+    """Return the dependent dofs and their rows over all dofs; chains are resolved to their first leader."""
     leader: dict[int, int] = {}  # node -> node
     dofs_of: dict[int, IntArray] = {}
     for pair in pairs:
@@ -297,7 +300,7 @@ def _followers(where: str, body: FEBody, pairs: list[tuple[IntArray, IntArray]])
         dofs_of |= dict(zip(nodes, pair, strict=True))
         roots = [_root(leader, node) for node in nodes]
         if roots[0] == roots[1]:
-            raise BodyError(f"{where}: a joint joins what is joined already; remove one of the joints")
+            raise BodyError(f"{where}: a joint connects interfaces that are joined already; remove one of the joints")
         leader[roots[1]] = roots[0]
     slaves: list[int] = []
     rows: list[int] = []

@@ -1,1 +1,1 @@
-"""What a finite element body is: `FEBody`, its interfaces, couplings and loads."""
+"""The finite element model of one body (`FEBody`), its interfaces, couplings and loads."""

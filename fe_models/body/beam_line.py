@@ -1,4 +1,4 @@
-"""A straight beam as beam theory sees it: mass and stiffness per length along x, uniform, tapered or stepped."""
+"""A straight beam of beam theory: mass and stiffness per length along x, uniform, tapered or stepped."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,36 +12,36 @@ from fe_models.foundation.errors import BodyError
 
 __all__ = ["BeamLine", "Law"]
 
-Law = float | Polynomial | Callable[[Array], Array]  #: a value per length: constant, or a function of x
+Law = float | Polynomial | Callable[[Array], Array]  #: a quantity per length: constant, or a function of x
 
 STIFFNESSES = ("EA", "EIy", "EIz", "GJ", "GAy", "GAz")
-SMOOTH_DEGREE = 24  #: degree to which a law given as a function is integrated
+SMOOTH_DEGREE = 24  #: polynomial degree assumed when a law given as a Python function is integrated
 
 
 @dataclass(frozen=True, eq=False)
 class BeamLine:
-    """A straight beam from x = 0 to its length, y and z the principal axes of its sections, centroids on x.
+    """A straight beam from x = 0 to its length; y and z are the principal axes of its sections, with centroids on x.
 
-    Each law is a number, a `numpy.polynomial.Polynomial` of x, or a function of an array of x. Integrals are exact for
-    numbers and polynomials between `breaks`; functions count as polynomials of degree 24.
+    Each law is a number, a `numpy.polynomial.Polynomial` of x, or a function of an array of x. Integrals of numbers and
+    polynomials are exact between `breaks`. Functions are integrated as polynomials of degree 24.
 
     Raises
     ------
     BodyError
-        If the length is not positive or the breaks are not inside it, ascending; later, where a law is not positive.
+        If the length is not positive, or the breaks are not ascending inside it; later, where a law is not positive.
     """
 
     length: float  #: [m]
     rho_A: Law  # noqa: N815  #: mass [kg/m]
-    EA: Law  #: of tension [N]
-    EIy: Law  #: of bending in the x-z plane, EI of ∫ z² [N m²]
-    EIz: Law  #: of bending in the x-y plane, EI of ∫ y² [N m²]
-    GJ: Law  #: of torsion [N m²]
+    EA: Law  #: axial stiffness [N]
+    EIy: Law  #: bending stiffness in the x-z plane, EI with I = ∫ z² dA [N m²]
+    EIz: Law  #: bending stiffness in the x-y plane, EI with I = ∫ y² dA [N m²]
+    GJ: Law  #: torsional stiffness [N m²]
     rho_Iy: Law = 0.0  # noqa: N815  #: rotary inertia ∫ rho z² [kg m]
     rho_Iz: Law = 0.0  # noqa: N815  #: rotary inertia ∫ rho y² [kg m]
-    GAy: Law = np.inf  #: of shear along y; infinite: sections stay normal to the axis [N]
-    GAz: Law = np.inf  #: of shear along z [N]
-    breaks: tuple[float, ...] = ()  #: where laws jump or have a kink, ascending, inside the length [m]
+    GAy: Law = np.inf  #: shear stiffness along y; infinite: sections stay normal to the axis [N]
+    GAz: Law = np.inf  #: shear stiffness along z [N]
+    breaks: tuple[float, ...] = ()  #: ascending positions inside the length at which laws have a jump or a kink [m]
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "length", float(self.length))
@@ -56,12 +56,12 @@ class BeamLine:
 
     @property
     def has_shear(self) -> bool:
-        """Whether it deforms in shear."""
+        """Whether the beam deforms in shear."""
         return any(callable(law) or np.isfinite(law) for law in (self.GAy, self.GAz))
 
     @property
     def degree(self) -> int:
-        """Highest degree of the laws, as they are integrated."""
+        """Highest polynomial degree of the laws as they are integrated."""
         degrees = [0]
         for name in (*STIFFNESSES, "rho_A", "rho_Iy", "rho_Iz"):
             law = getattr(self, name)
@@ -72,12 +72,19 @@ class BeamLine:
         return max(degrees)
 
     def at(self, name: str, x: Array) -> Array:
-        """Return the values of a law at the places x, (n,).
+        """Return the values of a law at positions x, (n,).
+
+        Parameters
+        ----------
+        name
+            Field name of the law, such as "EA".
+        x
+            Positions along the axis, (n,) [m].
 
         Raises
         ------
         BodyError
-            Where it is not positive (inertia: negative) or gives numbers of another shape.
+            If a value is not positive (for inertia: negative), or the law returns an array of another shape.
         """
         law = getattr(self, name)
         values = np.asarray(law(x) if callable(law) else np.full(np.shape(x), float(law)), dtype=float)
@@ -91,7 +98,7 @@ class BeamLine:
         return values
 
     def points(self, degree: int, *, breaks: Array | None = None) -> tuple[Array, Array]:
-        """Return Gauss points and weights, exact for laws times polynomials of this degree between the breaks, (n,)."""
+        """Return Gauss points and weights, (n,), exact between breaks for laws times polynomials of this degree."""
         inner = np.asarray(self.breaks if breaks is None else [*self.breaks, *breaks])
         inner = np.unique(inner[(inner > 0) & (inner < self.length)])
         ends = np.concatenate([[0.0], inner, [self.length]])

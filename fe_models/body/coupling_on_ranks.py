@@ -1,7 +1,7 @@
-"""Bodies whose stiffness and mass lie by rows on all ranks.
+"""Bodies whose stiffness and mass are distributed by rows over all ranks.
 
-In couplings, what stays stays where it is, and what is new comes from rank 0; a body that rank 0 has made whole gives
-its rows away (`spread_body`).
+A coupling leaves the kept rows on their ranks and takes the new rows from rank 0. A body that rank 0 has made alone
+distributes its rows with `spread_body`.
 """
 
 from dataclasses import replace
@@ -24,16 +24,16 @@ KEY_OF_WHOLE = "rows of rank 0"
 
 
 def spread_extension(A: SpreadMatrix, keep: IntArray, more: sp.csc_array) -> SpreadMatrix:
-    """Return [[A[keep][:, keep], 0], [0, 0]] + more, (n_new, n_new), by rows on all ranks.
+    """Return [[A[keep][:, keep], 0], [0, 0]] + more, (n_new, n_new), distributed by rows over all ranks.
 
-    Rows that stay lie on the ranks that have them, in their order; the last rank has those after them.
+    Kept rows stay on their ranks, in their order. The last rank also holds the new rows, after its own.
 
     Parameters
     ----------
     keep
-        Dofs that stay: the first of the new ones, in this order, (n_kept,).
+        Kept dofs; they become the first dofs of the result, in this order, (n_kept,).
     more
-        Symmetric, (n_new, n_new): the rows and columns of reference nodes and multipliers.
+        Symmetric matrix, (n_new, n_new), with the rows and columns of reference nodes and multipliers.
     """
     n_kept, n_new = len(keep), more.shape[0]
     new = np.full(len(A.order), -1, np.int64)
@@ -52,7 +52,7 @@ def spread_extension(A: SpreadMatrix, keep: IntArray, more: sp.csc_array) -> Spr
 
 
 def extended_here(ranks: Ranks, rows: Rows, more: sp.csr_array) -> OwnRows:
-    """Return this rank's rows of the result."""
+    """Return the rows of the result that this rank holds."""
     stay: OwnRows = ranks.store.pop(KEY)
     own = rows.of(ranks.rank)
     indptr = np.concatenate([stay.indptr, np.full(own.stop - own.start + 1 - len(stay.indptr), stay.indptr[-1])])
@@ -66,16 +66,17 @@ def extended_here(ranks: Ranks, rows: Rows, more: sp.csr_array) -> OwnRows:
 
 
 def spread_body(body: FEBody, ranks: Ranks) -> FEBody:
-    """Return a body whose K and M lie by rows on all ranks, those of rank 0 in place of the whole.
+    """Return a body whose K and M are distributed by rows over all ranks, in place of the whole matrices of rank 0.
 
-    Rows in an order in which neighbours are near, cut into parts of about as many entries of K. One rank, and a body
-    that lies so already, as those of solid meshes do: the body itself.
+    The rows are ordered so that neighbours are near, and are cut into parts with about as many entries of K each. With
+    one rank, or if the body is distributed already (as bodies of solid meshes are), the body itself is returned.
     """
     if ranks.size == 1 or isinstance(body.K, SpreadMatrix):
         return body
     order = nearby_order(body.K, body.dofs, np.arange(body.n_dof))
     rows = even_rows(np.concatenate([[0], np.cumsum(np.diff(body.K.indptr)[order])]), ranks.size)
-    # element models take columns of rank 0 where the recovery does not say where rows of the mesh lie
+    # Without a recovery that says on which ranks the rows of the mesh lie, element models would take the columns of
+    # rank 0.
     recovery = body.recovery or Recovery(sp.eye_array(body.n_dof, format="csr"), body.dofs)
     return replace(
         body,
@@ -86,7 +87,7 @@ def spread_body(body: FEBody, ranks: Ranks) -> FEBody:
 
 
 def spread_whole(ranks: Ranks, A: sp.csc_array, order: IntArray, rows: Rows) -> SpreadMatrix:
-    """Return a symmetric matrix of rank 0 by rows on all ranks, in this order."""
+    """Distribute a symmetric matrix of rank 0 by rows over all ranks, in this order."""
     by_rows = sp.csr_array((A.data, A.indices, A.indptr), shape=A.shape)[order]
     place = np.empty(len(order), by_rows.indices.dtype)
     place[order] = np.arange(len(order), dtype=place.dtype)
@@ -98,5 +99,5 @@ def spread_whole(ranks: Ranks, A: sp.csc_array, order: IntArray, rows: Rows) -> 
 
 
 def given_here(ranks: Ranks, rows: Rows) -> OwnRows:
-    """Return this rank's rows of what rank 0 has."""
+    """Return this rank's rows of the matrix that rank 0 holds."""
     return OwnRows(*spread(ranks, rows, ranks.store.pop(KEY_OF_WHOLE, None)))

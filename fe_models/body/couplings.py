@@ -1,9 +1,10 @@
-"""Couplings: interfaces of many nodes become boundary dofs, an FEBody becomes an FEBody (docs/theory.md §1).
+"""Couplings: interfaces with many nodes get boundary dofs. FEBody in, FEBody out (docs/theory.md §1).
 
-A rigid interface (RBE2) eliminates its member dofs: u_members = T u_reference. A distributing interface (RBE3)
-keeps them: the reference node follows the weighted mean motion, u_reference = A u_members, by six Lagrange
-multipliers that stay in the body as interior dofs without mass; K is then indefinite, its motions are not.
-Elimination of members instead would fill K with a dense block of all of them.
+A rigid interface (RBE2) eliminates its member dofs: u_members = T u_reference. A distributing interface (RBE3) keeps
+them: the reference node follows the weighted mean motion of the members, u_reference = A u_members. Six Lagrange
+multipliers enforce this; they stay in the body as massless interior dofs. K is then indefinite, but the motions that
+satisfy the constraints have positive energy. Eliminating the members instead would fill K with a dense block over all
+members.
 """
 
 from dataclasses import dataclass, replace
@@ -21,14 +22,15 @@ from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 
 __all__ = ["couple", "mean_motion"]
 
-RANK_TOLERANCE = 1e-6  #: smallest to largest radius of the members about their line, below which they are collinear
+#: ratio of smallest to largest radius of the members about their line, below which they count as collinear
+RANK_TOLERANCE = 1e-6
 
 
 def couple(body: FEBody) -> FEBody:
     """Give every interface of the body its boundary dofs.
 
-    Dofs of the result: those of the mesh that stay, in their order, then per rigid or distributing interface the six
-    of its reference node (a new node at the end of `nodes`, mesh axes), then the multipliers.
+    The dofs of the result are, in this order: the mesh dofs that stay; for each rigid or distributing interface the six
+    dofs of its reference node (a new node at the end of `nodes`, mesh axes); and the multipliers.
 
     Raises
     ------
@@ -46,7 +48,7 @@ def couple(body: FEBody) -> FEBody:
         _require_spread(body, interface)
     dofs_of_node = _DofTable(body)
 
-    # new dofs: kept mesh dofs | reference nodes | multipliers
+    # order of the new dofs: kept mesh dofs | reference nodes | multipliers
     slaves = [dofs_of_node.all_of(interface.nodes) for interface in rigid]
     is_kept = np.ones(body.n_dof, dtype=bool)
     for slave in slaves:
@@ -66,7 +68,7 @@ def couple(body: FEBody) -> FEBody:
         ]
     )
 
-    # u_mesh = T u: identity on kept dofs, rigid motion of the reference node on slaves
+    # u_mesh = T u, where T is the identity on kept dofs and the rigid motion of the reference node on slave dofs
     slave_rows = np.concatenate(slaves) if slaves else np.zeros(0, np.int64)
     blocks = [_rigid_rows(body, interface, slave) for interface, slave in zip(rigid, slaves, strict=True)]
     T_s = sp.block_diag(blocks, format="csr") if blocks else sp.csr_array((0, 0))
@@ -115,14 +117,23 @@ def couple(body: FEBody) -> FEBody:
 
 
 def mean_motion(points: Array, weights: Array, reference: Array) -> Array:
-    """Weighted mean motion of points: the rigid motion of the reference point nearest to theirs (RBE3).
+    """Return the weighted mean motion of points: the best-fitting rigid motion of the reference point (RBE3).
 
-    Least squares Σ w_i |u_i - d - theta × (c_i - reference)|² gives [d; theta] = (Σ w GᵀG)⁻¹ Σ w Gᵀ u.
+    Minimising Σ w_i |u_i - d - theta × (c_i - reference)|² gives [d; theta] = (Σ w GᵀG)⁻¹ Σ w Gᵀ u.
+
+    Parameters
+    ----------
+    points
+        Positions, (n_points, 3) [m].
+    weights
+        Weight of each point, (n_points,) [-].
+    reference
+        Reference point, (3,) [m].
 
     Returns
     -------
     Array
-        A with [d; theta] = A u, (6, 3 n_points), columns node-major.
+        A in [d; theta] = A u, (6, 3 n_points), columns node-major.
     """
     G = rigid_motion_of_points(points, reference)  # (n, 3, 6)
     weighted = weights[:, None, None] * G
@@ -132,14 +143,14 @@ def mean_motion(points: Array, weights: Array, reference: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Positions:
-    """Rows of a node in the dof table: order[start[node]:start[node + 1]], by component."""
+    """Rows of each node in the dof table: order[start[node]:start[node + 1]], sorted by component."""
 
     order: IntArray
     start: IntArray
 
 
 class _DofTable:
-    """Dofs of given nodes, by node and component."""
+    """Look-up of the dofs of given nodes, by node and component."""
 
     def __init__(self, body: FEBody) -> None:
         order = np.lexsort((body.dofs[:, 1], body.dofs[:, 0]))
@@ -168,7 +179,7 @@ def _node_dofs(node: int) -> IntArray:
 
 
 def _rigid_rows(body: FEBody, interface: Interface, slaves: IntArray) -> Array:
-    """Rows of u_members = T u_reference for these slave dofs, (n_slaves, 6)."""
+    """Return the rows of u_members = T u_reference for these slave dofs, (n_slaves, 6)."""
     node, component = body.dofs[slaves].T
     rows = np.zeros((len(slaves), 6))
     translation = component < 3
@@ -196,10 +207,10 @@ def _congruence(
     n_more: int,
     more: sp.csc_array | None = None,
 ) -> sp.csc_array:
-    """Return Tᵀ A T + more of T = [1 0; 0 T_s] with n_more empty rows and columns at the end.
+    """Return Tᵀ A T + more with T = [1 0; 0 T_s], where T has n_more empty rows and columns at the end.
 
-    The kept block is cut out in one pass and the few new rows and columns are added: the product with the whole T
-    would walk all of A three times. A matrix by rows on all ranks stays there.
+    The kept block is cut out in one pass, and the few new rows and columns are added. The product with the whole T
+    would read all of A three times. A distributed matrix stays distributed.
     """
     n_new = len(keep) + T_s.shape[1] + n_more
     new = _reference_entries(A, keep, slave_rows, T_s, n_new) if len(slave_rows) else None
@@ -232,7 +243,7 @@ def _reference_entries(
 
 
 def _longer(indptr: IntArray, n: int) -> IntArray:
-    """Return the column pointers with empty columns added up to n."""
+    """Return the column pointers extended to n columns; the new columns are empty."""
     return np.concatenate([indptr, np.full(n + 1 - len(indptr), indptr[-1], indptr.dtype)])
 
 
@@ -247,7 +258,7 @@ def _multiplier_rows(
 ) -> sp.csc_array:
     """Return [[0, Cᵀ], [C, 0]] of the constraints C u = A u_members - u_reference = 0, scaled to the size of K.
 
-    The scale is that of the members' stiffness, and the rotation rows are lengths (theta times the radius of the
+    The scale is the stiffness of the members. The rotation rows are scaled to lengths (theta times the radius of the
     interface), so that the pivots of the factorisation stay comparable.
     """
     rows, columns, values = [], [], []
@@ -286,7 +297,7 @@ def _refuse_overlap(body: FEBody) -> None:
 
 
 def _require_dofs(body: FEBody, interfaces: list[Interface]) -> None:
-    """Refuse members without dofs: nodes that already follow others."""
+    """Raise `BodyError` if members have no dofs because they already follow other nodes."""
     has_dofs = np.zeros(len(body.nodes), dtype=bool)
     has_dofs[body.dofs[:, 0]] = True
     for interface in interfaces:
@@ -299,11 +310,11 @@ def _require_dofs(body: FEBody, interfaces: list[Interface]) -> None:
 
 
 def _require_spread(body: FEBody, interface: Interface) -> None:
-    """Refuse members on one point or line: a rotation of the reference node about the line would move nothing."""
+    """Raise `BodyError` if the members lie at one point or on one line, so that a rotation about it moves nothing."""
     where = f"body {body.name!r}: interface {interface.name!r}"
     has_rotation = np.isin(interface.nodes, body.dofs[body.dofs[:, 1] >= 3, 0]).any()
     if interface.kind == "rigid" and has_rotation:
-        return  # a node with rotations follows all six motions
+        return  # one node with rotations carries all six motions
     weights = np.asarray(interface.weights) if interface.kind == "distributing" else np.ones(len(interface.nodes))
     used = interface.nodes[weights > 0]
     points = body.nodes[used]

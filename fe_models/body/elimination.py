@@ -1,4 +1,4 @@
-"""Elimination: some dofs of a body become a linear combination of others (a congruence); FEBody to FEBody."""
+"""Elimination of dofs: some dofs become a linear combination of others (a congruence). FEBody in, FEBody out."""
 
 from dataclasses import replace
 
@@ -13,17 +13,17 @@ __all__ = ["eliminate_dofs"]
 
 
 def eliminate_dofs(body: FEBody, slaves: IntArray, T_s: sp.sparray) -> FEBody:
-    """Return the body with u_slaves = T_s u put into M, K, D and the load cases: Tᵀ A T.
+    """Substitute u_slaves = T_s u in M, K, D and the load cases, as Tᵀ A T, and return the new body.
 
-    The nodes stay, the recovery to the dofs of the mesh is carried along, boundary dofs are renumbered.
+    The nodes stay. The recovery of the mesh dofs is updated, and the boundary dofs are renumbered.
 
     Parameters
     ----------
     body
         Any body.
-    slaves
+    Dofs to eliminate, (n_slaves,).
         Dofs that leave, (n_slaves,).
-    T_s
+    Rows over all dofs of the body, zero in the columns of the slaves, (n_slaves, n_dof).
         Over all dofs of the body, zero in the columns of the slaves, (n_slaves, n_dof).
 
     Raises

@@ -1,4 +1,4 @@
-"""The finite element model of one body, as every source hands it to the reduction."""
+"""The finite element model of one body: the form in which every source passes it to the reduction."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -35,14 +35,14 @@ INTERFACE_KINDS = ("rigid", "distributing", "nodes")
 
 
 class ElementModel(Protocol):
-    """What only the elements know of a displacement field: exact integrals over mass, stress, geometric stiffness."""
+    """Quantities that only the elements know: exact mass integrals, stress and geometric stiffness."""
 
     @property
     def has_nodal_stress(self) -> bool:
-        """Whether `nodal_stress` can be asked for; bare matrices and pure frames of beams do not know it."""
+        """Whether `nodal_stress` may be called; bare matrices and pure beam frames do not know the stress."""
 
     def mass_gram(self, u: Array) -> Array:
-        """Integrals over mass ∫ a aᵀ of a = [1, c, u_x, u_y, u_z] (docs/theory.md §5).
+        """Return the mass integrals ∫ a aᵀ dm with a = [1, c, u_x, u_y, u_z] (docs/theory.md §5).
 
         Parameters
         ----------
@@ -52,19 +52,19 @@ class ElementModel(Protocol):
         Returns
         -------
         Array
-            (4 + 3 k, 4 + 3 k) [kg × units of the products]; u_x of all columns first, then u_y, u_z.
+            (4 + 3 k, 4 + 3 k) [kg × units of the products]; u_x of all columns come first, then u_y, u_z.
         """
 
     def nodal_stress(self, u: Array, *, nodes: IntArray | None = None) -> Array:
-        """Stress at the nodes, averaged over the adjoining elements of one material.
+        """Return the stress at the nodes, averaged over the adjoining elements of one material.
 
         Parameters
         ----------
         u
             Displacement columns over the dofs of the uncoupled body, (n_mesh_dof, k).
         nodes
-            Whose stress is wanted; None: that of all. Nodes of an interface may be beyond the mesh: they have none. The
-            others may show zero.
+            Nodes whose stress is wanted; None: all nodes. Nodes beyond the mesh, such as those of an interface, have no
+            stress. The result may be zero at nodes that are not listed.
 
         Returns
         -------
@@ -73,27 +73,32 @@ class ElementModel(Protocol):
         """
 
     def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
-        """Rotation vectors at nodes that have no rotations among their dofs, from the elements there.
+        """Return rotation vectors, from the adjoining elements, at nodes that have no rotational dofs.
 
         Parameters
         ----------
         u
             Displacement columns over the dofs of the uncoupled body, (n_mesh_dof, k).
         nodes
-            Indices of nodes, some perhaps beyond the mesh, (n,).
+            Indices of nodes, (n,); some may lie beyond the mesh.
 
         Returns
         -------
         Array
-            (n, 3, k); NaN where the elements do not know it.
+            (n, 3, k); NaN where the elements do not know the rotation.
         """
 
     @property
     def has_geometric_stiffness(self) -> bool:
-        """Whether the three functions below can be asked for; bare matrices do not know them."""
+        """Whether the three methods below may be called; bare matrices do not know the geometric stiffness."""
 
     def mass_forces(self, loads: MassLoads) -> Array:
-        """Nodal forces of loads per mass, consistent: their work on any u is that of the loads on its field.
+        """Return consistent nodal forces of loads per unit mass: their work on any u equals the work of the loads.
+
+        Parameters
+        ----------
+        loads
+            Loads per unit mass.
 
         Returns
         -------
@@ -102,14 +107,14 @@ class ElementModel(Protocol):
         """
 
     def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
-        """Nodal forces that hold the displacements u: f_int = K u of the elements, without couplings.
+        """Return the nodal forces that hold the displacements u: f_int = K u of the elements, without couplings.
 
         Parameters
         ----------
         u
             Displacement columns over the dofs of the uncoupled body, (n_mesh_dof, k).
         nodes
-            Whose forces are wanted; None: those of all. The others may show zero.
+            Nodes whose forces are wanted; None: all nodes. The result may be zero at the other nodes.
 
         Returns
         -------
@@ -118,35 +123,35 @@ class ElementModel(Protocol):
         """
 
     def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Array) -> Array:
-        """Return Phiᵀ K_geo(sigma_j) Phi of static states u_j, (k, n, n), symmetric, linear in them (theory.md §7).
+        """Return Phiᵀ K_geo(sigma_j) Phi of static states u_j, (k, n, n), symmetric and linear in u_j (theory.md §7).
 
-        K_geo is the second derivative of the potential energy by the displacements at fixed stress: solids
-        ∫ sigma_ab u_c,a u_c,b. Elements with rotations take them as rotation vectors, and add the work of what acts off
-        their axis (section, offset) on the second order of the rotation, for which they need the loads. Together:
-        K_geo(sigma_j) of the rigid rotation theta, (theta × c, theta), is (theta × f, ½ theta × m) with f, m the nodal
-        forces `internal_forces` - `mass_forces`, plus ∫ (theta × load)·N over mass.
+        K_geo is the second derivative of the potential energy with respect to the displacements, at fixed stress. For
+        solids it is ∫ sigma_ab u_c,a u_c,b dV. Elements with rotations take the rotations as rotation vectors. They add
+        the work that forces off their axis (section, offset) do on the second-order term of the rotation; for this they
+        need the loads. Together: K_geo(sigma_j) applied to the rigid rotation theta, (theta × c, theta), is (theta × f,
+        ½ theta × m) plus ∫ (theta × load)·N dm, where f, m are the nodal forces `internal_forces` - `mass_forces`.
 
         Parameters
         ----------
         u
-            Displacements of the static states, (n_mesh_dof, k): only their stress counts, not their rigid part.
+            Displacements of the static states, (n_mesh_dof, k). Only their stress counts, not their rigid part.
         loads
-            The loads per mass that act in these states.
+            The loads per unit mass that act in these states.
         Phi
             Displacement columns over the dofs of the uncoupled body, (n_mesh_dof, n).
         """
 
 
 class StressPointModel(Protocol):
-    """Stress of a displacement field at named points, such as the outer points of beam sections."""
+    """Stress of a displacement field at named points, such as the extreme fibres of beam sections."""
 
     @property
     def names(self) -> tuple[str, ...]:
-        """One per point, such as "shaft 3 a top": (n_points,)."""
+        """Name of each point, such as "shaft 3 a top", (n_points,)."""
 
     @property
     def positions(self) -> Array:
-        """Undeformed, mesh axes, (n_points, 3) [m]."""
+        """Undeformed positions in mesh axes, (n_points, 3) [m]."""
 
     def stress(self, u: Array) -> Array:
         """Return the stress, (n_points, 6, k) [Pa], components as in `ElementModel.nodal_stress`, mesh axes.
@@ -160,20 +165,20 @@ class StressPointModel(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Interface:
-    """A named place where the body meets its neighbours.
+    """A named place at which neighbours connect to the body.
 
-    kind "rigid" (RBE2): the member nodes move rigidly with the reference node;
-    kind "distributing" (RBE3): the reference node follows the weighted mean motion of the members;
-    kind "nodes": every dof of every member node is a boundary dof.
+    "rigid" (RBE2): the member nodes move rigidly with the reference node.
+    "distributing" (RBE3): the reference node follows the weighted mean motion of the members.
+    "nodes": every dof of every member node is a boundary dof.
     """
 
     name: str
     kind: str
     nodes: IntArray  #: member nodes, indices into `FEBody.nodes`, (n_members,)
     reference: Array  #: reference point in mesh coordinates, (3,) [m]
-    triad: Array = field(default_factory=lambda: np.eye(3))  #: columns: axes of the interface in mesh axes, (3, 3)
-    weights: Array | None = None  #: weights of the members (area), summing to 1, (n_members,); None: equal
-    dofs: IntArray | None = None  #: boundary dofs, indices into `FEBody.dofs`; None until `couple` has made them
+    triad: Array = field(default_factory=lambda: np.eye(3))  #: interface axes as columns, in mesh axes, (3, 3)
+    weights: Array | None = None  #: weight of each member (its area), summing to 1, (n_members,); None: equal weights
+    dofs: IntArray | None = None  #: boundary dofs, indices into `FEBody.dofs`; None until `couple` has created them
 
     def __post_init__(self) -> None:
         where = f"interface {self.name!r}"
@@ -204,19 +209,19 @@ class Interface:
 
 @dataclass(frozen=True, eq=False)
 class Recovery:
-    """The way from a coupled body back to the dofs of its mesh: u_mesh = matrix @ u."""
+    """The map from a coupled body back to its mesh dofs: u_mesh = matrix @ u."""
 
     matrix: sp.csr_array  #: (n_mesh_dof, n_dof)
     dofs: IntArray  #: (node, component) of the mesh dofs, (n_mesh_dof, 2)
-    layout: RowLayout | None = None  #: where rows of the mesh dofs lie on many ranks
+    layout: RowLayout | None = None  #: ranks on which the rows of the mesh dofs lie, if they are distributed
 
 
 @dataclass(frozen=True, eq=False)
 class FEBody:
-    """Finite element model of one body: free, or held to the ground where it says so.
+    """Finite element model of one body, free or intentionally held to the ground.
 
-    Dof k is component `dofs[k, 1]` (0-2 translation, 3-5 rotation, `MULTIPLIER`) of node `dofs[k, 0]`, mesh axes.
-    A body is *coupled* when every interface has its boundary dofs (`cms.couple`); mode sets want a coupled body.
+    Dof k is component `dofs[k, 1]` (0-2 translation, 3-5 rotation, `MULTIPLIER`) of node `dofs[k, 0]`, in mesh axes. A
+    body is *coupled* if every interface has its boundary dofs (`cms.couple`). Mode sets need a coupled body.
 
     Raises
     ------
@@ -225,24 +230,26 @@ class FEBody:
     """
 
     name: str
-    M: sp.csc_array  #: mass, (n_dof, n_dof) [kg, kg m²]; a `SpreadMatrix` where many ranks work on the body
-    K: sp.csc_array  #: stiffness, (n_dof, n_dof) [N/m, N m]; likewise
+    M: sp.csc_array  #: mass, (n_dof, n_dof) [kg, kg m²]; a `SpreadMatrix` if the body is distributed over ranks
+    K: sp.csc_array  #: stiffness, (n_dof, n_dof) [N/m, N m]; a `SpreadMatrix` if the body is distributed over ranks
     nodes: Array  #: positions in mesh axes, (n_nodes, 3) [m]
     dofs: IntArray  #: (node, component) of every dof, (n_dof, 2)
     interfaces: tuple[Interface, ...] = ()
     units: Units = field(default_factory=lambda: unit_system("m-kg-s"))
     D: sp.csc_array | None = None  #: viscous damping, (n_dof, n_dof) [N s/m, N m s]
     surface: IntArray = field(default_factory=lambda: np.zeros((0, 3), np.int64))  #: triangles of nodes, (n_tri, 3)
-    element_model: ElementModel | None = None  #: None: bare matrices, then exact only what matrices can give
-    recovery: Recovery | None = None  #: None: the dofs are those of the mesh
+    #: None: bare matrices; only integrals that follow from the matrices are exact
+    element_model: ElementModel | None = None
+    recovery: Recovery | None = None  #: None: the dofs are the mesh dofs
     load_cases: tuple[LoadCase, ...] = ()  #: named loads over the dofs of this body
-    stress_points: StressPointModel | None = None  #: stress at points beside the nodes; None: there are none
-    #: volume each node stands for, none negative, (n_nodes,) [m³]; None: unknown, nodes with translations count equally
+    stress_points: StressPointModel | None = None  #: stress at points that are not nodes; None: no such points
+    #: volume that each node represents, not negative, (n_nodes,) [m³]; None: unknown, all nodes with translations count
+    #: equally
     node_volumes: Array | None = None
-    provenance: Mapping[str, str] = field(default_factory=dict)  #: where it came from: file, digest, options
-    is_held: bool = False  #: whether it is held to the ground, as it is meant to be; no floating frame takes it
-    numbering: Numbering = field(default_factory=Numbering)  #: the user's numbers of nodes and elements, and sets
-    #: nodes that the reduced body keeps with translations and rotations, beside surface and interfaces, (n,)
+    provenance: Mapping[str, str] = field(default_factory=dict)  #: origin of the body: file, digest, options
+    is_held: bool = False  #: whether the body is intentionally held to the ground; a floating frame rejects it
+    numbering: Numbering = field(default_factory=Numbering)  #: the user's numbers of nodes and elements, and the sets
+    #: nodes that the reduced body keeps with translations and rotations, in addition to surface and interfaces, (n,)
     kept: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
 
     def __post_init__(self) -> None:
@@ -296,7 +303,7 @@ class FEBody:
 
     @property
     def numbered(self) -> tuple[str, Numbering, int, int]:
-        """Name, numbering, number of nodes and of triangles: what joins the numbering of several bodies."""
+        """Name, numbering, number of nodes and number of triangles; used to join the numberings of several bodies."""
         return self.name, self.numbering, len(self.nodes), len(self.surface)
 
     @property
@@ -311,23 +318,23 @@ class FEBody:
 
     @property
     def b(self) -> IntArray:
-        """Boundary dofs: those of all interfaces in their order, (n_b,)."""
+        """Boundary dofs of all interfaces, in the order of the interfaces, (n_b,)."""
         self.require_coupled()
         parts = [interface.dofs for interface in self.interfaces if interface.dofs is not None]
         return np.concatenate(parts) if parts else np.zeros(0, np.int64)
 
     @property
     def i(self) -> IntArray:
-        """Interior dofs: all others, ascending, (n_i,)."""
+        """Interior dofs, which are all others, ascending, (n_i,)."""
         return np.setdiff1d(np.arange(self.n_dof), self.b)
 
     @property
     def length(self) -> float:
-        """Diagonal of the bounding box of the nodes [m]; scales rotations."""
+        """Diagonal of the bounding box of the nodes [m]; the length that scales rotations."""
         return float(np.linalg.norm(np.ptp(self.nodes, axis=0)))
 
     def interface(self, name: str) -> Interface:
-        """Return the interface of that name; `BodyError` with the choices if there is none."""
+        """Return the interface of that name; raise `BodyError` with the known names if there is none."""
         for interface in self.interfaces:
             if interface.name == name:
                 return interface
@@ -343,15 +350,15 @@ class FEBody:
             )
 
     def mesh_displacement(self, u: Any) -> Any:
-        """Return displacement columns over the dofs of the mesh, (n_mesh_dof, k), of columns u, (n_dof, k).
+        """Return the columns u, (n_dof, k), as displacement columns over the mesh dofs, (n_mesh_dof, k).
 
-        Those of columns on many ranks lie there too, if the recovery says how; else they are an array.
+        Columns on many ranks stay distributed if the recovery has a layout; otherwise the result is an array.
         """
         if self.recovery is None:
             return u
         if isinstance(u, SpreadColumns):
             return self._spread_displacement(u)
-        if not is_on_disk(u) or not u.flags.c_contiguous:  # some columns of an array on disk are few
+        if not is_on_disk(u) or not u.flags.c_contiguous:  # a few columns of an array on disk fit in memory
             return self.recovery.matrix @ in_memory(u)
         T = sp.csr_array(self.recovery.matrix)
         result = zeros_like(u, (T.shape[0], u.shape[1]))
@@ -368,9 +375,9 @@ class FEBody:
         return spread_parts(self.recovery.layout, u.shape[1], (T @ x for _, x in u.parts()))
 
     def translations(self, u: Array) -> Array:
-        """Return translations at all nodes, (n_nodes, 3, k), of displacement columns u, (n_dof, k) [m].
+        """Return the translations at all nodes, (n_nodes, 3, k) [m], of displacement columns u, (n_dof, k).
 
-        Nodes without translational dofs (a distributing reference node has them) stay at zero.
+        They are zero at nodes without translational dofs. The reference node of a distributing interface has such dofs.
         """
         u = in_memory(u)
         field_ = np.zeros((len(self.nodes), 3, u.shape[1]))
@@ -380,7 +387,7 @@ class FEBody:
         return field_
 
     def with_interfaces(self, *interfaces: Interface) -> "FEBody":
-        """Return the body with these interfaces added (still to be coupled)."""
+        """Return the body with these interfaces added; they are not yet coupled."""
         return replace(self, interfaces=(*self.interfaces, *interfaces))
 
     def with_load_cases(self, *load_cases: LoadCase) -> "FEBody":
@@ -389,7 +396,7 @@ class FEBody:
 
 
 def checked_matrix(where: str, A: Any, n: int) -> Any:
-    """Return a symmetric matrix; one on many ranks was made so."""
+    """Return a symmetric matrix after checking it; a distributed matrix was symmetrised when it was made."""
     if not isinstance(A, SpreadMatrix):
         return symmetric_csc(where, A, n)
     if A.shape != (n, n) or not np.isfinite(A.largest):
@@ -398,6 +405,6 @@ def checked_matrix(where: str, A: Any, n: int) -> Any:
 
 
 def put_translations(field_: Array, dofs: IntArray, u: Array) -> None:
-    """Write the translational rows of u into field_, (n_nodes, 3, k)."""
+    """Write the translational rows of u into `field_`, (n_nodes, 3, k)."""
     rows = np.flatnonzero((dofs[:, 1] >= 0) & (dofs[:, 1] < 3))
     field_[dofs[rows, 0], dofs[rows, 1]] = u[rows]

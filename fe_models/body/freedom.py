@@ -1,4 +1,4 @@
-"""What the stiffness of a body says to rigid-body motion: nothing, if it is free."""
+"""Forces with which the stiffness of a body resists rigid-body motion; a free body resists none."""
 
 from dataclasses import dataclass
 
@@ -10,23 +10,28 @@ from fe_models.foundation.arrays import Array, IntArray, frozen
 
 __all__ = ["FREE", "MOTIONS", "RigidForces", "rigid_forces"]
 
-FREE = 1e-6  #: force of a rigid-body motion over |K| |Psi_R|, of the stiffest entry or of its own row, that is rounding
-STANDS_OUT, MANY_TIMES = 1e-9, 1e4  #: share of a row, beside the median of all, by which a soft spring shows
-ROUNDING, WEAKEST = 1e-11, 1e-8  #: of the stiffest entry, of the stiffest support: what holds a body at least
+#: force of a rigid-body motion relative to |K| |Psi_R| (of the stiffest entry or of its own row) that counts as
+#: rounding
+FREE = 1e-6
+#: share of a row, absolute and relative to the median share, at which a soft spring is detected
+STANDS_OUT, MANY_TIMES = 1e-9, 1e4
+#: share of the stiffest entry, and of the stiffest support, below which a force does not count as a support
+ROUNDING, WEAKEST = 1e-11, 1e-8
 MOTIONS = ("x", "y", "z", "a turn about x", "a turn about y", "a turn about z")
 
 
 @dataclass(frozen=True, eq=False)
 class RigidForces:
-    """Forces K Psi_R of rigid-body motions about the mean of the nodes, rotations over the size of the body."""
+    """Forces K Psi_R of rigid-body motions about the mean of the nodes; rotations are scaled to the body size."""
 
-    F: Array  #: K Psi_R, zero for motions that the dofs of the body cannot make, (n_dof, 6) [N/m]
-    share: Array  #: of every row: |F| over the sum of |K_kl| s_l, s the size of motion of a dof, (n_dof, 6)
-    largest: Array  #: largest force over the stiffest entry, (6,)
+    F: Array  #: K Psi_R, (n_dof, 6) [N/m]; zero for motions that the dofs of the body cannot make
+    #: share of every row: |F| divided by the sum of |K_kl| s_l, where s is the size of the motion of a dof, (n_dof, 6)
+    share: Array
+    largest: Array  #: largest force divided by the stiffest entry, (6,)
     energy: Array  #: Psi_Rᵀ K Psi_R, (6, 6) [N/m]
     mass: Array  #: Psi_Rᵀ M Psi_R, (6, 6) [kg]
     stiffest: float  #: largest entry of K [N/m]
-    is_possible: np.ndarray  #: whether the dofs of the body can make the motion, (6,) bool
+    is_possible: np.ndarray  #: whether the dofs of the body can make each motion, (6,) bool
 
     def __post_init__(self) -> None:
         for name in ("F", "share", "largest", "energy", "mass"):
@@ -34,24 +39,25 @@ class RigidForces:
 
     @property
     def is_free(self) -> bool:
-        """Whether no motion is answered by more than rounding."""
+        """Whether no motion meets a resistance beyond rounding."""
         return not self.is_answered.any()
 
     @property
     def is_answered(self) -> np.ndarray:
-        """Whether a motion is answered by forces, (6,) bool."""
+        """Whether each motion meets a resistance, (6,) bool."""
         return np.asarray((self.largest > FREE) | self._answers.any(axis=0))
 
     @property
     def rows(self) -> IntArray:
-        """Rows that answer some motion, ascending."""
+        """Rows that resist some motion, ascending."""
         return np.flatnonzero(self._answers.any(axis=1)).astype(np.int64)
 
     @property
     def _answers(self) -> np.ndarray:
-        """Which row answers which motion, (n_dof, 6) bool.
+        """Whether each row resists each motion, (n_dof, 6) bool.
 
-        Translations do not depend on the digits of the nodes: there a soft spring shows as a row far above the others.
+        Translations do not depend on the digits of the node positions, so a soft spring shows as a row far above the
+        others.
         """
         translations = self.share[:, :3]
         usual = np.median(translations, axis=0) if len(translations) else np.zeros(3)
@@ -60,31 +66,31 @@ class RigidForces:
 
     @property
     def n_free(self) -> int:
-        """Number of independent possible motions that are answered by rounding alone, combinations among them."""
+        """Number of independent possible motions, combinations included, that meet no resistance beyond rounding."""
         F = self.F[:, self.is_possible]
         values = np.linalg.svd(F, compute_uv=False)
         return int((values <= max(ROUNDING * self.stiffest, WEAKEST * values.max(initial=0.0))).sum())
 
     @property
     def place(self) -> tuple[int, int]:
-        """Row and motion of the largest force."""
+        """Row and motion with the largest force."""
         row, motion = np.unravel_index(int(np.argmax(np.abs(self.F))), self.F.shape)
         return int(row), int(motion)
 
     @property
     def swing(self) -> Array:
-        """Frequency at which the body would swing in each motion if it moved rigidly, (6,) [1 / time unit]."""
+        """Frequency at which the body would oscillate in each motion if it moved rigidly, (6,) [1 / time unit]."""
         mass = np.diag(self.mass)
         omega2 = np.diag(self.energy) / np.where(mass > 0, mass, np.inf)
         return np.asarray(np.sqrt(np.maximum(omega2, 0.0)) / (2 * np.pi))
 
 
 def rigid_forces(K: sp.csc_array, M: sp.csc_array, nodes: Array, dofs: IntArray) -> RigidForces:
-    """Find what K answers to rigid-body motion.
+    """Compute the forces with which K resists rigid-body motion.
 
-    A motion is left out where the body lacks all dofs of a component that moves in it: a plane body knows no motion
-    out of its plane, a row of masses along x none but that along x. Nodes that lack dofs which others have do not
-    excuse a motion.
+    A motion is left out if the body has no dof at all of a component that moves in it. A plane body, for example, has
+    no motion out of its plane, and a row of masses along x only has the motion along x. A motion is not left out
+    because some nodes lack dofs that others have.
 
     Parameters
     ----------
@@ -105,7 +111,8 @@ def rigid_forces(K: sp.csc_array, M: sp.csc_array, nodes: Array, dofs: IntArray)
     arms = np.abs(nodes[used] - center).max(axis=0)
     for k in range(3):
         is_possible[k] = known[k]
-        others = [c for c in range(3) if c != k]  # a turn about k moves points along these, by their other arm
+        # a rotation about k moves points along these two axes, each by the other component of the arm
+        others = [c for c in range(3) if c != k]
         moves = [c for c in others if arms[3 - k - c] > 1e-9 * size]
         is_possible[3 + k] = (all(known[c] for c in moves) and bool(moves)) or (not moves and known[3 + k])
         is_possible[3 + k] &= known[3 + k] or not has_rotations

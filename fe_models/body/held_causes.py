@@ -1,7 +1,7 @@
-"""Why matrices are those of no free body: a support that is meant, or a mistake that can be named.
+"""Reasons why matrices are not those of a free body: an intended support, or a recognisable mistake.
 
-A support answers translations where it stands. Rows in another order answer everywhere, and fit once they are put in
-order; nodes that are not where K has them answer turns alone; a penalty stands out on the diagonal.
+A support resists translations at its nodes. Rows in a wrong order resist everywhere, and fit once they are reordered.
+Wrong node positions resist rotations alone. A penalty has a conspicuously large diagonal entry.
 """
 
 from collections.abc import Callable
@@ -16,15 +16,16 @@ from fe_models.foundation.words import node_list
 
 __all__ = ["mistake_of", "support_words"]
 
-Called = Callable[[int], str]  #: what the user calls a node, by its index
+Called = Callable[[int], str]  #: gives the user's name of a node, by its index
 
-PENALTY = 1e6  #: of the median of the diagonal, in a row that answers with nearly all of its stiffness
-ALONE = 0.9  #: share of a row that counts as nearly all
+#: ratio of a diagonal entry to the median diagonal above which a row that resists with all its stiffness is a penalty
+PENALTY = 1e6
+ALONE = 0.9  #: share of a row that counts as all of its stiffness
 LENGTHS = {1e-3: "mm beside matrices in m", 1e3: "m beside matrices in mm", 0.0254: "inches beside matrices in m",
            1 / 0.0254: "m beside matrices in inches"}  # fmt: skip
-#: by what the nodes would have to be multiplied: what they are in
-MOST_SOLVED = 3000  #: dofs of suspected nodes whose true places are sought
-APART = 1e-3  #: distance from a node to its true place over the size of the body, that is a mistake
+#: factor by which the nodes would have to be multiplied, and the unit mistake that it reveals
+MOST_SOLVED = 3000  #: largest number of dofs of suspected nodes for which the true positions are computed
+APART = 1e-3  #: distance from a node to its true position, relative to the size of the body, that counts as a mistake
 
 
 def mistake_of(
@@ -37,22 +38,22 @@ def mistake_of(
     with_rows: bool,
     called: Called = str,
 ) -> str | None:
-    """Return in words what is wrong with matrices that are not free; None if a support explains them.
+    """Describe what is wrong with matrices that are not free; None if a support explains them.
 
     (1) a penalty on the diagonal
-    (2) the same matrices are free with their rows in another order, or with the nodes in another unit
-    (3) turns are answered and translations are not, and not by springs of rotations: nodes are not where K has them;
-        their true places u = -K_SS⁻¹ K_S,rest Psi_rest, S the dofs of suspected nodes, tell which
-    (4) rows that other nodes have are missing (only `with_rows`)
+    (2) the same matrices are free if their rows are reordered, or if the nodes are in another unit
+    (3) rotations are resisted but translations are not, and not by rotational springs, so nodes are misplaced; their
+        true positions follow from u = -K_SS⁻¹ K_S,rest Psi_rest, where S are the dofs of the suspected nodes
+    (4) rows are missing that other nodes have (only if `with_rows`)
 
     Parameters
     ----------
     forces
         `rigid_forces` of these matrices.
     with_rows
-        Whether missing rows are a mistake; where the body is said to be held they are its support.
+        Whether missing rows are a mistake. If the body is declared held, they are its support.
     called
-        What messages call a node, by its index.
+        Gives the user's name of a node, by its index, for messages.
     """
     diagonal = np.abs(K.diagonal())
     median = float(np.median(diagonal[diagonal > 0])) if (diagonal > 0).any() else 1.0
@@ -72,7 +73,7 @@ def mistake_of(
     turns_only = not forces.is_answered[:3].any() and bool(forces.is_possible[:3].all())
     if turns_only and (dofs[forces.rows, 1] < 3).any():  # (3)
         moved = moved_words(K, nodes, dofs, forces, called)
-        return f"K answers turns and no translation: nodes are not where K has them{moved}"
+        return f"K resists rotations but no translation: the positions of nodes do not fit K{moved}"
     missing = missing_rows(dofs, len(nodes))
     if with_rows and len(missing):  # (4)
         node, component = missing[0]
@@ -84,7 +85,7 @@ def mistake_of(
 
 
 def fitting_order(K: sp.csc_array, M: sp.csc_array, nodes: Array, dofs: IntArray) -> str:
-    """Return the order of rows in which these matrices are free; "" if it is none of the usual ones."""
+    """Return the order of rows in which these matrices are free; "" if no usual order makes them free."""
     node, component = dofs.T
     orders = {"component-major": np.lexsort((node, component)), "node-major": np.lexsort((component, node))}
     for name, order in orders.items():
@@ -94,7 +95,7 @@ def fitting_order(K: sp.csc_array, M: sp.csc_array, nodes: Array, dofs: IntArray
 
 
 def moved_words(K: sp.csc_array, nodes: Array, dofs: IntArray, forces: RigidForces, called: Called) -> str:
-    """Say which nodes are elsewhere, as far as that can be told."""
+    """Say which nodes are misplaced, as far as the matrices allow."""
     suspected = np.unique(dofs[forces.rows, 0])
     S = np.flatnonzero(np.isin(dofs[:, 0], suspected))
     rest = np.flatnonzero(~np.isin(dofs[:, 0], suspected))
@@ -106,12 +107,12 @@ def moved_words(K: sp.csc_array, nodes: Array, dofs: IntArray, forces: RigidForc
     Psi = rigid_motion_of_dofs(nodes, dofs, center)[:, 3:]
     try:
         u = sla.splu(sp.csc_array(K[S][:, S])).solve(-np.asarray(K[S][:, rest] @ Psi[rest]))
-    except RuntimeError:  # the suspected nodes are a mechanism by themselves
+    except RuntimeError:  # the suspected nodes alone form a mechanism
         return "; mend the nodes, or the order of the dofs"
     place = np.full((len(nodes), 3), np.nan)
     node, component = dofs[S].T
     for target, (along, turn, sign) in enumerate(((1, 2, 1.0), (2, 0, 1.0), (0, 1, 1.0))):
-        rows = np.flatnonzero(component == along)  # a turn about z moves points along y by x
+        rows = np.flatnonzero(component == along)  # a rotation about z moves points along y in proportion to x
         place[node[rows], target] = sign * u[rows, turn] + center[target]
     distance = np.linalg.norm(place[suspected] - nodes[suspected], axis=1)
     is_apart = distance > APART * np.linalg.norm(np.ptp(nodes, axis=0))
@@ -130,7 +131,7 @@ def moved_words(K: sp.csc_array, nodes: Array, dofs: IntArray, forces: RigidForc
 
 
 def missing_rows(dofs: IntArray, n_nodes: int) -> list[tuple[int, int]]:
-    """Return (node, component) of dofs that nodes lack, of components that most nodes with dofs have."""
+    """Return (node, component) of the missing dofs, for components that most nodes with dofs have."""
     has = np.zeros((n_nodes, 6), dtype=bool)
     has[dofs[:, 0], dofs[:, 1]] = True
     wanted = has[np.unique(dofs[:, 0])].mean(axis=0) > 0.5
@@ -138,7 +139,7 @@ def missing_rows(dofs: IntArray, n_nodes: int) -> list[tuple[int, int]]:
 
 
 def support_words(forces: RigidForces, dofs: IntArray, time: float, *, called: Called = str) -> str:
-    """Return in words where a body is held and how stiffly; time: [s] of its time unit."""
+    """Describe where a body is held and how stiffly; `time` is its time unit [s]."""
     row, motion = forces.place
     n_nodes = len(np.unique(dofs[forces.rows, 0]))
     return (

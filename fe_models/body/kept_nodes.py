@@ -1,4 +1,4 @@
-"""Nodes that a reduced body keeps beside its surface and interfaces, as the user names them."""
+"""Nodes, named by the user, that a reduced body keeps in addition to its surface and interfaces."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -13,24 +13,25 @@ from fe_models.foundation.errors import BodyError
 
 __all__ = ["TOLERANCE", "keep_nodes"]
 
-TOLERANCE = 1e-3  #: of the size of a body: how far a node may be from the position that asks for it
+TOLERANCE = 1e-3  #: largest distance between a node and the position that selects it, relative to the size of the body
 
 
 def keep_nodes(body: FEBody, keep: Sequence[Any]) -> FEBody:
-    """Return the body that keeps some nodes, with translations and rotations, beside those it keeps already.
+    """Return the body that also keeps these nodes, with translations and rotations.
 
     Parameters
     ----------
     body
         Coupled or not.
     keep
-        A number of a node (12, or "INSTANCE.12"), the name of a set, or a position [x, y, z] in mesh axes, at which
-        a node stands within 1e-3 of the size of the body.
+        Each entry is a node number (12, or "INSTANCE.12"), the name of a set, or a position [x, y, z] in mesh axes. A
+        position selects the node within 1e-3 of the size of the body.
 
     Raises
     ------
     BodyError
-        If there is no such node or set, a set is empty, or no node stands at a position: with the nearest ones.
+        If there is no such node or set, a set is empty, or no node is at a position. The message names the nearest
+        ones.
     """
     if not len(keep):
         return body
@@ -40,7 +41,7 @@ def keep_nodes(body: FEBody, keep: Sequence[Any]) -> FEBody:
 
 
 def named_rows(body: FEBody, where: str, asked: Any) -> IntArray:
-    """Return the nodes of one entry: of a node number, of a set, or at a position."""
+    """Return the nodes of one entry: a node number, a set or a position."""
     numbering = body.numbering
     if isinstance(asked, str):
         prefix = asked.rpartition(".")[0]
@@ -71,7 +72,7 @@ def named_rows(body: FEBody, where: str, asked: Any) -> IntArray:
 
 
 def own_nodes(body: FEBody, rows: IntArray) -> IntArray:
-    """Return the rows that are nodes themselves, each node once: no points of a skin, no second copies."""
+    """Return the rows that are nodes themselves, each node once, without points of a skin and duplicates."""
     numbering = body.numbering
     if numbering.on_skin.size:
         rows = rows[numbering.on_skin[rows] == 0]

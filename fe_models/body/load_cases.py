@@ -1,4 +1,4 @@
-"""Load cases: named force vectors on a body, carried through couplings and into the reduced body."""
+"""Load cases: named force vectors on a body, which couplings and the reduction transform with it."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from fe_models.foundation.errors import BodyError
 
 __all__ = ["LOAD_CASE_KINDS", "LoadCase", "ReducedLoadCase", "check_load_cases", "load_columns"]
 
-LOAD_CASE_KINDS = ("pressure", "gravity", "force")  #: in words of the job file; a body takes any text
+LOAD_CASE_KINDS = ("pressure", "gravity", "force")  #: kinds in the job file; a body accepts any text
 
 
 @frozen_copies
@@ -19,12 +19,12 @@ LOAD_CASE_KINDS = ("pressure", "gravity", "force")  #: in words of the job file;
 class LoadCase:
     """A named load of unit amplitude: generalised forces over the dofs of its body.
 
-    A coupling u_mesh = T u carries it by congruence of the work, f = Tᵀ f_mesh; so does a reduction, Phiᵀ f.
+    A coupling u_mesh = T u keeps the work and so transforms the forces to f = Tᵀ f_mesh; a reduction to Phiᵀ f.
     """
 
     name: str
-    kind: str  #: what it is, in one word, such as those of `LOAD_CASE_KINDS`
-    f: Array  #: work-conjugate to the dofs of the body, mesh axes, (n_dof,) [N, N m]
+    kind: str  #: kind in one word, such as one of `LOAD_CASE_KINDS`
+    f: Array  #: conjugate to the dofs of the body, mesh axes, (n_dof,) [N, N m]
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "f", frozen(self.f))
@@ -38,7 +38,7 @@ class LoadCase:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ReducedLoadCase:
-    """A named load on a reduced body: its resultant and its modal forces, for an amplitude of one."""
+    """A named load of unit amplitude on a reduced body: its resultant and its modal forces."""
 
     name: str
     kind: str
@@ -58,7 +58,7 @@ class ReducedLoadCase:
 
 
 def check_load_cases(where: str, load_cases: Iterable[LoadCase], n_dof: int) -> tuple[LoadCase, ...]:
-    """Return the load cases as a tuple after checking that their names differ and their lengths fit.
+    """Return the load cases as a tuple, after a check that names differ and lengths fit.
 
     Raises
     ------

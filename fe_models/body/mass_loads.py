@@ -1,4 +1,4 @@
-"""Loads per mass that are linear in the position: weight and d'Alembert loads of rigid-body motion (theory.md §7)."""
+"""Loads per unit mass that are linear in position: weight and d'Alembert loads of rigid motion (theory.md §7)."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ __all__ = ["MassLoads", "rotation_work"]
 
 @dataclass(frozen=True, eq=False)
 class MassLoads:
-    """Forces per mass f = A c + b at the undeformed position c, mesh axes; one for each of k loads."""
+    """k loads, each with forces per unit mass f = A c + b at the undeformed position c, mesh axes."""
 
     A: Array  #: (k, 3, 3) [1/s² per unit of the load]
     b: Array  #: (k, 3) [m/s² per unit of the load]
@@ -35,11 +35,11 @@ class MassLoads:
         return len(self.b)
 
     def at(self, points: Array) -> Array:
-        """Return the forces per mass at points (..., 3), (..., 3, k)."""
+        """Return the forces per unit mass at points (..., 3), as (..., 3, k)."""
         return np.einsum("jab,...b->...aj", self.A, points) + self.b.T
 
     def plus_rigid(self, motion: Array, origin: Array) -> "MassLoads":
-        """Return the loads with d + theta × (c - origin) added, motion = [d; theta], (6, k)."""
+        """Return the loads plus d + theta × (c - origin), where motion = [d; theta], (6, k)."""
         d, theta = motion[:3].T, motion[3:].T
         A = np.array(self.A)
         for a, (b, c) in enumerate(((1, 2), (2, 0), (0, 1))):  # theta~ has -theta_a in row b, column c
@@ -49,10 +49,10 @@ class MassLoads:
 
 
 def rotation_work(V: Array) -> Array:
-    """Return W with thetaᵀ W theta' the work of forces on the second order of a rigid rotation, (..., 3, 3).
+    """Return W, (..., 3, 3), in thetaᵀ W theta', the work of forces on the second-order term of a rigid rotation.
 
-    A point at lever o moves by theta × o + ½ theta × (theta × o) when theta is a rotation vector. Forces f work on the
-    bilinear form ½ [theta × (theta' × o) + theta' × (theta × o)], that is W = sym(V) - tr(V) 1 with V = Σ f oᵀ.
+    A point at lever o moves by theta × o + ½ theta × (theta × o) if theta is a rotation vector. Forces f do work on the
+    bilinear form ½ [theta × (theta' × o) + theta' × (theta × o)]. Hence W = sym(V) - tr(V) 1 with V = Σ f oᵀ.
     """
     V = np.asarray(V)
     trace = np.trace(V, axis1=-2, axis2=-1)[..., None, None]

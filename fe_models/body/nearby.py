@@ -1,8 +1,8 @@
-"""An order of dofs in which neighbours lie near each other, whatever the order of the nodes in their file.
+"""An ordering of dofs that places neighbours near each other, whatever the order of the nodes in the file.
 
-A product with a sparse matrix reads the rows of its columns in the order of the numbering. Mesh programs number nodes
-corner by corner, then edge by edge, so that neighbours lie tens of thousands of rows apart and every read misses the
-cache; in reverse Cuthill-McKee order they lie within a band.
+A product with a sparse matrix reads the vector in the order of the numbering. Mesh programs number nodes corner by
+corner, then edge by edge, so neighbours lie tens of thousands of rows apart and every read misses the cache. In reverse
+Cuthill-McKee order they lie within a band.
 """
 
 import numpy as np
@@ -15,15 +15,15 @@ from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 
 __all__ = ["nearby_order"]
 
-SMALL = 20_000  #: dofs whose columns stay in the cache in any order
+SMALL = 20_000  #: number of dofs below which the columns stay in the cache in any order
 
 
 def nearby_order(A: sp.csc_array, dofs: IntArray, index: IntArray) -> IntArray:
-    """Return some dofs in an order in which neighbours are near; few dofs as they come, all in that of rows on ranks.
+    """Return dofs in an order that places neighbours near each other; small or distributed sets keep their order.
 
-    (1) graph of the nodes: entries of A between the first of the given dofs of each node
-    (2) reverse Cuthill-McKee order of the nodes
-    (3) dofs node by node; nodes of which not all of ux, uy, uz and no more are given come last, so that the mass of a
+    (1) build the graph of the nodes from the entries of A between the first given dof of each node
+    (2) order the nodes by reverse Cuthill-McKee
+    (3) list the dofs node by node; nodes that do not have exactly the dofs ux, uy, uz come last, so that the mass of a
         solid begins with M_s ⊗ 1₃ (`scalar_part`)
 
     Parameters
@@ -33,7 +33,7 @@ def nearby_order(A: sp.csc_array, dofs: IntArray, index: IntArray) -> IntArray:
     dofs
         (node, component) of all dofs, (n_dof, 2).
     index
-        The dofs to be ordered, ascending, (n,).
+        The dofs to order, ascending, (n,).
     """
     if isinstance(A, SpreadMatrix):
         return A.ordered(index)

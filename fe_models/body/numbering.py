@@ -1,8 +1,8 @@
-"""Numbers and names of the user: of nodes, elements and sets, as the deck or mesh has them that a body came from.
+"""The user's numbers and names of nodes, elements and sets, as in the deck or mesh of the body.
 
-Inside, a node is its row in an array of nodes, and an element is known by the triangles of the surface that it made.
-This record says what the user calls them. It goes with the body through coupling, joining and reduction into the modal
-file; messages, sensors, tables and files of other programs take names from here alone.
+Internally, a node is its row in an array of nodes, and an element is the set of surface triangles that it made. This
+record holds the user's names. It stays with the body through coupling, joining and reduction, and goes into the modal
+file. Messages, sensors, tables and exported files take names only from here.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,25 +17,25 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["NONE", "NamedSet", "Numbering", "no_numbers", "node_place", "numbering_side_by_side"]
 
-NONE = -1  #: a node or element that the user did not number: reference nodes of interfaces made here
-SHOWN = 3  #: nearest numbers that a message names
+NONE = -1  #: marks a node or element without a user number, such as the reference node of an interface
+SHOWN = 3  #: how many of the nearest numbers a message lists
 KINDS = ("nodes", "elements")
 
 
 def no_numbers() -> IntArray:
-    """Return an empty array: there are no numbers."""
+    """Return an empty array, which stands for unknown numbers."""
     return frozen_int(np.zeros(0))
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class NamedSet:
-    """A set of the user, as far as the body has it."""
+    """A set of the user, with the members that the body has kept."""
 
     name: str
     kind: str  #: "nodes" or "elements"
-    members: IntArray  #: rows of the nodes, or of the triangles of the surface that its elements made, (n,)
-    size: int  #: nodes or elements that it has in the deck or mesh
+    members: IntArray  #: rows of the nodes, or of the surface triangles of its elements, (n,)
+    size: int  #: number of nodes or elements in the deck or mesh
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "members", frozen_int(self.members))
@@ -48,19 +48,21 @@ class NamedSet:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Numbering:
-    """The user's numbers of the nodes of a body and of the elements behind its surface, and the sets of both.
+    """The user's numbers of nodes and of elements at the surface, and the user's sets.
 
-    Arrays that are empty are not known: nodes are then told by their index, and said to be.
+    An empty array means that the numbers are unknown. Messages then name nodes by their index, and say so.
     """
 
     nodes: IntArray = field(default_factory=no_numbers)  #: number of each node, `NONE` where it has none, (n_nodes,)
-    #: 1: the row is a point of a skin that moves with the node of that number, as those of beams and shells;
-    #: 0: the node itself, (n_nodes,); empty: all are nodes themselves
+    #: 1: the row is a point of a skin (of beams or shells) that moves with the node of that number; 0: the row is the
+    #: node itself, (n_nodes,); empty: all rows are nodes
     on_skin: IntArray = field(default_factory=no_numbers)
     elements: IntArray = field(default_factory=no_numbers)  #: number of the element behind each triangle, (n_tri,)
-    instances: tuple[str, ...] = ()  #: names of what repeats numbers: instances of parts, bodies that were joined
-    node_instance: IntArray = field(default_factory=no_numbers)  #: of each node, `NONE` for none, (n_nodes,)
-    element_instance: IntArray = field(default_factory=no_numbers)  #: of each triangle, `NONE` for none, (n_tri,)
+    #: names that distinguish repeated numbers: instances of parts, or bodies that were joined
+    instances: tuple[str, ...] = ()
+    node_instance: IntArray = field(default_factory=no_numbers)  #: instance of each node, `NONE` for none, (n_nodes,)
+    #: instance of the element of each triangle, `NONE` for none, (n_tri,)
+    element_instance: IntArray = field(default_factory=no_numbers)
     sets: tuple[NamedSet, ...] = ()
 
     def __post_init__(self) -> None:
@@ -87,11 +89,11 @@ class Numbering:
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing is known."""
+        """Whether no numbers and no sets are known."""
         return not (self.nodes.size or self.elements.size or self.sets)
 
     def require_fit(self, where: str, n_nodes: int, n_triangles: int) -> None:
-        """Raise `BodyError` unless it is one for so many nodes and triangles."""
+        """Raise `BodyError` unless the arrays have these numbers of nodes and triangles."""
         for name, n in (("nodes", n_nodes), ("elements", n_triangles)):
             if getattr(self, name).size not in (0, n):
                 raise BodyError(f"{where}: numbering: {name}: expected ({n},) or none, got {getattr(self, name).shape}")
@@ -100,20 +102,20 @@ class Numbering:
             if each.members.size and (each.members.min() < 0 or each.members.max() >= n):
                 raise BodyError(f"{where}: numbering: set {each.name!r}: members outside 0..{n - 1}")
 
-    # Names ------------------------------------------------------------------------------------------------------------
+    # Numbers to names -------------------------------------------------------------------------------------------------
 
     def node_name(self, row: int) -> str:
-        """Return what the user calls a node: "12", or "PART-1-1.12"; of one without number "index 7", its row."""
+        """Return the user's name of a node: "12", "PART-1-1.12", or "index 7" (its row) if it has no number."""
         if not self.nodes.size or self.nodes[row] == NONE:
             return f"index {row}"
         return self._name(int(self.nodes[row]), self.node_instance, row)
 
     def called(self, row: int) -> str:
-        """Return what messages call a node: as `node_name`; where nodes have no numbers at all its row."""
+        """Return the name of a node in messages: its `node_name`, or its row if no node has a number."""
         return self.node_name(int(row)) if self.nodes.size else str(int(row))
 
     def element_name(self, triangle: int) -> str:
-        """Return what the user calls the element behind a triangle; of one without number "of triangle 7"."""
+        """Return the user's name of the element of a triangle, or "of triangle 7" if it has no number."""
         if not self.elements.size or self.elements[triangle] == NONE:
             return f"of triangle {triangle}"
         return self._name(int(self.elements[triangle]), self.element_instance, triangle)
@@ -124,26 +126,26 @@ class Numbering:
 
     @property
     def set_names(self) -> tuple[str, ...]:
-        """Names of the sets, of nodes first, each once."""
+        """Names of the sets, node sets first, each name once."""
         of_nodes = [each.name for each in self.sets if each.kind == "nodes"]
         return tuple(dict.fromkeys([*of_nodes, *(each.name for each in self.sets)]))
 
-    # What a name means ------------------------------------------------------------------------------------------------
+    # Names to rows ----------------------------------------------------------------------------------------------------
 
     def rows_of_node(self, where: str, node: int | str) -> IntArray:
-        """Return the rows of a node, itself first, then the points of a skin that move with it, (n,) with n >= 1.
+        """Return the rows of a node: first the node itself, then the skin points that move with it, (n,) with n >= 1.
 
         Parameters
         ----------
         where
-            Who asks, for messages.
+            Start of the error message: the place where the user named the node.
         node
-            Its number, or "INSTANCE.number" where instances have the same numbers.
+            The number, or "INSTANCE.number" if several instances have it.
 
         Raises
         ------
         BodyError
-            If nodes have no numbers, there is no such node, or several instances have one.
+            If the body has no node numbers, there is no such node, or several instances have it.
         """
         rows = self._found(where, "node", node, self.nodes, self.node_instance)
         if self.on_skin.size:
@@ -151,11 +153,11 @@ class Numbering:
         return rows
 
     def triangles_of_element(self, where: str, element: int | str) -> IntArray:
-        """Return the triangles of an element, (n,) with n >= 1; `BodyError` if it is not behind the surface."""
+        """Return the triangles of an element, (n,) with n >= 1; raise `BodyError` if it has none on the surface."""
         return self._found(where, "element", element, self.elements, self.element_instance)
 
     def named_set(self, where: str, name: str) -> NamedSet:
-        """Return the set of that name, of nodes before one of elements; `BodyError` if there is none or it is empty."""
+        """Return the set of that name, node sets first; raise `BodyError` if there is none or it is empty."""
         for kind in KINDS:
             for each in self.sets:
                 if (each.kind, each.name) == (kind, name):
@@ -194,7 +196,7 @@ class Numbering:
         return np.asarray(found)
 
     def _near(self, what: str, number: int, numbers: IntArray, instance: IntArray) -> str:
-        """Say which numbers are there, the nearest ones by name."""
+        """Describe the range of known numbers, and the nearest ones."""
         rows = np.flatnonzero(numbers != NONE)
         if not rows.size:
             return f": no {what} that is kept has a number"
@@ -210,10 +212,10 @@ class Numbering:
             f"{', '.join(names)}"
         )
 
-    # Carried along ----------------------------------------------------------------------------------------------------
+    # Numberings of derived bodies -------------------------------------------------------------------------------------
 
     def with_nodes_added(self, n: int) -> "Numbering":
-        """Return the numbering of a body with n nodes more at the end, which the user did not number."""
+        """Return the numbering with n more nodes at the end, which have no user number."""
         return replace(
             self,
             nodes=longer(self.nodes, n, NONE),
@@ -222,7 +224,7 @@ class Numbering:
         )
 
     def of_rows(self, rows: IntArray, n_nodes: int) -> "Numbering":
-        """Return the numbering of some nodes, (n,) rows of n_nodes, in that order; triangles are those of before."""
+        """Return the numbering of the given rows of n_nodes, in that order, (n,); triangles stay the same."""
         place = np.full(n_nodes, NONE)
         place[rows] = np.arange(len(rows))
         sets = []
@@ -235,9 +237,9 @@ class Numbering:
         return replace(self, **{name: a[rows] if a.size else a for name, a in taken.items()}, sets=tuple(sets))
 
     def with_instances(self, instances: tuple[str, ...], step: int) -> "Numbering":
-        """Return the numbering of a deck whose k-th instance has k step added to its numbers, taken off again.
+        """Split numbers that contain the instance: instance k had k step added to its numbers.
 
-        Numbers beyond those of the last instance are of the assembly itself, and belong to none.
+        Larger numbers than those of the last instance belong to the assembly itself, and to no instance.
         """
         if not instances or not step:
             return self
@@ -251,14 +253,14 @@ class Numbering:
         return replace(self, instances=instances, **told)  # type: ignore[arg-type]
 
     def without_indices(self, indices: IntArray) -> "Numbering":
-        """Return the numbering without numbers of nodes that say no more than these indices, (n_nodes,)."""
+        """Return the numbering without node numbers if they equal these indices, (n_nodes,)."""
         if np.array_equal(self.nodes, indices) and not self.instances and not self.on_skin.any():
             return replace(self, nodes=no_numbers(), on_skin=no_numbers())
         return self
 
 
 def split_name(where: str, what: str, asked: int | str) -> tuple[str | None, int]:
-    """Return instance, None for none, and number of 12, "12" or "PART-1-1.12"."""
+    """Split 12, "12" or "PART-1-1.12" into the instance (None if not given) and the number."""
     if isinstance(asked, bool) or not isinstance(asked, int | np.integer | str):
         raise BodyError(f'{where}: {what}: expected a whole number, or text "INSTANCE.number", got {asked!r}')
     prefix, dot, number = str(asked).rpartition(".")
@@ -268,22 +270,22 @@ def split_name(where: str, what: str, asked: int | str) -> tuple[str | None, int
 
 
 def longer(values: IntArray, n: int, filling: int) -> IntArray:
-    """Return an array with n equal values added at its end; an empty one as it is."""
+    """Return an array with n equal values appended; an empty array stays empty."""
     return np.concatenate([values, np.full(n, filling)]) if values.size else values
 
 
 def numbering_side_by_side(
     parts: Sequence[tuple[str, Numbering, int, int]], *, share_numbers: bool = False
 ) -> Numbering:
-    """Return the numbering of bodies side by side.
+    """Join the numberings of several bodies into one.
 
     Parameters
     ----------
     parts
-        Name, numbering, number of nodes and of triangles of each.
+        Name, numbering, number of nodes and number of triangles of each body.
     share_numbers
-        Whether they share the nodes of one deck, so that a number that is there twice means one node, and a set of
-        the same name one set; else the names of the bodies tell them apart.
+        True if the bodies come from one deck: an equal number then means the same node, and an equal set name the same
+        set. False: names of bodies distinguish equal numbers.
     """
     n_nodes, n_triangles = np.cumsum([0, *(n for _, _, n, _ in parts)]), np.cumsum([0, *(n for *_, n in parts)])
     joined: dict[str, IntArray] = {}
@@ -311,7 +313,7 @@ def numbering_side_by_side(
 
 
 def told_apart(parts: Sequence[tuple[str, Numbering, int, int]], joined: Mapping[str, IntArray]) -> dict[str, object]:
-    """Return instances of nodes and triangles where numbers of several bodies are the same; else nothing."""
+    """Return the instances of nodes and triangles if several bodies have equal numbers; else an empty dict."""
     had = any(part[1].instances for part in parts)
     if not had and not any(overlap([part[1] for part in parts], name) for name in ("nodes", "elements")):
         return {}
@@ -337,12 +339,12 @@ def told_apart(parts: Sequence[tuple[str, Numbering, int, int]], joined: Mapping
 
 
 def overlap(numberings: Iterable[Numbering], name: str) -> bool:
-    """Whether two of them have the same number."""
+    """Whether two of the numberings have a number in common."""
     own = [np.unique(a[a != NONE]) for a in (getattr(each, name) for each in numberings)]
     together = np.concatenate([*own, np.zeros(0, np.int64)])
     return len(np.unique(together)) < len(together)
 
 
 def node_place(numbering: Numbering, nodes: Array, row: int) -> str:
-    """Say name and place of a node in words, for messages."""
+    """Describe a node by its name and position, for messages."""
     return f"node {numbering.node_name(row)} at [{', '.join(f'{x:.6g}' for x in nodes[row])}]"

@@ -1,4 +1,4 @@
-"""Mass matrices with slightly negative eigenvalues, as some programs write them, and the remedy."""
+"""Repair of mass matrices with slightly negative eigenvalues, as some programs write them."""
 
 from dataclasses import replace
 
@@ -14,15 +14,19 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["DENSE", "ROUNDING", "negative_mass", "positive_mass"]
 
-ROUNDING = 1e-10  #: eigenvalue of the scaled mass below zero, of the largest, that is rounding
-MENDED = 1e-3  #: the same, up to which it is mended: beyond it this is no mass matrix
-DENSE = 1500  #: dofs up to which all eigenvalues are found
-MOST_NEGATIVE = 200  #: negative eigenvalues of a large matrix that are sought
-NOTHING = 1e-13  #: entry of such a vector, of its largest, that is left out so that the matrix stays sparse
+#: magnitude of a negative eigenvalue of the scaled mass, relative to the largest, that counts as rounding
+ROUNDING = 1e-10
+#: magnitude of a negative eigenvalue, relative to the largest, up to which it is repaired; beyond it M is no mass
+#: matrix
+MENDED = 1e-3
+DENSE = 1500  #: number of dofs up to which all eigenvalues are computed
+MOST_NEGATIVE = 200  #: number of negative eigenvalues that are searched for in a large matrix
+#: entries of an eigenvector below this share of the largest are dropped, so that the matrix stays sparse
+NOTHING = 1e-13
 
 
 def scales(M: sp.csc_array, dofs: IntArray) -> Array:
-    """Return the root of the largest mass of a translation and of a modal coordinate, and inertia of a rotation."""
+    """Return the scale of every dof: the root of the largest mass of a translation, modal coordinate or rotation."""
     diagonal = np.abs(M.diagonal())
     size = np.ones(len(dofs))
     for is_kind in (dofs[:, 1] < 0, (dofs[:, 1] >= 0) & (dofs[:, 1] < 3), dofs[:, 1] >= 3):
@@ -32,7 +36,7 @@ def scales(M: sp.csc_array, dofs: IntArray) -> Array:
 
 
 def negative_mass(M: sp.csc_array, dofs: IntArray) -> tuple[Array, Array]:
-    """Return negative eigenvalues of M and their vectors, translations and rotations scaled to a largest mass of 1.
+    """Return the negative eigenvalues of M and their vectors, with translations and rotations scaled to similar mass.
 
     Parameters
     ----------
@@ -44,9 +48,9 @@ def negative_mass(M: sp.csc_array, dofs: IntArray) -> tuple[Array, Array]:
     Returns
     -------
     values
-        Below -`ROUNDING` of the largest, ascending, (k,) [-].
+        Eigenvalues below -`ROUNDING` times the largest, ascending, (k,) [-].
     vectors
-        (n_dof, k) [kg^(1/2), kg^(1/2) m]: M + sum |value| v vᵀ has none of them.
+        (n_dof, k) [kg^(1/2), kg^(1/2) m]. M + sum |value| v vᵀ has no negative eigenvalue.
     """
     size = scales(M, dofs)
     scaled = sp.csc_array(sp.diags_array(1 / size) @ M @ sp.diags_array(1 / size))
@@ -68,15 +72,16 @@ def negative_mass(M: sp.csc_array, dofs: IntArray) -> tuple[Array, Array]:
 
 
 def positive_mass(body: FEBody) -> FEBody:
-    """Return the body with the negative eigenvalues of its mass set to zero, and what was done in its provenance.
+    """Return the body with the negative eigenvalues of its mass set to zero, and record this in its provenance.
 
-    (1) eigenvalues and vectors of M below zero, translations and rotations scaled alike (`negative_mass`)
-    (2) M + sum |value| v vᵀ: the nearest matrix in that scale that has none; those motions lose their kinetic energy
+    (1) find the negative eigenvalues and vectors of M, translations and rotations scaled to similar mass
+        (`negative_mass`)
+    (2) add sum |value| v vᵀ, which gives the nearest matrix in that scaling; these motions then have no kinetic energy
 
     Raises
     ------
     BodyError
-        If an eigenvalue is below `-MENDED` of the largest: this is no mass matrix with rounding, but another matrix.
+        If an eigenvalue is below `-MENDED` times the largest: the matrix is then no mass matrix with rounding errors.
     """
     where = f"body {body.name!r}"
     values, vectors = negative_mass(body.M, body.dofs)  # (1)

@@ -8,9 +8,9 @@ __all__ = ["rigid_motion_of_dofs", "rigid_motion_of_points"]
 
 
 def rigid_motion_of_points(points: Array, origin: Array) -> Array:
-    """Translations of points under the six unit rigid-body motions about the origin, (n_points, 3, 6).
+    """Return the translations of points under the six unit rigid-body motions about the origin, (n_points, 3, 6).
 
-    u = d + theta × (c - origin); columns d_x d_y d_z theta_x theta_y theta_z.
+    u = d + theta × (c - origin), with columns d_x d_y d_z theta_x theta_y theta_z.
     """
     motion = np.zeros((len(points), 3, 6))
     motion[:, :, :3] = np.eye(3)
@@ -22,16 +22,17 @@ def rigid_motion_of_points(points: Array, origin: Array) -> Array:
 
 
 def rigid_motion_of_dofs(nodes: Array, dofs: IntArray, origin: Array) -> Array:
-    """Values of dofs under the six unit rigid-body motions about the origin, (n_dof, 6).
+    """Return the values of dofs under the six unit rigid-body motions about the origin, (n_dof, 6).
 
-    Columns d_x d_y d_z [-] and theta_x theta_y theta_z [m]; rows of rotations are the rotation, of multipliers zero.
+    The columns are d_x d_y d_z [-] and theta_x theta_y theta_z [m]. Rotational dofs take the rotation; multipliers are
+    zero.
 
     Parameters
     ----------
     nodes
         (n_nodes, 3) [m].
     dofs
-        (node, component) of every dof, component 0-2 translation, 3-5 rotation, below 0 multiplier, (n_dof, 2).
+        (node, component) of every dof, (n_dof, 2); component 0-2 translation, 3-5 rotation, negative: multiplier.
     """
     motion = rigid_motion_of_points(nodes, origin)
     node, component = dofs.T

@@ -1,6 +1,6 @@
-"""Compiled loops over large sparse matrices in compressed columns; imported where they are used.
+"""Compiled loops over large sparse matrices in compressed columns; imported only where used.
 
-A kernel works on a share of the columns, `part` of `n_parts`, and writes nothing outside it.
+A kernel works on one share of the columns, `part` of `n_parts`, and writes only to that share.
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ jit = njit(cache=True, nogil=True, error_model="numpy")
 
 @jit
 def column_counts(indptr, indices, index, new_row, part, n_parts, counts):
-    """Count the entries of column index[k] whose rows stay, into counts, (n,); new_row: -1 where a row leaves."""
+    """Count the kept entries of column index[k] into counts, (n,); new_row is -1 for rows that are dropped."""
     for k in range(part * index.size // n_parts, (part + 1) * index.size // n_parts):
         count = 0
         for e in range(indptr[index[k]], indptr[index[k] + 1]):
@@ -24,10 +24,9 @@ def column_counts(indptr, indices, index, new_row, part, n_parts, counts):
 
 @jit
 def column_entries(indptr, indices, data, index, new_row, part, n_parts, new_indptr, new_indices, new_data):
-    """Write the entries that `column_counts` counted, the rows of every column ascending.
+    """Write the entries that `column_counts` counted, with ascending rows in every column.
 
-    Rows that follow each other, such as those of a node, keep to each other: (1) runs of them are put in order, (2)
-    written.
+    Consecutive rows, such as those of a node, stay consecutive. (1) Sort the runs of such rows; (2) write them.
     """
     first_k, last_k = part * index.size // n_parts, (part + 1) * index.size // n_parts
     longest = 0
@@ -56,9 +55,9 @@ def column_entries(indptr, indices, data, index, new_row, part, n_parts, new_ind
 
 @jit
 def n_scalar_nodes(indptr, indices, data):
-    """Return the largest p for which the first 3 p rows and columns of a symmetric matrix are S ⊗ 1₃, bit for bit.
+    """Return the largest p for which the first 3 p rows and columns of a symmetric matrix are exactly S ⊗ 1₃.
 
-    Entries beyond the diagonal block of a node are judged with the node they lead to: the matrix is symmetric.
+    Entries outside the diagonal block of a node are compared with the node they couple to; the matrix is symmetric.
     """
     n_nodes = (indptr.size - 1) // 3
     for node in range(n_nodes):
@@ -80,7 +79,7 @@ def n_scalar_nodes(indptr, indices, data):
 
 @jit
 def scalar_entries(indptr, indices, data, p, new_indptr, new_indices, new_data):
-    """Write S, (p, p), of the first 3 p columns S ⊗ 1₃; with empty arrays for its entries count them only."""
+    """Write S, (p, p), from the first 3 p columns S ⊗ 1₃; with empty output arrays only count its entries."""
     at = 0
     for node in range(p):
         for e in range(indptr[3 * node], indptr[3 * node + 1]):

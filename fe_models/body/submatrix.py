@@ -1,4 +1,4 @@
-"""Parts of large sparse matrices in one pass over them, where SciPy's indexing takes several."""
+"""Parts of large sparse matrices in one pass; SciPy's indexing needs several passes."""
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -14,15 +14,15 @@ from fe_models.foundation.threads import n_threads
 
 __all__ = ["PrincipalBlock", "principal_block", "scalar_part"]
 
-SMALL = 200_000  #: stored entries below which compiled loops cost more than they bring
+SMALL = 200_000  #: number of stored entries below which compiled loops cost more than they save
 
 
 @dataclass(frozen=True, eq=False)
 class PrincipalBlock:
-    """A[index][:, index], (n, n), of which products and the diagonal are had without cutting it out."""
+    """The submatrix A[index][:, index], (n, n); gives products and the diagonal without forming the submatrix."""
 
     A: sp.csc_array
-    index: IntArray  #: in any order, each once, (n,)
+    index: IntArray  #: rows and columns, in any order, each once, (n,)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -40,7 +40,7 @@ class PrincipalBlock:
         return np.asarray((self.A @ whole)[self.index])
 
     def spread(self) -> SpreadBlock | None:
-        """Return it by rows on the ranks that have A by rows; None where they have not, or not in this order."""
+        """Return the submatrix distributed over the ranks of A; None if A is not distributed, or in another order."""
         return self.A.block(self.index) if isinstance(self.A, SpreadMatrix) else None
 
     def cut(self) -> sp.csc_array:
@@ -74,12 +74,12 @@ def principal_block(A: sp.csc_array, index: IntArray) -> sp.csc_array:
 
 
 def scalar_part(A: sp.csc_array) -> sp.csr_array:
-    """Return the largest S, (p, p), with A[:3p, :3p] = S ⊗ 1₃ bit for bit, such as the scalar mass of a solid.
+    """Return the largest S, (p, p), with A[:3p, :3p] = S ⊗ 1₃ exactly, such as the scalar mass of a solid.
 
     Parameters
     ----------
     A
-        Symmetric, (n, n), dofs node by node; p is 0 where the first three are no such block already, or its row
+        Symmetric, (n, n), dofs node by node. p is 0 if the first three dofs do not form such a block, or if the row
         indices are not sorted.
     """
     from fe_models.body.sparse_kernels import n_scalar_nodes, scalar_entries
@@ -93,7 +93,7 @@ def scalar_part(A: sp.csc_array) -> sp.csr_array:
 
 
 def in_threads(kernel: Callable[..., Any], inputs: tuple[Any, ...], outputs: tuple[Any, ...]) -> None:
-    """Run kernel(*inputs, part, n_parts, *outputs) for every part in threads."""
+    """Run kernel(*inputs, part, n_parts, *outputs) for every part, each in a thread."""
     n_parts = n_threads()
     with ThreadPoolExecutor(n_parts) as pool:
         list(pool.map(lambda part: kernel(*inputs, part, n_parts, *outputs), range(n_parts)))

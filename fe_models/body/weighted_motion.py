@@ -1,4 +1,4 @@
-"""The mean motion of points with a weight for each of their components, as the RBE3 element of Nastran has it."""
+"""Mean motion of points with one weight per component, as in the RBE3 element of Nastran."""
 
 import numpy as np
 
@@ -10,16 +10,16 @@ __all__ = ["characteristic_length", "weighted_motion"]
 
 ALL = (0, 1, 2, 3, 4, 5)
 UNDETERMINED = (
-    1e-12  #: eigenvalue of the normal matrix, of its largest, below which a motion moves no weighted component
+    1e-12  #: eigenvalue of the normal matrix, relative to the largest, below which a motion moves no weighted component
 )
-PART = 1e-6  #: of such a motion in a component that is asked for, below which it does not take part
+PART = 1e-6  #: largest share of such a motion in a requested component
 
 
 def characteristic_length(points: Array, reference: Array) -> float:
-    """Return the mean distance of the points from the reference point [m]: 1 if all of them are there.
+    """Return the mean distance of the points from the reference point [m], or 1 if all points coincide with it.
 
-    Nastran multiplies weights of rotations by its square, so that they compare with those of translations; other
-    programs take other lengths, or leave the rotations of members out.
+    Nastran multiplies the weights of rotations by the square of this length, so that they compare with those of
+    translations. Other programs use other lengths, or ignore the rotations of members.
     """
     length = float(np.linalg.norm(points - reference, axis=1).mean())
     return length if length > 0 else 1.0
@@ -34,38 +34,39 @@ def weighted_motion(
     components: tuple[int, ...] = ALL,
     triad: Array | None = None,
 ) -> Array:
-    """Return the rigid motion at a reference point that is nearest to the motion of points.
+    """Return the rigid motion of a reference point that fits the motion of points best.
 
-    (1) u_i = G_i [d; theta], G_i (6, 6): translation and rotation of point i in a rigid motion, in its own axes
-    (2) least squares: minimise Σ w_ic (u_ic - G_i,c [d; theta])², w_ic the weight, that of a rotation times L²
-    (3) [d; theta] = N⁻¹ Σ G_iᵀ W_i u_i, N = Σ G_iᵀ W_i G_i; L the mean distance from the reference point
+    (1) a rigid motion moves point i by u_i = G_i [d; theta], G_i (6, 6), translation and rotation in the axes of i
+    (2) minimise Σ w_ic (u_ic - G_i,c [d; theta])², where w_ic is the weight, times L² for rotations
+    (3) solve [d; theta] = N⁻¹ Σ G_iᵀ W_i u_i with N = Σ G_iᵀ W_i G_i; L is the mean distance from the reference point
 
     Parameters
     ----------
     points
         (n, 3) [m].
     weights
-        Of translations and rotations of each point, (n, 6) [-]; 0: this component does not take part.
+        Weights of the translations and rotations of each point, (n, 6) [-]; a component with weight 0 does not take
+        part.
     reference
-        (3,) [m].
+        Reference point, (3,) [m].
     axes
-        Of the components that the weights belong to, columns, (n, 3, 3); None: mesh axes.
+        Axes of the weighted components, as columns, (n, 3, 3); None: mesh axes.
     components
-        Of the motion that are asked for.
+        Requested components of the motion, 0-2 translation, 3-5 rotation.
     triad
-        Axes in which they are, columns, (3, 3); None: mesh axes.
+        Axes of the requested components, as columns, (3, 3); None: mesh axes.
 
     Returns
     -------
     Array
-        A with (the components of [d; theta]) = A u, (n_components, 6 n); columns: translation and rotation of each
-        point in mesh axes.
+        A in (requested components of [d; theta]) = A u, (n_components, 6 n). The columns are the translation and
+        rotation of each point in mesh axes.
 
     Raises
     ------
     BodyError
-        If weights are negative, infinite or all zero, or a component that is asked for moves no weighted one: points
-        on a line without weights of rotation.
+        If weights are negative, infinite or all zero, or if a requested component moves no weighted component, as for
+        points on a line without rotational weights.
     """
     points, weights = np.asarray(points, dtype=float), np.asarray(weights, dtype=float)
     if weights.shape != (len(points), 6):
@@ -83,7 +84,7 @@ def weighted_motion(
     weighted = np.swapaxes(to_axes, 1, 2) @ (W[:, :, None] * to_axes)  # (n, 6, 6), mesh axes
     right = np.einsum("nak,nab->knb", G, weighted).reshape(6, -1)  # (2)
     N = right @ G.reshape(-1, 6)
-    scale = np.repeat([1.0, 1 / L], 3)  # rotations as lengths
+    scale = np.repeat([1.0, 1 / L], 3)  # rotations are scaled to lengths
     values, vectors = np.linalg.eigh(scale[:, None] * N * scale)
     turned = np.zeros((6, 6))
     turned[:3, :3] = turned[3:, 3:] = np.eye(3) if triad is None else np.asarray(triad, dtype=float).T

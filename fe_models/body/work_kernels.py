@@ -1,4 +1,4 @@
-"""Compiled products of fields at points; imported where they are used."""
+"""Compiled products of fields at points; imported only where used."""
 
 from numba import njit
 
@@ -9,9 +9,10 @@ jit_fast = njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract
 
 @jit_fast
 def work_products(fields, unit, row, column, value, products):
-    """Write fieldsᵀ U_r fields of all pairs of columns k <= l at every point, (n_points, n_units, n_pairs).
+    """Write fieldsᵀ U_r fields for all pairs of columns k <= l at every point, (n_points, n_units, n_pairs).
 
-    fields: (n_points, c, n); U_r symmetric, (c, c), by its entries: unit r, row <= column, value, (n_entries,) each.
+    fields is (n_points, c, n). U_r is symmetric, (c, c), given by entries (unit r, row <= column, value), (n_entries,)
+    each.
     """
     n = fields.shape[2]
     for p in range(fields.shape[0]):
