@@ -1,4 +1,4 @@
-"""What is attached to the nodes of a frame: point masses, springs, rigid links."""
+"""Attachments at the nodes of a frame: point masses, springs, rigid links."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,12 +11,12 @@ from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int, til
 
 __all__ = ["PointMass", "RigidLink", "Spring"]
 
-SYMMETRIC = 1e-9  #: relative defect of a given matrix that is taken for rounding
+SYMMETRIC = 1e-9  #: relative asymmetry of a given matrix that counts as rounding
 
 
 @dataclass(frozen=True, eq=False)
 class PointMass:
-    """A rigid piece carried by a node.
+    """A rigid piece that a node carries.
 
     Raises
     ------
@@ -26,7 +26,8 @@ class PointMass:
 
     node: int
     mass: float  #: [kg]
-    inertia: Any = 0.0  #: about its centre of mass, mesh axes: (3, 3) [kg m²], or three principal values, or one
+    #: about the centre of mass, mesh axes, (3, 3) [kg m²], or three principal values, or one value for all axes
+    inertia: Any = 0.0
     offset: Any = (0.0, 0.0, 0.0)  #: from the node to the centre of mass, mesh axes, (3,) [m]
 
     def __post_init__(self) -> None:
@@ -49,27 +50,28 @@ class PointMass:
 
 @dataclass(frozen=True, eq=False)
 class Spring:
-    """A linear spring between two nodes; it acts at one point, to which both nodes reach rigidly.
+    """A linear spring between two nodes. It acts at one point, to which both nodes are connected rigidly.
 
-    The spring force is stiffness @ d with d the motion of the second node's side relative to the first's at the
-    point, six components in the axes of the triad; so rigid-body motion costs nothing wherever the nodes are.
+    The spring force is stiffness @ d, where d is the motion of the second node's side relative to the first node's side
+    at that point: six components in the axes of the triad. Rigid-body motion therefore causes no force, wherever the
+    nodes are.
 
     Raises
     ------
     BeamError
-        If the nodes are one, or a matrix is not symmetric positive semidefinite.
+        If both nodes are the same, or a matrix is not symmetric positive semidefinite.
     """
 
     nodes: tuple[int, int]
     stiffness: Any  #: (6,) diagonal or (6, 6): three translations, three rotations [N/m, N, N m]
-    damping: Any = None  #: viscous, (6,) or (6, 6) [N s/m, N s, N m s]; None: none
-    point: Any = None  #: where it acts, (3,) [m]; None: midway between the nodes
+    damping: Any = None  #: viscous damping, (6,) or (6, 6) [N s/m, N s, N m s]; None: no damping
+    point: Any = None  #: point at which the spring acts, (3,) [m]; None: midway between the nodes
     triad: Any = field(default_factory=lambda: np.eye(3))  #: axes as columns, (3, 3)
 
     def __post_init__(self) -> None:
         where = f"spring between nodes {self.nodes[0]} and {self.nodes[1]}"
         if self.nodes[0] == self.nodes[1]:
-            raise BeamError(f"{where}: expected two nodes; a spring to the ground would not let the body move")
+            raise BeamError(f"{where}: expected two nodes; a spring to the ground would hold the body")
         for name in ("stiffness", "damping"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, frozen(_semidefinite(f"{where}: {name}", getattr(self, name))))
@@ -85,16 +87,16 @@ class Spring:
 
 @dataclass(frozen=True, eq=False)
 class RigidLink:
-    """Nodes that move rigidly with one node (RBE2 inside the body): their dofs are eliminated.
+    """Nodes that move rigidly with one node (RBE2 inside the body); their dofs are eliminated.
 
     Raises
     ------
     BeamError
-        If there is no follower, or the leader is among them.
+        If there is no follower, or the leader is one of the followers.
     """
 
     node: int  #: the leader, which keeps its dofs
-    followers: Any  #: nodes, (n,)
+    followers: Any  #: nodes that follow, (n,)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "followers", frozen_int(np.atleast_1d(self.followers)))
@@ -105,7 +107,7 @@ class RigidLink:
 
 
 def point_slices(nodes: Array, masses: tuple[PointMass, ...]) -> Slices:
-    """Return the point masses as slices moved by the six dofs of their nodes."""
+    """Return the point masses as slices, which the six dofs of their nodes move."""
     n = len(masses)
     at = np.array([item.node for item in masses], dtype=np.int64)
     offset = np.array([item.offset for item in masses]).reshape(n, 3)
@@ -123,13 +125,13 @@ def point_slices(nodes: Array, masses: tuple[PointMass, ...]) -> Slices:
 
 
 def spring_matrix(nodes: Array, spring: Spring, matrix: Array) -> tuple[Array, IntArray]:
-    """Return Bᵀ matrix B with d = B u over the twelve dofs of both nodes, (12, 12), and these dofs."""
+    """Return Bᵀ matrix B, (12, 12), with d = B u over the twelve dofs of both nodes, and these dofs."""
     B, dofs = spring_motion(nodes, spring)
     return B.T @ matrix @ B, dofs
 
 
 def spring_motion(nodes: Array, spring: Spring) -> tuple[Array, IntArray]:
-    """Return B of d = B u, the motion of the second side against the first at the point, (6, 12), and the dofs u."""
+    """Return B in d = B u, (6, 12), the motion of the second side relative to the first, and the dofs of u."""
     first, second = (nodes[node] for node in spring.nodes)
     point = (first + second) / 2 if spring.point is None else np.asarray(spring.point)
     B = np.zeros((6, 12))

@@ -1,4 +1,4 @@
-"""Local axes of straight lines, and the way from nodal dofs to those of the ends of the beam axis."""
+"""Local axes of straight lines, and the map from nodal dofs to the dofs at the ends of the beam axis."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from fe_models.meshes.line_mesh import LineMesh
 
 __all__ = ["LineGeometry", "line_geometry"]
 
-PARALLEL = 1e-6  #: sine of the angle between a line and its orientation vector, below which there is no y axis
+PARALLEL = 1e-6  #: sine of the angle between a line and its orientation vector below which the y axis is undefined
 
 
 class LineGeometry:
@@ -19,8 +19,8 @@ class LineGeometry:
     ends : (n_lines, 2, 3) ends of the axis: node + offset [m]
     length : (n_lines,) [m]
     R : (n_lines, 3, 3) local axes x, y, z as columns, in mesh axes
-    T : (n_lines, 12, 12) local dofs of the axis ends from the dofs of the nodes
-    levers : (n_lines, 2, 3) from the nodes to the ends [m]
+    T : (n_lines, 12, 12) maps the dofs of the nodes to the local dofs of the axis ends
+    levers : (n_lines, 2, 3) vectors from the nodes to the ends [m]
     """
 
     def __init__(self, ends: Array, levers: Array, R: Array) -> None:
@@ -39,10 +39,11 @@ class LineGeometry:
 
 
 def line_geometry(mesh: LineMesh, orientations: Array, section_offsets: Array) -> LineGeometry:
-    """Return the geometry of the lines.
+    """Return the ends and local axes of the lines.
 
-    (1) x from the first to the second end of the line, its offsets included
-    (2) y: the part of the orientation vector v across x; by default v = e_z × x (z points up), e_y for a vertical line
+    (1) x points from the first to the second end of the line, including the offsets of the ends
+    (2) y is the component of the orientation vector v normal to x; default: v = e_z × x (z points up), or e_y if
+        vertical
     (3) z = x × y
     (4) section offsets move both ends along the local y and z
 
@@ -53,12 +54,12 @@ def line_geometry(mesh: LineMesh, orientations: Array, section_offsets: Array) -
     orientations
         Vector v of each line, (n_lines, 3); NaN rows: default.
     section_offsets
-        Of the centroid from the line, local (y, z), (n_lines, 2) [m].
+        Offset of the centroid from the line, local (y, z), (n_lines, 2) [m].
 
     Raises
     ------
     BeamError
-        If a line has no length, or its orientation vector is along it.
+        If a line has no length, or its orientation vector is parallel to it.
     """
     n = len(mesh.lines)
     levers = np.zeros((n, 2, 3)) if mesh.offsets is None else np.array(mesh.offsets)

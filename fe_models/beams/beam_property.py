@@ -1,4 +1,4 @@
-"""Section, material and theory of groups of lines."""
+"""Section, material and beam theory of groups of lines."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -18,15 +18,16 @@ __all__ = ["BeamProperty", "assign_properties", "section_of"]
 
 @dataclass(frozen=True, eq=False)
 class BeamProperty:
-    """Section, material and theory of a group of lines."""
+    """Section, material and beam theory of a group of lines."""
 
     section: Section
     material: Material
-    offset: tuple[float, float] = (0.0, 0.0)  #: of the centroid from the line, local (y, z) [m]
-    orientation: tuple[float, float, float] | None = None  #: vector towards local y; None: that of the mesh, else z up
+    offset: tuple[float, float] = (0.0, 0.0)  #: offset of the centroid from the line, local (y, z) [m]
+    #: vector towards local y; None: from the mesh, or else such that z points up
+    orientation: tuple[float, float, float] | None = None
     shear: bool = True  #: False: no shear deformation (Euler-Bernoulli)
-    rotary_inertia: bool = True  #: False: no rotary inertia of bending; that of torsion stays
-    added_mass: float = 0.0  #: per length, without stiffness [kg/m]
+    rotary_inertia: bool = True  #: False: no rotary inertia in bending; torsion keeps its inertia
+    added_mass: float = 0.0  #: additional mass per length, without stiffness [kg/m]
 
     def __post_init__(self) -> None:
         require_isotropic("beam property", self.material)
@@ -39,7 +40,7 @@ class BeamProperty:
 
 
 def section_of(item: BeamProperty) -> SectionProperties:
-    """Return the section properties for the material, without shear deformation where that is asked for."""
+    """Return the section properties for the material; shear deformation is removed if the property says so."""
     section = item.section.properties(item.material.nu)
     return section if item.shear else replace(section, A_sy=np.inf, A_sz=np.inf)
 
@@ -47,7 +48,7 @@ def section_of(item: BeamProperty) -> SectionProperties:
 def assign_properties(
     mesh: LineMesh, properties: BeamProperty | Mapping[str, BeamProperty]
 ) -> tuple[tuple[BeamProperty, ...], IntArray]:
-    """Return the properties in use and the number of the property of every line, (n_lines,)."""
+    """Return the properties in use, and the index of the property of every line, (n_lines,)."""
     if isinstance(properties, BeamProperty):
         return (properties,), np.zeros(len(mesh.lines), np.int64)
     number = np.full(len(mesh.lines), -1, np.int64)

@@ -1,4 +1,4 @@
-"""A finite element body from a mesh of beams, point masses, springs and rigid links."""
+"""The finite element body of a frame: beams, point masses, springs and rigid links."""
 
 from collections.abc import Iterable, Mapping
 
@@ -35,35 +35,35 @@ def beam_body(
     springs: Iterable[Spring] = (),
     links: Iterable[RigidLink] = (),
 ) -> FEBody:
-    """Make the body of a frame: straight Timoshenko beams, six dofs per node, consistent mass with rotary inertia.
+    """Make the body of a frame of straight Timoshenko beams with six dofs per node and consistent mass.
 
     Parameters
     ----------
     mesh
-        Nodes, lines and groups.
+        Nodes, lines and groups of lines.
     properties
-        One for all lines, or line group -> property.
+        One property for all lines, or one for each group of lines.
     name
-        Of the body.
+        Name of the body.
     units
-        In which everything is.
+        Unit system of all inputs.
     interfaces
-        Named places, to be coupled later by `cms.couple`; see `line_interface`.
+        Named places that `cms.couple` couples later; see `line_interface`.
     point_masses, springs, links
-        Attached to the nodes.
+        Attachments at the nodes.
 
     Returns
     -------
     FEBody
-        Dof 6 i + c of node i but for nodes that follow a rigid link. Its nodes are those of the mesh, then those of
-        the skin, which follow them and are drawn; `BeamModel` is the element model.
+        Node i has the dofs 6 i + c, unless it follows a rigid link. The nodes are those of the mesh, then those of the
+        skin, which follow the mesh nodes and are drawn. The element model is a `BeamModel`.
 
     Raises
     ------
     BeamError
-        If a line has no length or no y axis, a node belongs to nothing, or a link is impossible.
+        If a line has no length or no y axis, a node has no attached element, or a link is impossible.
     SectionError
-        If a group is unknown, or lines have no property or two.
+        If a group is unknown, or lines have no property or two properties.
     """
     used, of_line = assign_properties(mesh, properties)
     point_masses, springs, links = tuple(point_masses), tuple(springs), tuple(links)
@@ -127,7 +127,7 @@ def beam_body(
 
 
 def assembled(parts: list[tuple[IntArray, Array]], n_dof: int) -> sp.csc_array:
-    """Return the sum of element matrices, (n, d, d) over dofs (n, d), as a sparse matrix."""
+    """Assemble element matrices, (n, d, d) over dofs (n, d), into a sparse matrix."""
     if not parts:
         return sp.csc_array((n_dof, n_dof))
     rows = [np.repeat(dofs, dofs.shape[1], axis=1).ravel() for dofs, _ in parts]
@@ -139,7 +139,7 @@ def assembled(parts: list[tuple[IntArray, Array]], n_dof: int) -> sp.csc_array:
 
 
 def skin_rows(nodes: Array, points: Array, mover: IntArray) -> sp.csr_array:
-    """Translations of skin points from the dofs of the nodes that move them, (3 n_skin, 6 n_nodes)."""
+    """Return the matrix that maps dofs of nodes to translations of skin points, (3 n_skin, 6 n_nodes)."""
     n = len(points)
     if n == 0:
         return sp.csr_array((0, 6 * len(nodes)))
@@ -153,7 +153,7 @@ def skin_rows(nodes: Array, points: Array, mover: IntArray) -> sp.csr_array:
 def _node_volumes(
     n_nodes: int, length: Array, of_line: IntArray, sections: tuple[SectionProperties, ...], skin: Skin
 ) -> Array | None:
-    """Half of the volume of every line on the ring of points at each of its ends, (n_nodes + n_skin,) [m³]."""
+    """Assign half of the volume of every line to the ring of points at each end, (n_nodes + n_skin,) [m³]."""
     volumes = np.zeros(n_nodes + len(skin.points))
     for number, section in enumerate(sections):
         lines = np.flatnonzero(of_line == number)
@@ -164,7 +164,7 @@ def _node_volumes(
 
 
 def _orientations(mesh: LineMesh, used: tuple[BeamProperty, ...], of_line: IntArray) -> Array:
-    """Vector towards y of every line: that of its mesh, else of its property, else NaN, (n_lines, 3)."""
+    """Return the vector towards y of every line from the mesh, else from its property, else NaN, (n_lines, 3)."""
     own = [(np.nan,) * 3 if item.orientation is None else item.orientation for item in used]
     of_property = np.array(own, dtype=float).reshape(-1, 3)[of_line]
     if mesh.orientations is None:

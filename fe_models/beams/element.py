@@ -1,10 +1,10 @@
-"""The straight Timoshenko beam element of two nodes in its local axes: interpolation and stiffness.
+"""The straight two-node Timoshenko beam element in local axes: interpolation and stiffness.
 
-Local dofs of both ends: u_x u_y u_z theta_x theta_y theta_z of the centroid; x along the axis, xi = x/L in 0..1.
-Without load along the element the equilibrium EI theta'' + kappa G A (v' - theta) = 0, kappa G A (v' - theta)' = 0 has
-cubic v and quadratic theta; with the end values as constants and Phi = 12 E I / (kappa G A L²) this gives the shape
-functions below, exact for end loads. The stiffness is the energy of these fields, hence exact too. Torsion and shear
-act at the shear centre (y_s, z_s): v_s = v - z_s theta_x, w_s = w + y_s theta_x.
+The local dofs at both ends are u_x u_y u_z theta_x theta_y theta_z of the centroid, with x along the axis and xi = x/L
+in 0..1. Without distributed load, the equilibrium EI theta'' + kappa G A (v' - theta) = 0, kappa G A (v' - theta)' = 0
+has cubic v and quadratic theta. With the end values as constants and Phi = 12 E I / (kappa G A L²), this gives the
+shape functions below, which are exact for end loads. The stiffness is the energy of these fields, hence exact too.
+Torsion and shear act at the shear centre (y_s, z_s): v_s = v - z_s theta_x, w_s = w + y_s theta_x.
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["end_forces_at_centroid", "interpolation", "local_stiffness", "shear_parameter"]
 
-# local dofs of bending in the x-y plane (v, theta_z at both ends) and in the x-z plane, where w' = -theta_y
+# local dofs of bending in the x-y plane (v, theta_z at both ends), and in the x-z plane, where w' = -theta_y
 _XY, _XZ = np.array([1, 5, 7, 11]), np.array([2, 4, 8, 10])
 _SIGNS = {"xy": np.array([1.0, 1.0, 1.0, 1.0]), "xz": np.array([1.0, -1.0, 1.0, -1.0])}
 
@@ -24,7 +24,7 @@ def shear_parameter(EI: Array, GA_s: Array, L: Array) -> Array:
 
 
 def bending_shapes(xi: Array, Phi: Array, L: Array) -> tuple[Array, Array]:
-    """Shape functions of deflection and rotation for v_1 theta_1 v_2 theta_2, (n, n_points, 4) each.
+    """Return shape functions of deflection and rotation for v_1 theta_1 v_2 theta_2, (n, n_points, 4) each.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def bending_shapes(xi: Array, Phi: Array, L: Array) -> tuple[Array, Array]:
 
 
 def interpolation(xi: Array, Phi_y: Array, Phi_z: Array, L: Array, shear_center: Array) -> Array:
-    """Motion of the centroid (u, theta) at points xi for unit local dofs, (n, n_points, 6, 12).
+    """Return the motion (u, theta) of the centroid at points xi for unit local dofs, (n, n_points, 6, 12).
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def interpolation(xi: Array, Phi_y: Array, Phi_z: Array, L: Array, shear_center:
 
 
 def _about_shear_center(N: Array, shear_center: Array) -> Array:
-    """Take the interpolation to hold at the shear centre and return that of the centroid."""
+    """Take the interpolation as that of the shear centre, and return that of the centroid."""
     if not np.any(shear_center):
         return N
     y_s, z_s = np.asarray(shear_center).T
@@ -94,9 +94,9 @@ def _about_shear_center(N: Array, shear_center: Array) -> Array:
 
 
 def local_stiffness(EA: Array, GJ: Array, EIy: Array, EIz: Array, Phi_y: Array, Phi_z: Array, L: Array) -> Array:
-    """Stiffness in local axes with shear centre and centroid in one point, (n, 12, 12) [N/m, N, N m].
+    """Return the stiffness in local axes if shear centre and centroid coincide, (n, 12, 12) [N/m, N, N m].
 
-    Bending block of one plane: E I / ((1 + Phi) L³) [[12, 6L, -12, 6L], [., (4+Phi)L², -6L, (2-Phi)L²], …].
+    The bending block of one plane is E I / ((1 + Phi) L³) [[12, 6L, -12, 6L], [., (4+Phi)L², -6L, (2-Phi)L²], …].
     """
     n = len(L)
     K = np.zeros((n, 12, 12))
@@ -117,7 +117,7 @@ def local_stiffness(EA: Array, GJ: Array, EIy: Array, EIz: Array, Phi_y: Array, 
 
 
 def stiffness_about_shear_center(K: Array, shear_center: Array) -> Array:
-    """Return the stiffness with torsion and shear at the shear centre, over dofs of the centroid, (n, 12, 12)."""
+    """Return the stiffness over dofs of the centroid if torsion and shear act at the shear centre, (n, 12, 12)."""
     if not np.any(shear_center):
         return K
     y_s, z_s = np.asarray(shear_center).T
@@ -129,10 +129,10 @@ def stiffness_about_shear_center(K: Array, shear_center: Array) -> Array:
 
 
 def end_forces_at_centroid(f: Array) -> Array:
-    """Section forces N Vy Vz Mx My Mz at both ends from the nodal forces of an element, (n, 2, 6, k).
+    """Return section forces N Vy Vz Mx My Mz at both ends from the nodal forces of an element, (n, 2, 6, k).
 
-    The face at the second end has the normal +x, so its section forces are the nodal forces; at the first their
-    opposite.
+    The face at the second end has the normal +x, so its section forces equal the nodal forces. At the first end they
+    are the negative of the nodal forces.
     """
     f = np.asarray(f)
     f = f.reshape(len(f), 2, 6, f.shape[2] if f.ndim == 3 else 1)

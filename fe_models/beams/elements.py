@@ -1,4 +1,4 @@
-"""The beam elements of a mesh, all at once."""
+"""All beam elements of a mesh, as arrays."""
 
 import numpy as np
 
@@ -16,17 +16,17 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["Elements", "gauss_points"]
 
-N_GAUSS = 4  #: exact for the square of a cubic, degree 6
+N_GAUSS = 4  #: exact up to degree 7; the square of a cubic has degree 6
 
 
 def gauss_points() -> tuple[Array, Array]:
-    """Return the points of the slices, 0 to 1, and their weights, whose sum is 1."""
+    """Return the positions of the slices, 0 to 1, and their weights, which sum to 1."""
     xi, weights = np.polynomial.legendre.leggauss(N_GAUSS)
     return (xi + 1) / 2, weights / 2
 
 
 class Elements:
-    """The beam elements of a mesh, all at once: stiffness and slices."""
+    """All beam elements of a mesh, as arrays: stiffness and slices."""
 
     def __init__(
         self,
@@ -59,7 +59,7 @@ class Elements:
         self.N = interpolation(self.xi, Phi_y, Phi_z, L, shear_center)
 
     def stiffness(self) -> Array:
-        """Return the stiffness over the dofs of the nodes, (n, 12, 12)."""
+        """Return the element stiffness matrices over the dofs of the nodes, (n, 12, 12)."""
         K = self.geometry.T.transpose(0, 2, 1) @ self.K_local @ self.geometry.T
         return np.asarray((K + K.transpose(0, 2, 1)) / 2)
 

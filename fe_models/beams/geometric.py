@@ -1,16 +1,18 @@
-"""Geometric stiffness of straight Timoshenko beams, of point masses and of springs (docs/theory.md §7).
+"""Geometric stiffness of straight Timoshenko beams, point masses and springs (docs/theory.md §7).
 
-Sections turn by rotation vectors, R = exp(theta~) = 1 + theta~ + ½ theta~² + …, and keep their shape. With r' = e + u'
-the strains of a section are Gamma = Rᵀ r' - e and kappa, the axial vector of Rᵀ R'; to second order
+Sections rotate by rotation vectors, R = exp(theta~) = 1 + theta~ + ½ theta~² + …, and keep their shape. With r' = e +
+u', the strains of a section are Gamma = Rᵀ r' - e, and kappa, the axial vector of Rᵀ R'. To second order
 
     Gamma = u' - theta × e  +  [-theta × u' + ½ theta × (theta × e)],   kappa = theta'  +  [-½ theta × theta'],
 
-and a twisted fibre at distance o from the axis becomes longer by ½ kappa_x² o² besides. The section force n, the moment
-m and the tension n·e of the fibres work on these second-order terms, and so do the loads off the axis on the second
-order of the rotation of their section (`mass_loads.rotation_work`): the transverse stress of a spinning shaft.
+In addition, a twisted fibre at distance o from the axis becomes longer by ½ kappa_x² o². The section force n, the
+moment m and the tension n·e of the fibres do work on these second-order terms. So do loads off the axis, on the
+second-order term of the rotation of their section (`mass_loads.rotation_work`); an example is the transverse stress of
+a spinning shaft.
 
-n(s) and m(s) are those of the loaded element, in equilibrium with the loads along it: n' + q = 0, m' + e × n + mu = 0.
-Then the geometric stiffness is that of the exact section forces, and it meets a rigid rotation to rounding.
+n(s) and m(s) are the section forces of the loaded element, in equilibrium with the loads along it: n' + q = 0, m' + e ×
+n + mu = 0. The geometric stiffness is then that of the exact section forces, and its work on a rigid rotation is right
+to roundoff.
 """
 
 from dataclasses import dataclass
@@ -29,11 +31,11 @@ __all__ = [
 
 @dataclass(frozen=True, eq=False)
 class BeamLines:
-    """What the geometric stiffness needs of the lines of a frame."""
+    """Data of the lines of a frame that the geometric stiffness needs."""
 
-    slices: Slices  #: at the Gauss points of every line
+    slices: Slices  #: slices at the Gauss points of every line
     xi: Array  #: Gauss points, 0 to 1, (p,)
-    weights: Array  #: their sum is 1, (p,)
+    weights: Array  #: Gauss weights, which sum to 1, (p,)
     length: Array  #: (n,) [m]
     x: Array  #: unit vectors along the axes, (n, 3)
     levers: Array  #: from the nodes to the ends of the axis, (n, 2, 3) [m]
@@ -41,9 +43,9 @@ class BeamLines:
 
 
 def slice_couples(slices: Slices, loads: MassLoads) -> tuple[Array, Array]:
-    """Return force and V = Σ f oᵀ about the centre of each slice, (k, n, p, 3) and (k, n, p, 3, 3).
+    """Return the force and V = Σ f oᵀ about the centre of each slice, (k, n, p, 3) and (k, n, p, 3, 3).
 
-    f = A (c + o) + b per mass; over a slice the first moment of o vanishes, so that V = A E with E = ∫ o oᵀ.
+    f = A (c + o) + b per unit mass. The first moment of o over a slice is zero, so that V = A E with E = ∫ o oᵀ dm.
     """
     force = np.einsum("np,npaj->jnpa", slices.mass, loads.at(slices.position))
     E = (slices.axes * slices.moments[..., None, :]) @ slices.axes.swapaxes(-1, -2)
@@ -51,7 +53,7 @@ def slice_couples(slices: Slices, loads: MassLoads) -> tuple[Array, Array]:
 
 
 def slice_forces(slices: Slices, loads: MassLoads) -> Array:
-    """Return the consistent forces on the dofs of the elements, (n, d, k): Σ motionᵀ (force, moment) over slices."""
+    """Return the consistent forces on the dofs of the elements, Σ motionᵀ (force, moment) over slices, (n, d, k)."""
     force, V = slice_couples(slices, loads)
     wrench = np.concatenate([force, axial(V)], axis=-1)
     k, n, p, _ = wrench.shape
@@ -60,7 +62,7 @@ def slice_forces(slices: Slices, loads: MassLoads) -> Array:
 
 
 def axial(V: Array) -> Array:
-    """Return Σ o × f of V = Σ f oᵀ, (..., 3)."""
+    """Return Σ o × f from V = Σ f oᵀ, (..., 3)."""
     return np.stack([V[..., 2, 1] - V[..., 1, 2], V[..., 0, 2] - V[..., 2, 0], V[..., 1, 0] - V[..., 0, 1]], axis=-1)
 
 
@@ -70,9 +72,9 @@ def line_geometric_stiffness(lines: BeamLines, end_forces: Array, loads: MassLoa
     Parameters
     ----------
     end_forces
-        Forces and moments on the element by its nodes less the consistent loads, mesh axes, (n, 2, 6) [N, N m].
+        Forces and moments of the nodes on the element minus the consistent loads, mesh axes, (n, 2, 6) [N, N m].
     loads
-        The load per mass, k = 1.
+        One load per unit mass, k = 1.
     """
     slices = lines.slices
     n_force, n_moment = section_forces(lines, end_forces, loads)
@@ -84,29 +86,29 @@ def line_geometric_stiffness(lines: BeamLines, end_forces: Array, loads: MassLoa
     n_tilde, m_tilde = tilde(n_force), tilde(n_moment)
     x_slices = np.broadcast_to(x[:, None], n_force.shape)
     _, V = slice_couples(slices, loads)
-    # -n·(theta_k × u_l') = theta_kᵀ n~ u_l', and the other way round
+    # -n·(theta_k × u_l') = theta_kᵀ n~ u_l', and the same with k and l exchanged
     mixed = np.einsum("npad,npab,npbc,np->ndc", Theta, n_tilde, dU, weight, optimize=True)
     # -½ m·(theta_k × theta_l')
     mixed += np.einsum("npad,npab,npbc,np->ndc", Theta, m_tilde, dTheta, weight / 2, optimize=True)
     K = mixed + mixed.transpose(0, 2, 1)
-    # ½ n·[theta_k × (theta_l × x) + …], and the loads of the slices, which act outward
+    # ½ n·[theta_k × (theta_l × x) + …], and the loads of the slices, which act in the opposite direction
     turning = weight[..., None, None] * rotation_work(n_force[..., :, None] * x_slices[..., None, :])
     turning -= rotation_work(V[0])
     K += np.einsum("npad,npab,npbc->ndc", Theta, turning, Theta, optimize=True)
     tension = np.einsum("npa,na->np", n_force, x) * weight * lines.polar_radius2[:, None]
     twist = np.einsum("npad,na->npd", dTheta, x)
     K += np.einsum("npd,np,npc->ndc", twist, tension, twist, optimize=True)
-    for end in range(2):  # the ends of the axis move with the nodes, by their levers
+    for end in range(2):  # the ends of the axis move with the nodes through the levers
         at = slice(6 * end + 3, 6 * end + 6)
         K[:, at, at] += rotation_work(end_forces[:, end, :3, None] * lines.levers[:, end, None, :])
     return np.asarray((K + K.transpose(0, 2, 1)) / 2)
 
 
 def section_forces(lines: BeamLines, end_forces: Array, loads: MassLoads) -> tuple[Array, Array]:
-    """Return n and m on faces whose normal is +x, at the Gauss points, mesh axes, (n, p, 3) each."""
+    """Return n and m at the Gauss points, on faces with normal +x, mesh axes, (n, p, 3) each."""
     slices, x = lines.slices, lines.x
     s = lines.xi * lines.length[:, None]
-    mass = slices.mass / (lines.weights * lines.length[:, None])  # per length
+    mass = slices.mass / (lines.weights * lines.length[:, None])  # mass per length
     start = slices.position[:, 0] - lines.xi[0] * lines.length[:, None] * x
     q_0 = mass[:, 0, None] * loads.at(start)[..., 0]
     q_1 = mass[:, 0, None] * np.einsum("ab,nb->na", loads.A[0], x)
@@ -123,7 +125,7 @@ def section_forces(lines: BeamLines, end_forces: Array, loads: MassLoads) -> tup
 def point_geometric_stiffness(points: Slices, loads: MassLoads) -> Array:
     """Return the geometric stiffness of point masses over the dofs of their nodes, (n, 6, 6), for one load.
 
-    Nothing is strained; their loads work on the second order of the rotation of offset and inertia.
+    A point mass has no strain. Its loads do work on the second-order term of the rotation of its offset and inertia.
     """
     force, V = slice_couples(points, loads)
     lever = -axial(points.motion[:, 0, :3, 3:]) / 2  # the block is -o~
@@ -135,14 +137,14 @@ def point_geometric_stiffness(points: Slices, loads: MassLoads) -> Array:
 def spring_geometric_stiffness(nodes: Array, spring: Spring, u: Array) -> Array:
     """Return the geometric stiffness of a spring over the dofs of its nodes, (12, 12), in the state u, (12,).
 
-    The point on both sides moves by d_i = u_i + (R_i - 1) l_i; the spring turns with the mean rotation theta of its
-    sides, so that its extension Rᵀ (d_2 - d_1) has the second order -theta × d + ½ [theta_2 × (theta_2 × l_2) - …], and
-    its twist, the logarithm of R_1ᵀ R_2, has -½ theta_1 × theta_2.
+    The point on each side moves by d_i = u_i + (R_i - 1) l_i. The axes of the spring rotate with the mean rotation
+    theta of its sides. The second-order term of its extension Rᵀ (d_2 - d_1) is therefore -theta × d + ½ [theta_2 ×
+    (theta_2 × l_2) - …], and that of its twist, the logarithm of R_1ᵀ R_2, is -½ theta_1 × theta_2.
     """
     first, second = (nodes[node] for node in spring.nodes)
     point = (first + second) / 2 if spring.point is None else np.asarray(spring.point)
     force = spring_matrix(nodes, spring, np.asarray(spring.stiffness))[0] @ u
-    S = force[6:9]  # on the second node; the first has the opposite
+    S = force[6:9]  # force on the second node; the force on the first is opposite
     levers = point - first, point - second
     M = force[9:] - np.cross(levers[1], S)
     turns = np.eye(12)[3:6], np.eye(12)[9:]

@@ -1,4 +1,4 @@
-"""Interfaces of a frame: nodes made rigid, distributing, or kept node by node."""
+"""Interfaces of a frame: rigid, distributing, or with the dofs of every node."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ __all__ = ["NodeIndices", "line_interface", "node_interface"]
 
 @dataclass(frozen=True)
 class NodeIndices:
-    """Nodes by their index in the mesh."""
+    """Selection of nodes by their index in the mesh."""
 
     nodes: tuple[int, ...]
 
@@ -47,11 +47,11 @@ def line_interface(
     name
         Name of the interface.
     selection
-        Which nodes, such as `NodeSet("end")`, `NodeIndices((0,))` or `NearestNode(point)`.
+        Selected nodes, such as `NodeSet("end")`, `NodeIndices((0,))` or `NearestNode(point)`.
     kind
-        "rigid": the nodes move rigidly with the reference node, one node is enough; "distributing": the reference node
-        follows their mean motion, weighted by the length of the lines, which needs three nodes beside one line;
-        "nodes": every dof of every node.
+        "rigid": the nodes move rigidly with the reference node; one node is enough. "distributing": the reference node
+        follows the mean motion of the nodes, weighted with the length of their lines; this needs three nodes that are
+        not collinear. "nodes": every dof of every node is a boundary dof.
     reference
         Reference point, (3,) [m]; None: the mean of the nodes.
     triad
@@ -60,7 +60,7 @@ def line_interface(
     Raises
     ------
     InterfaceError
-        If nothing is selected, or reference or triad do not do.
+        If no node is selected, or `reference` or `triad` is invalid.
     """
     return node_interface(mesh, name, selection, kind, reference, triad, line_weights(mesh))
 
@@ -74,7 +74,7 @@ def node_interface(
     triad: ArrayLike | None,
     weights: Array,
 ) -> Interface:
-    """Make an interface at nodes that have rotations; `weights`, (n_nodes,), count where it is distributing."""
+    """Make an interface at nodes with rotations; `weights`, (n_nodes,), are used by the kind "distributing"."""
     try:
         nodes = selection.members(mesh)
     except InterfaceError as error:
@@ -90,7 +90,7 @@ def node_interface(
 
 
 def line_weights(mesh: LineMesh) -> Array:
-    """Half of the length of every line at each of its nodes, (n_nodes,) [m]."""
+    """Assign half of the length of every line to each of its nodes, (n_nodes,) [m]."""
     ends = mesh.nodes[mesh.lines]
     weights = np.zeros(len(mesh.nodes))
     np.add.at(weights, mesh.lines.ravel(), np.repeat(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / 2, 2))

@@ -1,4 +1,4 @@
-"""Sections and material as the laws of a straight beam without a mesh."""
+"""Sections and material as the laws of a straight beam without a mesh (`BeamLine`)."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -23,23 +23,23 @@ def beam_line(
     taper: Callable[[float], Section] | None = None,
     breaks: tuple[float, ...] = (),
 ) -> BeamLine:
-    """Return mass and stiffness per length of a straight beam along x, its local y and z axes those of the body.
+    """Return mass and stiffness per length of a straight beam along x; its local y and z axes are those of the body.
 
     Parameters
     ----------
     length
-        [m]
+        Length [m].
     item
-        Section, material and theory. Its offset and orientation must be left out: x is the line of centroids.
+        Section, material and theory. Offset and orientation must not be set, because x is the line of centroids.
     taper
-        Section at a place x, in place of `item.section`; smooth between the breaks.
+        Section at position x, instead of `item.section`; smooth between the breaks.
     breaks
-        Places where sections jump.
+        Positions at which the section jumps [m].
 
     Raises
     ------
     SectionError
-        If the section has an offset, or a shear centre beside its centroid.
+        If the section has an offset, or its shear centre is not at the centroid.
     """
     if any(item.offset) or item.orientation is not None:
         raise SectionError("beam_line: offset and orientation: expected none, since the beam lies along x of its body")
@@ -49,7 +49,7 @@ def beam_line(
     def values(section: SectionProperties) -> dict[str, float]:
         if any(section.shear_center):
             raise SectionError(
-                f"beam_line: shear centre {section.shear_center} beside the centroid: torsion bends such a beam; take "
+                f"beam_line: shear centre {section.shear_center} is not the centroid: torsion bends such a beam; use "
                 "fe_models.beam_body"
             )
         return {
@@ -65,7 +65,7 @@ def beam_line(
         }
 
     if not is_rotary:
-        raise SectionError("beam_line: rotary_inertia = False: expected True; sections of a beam line turn with it")
+        raise SectionError("beam_line: rotary_inertia = False: expected True; a beam line always has rotary inertia")
     if taper is None:
         laws: dict[str, Law] = {**values(section_of(item))}
         return BeamLine(length, breaks=breaks, **laws)
@@ -81,5 +81,5 @@ def beam_line(
 
         return of_place
 
-    names = [name for name, value in at(0.0).items() if np.isfinite(value)]  # infinite: the default
+    names = [name for name, value in at(0.0).items() if np.isfinite(value)]  # infinite values keep the default
     return BeamLine(length, breaks=breaks, **{name: law(name) for name in names})

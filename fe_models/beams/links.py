@@ -1,4 +1,4 @@
-"""Rigid links inside a body: nodes that follow others lose their dofs."""
+"""Rigid links inside a body: nodes that follow other nodes lose their dofs."""
 
 from collections.abc import Iterable
 
@@ -17,12 +17,12 @@ __all__ = ["link_rigidly"]
 def link_rigidly(body: FEBody, links: Iterable[RigidLink]) -> FEBody:
     """Return the body with the followers of rigid links eliminated: u = u_leader + theta × (c - c_leader).
 
-    A leader may itself follow another link: the chain is resolved to the node that leads all.
+    A leader may itself follow another link. The chain is then resolved to its first leader.
 
     Raises
     ------
     BeamError
-        If a node follows two leaders or itself, a leader has not six dofs, or a follower has none.
+        If a node follows two leaders or itself, a leader does not have six dofs, or a follower has no dofs.
     """
     leader: dict[int, int] = {}
     for link in links:
@@ -44,7 +44,7 @@ def link_rigidly(body: FEBody, links: Iterable[RigidLink]) -> FEBody:
         while root in leader:
             root, steps = leader[root], steps + 1
             if steps > len(leader):
-                raise BeamError(f"rigid links: node {node} follows itself round a ring of links; open the ring")
+                raise BeamError(f"rigid links: node {node} follows itself through a loop of links; open the loop")
         if (row_of[root] < 0).any():
             raise BeamError(f"rigid links: node {root} leads others, but has not six dofs")
         mine = np.flatnonzero(row_of[node] >= 0)

@@ -1,4 +1,4 @@
-"""The elements behind a frame: integrals over mass, section forces, stress at the skin, geometric stiffness."""
+"""The element model of a frame: mass integrals, section forces, stress at the skin, geometric stiffness."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -28,10 +28,11 @@ __all__ = ["BeamModel"]
 
 @dataclass(frozen=True, eq=False)
 class BeamModel:
-    """Element model of a frame (`fe_body.ElementModel`); its dofs: six per node, then three per skin node."""
+    """Element model of a frame (`fe_body.ElementModel`); six dofs per node come first, then three per skin node."""
 
     nodes: Array  #: of the mesh, (n_nodes, 3) [m]
-    pieces: tuple[Slices, ...]  #: of the lines if there are some, then of the point masses if there are some
+    #: slices of the lines if there are lines, then of the point masses if there are point masses
+    pieces: tuple[Slices, ...]
     geometry: LineGeometry
     K_local: Array  #: (n_lines, 12, 12)
     dofs: IntArray  #: of the nodes of each line, (n_lines, 12)
@@ -43,21 +44,21 @@ class BeamModel:
 
     @property
     def n_nodes(self) -> int:
-        """Nodes of the mesh; those of the skin come after them."""
+        """Number of mesh nodes; skin nodes are numbered after them."""
         return len(self.nodes)
 
     @property
     def has_nodal_stress(self) -> bool:
-        """Whether there is a skin that shows stress."""
+        """Whether the body has a skin that shows stress."""
         return len(self.skin.points) > 0
 
     @property
     def n_mesh_dof(self) -> int:
-        """Dofs of the mesh: of the nodes, then of the skin."""
+        """Number of mesh dofs: those of the nodes, then those of the skin."""
         return 6 * self.n_nodes + 3 * len(self.skin.points)
 
     def mass_gram(self, u: Array) -> Array:
-        """Return ∫ a aᵀ over mass, a = [1, c, u_x, u_y, u_z], exact over the cross-sections (docs/theory.md §5).
+        """Return ∫ a aᵀ dm with a = [1, c, u_x, u_y, u_z], exact over the cross-sections (docs/theory.md §5).
 
         Parameters
         ----------
@@ -71,16 +72,16 @@ class BeamModel:
     def section_forces(self, u: Array) -> Array:
         """Return N Vy Vz Mx My Mz at both ends of each line, (n_lines, 2, 6, k) [N, N m].
 
-        Local axes, about the centroid, on the face whose normal is +x.
+        The forces are in local axes, about the centroid, on the face with normal +x.
         """
         self._require_rows("section_forces", u)
         local = self.geometry.T @ np.asarray(u)[self.dofs]
         return end_forces_at_centroid(self.K_local @ local)
 
     def nodal_stress(self, u: Array, *, nodes: IntArray | None = None) -> Array:
-        """Return the stress at the skin nodes, the mean of both lines where they share one; zero at nodes of the axis.
+        """Return the stress at the skin nodes, averaged where two lines share a node; zero at nodes of the axis.
 
-        sigma_xx from N, My, Mz; tau from torsion and shear as the section gives it; turned into mesh axes.
+        sigma_xx comes from N, My, Mz, and tau from torsion and shear according to the section; both are in mesh axes.
 
         Returns
         -------
@@ -96,7 +97,8 @@ class BeamModel:
                 continue
             for end in range(2):
                 rows = self.skin.ring_start[lines, end, None] + np.arange(len(section.points))
-                stress[rows] += self.stress_at_end(lines, forces[lines, end])  # a ring joins one end to one start
+                # a ring joins one line end to one line start
+                stress[rows] += self.stress_at_end(lines, forces[lines, end])
                 count[rows] += 1.0
         stress /= np.maximum(count, 1.0)[:, None, None]
         return np.concatenate([np.zeros((self.n_nodes, 6, k)), stress])
@@ -120,16 +122,16 @@ class BeamModel:
         return np.asarray((table.reshape(n, 6 * n_points, 6) @ about).reshape(n, n_points, 6, -1))
 
     def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
-        """Return NaN, (n, 3, k): rotations of beams are dofs."""
+        """Return NaN, (n, 3, k), because rotations of beam nodes are dofs."""
         return np.full((len(nodes), 3, np.shape(u)[1]), np.nan)
 
     @property
     def has_geometric_stiffness(self) -> bool:
-        """True: from section forces, masses and springs."""
+        """True: section forces, masses and springs give a geometric stiffness."""
         return True
 
     def mass_forces(self, loads: MassLoads) -> Array:
-        """Return the consistent forces and moments of loads per mass, (n_mesh_dof, k), couples of sections included."""
+        """Return consistent forces and moments of loads per unit mass, with section couples, (n_mesh_dof, k)."""
         forces = np.zeros((self.n_mesh_dof, loads.k))
         for piece in self.pieces:
             np.add.at(forces, piece.dofs, slice_forces(piece, loads))
@@ -168,7 +170,7 @@ class BeamModel:
         return (K + K.transpose(0, 2, 1)) / 2
 
     def _node_forces(self, u: Array) -> Array:
-        """Forces and moments on each line by its nodes, mesh axes, (n_lines, 12, k)."""
+        """Return the forces and moments of the nodes on each line, mesh axes, (n_lines, 12, k)."""
         T = self.geometry.T
         return np.asarray(T.transpose(0, 2, 1) @ (self.K_local @ (T @ np.asarray(u)[self.dofs])))
 
@@ -185,7 +187,7 @@ class BeamModel:
 
 
 def _stress_directions(R: Array) -> Array:
-    """Components xx yy zz yz xz xy in mesh axes of unit sigma_xx, tau_xy, tau_xz in local axes, (n, 6, 3)."""
+    """Return components xx yy zz yz xz xy in mesh axes of unit local sigma_xx, tau_xy, tau_xz, (n, 6, 3)."""
     x, y, z = R[:, :, 0], R[:, :, 1], R[:, :, 2]
     columns = []
     for other in (None, y, z):

@@ -16,7 +16,7 @@ __all__ = ["SectionPoints", "section_points"]
 
 @dataclass(frozen=True, eq=False)
 class SectionPoints:
-    """Points of the sections at both ends of some lines; each end shows its own element, no mean."""
+    """Section points at both ends of some lines. Each end shows the stress of its own element, without averaging."""
 
     model: BeamModel
     lines: IntArray  #: (n_lines,)
@@ -26,7 +26,7 @@ class SectionPoints:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """One per point: "line 3 start point 0", (n_points,)."""
+        """Name of each point, such as "line 3 start point 0", (n_points,)."""
         return tuple(
             f"line {line} {end} point {point}"
             for line in self.lines
@@ -49,7 +49,7 @@ class SectionPoints:
         )
 
     def stress(self, u: Array) -> Array:
-        """Return the stress, (n_points, 6, k) [Pa], xx yy zz yz xz xy in mesh axes, of columns over the mesh dofs."""
+        """Return the stress of columns over the mesh dofs, (n_points, 6, k) [Pa], xx yy zz yz xz xy in mesh axes."""
         forces = self.model.section_forces(u)
         return np.concatenate(
             [
@@ -71,17 +71,17 @@ def section_points(body: FEBody, lines: Iterable[int]) -> FEBody:
     body
         Made by `beam_body`, coupled or not.
     lines
-        Rows of `LineMesh.lines`.
+        Indices into `LineMesh.lines`.
 
     Raises
     ------
     BeamError
-        If the body is no frame, or a line does not exist.
+        If the body is not a frame, or a line does not exist.
     """
     model = body.element_model
     chosen = np.array(list(lines), dtype=np.int64)
     if not isinstance(model, BeamModel):
-        raise BeamError(f"section_points: body {body.name!r} is no frame of beams; choose points before welding")
+        raise BeamError(f"section_points: body {body.name!r} is not a frame of beams; choose the points before welding")
     n = len(model.of_line)
     if not len(chosen) or chosen.min() < 0 or chosen.max() >= n:
         raise BeamError(f"section_points: body {body.name!r}: expected lines 0..{n - 1}, got {chosen.tolist()[:5]}")

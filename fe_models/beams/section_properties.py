@@ -1,4 +1,4 @@
-"""What a beam element needs to know of a cross-section, and how section forces become stress at its points."""
+"""Cross-section data of a beam element, and the map from section forces to stress at its points."""
 
 from dataclasses import dataclass, field
 
@@ -9,7 +9,7 @@ from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 
 __all__ = ["SectionProperties", "normal_stress"]
 
-FORCES = ("N", "Vy", "Vz", "Mx", "My", "Mz")  #: section forces on the face whose normal is +x, at the centroid
+FORCES = ("N", "Vy", "Vz", "Mx", "My", "Mz")  #: section forces at the centroid, on the face with normal +x
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,18 +23,18 @@ class SectionProperties:
     """
 
     A: float  #: area [m²]
-    Iy: float  #: ∫ z², bending in the x-z plane [m⁴]
-    Iz: float  #: ∫ y², bending in the x-y plane [m⁴]
+    Iy: float  #: ∫ z² dA, bending in the x-z plane [m⁴]
+    Iz: float  #: ∫ y² dA, bending in the x-y plane [m⁴]
     J: float  #: Saint-Venant torsion constant [m⁴]
     A_sy: float  #: shear area along y, kappa_y A [m²]; infinite: no shear deformation
     A_sz: float  #: shear area along z, kappa_z A [m²]
-    points: Array  #: stress recovery points (y, z), which are the vertices of the outline too, (n_points, 2) [m]
+    points: Array  #: stress recovery points (y, z), which are also the vertices of the outline, (n_points, 2) [m]
     stress: Array  #: (sigma_xx, tau_xy, tau_xz) at the points for unit `FORCES`, (n_points, 3, 6) [1/m², 1/m³]
     loops: tuple[IntArray, ...] = ()  #: outline: points of the outer loop anticlockwise in (y, z), then of holes
     cap: IntArray = field(default_factory=lambda: np.zeros((0, 3), np.int64))  #: triangles of the face with normal +x
     shear_center: tuple[float, float] = (0.0, 0.0)  #: (y, z) of the shear centre [m]
-    shows_shear: bool = True  #: whether `stress` has the shear stress of shear forces and torsion, or none
-    is_outline_known: bool = True  #: whether the points are those of the true section: else a rectangle is assumed
+    shows_shear: bool = True  #: whether `stress` contains the shear stress of shear forces and torsion
+    is_outline_known: bool = True  #: whether the points are those of the true section; False: of an assumed rectangle
 
     def __post_init__(self) -> None:
         for name in ("A", "Iy", "Iz", "J", "A_sy", "A_sz"):
@@ -54,7 +54,7 @@ class SectionProperties:
 
     @property
     def J_polar(self) -> float:
-        """Polar second moment Iy + Iz, of the rotary inertia about x [m⁴]."""
+        """Polar second moment Iy + Iz, which gives the rotary inertia about x [m⁴]."""
         return self.Iy + self.Iz
 
 

@@ -1,8 +1,9 @@
-"""Cross-sections of beams: closed forms for common shapes, and a general one from given numbers.
+"""Cross-sections of beams: closed forms for common shapes, and a general section given by its properties.
 
-Local axes: x along the beam, y and z principal axes through the centroid; widths are measured along y, heights along z.
-Shear areas kappa A are Cowper's (1966): for circle, ring and rectangle, and for thin-walled I and box across the web;
-at nu = 0 they are those of the energy of the shear flow, kappa = I² / (A ∫ S²/t² dA), which the tests integrate.
+Local axes: x along the beam; y and z are principal axes through the centroid. Widths are along y, heights along z.
+Shear areas kappa A follow Cowper (1966) for circle, ring, rectangle, and thin-walled I and box sections along their
+webs. At nu = 0 they equal the values from the energy of the shear flow, kappa = I² / (A ∫ S²/t² dA), which the tests
+integrate.
 """
 
 from dataclasses import dataclass, fields
@@ -18,11 +19,11 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["SECTIONS", "BoxSection", "Circle", "GeneralSection", "ISection", "Rectangle", "Section", "Tube"]
 
-N_CIRCLE = 16  #: points of a circular outline: between two of them the largest bending stress is missed by 2 % at most
+N_CIRCLE = 16  #: points of a circular outline; they miss the largest bending stress by at most 2 %
 
 
 class Section(Protocol):
-    """A shape that knows its properties."""
+    """A shape that can compute its section properties."""
 
     def properties(self, nu: float) -> SectionProperties:
         """Return area, second moments, torsion constant, shear areas for Poisson's ratio nu, outline and stress."""
@@ -47,7 +48,7 @@ class Tube:
     """Hollow circle."""
 
     radius: float  #: outer [m]
-    thickness: float  #: of the wall [m]
+    thickness: float  #: wall thickness [m]
 
     def __post_init__(self) -> None:
         require_lengths(self)
@@ -98,7 +99,7 @@ class Rectangle:
 
 @dataclass(frozen=True)
 class BoxSection:
-    """Rectangular hollow section; outer sides, webs along z."""
+    """Rectangular hollow section, given by its outer sides; webs are along z."""
 
     width: float  #: outer, along y [m]
     height: float  #: outer, along z [m]
@@ -113,7 +114,7 @@ class BoxSection:
     def properties(self, nu: float) -> SectionProperties:
         """Return the properties; J = 4 A_m² / ∮ ds/t (Bredt) + ∮ t³ ds / 3, A_m within the middle line.
 
-        Sharp corners carry more: J is 1 % low for walls of a fiftieth of the width, 3 % for a twelfth.
+        Corners are taken as sharp-edged strips, so J is 1 % low for walls of 1/50 of the width, and 3 % low for 1/12.
         """
         b, h, t_w, t_f = self.width, self.height, self.web, self.flange
         b_i, h_i = b - 2 * t_w, h - 2 * t_f
@@ -123,9 +124,10 @@ class BoxSection:
         points = np.vstack([rectangle_points(b, h), rectangle_points(b_i, h_i)])
         stress = normal_stress(points, A, Iy, Iz)
         bredt_w, bredt_f = 1 / (2 * b_m * h_m * t_w), 1 / (2 * b_m * h_m * t_f)
-        S_corner, S_web = b_m / 2 * t_f * h_m / 2, b_m / 2 * t_f * h_m / 2 + t_w * h_m**2 / 8  # of one half of the box
-        S_flange = h_m / 2 * t_w * b_m / 2 + t_f * b_m**2 / 8  # for a force along y
-        for first in (0, 8):  # corners belong to the webs: shear flow of a force along z, none of one along y
+        # first moments of one half of the box, for a force along z
+        S_corner, S_web = b_m / 2 * t_f * h_m / 2, b_m / 2 * t_f * h_m / 2 + t_w * h_m**2 / 8
+        S_flange = h_m / 2 * t_w * b_m / 2 + t_f * b_m**2 / 8  # first moments for a force along y
+        for first in (0, 8):  # corners belong to the webs: shear flow from a force along z only
             for k, side in ((0, 1), (1, 1), (2, 1), (4, -1), (5, -1), (6, -1)):
                 stress[first + k, 2, 2] = (S_web if k in (1, 5) else S_corner) / (Iy * t_w)
                 stress[first + k, 2, 3] = side * bredt_w
@@ -163,8 +165,8 @@ class ISection:
     def properties(self, nu: float) -> SectionProperties:
         """Return the properties; J is the sum of the three rectangles.
 
-        Fillets and junctions are left out: J is 2 to 4 % low for sharp-cornered rolled profiles, 9 % where the walls
-        are a tenth of the width.
+        Fillets and junctions are neglected. J is 2 to 4 % low for sharp-cornered rolled profiles, and 9 % low if the
+        walls are a tenth of the width.
         """
         b, h, t_w, t_f = self.width, self.height, self.web, self.flange
         h_w, h_m = h - 2 * t_f, h - t_f
@@ -181,10 +183,10 @@ class ISection:
         stress = normal_stress(points, A, Iy, Iz)
         S_junction, S_web = b * t_f * h_m / 2, b * t_f * h_m / 2 + t_w * h_w**2 / 8
         for k, (y, z) in enumerate(points):
-            if abs(y) == u:  # web: q = V S / I
+            if abs(y) == u:  # in the web q = V S / I
                 stress[k, 2, 2] = (S_web if z == 0 else S_junction) / (Iy * t_w)
                 stress[k, 2, 3] = np.sign(y) * t_w / J
-            else:  # flange: Vy as on a rectangle, nothing at its tips; torsion along its faces
+            else:  # in the flange Vy acts as on a rectangle and vanishes at the tips; torsion acts along its faces
                 stress[k, 1, 1] = 1.5 / (2 * b * t_f) if y == 0 else 0.0
                 stress[k, 1, 3] = -(1 if abs(z) == top else -1) * np.sign(z) * t_f / J
         return SectionProperties(
@@ -203,9 +205,9 @@ class ISection:
 
 @dataclass(frozen=True, eq=False)
 class GeneralSection:
-    """A section given by its numbers, in principal axes.
+    """A section given by its properties, in principal axes.
 
-    Shear stress is not recovered; the outline is drawn, and its vertices show the normal stress.
+    Shear stress is not recovered. The outline is drawn, and its vertices show the normal stress.
     """
 
     A: float  #: [m²]
@@ -216,11 +218,11 @@ class GeneralSection:
     A_sz: float = np.inf  #: shear area along z [m²]
     shear_center: tuple[float, float] = (0.0, 0.0)  #: (y, z) from the centroid [m]
     outline: Array | None = (
-        None  #: polygon (y, z), anticlockwise, (n, 2) [m]; None: the rectangle of the same A, Iy, Iz
+        None  #: polygon (y, z), anticlockwise, (n, 2) [m]; None: the rectangle with the same A, Iy, Iz
     )
 
     def properties(self, nu: float) -> SectionProperties:
-        """Return the numbers as they are."""
+        """Return the given properties."""
         if not (self.A > 0 and self.Iy > 0 and self.Iz > 0):
             raise SectionError(
                 f"section GeneralSection: expected A, Iy, Iz above zero, got {self.A}, {self.Iy}, {self.Iz}"
@@ -255,7 +257,7 @@ SECTIONS: dict[str, type] = {
     "box": BoxSection,
     "i": ISection,
     "general": GeneralSection,
-}  #: name in a job file -> shape
+}  #: shape of each name in a job file
 
 
 def require_lengths(section: object) -> None:
@@ -270,7 +272,7 @@ def require_lengths(section: object) -> None:
 
 
 def round_properties(r_o: float, r_i: float, nu: float) -> SectionProperties:
-    """Properties of a ring; tau = Mx r / J, and V ∫ y dA / (I 2 t) of the sector beyond along the wall."""
+    """Return the properties of a ring; tau = Mx r / J, and V ∫ y dA / (I 2 t) over the sector beyond the point."""
     A, inertia = np.pi * (r_o**2 - r_i**2), np.pi / 4 * (r_o**4 - r_i**4)
     m2 = (r_i / r_o) ** 2
     kappa = 6 * (1 + nu) * (1 + m2) ** 2 / ((7 + 6 * nu) * (1 + m2) ** 2 + (20 + 12 * nu) * m2)
@@ -303,7 +305,7 @@ def rectangle_points(b: float, h: float) -> Array:
 
 
 def i_shear_coefficient(h: float, t_w: float, b: float, t_f: float, nu: float) -> float:
-    """Return Cowper's kappa of a thin-walled I along its web; h between the middle lines of the flanges."""
+    """Return Cowper's kappa of a thin-walled I section along its web; h is measured between flange mid-lines."""
     m, n2 = 2 * b * t_f / (h * t_w), (b / h) ** 2
     return (
         10 * (1 + nu) * (1 + 3 * m) ** 2 / (_web_terms(m, nu) + 30 * n2 * (m + m**2) + 5 * nu * n2 * (8 * m + 9 * m**2))
@@ -311,7 +313,7 @@ def i_shear_coefficient(h: float, t_w: float, b: float, t_f: float, nu: float) -
 
 
 def box_shear_coefficient(h: float, t_webs: float, b: float, t_f: float, nu: float) -> float:
-    """Return Cowper's kappa of a thin-walled box along its webs, which are t_webs thick together."""
+    """Return Cowper's kappa of a thin-walled box along its webs, whose total thickness is t_webs."""
     m, n2 = 2 * b * t_f / (h * t_webs), (b / h) ** 2
     return 10 * (1 + nu) * (1 + 3 * m) ** 2 / (_web_terms(m, nu) + 10 * n2 * ((3 + nu) * m + 3 * m**2))
 

@@ -1,13 +1,13 @@
-"""Rigid slices: a body as many rigid pieces, each with a mass, a tensor of second moments and six motions.
+"""Rigid slices: a body as a set of rigid pieces, each with a mass, second moments and six motions.
 
-A beam is a row of rigid cross-sections, a point mass is one slice. A slice at c with mass m and second moments
-E = ∫ o oᵀ (o: offset from c) and the motion u + theta × o contributes to the Gram matrix of a = [1, c, u_x, u_y, u_z]
+A beam is a row of rigid cross-sections; a point mass is one slice. A slice at c with mass m, second moments E = ∫ o oᵀ
+dm (o: offset from c) and motion u + theta × o contributes to the Gram matrix of a = [1, c, u_x, u_y, u_z]
 
     m a_0 a_0ᵀ + Σ_f E_f a_f a_fᵀ,   a_0 = [1, c, u],   a_f = [0, e_f, theta × e_f],
 
-E_f, e_f principal values and axes of E; its mass matrix is m |u|² + thetaᵀ J theta with J = tr(E) 1 - E. Both come from
-the same numbers, so Σ_a S_aa,kl = phi_kᵀ M phi_l to rounding. An inertia J given without a shape has
-E = tr(J)/2 1 - J, whose principal values may be negative: the algebra does not mind.
+where E_f, e_f are principal values and axes of E. Its mass matrix is m |u|² + thetaᵀ J theta with J = tr(E) 1 - E. Both
+come from the same numbers, so Σ_a S_aa,kl = phi_kᵀ M phi_l to roundoff. An inertia J given without a shape has E =
+tr(J)/2 1 - J. Its principal values may be negative, which the formulas allow.
 """
 
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 
 __all__ = ["Slices", "second_moments"]
 
-CHUNK = 2000  #: elements whose fields are held at once
+CHUNK = 2000  #: number of elements processed at once
 
 
 @dataclass(frozen=True, eq=False)
 class Slices:
-    """Rigid slices of n elements with p slices each, moved by d dofs of the element."""
+    """Rigid slices of n elements, p slices per element, moved by the d dofs of the element."""
 
     position: Array  #: (n, p, 3) [m]
     mass: Array  #: (n, p) [kg]
@@ -49,7 +49,7 @@ class Slices:
         return np.asarray((M + M.transpose(0, 2, 1)) / 2)
 
     def gram(self, u: Array) -> Array:
-        """Return ∫ a aᵀ over mass of the displacement columns u, (n_mesh_dof, k), as (4 + 3 k, 4 + 3 k)."""
+        """Return ∫ a aᵀ dm for the displacement columns u, (n_mesh_dof, k), as (4 + 3 k, 4 + 3 k)."""
         k = u.shape[1]
         gram = np.zeros((4 + 3 * k, 4 + 3 * k))
         for begin in range(0, len(self.dofs), CHUNK):
@@ -73,6 +73,6 @@ class Slices:
 
 
 def second_moments(J: Array) -> tuple[Array, Array]:
-    """Return principal values (3,) and axes (columns, (3, 3)) of E = tr(J)/2 1 - J of an inertia tensor J [kg m²]."""
+    """Return principal values, (3,), and axes, (3, 3), of E = tr(J)/2 1 - J, for an inertia tensor J [kg m²]."""
     J = np.asarray(J, dtype=float)
     return np.linalg.eigh(np.trace(J) / 2 * np.eye(3) - J)

@@ -1,4 +1,4 @@
-"""Saint-Venant torsion of a rectangle, by the series of its stress function.
+"""Saint-Venant torsion of a rectangle, from the series of its stress function.
 
 The stress function of a rectangle b x h (|y| <= b/2, |z| <= h/2) with psi = 0 on the boundary and laplacian -2:
 psi = b²/4 - y² - (8 b²/pi³) Σ_odd (-1)^((n-1)/2) / n³ · cos(n pi y/b) cosh(n pi z/b) / cosh(n pi h/(2 b)).
@@ -22,7 +22,7 @@ def rectangle_torsion_constant(b: float, h: float) -> float:
 def rectangle_torsion_stress(b: float, h: float) -> float:
     """Return the shear stress in the middle of the side y = b/2 for a unit torque [1/m³].
 
-    -∂psi/∂y = b (1 - (8/pi²) Σ_odd 1 / (n² cosh(n pi h/(2 b)))), over J. The largest of the section where b <= h.
+    This is -∂psi/∂y = b (1 - (8/pi²) Σ_odd 1 / (n² cosh(n pi h/(2 b)))), divided by J. It is the maximum if b <= h.
     """
     argument = np.minimum(_ODD * np.pi * h / (2 * b), 300.0)
     series = (1 / (_ODD**2 * np.cosh(argument))).sum()

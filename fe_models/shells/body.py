@@ -1,4 +1,4 @@
-"""A finite element body from a mesh of shells, stiffeners, point masses, springs and rigid links."""
+"""The finite element body of a shell: shell cells, stiffeners, point masses, springs and rigid links."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -45,40 +45,40 @@ def shell_body(
     links: Iterable[RigidLink] = (),
     warp_limit: float = WARP_LIMIT,
 ) -> FEBody:
-    """Make the body of a shell: flat Reissner-Mindlin elements, six dofs per node, consistent mass with rotary inertia.
+    """Make the body of a shell of flat Reissner-Mindlin elements with six dofs per node and consistent mass.
 
     Parameters
     ----------
     mesh
-        Nodes, triangles, quads, lines and groups.
+        Nodes, triangles, quads, lines, and their groups.
     properties
-        One for all cells, or group -> property.
+        One property for all cells, or one for each group of cells.
     name
-        Of the body.
+        Name of the body.
     units
-        In which everything is.
+        Unit system of all inputs.
     interfaces
-        Named places, to be coupled later by `cms.couple`; see `shell_interface`.
+        Named places that `cms.couple` couples later; see `shell_interface`.
     stiffeners
-        Sections of the lines of the mesh, one for all or line group -> property; None: the lines do not count.
+        Sections of the lines of the mesh: one for all lines, or one for each group of lines. None: lines are ignored.
     point_masses, springs, links
-        Attached to the nodes.
+        Attachments at the nodes.
     warp_limit
-        Largest angle between two halves of a quad [degree].
+        Largest accepted angle between the two halves of a quad [degree].
 
     Returns
     -------
     FEBody
-        Dof 6 i + c of node i but for nodes that follow a rigid link. Its nodes are those of the mesh, then those of
-        the skin (top and bottom faces, outlines of stiffeners), which follow them and are drawn.
+        Node i has the dofs 6 i + c, unless it follows a rigid link. The nodes are those of the mesh, then those of the
+        skin (top and bottom faces, outlines of stiffeners), which follow the mesh nodes and are drawn.
 
     Raises
     ------
     ShellError
-        If a group is unknown, cells have no thickness or two, no area, or are folded or warped, or a node belongs to
-        nothing, or cells stand across the direction of their layup.
+        If a group is unknown; if cells have no thickness or two thicknesses, have no area, or are folded or warped; if
+        a node has no attached element; or if cells are nearly normal to the direction of their layup.
     SectionError, BeamError
-        As `beam_body` for the stiffeners and what is attached.
+        As `beam_body` raises them, for the stiffeners and the attachments.
     """
     mesh = as_shell_mesh(mesh)
     used, of_cell = assign_shell_properties(mesh, properties)
@@ -135,7 +135,7 @@ def _frame(
     name: str,
     units: Units,
 ) -> tuple[FEBody, IntArray] | None:
-    """Return stiffeners, masses and springs as a body of its own, and the nodes of the mesh for its nodes."""
+    """Return stiffeners, masses and springs as one body, and the mesh node of each of its nodes."""
     lines = mesh.lines if stiffeners is not None else np.zeros((0, 2), np.int64)
     ends = [lines.ravel(), np.array([item.node for item in masses], dtype=np.int64)]
     ends += [np.array(spring.nodes, dtype=np.int64) for spring in springs]
@@ -179,7 +179,7 @@ def _used_nodes(mesh: ShellMesh, frame_nodes: IntArray, links: tuple[RigidLink, 
 
 
 def _require_cells(mesh: ShellMesh, warp_limit: float) -> None:
-    """Raise `ShellError` with every cell that has no area, is folded, or warped beyond the limit."""
+    """Raise `ShellError` that lists every cell without area, folded, or warped beyond the limit."""
     if not mesh.n_cells:
         raise ShellError("shell: expected triangles or quads, got none")
     problems = []
@@ -204,7 +204,7 @@ def _require_cells(mesh: ShellMesh, warp_limit: float) -> None:
 
 
 def _node_volumes(n_nodes: int, groups: tuple[ShellCells, ...], skin: ShellSkin) -> Array:
-    """Volume of every cell shared out to its corners, half to the top and half to the bottom, (n_nodes + n_skin,)."""
+    """Distribute the volume of cells to their corners, half to top and half to bottom, (n_nodes + n_skin,)."""
     volumes = np.zeros(n_nodes + len(skin.points))
     for group, patch in zip(groups, skin.patch, strict=True):
         share = np.repeat(group.areas() * group.t / (2 * patch.shape[1]), patch.shape[1])

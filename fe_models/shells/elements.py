@@ -1,4 +1,4 @@
-"""The shell elements of one cell type: stiffness, mass, stress resultants, stress."""
+"""All shell elements of one cell type: stiffness, mass, stress resultants, stress."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -19,23 +19,24 @@ from fe_models.shells.triangle import triangle_strains
 
 __all__ = ["ShellCells", "shell_cells"]
 
-CHUNK = 500  #: cells whose operators are held at once
-LEAST_ANGLE = 5.0  #: between the direction of a layup and the normal of a cell [degree]
-DRILLING = 0.1  #: gamma of quads, over the shear modulus; see docs/shells.md for what larger and smaller ones cost
-DRILLING_SHARE = {"triangle": 1.0, "quad": 0.3}  #: of the drilling rotations in the displacement of the sides
+CHUNK = 500  #: number of cells whose operators are held at once
+LEAST_ANGLE = 5.0  #: smallest angle between the direction of a layup and the normal of a cell [degree]
+#: gamma of quads, relative to the shear modulus; docs/shells.md shows the error of larger and smaller values
+DRILLING = 0.1
+DRILLING_SHARE = {"triangle": 1.0, "quad": 0.3}  #: share of the drilling rotations in the displacement of the sides
 STRAIN_DEGREE = {"triangle": 2, "quad": 3}
-MASS_DEGREE = {"triangle": 4, "quad": 5}  #: squares of quadratic fields, times the area element
+MASS_DEGREE = {"triangle": 4, "quad": 5}  #: covers squares of quadratic fields, times the area element
 
 
 @dataclass(frozen=True, eq=False)
 class ShellCells:
-    """Cells of one type with their planes and numbers per cell."""
+    """Cells of one type, with their planes, thicknesses and laws."""
 
     kind: str
     cells: IntArray  #: nodes, (n, c)
     planes: CellPlanes
     laws: tuple[ShellLaw, ...]
-    law: IntArray  #: number of that of each cell, (n,)
+    law: IntArray  #: index of the law of each cell, (n,)
 
     @property
     def t(self) -> Array:
@@ -43,7 +44,7 @@ class ShellCells:
         return self.by_law(lambda law: law.thickness, slice(None))
 
     def by_law(self, value: Callable[[ShellLaw], Any], rows: slice) -> Array:
-        """Return a value of the laws for each of some cells, (n, ...)."""
+        """Evaluate a function of the law for each of some cells, (n, ...)."""
         return np.array([value(law) for law in self.laws], dtype=float)[self.law[rows]]
 
     @property
@@ -52,12 +53,12 @@ class ShellCells:
         return (6 * self.cells[:, :, None] + np.arange(6)).reshape(len(self.cells), -1)
 
     def chunks(self) -> Iterator[slice]:
-        """Yield slices of rows small enough to hold their operators."""
+        """Yield slices of rows whose operators fit in memory."""
         for begin in range(0, len(self.cells), CHUNK):
             yield slice(begin, min(begin + CHUNK, len(self.cells)))
 
     def strains(self, rows: slice) -> FlatStrains:
-        """Return strain operators in local axes over the dofs of the nodes, points of `STRAIN_DEGREE`."""
+        """Return strain operators in local axes, over the dofs of the nodes, at the points of `STRAIN_DEGREE`."""
         planes = self.planes[rows]
         law = FlatLaw(
             A=self.by_law(lambda law: law.A, rows),
@@ -71,7 +72,7 @@ class ShellCells:
         return FlatStrains(_times_blocks(local.B, planes), local.weights)
 
     def elasticity(self, rows: slice) -> Array:
-        """Return resultants per strain: N, M, Q and drilling, (n, 9, 9) [N/m, N m]."""
+        """Return the matrix from strains to resultants N, M, Q and drilling moment, (n, 9, 9) [N/m, N m]."""
         stiffness = self.by_law(lambda law: law.stiffness, rows)
         D = np.zeros((len(stiffness), N_STRAINS, N_STRAINS))
         D[:, :8, :8] = stiffness
@@ -90,10 +91,10 @@ class ShellCells:
         return (K + K.transpose(0, 2, 1)) / 2
 
     def slices(self, rows: slice) -> Slices:
-        """Return pieces of the normal as rigid slices: mass per area, and its second moment along the normal.
+        """Return pieces of the normal as rigid slices, with mass per area and its second moment along the normal.
 
-        A point of it moves by u + theta × z n, z in -t/2..t/2: the drilling rotation does not move it. The second
-        moment is t²/12 for one material; layers may have their centre of mass aside the middle surface.
+        A point moves by u + theta × z n, z in -t/2..t/2, so the drilling rotation does not move it. The second moment
+        is t²/12 for one material. Layers may have their centre of mass away from the middle surface.
         """
         planes = self.planes[rows]
         points, w = flat_quadrature(self.kind, MASS_DEGREE[self.kind])
@@ -119,7 +120,7 @@ class ShellCells:
         )
 
     def mass_arms(self, rows: slice) -> Array:
-        """Return the way from the middle surface to the centre of mass, mesh axes, (n, 3) [m]."""
+        """Return the vector from the middle surface to the centre of mass, mesh axes, (n, 3) [m]."""
         return self.by_law(lambda law: law.centre, rows)[:, None] * self.planes.R[rows][:, :, 2]
 
     def areas(self) -> Array:
@@ -139,7 +140,7 @@ class ShellCells:
         u
             Columns over the dofs of the nodes, (6 n_nodes, k).
         rows
-            Of the cells.
+            Rows of the cells.
         """
         strains = self.strains(rows)
         n, p, _, d = strains.B.shape
@@ -147,7 +148,7 @@ class ShellCells:
         return np.asarray((self.elasticity(rows)[:, None] @ values)[:, :, :8])
 
     def internal_forces(self, u: Array, rows: slice) -> Array:
-        """Return K u of cells by the dofs of their nodes, (n, 6 c, k) [N, N m]."""
+        """Return K u of some cells over the dofs of their nodes, (n, 6 c, k) [N, N m]."""
         strains = self.strains(rows)
         n, p, _, d = strains.B.shape
         flat = strains.B.reshape(n, p * N_STRAINS, d)
@@ -156,23 +157,24 @@ class ShellCells:
         return np.asarray(flat.transpose(0, 2, 1) @ resultants.reshape(n, p * N_STRAINS, -1))
 
     def corner_resultants(self, u: Array, rows: slice) -> Array:
-        """Return the resultants carried linearly to the corners, (n, c, 8, k)."""
+        """Return the resultants extrapolated linearly to the corners, (n, c, 8, k)."""
         return np.einsum("cp,npsk->ncsk", corner_extrapolation(self.kind), self.resultants(u, rows))
 
     def stress(self, resultants: Array, rows: slice, height: float) -> Array:
-        """Return the stress at a height of the thickness, (n, ..., 6, k) [Pa], xx yy zz yz xz xy in mesh axes.
+        """Return the stress at one height of the thickness, (n, ..., 6, k) [Pa], xx yy zz yz xz xy in mesh axes.
 
-        sigma = Q (eps + z kappa) of the layer there, below where two meet; transverse shear from equilibrium
-        (`fe_models.shells.laminate`). One material: N/t + 12 z M/t³ and 3 Q/(2 t) (1 - 4 z²/t²).
+        sigma = Q (eps + z kappa) of the layer at this height (of the lower layer where two meet). Transverse shear
+        follows from equilibrium (`fe_models.shells.laminate`). One material gives N/t + 12 z M/t³ and 3 Q/(2 t) (1 - 4
+        z²/t²).
 
         Parameters
         ----------
         resultants
-            In local axes, (n, p, 8, k).
+            Stress resultants in local axes, (n, p, 8, k).
         rows
-            Of the cells.
+            Rows of the cells.
         height
-            z/t, -1/2 bottom, 0 middle, 1/2 top.
+            z/t: -1/2 bottom, 0 middle, 1/2 top.
         """
 
         def at_height(law: ShellLaw) -> Array:
@@ -191,11 +193,11 @@ def shell_cells(
     Parameters
     ----------
     nodes
-        (n_nodes, 3) [m].
+        Positions, (n_nodes, 3) [m].
     kind, cells
         Type and nodes of the cells.
     used, of_cell
-        Properties and the number of that of each cell, (n,).
+        Properties, and the index of the property of each cell, (n,).
     """
     none = (0.0, 0.0, 0.0)
     directions = np.array([item.direction if isinstance(item, LaminateProperty) else none for item in used])
@@ -215,22 +217,23 @@ def shell_cells(
 
 
 def translations(planes: CellPlanes, N: Array, E: Array, shape: FlatShape, share: float) -> Array:
-    """Translation of the middle surface for unit dofs of the nodes, mesh axes, (n, p, 3, c, 6).
+    """Return translations of the middle surface for unit dofs of the nodes, mesh axes, (n, p, 3, c, 6).
 
-    u = Σ N_i (u_i + theta_i × lever_i) - 1/8 Σ_sides E_k (theta_j - theta_i) × (x_j - x_i): each side is the cubic's
-    parabola through its ends with the rotations there, across the plane (bending) and in it (drilling). So u is
-    quadratic along sides, and a rigid rotation is exact.
+    u = Σ N_i (u_i + theta_i × lever_i) - 1/8 Σ_sides E_k (theta_j - theta_i) × (x_j - x_i). On each side this is the
+    parabola of the cubic through the ends with their rotations, normal to the plane (bending) and in it (drilling). So
+    u is quadratic along sides, and a rigid rotation is exact.
 
     Parameters
     ----------
     planes
-        Of the cells.
+        Planes of the cells.
     N, E
-        Values, or derivatives by one coordinate, of the functions of corners and sides: (p, c) or (n, p, c).
+        Functions of corners (N) and sides (E), or their derivatives with respect to one coordinate: (p, c) or (n, p,
+        c).
     shape
-        For the ends of the sides.
+        Shape functions, which name the ends of the sides.
     share
-        Of the drilling part.
+        Share of the drilling part.
     """
     n, c = planes.levers.shape[:2]
     N, E = (np.broadcast_to(table, (n, *table.shape[-2:])) for table in (N, E))
@@ -250,7 +253,7 @@ def translations(planes: CellPlanes, N: Array, E: Array, shape: FlatShape, share
 
 
 def corner_extrapolation(kind: str) -> Array:
-    """Return values at the corners from those at the strain points, linear or bilinear, (c, p)."""
+    """Return the matrix from values at the strain points to values at the corners, linear or bilinear, (c, p)."""
     points, _ = flat_quadrature(kind, STRAIN_DEGREE[kind])
     if kind == "triangle":
         corners = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
@@ -262,7 +265,7 @@ def corner_extrapolation(kind: str) -> Array:
 
 
 def stress_directions(R: Array) -> Array:
-    """Components xx yy zz yz xz xy in mesh axes of sigma_x sigma_y tau_xy tau_xz tau_yz in local ones, (n, 6, 5)."""
+    """Return the map from local sigma_x sigma_y tau_xy tau_xz tau_yz to xx yy zz yz xz xy in mesh axes, (n, 6, 5)."""
     columns = []
     for i, j in ((0, 0), (1, 1), (0, 1), (0, 2), (1, 2)):
         tensor = np.einsum("na,nb->nab", R[:, :, i], R[:, :, j])
@@ -273,7 +276,7 @@ def stress_directions(R: Array) -> Array:
 
 
 def _times_blocks(B: Array, planes: CellPlanes) -> Array:
-    """B over local dofs of the corners as one over the dofs of the nodes: B T, block by block."""
+    """Return B T, block by block: B over local dofs of the corners becomes B over dofs of the nodes."""
     n, p, s, d = B.shape
     c = d // 6
     blocks = B.reshape(n, p * s, c, 6)

@@ -1,16 +1,18 @@
 """Geometric stiffness of flat shells (docs/theory.md §7).
 
-A point at the distance z from the middle surface moves by u + z psi + ½ z theta × (theta × n), psi = theta × n, theta a
-rotation vector. The second order of its Green strain is worked on by the stress, whose resultants are N = ∫ sigma,
-M = ∫ z sigma, Q; P = ∫ z² sigma, N t²/12 for one material. Over the middle surface, a and b along its axes e_a:
+A point at distance z from the middle surface moves by u + z psi + ½ z theta × (theta × n), where psi = theta × n and
+theta is a rotation vector. The stress does work on the second-order terms of the Green strain. Its resultants are N = ∫
+sigma dz, M = ∫ z sigma dz, Q, and P = ∫ z² sigma dz, which is N t²/12 for one material. Over the middle surface, with a
+and b along its axes e_a, the work is
 
     ½ N_ab u,a·u,b + ½ P_ab psi,a·psi,b  +  M_ab [u,a·psi,b + ½ e_b·(theta × (theta × n)),a]
     +  Q_a [u,a·psi + ½ e_a·(theta × (theta × n))]
 
-and the loads work on the second order of the rotation, on the normal and on the levers between nodes and middle surface
-(`mass_loads.rotation_work`), to which the nodal forces of the cell itself belong as well. The drilling stress of
-quads, which vanishes with the mesh, is left out. Q is the one that holds the nodal forces across the cell: these
-elements carry most of it by the change of M along their sides, where the strain of their middle does not show it.
+The loads also do work on the second-order term of the rotation, through the normal and through the levers between nodes
+and middle surface (`mass_loads.rotation_work`). The nodal forces of the cell do so too. The drilling stress of quads,
+which vanishes as the mesh is refined, is neglected. Q is the shear force that balances the nodal forces normal to the
+cell. These elements carry most of it through the change of M along their sides, where the strain at their centre does
+not show it.
 """
 
 from functools import cache
@@ -26,9 +28,9 @@ from fe_models.shells.strains import inverse_2x2, jacobians
 
 __all__ = ["cell_geometric_stiffness"]
 
-N_FIELDS = 15  #: u,1 u,2 theta,1 theta,2 theta, three components each
+N_FIELDS = 15  #: u,1 u,2 theta,1 theta,2 theta, with three components each
 FIRST, SECOND = np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1])  #: components xx yy zz yz xz xy
-PRODUCT_BYTES = 1.5e6  #: of the products held at once by a thread: they shall stay in its cache
+PRODUCT_BYTES = 1.5e6  #: memory of the products that a thread holds at once; they must stay in its cache
 
 
 def cell_geometric_stiffness(cells: ShellCells, rows: slice, u: Array, loads: MassLoads, Phi: Array) -> Array:
@@ -37,11 +39,11 @@ def cell_geometric_stiffness(cells: ShellCells, rows: slice, u: Array, loads: Ma
     Parameters
     ----------
     cells, rows
-        Cells of one type, and which of them.
+        Cells of one type, and the rows to use.
     u
         Static states over the dofs of the nodes, (6 n_nodes, k).
     loads
-        The k loads per mass that act in them.
+        The k loads per unit mass that act in these states.
     Phi
         Columns over the dofs of the nodes, (6 n_nodes, n).
     """
@@ -72,9 +74,10 @@ def cell_geometric_stiffness(cells: ShellCells, rows: slice, u: Array, loads: Ma
 
 
 def _missing_shear(cells: ShellCells, rows: slice, forces: Array, Q: Array, weights: Array) -> Array:
-    """What weighted Q, (m, p, 2, k), lacks to hold the nodal forces across the cell: the gradient of Σ c_i N_i.
+    """Return the part of the weighted shear force, (m, p, 2, k), that Q lacks to balance the nodal forces.
 
-    ∫ (Q + ∇ Σ c_j N_j)·∇N_i = f_z,i  at every corner i; the constant in c is free and zero.
+    It is the gradient of Σ c_i N_i, where ∫ (Q + ∇ Σ c_j N_j)·∇N_i = f_z,i at every corner i. The constant in c is free
+    and set to zero.
     """
     planes = cells.planes[rows]
     n, c, k = len(planes.R), planes.xy.shape[1], forces.shape[2]
@@ -84,16 +87,17 @@ def _missing_shear(cells: ShellCells, rows: slice, forces: Array, Q: Array, weig
     across = np.einsum("na,ncaj->ncj", planes.R[:, :, 2], forces.reshape(n, c, 6, k)[:, :, :3])
     missing = across - np.einsum("npca,npaj->ncj", dN, Q)
     laplacian = np.einsum("npca,npda,np->ncd", dN, dN, weights)
-    laplacian += laplacian.trace(axis1=1, axis2=2)[:, None, None] / c  # the constant: neither needed nor singular
+    # makes the matrix regular; the constant in c stays zero
+    laplacian += laplacian.trace(axis1=1, axis2=2)[:, None, None] / c
     gradient = np.einsum("npca,ncj->npaj", dN, np.linalg.solve(laplacian, missing))
     return np.asarray(weights[:, :, None, None] * gradient)
 
 
 def _contracted(fields: Array, units: Array, weights: Array) -> Array:
-    """Sum of weights_r,j fieldsᵀ U_r fields over all points and unit works r, (k, n, n) for k states j.
+    """Return the sum of weights_r,j fieldsᵀ U_r fields over all points and unit works r, (k, n, n), for k states j.
 
-    The products of the fields do not depend on the state: they are formed once, for some points at a time, and one
-    matrix product with the weights of all states does the sum.
+    The products of the fields do not depend on the state. They are computed once, for some points at a time, and one
+    matrix product with the weights of all states sums over the points.
 
     Parameters
     ----------
@@ -133,14 +137,14 @@ def _symmetric_parts(W: Array) -> Array:
 
 @cache
 def _symmetric_units() -> Array:
-    """Return the symmetric matrices of one component each, (6, 3, 3)."""
+    """Return the six symmetric matrices with one unit component each, (6, 3, 3)."""
     units = np.zeros((6, 3, 3))
     units[np.arange(6), FIRST, SECOND] = units[np.arange(6), SECOND, FIRST] = 1.0
     return frozen(units)
 
 
 def _fields(cells: ShellCells, rows: slice) -> Array:
-    """Gradients of u and theta, and theta, in local axes, for unit dofs of the nodes, (m, p, 15, 6 c)."""
+    """Return gradients of u and theta, and theta, in local axes, for unit dofs of the nodes, (m, p, 15, 6 c)."""
     planes = cells.planes[rows]
     points, _ = flat_quadrature(cells.kind, STRAIN_DEGREE[cells.kind])
     shape = flat_shape(cells.kind, points)
@@ -161,13 +165,13 @@ def _fields(cells: ShellCells, rows: slice) -> Array:
 
 
 def stress_second_moments(cells: ShellCells, rows: slice) -> Array:
-    """P = ∫ z² sigma dz by eps and kappa, (m, 3, 6)."""
+    """Return the matrix from eps and kappa to P = ∫ z² sigma dz, (m, 3, 6)."""
     return cells.by_law(lambda law: np.hstack([law.D, law.third]), rows)
 
 
 @cache
 def _unit_work() -> Array:
-    """Second derivatives of the work of unit N_x N_y N_xy, M_x M_y M_xy, Q_x Q_y, P (three), (11, 15, 15)."""
+    """Return second derivatives of the work of unit N_x N_y N_xy, M_x M_y M_xy, Q_x Q_y, P (three), (11, 15, 15)."""
     W = np.zeros((11, 5, 3, 5, 3))
     across = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])  # psi = across @ theta = theta × e_z
     for number, pairs in enumerate((((0, 0),), ((1, 1),), ((0, 1), (1, 0)))):

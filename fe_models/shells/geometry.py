@@ -1,4 +1,4 @@
-"""The plane of every cell: local axes, corners in the plane, and the way from the dofs of the nodes to theirs."""
+"""The plane of every cell: local axes, corners in the plane, and the map from nodal dofs to corner dofs."""
 
 from dataclasses import dataclass
 
@@ -13,19 +13,19 @@ __all__ = ["CellPlanes", "cell_planes"]
 class CellPlanes:
     """The planes of n cells of one type with c corners.
 
-    The corners of the plane are rigid arms away from the nodes: across the plane where four nodes are warped, and by
-    the offset of the middle surface. u_corner = u_node + theta_node × lever, so rigid motion is exact in any case.
+    The corners of the plane are connected to the nodes by rigid arms: normal to the plane where four nodes are warped,
+    and along the offset of the middle surface. u_corner = u_node + theta_node × lever, so rigid motion is always exact.
     """
 
     R: Array  #: local axes x, y, z (normal) as columns, mesh axes, (n, 3, 3)
-    corners: Array  #: of the middle surface, mesh axes, (n, c, 3) [m]
-    levers: Array  #: from node to corner, mesh axes, (n, c, 3) [m]
+    corners: Array  #: corners of the middle surface, mesh axes, (n, c, 3) [m]
+    levers: Array  #: vectors from node to corner, mesh axes, (n, c, 3) [m]
     xy: Array  #: corners in local axes about their mean, (n, c, 2) [m]
     warp: Array  #: distance of the nodes of a quad from its plane, (n,) [m]
 
     @property
     def T(self) -> Array:
-        """Local dofs of the corners, u_x u_y u_z theta_x theta_y theta_z each, from those of the nodes, (n, 6c, 6c)."""
+        """Map from nodal dofs to local corner dofs, u_x u_y u_z theta_x theta_y theta_z each, (n, 6c, 6c)."""
         n, c = self.levers.shape[:2]
         T = np.zeros((n, 6 * c, 6 * c))
         Rt = self.R.transpose(0, 2, 1)
@@ -42,21 +42,21 @@ class CellPlanes:
 def cell_planes(nodes: Array, cells: IntArray, offset: Array, direction: Array) -> CellPlanes:
     """Return the planes of cells of three or four nodes.
 
-    (1) z: normal to both diagonals of a quad, to the sides of a triangle, by the right hand along the order of nodes
-    (2) x: the direction projected on the plane; where there is none, along the first side of a triangle, between the
-        diagonals of a quad, along d_13 - d_24
-    (3) the plane goes through the mean of the nodes, moved by the offset along z
+    (1) z is normal to both diagonals of a quad, or to the sides of a triangle, right-handed in the order of the nodes
+    (2) x is the direction projected onto the plane; without a direction it is the first side of a triangle, or for a
+        quad d_13 - d_24, which lies between the diagonals
+    (3) the plane passes through the mean of the nodes, moved by the offset along z
 
     Parameters
     ----------
     nodes
-        (n_nodes, 3) [m].
+        Positions, (n_nodes, 3) [m].
     cells
-        (n, 3) or (n, 4).
+        Nodes of the cells, (n, 3) or (n, 4).
     offset
-        Of the middle surface from the nodes along z, (n,) [m].
+        Distance of the middle surface from the nodes along z, (n,) [m].
     direction
-        In mesh axes, (n, 3); zero: none.
+        Direction in mesh axes, (n, 3); zero: none.
     """
     X = nodes[cells]
     if cells.shape[1] == 3:

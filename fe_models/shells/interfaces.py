@@ -1,4 +1,4 @@
-"""Interfaces of a shell: nodes made rigid, distributing, or kept node by node."""
+"""Interfaces of a shell: rigid, distributing, or with the dofs of every node."""
 
 from typing import Any
 
@@ -35,12 +35,13 @@ def shell_interface(
     name
         Name of the interface.
     selection
-        Which nodes: `NodeSet("v0")` for the nodes of an edge, `FaceGroup("lug")` for those of a group of cells, or by
-        geometry.
+        Selected nodes: `NodeSet("v0")` for the nodes of an edge, `FaceGroup("lug")` for those of a group of cells, or a
+        selection by geometry.
     kind
-        "rigid": the nodes move rigidly with the reference node, one node is enough; "distributing": the reference node
-        follows their mean motion, weighted by the area of the cells whose nodes are all selected, or else by the length
-        of the edges, which needs three nodes beside one line; "nodes": every dof of every node.
+        "rigid": the nodes move rigidly with the reference node; one node is enough. "distributing": the reference node
+        follows the mean motion of the nodes, weighted with the area of the cells whose nodes are all selected, or else
+        with the length of the edges; this needs three nodes that are not collinear. "nodes": every dof of every node is
+        a boundary dof.
     reference
         Reference point, (3,) [m]; None: the mean of the nodes.
     triad
@@ -49,7 +50,7 @@ def shell_interface(
     Raises
     ------
     InterfaceError
-        If nothing is selected, or reference or triad do not do.
+        If no node is selected, or `reference` or `triad` is invalid.
     """
     mesh = as_shell_mesh(mesh)
     weights = _weights(mesh, selection) if kind == "distributing" else np.ones(len(mesh.nodes))
@@ -57,7 +58,7 @@ def shell_interface(
 
 
 def _weights(mesh: ShellMesh, selection: Selection) -> Array:
-    """Area of the selected cells at their nodes, or length of the selected edges, or one, (n_nodes,)."""
+    """Return weights of the nodes, (n_nodes,): area of the selected cells, or length of the selected edges, or one."""
     facets = selected_facets(mesh, selection)
     if facets:
         return facet_weights(mesh.nodes, facets)

@@ -1,4 +1,4 @@
-"""The elements behind a shell body: integrals over mass, stress at the faces, geometric stiffness."""
+"""The element model of a shell body: mass integrals, stress at the faces, geometric stiffness."""
 
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -20,13 +20,13 @@ from fe_models.shells.skin import ShellSkin
 
 __all__ = ["ShellModel"]
 
-AHEAD = 2  #: chunks of cells for each thread whose results may wait
+AHEAD = 2  #: chunks of cells for each thread whose results may be pending
 TOP, MIDDLE, BOTTOM = 0.5, 0.0, -0.5  #: heights in the thickness, z/t
 
 
 @dataclass(frozen=True, eq=False)
 class ShellModel:
-    """Element model of a shell (`fe_body.ElementModel`); its dofs: six per node, then three per skin point."""
+    """Element model of a shell (`fe_body.ElementModel`); six dofs per node come first, then three per skin point."""
 
     n_nodes: int
     groups: tuple[ShellCells, ...]
@@ -34,16 +34,16 @@ class ShellModel:
 
     @property
     def has_nodal_stress(self) -> bool:
-        """True: at the skin points, and in the middle surface at the nodes."""
+        """True: the stress is known at skin points, and in the middle surface at nodes."""
         return True
 
     @property
     def n_mesh_dof(self) -> int:
-        """Dofs of the mesh: of the nodes, then of the skin."""
+        """Number of mesh dofs: those of the nodes, then those of the skin."""
         return 6 * self.n_nodes + 3 * len(self.skin.points)
 
     def mass_gram(self, u: Array) -> Array:
-        """Return ∫ a aᵀ over mass, a = [1, c, u_x, u_y, u_z], exact through the thickness (docs/theory.md §5).
+        """Return ∫ a aᵀ dm with a = [1, c, u_x, u_y, u_z], exact through the thickness (docs/theory.md §5).
 
         Parameters
         ----------
@@ -58,10 +58,10 @@ class ShellModel:
         return gram
 
     def nodal_stress(self, u: Array, *, nodes: IntArray | None = None) -> Array:
-        """Return the stress at the nodes: that of the middle surface at those of the mesh, of the faces at skin points.
+        """Return the stress of the middle surface at the mesh nodes, and of the faces at the skin points.
 
-        The mean over the cells that meet there, weighted by area; a skin point belongs to one smooth patch of cells.
-        All nodes are computed, `nodes` or not.
+        It is averaged over the adjoining cells, weighted with area. A skin point belongs to one smooth patch of cells.
+        All nodes are computed, even if `nodes` are given.
 
         Returns
         -------
@@ -71,12 +71,13 @@ class ShellModel:
         return self.means_of_corners(u, ShellCells.stress)
 
     def means_of_corners(self, u: Array, values: Callable[[ShellCells, Array, slice, float], Array]) -> Array:
-        """Return the means of six values of the cells at the nodes, as `nodal_stress` has them, (n, 6, k).
+        """Return the averages of six values of the cells at the nodes, as for `nodal_stress`, (n, 6, k).
 
         Parameters
         ----------
         values
-            Of cells, resultants at their corners, rows and a height in the thickness, as `ShellCells.stress`.
+            Function of cells, resultants at their corners, rows and a height in the thickness, such as
+            `ShellCells.stress`.
         """
         self._require_rows("nodal_stress", u)
         u = np.asarray(u)
@@ -92,23 +93,23 @@ class ShellModel:
         return total.reshape(-1, 6, k)
 
     def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
-        """Return NaN, (n, 3, k): rotations of shells are dofs."""
+        """Return NaN, (n, 3, k), because rotations of shell nodes are dofs."""
         return np.full((len(nodes), 3, np.shape(u)[1]), np.nan)
 
     @property
     def has_geometric_stiffness(self) -> bool:
-        """True: from stress resultants and masses."""
+        """True: stress resultants and masses give a geometric stiffness."""
         return True
 
     def mass_forces(self, loads: MassLoads) -> Array:
-        """Return the consistent forces and moments of loads per mass, (n_mesh_dof, k), couples of normals included."""
+        """Return consistent forces and moments of loads per unit mass, with couples of normals, (n_mesh_dof, k)."""
         forces = np.zeros((self.n_mesh_dof, loads.k))
         for dofs, part in self._of_chunks(lambda group, rows: slice_forces(group.slices(rows), loads)):
             np.add.at(forces, dofs, part)
         return forces
 
     def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
-        """Return K u of all cells, (n_mesh_dof, k) [N, N m]; of those near `nodes` where these are given."""
+        """Return K u of all cells, (n_mesh_dof, k) [N, N m]; only of the cells at `nodes` if these are given."""
         self._require_rows("internal_forces", u)
         forces = np.zeros(np.shape(u))
         for dofs, part in self._of_chunks(lambda group, rows: group.internal_forces(np.asarray(u), rows), nodes):
@@ -128,9 +129,9 @@ class ShellModel:
     def _of_chunks(
         self, work: Callable[[ShellCells, slice], Array], nodes: IntArray | None = None
     ) -> Iterator[tuple[IntArray, Array]]:
-        """Yield the dofs of chunks of cells, or of those that meet some nodes, and what is made of them, in threads.
+        """Yield, for chunks of the cells (or of those at some nodes), their dofs and the result of `work`, in threads.
 
-        In the order of the chunks, so that sums repeat bit for bit; some wait to be taken, not all.
+        The chunks come in order, so that sums are bitwise reproducible. Only a few results wait in memory.
         """
         chunks = [(group, rows) for group in self.groups for rows in group.chunks()]
         if nodes is not None:
@@ -147,7 +148,7 @@ class ShellModel:
 
     @cached_property
     def _means(self) -> tuple[tuple[sp.csc_array, ...], ...]:
-        """Weights of corners in the means at nodes (middle), tops and bottoms, (n_nodes + n_skin, n_corners) each."""
+        """Matrices that average corners at nodes (middle), tops and bottoms, (n_nodes + n_skin, n_corners) each."""
         n_rows = self.n_nodes + len(self.skin.points)
         places = [
             (group.cells.ravel(), self.n_nodes + patch.ravel(), self.n_nodes + self.skin.n_patches + patch.ravel())

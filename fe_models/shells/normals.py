@@ -1,4 +1,4 @@
-"""One sense of the normal for all cells of a wall."""
+"""Consistent orientation of the normals of all cells of a wall."""
 
 from dataclasses import replace
 
@@ -13,11 +13,11 @@ __all__ = ["orient_normals"]
 
 
 def orient_normals(mesh: ShellMesh) -> ShellMesh:
-    """Return the mesh with the normals of neighbouring cells on one side, by turning round the nodes of some.
+    """Return the mesh with the normals of neighbouring cells on one side, by reversing the nodes of some cells.
 
-    Cells are neighbours where they are the only two on an edge. In each part so joined the first cell keeps its
-    normal and the others follow; a part that cannot be oriented, such as a Möbius strip, keeps one seam. A joint of
-    three walls joins nothing: each wall keeps the normal of its own first cell.
+    Two cells are neighbours if they are the only two cells on an edge. In each connected part the first cell keeps its
+    normal, and the others follow. A part that cannot be oriented, such as a Möbius strip, keeps one seam. An edge of
+    three walls connects nothing: each wall keeps the normal of its own first cell.
 
     Parameters
     ----------

@@ -1,19 +1,19 @@
 r"""The four-node element: discrete Kirchhoff-Mindlin plate (DKMQ), membrane with incompatible modes, drilling rotation.
 
-Rotation of the normal: beta_x = theta_y, beta_y = -theta_x, in-plane displacement u + z beta.
+The rotation of the normal is beta_x = theta_y, beta_y = -theta_x; the in-plane displacement is u + z beta.
 
-Plate [1]_: the rotation along each side is quadratic and its shear strain constant, as in the triangle
-(`fe_models.shells.strains.plate_sides`); inside, the rotation is bilinear plus the sides' part, and the covariant
-shear strains are linear between those of opposite sides. Quads and triangles so have one rotation on a side they
-share: a plate of both passes the patch test of constant twist, which quads with straight sides (MITC4) beside these
-triangles do not.
+Plate [1]_: along each side the rotation is quadratic and the shear strain constant, as in the triangle
+(`fe_models.shells.strains.plate_sides`). Inside, the rotation is bilinear plus the contribution of the sides, and the
+covariant shear strains are linear between those of opposite sides. Quads and triangles therefore have the same rotation
+on a shared side. A plate of both passes the patch test of constant twist; a mixture of these triangles with quads that
+have straight sides (MITC4) does not.
 
-Membrane: the displacement is u = Σ N_i u_i + (1 - xi²) a_1 + (1 - eta²) a_2 with internal vectors a; their gradients
-are taken with the Jacobian at the centre, scaled by its determinant, so that their mean is zero and constant strain
-is exact on any shape. The drilling rotation is tied to the rotation of the same field by
-gamma G t ∫ (½ (v,x - u,y) - theta_z)² (Hughes and Brezzi), which a rigid rotation leaves at zero. Since the internal
-modes take part in the rotation, pure in-plane bending of rectangles stays exact at any gamma. The internal vectors are
-condensed, so that strains are a linear function of the nodal dofs alone.
+Membrane: the displacement is u = Σ N_i u_i + (1 - xi²) a_1 + (1 - eta²) a_2 with internal vectors a. Their gradients
+use the Jacobian at the centre, scaled by its determinant, so that their mean is zero and constant strain is exact for
+any shape. The drilling rotation is tied to the rotation of the same field by the energy gamma G t ∫ (½ (v,x - u,y) -
+theta_z)² (Hughes and Brezzi), which is zero for a rigid rotation. Because the internal modes contribute to the
+rotation, pure in-plane bending of rectangles is exact for any gamma. The internal vectors are condensed, so that
+strains are a linear function of the nodal dofs alone.
 
 .. [1] Katili (1993), Int. J. Numer. Meth. Engng 36, 1885-1908.
 """
@@ -35,7 +35,7 @@ def quad_strains(xy: Array, law: FlatLaw) -> FlatStrains:
     xy
         Corners in the plane, (n, 4, 2) [m].
     law
-        Of the elements.
+        Law of the elements.
     """
     n = len(xy)
     points, w = flat_quadrature("quad", 3)
@@ -43,7 +43,7 @@ def quad_strains(xy: Array, law: FlatLaw) -> FlatStrains:
     J, det = jacobians(shape.gradients, xy)
     inverse = inverse_2x2(J, det)
     weights = w * det
-    dN = np.einsum("npak,pck->npca", inverse, shape.gradients)  # by x, y
+    dN = np.einsum("npak,pck->npca", inverse, shape.gradients)  # derivatives with respect to x, y
     B = np.zeros((n, len(points), N_STRAINS, 4, 6))
     B[:, :, 0, :, 0] = B[:, :, 2, :, 1] = dN[..., 0]
     B[:, :, 1, :, 1] = B[:, :, 2, :, 0] = dN[..., 1]
@@ -61,8 +61,8 @@ def quad_strains(xy: Array, law: FlatLaw) -> FlatStrains:
 
 
 def _shear(xy: Array, points: Array, inverse: Array, sides: PlateSides) -> Array:
-    """Shear strain operators over w, theta_x, theta_y, (n, p, 2, 4, 3)."""
-    # along xi on the sides 12 and 34, along eta on 23 and 41; covariant: times half of the length
+    """Return shear strain operators over w, theta_x, theta_y, (n, p, 2, 4, 3)."""
+    # along xi on the sides 12 and 34, along eta on 23 and 41; covariant components are multiplied by half of the length
     covariant_sides = sides.shear * (sides.length / 2 * np.array([1.0, 1.0, -1.0, -1.0]))[:, :, None, None]
     xi, eta = points.T
     covariant = np.zeros((len(xy), len(points), 2, 4, 3))
@@ -72,21 +72,21 @@ def _shear(xy: Array, points: Array, inverse: Array, sides: PlateSides) -> Array
 
 
 def _between(low: Array, high: Array, x: Array) -> Array:
-    """Linear in x between the values at -1 and +1, (n, p, 4, 6)."""
+    """Interpolate linearly in x between the values at -1 and +1, (n, p, 4, 6)."""
     return np.asarray((1 - x[:, None, None]) / 2 * low[:, None] + (1 + x[:, None, None]) / 2 * high[:, None])
 
 
 def _condensed_modes(xy: Array, points: Array, det: Array, weights: Array, law: FlatLaw, operators: Array) -> Array:
-    """What the internal modes add to eps_x eps_y gamma_xy and the drilling strain, (n, p, 4, 24).
+    """Return the contribution of the internal modes to eps_x eps_y gamma_xy and the drilling strain, (n, p, 4, 24).
 
-    The internal vectors a make the energy least: a = -(∫ Gᵀ C G)⁻¹ ∫ Gᵀ (C B u + N_kappa), C of A and the
-    drilling, N_kappa = B kappa the membrane force of the curvatures of layups that are not symmetric.
+    The internal vectors a minimise the energy: a = -(∫ Gᵀ C G)⁻¹ ∫ Gᵀ (C B u + N_kappa). C holds A and the drilling
+    stiffness; N_kappa = B kappa is the membrane force of the curvatures of unsymmetric layups.
     """
     n, p = weights.shape
     centre = flat_shape("quad", np.zeros((1, 2)))
     J_0, det_0 = jacobians(centre.gradients, xy)
     inverse_0 = inverse_2x2(J_0, det_0)[:, 0]
-    slopes = np.zeros((p, 2, 2))  # of the modes by xi, eta
+    slopes = np.zeros((p, 2, 2))  # derivatives of the modes with respect to xi, eta
     slopes[:, 0, 0], slopes[:, 1, 1] = -2 * points[:, 0], -2 * points[:, 1]
     dM = np.einsum("nak,pmk->npma", inverse_0, slopes) * (det_0 / det)[:, :, None, None]
     modes = np.zeros((n, p, 4, 2, 2))

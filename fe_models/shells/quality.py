@@ -1,4 +1,4 @@
-"""How good flat cells are: area, convexity, warp."""
+"""Quality of flat cells: area, convexity, warp."""
 
 from dataclasses import dataclass
 
@@ -9,19 +9,19 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["WARP_LIMIT", "CellQuality", "cell_quality"]
 
-WARP_LIMIT = 20.0  #: angle between the two halves of a quad beyond which it is refused [degree]
-FLAT = 1e-9  #: area over the square of the size of a cell, below which it has none
+WARP_LIMIT = 20.0  #: angle between the two halves of a quad beyond which it is rejected [degree]
+FLAT = 1e-9  #: area relative to the square of the cell size below which the cell has no area
 
 
 @dataclass(frozen=True, eq=False)
 class CellQuality:
-    """Numbers of the cells of one type."""
+    """Quality measures of the cells of one type."""
 
     area: Array  #: (n,) [m²]
-    is_degenerate: NDArray[np.bool_]  #: without area, (n,)
+    is_degenerate: NDArray[np.bool_]  #: cells without area, (n,)
     is_folded: NDArray[np.bool_]  #: quads with an inner angle of 180 degrees or more, (n,)
     warp: Array  #: largest angle between two halves of a quad, over both diagonals, (n,) [degree]
-    aspect: Array  #: longest over shortest side, (n,)
+    aspect: Array  #: longest side divided by shortest side, (n,)
 
 
 def cell_quality(nodes: Array, cells: IntArray) -> CellQuality:
@@ -30,7 +30,8 @@ def cell_quality(nodes: Array, cells: IntArray) -> CellQuality:
     c = cells.shape[1]
     sides = np.roll(X, -1, axis=1) - X
     length = np.linalg.norm(sides, axis=2)
-    corner_normals = np.cross(np.roll(sides, 1, axis=1), sides)  # of the triangle at each corner, twice its area
+    # normals of the triangle at each corner, with twice its area as length
+    corner_normals = np.cross(np.roll(sides, 1, axis=1), sides)
     if c == 3:
         vector = corner_normals[:, 0] / 2
     else:

@@ -1,20 +1,20 @@
-r"""Rotations of a stiffener's sections that are not those of the wall it sits on.
+r"""Section rotations of a stiffener that differ from the rotations of its wall.
 
-A wall holds a beam along a line: the displacement of the line, and the rotation about it, are those of both. The other
-rotations of a section follow the axis of the beam instead. Where the wall twists by theta_x', the shear centre of a
-section with the lever r across the line moves by theta_x × r, so that its axis turns against the wall's line by
-theta_x' e_x × (e_x × r) = -theta_x' r; about the normal n the wall has, in the end, no rotation of its own but the mean
-½ (v,x - u,y) of two slopes, while the axis of a beam turns by v,x alone. A section that had to turn with the node would
-shear by that difference, with a stiffness of torsion GA r² in the place of GJ; a coarse mesh hides it, since the
-drilling rotation of large cells is soft, and a finer one does not.
+A wall supports a beam along a line. The displacement of the line and the rotation about it are common to both. The
+other rotations of a section follow the axis of the beam. If the wall twists by theta_x', the shear centre of a section
+with lever r from the line moves by theta_x × r, so its axis rotates relative to the wall's line by theta_x' e_x × (e_x
+× r) = -theta_x' r. About the normal n, the wall has in the limit no rotation of its own but the mean ½ (v,x - u,y) of
+two slopes, while the axis of the beam rotates by v,x alone. A section that had to rotate with the node would shear by
+that difference, with a torsional stiffness of GA r² instead of GJ. A coarse mesh hides this, because the drilling
+rotation of large cells is compliant; a fine mesh does not.
 
-So a section turns by itself about the normal, and about its lever where that leaves the normal; the rest of its
-rotation is that of the node:
+A section therefore rotates independently about the normal, and about its lever where the lever is not along the normal.
+Its other rotations are those of the node:
 
     theta_b = theta_s + A (A_C)⁻¹ (phi - theta_s,C)
 
-A, (3, k): orthonormal axes, across all lines at the node; C: k components in which they are independent; phi: the
-section's own rotation about these mesh axes, so that rigid motion has phi = theta_C.
+A, (3, k), holds orthonormal axes normal to all lines at the node. C are k components in which they are independent. phi
+is the section's own rotation about these mesh axes, so that rigid motion has phi = theta_C.
 """
 
 from dataclasses import dataclass
@@ -31,31 +31,31 @@ from fe_models.shells.skin import cell_edges
 
 __all__ = ["SectionRotations", "own_axes", "rotations_of_sections"]
 
-SMOOTH = np.cos(np.deg2rad(40.0))  #: of the angle between normals at a node, from which its wall is folded
-ALONG = 0.1  #: share of the lines at a node that point along an axis, above which no section turns about it
-APART = 0.1  #: sine of the angle between two axes below which they count as one
-ON_LINE = 1e-6  #: lever over the length of the line, below which a section lies on it
+SMOOTH = np.cos(np.deg2rad(40.0))  #: angle between normals at a node above which its wall counts as folded
+ALONG = 0.1  #: share of the lines at a node along an axis, above which no section rotates independently about it
+APART = 0.1  #: sine of the angle between two axes below which they count as the same
+ON_LINE = 1e-6  #: lever relative to the length of the line below which a section lies on the line
 
 
 @dataclass(frozen=True, eq=False)
 class SectionRotations:
-    """How the nodes of a frame follow those of a shell, and the dofs that are their own."""
+    """Map from shell nodes to the frame nodes on them, and the independent rotations of sections."""
 
-    place: sp.csr_array  #: dofs of the frame from those of the shell, then the own ones, (6 n_frame, 6 n_shell + n_own)
+    place: sp.csr_array  #: maps dofs of the shell, then own dofs, to dofs of the frame, (6 n_frame, 6 n_shell + n_own)
     own: IntArray  #: (node of the frame, component 3-5) of the own dofs, (n_own, 2)
 
 
 def section_rotations(axes: list[Array], nodes: IntArray, n_shell: int) -> SectionRotations:
-    """Return the way from the dofs of the shell to those of a frame on it.
+    """Return the map from the dofs of the shell to the dofs of a frame on it.
 
     Parameters
     ----------
     axes
-        Own axes at each node of the frame, (3, k) with k from 0 to 2; see `own_axes`.
+        Axes of independent rotation at each node of the frame, (3, k) with k from 0 to 2; see `own_axes`.
     nodes
         Node of the shell for each node of the frame, (n_frame,).
     n_shell
-        Nodes of the shell.
+        Number of nodes of the shell.
     """
     n_frame = len(nodes)
     own: list[tuple[int, int]] = []
@@ -87,12 +87,12 @@ def section_rotations(axes: list[Array], nodes: IntArray, n_shell: int) -> Secti
 def own_axes(
     lines: IntArray, directions: Array, levers: Array, normals: Array, is_held: NDArray[np.bool_]
 ) -> list[Array]:
-    """Return the axes about which the sections at each node turn by themselves, orthonormal, (3, k), k = 0..2.
+    """Return the axes about which the sections at each node rotate independently, orthonormal, (3, k), k = 0..2.
 
-    (1) free: across the lines at the node, so that the wall hands them its twist
-    (2) wished for: the normal of a smooth wall; the levers of lines that go on beyond the node (where one ends, its
-        moments shall reach the wall)
-    (3) the span of what is wished for in what is free
+    (1) possible axes: normal to the lines at the node, because the wall transmits its twist to the lines
+    (2) desired axes: the normal of a smooth wall, and the levers of lines that continue beyond the node (where a line
+        ends, its moments must reach the wall)
+    (3) result: the projection of the desired axes onto the span of the possible axes
 
     Parameters
     ----------
@@ -101,11 +101,11 @@ def own_axes(
     directions
         Unit vectors along the lines, (n_lines, 3).
     levers
-        From the line to the shear centre at both ends, in lengths of the line, (n_lines, 2, 3).
+        Vectors from the line to the shear centre at both ends, divided by the length of the line, (n_lines, 2, 3).
     normals
-        Of the wall at each node, (n_frame, 3); NaN where it is folded.
+        Normal of the wall at each node, (n_frame, 3); NaN where the wall is folded.
     is_held
-        Nodes whose sections turn with the node in all axes, (n_frame,).
+        Whether the sections at each node rotate with the node about all axes, (n_frame,).
     """
     n = len(normals)
     at_node: list[list[tuple[int, int]]] = [[] for _ in range(n)]
@@ -134,16 +134,16 @@ def own_axes(
 
 
 def rotations_of_sections(model: ShellModel, beams: BeamModel, nodes: IntArray, held: IntArray) -> SectionRotations:
-    """Return how sections turn on the shell: with it at nodes where something else holds them, or a line leaves it.
+    """Return the independent section rotations; there are none at held nodes, or where a line leaves the shell.
 
     Parameters
     ----------
     model, beams
         The shell and the frame on it.
     nodes
-        Of the shell, for each node of the frame, (n_frame_nodes,).
+        Shell node of each node of the frame, (n_frame_nodes,).
     held
-        Nodes of the shell where something else is attached, (n_held,).
+        Nodes of the shell that have other attachments, (n_held,).
     """
     lines = beams.dofs[:, ::6] // 6
     is_held = np.isin(nodes, held)
@@ -158,14 +158,14 @@ def rotations_of_sections(model: ShellModel, beams: BeamModel, nodes: IntArray, 
 
 
 def _along_cells(model: ShellModel, lines: IntArray) -> NDArray[np.bool_]:
-    """Return which pairs of nodes are an edge of a cell, (n_lines,)."""
+    """Return which pairs of nodes form an edge of a cell, (n_lines,)."""
     ends = np.sort(np.concatenate([cell_edges(tuple(group.cells for group in model.groups)).nodes, lines]), axis=1)
     number = ends @ [model.n_nodes, 1]
     return np.isin(number[len(number) - len(lines) :], number[: len(number) - len(lines)])
 
 
 def _normals(model: ShellModel, nodes: IntArray) -> Array:
-    """Return the normal of the wall at some nodes, of either sign, (n, 3); NaN where walls meet at a fold."""
+    """Return the normal of the wall at some nodes, with either sign, (n, 3); NaN where walls meet at a fold."""
     spread = np.zeros((model.n_nodes, 3, 3))
     for group in model.groups:
         n = group.planes.R[:, :, 2]

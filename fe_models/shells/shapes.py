@@ -12,12 +12,12 @@ __all__ = ["FlatShape", "flat_quadrature", "flat_shape"]
 
 @dataclass(frozen=True, eq=False)
 class FlatShape:
-    """Shape functions at some points: N of the corners, E of the sides (1 in the middle of a side, 0 on the others)."""
+    """Shape functions at some points: N of the corners, and E of the sides (1 at its mid-point, 0 on other sides)."""
 
     values: Array  #: N, (n_points, n_corners)
-    gradients: Array  #: of N by reference coordinates, (n_points, n_corners, 2)
+    gradients: Array  #: gradients of N with respect to the reference coordinates, (n_points, n_corners, 2)
     side_values: Array  #: E, (n_points, n_sides)
-    side_gradients: Array  #: of E, (n_points, n_sides, 2)
+    side_gradients: Array  #: gradients of E with respect to the reference coordinates, (n_points, n_sides, 2)
     sides: IntArray  #: first and second corner of each side, (n_sides, 2)
 
 
@@ -58,10 +58,10 @@ QUAD_CORNERS = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
 
 @cache
 def flat_quadrature(kind: str, degree: int) -> tuple[Array, Array]:
-    """Return points (n_points, 2) and weights of a rule in reference coordinates, exact for that degree.
+    """Return points, (n_points, 2), and weights of a rule in reference coordinates, exact for that degree.
 
-    Triangle: the middles of the sides up to degree 2, else a rule of scikit-fem. Quad: products of Gauss points, of
-    that degree in each direction.
+    Triangles use the mid-points of the sides up to degree 2, else a rule of scikit-fem. Quads use products of Gauss
+    points, exact for that degree in each direction.
     """
     if kind == "quad":
         x, w = np.polynomial.legendre.leggauss((degree + 2) // 2)

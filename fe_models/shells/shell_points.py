@@ -1,4 +1,4 @@
-"""Stress at the centres of chosen cells: named points (`fe_body.StressPointModel`) and layers."""
+"""Stress at the centres of chosen cells: as named points (`fe_body.StressPointModel`), and in layers."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -20,13 +20,13 @@ HEIGHTS = {"top": TOP, "middle": MIDDLE, "bottom": BOTTOM}
 
 @dataclass(frozen=True, eq=False)
 class ShellPoints:
-    """Points through the thickness at the centres of cells; each shows its own cell, no mean."""
+    """Points through the thickness at cell centres. Each shows the stress of its own cell, without averaging."""
 
     parts: tuple[tuple[ShellCells, IntArray], ...]  #: cells of one type and the chosen rows
 
     @property
     def names(self) -> tuple[str, ...]:
-        """One per point: "quad 3 top", (n_points,)."""
+        """Name of each point, such as "quad 3 top", (n_points,)."""
         return tuple(f"{group.kind} {row} {name}" for group, rows in self.parts for row in rows for name in HEIGHTS)
 
     @property
@@ -40,7 +40,7 @@ class ShellPoints:
         return frozen(np.concatenate(places))
 
     def stress(self, u: Array) -> Array:
-        """Return the stress, (n_points, 6, k) [Pa], xx yy zz yz xz xy in mesh axes, of columns over the mesh dofs."""
+        """Return the stress of columns over the mesh dofs, (n_points, 6, k) [Pa], xx yy zz yz xz xy in mesh axes."""
         values = []
         for group, rows in self.parts:
             for row in rows.tolist():
@@ -51,19 +51,19 @@ class ShellPoints:
 
 
 def shell_points(body: FEBody, cells: Mapping[str, Iterable[int]]) -> FEBody:
-    """Return the body with named stress points at top, middle and bottom of some cells.
+    """Return the body with named stress points at the top, middle and bottom of some cells.
 
     Parameters
     ----------
     body
         Made by `shell_body`, coupled or not.
     cells
-        Cell type -> rows of `ShellMesh.cells`, such as a group `mesh.cell_sets["lug"]`.
+        Indices into `ShellMesh.cells`, by cell type, such as a group `mesh.cell_sets["lug"]`.
 
     Raises
     ------
     ShellError
-        If the body is no shell, or a cell does not exist.
+        If the body is not a shell, or a cell does not exist.
     """
     return replace(body, stress_points=ShellPoints(_chosen("shell_points", body, cells)))
 
@@ -76,22 +76,22 @@ def layer_stress(body: FEBody, u: Array, cells: Mapping[str, Iterable[int]], lay
     body
         Made by `shell_body`, coupled or not.
     u
-        Columns over its dofs, (n_dof, k).
+        Displacement columns over the dofs of the body, (n_dof, k).
     cells
-        Cell type -> rows of `ShellMesh.cells`.
+        Indices into `ShellMesh.cells`, by cell type.
     layer
-        Number of the layer, 0 at the bottom.
+        Index of the layer, 0 at the bottom.
 
     Returns
     -------
     Array
-        (n_cells, 2, 5, k) [Pa]: at the bottom and at the top of the layer sigma_1 sigma_2 tau_12 tau_13 tau_23, axis 1
-        at the angle of the layer, axis 3 the normal; cells in the order given.
+        (n_cells, 2, 5, k) [Pa]: sigma_1 sigma_2 tau_12 tau_13 tau_23 at the bottom and at the top of the layer. Axis 1
+        is at the angle of the layer, and axis 3 is the normal. Cells keep the given order.
 
     Raises
     ------
     ShellError
-        If the body is no shell, a cell does not exist or has no such layer.
+        If the body is not a shell, or a cell does not exist or has no such layer.
     """
     u = np.asarray(u)
     if u.ndim != 2 or len(u) != body.n_dof:
@@ -117,7 +117,7 @@ def _chosen(what: str, body: FEBody, cells: Mapping[str, Iterable[int]]) -> tupl
         model = model.shell
     where = f"{what}: body {body.name!r}"
     if not isinstance(model, ShellModel):
-        raise ShellError(f"{where} is no shell; choose points before welding")
+        raise ShellError(f"{where} is not a shell; choose the points before welding")
     parts = []
     for kind, chosen in cells.items():
         group = next((group for group in model.groups if group.kind == kind), None)

@@ -21,15 +21,15 @@ class ShellProperty:
     Raises
     ------
     ShellError
-        Unless the thickness is above zero, the added mass not below, and all numbers finite.
+        Unless the thickness is positive, the added mass is not negative, and all numbers are finite.
     """
 
     thickness: float  #: [m]
     material: Material
-    offset: float = 0.0  #: of the middle surface from the nodes, along the normal of the cell [m]
-    added_mass: float = 0.0  #: per area, without stiffness, spread through the thickness [kg/m²]
-    bending_ratio: float = 1.0  #: stiffness in bending over that of a plate of this thickness (ribs, honeycomb)
-    shear_ratio: float = 1.0  #: stiffness in transverse shear over that of a plate of this thickness
+    offset: float = 0.0  #: distance of the middle surface from the nodes, along the normal of the cell [m]
+    added_mass: float = 0.0  #: additional mass per area, without stiffness, distributed through the thickness [kg/m²]
+    bending_ratio: float = 1.0  #: bending stiffness relative to that of a plate of this thickness (ribs, honeycomb)
+    shear_ratio: float = 1.0  #: transverse shear stiffness relative to that of a plate of this thickness
 
     def __post_init__(self) -> None:
         require_isotropic("shell property", self.material)
@@ -42,7 +42,7 @@ class ShellProperty:
 
     @property
     def materials(self) -> tuple[AnyMaterial, ...]:
-        """The material, as that of layers."""
+        """The material, as a tuple, as for layers."""
         return (self.material,)
 
 
@@ -53,14 +53,12 @@ class Layer:
     Raises
     ------
     ShellError
-        Unless the thickness is above zero and the angle finite, and where the material has axes of its own.
+        Unless the thickness is positive and the angle finite, or if the material has its own axes.
     """
 
     material: AnyMaterial
     thickness: float  #: [m]
-    angle: float = (
-        0.0  #: of the material's axis 1 from the direction of the layup, right hand about the normal [degree]
-    )
+    angle: float = 0.0  #: angle of material axis 1 from the layup direction, right-handed about the normal [degree]
 
     def __post_init__(self) -> None:
         _require_numbers("layer", self, ("thickness", "angle"))
@@ -74,8 +72,8 @@ class Layer:
             )
         if isinstance(material, OrthotropicMaterial) and not np.array_equal(material.axes, np.eye(3)):
             raise ShellError(
-                f"layer: material {material.name!r} has axes of its own; a layer is laid by its angle from the "
-                "direction of the layup: take a material without axes"
+                f"layer: material {material.name!r} has axes of its own; the angle of a layer is measured from the "
+                "direction of the layup: use a material without axes"
             )
 
 
@@ -86,15 +84,15 @@ class LaminateProperty:
     Raises
     ------
     ShellError
-        Unless there are layers, the direction is none of zero length, and all numbers are finite.
+        Unless there are layers, the direction is not zero, and all numbers are finite.
     """
 
     layers: tuple[Layer, ...]  #: from the bottom to the top, along the normal of the cell
-    direction: tuple[float, float, float]  #: mesh axes; projected on a cell it is the first axis of the layup
-    offset: float = 0.0  #: of the middle surface from the nodes, along the normal of the cell [m]
-    added_mass: float = 0.0  #: per area, without stiffness, spread through the thickness [kg/m²]
-    bending_ratio: float = 1.0  #: stiffness in bending over that of the layer; 1 where there are several
-    shear_ratio: float = 1.0  #: stiffness in transverse shear over that of the layers
+    direction: tuple[float, float, float]  #: direction in mesh axes; its projection onto a cell is the first layup axis
+    offset: float = 0.0  #: distance of the middle surface from the nodes, along the normal of the cell [m]
+    added_mass: float = 0.0  #: additional mass per area, without stiffness, distributed through the thickness [kg/m²]
+    bending_ratio: float = 1.0  #: bending stiffness relative to that of the layer; 1 if there are several layers
+    shear_ratio: float = 1.0  #: transverse shear stiffness relative to that of the layers
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "layers", tuple(self.layers))
@@ -118,12 +116,12 @@ class LaminateProperty:
 
     @property
     def thickness(self) -> float:
-        """Of all layers [m]."""
+        """Thickness of all layers together [m]."""
         return sum(layer.thickness for layer in self.layers)
 
     @property
     def materials(self) -> tuple[AnyMaterial, ...]:
-        """Of the layers, each once."""
+        """Materials of the layers, each once."""
         return tuple(dict.fromkeys(layer.material for layer in self.layers))
 
 
@@ -131,7 +129,7 @@ AnyShellProperty = ShellProperty | LaminateProperty
 
 
 def symmetric(layers: Sequence[Layer]) -> tuple[Layer, ...]:
-    """Return the layers, bottom to middle, and their mirror image above: [0, 90] gives [0, 90, 90, 0]."""
+    """Return the layers, bottom to middle, followed by their mirror image: [0, 90] gives [0, 90, 90, 0]."""
     return (*layers, *reversed(layers))
 
 
@@ -152,19 +150,19 @@ def _require_ratios(where: str, item: object) -> None:
 def assign_shell_properties(
     mesh: ShellMesh, properties: AnyShellProperty | Mapping[str, AnyShellProperty]
 ) -> tuple[tuple[AnyShellProperty, ...], dict[str, IntArray]]:
-    """Return the properties in use and, by cell type, the number of the property of every cell.
+    """Return the properties in use and, for each cell type, the index of the property of every cell.
 
     Parameters
     ----------
     mesh
-        Its `cell_sets` name the groups.
+        The mesh; its `cell_sets` name the groups.
     properties
-        One for all cells, or group -> property. Groups may overlap where they agree.
+        One property for all cells, or one for each group name. Groups may overlap if they have the same property.
 
     Raises
     ------
     ShellError
-        If a group is unknown, or cells have no property or two.
+        If a group is unknown, or cells have no property or two properties.
     """
     if isinstance(properties, AnyShellProperty):
         return (properties,), {kind: np.zeros(len(cells), np.int64) for kind, cells in mesh.cells.items()}
@@ -192,7 +190,7 @@ def assign_shell_properties(
         ]
         where = f"they are in the groups {', '.join(groups)}: give these one" if groups else "they are in no group"
         raise ShellError(
-            f"shells: cells without a thickness: {counts}; {where}; cells not meant to be of the body are left "
-            'out by read_shell_mesh(groups=...), in a job by accept = ["left-out"]'
+            f"shells: cells without a thickness: {counts}; {where}; cells outside the body are left out by  "
+            'read_shell_mesh(groups=...) or, in a job, accept = ["left-out"]'
         )
     return used, number

@@ -1,4 +1,4 @@
-"""The skin of a shell: a point above and below every node, once for each smooth patch that meets there."""
+"""The skin of a shell: a point above and below every node, once for each smooth patch of cells at the node."""
 
 from dataclasses import dataclass
 
@@ -10,39 +10,39 @@ from fe_models.shells.elements import ShellCells
 
 __all__ = ["ShellSkin", "cell_edges", "make_shell_skin"]
 
-SMOOTH = np.cos(np.deg2rad(40.0))  #: of the angle between the normals of two cells that share skin points
+SMOOTH = np.cos(np.deg2rad(40.0))  #: largest angle between the normals of two cells that share skin points
 
 
 @dataclass(frozen=True, eq=False)
 class ShellSkin:
-    """Points on the top and the bottom faces, which follow their nodes rigidly; n patches of corners each have two."""
+    """Points on the top and bottom faces, which follow their nodes rigidly; each of n patches of corners has two."""
 
-    points: Array  #: those of the tops, then of the bottoms, (2 n, 3) [m]
-    mover: IntArray  #: node of the mesh that moves each point, (2 n,)
-    triangles: IntArray  #: of points, outward, (n_tri, 3)
-    cell_of: IntArray  #: the cell behind each triangle, numbered through, (n_tri,)
-    patch: tuple[IntArray, ...]  #: of every corner, for each cell type, (n_cells, c)
+    points: Array  #: points of the tops, then of the bottoms, (2 n, 3) [m]
+    mover: IntArray  #: mesh node that moves each point, (2 n,)
+    triangles: IntArray  #: triangles between points, normals outward, (n_tri, 3)
+    cell_of: IntArray  #: cell of each triangle, numbered through all types, (n_tri,)
+    patch: tuple[IntArray, ...]  #: patch of every corner, for each cell type, (n_cells, c)
 
     @property
     def n_patches(self) -> int:
-        """Half of the number of points."""
+        """Number of patches, half of the number of points."""
         return len(self.points) // 2
 
 
 @dataclass(frozen=True, eq=False)
 class CellEdges:
-    """The edges of all cells; corners are numbered through, cell type by cell type, cell by cell."""
+    """The edges of all cells; corners are numbered consecutively, by cell type and cell."""
 
-    corners: IntArray  #: corner at the start and at the end, (n_edges, 2)
+    corners: IntArray  #: corner at the start and at the end of each edge, (n_edges, 2)
     nodes: IntArray  #: (n_edges, 2)
-    cell: IntArray  #: numbered through, (n_edges,)
-    first: IntArray  #: edges that meet one other edge only: one of the two, (n_pairs,)
-    second: IntArray  #: and the other, (n_pairs,)
-    count: IntArray  #: edges on the same two nodes, itself included, (n_edges,)
+    cell: IntArray  #: cell of each edge, numbered through all types, (n_edges,)
+    first: IntArray  #: one edge of each pair of edges that meet no third edge, (n_pairs,)
+    second: IntArray  #: the other edge of each pair, (n_pairs,)
+    count: IntArray  #: number of edges on the same two nodes, including the edge itself, (n_edges,)
 
 
 def cell_edges(cells: tuple[IntArray, ...]) -> CellEdges:
-    """Return the edges of cells and which of them meet."""
+    """Return the edges of cells, and the pairs of edges that meet."""
     corners, nodes, owner = [], [], []
     first_corner = first_cell = 0
     for rows in cells:
@@ -64,16 +64,16 @@ def cell_edges(cells: tuple[IntArray, ...]) -> CellEdges:
 def make_shell_skin(nodes: Array, groups: tuple[ShellCells, ...]) -> ShellSkin:
     """Make the skin of all cells.
 
-    (1) corners of neighbouring cells at a node share their points where the cells have one thickness, offset and sense
-        of the normal, and turn by less than 40 degrees; folds, joints of three cells and steps stay sharp
-    (2) points: the mean of the corners of the middle surface, plus and minus half of the thickness along the mean
-        of the normals
-    (3) triangles on both faces, and round every edge where the skin does not continue
+    (1) corners of neighbouring cells at a node share their points if the cells have the same thickness, offset and
+        sense of the normal, and meet at less than 40 degrees; folds, joints of three cells and steps stay sharp
+    (2) the points are the mean of the corners of the middle surface, plus and minus half of the thickness along the
+        mean normal
+    (3) triangles cover both faces, and the rim along every edge where the skin ends
 
     Parameters
     ----------
     nodes
-        Of the mesh, (n_nodes, 3).
+        Nodes of the mesh, (n_nodes, 3).
     groups
         Cells of each type.
     """

@@ -1,4 +1,4 @@
-"""Beams on a shell: one body of both, whose nodes move together but for the rotations of sections of their own."""
+"""A shell with beams on it as one body; nodes move together, except for independent rotations of sections."""
 
 from dataclasses import dataclass, replace
 
@@ -21,19 +21,19 @@ __all__ = ["StiffenedModel", "element_model_of", "with_frame"]
 class StiffenedModel:
     """A shell and a frame on it (`fe_models.body.fe_body.ElementModel`).
 
-    Dofs of the mesh: those of the shell (six per node, three per skin point), then those of the frame (the same).
-    Each node of the frame stands at one of the shell. Where its section turns by itself, the rotation theta_b of the
-    section is that of the node, theta_s, followed by one about axes that turn with the node: to second order the
-    rotation vector gains ½ theta_s × theta_b, on which the moment works that the section takes from the node.
+    The mesh dofs are those of the shell (six per node, three per skin point), then those of the frame (likewise). Each
+    node of the frame is at a node of the shell. If its section rotates independently, the section rotation is the node
+    rotation theta_s, followed by a rotation theta_b about axes that rotate with the node. To second order the rotation
+    vector then contains ½ theta_s × theta_b, on which the moment between section and node does work.
     """
 
     shell: ShellModel
     frame: BeamModel
-    nodes: IntArray  #: of the shell, for each node of the frame, (n_frame_nodes,)
+    nodes: IntArray  #: shell node of each node of the frame, (n_frame_nodes,)
 
     @property
     def has_nodal_stress(self) -> bool:
-        """True: the shell knows it."""
+        """True, because the shell knows its stress."""
         return True
 
     @property
@@ -42,36 +42,36 @@ class StiffenedModel:
         return self.shell.n_mesh_dof + self.frame.n_mesh_dof
 
     def mass_gram(self, u: Array) -> Array:
-        """Return the sum of both, (4 + 3 k, 4 + 3 k)."""
+        """Return the sum of the Gram matrices of shell and frame, (4 + 3 k, 4 + 3 k)."""
         of_shell, of_frame = self._parts("mass_gram", u)
         return self.shell.mass_gram(of_shell) + self.frame.mass_gram(of_frame)
 
     def nodal_stress(self, u: Array, *, nodes: IntArray | None = None) -> Array:
-        """Return the stress of the shell at its nodes and skin, then that of the frame at its own."""
+        """Return the stress of the shell at its nodes and skin, then of the frame at its own."""
         of_shell, of_frame = self._parts("nodal_stress", u)
         return np.concatenate([self.shell.nodal_stress(of_shell, nodes=nodes), self.frame.nodal_stress(of_frame)])
 
     def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
-        """Return NaN, (n, 3, k): rotations of shells and beams are dofs."""
+        """Return NaN, (n, 3, k), because rotations of shell and beam nodes are dofs."""
         return np.full((len(nodes), 3, np.shape(u)[1]), np.nan)
 
     @property
     def has_geometric_stiffness(self) -> bool:
-        """True: both know it."""
+        """True, because shell and frame know their geometric stiffness."""
         return True
 
     def mass_forces(self, loads: MassLoads) -> Array:
-        """Return the consistent forces of loads per mass on both, (n_mesh_dof, k)."""
+        """Return the consistent forces of loads per unit mass on shell and frame, (n_mesh_dof, k)."""
         return np.concatenate([self.shell.mass_forces(loads), self.frame.mass_forces(loads)])
 
     def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
-        """Return K u of both, (n_mesh_dof, k) [N, N m]; of the shell that of its cells near `nodes` where given."""
+        """Return K u of shell and frame, (n_mesh_dof, k) [N, N m]; with `nodes` only of the shell cells at them."""
         of_shell, of_frame = self._parts("internal_forces", u)
         on_shell = self.shell.internal_forces(of_shell, nodes=nodes)
         return np.concatenate([on_shell, self.frame.internal_forces(of_frame)])
 
     def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Array) -> Array:
-        """Return the sum of both and of the sections that turn by themselves, (k, n, n)."""
+        """Return the geometric stiffness of shell, frame and independently rotating sections, (k, n, n)."""
         u_shell, u_frame = self._parts("geometric_stiffness", u)
         on_shell, on_frame = self._parts("geometric_stiffness", Phi)
         forces = self.frame.internal_forces(u_frame) - self.frame.mass_forces(loads)
@@ -83,7 +83,7 @@ class StiffenedModel:
         )
 
     def _of_own_rotations(self, moments: Array, on_shell: Array, on_frame: Array) -> Array:
-        """Second derivative of ½ m·(theta_s × theta_b) of all sections, (k, n, n), of moments m, (n_frame, 3, k)."""
+        """Return second derivatives of ½ m·(theta_s × theta_b) of all sections, (k, n, n), for m (n_frame, 3, k)."""
         n = len(self.nodes)
         theta_b = on_frame[: 6 * n].reshape(n, 6, -1)[:, 3:]
         theta_s = on_shell[: 6 * self.shell.n_nodes].reshape(self.shell.n_nodes, 6, -1)[self.nodes, 3:]
@@ -97,7 +97,7 @@ class StiffenedModel:
         return np.asarray((K + K.transpose(0, 2, 1)) / 2)
 
     def _parts(self, where: str, u: Array) -> tuple[Array, Array]:
-        """Rows of the shell and of the frame."""
+        """Return the rows of u of the shell and of the frame."""
         if np.ndim(u) != 2 or np.shape(u)[0] != self.n_mesh_dof:
             raise BodyError(f"{where}: u: expected columns over {self.n_mesh_dof} dofs, got {np.shape(u)}")
         u = np.asarray(u)
@@ -110,19 +110,20 @@ def with_frame(shell: FEBody, model: ShellModel, frame: FEBody, nodes: IntArray,
     Parameters
     ----------
     shell, model
-        The shell, its dofs six per node, and its element model.
+        The shell, with six dofs per node, and its element model.
     frame
-        The frame, its dofs six per node.
+        The frame, with six dofs per node.
     nodes
-        Node of the shell for each node of the frame, (n_frame_nodes,).
+        Shell node of each node of the frame, (n_frame_nodes,).
     turns
-        How the nodes of the frame follow those of the shell.
+        The map from shell nodes to the nodes of the frame, and the independent rotations.
 
     Returns
     -------
     FEBody
-        Its nodes are those of the shell and its skin, then those of the frame, each at the place of one of the shell,
-        and its skin. Its dofs are those of the shell, then the own rotations of sections, at nodes of the frame.
+        The nodes are those of the shell and its skin, then those of the frame, each at the position of a shell node,
+        and its skin. The dofs are those of the shell, then the independent rotations of sections, at nodes of the
+        frame.
     """
     if shell.recovery is None or frame.recovery is None:
         raise BodyError("with_frame: expected bodies with a skin")
@@ -157,7 +158,7 @@ def with_frame(shell: FEBody, model: ShellModel, frame: FEBody, nodes: IntArray,
 
 
 def element_model_of(model: ElementModel | None) -> BeamModel:
-    """Return the model of a frame; `BodyError` for any other."""
+    """Return the element model of a frame; raise `BodyError` for any other model."""
     if not isinstance(model, BeamModel):
         raise BodyError("with_frame: expected a frame of beams")
     return model

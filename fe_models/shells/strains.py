@@ -1,4 +1,4 @@
-"""Strains of flat shells at their integration points, and the elasticity that belongs to them."""
+"""Strains of flat shells at their integration points, and the corresponding elasticity."""
 
 from dataclasses import dataclass
 
@@ -22,7 +22,7 @@ N_STRAINS = 9  #: eps_x eps_y gamma_xy, kappa_x kappa_y kappa_xy, gamma_xz gamma
 
 @dataclass(frozen=True, eq=False)
 class FlatStrains:
-    """Strain operators of n elements at p points: strains = B u with u the local dofs, six per corner."""
+    """Strain operators of n elements at p points: strains = B u, where u are the local dofs, six per corner."""
 
     B: Array  #: (n, p, 9, 6 c)
     weights: Array  #: area elements, (n, p) [m²]
@@ -30,10 +30,10 @@ class FlatStrains:
 
 @dataclass(frozen=True, eq=False)
 class FlatLaw:
-    """What the strain operators of n elements depend on, per area, in local axes (`fe_models.shells.laminate`)."""
+    """Stiffness per area of n elements in local axes, for the strain operators (`fe_models.shells.laminate`)."""
 
-    A: Array  #: membrane forces by membrane strains, (n, 3, 3) [N/m]
-    B: Array  #: by curvatures, (n, 3, 3) [N]
+    A: Array  #: from membrane strains to membrane forces, (n, 3, 3) [N/m]
+    B: Array  #: from curvatures to membrane forces, (n, 3, 3) [N]
     bending: Array  #: D* = D - B A⁻¹ B, (n, 3, 3) [N m]
     shear_flexibility: Array  #: H⁻¹, (n, 2, 2) [m/N]
     drilling: Array  #: gamma G t, (n,) [N/m]
@@ -56,7 +56,7 @@ def jacobians(dN: Array, xy: Array) -> tuple[Array, Array]:
 
 
 def inverse_2x2(J: Array, det: Array) -> Array:
-    """Return J⁻¹ by its adjugate, (n, p, 2, 2)."""
+    """Return J⁻¹ from its adjugate, (n, p, 2, 2)."""
     inverse = np.empty_like(J)
     inverse[..., 0, 0], inverse[..., 1, 1] = J[..., 1, 1], J[..., 0, 0]
     inverse[..., 0, 1], inverse[..., 1, 0] = -J[..., 0, 1], -J[..., 1, 0]
@@ -65,20 +65,21 @@ def inverse_2x2(J: Array, det: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class PlateSides:
-    """Rotation and shear along the sides of plate elements, over w, theta_x, theta_y of the corners."""
+    """Rotation and shear along the sides of plate elements, as operators on w, theta_x, theta_y of the corners."""
 
     length: Array  #: (n, n_sides) [m]
     along: Array  #: unit vectors from the first to the second corner, (n, n_sides, 2)
-    bulge: Array  #: Delta, of the rotation beta_s in the middle over the mean of the ends, (n, n_sides, c, 3)
-    shear: Array  #: gamma of the sides, (n, n_sides, c, 3)
+    bulge: Array  #: Delta, the rotation beta_s at the mid-point minus the mean of the ends, (n, n_sides, c, 3)
+    shear: Array  #: shear strain gamma of the sides, (n, n_sides, c, 3)
 
     def curvature(self, gradients: Array) -> Array:
-        """Return what the bulges add to kappa_x kappa_y kappa_xy, (n, p, 3, c, 3).
+        """Return the contribution of the mid-side rotations Delta to kappa_x kappa_y kappa_xy, (n, p, 3, c, 3).
 
         Parameters
         ----------
         gradients
-            Of the functions of the sides (1 in the middle of a side, 0 on the others), by x, y, (n, p, n_sides, 2).
+            Gradients of the side functions (1 at the mid-point of a side, 0 on others), with respect to x, y, (n, p,
+            n_sides, 2).
         """
         c, s = np.moveaxis(self.along, -1, 0)
         by_x, by_y = gradients[..., 0], gradients[..., 1]
@@ -90,9 +91,9 @@ def plate_sides(xy: Array, sides: IntArray, law: FlatLaw) -> PlateSides:
     """Return rotation and shear along the sides of plate elements (DKMT, DKMQ).
 
     (1) the rotation is quadratic, beta_s = linear + 4 s/L (1 - s/L) Delta
-    (2) equilibrium of the side, Q = M,s, gives its constant shear strain gamma = -(2/3) phi Delta with
-        phi = 12 D_s/L² (H⁻¹)_s, D_s the bending stiffness along the side and (H⁻¹)_s the shear flexibility; of one
-        isotropic material 12 D/(kappa G t L²)
+    (2) equilibrium of the side, Q = M,s, gives its constant shear strain gamma = -(2/3) phi Delta with phi = 12 D_s/L²
+        (H⁻¹)_s, where D_s is the bending stiffness along the side and (H⁻¹)_s the shear flexibility; for one isotropic
+        material phi = 12 D/(kappa G t L²)
     (3) ∫ (w,s + beta_s - gamma) ds = 0 gives Delta = -3/2/(1 + phi) [(w_j - w_i)/L + (beta_si + beta_sj)/2]
 
     Parameters
@@ -100,16 +101,16 @@ def plate_sides(xy: Array, sides: IntArray, law: FlatLaw) -> PlateSides:
     xy
         Corners in the plane, (n, c, 2) [m].
     sides
-        First and second corner of each, (n_sides, 2).
+        First and second corner of each side, (n_sides, 2).
     law
-        Of the elements.
+        Law of the elements.
     """
     n, c = xy.shape[:2]
     d = xy[:, sides[:, 1]] - xy[:, sides[:, 0]]
     L = np.linalg.norm(d, axis=2)
     along = d / L[..., None]
     cos, sin = np.moveaxis(along, -1, 0)
-    curvature = np.stack([cos**2, sin**2, 2 * cos * sin], axis=-1)  # of a unit one along the side
+    curvature = np.stack([cos**2, sin**2, 2 * cos * sin], axis=-1)  # components of a unit curvature along the side
     D_s = np.einsum("nsi,nij,nsj->ns", curvature, law.bending, curvature)
     phi = 12 * D_s * np.einsum("nsi,nij,nsj->ns", along, law.shear_flexibility, along) / L**2
     bulge = np.zeros((n, len(sides), c, 3))

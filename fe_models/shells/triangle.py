@@ -1,14 +1,15 @@
 r"""The three-node element: discrete Kirchhoff-Mindlin plate (DKMT), optimal membrane with drilling (ANDES).
 
-Plate [1]_: the rotation along each side is quadratic and its shear strain constant
-(`fe_models.shells.strains.plate_sides`). So thin triangles are those of the discrete Kirchhoff theory and thick ones
-deform in shear; nothing locks. The shear field inside is linear with constant tangential strain on every side.
+Plate [1]_: along each side the rotation is quadratic and the shear strain constant
+(`fe_models.shells.strains.plate_sides`). Thin triangles are then those of discrete Kirchhoff theory, and thick
+triangles deform in shear, without locking. The shear field inside is linear, with constant tangential strain on every
+side.
 
-Membrane [2]_: a constant part with L lumped from linear side displacements and the drilling rotations (alpha_b = 3/2),
-and a part linear in the hierarchical drilling rotations theta~ = theta - theta_0, theta_0 the rotation of the linear
-triangle, whose natural strains at the corners are Q_k theta~ with the optimal coefficients; beta_0 = (1 - 4 nu²)/2
-makes in-plane bending of a rectangle of two triangles nearly exact at any aspect ratio. Both parts are orthogonal in
-energy.
+Membrane [2]_: the element has two parts. The constant part has L lumped from linear side displacements and the drilling
+rotations (alpha_b = 3/2). The linear part depends on the hierarchical drilling rotations theta~ = theta - theta_0,
+where theta_0 is the rotation of the linear triangle. Its natural strains at the corners are Q_k theta~ with the optimal
+coefficients. beta_0 = (1 - 4 nu²)/2 makes in-plane bending of a rectangle of two triangles nearly exact at any aspect
+ratio. Both parts are orthogonal in energy.
 
 .. [1] Katili (1993), Int. J. Numer. Meth. Engng 36, 1859-1883.
 .. [2] Felippa (2003), Comput. Methods Appl. Mech. Engrg. 192, 2125-2168.
@@ -22,8 +23,8 @@ from fe_models.shells.strains import N_STRAINS, FlatLaw, FlatStrains, plate_side
 
 __all__ = ["triangle_strains"]
 
-SIDES = ((0, 1), (1, 2), (2, 0))  #: of the membrane
-#: natural strains at the corners from theta~, before scaling by 2 A/(3 l²) of the sides 21, 32, 13
+SIDES = ((0, 1), (1, 2), (2, 0))  #: sides of the membrane
+#: natural strains at the corners from theta~, before scaling with 2 A/(3 l²) of the sides 21, 32, 13
 CORNER_STRAINS = np.array(
     [
         [(1, 2, 1), (0, 1, -1), (-1, -1, -2)],
@@ -32,18 +33,18 @@ CORNER_STRAINS = np.array(
     ],
     dtype=float,
 )
-LEAST_BETA_0 = 0.01  #: where nu is near 1/2
+LEAST_BETA_0 = 0.01  #: lower bound, reached where nu is near 1/2
 
 
 def triangle_strains(xy: Array, law: FlatLaw) -> FlatStrains:
-    """Return the strain operators in the middles of the sides.
+    """Return the strain operators at the mid-points of the sides.
 
     Parameters
     ----------
     xy
         Corners in the plane, anticlockwise, (n, 3, 2) [m].
     law
-        Of the elements.
+        Law of the elements.
     """
     n = len(xy)
     points, w = flat_quadrature("triangle", 2)
@@ -55,9 +56,9 @@ def triangle_strains(xy: Array, law: FlatLaw) -> FlatStrains:
 
 
 def _membrane(xy: Array, area: Array, nu: Array) -> Array:
-    """Membrane strain operators in the middles of sides 12, 23, 31 over u, v, theta_z, (n, 3, 3, 3 corners, 3)."""
+    """Return membrane strain operators at the mid-points of sides 12, 23, 31 over u, v, theta_z, (n, 3, 3, 3, 3)."""
     n = len(xy)
-    mean = np.zeros((n, 3, 3, 3))  # Lᵀ/V: force of unit stresses, (n, strain, corner, dof)
+    mean = np.zeros((n, 3, 3, 3))  # Lᵀ/V: nodal forces of unit stresses, (n, strain, corner, dof)
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         y_jk, x_kj = xy[:, j, 1] - xy[:, k, 1], xy[:, k, 0] - xy[:, j, 0]
         y_ik, y_ji = xy[:, i, 1] - xy[:, k, 1], xy[:, j, 1] - xy[:, i, 1]
@@ -76,7 +77,7 @@ def _membrane(xy: Array, area: Array, nu: Array) -> Array:
     l2 = np.stack([((xy[:, j] - xy[:, i]) ** 2).sum(axis=1) for i, j in SIDES], axis=1)  # 21, 32, 13
     at_corners = CORNER_STRAINS * (2 * area[:, None] / (3 * l2))[:, None, :, None]  # (n, corner, side, theta~)
     at_middles = (at_corners + np.roll(at_corners, -1, axis=1)) / 2
-    # natural strains along the sides to eps_x eps_y gamma_xy
+    # convert natural strains along the sides to eps_x eps_y gamma_xy
     d = np.stack([xy[:, j] - xy[:, i] for i, j in SIDES], axis=1)
     along = np.stack([d[..., 0] ** 2, d[..., 1] ** 2, d[..., 0] * d[..., 1]], axis=2) / l2[:, :, None]
     linear = np.linalg.solve(along[:, None], at_middles)  # (n, middle, strain, theta~)
@@ -87,10 +88,10 @@ def _membrane(xy: Array, area: Array, nu: Array) -> Array:
 
 
 def _plate(xy: Array, area: Array, law: FlatLaw, points: Array) -> Array:
-    """Curvature and shear operators over w, theta_x, theta_y, (n, p, 5, 3 corners, 3)."""
+    """Return curvature and shear operators over w, theta_x, theta_y, (n, p, 5, 3 corners, 3)."""
     n = len(xy)
     shape = flat_shape("triangle", points)
-    slope = np.zeros((n, 3, 2))  # of the corner functions by x, y
+    slope = np.zeros((n, 3, 2))  # derivatives of the corner functions with respect to x, y
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         slope[:, i, 0] = (xy[:, j, 1] - xy[:, k, 1]) / (2 * area)
         slope[:, i, 1] = (xy[:, k, 0] - xy[:, j, 0]) / (2 * area)
@@ -103,7 +104,7 @@ def _plate(xy: Array, area: Array, law: FlatLaw, points: Array) -> Array:
     by_xy = slope[:, 1:]  # the reference coordinates are the functions of the second and third corner
     B[:, :, :3] += sides.curvature(np.einsum("pks,nsa->npka", shape.side_gradients, by_xy))
     along, shear = sides.along, sides.shear
-    for corner, (k, m) in enumerate(((0, 2), (1, 0), (2, 1))):  # the sides that meet at it
+    for corner, (k, m) in enumerate(((0, 2), (1, 0), (2, 1))):  # the sides that meet at the corner
         here = np.linalg.solve(along[:, [k, m]], shear[:, [k, m]].reshape(n, 2, 9)).reshape(n, 2, 3, 3)
         B[:, :, 3:] += shape.values[None, :, corner, None, None, None] * here[:, None]
     return B

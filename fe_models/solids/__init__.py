@@ -1,1 +1,1 @@
-"""Solid bodies: elements, assembly, stress, geometric stiffness, interfaces on their faces."""
+"""Solid bodies: elements, assembly, stress, geometric stiffness, and interfaces on their faces."""

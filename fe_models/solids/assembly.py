@@ -1,11 +1,12 @@
-"""Stiffness and consistent mass of a mesh of solid elements, straight into compressed sparse form.
+"""Stiffness and consistent mass of a mesh of solid elements, assembled directly into compressed sparse form.
 
-(1) number the places of all elements one after the other and list, for each node, the places where it occurs;
-(2) from that the graph of the nodes: row i holds the nodes that share an element with node i, ascending;
-(3) element matrices in batches of bounded size, computed in threads;
-(4) after each batch, every node adds what its elements give to its own rows, in the order of the elements: no two
-    threads write to one entry, and the sums do not depend on the number of threads, so that results repeat bit for bit;
-(5) the scalar mass M_s is assembled once and expanded by components, M = M_s ⊗ 1₃.
+(1) number the element nodes of all elements consecutively, and list for each node the places where it occurs;
+(2) derive the graph of the nodes: row i holds the nodes that share an element with node i, ascending;
+(3) compute element matrices in batches of bounded size, in threads;
+(4) after each batch, add the contributions of the elements to the rows of each node, in the order of the elements. No
+    two threads write to one entry, and the sums do not depend on the number of threads, so results are bitwise
+    reproducible;
+(5) assemble the scalar mass M_s once and expand it by components, M = M_s ⊗ 1₃.
 """
 
 from collections.abc import Callable, Mapping
@@ -27,20 +28,20 @@ from fe_models.solids.incompatible import KIND, brick_chunks, brick_stiffness
 
 __all__ = ["Progress", "assemble", "elastic_properties", "expand_scalar_mass"]
 
-Progress = Callable[[float], None]  #: is told the finished fraction, 0 to 1
+Progress = Callable[[float], None]  #: receives the finished fraction, 0 to 1
 
-BATCH_BYTES = 32e6  #: of element matrices held at once; larger batches leave the cache and are not faster
+BATCH_BYTES = 32e6  #: memory of one batch of element matrices; larger batches leave the cache and are not faster
 LARGEST_INT32 = 2**31 - 1
 
 
 @dataclass(frozen=True, eq=False)
 class NodeGraph:
-    """Which nodes share an element, and where each node occurs in the elements."""
+    """Graph of nodes that share an element, and the places of each node in the elements."""
 
     start: IntArray  #: first entry of `places` of each node, (n_nodes + 1,)
     places: np.ndarray  #: places in the joined element lists, node by node, ascending, (n_places,) int32
     row_start: IntArray  #: first entry of `columns` of each node, (n_nodes + 1,)
-    columns: np.ndarray  #: neighbours of each node, itself included, ascending, (n_entries,) int32
+    columns: np.ndarray  #: neighbours of each node, including itself, ascending, (n_entries,) int32
 
     @property
     def n_nodes(self) -> int:
@@ -50,15 +51,15 @@ class NodeGraph:
 
 @dataclass(frozen=True, eq=False)
 class Elasticity:
-    """What the materials of a mesh are to its elements."""
+    """Elastic constants and densities of the materials of a mesh, as arrays."""
 
-    properties: Array  #: lam, mu, rho of each material, (n_materials, 3); of general ones without meaning but for rho
-    tensors: Array  #: stress by strain of each material, (n_materials, 6, 6)
+    properties: Array  #: lam, mu, rho of each material, (n_materials, 3); lam and mu are unused for general materials
+    tensors: Array  #: matrix of each material that maps strain to stress, (n_materials, 6, 6)
     is_general: np.ndarray  #: whether a material is not isotropic, (n_materials,) bool
 
     @staticmethod
     def of(properties: Array, tensors: Mapping[int, Array] | None) -> "Elasticity":
-        """Return it from lam, mu, rho and the tensors of the materials that are not isotropic."""
+        """Make it from lam, mu, rho and the stiffness matrices of the materials that are not isotropic."""
         given = dict(tensors or {})
         every = [given.get(k, isotropic_tensor(lam, mu)) for k, (lam, mu, _) in enumerate(properties)]
         return Elasticity(properties, np.array(every), np.isin(np.arange(len(properties)), list(given)))
@@ -84,23 +85,23 @@ def assemble(
     properties
         lam [Pa], mu [Pa], rho [kg/m³] of each material, (n_materials, 3).
     of_cell
-        Cell type -> material of each cell, (n_cells,).
+        Index of the material of each cell, (n_cells,), by cell type.
     incompatible
-        Whether bricks of eight nodes have incompatible modes (`fe_models.solids.incompatible`).
+        Whether eight-node bricks have incompatible modes (`fe_models.solids.incompatible`).
     integration, mass
-        Of `INTEGRATIONS` and `MASSES` of `fe_models.solids.elements`. A lumped mass is the diagonal of the consistent
-        one of each element, scaled to the mass of the element.
+        Names in `INTEGRATIONS` and `MASSES` of `fe_models.solids.elements`. A lumped element mass is the diagonal of
+        the consistent mass, scaled to the mass of the element.
     tensors
-        Of materials that are not isotropic: number of the material -> stress by strain, (6, 6) [Pa], rows xx yy zz yz
-        xz xy; their lam and mu are not used.
+        Stiffness of each material that is not isotropic, by its index: maps strain to stress, (6, 6) [Pa], rows xx yy
+        zz yz xz xy. The lam and mu of these materials are not used.
     progress
         Called with the finished fraction.
 
     Returns
     -------
     tuple
-        K, (3 n_nodes, 3 n_nodes) [N/m], dof 3 i + c is component c of node i, and M_s, (n_nodes, n_nodes) [kg]; both
-        symmetric bit for bit, with sorted indices.
+        K, (3 n_nodes, 3 n_nodes) [N/m], where dof 3 i + c is component c of node i, and M_s, (n_nodes, n_nodes) [kg].
+        Both are exactly symmetric, with sorted indices.
 
     Raises
     ------
@@ -129,13 +130,13 @@ def assemble(
 
 
 def elastic_properties(materials: tuple[AnyMaterial, ...]) -> tuple[Array, dict[int, Array]]:
-    """Return lam, mu, rho of each material, (n, 3), and number -> tensor of those that are not isotropic."""
+    """Return lam, mu, rho of each material, (n, 3), and the stiffness matrices of those that are not isotropic."""
     rows = [(m.lam, m.mu, m.rho) if isinstance(m, Material) else (0.0, 0.0, m.rho) for m in materials]
     return np.array(rows), {k: m.stiffness for k, m in enumerate(materials) if not isinstance(m, Material)}
 
 
 def expand_scalar_mass(M_s: sp.csr_array) -> sp.csc_array:
-    """Return M = M_s ⊗ 1₃, (3 n_nodes, 3 n_nodes), dof 3 i + c, of the symmetric scalar mass, (n_nodes, n_nodes)."""
+    """Return M = M_s ⊗ 1₃, (3 n_nodes, 3 n_nodes), dof 3 i + c, from the symmetric scalar mass, (n_nodes, n_nodes)."""
     from fe_models.solids.assembly_kernels import expand_mass
 
     n_nodes, nnz = M_s.shape[0], 3 * M_s.nnz
@@ -148,7 +149,7 @@ def expand_scalar_mass(M_s: sp.csr_array) -> sp.csc_array:
 
 
 def node_graph(lists: list[np.ndarray], n_nodes: int, pool: ThreadPoolExecutor) -> NodeGraph:
-    """Steps (1) and (2) for the element lists of all types, each (n_cells, nodes per cell)."""
+    """Make the node graph, steps (1) and (2), from the element lists of all types, each (n_cells, nodes per cell)."""
     from fe_models.solids.assembly_kernels import node_incidence, row_columns, row_counts
 
     members = np.concatenate([cells.ravel() for cells in lists])
@@ -188,7 +189,7 @@ def assembled_data(
     rules: tuple[str, str],
     progress: Progress | None,
 ) -> tuple[Array, Array]:
-    """Steps (3) and (4): the entries of K, row by row, and of M_s."""
+    """Compute the entries of K, row by row, and of M_s: steps (3) and (4)."""
     from fe_models.solids.assembly_kernels import element_matrices, scatter_elements
     from fe_models.solids.tensor_kernels import tensor_stiffness
 
@@ -201,7 +202,8 @@ def assembled_data(
         element = reference_element(kind, *rules)
         tables = kernel_tables(element)
         n_a = element.n_nodes
-        n_batch = min(len(cells), max(n_parts, int(BATCH_BYTES / (80 * n_a**2))))  # 9 + 1 numbers for each pair
+        # 9 + 1 numbers for each pair of nodes
+        n_batch = min(len(cells), max(n_parts, int(BATCH_BYTES / (80 * n_a**2))))
         K_e, M_e = np.empty((n_batch, 3 * n_a, 3 * n_a)), np.empty((n_batch, n_a, n_a))
         is_inverted = np.zeros(len(cells), bool)
         materials = np.asarray(of_cell[kind])
@@ -279,14 +281,14 @@ def lumped_mass(M_e: Array) -> Array:
 
 
 def kernel_tables(element: ReferenceElement) -> tuple[tuple[np.ndarray, ...], ...]:
-    """Return what the kernel needs for affine elements, for the stiffness and for the mass of curved ones."""
+    """Return the kernel's tables: for affine elements, and for stiffness and mass of curved elements."""
     affine = (element.nodes, element.axis_nodes, element.stiffness_integrals, element.mass_integrals)
     stiffness = (element.stiffness.gradients, element.stiffness.weights)
     return affine, stiffness, (element.mass.values, element.mass.gradients, element.mass.weights)
 
 
 def expanded_stiffness(graph: NodeGraph, K_data: Array, pool: ThreadPoolExecutor) -> sp.csc_array:
-    """Give the entries of K their row starts and column numbers; rows are columns, since K is symmetric."""
+    """Make K from its entries, the row starts and the column numbers; rows equal columns, because K is symmetric."""
     from fe_models.solids.assembly_kernels import expand_columns
 
     index_type = np.int32 if len(K_data) <= LARGEST_INT32 else np.int64
@@ -296,32 +298,32 @@ def expanded_stiffness(graph: NodeGraph, K_data: Array, pool: ThreadPoolExecutor
 
 
 def sorted_csc(data: Array, indices: np.ndarray, indptr: np.ndarray) -> sp.csc_array:
-    """Wrap the arrays of a square matrix whose column entries are sorted and unique, without a check or a copy."""
+    """Wrap the arrays of a square matrix with sorted and unique column entries, without check or copy."""
     matrix = sp.csc_array((data, indices, indptr), shape=2 * (len(indptr) - 1,))
     matrix.has_canonical_format = True
     return matrix
 
 
 def index_like(values: IntArray, largest: int) -> np.ndarray:
-    """Return index numbers as int32 where they fit: half of the memory, and what the sparse solvers take."""
+    """Return index numbers as int32 if they fit; this halves the memory and suits the sparse solvers."""
     return values.astype(np.int32) if largest <= LARGEST_INT32 else values
 
 
 def in_parts(pool: ThreadPoolExecutor, kernel: Any, inputs: tuple[Any, ...], outputs: tuple[Any, ...]) -> None:
-    """Run kernel(*inputs, part, n_parts, *outputs) for every part in threads."""
+    """Run kernel(*inputs, part, n_parts, *outputs) for every part, in threads."""
     n_parts = n_threads()
     run(pool, [(kernel, *inputs, part, n_parts, *outputs) for part in range(n_parts)])
 
 
 def run(pool: ThreadPoolExecutor, calls: list[tuple[Any, ...]]) -> None:
-    """Run the calls (function, *arguments) in threads, and wait for all."""
+    """Run the calls (function, *arguments) in threads, and wait for all of them."""
     futures = [pool.submit(function, *arguments) for function, *arguments in calls]
     for future in futures:
         future.result()
 
 
 def require_assemblable(mesh: Mesh) -> list[str]:
-    """Return the kinds of cells; raise `MeshError` where nodes or cells cannot be those of a body."""
+    """Return the types of the solid cells; raise `MeshError` if nodes or cells cannot form a body."""
     kinds = [kind for kind, cells in mesh.cells.items() if len(cells)]
     if not kinds:
         raise MeshError("assembly: the mesh has no solid cells; expected tetrahedra, hexahedra or wedges")
@@ -336,7 +338,7 @@ def require_assemblable(mesh: Mesh) -> list[str]:
 
 
 def require_known_nodes(kind: str, cells: IntArray, n_nodes: int) -> None:
-    """Raise `MeshError` if cells have the wrong number of nodes or name nodes that are not there."""
+    """Raise `MeshError` if cells have the wrong number of nodes or refer to unknown nodes."""
     expected = reference_element(kind).n_nodes
     if cells.ndim != 2 or cells.shape[1] != expected:
         raise MeshError(f"assembly: {kind}: expected (n_cells, {expected}) nodes, got {cells.shape}")
@@ -345,7 +347,7 @@ def require_known_nodes(kind: str, cells: IntArray, n_nodes: int) -> None:
 
 
 def require_upright(kind: str, is_inverted: np.ndarray) -> None:
-    """Raise `MeshError` naming the inverted elements of one type."""
+    """Raise `MeshError` that names the inverted elements of one type."""
     rows = np.flatnonzero(is_inverted)
     if rows.size:
         some = ", ".join(str(row) for row in rows[:5]) + (", ..." if rows.size > 5 else "")

@@ -1,7 +1,7 @@
-"""Compiled loops of the assembly; imported where they are used, since numba takes half a second to import.
+"""Compiled loops of the assembly. They are imported only where used, because numba takes half a second to import.
 
-Every kernel works on a share of the rows, columns or elements, `part` of `n_parts`, and writes nothing outside it: the
-shares run in threads without locks, and the order of additions to an entry never depends on the threads.
+Every kernel works on one share of the rows, columns or elements, `part` of `n_parts`, and writes only to that share.
+The shares run in threads without locks, and the order of additions to an entry never depends on the threads.
 """
 
 import numpy as np
@@ -17,15 +17,16 @@ __all__ = [
     "scatter_elements",
 ]
 
-STRIPE = 64  #: consecutive nodes that one part owns; parts take stripes in turn, which balances any node order
+#: number of consecutive nodes in a stripe; parts take stripes in turn, which balances the load for any node order
+STRIPE = 64
 
 jit = njit(cache=True, nogil=True, error_model="numpy")
-jit_fma = njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})  # a * b + c in one rounding, no more
+jit_fma = njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})  # only allow fused a * b + c
 
 
 @jit
 def node_incidence(members, n_nodes):
-    """Return start (n_nodes + 1,) and, node by node, the ascending places in `members` where the node occurs."""
+    """Return start, (n_nodes + 1,), and for each node the ascending places in `members` where it occurs."""
     start = np.zeros(n_nodes + 1, np.int64)
     for place in range(members.size):
         start[members[place] + 1] += 1
@@ -42,7 +43,7 @@ def node_incidence(members, n_nodes):
 
 @jit
 def neighbours_of(node, members, first, n_members, start, places, seen, found):
-    """Collect in `found` the nodes that share an element with `node`, unsorted; return their number."""
+    """Collect in `found` the nodes that share an element with `node`, unsorted; return how many there are."""
     count = 0
     for k in range(start[node], start[node + 1]):
         element_first = first[places[k]]
@@ -57,7 +58,7 @@ def neighbours_of(node, members, first, n_members, start, places, seen, found):
 
 @jit
 def row_counts(members, first, n_members, start, places, part, n_parts, counts):
-    """Count the neighbours (itself included) of the nodes of this part into counts, (n_nodes,)."""
+    """Count the neighbours (including itself) of each node of this part into counts, (n_nodes,)."""
     n_nodes = counts.size
     seen = np.full(n_nodes, -1, np.int32)
     found = np.empty(n_nodes, np.int32)
@@ -67,14 +68,14 @@ def row_counts(members, first, n_members, start, places, part, n_parts, counts):
 
 @jit
 def row_columns(members, first, n_members, start, places, part, n_parts, row_start, columns):
-    """Write the ascending neighbours of the nodes of this part into columns, (row_start[-1],)."""
+    """Write the ascending neighbours of each node of this part into columns, (row_start[-1],)."""
     n_nodes = row_start.size - 1
     seen = np.full(n_nodes, -1, np.int32)
     found = np.empty(n_nodes, np.int32)
     for node in range(part * n_nodes // n_parts, (part + 1) * n_nodes // n_parts):
         count = neighbours_of(node, members, first, n_members, start, places, seen, found)
         at = row_start[node]
-        for k in range(count):  # insertion sort: rows are short and nearly sorted
+        for k in range(count):  # insertion sort, because rows are short and nearly sorted
             value = found[k]
             m = at + k
             while m > at and columns[m - 1] > value:
@@ -85,8 +86,9 @@ def row_columns(members, first, n_members, start, places, part, n_parts, row_sta
 
 @jit_fma
 def cofactors_of(J, cofactors):
-    """Write det(J) J⁻¹, (3, 3), and return det(J) of J, (3, 3)."""
-    for i in range(J.shape[0]):  # a size unknown to the compiler: it does not unroll, and compiles in half of the time
+    """Write det(J) J⁻¹, (3, 3), and return det(J), for J, (3, 3)."""
+    # the compiler does not know this size, so it does not unroll, and compiles in half of the time
+    for i in range(J.shape[0]):
         i1, i2 = (i + 1) % 3, (i + 2) % 3
         for j in range(J.shape[0]):
             j1, j2 = (j + 1) % 3, (j + 2) % 3
@@ -108,10 +110,10 @@ def jacobian(x, dN, J, Q):
 
 @jit
 def is_affine(x, corners, reference, J):
-    """Write J from the edges at node 0; return whether x is affine in the reference, to the rounding of coordinates.
+    """Write J from the edges at node 0; return whether x is affine in the reference coordinates, to roundoff.
 
-    x: positions of the nodes, (n_a, 3); corners: the nodes at e_1, e_2, e_3 of the reference cell, (3,);
-    reference: its nodes, (n_a, 3).
+    x: positions of the nodes, (n_a, 3); corners: the nodes at e_1, e_2, e_3 of the reference cell, (3,); reference:
+    nodes of the reference cell, (n_a, 3).
     """
     largest = 0.0
     for i in range(3):
@@ -130,7 +132,7 @@ def is_affine(x, corners, reference, J):
 
 @jit_fma
 def affine_element(J, lam, mu, rho, R_K, R_M, K, M):
-    """Element matrices with a constant Jacobian, from integrals over the reference cell; return det(J).
+    """Compute element matrices with a constant Jacobian from integrals over the reference cell; return det(J).
 
     (1) C_ij,kl = det(J) (lam Q_ki Q_lj + mu Q_kj Q_li + mu δ_ij Q_k·Q_l) with Q = J⁻¹
     (2) K_ai,bj = Σ_kl C_ij,kl ∫ ∂N_a/∂xi_k ∂N_b/∂xi_l,  M_ab = rho det(J) ∫ N_a N_b, for the pairs b >= a.
@@ -171,9 +173,9 @@ def affine_element(J, lam, mu, rho, R_K, R_M, K, M):
 
 @jit_fma
 def curved_element(x, lam, mu, rho, dN_K, w_K, N_M, dN_M, w_M, g, K, M):
-    """Element matrices by quadrature; return the least det(J), or the first that is not positive.
+    """Compute element matrices by quadrature; return the smallest det(J), or the first that is not positive.
 
-    (1) G = Σ_q w det(J) g gᵀ with g the gradients ∂N_a/∂x_i in one column, node-major
+    (1) G = Σ_q w det(J) g gᵀ, where g holds the gradients ∂N_a/∂x_i in one column, node-major
     (2) K_ai,bj = lam G_ai,bj + mu G_aj,bi + mu δ_ij Σ_k G_ak,bk for the pairs b >= a
     (3) M_ab = rho Σ_q w det(J) N_a N_b.
 
@@ -186,11 +188,11 @@ def curved_element(x, lam, mu, rho, dN_K, w_K, N_M, dN_M, w_M, g, K, M):
         det = jacobian(x, dN_K[q], J, Q)
         if not det > 0.0:
             return det
-        factor[q] = w_K[q] / det  # det(J) once as measure, 1 / det(J) in each of the two gradients
+        factor[q] = w_K[q] / det  # det(J) from the measure, and 1 / det(J) from each of the two gradients
         for a in range(n_a):
             for i in range(J.shape[0]):
                 g[q, 3 * a + i] = dN_K[q, a, 0] * Q[0, i] + dN_K[q, a, 1] * Q[1, i] + dN_K[q, a, 2] * Q[2, i]
-    for r in range(3 * n_a):  # (1), G in the place of K
+    for r in range(3 * n_a):  # (1); K is the workspace for G
         first = 3 * (r // 3)
         row = K[r, first:]
         for s in range(row.size):
@@ -229,7 +231,7 @@ def curved_element(x, lam, mu, rho, dN_K, w_K, N_M, dN_M, w_M, g, K, M):
 
 @jit
 def element_matrices(nodes, cells, properties, of_cell, affine, stiffness, mass, K, M, is_inverted):
-    """Stiffness K, (n, 3 n_a, 3 n_a), and scalar mass M, (n, n_a, n_a), of the n elements `cells`, (n, n_a).
+    """Compute stiffness K, (n, 3 n_a, 3 n_a), and scalar mass M, (n, n_a, n_a), of the n elements `cells`, (n, n_a).
 
     properties: lam, mu, rho of every material, (n_materials, 3); of_cell: the material of each element;
     affine, stiffness, mass: tables of the reference element, see `fe_models.solids.assembly.kernel_tables`.
@@ -257,9 +259,9 @@ def scatter_elements(
 ):
     """Add the element matrices of the consecutive elements `cells` to the rows of the nodes of this part.
 
-    Row 3 i + c of the stiffness has 3 entries for each of the m_i neighbours of node i, so that entry (c, d) for the
-    p-th neighbour lies at 9 row_start[i] + 3 m_i c + 3 p + d of K_data: no conversion follows.
-    cursor: for each node, its next place in `places` that has not been added yet; where: workspace, (n_nodes,).
+    Row 3 i + c of the stiffness has 3 entries for each of the m_i neighbours of node i. Entry (c, d) of the p-th
+    neighbour is therefore at 9 row_start[i] + 3 m_i c + 3 p + d of K_data, and no conversion is needed.
+    cursor: for each node, its first place in `places` that has not been added yet; where: workspace, (n_nodes,).
     """
     n_nodes = row_start.size - 1
     n_a = cells.shape[1]
@@ -288,7 +290,7 @@ def scatter_elements(
 
 @jit
 def expand_columns(row_start, columns, part, n_parts, indptr, indices):
-    """Row starts and column numbers of the stiffness from those of the node graph: three columns for each neighbour."""
+    """Write row starts and column numbers of the stiffness from the node graph, three columns for each neighbour."""
     n_nodes = row_start.size - 1
     for node in range(part * n_nodes // n_parts, (part + 1) * n_nodes // n_parts):
         at = row_start[node]
@@ -303,7 +305,7 @@ def expand_columns(row_start, columns, part, n_parts, indptr, indices):
 
 @jit
 def expand_mass(row_start, columns, M_data, part, n_parts, indptr, indices, data):
-    """M_s ⊗ 1₃: row 3 i + c has M_s,ij in column 3 j + c."""
+    """Write M_s ⊗ 1₃: row 3 i + c has M_s,ij in column 3 j + c."""
     n_nodes = row_start.size - 1
     for node in range(part * n_nodes // n_parts, (part + 1) * n_nodes // n_parts):
         at = row_start[node]

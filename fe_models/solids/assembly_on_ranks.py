@@ -1,12 +1,12 @@
-"""Stiffness and mass of a mesh of solid elements by parts of the mesh, rows of both on all ranks.
+"""Assembly of solid elements on several ranks: each rank assembles a part of the mesh and keeps its rows of K and M.
 
-(1) rank 0 orders the nodes so that neighbours are near, and cuts the order into parts of about as many entries
-(2) every rank gets the elements that touch its nodes, and these elements alone
-(3) it assembles them and keeps the rows of its own nodes, which are whole: no sums pass between ranks
-(4) rows of the scalar mass M_s stay likewise, for the moments of the body
+(1) rank 0 orders the nodes so that neighbours are near, and cuts the order into parts with similar numbers of entries
+(2) every rank receives only the elements that touch its nodes
+(3) it assembles them and keeps the rows of its own nodes; these rows are complete, so no sums pass between ranks
+(4) it also keeps its rows of the scalar mass M_s, for the mass integrals of the body
 
-Elements at a cut are computed by each rank whose nodes they touch. Entries are those of one process bit for bit, since
-the elements of a node are added in the same sequence.
+Every rank whose nodes touch an element at a cut computes that element. Entries equal those of a single process bitwise,
+because the elements of a node are added in the same order.
 """
 
 import weakref
@@ -32,22 +32,22 @@ from fe_models.solids.assembly import assemble, in_parts, node_graph, require_as
 
 __all__ = ["MeshPart", "SpreadMesh", "assemble_on_ranks"]
 
-KEY = "assembled rows"  #: of what a rank has assembled and not yet handed on
+KEY = "assembled rows"  #: key in the store of a rank for rows that it has assembled and not yet delivered
 MATRICES = ("K", "M", "M_s")
 KEPT = (*MATRICES, "mesh")
 
 
 @dataclass(frozen=True, eq=False)
 class MeshPart:
-    """What a rank needs of the mesh."""
+    """The part of the mesh that one rank needs."""
 
-    mesh: Mesh  #: nodes of the elements that touch its own nodes, and these elements
-    of_cell: Mapping[str, IntArray]  #: material of each
-    position: np.ndarray  #: of each node of the part in the order of all, (n_part_nodes,)
-    own: np.ndarray  #: its own nodes among them, in that order, (n_own,)
+    mesh: Mesh  #: the elements that touch the nodes of the rank, and all nodes of these elements
+    of_cell: Mapping[str, IntArray]  #: material of each cell, by cell type
+    position: np.ndarray  #: position of each node of the part in the global order, (n_part_nodes,)
+    own: np.ndarray  #: indices of the nodes that the rank owns, in that order, (n_own,)
 
     def cells_of(self, rows: slice) -> "MeshPart":
-        """Return the cells whose first node in the order of all is an own one: each is of one rank."""
+        """Return the cells whose first node in the global order is owned by the rank, so each cell has one rank."""
         first = {kind: self.position[cells].min(axis=1) for kind, cells in self.mesh.cells.items()}
         index = {kind: np.flatnonzero((at >= rows.start) & (at < rows.stop)) for kind, at in first.items()}
         cells = {kind: self.mesh.cells[kind][some] for kind, some in index.items() if len(some)}
@@ -56,10 +56,10 @@ class MeshPart:
 
 
 class SpreadMesh:
-    """The mesh by parts: every rank keeps the cells that touch its nodes; with the last name of it they go."""
+    """The distributed mesh: every rank keeps the cells that touch its nodes, until the last reference is dropped."""
 
     def __init__(self, layout: RowLayout) -> None:
-        """Let every rank keep what it assembled; layout: of the nodes."""
+        """Let every rank keep the part of the mesh that it assembled; layout: distribution of the nodes."""
         self.layout, self.key = layout, new_key()
         layout.ask(mesh_here, self.key)
         weakref.finalize(self, dropped.append, self.key).atexit = False
@@ -68,14 +68,14 @@ class SpreadMesh:
 def assemble_on_ranks(
     ranks: Ranks, mesh: Mesh, properties: Array, of_cell: Mapping[str, IntArray], options: Mapping[str, Any]
 ) -> tuple[SpreadMatrix, SpreadMatrix, SpreadMatrix, SpreadMesh]:
-    """Return K, M = M_s ⊗ 1₃ and M_s by rows on all ranks (`fe_models.solids.assembly.assemble`), and the mesh so.
+    """Return K, M = M_s ⊗ 1₃, M_s and the mesh, all distributed over the ranks.
 
     Parameters
     ----------
     properties, of_cell
-        As there.
+        As for `fe_models.solids.assembly.assemble`.
     options
-        Its further arguments.
+        Its keyword arguments.
     """
     kinds = require_assemblable(mesh)
     lists = {kind: np.ascontiguousarray(mesh.cells[kind], dtype=np.int32) for kind in kinds}
@@ -83,8 +83,9 @@ def assemble_on_ranks(
     ranks.store[KEY] = [mesh_part(mesh, lists, of_cell, order, rows, rank) for rank in range(ranks.size)]  # (2)
     try:
         asked(ranks, assemble_here, properties, dict(options))  # (3)
-    except MeshError:  # told of a part of the mesh: one process finds the same in the whole
-        asked(ranks, forget_here)  # the rows of ranks whose part does
+    # the message refers to a part of the mesh; a single process finds the same fault in the whole mesh
+    except MeshError:
+        asked(ranks, forget_here)  # drop the rows of the ranks that found no fault
         assemble(mesh, properties, of_cell, **options)
         raise
     of_dofs = (3 * order[:, None] + np.arange(3)).ravel()
@@ -95,7 +96,7 @@ def assemble_on_ranks(
 
 
 def node_order(lists: list[np.ndarray], n_nodes: int, size: int) -> tuple[IntArray, Rows]:
-    """Step (1): the node at each place, (n_nodes,), and the places of each rank."""
+    """Order the nodes, step (1): return the node at each position, (n_nodes,), and the positions of each rank."""
     with ThreadPoolExecutor(n_threads()) as pool:
         graph = node_graph(lists, n_nodes, pool)
     starts = graph.row_start.astype(np.int32)
@@ -112,7 +113,7 @@ def mesh_part(
     rows: Rows,
     rank: int,
 ) -> MeshPart:
-    """Return the elements that touch the nodes of a rank."""
+    """Return the elements that touch the nodes of a rank, step (2)."""
     is_own = np.zeros(len(order), bool)
     is_own[order[rows.of(rank)]] = True
     chosen = {kind: np.flatnonzero(is_own[cells].any(axis=1)) for kind, cells in lists.items()}
@@ -134,18 +135,19 @@ def mesh_part(
 
 
 def assemble_here(ranks: Ranks, properties: Array, options: dict[str, Any]) -> None:
-    """Step (3): keep own rows of K, M and M_s, columns in the order of all."""
+    """Assemble and keep this rank's rows of K, M and M_s, with columns in the global order: step (3)."""
     parts = ranks.store.pop(KEY, None) or [None] * ranks.size
     part: MeshPart = parts[0] if ranks.size == 1 else ranks.comm.alltoall(parts)[0]
     del parts
     ranks.store[f"{KEY} mesh"] = part
-    if not len(part.own):  # fewer nodes than ranks
+    if not len(part.own):  # there are fewer nodes than ranks
         for name in MATRICES:
             ranks.store[f"{KEY} {name}"] = OwnRows(np.zeros(1, np.int32), np.zeros(0, np.int32), np.zeros(0))
         return
     K, M_s = assemble(part.mesh, properties, part.of_cell, **options)
     dofs = (3 * part.own[:, None] + np.arange(3)).ravel()
-    own_K = sp.csr_array((K.data, K.indices, K.indptr), shape=K.shape)[dofs]  # columns of a symmetric matrix are rows
+    # columns of a symmetric matrix are its rows
+    own_K = sp.csr_array((K.data, K.indices, K.indptr), shape=K.shape)[dofs]
     del K
     own_M = sp.csr_array(M_s[part.own])
     del M_s
@@ -158,25 +160,25 @@ def assemble_here(ranks: Ranks, properties: Array, options: dict[str, Any]) -> N
 
 
 def forget_here(ranks: Ranks) -> None:
-    """Forget what was assembled or given for it."""
+    """Drop the assembled rows and the part of the mesh."""
     for key in (KEY, *(f"{KEY} {name}" for name in KEPT)):
         ranks.store.pop(key, None)
     give_back()
 
 
 def mesh_here(ranks: Ranks, key: str) -> None:
-    """Keep the part of the mesh by another name."""
+    """Keep the part of the mesh under another key."""
     ranks.store[key] = ranks.store.pop(f"{KEY} mesh")
 
 
 def handed_here(ranks: Ranks, name: str) -> OwnRows:
-    """Return the rows that were assembled, and forget them."""
+    """Return the assembled rows, and drop them from the store."""
     rows: OwnRows = ranks.store.pop(f"{KEY} {name}")
     return rows
 
 
 def expanded_rows(indptr: np.ndarray, columns: np.ndarray, data: Array) -> OwnRows:
-    """Return S ⊗ 1₃ of rows of a scalar matrix S."""
+    """Return the rows S ⊗ 1₃ from the rows of a scalar matrix S."""
     from fe_models.solids.assembly_kernels import expand_mass
 
     n = 3 * len(data)

@@ -1,4 +1,4 @@
-"""A finite element body from a mesh of solid cells."""
+"""The finite element body of a mesh of solid cells."""
 
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -42,34 +42,34 @@ from fe_models.solids.stress import nodal_stress, stiffest_at_nodes
 
 __all__ = ["SolidModel", "scalar_mass_gram", "solid_body"]
 
-CELLS_AT_ONCE = 8_000  #: whose Jacobians are held at once
-GRAM_BYTES = 64e6  #: of M_s times some columns, which are held at once
+CELLS_AT_ONCE = 8_000  #: number of cells whose Jacobians are held at once
+GRAM_BYTES = 64e6  #: memory for M_s times a block of columns
 
 
 @dataclass(frozen=True, eq=False)
 class SolidModel:
-    """The elements behind a solid body (`fe_body.ElementModel`): mass moments, stress, geometric stiffness."""
+    """The element model of a solid body (`fe_body.ElementModel`): mass integrals, stress, geometric stiffness."""
 
     mesh: Mesh
     materials: tuple[AnyMaterial, ...]
-    of_cell: Mapping[str, IntArray]  #: cell type -> material of each cell, (n_cells,)
+    of_cell: Mapping[str, IntArray]  #: index of the material of each cell, (n_cells,), by cell type
     M_s: sp.csr_array | SpreadMatrix  #: scalar consistent mass, (n_nodes, n_nodes) [kg]
-    incompatible: bool = False  #: whether bricks of eight nodes have incompatible modes
-    integration: str = "full"  #: of the stiffness, of `fe_models.solids.elements.INTEGRATIONS`
-    parts: SpreadMesh | None = None  #: the mesh by parts, where many ranks assembled it
+    incompatible: bool = False  #: whether eight-node bricks have incompatible modes
+    integration: str = "full"  #: integration of the stiffness, one of `fe_models.solids.elements.INTEGRATIONS`
+    parts: SpreadMesh | None = None  #: the distributed mesh, if several ranks assembled it
 
     @cached_property
     def of_node(self) -> IntArray:
-        """The material whose stress each node shows: the stiffest of its elements, (n_nodes,)."""
+        """Material whose stress each node shows: that of the stiffest adjoining element, (n_nodes,)."""
         return frozen_int(stiffest_at_nodes(self.mesh, self.materials, self.of_cell))
 
     @property
     def has_nodal_stress(self) -> bool:
-        """True: the elements know it."""
+        """True, because solid elements know their stress."""
         return True
 
     def mass_gram(self, u: Any) -> Array:
-        """Return ∫ a aᵀ over mass, a = [1, c, u_x, u_y, u_z], (4 + 3 k, 4 + 3 k), exact; u is (3 n_nodes, k)."""
+        """Return ∫ a aᵀ dm with a = [1, c, u_x, u_y, u_z], (4 + 3 k, 4 + 3 k), exact; u is (3 n_nodes, k)."""
         if isinstance(self.M_s, SpreadMatrix):
             return spread_mass_gram(self.M_s, self.mesh.nodes, u)
         return scalar_mass_gram(self.M_s, self.mesh.nodes, np.asarray(u).reshape(len(self.mesh.nodes), 3, -1))
@@ -77,7 +77,7 @@ class SolidModel:
     def nodal_stress(self, u: Array, *, nodes: IntArray | None = None) -> Array:
         """Return the stress at the nodes, (n_nodes, 6, k) [Pa], xx yy zz yz xz xy, of columns u, (3 n_nodes, k).
 
-        Only the elements at `nodes` are visited where these are given; the other nodes show zero.
+        If `nodes` are given, only their elements are visited, and the other nodes report zero.
         """
         require_rows("nodal_stress", u, 3 * len(self.mesh.nodes))
         return nodal_stress(
@@ -85,7 +85,7 @@ class SolidModel:
         )
 
     def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
-        """Return half the curl of u at nodes of the mesh, (n, 3, k); NaN at others."""
+        """Return half the curl of u at nodes of the mesh, (n, 3, k); NaN at other nodes."""
         require_rows("nodal_rotation", u, 3 * len(self.mesh.nodes))
         rotation = np.full((len(nodes), 3, u.shape[1]), np.nan)
         is_own = nodes < len(self.mesh.nodes)
@@ -94,15 +94,15 @@ class SolidModel:
 
     @property
     def has_geometric_stiffness(self) -> bool:
-        """True: solid elements know it."""
+        """True, because solid elements know their geometric stiffness."""
         return True
 
     def mass_forces(self, loads: MassLoads) -> Array:
-        """Return the consistent nodal forces of loads per mass, (3 n_nodes, k): exact, the loads are linear in c."""
+        """Return consistent nodal forces of loads per unit mass, (3 n_nodes, k); exact for loads linear in c."""
         return np.asarray(self.M_s @ loads.at(self.mesh.nodes).reshape(len(self.mesh.nodes), -1)).reshape(-1, loads.k)
 
     def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
-        """Return ∫ sigma grad N, (3 n_nodes, k) [N], of columns u; only at `nodes` where these are given."""
+        """Return ∫ sigma grad N dV of the columns u, (3 n_nodes, k) [N]; if `nodes` are given, only there."""
         require_rows("internal_forces", u, 3 * len(self.mesh.nodes))
         return internal_forces(
             self.mesh,
@@ -115,9 +115,9 @@ class SolidModel:
         )
 
     def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Any) -> Array:
-        """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), of the states u, (3 n_nodes, k); the stress alone makes it.
+        """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), of the states u, (3 n_nodes, k); only their stress counts.
 
-        Of columns on many ranks each rank does its cells.
+        If Phi is distributed, each rank computes the contribution of its cells.
         """
         require_rows("geometric_stiffness", u, 3 * len(self.mesh.nodes))
         require_rows("geometric_stiffness", Phi, 3 * len(self.mesh.nodes))
@@ -148,49 +148,49 @@ def solid_body(
     progress: Progress | None = None,
     ranks: Ranks | None = None,
 ) -> FEBody:
-    """Make the body of a mesh of solid cells: isoparametric elements, consistent mass, dof 3 i + c of every node i.
+    """Make the body of a mesh of solid cells: isoparametric elements with consistent mass, dof 3 i + c at node i.
 
     Parameters
     ----------
     mesh
-        Tetrahedra, hexahedra and wedges, mixed as they come; faces and lines do not enter. A `fe_models.Mesh`, or a
+        Tetrahedra, hexahedra, wedges and pyramids, also mixed; faces and lines are ignored. A `fe_models.Mesh`, or a
         mesh of meshio, pyvista or scikit-fem (`fe_models.as_mesh`).
     materials
-        One for all cells, or group name -> material (`assign_materials`), in the units of the mesh; isotropic or
-        orthotropic.
+        One material for all cells, or one for each group name (`assign_materials`), in the units of the mesh. Materials
+        may be anisotropic.
     name
-        Of the body.
+        Name of the body.
     units
-        In which coordinates and materials are.
+        Unit system of coordinates and materials.
     interfaces
-        Named places, to be coupled later by `cms.couple`.
+        Named places that `cms.couple` couples later.
     incompatible_modes
-        Whether bricks of eight nodes have internal modes that let them bend (`fe_models.solids.incompatible`); other
-        cells stay as they are.
+        Whether eight-node bricks have internal bending modes (`fe_models.solids.incompatible`). Other cells do not
+        change.
     integration
-        Of the stiffness: "full", or "reduced" by the fewest points that finite element programs use
-        (`fe_models.solids.elements.REDUCED`): bricks of 20 nodes by 8 as C3D20R, wedges by 2.
+        Integration of the stiffness: "full", or "reduced" with the fewest points that finite element programs use
+        (`fe_models.solids.elements.REDUCED`): 8 points for 20-node bricks as in C3D20R, 2 points for six-node wedges.
     mass
-        "consistent", "reduced" by the points of the reduced stiffness, "14-point" as ANSYS has it for bricks of 20
-        nodes, or "lumped" on the diagonal. Reduced integration
-        by too few points leaves motions without mass: the rank of the mass is then less than its size.
+        "consistent"; "reduced", with the points of the reduced stiffness; "14-point", as ANSYS integrates 20-node
+        bricks; or "lumped" to the diagonal. Too few points leave some motions without mass: the mass matrix is then
+        singular.
     progress
-        Called with the finished fraction of the assembly, 0 to 1.
+        Receives the finished fraction of the assembly, 0 to 1.
     ranks
-        Processes that assemble parts of the mesh and keep rows of K and M (`SpreadMatrix`); None, or one: K and M are
-        here.
+        Processes that assemble parts of the mesh and keep their rows of K and M (`SpreadMatrix`). None, or a single
+        rank: K and M are ordinary matrices.
 
     Returns
     -------
     FEBody
-        With `SolidModel` as its element model and the boundary triangles as its surface.
+        Its element model is a `SolidModel`, and its surface is the boundary triangles.
 
     Raises
     ------
     MaterialError
-        If a group is unknown, or cells have no material or two.
+        If a group is unknown, or cells have no material or two materials.
     MeshError
-        If there is no solid cell, a node belongs to none, or an element is inverted.
+        If there is no solid cell, a node belongs to no solid cell, or an element is inverted.
     """
     rule_words = _rule_words(integration, mass)
     mesh = as_mesh(mesh)
@@ -232,14 +232,14 @@ def scalar_mass_gram(M_s: sp.csr_array, nodes: Array, u: Array) -> Array:
     M_s
         Scalar mass, (n_nodes, n_nodes) [kg].
     nodes
-        X, (n_nodes, 3) [m].
+        Positions X, (n_nodes, 3) [m].
     u
         Translations of the nodes, (n_nodes, 3, k) [m].
     """
     n_parts = n_threads()
     cuts = np.linspace(0, len(nodes), n_parts + 1).astype(int)
     parts = [M_s[a:b] for a, b in pairwise(cuts)]
-    with ThreadPoolExecutor(n_parts) as pool:  # sparse products in threads; the dense ones have threads of their own
+    with ThreadPoolExecutor(n_parts) as pool:  # threads for sparse products; dense products have their own threads
 
         def multiply(block: Array) -> Array:
             return np.concatenate(list(pool.map(lambda part: part @ block, parts)))
@@ -248,17 +248,18 @@ def scalar_mass_gram(M_s: sp.csr_array, nodes: Array, u: Array) -> Array:
 
 
 def width_of_gram(n_nodes: int) -> int:
-    """Return how many columns are multiplied by M_s at once."""
+    """Return how many columns are multiplied by M_s at a time."""
     return max(16, int(GRAM_BYTES / (8 * n_nodes)))
 
 
 def gram_by_products(multiply: Callable[[Array], Array], nodes: Array, columns: Array, width: int) -> Array:
-    """Return Aᵀ M_s A, A = [1, X, columns], by products x -> M_s x, so many columns at once.
+    """Return Aᵀ M_s A with A = [1, X, columns] from products x -> M_s x of `width` columns at a time.
 
     Parameters
     ----------
     nodes, columns
-        Rows of X and of u_x, u_y, u_z of all nodes or, on one of many ranks, of its own; results of ranks are summed.
+        Rows of X and of u_x, u_y, u_z for all nodes. On one of several ranks: for its own nodes; the results of all
+        ranks are then summed.
     """
     n_nodes, k = columns.shape
     linear = np.hstack([np.ones((n_nodes, 1)), nodes])
@@ -272,27 +273,27 @@ def gram_by_products(multiply: Callable[[Array], Array], nodes: Array, columns: 
         gram[:4, own] = linear.T @ product
         for rows in row_slices(n_nodes, columns):
             gram[4 : 4 + end, own] += columns[rows, :end].T @ product[rows]
-        gram[own, : 4 + begin] = gram[: 4 + begin, own].T  # symmetric by definition: the other half is not formed
+        gram[own, : 4 + begin] = gram[: 4 + begin, own].T  # symmetric by definition, so only one half is computed
         gram[own, own] = (gram[own, own] + gram[own, own].T) / 2
     return gram
 
 
 def spread_mass_gram(M_s: SpreadMatrix, nodes: Array, u: Any) -> Array:
-    """Return `scalar_mass_gram` of columns u, (3 n_nodes, k), where M_s lies by rows on many ranks, as a sum of these.
+    """Return `scalar_mass_gram` of columns u, (3 n_nodes, k), for a distributed M_s, as the sum over the ranks.
 
-    Columns on the ranks lie as the dofs of the nodes do; those of rank 0 go there.
+    Distributed columns must be laid out as the dofs of the nodes. Columns of rank 0 are sent to the ranks.
     """
     order = (3 * M_s.order[:, None] + np.arange(3)).ravel()
     layout = RowLayout(M_s.ranks, order, Rows(tuple(3 * start for start in M_s.rows.starts)))
     columns, places = spread_columns(layout, u), spread_columns(M_s.layout, nodes)
     if not columns.layout.is_like(layout):
-        raise BodyError(f"mass_gram: u, {columns.shape}: its rows lie on the ranks otherwise than those of the mass")
+        raise BodyError(f"mass_gram: u, {columns.shape}: its rows are distributed differently from those of M_s")
     width = width_of_gram(len(nodes))
     return np.asarray(np.sum(M_s.layout.ask(gram_here, M_s.key, places.part, columns.part, width), axis=0))
 
 
 def gram_here(ranks: Ranks, key: str, nodes: Part, u: Part, width: int) -> Array:
-    """Return the part of Aᵀ M_s A of this rank's rows."""
+    """Return the contribution of this rank's rows to Aᵀ M_s A."""
     product: RowsProduct = ranks.store[key]
     own = own_part(ranks, u)
     columns = np.ascontiguousarray(own).reshape(product.n_own, 3 * own.shape[1])
@@ -300,10 +301,10 @@ def gram_here(ranks: Ranks, key: str, nodes: Part, u: Part, width: int) -> Array
 
 
 def node_volumes(mesh: Mesh) -> Array:
-    """Return the volume each node stands for, (n_nodes,) [m³]: that of its elements, shared out by ∫N_n².
+    """Return the volume that each node represents, (n_nodes,) [m³]: element volumes, distributed by ∫N_n².
 
-    ∫N_n itself, which would be consistent, is negative at the corners of quadratic elements. The shares are those of
-    the reference cell; volumes by the few points of the stress, exact for cells with straight edges.
+    The consistent weight ∫N_n is negative at the corners of quadratic elements. The shares are those of the reference
+    cell. Volumes are integrated with the stress points, which is exact for cells with straight edges.
     """
     volumes = np.zeros(len(mesh.nodes))
     for kind, cells in mesh.cells.items():
@@ -317,7 +318,7 @@ def node_volumes(mesh: Mesh) -> Array:
 
 
 def provenance(mesh: Mesh, materials: tuple[AnyMaterial, ...], of_cell: Mapping[str, IntArray]) -> dict[str, str]:
-    """Say where the body came from: mesh, digest, elements, materials and the version of scikit-fem."""
+    """Return the origin of the body: mesh, digest, elements, materials and the version of scikit-fem."""
     record = {"mesh": mesh.source, "mesh sha256": mesh.digest, "nodes": str(len(mesh.nodes))}
     record |= {f"file {path}": digest for path, digest in mesh.included.items()}
     record |= dict(mesh.origin)
@@ -333,7 +334,7 @@ def _brick_words(mesh: Mesh, incompatible_modes: bool) -> dict[str, str]:
 
 
 def _rule_words(integration: str, mass: str) -> dict[str, str]:
-    """Say what differs from full integration and consistent mass; refuse what is neither."""
+    """Describe deviations from full integration and consistent mass; raise `BodyError` for unknown rules."""
     for what, value, choices in (("integration", integration, INTEGRATIONS), ("mass", mass, MASSES)):
         if value not in choices:
             raise BodyError(f"solid_body: {what}: unknown {quoted(value)}{nearest(value, choices)}")

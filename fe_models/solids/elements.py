@@ -1,4 +1,4 @@
-"""Reference elements of the solids: shape functions of scikit-fem in the node order of meshio, and their quadrature.
+"""Reference elements of the solids: shape functions of scikit-fem in the node order of meshio, with quadrature.
 
 The orders are chosen so that, on an isoparametric (curved) element,
 
@@ -23,10 +23,12 @@ __all__ = [
     "INTEGRATIONS", "MASSES", "ReferenceElement", "ShapeTable", "reference_centre", "reference_element", "shape_table",
 ]  # fmt: skip
 
-Degree = int | tuple[int, int]  #: wedges: of triangle and line; pyramids: numbers of points across and up
+#: polynomial degree; wedges: of triangle and line; pyramids: numbers of points across and up
+Degree = int | tuple[int, int]
 
-# scikit-fem 12 labels its tetrahedron tables 5 to 8 one degree too high (measured; a test holds them to what is used
-# here), so label 8 gives degree 7. Degrees: stiffness, mass; per direction for hexahedra, (triangle, line) for wedges.
+# scikit-fem 12 labels its tetrahedron tables 5 to 8 one degree too high (measured; a test checks the tables used here),
+# so label 8 gives degree 7. Degrees are (stiffness, mass): one per direction for hexahedra, (triangle, line) for
+# wedges.
 RULES: dict[str, tuple[str, Degree, Degree]] = {
     "tetra": ("tet", 1, 2),  # mass: N N = 2
     "tetra10": ("tet", 5, 8),  # stiffness: 14 positive weights, degree 4; mass: 2 + 2 + 3 for the Jacobian = 7
@@ -34,29 +36,30 @@ RULES: dict[str, tuple[str, Degree, Degree]] = {
     "hexahedron20": ("hex", 5, 9),  # mass: 2 + 2 + 5 = 9
     "hexahedron27": ("hex", 5, 9),
     "wedge": ("wedge", (2, 3), (3, 5)),  # mass: triangle 1 + 1 + 1 = 3, line 1 + 1 + 2 = 4
-    # stiffness: triangle 2 (1 + 1), or 3 (0 + 2, along the line) within 4, line 2 + 2; mass: triangle 2 + 2 + 3, line 9
+    # wedge15, stiffness: triangle degree 4 covers 2 (1 + 1) and 3 (0 + 2, along the line), line 2 + 2; mass: triangle 2
+    # + 2 + 3, line 9
     "wedge15": ("wedge", (4, 5), (8, 9)),
-    # of x/w, y/w and w = 1 - z, points across and up: the gradients of the functions have degree 1 and 0, 2 and 1, the
-    # Jacobian three of them, and the weight has w²
+    # Pyramids use polynomials of x/w, y/w and w = 1 - z, with numbers of points across and up. Gradients of the shape
+    # functions have degree 1 and 0, or 2 and 1. The Jacobian contains three of them, and the weight contains w².
     "pyramid": ("pyramid", (2, 2), (3, 3)),  # stiffness: 3 across, 0 + 2 up; mass: 2 + 3 across, 2 + 0 + 2 up
     "pyramid13": ("pyramid", (4, 3), (6, 5)),  # stiffness: 6 across, 3 + 2 up; mass: 4 + 6 across, 4 + 3 + 2 up
 }
 REDUCED: dict[str, tuple[str, Degree]] = {
     "tetra": ("tet", 1),  # 1 point
     "tetra10": ("tet", 2),  # 4
-    "hexahedron": ("hex", 3),  # 8: fewer would let it move without strain
+    "hexahedron": ("hex", 3),  # 8; with fewer points some motions would have no strain energy
     "hexahedron20": ("hex", 3),  # 8, as C3D20R
     "hexahedron27": ("hex", 3),
     "wedge": ("wedge", (1, 3)),  # 1 x 2
     "wedge15": ("wedge", (2, 5)),  # 3 x 3
     "pyramid": ("pyramid", (2, 2)),  # 8
     "pyramid13": ("pyramid", (2, 2)),  # 8
-}  #: fewest points that programs use; cells with straight edges keep their full stiffness but for the wedges and bricks
-INTEGRATIONS = ("full", "reduced")  #: of the stiffness
-#: consistent; by the points of the reduced stiffness; bricks of 20 nodes by 14 points (others consistent); diagonal
+}  #: fewest points that programs use; straight-edged cells keep their full stiffness, except wedges and bricks
+INTEGRATIONS = ("full", "reduced")  #: integration of the stiffness
+#: consistent; with the points of the reduced stiffness; 14 points for 20-node bricks (others consistent); diagonal
 MASSES = ("consistent", "reduced", "14-point", "lumped")
-# Stress is sampled where it is most accurate (the points of reduced integration for quadratic elements) and carried to
-# the nodes by the shape functions of the low-order element, which fit those points exactly.
+# Stress is sampled where it is most accurate (at the points of reduced integration for quadratic elements). It is
+# extrapolated to the nodes by the shape functions of the low-order element, which interpolate those points exactly.
 STRESS_RULES: dict[str, tuple[tuple[str, Degree], str | None]] = {
     "tetra": (("tet", 1), None),
     "tetra10": (("tet", 2), "tetra"),
@@ -65,7 +68,7 @@ STRESS_RULES: dict[str, tuple[tuple[str, Degree], str | None]] = {
     "hexahedron27": (("hex", 3), "hexahedron"),
     "wedge": (("wedge", (2, 3)), "wedge"),
     "wedge15": (("wedge", (2, 3)), "wedge"),
-    "pyramid": (("pyramid", (2, 2)), "pyramid"),  # 8 points for 5 functions: the nearest in the sense of least squares
+    "pyramid": (("pyramid", (2, 2)), "pyramid"),  # 8 points for 5 functions: least-squares fit
     "pyramid13": (("pyramid", (2, 2)), "pyramid"),
 }
 
@@ -77,17 +80,17 @@ class ShapeTable:
     points: Array  #: (n_points, 3)
     weights: Array  #: (n_points,); their sum is the volume of the reference cell
     values: Array  #: N_a, (n_points, n_nodes)
-    gradients: Array  #: ∂N_a/∂xi_j, derivatives by the reference coordinates, (n_points, n_nodes, 3)
+    gradients: Array  #: derivatives ∂N_a/∂xi_j with respect to the reference coordinates, (n_points, n_nodes, 3)
 
 
 @dataclass(frozen=True, eq=False)
 class ReferenceElement:
-    """What assembly and stress recovery know of one cell type."""
+    """Tables of one cell type that assembly and stress recovery use."""
 
     kind: str  #: name in `SOLID_TYPES`
     stiffness: ShapeTable
     mass: ShapeTable
-    stress: ShapeTable  #: at the sampling points of the stress
+    stress: ShapeTable  #: shape functions at the sampling points of the stress
     extrapolation: Array  #: from the sampling points to the nodes, (n_nodes, n_points)
 
     @property
@@ -102,19 +105,19 @@ class ReferenceElement:
 
     @cached_property
     def axis_nodes(self) -> IntArray:
-        """The nodes at e_1, e_2, e_3 of the reference cell; node 0 is at its origin, (3,)."""
+        """The nodes at e_1, e_2, e_3 of the reference cell, (3,); node 0 is at its origin."""
         return np.array([int(np.flatnonzero((self.nodes == axis).all(axis=1))[0]) for axis in np.eye(3)])
 
     @cached_property
     def stiffness_integrals(self) -> Array:
-        """∫ ∂N_a/∂xi_k ∂N_b/∂xi_l over the reference cell, row 3 k + l, pairs b >= a by rows, (9, n_pairs)."""
+        """∫ ∂N_a/∂xi_k ∂N_b/∂xi_l over the reference cell: row 3 k + l, pairs b >= a row by row, (9, n_pairs)."""
         a, b = np.triu_indices(self.n_nodes)
         gradients = self.stiffness.gradients
         return np.einsum("q,qpk,qpl->klp", self.stiffness.weights, gradients[:, a], gradients[:, b]).reshape(9, -1)
 
     @cached_property
     def mass_integrals(self) -> Array:
-        """∫ N_a N_b over the reference cell, pairs b >= a by rows, (n_pairs,)."""
+        """∫ N_a N_b over the reference cell, pairs b >= a row by row, (n_pairs,)."""
         a, b = np.triu_indices(self.n_nodes)
         return np.einsum("q,qp,qp->p", self.mass.weights, self.mass.values[:, a], self.mass.values[:, b])
 
@@ -122,8 +125,8 @@ class ReferenceElement:
 def quadrature(cell: str, degree: Degree) -> tuple[Array, Array]:
     """Return points (n_points, 3) and weights (n_points,) of a rule on "tet", "hex", "wedge" or "pyramid".
 
-    The wedge is the product of the triangle and the line made here: scikit-fem 12 repeats the triangle's points with
-    products of its weights and so gives half of the volume. It has no pyramid: Gauss points across and up.
+    The wedge is a product of triangle and line made here. scikit-fem 12 repeats the triangle's points with products of
+    its weights, which gives half of the volume. It has no pyramid, so the pyramid uses Gauss points across and up.
     """
     from skfem.quadrature import get_quadrature
     from skfem.refdom import RefHex, RefLine, RefTet, RefTri
@@ -135,7 +138,7 @@ def quadrature(cell: str, degree: Degree) -> tuple[Array, Array]:
     if cell == "wedge":
         degree_triangle, degree_line = degree  # type: ignore[misc]
         triangle, w_triangle = get_quadrature(RefTri, degree_triangle)
-        if degree_triangle == 1:  # one point does; scikit-fem takes three
+        if degree_triangle == 1:  # one point suffices; scikit-fem uses three
             triangle, w_triangle = np.full((2, 1), 1 / 3), np.array([1 / 2])
         line, w_line = get_quadrature(RefLine, degree_line)
         points = np.vstack([np.repeat(triangle, line.size, axis=1), np.tile(line, triangle.shape[1])])
@@ -145,10 +148,10 @@ def quadrature(cell: str, degree: Degree) -> tuple[Array, Array]:
 
 
 def fourteen_points() -> tuple[Array, Array]:
-    """Return the rule of 14 points on the unit cube that is exact to degree 5, as ANSYS has it for its bricks.
+    """Return the 14-point rule on the unit cube, exact to degree 5, which ANSYS uses for its bricks.
 
-    On -1..1: six points ±a e_i of weight w_a and eight (±b, ±b, ±b) of weight w_b. Exact for 1, x², x⁴ and x² y²:
-    6 w_a + 8 w_b = 8, 2 w_a a² + 8 w_b b² = 8/3, 2 w_a a⁴ + 8 w_b b⁴ = 8/5, 8 w_b b⁴ = 8/9.
+    On -1..1 it has six points ±a e_i with weight w_a and eight points (±b, ±b, ±b) with weight w_b. Exactness for 1,
+    x², x⁴ and x² y² requires 6 w_a + 8 w_b = 8, 2 w_a a² + 8 w_b b² = 8/3, 2 w_a a⁴ + 8 w_b b⁴ = 8/5, 8 w_b b⁴ = 8/9.
     Hence w_a a⁴ = 16/45, b⁴ = 1/(9 w_b), and a² = 19/30, b² = 19/33.
     """
     a, b = np.sqrt(19 / 30), np.sqrt(19 / 33)
@@ -189,7 +192,7 @@ def reference_element(kind: str, integration: str = "full", mass: str = "consist
     kind
         Cell type.
     integration, mass
-        Of `INTEGRATIONS` and `MASSES`: by which points stiffness and mass are integrated. Lumping is not done here.
+        Names in `INTEGRATIONS` and `MASSES`, which choose the points for stiffness and mass. Lumping is done elsewhere.
 
     Raises
     ------

@@ -1,9 +1,9 @@
-"""Geometric stiffness of solid elements: Phiᵀ K_geo(sigma_j) Phi for many states j in one pass (docs/theory.md §7).
+"""Geometric stiffness of solid elements: Phiᵀ K_geo(sigma_j) Phi of many states j in one pass (docs/theory.md §7).
 
-K_geo(sigma)_kl = ∫ sigma_ab Σ_c phi_k,c,a phi_l,c,b is linear in the stress. The products of gradients of a pair of
-columns do not depend on the state, so they are formed once at every point; a matrix product with the stress of all
-states does the sum over points. With very many columns those products are the larger part: then a sparse matrix is
-assembled for each state (`fe_models.solids.geometric_matrix`).
+K_geo(sigma)_kl = ∫ sigma_ab Σ_c phi_k,c,a phi_l,c,b dV is linear in the stress. The products of gradients of a pair of
+columns do not depend on the state. They are therefore computed once at every point, and one matrix product with the
+stress of all states sums over the points. With very many columns these products dominate the cost; a sparse matrix is
+then assembled for each state (`fe_models.solids.geometric_matrix`).
 """
 
 from collections.abc import Mapping
@@ -22,7 +22,7 @@ from fe_models.solids.incompatible import KIND, brick_chunks, brick_operators, b
 
 __all__ = ["internal_forces", "projected_geometric_stiffness"]
 
-CHUNK_BYTES = 1.5e6  #: of the products held at once by a thread: they shall stay in its cache
+CHUNK_BYTES = 1.5e6  #: memory of the products that a thread holds at once; they must stay in its cache
 
 
 def projected_geometric_stiffness(
@@ -35,7 +35,7 @@ def projected_geometric_stiffness(
     incompatible: bool = False,
     integration: str = "full",
 ) -> Array:
-    """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), of the stress of the states u, (3 n_nodes, k).
+    """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), for the stress of the states u, (3 n_nodes, k).
 
     Parameters
     ----------
@@ -46,9 +46,10 @@ def projected_geometric_stiffness(
     Phi
         Columns, (3 n_nodes, n).
     incompatible
-        Whether bricks of eight nodes have incompatible modes; stress then acts on the gradients of their whole field.
+        Whether eight-node bricks have incompatible modes. The stress then acts on the gradients of their complete
+        field.
     integration
-        Of the stiffness, of `fe_models.solids.elements.INTEGRATIONS`.
+        Integration of the stiffness, one of `fe_models.solids.elements.INTEGRATIONS`.
     """
     n_nodes, n = len(mesh.nodes), Phi.shape[1]
     tensors = np.array([material.stiffness for material in materials])
@@ -86,7 +87,7 @@ def projected_geometric_stiffness(
                 for a, b in pairwise(cuts)
                 if b > a
             ]
-            for future in futures:  # in their order: results repeat bit for bit
+            for future in futures:  # summed in this order, so that results are bitwise reproducible
                 pairs += future.result()
     K = np.empty((len(pairs), n, n))
     row, column = np.triu_indices(n)
@@ -98,7 +99,7 @@ def projected_geometric_stiffness(
 
 
 def _of_bricks(nodes: Array, cells: IntArray, tensors: Array, u: Array, Phi: Array) -> Array:
-    """Return Phiᵀ K_geo Phi of bricks with incompatible modes, (k, n, n); tensors: of each cell, (n_cells, 6, 6)."""
+    """Return Phiᵀ K_geo Phi of bricks with incompatible modes, (k, n, n); tensors: stiffness of cells, (n, 6, 6)."""
     n = Phi.shape[1]
     K = np.zeros((u.shape[1], n, n))
     for rows, dofs in brick_chunks(cells):
@@ -121,7 +122,7 @@ def internal_forces(
     incompatible: bool = False,
     integration: str = "full",
 ) -> Array:
-    """Return ∫ sigma grad N by the points of the geometric stiffness, (3 n_nodes, k); exact where `nodes` says so."""
+    """Return ∫ sigma grad N dV at the points of the geometric stiffness, (3 n_nodes, k); zero except at `nodes`."""
     from fe_models.solids.geometric_kernels import add_internal_forces
 
     fields = np.ascontiguousarray(u).reshape(len(mesh.nodes), 3, -1)
@@ -149,8 +150,9 @@ def internal_forces(
 def geometric_table(kind: str, integration: str = "full") -> ShapeTable:
     """Return the quadrature of the geometric stiffness.
 
-    sigma · grad N must be exact where the cell is affine, so that a rigid rotation meets the nodal forces K u to
-    rounding. The four stress points of a quadratic tetrahedron do (degree 2); bricks need the points of the stiffness.
+    sigma · grad N must be exact for affine cells, so that the work on a rigid rotation equals that of the nodal forces
+    K u to roundoff. The four stress points of a quadratic tetrahedron satisfy this (degree 2); bricks need the
+    stiffness points.
     """
     element = reference_element(kind, integration)
     return element.stress if kind == "tetra10" else element.stiffness
@@ -159,7 +161,7 @@ def geometric_table(kind: str, integration: str = "full") -> ShapeTable:
 def _pairs_of(
     nodes: Array, cells: IntArray, material: IntArray, tensors: Array, table: ShapeTable, states: Array, columns: Array
 ) -> Array:
-    """Sum over the points of these cells, (n_states, n_pairs)."""
+    """Return the sum over the points of these cells, (n_states, n_pairs)."""
     from fe_models.solids.geometric_kernels import stress_and_products
 
     n_states, n = states.shape[2], columns.shape[2]

@@ -1,4 +1,4 @@
-"""Compiled loops of the geometric stiffness of solid elements; imported where they are used."""
+"""Compiled loops of the geometric stiffness of solid elements; imported only where used."""
 
 import numpy as np
 from numba import njit
@@ -15,11 +15,11 @@ FIRST, SECOND = np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1])  # xx
 
 @jit_fast
 def add_gradient(field, cell, dN, Q, det, H):
-    """Write H_ij = ∂u_i / ∂x_j, (3, 3, k), of the columns field, (n_nodes, 3, k), at one point of one element."""
+    """Write H_ij = ∂u_i / ∂x_j, (3, 3, k), of the columns `field`, (n_nodes, 3, k), at one point of one element."""
     n_k = field.shape[2]
     H[:] = 0.0
     for a in range(cell.size):
-        for j in range(H.shape[0]):  # a size unknown to the compiler: no unrolling, faster to compile
+        for j in range(H.shape[0]):  # the compiler does not know this size, so it does not unroll, and compiles faster
             g = (dN[a, 0] * Q[0, j] + dN[a, 1] * Q[1, j] + dN[a, 2] * Q[2, j]) / det
             for i in range(H.shape[0]):
                 row, column = H[i, j], field[cell[a], i]
@@ -29,7 +29,7 @@ def add_gradient(field, cell, dN, Q, det, H):
 
 @jit
 def write_stress(H, C, factor, sigma):
-    """Write factor times the stress C eps, (6, k), of the gradients H, (3, 3, k); zeros of C, (6, 6), cost nothing."""
+    """Write `factor` times the stress C eps, (6, k), of the gradients H, (3, 3, k); zeros of C, (6, 6), are skipped."""
     sigma[:] = 0.0
     for c in range(6):
         row = sigma[c]
@@ -50,9 +50,9 @@ def write_stress(H, C, factor, sigma):
 
 @jit_fast
 def write_products(G, P):
-    """Write Σ_c (u_c,a v_c,b + u_c,b v_c,a) of all pairs u <= v of columns, once where a = b, (6, n_pairs).
+    """Write Σ_c (u_c,a v_c,b + u_c,b v_c,a) for all pairs u <= v of columns, (6, n_pairs); counted once if a = b.
 
-    G: gradients G_ca, (3, 3, n). With the stress they give sigma : products = Σ sigma_ab u_c,a v_c,b over all a, b.
+    G: gradients G_ca, (3, 3, n). The product of stress and result is Σ sigma_ab u_c,a v_c,b over all a, b.
     """
     n = G.shape[2]
     for ab in range(P.shape[0]):
@@ -76,10 +76,10 @@ def write_products(G, P):
 
 @jit
 def stress_and_products(nodes, cells, of_cell, tensors, dN, w, u, phi, sigma, products):
-    """Stress of the states times its share of volume, and products of gradients, at the points of some elements.
+    """Write stress times volume of the states, and products of gradients, at the points of some elements.
 
     u: states, (n_nodes, 3, n_states); phi: columns, (n_nodes, 3, n); sigma: (n_cells, n_points, 6, n_states);
-    products: (n_cells, n_points, 6, n_pairs); tensors: stress by strain of every material, (n_materials, 6, 6).
+    products: (n_cells, n_points, 6, n_pairs); tensors: stiffness of every material, (n_materials, 6, 6).
     """
     n_a = cells.shape[1]
     x = np.empty((n_a, 3))
@@ -100,7 +100,7 @@ def stress_and_products(nodes, cells, of_cell, tensors, dN, w, u, phi, sigma, pr
 
 @jit
 def write_scalar_matrices(nodes, cells, of_cell, tensors, dN, w, u, matrices):
-    """Add ∫ grad N_aᵀ sigma grad N_b of the stress of one state u, (n_nodes, 3, 1), to (n_cells, n_a, n_a)."""
+    """Add ∫ grad N_aᵀ sigma grad N_b dV for the stress of one state u, (n_nodes, 3, 1), to (n_cells, n_a, n_a)."""
     n_a = cells.shape[1]
     x, g = np.empty((n_a, 3)), np.empty((n_a, 3))
     J, Q = np.empty((3, 3)), np.empty((3, 3))
@@ -128,7 +128,7 @@ def write_scalar_matrices(nodes, cells, of_cell, tensors, dN, w, u, matrices):
 
 @jit
 def add_internal_forces(nodes, cells, of_cell, tensors, dN, w, u, forces):
-    """Add ∫ sigma grad N_a of some elements to the forces at the nodes, (n_nodes, 3, k), as u; tensors: (n, 6, 6)."""
+    """Add ∫ sigma grad N_a dV of some elements to the nodal forces, (n_nodes, 3, k); tensors: stiffness, (n, 6, 6)."""
     n_a, n_k = cells.shape[1], u.shape[2]
     x = np.empty((n_a, 3))
     J, Q = np.empty((3, 3)), np.empty((3, 3))

@@ -1,8 +1,9 @@
 """Geometric stiffness of solid elements as a sparse matrix, for many columns (docs/theory.md §7).
 
-Over the nodes K_geo(sigma) is S ⊗ 1₃ with S_nm = ∫ grad N_nᵀ sigma grad N_m. With n columns and p points a node, the
-products of gradients of all pairs (`fe_models.solids.geometric`) take 9 p n² operations and 6 p n² more for every
-state; Phiᵀ (S Phi) takes 3 n² for every state, and no array of all pairs at a point, which is 1e7 numbers at n = 2000.
+Over the nodes, K_geo(sigma) is S ⊗ 1₃ with S_nm = ∫ grad N_nᵀ sigma grad N_m dV. With n columns and p points per node,
+the products of gradients of all pairs (`fe_models.solids.geometric`) take 9 p n² operations, plus 6 p n² for every
+state. Phiᵀ (S Phi) takes 3 n² operations for every state, and needs no array of all pairs at a point (1e7 numbers at n
+= 2000).
 """
 
 from collections.abc import Iterator, Mapping
@@ -20,8 +21,9 @@ from fe_models.solids.elements import ShapeTable
 
 __all__ = ["MANY_COLUMNS", "scalar_geometric_matrices", "sparse_geometric_stiffness"]
 
-MANY_COLUMNS = 100  #: from which the sparse matrix is faster (`python -m benchmarks.geometric_stiffness columns`)
-PRODUCT_BYTES = 64e6  #: of S times some columns, which are held at once
+#: number of columns above which the sparse matrix is faster (`python -m benchmarks.geometric_stiffness columns`)
+MANY_COLUMNS = 100
+PRODUCT_BYTES = 64e6  #: memory for S times a block of columns
 
 
 def sparse_geometric_stiffness(matrices: Iterator[sp.csr_array], n_states: int, Phi: Array) -> Array:
@@ -40,7 +42,7 @@ def sparse_geometric_stiffness(matrices: Iterator[sp.csr_array], n_states: int, 
                 product = product.reshape(len(Phi), last - first)
                 for rows in row_slices(len(Phi), Phi):
                     K_j[:last, first:last] += Phi[rows, :last].T @ product[rows]
-                K_j[first:last, :first] = K_j[:first, first:last].T  # symmetric: the other half is not formed
+                K_j[first:last, :first] = K_j[:first, first:last].T  # symmetric, so only one half is computed
                 own = K_j[first:last, first:last]
                 own[:] = (own + own.T) / 2
     return K
@@ -49,16 +51,16 @@ def sparse_geometric_stiffness(matrices: Iterator[sp.csr_array], n_states: int, 
 def scalar_geometric_matrices(
     mesh: Mesh, tensors: Array, of_cell: Mapping[str, IntArray], tables: Mapping[str, ShapeTable], u: Array
 ) -> Iterator[sp.csr_array]:
-    """Yield S, (n_nodes, n_nodes), of the stress of each state u, (3 n_nodes, k), over the cells `tables` names.
+    """Yield S, (n_nodes, n_nodes), for the stress of each state u, (3 n_nodes, k), over the cell types in `tables`.
 
     Parameters
     ----------
     tensors
-        Stress by strain of every material, (n_materials, 6, 6).
+        Matrix of every material that maps strain to stress, (n_materials, 6, 6).
     of_cell
-        Cell type -> material of each cell, (n_cells,).
+        Index of the material of each cell, (n_cells,), by cell type.
     tables
-        Cell type -> points and gradients of its shape functions.
+        Quadrature points and gradients of the shape functions, by cell type.
     """
     from fe_models.solids.geometric_kernels import write_scalar_matrices
 

@@ -1,4 +1,4 @@
-"""Interfaces of a meshed body: a selection of nodes, made rigid, distributing, or kept node by node."""
+"""Interfaces of a meshed body at selected nodes: rigid, distributing, or with the dofs of every node."""
 
 from collections.abc import Sequence
 from itertools import combinations
@@ -32,21 +32,21 @@ def rigid_interface(
     Parameters
     ----------
     mesh
-        Mesh of the body, ours or of another library, or a basis of scikit-fem (`fe_models.as_mesh`).
+        Mesh of the body, from this package or another library, or a basis of scikit-fem (`fe_models.as_mesh`).
     name
         Name of the interface.
     selection
-        Which nodes.
+        Selected nodes.
     reference
-        Reference point, (3,) [m]; None: the area centroid of the selected facets, or the mean of the nodes where
-        they make up no facet.
+        Reference point, (3,) [m]; None: the area centroid of the selected facets, or the mean of the nodes if they form
+        no facet.
     triad
         Axes of the interface as columns in mesh axes, (3, 3); None: the mesh axes.
 
     Raises
     ------
     InterfaceError
-        If nothing is selected, or fewer than three nodes, or nodes on one line: they would leave a rotation free.
+        If fewer than three nodes are selected, or all lie on one line, which would leave a rotation free.
     """
     mesh = selectable(mesh)
     nodes = _members(name, mesh, selection)
@@ -64,9 +64,9 @@ def distributing_interface(
 ) -> Interface:
     """Make a distributing interface (RBE3): the reference node follows the area-weighted mean motion of the nodes.
 
-    Members are the nodes of the selected facets: those of a face group, else the boundary facets whose nodes are all
-    selected. The weight of a node is its area, see `fe_models.meshes.boundary.facet_weights`; corners of flat quadratic
-    triangles weigh nothing and stay members.
+    Members are the nodes of the selected facets: the facets of a face group, or else the boundary facets whose nodes
+    are all selected. The weight of a node is its area (`fe_models.meshes.boundary.facet_weights`). The corners of flat
+    quadratic triangles have zero weight and stay members.
 
     Parameters
     ----------
@@ -110,21 +110,21 @@ def nodes_interface(
     Parameters
     ----------
     mesh, name, selection, reference, triad
-        As for `rigid_interface`; the reference point is where joints see the interface.
+        As for `rigid_interface`; joints act at the reference point.
 
     Raises
     ------
     InterfaceError
-        If nothing is selected.
+        If no node is selected.
     """
     mesh = selectable(mesh)
     return _interface(mesh, name, "nodes", _members(name, mesh, selection), selection, reference, triad)
 
 
 def check_overlap(interfaces: Sequence[Interface], *, numbers: IntArray | None = None) -> None:
-    """Raise `InterfaceError` if two interfaces have a name or nodes in common; it names the pairs and counts.
+    """Raise `InterfaceError` if two interfaces have the same name or share nodes; the message names pairs and counts.
 
-    numbers: of the nodes in the user's mesh, (n_nodes,); None or empty: messages have indices.
+    numbers: user's numbers of the nodes, (n_nodes,); None or empty: the messages use indices.
     """
     shared = []
     for first, second in combinations(interfaces, 2):
@@ -156,7 +156,7 @@ def _facets(name: str, mesh: Mesh, selection: Selection) -> dict[str, IntArray]:
 
 
 def _require_spread(name: str, kind: str, positions: Array, weights: Array) -> None:
-    """Raise unless the weighted points span at least a plane piece: two radii of gyration above zero."""
+    """Raise `InterfaceError` unless the weighted points span a plane, that is two radii of gyration above zero."""
     where = f"interface {name!r}: {kind}"
     weighted = positions[weights > 0]
     if len(weighted) < 3:

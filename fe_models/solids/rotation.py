@@ -1,10 +1,10 @@
-"""Rotation at nodes of a solid mesh, which have no rotations among their dofs: half the curl of the displacement.
+"""Rotation at nodes of a solid mesh, which have only translational dofs: half the curl of the displacement.
 
-(1) in a cell, H_ij = ∂u_i/∂x_j at its node, by its shape functions: exact for fields that are linear in x, so for
-    rigid rotations and constant strain on any mesh, and for quadratic fields in straight cells of second order
-(2) theta = ½ (H_32 - H_23, H_13 - H_31, H_21 - H_12): the rotation of the mean of all fibres through the point. In a
-    sheared beam it lies midway between the slope of the axis and the rotation of the section
-(3) at the node the mean over its cells
+(1) in a cell, H_ij = ∂u_i/∂x_j at its node, from its shape functions. This is exact for fields linear in x, hence for
+    rigid rotations and constant strain on any mesh, and for quadratic fields in straight-edged quadratic cells
+(2) theta = ½ (H_32 - H_23, H_13 - H_31, H_21 - H_12): the mean rotation of all fibres through the point. In a sheared
+    beam it lies midway between the slope of the axis and the rotation of the section
+(3) at a node, average over its cells
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ from fe_models.meshes.mesh import Mesh
 
 __all__ = ["nodal_rotation"]
 
-FLAT = 1e-9  #: det J over the cube of its largest entry, at or below which a cell has no gradient at its node
+FLAT = 1e-9  #: det J divided by the cube of its largest entry, up to which a cell has no gradient at its node
 
 
 def nodal_rotation(mesh: Mesh, u: Array, nodes: IntArray) -> Array:
@@ -25,7 +25,7 @@ def nodal_rotation(mesh: Mesh, u: Array, nodes: IntArray) -> Array:
     Raises
     ------
     BodyError
-        If no cell at a node has a gradient there: collapsed cells.
+        If no cell at a node has a gradient there, because the cells are collapsed.
     """
     fields = np.asarray(u).reshape(len(mesh.nodes), 3, -1)
     place = np.full(len(mesh.nodes), -1)

@@ -28,25 +28,25 @@ def nodal_stress(
 ) -> Array:
     """Return the stress at the nodes, (n_nodes, 6, k) [Pa], of displacement columns u, (3 n_nodes, k) [m].
 
-    (1) sigma = C eps, of isotropic materials lam tr(eps) 1 + 2 mu eps, at the sampling points of each element;
-    (2) carried to the element's nodes by the shape functions of its low-order relative (`ReferenceElement`);
-    (3) at each node the mean, weighted by element volume, over the elements of the node's material.
-    The result is linear in u. Components xx, yy, zz, yz, xz, xy.
+    (1) compute sigma = C eps at the sampling points of each element; for isotropic materials lam tr(eps) 1 + 2 mu eps;
+    (2) extrapolate to the element's nodes by the shape functions of its low-order relative (`ReferenceElement`);
+    (3) average at each node over the elements of the node's material, weighted with element volume.
+    The result is linear in u. The components are xx, yy, zz, yz, xz, xy.
 
     Parameters
     ----------
     mesh, materials
-        The solid cells, and the materials that `of_cell` counts.
+        The solid cells, and the materials to which `of_cell` refers.
     of_cell
-        Cell type -> material of each cell, (n_cells,).
+        Index of the material of each cell, (n_cells,), by cell type.
     of_node
-        The material whose stress each node shows, (n_nodes,); see `stiffest_at_nodes`.
+        Index of the material whose stress each node shows, (n_nodes,); see `stiffest_at_nodes`.
     u
         Displacement columns, dof 3 i + c is component c of node i, (3 n_nodes, k).
     nodes
-        Whose stress is wanted: only their elements are visited, the other nodes show zero; None: all.
+        Nodes whose stress is wanted. Only their elements are visited, and other nodes report zero. None: all nodes.
     incompatible
-        Whether bricks of eight nodes have incompatible modes.
+        Whether eight-node bricks have incompatible modes.
     """
     from fe_models.solids.stress_kernels import add_element_stress, volume_at_nodes
 
@@ -60,7 +60,7 @@ def nodal_stress(
     n_columns = fields.shape[2]
     stress = np.zeros((len(mesh.nodes), 6, n_columns))
     cuts = np.linspace(0, n_columns, min(n_threads(), n_columns) + 1).astype(int) if n_columns else np.zeros(1, int)
-    with ThreadPoolExecutor(n_threads()) as pool:  # a thread owns its columns: no two write to one entry
+    with ThreadPoolExecutor(n_threads()) as pool:  # each thread owns its columns, so no two threads write to one entry
         for kind, all_cells in mesh.cells.items():
             is_wanted = np.ones(len(all_cells), bool) if nodes is None else wanted[all_cells].any(axis=1)
             cells, material = all_cells[is_wanted], of_cell[kind][is_wanted]
@@ -103,15 +103,15 @@ def add_brick_stress(nodes: Array, cells: IntArray, tensors: Array, shows: Array
     Parameters
     ----------
     nodes, cells
-        Positions, (n_nodes, 3), and bricks, (n_cells, 8).
+        Positions, (n_nodes, 3), and the nodes of the bricks, (n_cells, 8).
     tensors
-        Stress by strain of each cell, (n_cells, 6, 6).
+        Matrix of each cell that maps strain to stress, (n_cells, 6, 6).
     shows
         Whether each node of each cell shows the material of the cell, (n_cells, 8).
     u
         Displacement columns, (3 n_nodes, k).
     stress
-        Sums at the nodes, (n_nodes, 6, k); they are added to.
+        Sums at the nodes, (n_nodes, 6, k), to which the function adds.
     """
     to_nodes = reference_element(KIND).extrapolation
     for rows, dofs in brick_chunks(cells):
@@ -122,10 +122,10 @@ def add_brick_stress(nodes: Array, cells: IntArray, tensors: Array, shows: Array
 
 
 def stiffest_at_nodes(mesh: Mesh, materials: tuple[AnyMaterial, ...], of_cell: Mapping[str, IntArray]) -> IntArray:
-    """Return for each node the material with the largest modulus among its elements, (n_nodes,); ties: the first.
+    """Return for each node the material with the largest modulus among its elements, (n_nodes,); ties take the first.
 
-    Stress jumps where materials meet; one number a node can show one side only. The stiffer side carries the larger
-    stress as a rule, and a fixed choice keeps the stress linear in the displacement.
+    Stress jumps where materials meet, and one value per node can show one side only. The stiffer side usually has the
+    larger stress, and a fixed choice keeps the stress linear in the displacement.
     """
     order = np.argsort([-material.E for material in materials], kind="stable")
     rank = np.empty(len(materials), np.int64)

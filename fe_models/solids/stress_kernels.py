@@ -1,4 +1,4 @@
-"""Compiled loops of the stress recovery; imported where they are used."""
+"""Compiled loops of the stress recovery; imported only where used."""
 
 import numpy as np
 from numba import njit
@@ -13,7 +13,7 @@ jit = njit(cache=True, nogil=True, error_model="numpy")
 
 @jit
 def volume_at_nodes(nodes, cells, of_cell, of_node, dN, w, volume):
-    """Add to volume, (n_nodes,), that of the elements which adjoin the node and have its material."""
+    """Add to volume, (n_nodes,), the volumes of the elements that adjoin each node and have its material."""
     n_a = cells.shape[1]
     x = np.empty((n_a, 3))
     J, Q = np.empty((3, 3)), np.empty((3, 3))
@@ -31,11 +31,11 @@ def volume_at_nodes(nodes, cells, of_cell, of_node, dN, w, volume):
 
 @jit
 def add_element_stress(nodes, cells, of_cell, of_node, tensors, dN, w, extrapolation, u, first, last, stress):
-    """Add to the columns first..last of stress, (n_nodes, 6, k), volume times stress of every element at its nodes.
+    """Add volume times stress of every element at its nodes to columns first..last of stress, (n_nodes, 6, k).
 
-    u: displacement columns, (n_nodes, 3, k); tensors: stress by strain of every material, (n_materials, 6, 6);
-    of_cell, of_node: materials of elements and nodes. Columns are the inner loop: the geometry is worked out once for
-    all of them.
+    u: displacement columns, (n_nodes, 3, k); tensors: matrix of every material that maps strain to stress,
+    (n_materials, 6, 6); of_cell, of_node: materials of elements and nodes. The inner loop runs over the columns, so the
+    geometry is computed once for all of them.
     """
     n_a = cells.shape[1]
     n_k = last - first
@@ -53,7 +53,8 @@ def add_element_stress(nodes, cells, of_cell, of_node, tensors, dN, w, extrapola
             total += w[q] * det
             H[:] = 0.0  # displacement gradient, H_ij = ∂u_i / ∂x_j
             for a in range(n_a):
-                for j in range(J.shape[0]):  # a size unknown to the compiler: no unrolling, faster to compile
+                # the compiler does not know this size, so it does not unroll, and compiles faster
+                for j in range(J.shape[0]):
                     g = (dN[q, a, 0] * Q[0, j] + dN[q, a, 1] * Q[1, j] + dN[q, a, 2] * Q[2, j]) / det
                     for i in range(J.shape[0]):
                         row, column = H[i, j], u[cells[e, a], i, first:last]

@@ -1,4 +1,4 @@
-"""Compiled stiffness of solid elements by a tensor of elasticity; imported where it is used."""
+"""Compiled stiffness of solid elements from an elasticity tensor; imported only where used."""
 
 import numpy as np
 from numba import njit
@@ -9,17 +9,17 @@ __all__ = ["tensor_stiffness"]
 
 jit = njit(cache=True, nogil=True, error_model="numpy")
 
-PLACE = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])  #: component of xx yy zz yz xz xy at i, j
+PLACE = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])  #: index of component i, j in xx yy zz yz xz xy
 
 
 @jit
 def tensor_stiffness(nodes, cells, tensors, is_general, of_cell, dN, w, K):
-    """Write K, (n, 3 n_a, 3 n_a), of the elements whose material is not isotropic; the others stay as they are.
+    """Write K, (n, 3 n_a, 3 n_a), of the elements whose material is not isotropic; leave the other entries unchanged.
 
-    (1) T_j = Σ_l C_ij,kl g_bl, the stress in row i, column j of a displacement of node b along k
+    (1) T_j = Σ_l C_ij,kl g_bl: the stress in row i, column j from a unit displacement of node b along k
     (2) K_ai,bk = Σ_q w det(J) Σ_j g_aj T_j, for b >= a, and its transpose
 
-    tensors: stress by strain of every material, (n_materials, 6, 6); g: gradients of the shape functions.
+    tensors: matrix of every material that maps strain to stress, (n_materials, 6, 6); g: shape function gradients.
     """
     n_a = cells.shape[1]
     x, g = np.empty((n_a, 3)), np.empty((n_a, 3))
@@ -35,7 +35,7 @@ def tensor_stiffness(nodes, cells, tensors, is_general, of_cell, dN, w, K):
         for q in range(w.size):
             det = jacobian(x, dN[q], J, Q)
             if not det > 0.0:
-                break  # told by the loop over all elements
+                break  # the loop over all elements reports the inverted element
             for a in range(n_a):
                 for i in range(J.shape[0]):
                     g[a, i] = (dN[q, a, 0] * Q[0, i] + dN[q, a, 1] * Q[1, i] + dN[q, a, 2] * Q[2, i]) / det

@@ -325,7 +325,7 @@ def test_section_points_show_each_end_of_a_line_by_itself():
     assert_allclose(body.stress_points.positions[8 + 3], [0.5, 0, 0.015], rtol=0, atol=1e-15)
     with pytest.raises(BeamError, match=r"expected lines 0\.\.1"):
         fm.section_points(body, [2])
-    with pytest.raises(BeamError, match="is no frame"):
+    with pytest.raises(BeamError, match="is not a frame"):
         fm.section_points(bodies.bar(1, 1, 1), [0])
 
 
