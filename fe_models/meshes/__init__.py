@@ -1,1 +1,1 @@
-"""Meshes as data: solids, shells, lines; their boundary, selections, and the cut into parts."""
+"""Meshes as data: solids, shells and lines, their boundary, selections of nodes, and the cut into parts."""

@@ -1,4 +1,4 @@
-"""The boundary of a solid mesh: facets that belong to one cell only, oriented outward."""
+"""The boundary of a solid mesh: outward facets that belong to only one cell."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -28,16 +28,17 @@ _TRIANGLES = {
     "quad": ((0, 1, 2), (0, 2, 3)),
     "quad8": ((0, 4, 7), (4, 1, 5), (5, 2, 6), (6, 3, 7), (4, 5, 6), (4, 6, 7)),
     "quad9": ((0, 4, 8), (4, 1, 8), (1, 5, 8), (5, 2, 8), (2, 6, 8), (6, 3, 8), (3, 7, 8), (7, 0, 8)),
-}  # flat triangles over the nodes of a face, turning the same way as the face
+}  # flat triangles over the nodes of a face, with the orientation of the face
 
 CORNERS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}  #: corner nodes of a face
 
 Facets = Mapping[str, IntArray]
-_known: WeakKeyDictionary[Mesh, tuple[Facets, Facets]] = WeakKeyDictionary()  # boundaries of meshes still in use
+# boundaries of meshes that are still in use
+_known: WeakKeyDictionary[Mesh, tuple[Facets, Facets]] = WeakKeyDictionary()
 
 
 def all_facets(mesh: Mesh) -> dict[str, IntArray]:
-    """Return face type -> facets of all solid cells, (n_cells x facets per cell, nodes per facet), outward.
+    """Return all facets of the solid cells by face type, (n_cells x facets per cell, nodes per facet), outward.
 
     A facet between two cells appears twice.
     """
@@ -49,23 +50,23 @@ def all_facets(mesh: Mesh) -> dict[str, IntArray]:
 
 
 def boundary_facets(mesh: Mesh) -> Mapping[str, IntArray]:
-    """Return face type -> facets that belong to one cell only, (n_facets, nodes per facet), oriented outward.
+    """Return the facets that belong to only one cell, by face type, (n_facets, nodes per facet), oriented outward.
 
-    Facets are compared by their corner nodes. Rows are complete faces in meshio order (corners, middles, centre).
-    The result is kept as long as the mesh is.
+    Facets are compared by their corner nodes. Rows are complete faces in meshio order (corners, middles, centre). The
+    result is cached as long as the mesh exists.
     """
     return _boundary(mesh)[0]
 
 
 def boundary_owners(mesh: Mesh) -> IntArray:
-    """Return the cell behind each of the `boundary_triangles`, (n_tri,); cells are numbered through, type by type."""
+    """Return the cell of each of the `boundary_triangles`, (n_tri,); cells are numbered through all types."""
     owners = _boundary(mesh)[1]
     parts = [np.repeat(cells, len(_TRIANGLES[kind])) for kind, cells in owners.items()]
     return np.concatenate(parts) if parts else np.zeros(0, np.int64)
 
 
 def _boundary(mesh: Mesh) -> tuple[Facets, Facets]:
-    """Return face type -> facets, and face type -> the cell of each."""
+    """Return the facets by face type, and the cell of each facet by face type."""
     if mesh not in _known:
         facets, owners = _single_facets(mesh)
         _known[mesh] = (
@@ -94,7 +95,7 @@ def _single_facets(mesh: Mesh) -> tuple[dict[str, IntArray], dict[str, IntArray]
 
 
 def _cells_of_facets(mesh: Mesh) -> dict[str, IntArray]:
-    """Return face type -> the cell of each of `all_facets`, numbered through, type by type."""
+    """Return the cell of each of `all_facets` by face type; cells are numbered through all types."""
     parts: dict[str, list[IntArray]] = {}
     first = 0
     for kind, cells in mesh.cells.items():
@@ -105,7 +106,7 @@ def _cells_of_facets(mesh: Mesh) -> dict[str, IntArray]:
 
 
 def first_of_equal_rows(rows: IntArray) -> tuple[IntArray, IntArray]:
-    """Return for every row the number of its class of equal rows, (n,), and the size of every class, (n_classes,)."""
+    """Return for every row the index of its class of equal rows, (n,), and the size of every class, (n_classes,)."""
     if len(rows) == 0:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     order = np.lexsort(rows.T[::-1])
@@ -130,24 +131,24 @@ def boundary_triangles(mesh: Mesh) -> IntArray:
 
 
 def face_triangles(faces: Mapping[str, IntArray]) -> IntArray:
-    """Return flat triangles over the nodes of faces by type, (n_tri, 3), turning the same way as the faces."""
+    """Return flat triangles over the nodes of faces, (n_tri, 3), with the orientation of the faces."""
     parts = [nodes[:, np.array(_TRIANGLES[kind])].reshape(-1, 3) for kind, nodes in faces.items()]
     return np.concatenate(parts) if parts else np.zeros((0, 3), np.int64)
 
 
 def facet_weights(nodes: Array, faces: Mapping[str, IntArray]) -> Array:
-    """Return the area of each node: the integral of its shape function over the faces, summed, (n_nodes,) [m²].
+    """Return the area of each node, (n_nodes,) [m²]: the integral of its shape function, summed over the faces.
 
-    The sum is the area of the faces. Corners of flat quadratic triangles get exactly zero. Corners of eight-node
-    quads would get a negative share (-1/12 of the face); these faces are shared out by the diagonal of their mass
-    matrix instead (∫N_i² scaled to the area), which is positive and keeps the area of each face.
+    The sum is the area of the faces. Corners of flat quadratic triangles get exactly zero. Corners of eight-node quads
+    would get a negative share (-1/12 of the face). These faces are distributed with the diagonal of their mass matrix
+    instead (∫N_i² scaled to the area), which is positive and keeps the area of each face.
 
     Parameters
     ----------
     nodes
         Node coordinates, (n_nodes, 3) [m].
     faces
-        Face type -> nodes, (n_faces, nodes per face).
+        Nodes of the faces, (n_faces, nodes per face), by face type.
     """
     weights = np.zeros(len(nodes))
     for kind, rows in faces.items():

@@ -1,4 +1,4 @@
-"""Angles between the neighbouring faces of solid cells: small or nearly straight ones make poor elements."""
+"""Angles between neighbouring faces of solid cells; small or nearly straight angles make poor elements."""
 
 from functools import cache
 
@@ -10,14 +10,15 @@ from fe_models.meshes.mesh import Mesh
 
 __all__ = ["face_angles"]
 
-_CHUNK = 20_000  #: cells at a time
+_CHUNK = 20_000  #: number of cells processed at a time
 
 
 def face_angles(mesh: Mesh) -> tuple[float, float]:
     """Return the smallest and the largest angle between two faces of a cell that share an edge [degrees].
 
-    At both ends of every edge, by the straight edges between corners: the angle of a regular tetrahedron is 70.5, that
-    of a cube 90. Both are NaN of a mesh without solid cells; corners that coincide count as an angle of 0.
+    The angle is measured at both ends of every edge, between the straight edges to other corners. It is 70.5 for a
+    regular tetrahedron and 90 for a cube. Both are NaN for a mesh without solid cells. Coincident corners count as
+    angle 0.
     """
     smallest, largest = np.inf, -np.inf
     for kind, cells in mesh.cells.items():
@@ -35,7 +36,7 @@ def face_angles(mesh: Mesh) -> tuple[float, float]:
 
 @cache
 def _corners(kind: str) -> IntArray:
-    """Return rows i, j, k, m: edge i-j, and the neighbours of i beside j on the two faces of the edge, (n, 4)."""
+    """Return rows i, j, k, m, (n, 4): edge i-j, and the other neighbours of i on the two faces of the edge."""
     beside: dict[tuple[int, int], list[int]] = {}
     for facet in CELL_SHAPES[kind].facets:
         n = len(facet)

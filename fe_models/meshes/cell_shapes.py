@@ -15,14 +15,15 @@ TIP = 1e-14  #: height below the tip of a pyramid that counts as the tip
 
 @dataclass(frozen=True)
 class CellShape:
-    """One kind of cell: its corners, what its other nodes are the middles of, and its polynomial space."""
+    """One cell type: its corners, the corners of its middle nodes, and its polynomial space."""
 
     name: str  #: meshio name
     dim: int  #: 3 solid, 2 face
     corners: tuple[tuple[float, ...], ...]  #: reference coordinates of the corner nodes
-    middles: tuple[tuple[int, ...], ...]  #: for every further node the corners it is the middle of
-    facets: tuple[tuple[int, ...], ...]  #: corner nodes of each facet, anticlockwise seen from outside
-    exponents: tuple[tuple[int, ...], ...]  #: monomials of the shape functions; of pyramids in x, y, 1 - z
+    middles: tuple[tuple[int, ...], ...]  #: for every further node, the corners of which it is the middle
+    facets: tuple[tuple[int, ...], ...]  #: corner nodes of each facet, anticlockwise from outside
+    #: exponents of the monomials of the shape functions; for pyramids in x, y, 1 - z
+    exponents: tuple[tuple[int, ...], ...]
 
     @property
     def n_nodes(self) -> int:
@@ -31,7 +32,7 @@ class CellShape:
 
     @property
     def is_pyramid(self) -> bool:
-        """Whether its functions are rational: polynomials in x/(1 - z), y/(1 - z) and 1 - z."""
+        """Whether its shape functions are rational: polynomials in x/(1 - z), y/(1 - z) and 1 - z."""
         return len(self.corners) == 5
 
     @property
@@ -43,17 +44,17 @@ class CellShape:
 
 
 def _grid(dim: int, order: int) -> tuple[tuple[int, ...], ...]:
-    """Exponents of the tensor-product space: each at most `order`."""
+    """Return the exponents of the tensor-product space, each at most `order`."""
     return tuple(tuple(int(i) for i in e) for e in np.ndindex(*(order + 1,) * dim))
 
 
 def _total(dim: int, order: int) -> tuple[tuple[int, ...], ...]:
-    """Exponents of the complete space: sum at most `order`."""
+    """Return the exponents of the complete space, with sum at most `order`."""
     return tuple(e for e in _grid(dim, order) if sum(e) <= order)
 
 
 def _serendipity(dim: int) -> tuple[tuple[int, ...], ...]:
-    """Exponents of the quadratic serendipity space: at most one of them is 2."""
+    """Return the exponents of the quadratic serendipity space: at most one of them is 2."""
     return tuple(e for e in _grid(dim, 2) if e.count(2) <= 1)
 
 
@@ -79,7 +80,7 @@ _TET_FACETS = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3))
 _HEX_FACETS = ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7))  # -x +x -y +y -z +z
 _WEDGE_FACETS = ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5))
 _PYRAMID_FACETS = ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4))
-# with w = 1 - z: on the base w = 1 and the space is that of the quad, on each side it is that of the triangle
+# with w = 1 - z: on the base w = 1, and the space is that of the quad; on each side it is that of the triangle
 _PYRAMID5 = (*_total(3, 1), (1, 1, -1))
 _PYRAMID13 = (*_total(3, 2), (1, 1, -1), (2, 1, -1), (1, 2, -1))
 _HEX_CENTRES = (*_HEX_FACETS, tuple(range(8)))
@@ -102,12 +103,12 @@ CELL_SHAPES = {
         CellShape("pyramid", 3, _PYRAMID, (), _PYRAMID_FACETS, _PYRAMID5),
         CellShape("pyramid13", 3, _PYRAMID, _PYRAMID_EDGES, _PYRAMID_FACETS, _PYRAMID13),
     )
-}  #: reference cells are the unit simplex, the unit square and cube, triangle x interval, square with tip
+}  #: the reference cells are the unit simplex, unit square, unit cube, triangle x interval, and square with tip
 
 
 @cache
 def facet_tables(kind: str) -> dict[str, IntArray]:
-    """Return face type -> local nodes of the facets of a solid cell, (n_facets, nodes per facet), oriented outward.
+    """Return the local nodes of the facets of a solid cell by face type, (n_facets, nodes per facet), outward.
 
     The facets are complete faces in meshio order: corners, then the middles of their edges, then their centre.
     """
@@ -126,12 +127,12 @@ def facet_tables(kind: str) -> dict[str, IntArray]:
 def shape_values(kind: str, points: Array) -> tuple[Array, Array]:
     """Return shape functions and their reference gradients at reference points.
 
-    The functions are the nodal basis of the monomials of the cell: N = p(x) V⁻¹ with V the monomials at the nodes.
+    The functions are the nodal basis of the monomials of the cell: N = p(x) V⁻¹, with V the monomials at the nodes.
 
     Parameters
     ----------
     kind
-        Cell type, key of `CELL_SHAPES`.
+        Cell type, a key of `CELL_SHAPES`.
     points
         Reference points, (n_points, dim).
 
@@ -159,7 +160,7 @@ def _monomials(points: Array, exponents: IntArray) -> Array:
 
 
 def _collapsed_monomials(points: Array, exponents: IntArray) -> Array:
-    """Return x^i y^j w^k = (x/w)^i (y/w)^j w^(i+j+k), w = 1 - z; at the tip, where x/w has no value, it is 1/2."""
+    """Return x^i y^j w^k = (x/w)^i (y/w)^j w^(i+j+k), w = 1 - z; at the tip, x/w and y/w are set to 1/2."""
     w = 1 - points[:, 2:]
     is_tip = w < TIP
     across = np.where(is_tip, 0.5, points[:, :2] / np.where(is_tip, 1.0, w))
@@ -169,14 +170,14 @@ def _collapsed_monomials(points: Array, exponents: IntArray) -> Array:
 
 @cache
 def quadrature(kind: str) -> tuple[Array, Array]:
-    """Return reference points (n_points, dim) and weights (n_points,) exact for the volume of any cell of this kind.
+    """Return reference points (n_points, dim) and weights (n_points,), exact for the volume of any cell of this type.
 
-    The Jacobian determinant has degree <= 5 in each direction of a hexahedron (3 Gauss points each) and total degree
-    3 in a quadratic tetrahedron; simplices use the square collapsed onto them, x = 1 - s, y = s t (Gauss points,
-    Jacobian s). Faces use the same rules: their area integrand is smooth but no polynomial when the face is curved.
+    The Jacobian determinant has degree <= 5 in each direction of a hexahedron (3 Gauss points each), and total degree 3
+    in a quadratic tetrahedron. Simplices use the square collapsed onto them, x = 1 - s, y = s t (Gauss points, Jacobian
+    s). Faces use the same rules; their area integrand is smooth, but not a polynomial if the face is curved.
     """
     shape = CELL_SHAPES[kind]
-    if kind in ("tetra", "triangle"):  # constant Jacobian, linear shape functions: the centroid is exact
+    if kind in ("tetra", "triangle"):  # constant Jacobian and linear shape functions: the centroid is exact
         return frozen(shape.nodes.mean(axis=0)[None]), frozen([1 / 6 if kind == "tetra" else 1 / 2])
     gauss = np.polynomial.legendre.leggauss
     x, w = gauss(4 if kind == "triangle6" else 3)
@@ -201,7 +202,8 @@ def quadrature(kind: str) -> tuple[Array, Array]:
 def collapsed_cube(n_across: int, n_up: int) -> tuple[Array, Array]:
     """Return Gauss points of a pyramid, (n, 3), and weights, (n,): x = w s, y = w t, z = 1 - w, weight w² ds dt dw.
 
-    Exact for polynomials in s, t of degree 2 n_across - 1 each times those in w of degree 2 n_up - 3.
+    The rule is exact for polynomials in s, t of degree 2 n_across - 1 each, times polynomials in w of degree 2 n_up -
+    3.
     """
     x, a = ((v + i) / 2 for v, i in zip(np.polynomial.legendre.leggauss(n_across), (1, 0), strict=True))
     w, b = ((v + i) / 2 for v, i in zip(np.polynomial.legendre.leggauss(n_up), (1, 0), strict=True))

@@ -1,4 +1,4 @@
-"""How the cells of a mesh hang together: parts, hinges, overlaps, and nodes at the same place."""
+"""Connections between the cells of a mesh: parts, hinges, overlaps, and coincident nodes."""
 
 from dataclasses import dataclass
 
@@ -14,18 +14,24 @@ __all__ = ["Connectivity", "coincident_nodes", "connectivity", "facet_pairs"]
 
 @dataclass(frozen=True, eq=False)
 class Connectivity:
-    """Parts and broken joints between cells."""
+    """Connected parts of a mesh, and faulty connections between cells."""
 
-    part_cells: tuple[int, ...]  #: cells of each part (no node in common), largest first
-    part_node: tuple[int, ...]  #: a node of each part
-    n_facet_parts: int  #: parts that have no facet in common: more than `part_cells` where parts meet in a node or edge
+    part_cells: tuple[int, ...]  #: number of cells of each part, largest first; parts have no node in common
+    part_node: tuple[int, ...]  #: one node of each part
+    n_facet_parts: int  #: parts without a common facet; more than `part_cells` if parts meet in a node or an edge
     n_overlapping: int  #: facets that belong to more than two cells
     n_mismatched: int  #: facets on which two cells meet with different middle nodes
-    n_transitions: int  #: quadrilateral facets on which a triangular facet of another cell lies
+    n_transitions: int  #: quadrilateral facets that touch a triangular facet of another cell
 
 
 def connectivity(mesh: Mesh) -> Connectivity:
-    """Return parts and broken joints of a mesh."""
+    """Find the connected parts of a mesh, and faulty connections between its cells.
+
+    Parameters
+    ----------
+    mesh
+        Any solid mesh.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -55,7 +61,7 @@ def connectivity(mesh: Mesh) -> Connectivity:
 
 
 def facet_pairs(mesh: Mesh) -> IntArray:
-    """Return pairs of cells with a common facet, (n_pairs, 2); cells are counted through all types of `mesh.cells`."""
+    """Return pairs of cells with a common facet, (n_pairs, 2); cells are numbered through all types of `mesh.cells`."""
     return _facet_pairs(mesh)[0]
 
 
@@ -85,7 +91,7 @@ def _facet_pairs(mesh: Mesh) -> tuple[IntArray, int, int]:
 
 
 def _owners(mesh: Mesh, owner: dict[str, IntArray]) -> dict[str, IntArray]:
-    """Return face type -> the cell of every row of `all_facets`."""
+    """Return the cell of every row of `all_facets`, by face type."""
     from fe_models.meshes.cell_shapes import facet_tables
 
     parts: dict[str, list[IntArray]] = {}
@@ -96,7 +102,7 @@ def _owners(mesh: Mesh, owner: dict[str, IntArray]) -> dict[str, IntArray]:
 
 
 def _transitions(mesh: Mesh) -> int:
-    """Return how many boundary quadrilaterals carry a boundary triangle of three of their corners."""
+    """Return how many boundary quadrilaterals contain a boundary triangle of three of their corners."""
     facets = boundary_facets(mesh)
     triangles = [np.sort(rows[:, :3], axis=1) for kind, rows in facets.items() if CORNERS[kind] == 3]
     quads = [rows[:, :4] for kind, rows in facets.items() if CORNERS[kind] == 4]
@@ -110,7 +116,7 @@ def _transitions(mesh: Mesh) -> int:
 
 
 def coincident_nodes(mesh: Mesh, distance: float) -> IntArray:
-    """Return the used nodes that have another used node within a distance [m], ascending, (n,)."""
+    """Return the used nodes that have another used node within the distance [m], ascending, (n,)."""
     from scipy.spatial import cKDTree
 
     nodes = np.flatnonzero(used_nodes(mesh))

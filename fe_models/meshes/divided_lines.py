@@ -1,4 +1,4 @@
-"""Lines cut into equal ones: a frame is described by its long lines, and computed with short ones."""
+"""Division of lines into equal pieces: a frame is described by long lines and computed with short ones."""
 
 from dataclasses import replace
 
@@ -13,23 +13,23 @@ __all__ = ["divide_lines"]
 
 
 def divide_lines(mesh: LineMesh, n: ArrayLike) -> LineMesh:
-    """Return the mesh with each line cut into equal ones.
+    """Return the mesh with each line divided into equal pieces.
 
-    The new nodes come after the old ones, line by line, from its first end on; their numbers in the file go on from the
-    highest. Groups of lines keep all pieces; a group of nodes of the same name that held all their ends takes the new
-    nodes, too. Orientations stay, offsets of the axis are linear between the ends.
+    The new nodes come after the old ones, line by line from the first end. Their numbers in the file continue from the
+    highest number. Groups of lines keep all pieces. A group of nodes with the same name that held all line ends also
+    receives the new nodes. Orientations stay, and offsets of the axis are interpolated linearly.
 
     Parameters
     ----------
     mesh
-        Any lines.
+        Any mesh of lines.
     n
-        Pieces of each line, one number or (n_lines,), 1 or more.
+        Number of pieces of each line, 1 or more: one number for all lines, or (n_lines,).
 
     Raises
     ------
     BeamError
-        If a number is no whole number from 1 on.
+        If a number is not a whole number of 1 or more.
     """
     given = np.asarray(n)
     if given.ndim > 1 or (given.ndim == 1 and given.shape != (len(mesh.lines),)):
@@ -37,10 +37,11 @@ def divide_lines(mesh: LineMesh, n: ArrayLike) -> LineMesh:
     if given.dtype == bool or not np.issubdtype(given.dtype, np.integer) or (given < 1).any():
         raise BeamError(f"divide_lines: expected whole numbers from 1 on, got {given.tolist()}")
     pieces = np.broadcast_to(given, len(mesh.lines)).astype(np.int64)
-    of_line = np.repeat(np.arange(len(pieces)), pieces)  # the old line of each new one
-    k = np.arange(len(of_line)) - np.repeat(np.cumsum(pieces) - pieces, pieces)  # its place in that
+    of_line = np.repeat(np.arange(len(pieces)), pieces)  # the old line of each new line
+    # position of each new line within its old line
+    k = np.arange(len(of_line)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
     start, end = k / pieces[of_line], (k + 1) / pieces[of_line]
-    is_inner = k > 0  # a new line whose first end is a new node
+    is_inner = k > 0  # the first end of the new line is a new node
     number = len(mesh.nodes) + np.cumsum(is_inner) - 1
     X = mesh.nodes[mesh.lines[of_line]]
     added = (1 - start)[:, None] * X[:, 0] + start[:, None] * X[:, 1]
@@ -53,7 +54,7 @@ def divide_lines(mesh: LineMesh, n: ArrayLike) -> LineMesh:
         offsets = np.stack([(1 - s)[:, None] * ends[:, 0] + s[:, None] * ends[:, 1] for s in (start, end)], axis=1)
     numbers = mesh.node_numbers
     if numbers.size:
-        numbers = np.concatenate([numbers, np.full(int(is_inner.sum()), -1)])  # the file does not number them
+        numbers = np.concatenate([numbers, np.full(int(is_inner.sum()), -1)])  # new nodes have no number in the file
     line_sets = {group: np.flatnonzero(np.isin(of_line, rows)) for group, rows in mesh.line_sets.items()}
     node_sets: dict[str, IntArray] = dict(mesh.node_sets)
     for group, rows in mesh.line_sets.items():

@@ -1,4 +1,4 @@
-"""The mesh of a frame: nodes, straight lines between two of them, and the groups that name sections and interfaces."""
+"""The mesh of a frame: nodes, straight two-node lines, and groups for sections and interfaces."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -20,21 +20,24 @@ class LineMesh:
     Raises
     ------
     BeamError
-        If shapes do not fit, a line names a node that does not exist, or a coordinate is not finite.
+        If shapes do not fit, a line refers to an unknown node, or a coordinate is not finite.
     """
 
     nodes: Array  #: (n_nodes, 3), in the length unit of the model
     lines: IntArray  #: end nodes, (n_lines, 2)
-    line_sets: Mapping[str, IntArray] = field(default_factory=dict)  #: group -> rows of `lines`
-    node_sets: Mapping[str, IntArray] = field(default_factory=dict)  #: group -> nodes
-    orientations: Array | None = None  #: vector towards the local y axis per line, (n_lines, 3); NaN rows: default
-    offsets: Array | None = None  #: from node to end of the axis, mesh axes, (n_lines, 2, 3) [m]; None: zero
+    line_sets: Mapping[str, IntArray] = field(default_factory=dict)  #: rows of `lines` of each group
+    node_sets: Mapping[str, IntArray] = field(default_factory=dict)  #: nodes of each group
+    orientations: Array | None = None  #: vector towards the local y axis of each line, (n_lines, 3); NaN rows: default
+    offsets: Array | None = None  #: vectors from node to axis end, mesh axes, (n_lines, 2, 3) [m]; None: zero
     source: str = ""  #: file it was read from, or how it was made
     digest: str = ""  #: sha256 of that file
-    included: Mapping[str, str] = field(default_factory=dict, kw_only=True)  #: files that it includes -> their sha256
-    node_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))  #: in the file, (n_nodes,); or none
-    line_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))  #: in the file, (n_lines,); or none
-    notes: tuple[str, ...] = ()  #: what the reader left out or changed, in words
+    #: sha256 of each file that the source includes
+    included: Mapping[str, str] = field(default_factory=dict, kw_only=True)
+    #: numbers in the file, (n_nodes,); empty: none
+    node_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
+    #: numbers in the file, (n_lines,); empty: none
+    line_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
+    notes: tuple[str, ...] = ()  #: descriptions of what the reader left out or changed
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -65,7 +68,7 @@ class LineMesh:
 
 
 def straight_line(start: object, end: object, n: int, *, name: str = "beam") -> LineMesh:
-    """Return a straight line of n equal elements, its ends in the node sets "start" and "end", its lines in `name`.
+    """Return a straight line of n equal elements; its node sets are "start" and "end", its line set is `name`.
 
     Parameters
     ----------
@@ -74,7 +77,7 @@ def straight_line(start: object, end: object, n: int, *, name: str = "beam") -> 
     n
         Number of elements.
     name
-        Of the line set.
+        Name of the line set.
     """
     a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
     if n < 1 or a.shape != (3,) or b.shape != (3,):

@@ -1,4 +1,4 @@
-"""The mesh of one body: nodes, solid cells, and the groups that name materials and interfaces."""
+"""The mesh of one body: nodes, solid cells, and groups for materials and interfaces."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -10,7 +10,7 @@ from fe_models.foundation.copies import FrozenMapping, frozen_copies
 
 __all__ = ["FACE_TYPES", "SOLID_TYPES", "Mesh"]
 
-#: meshio names, node order
+#: meshio names and node order
 SOLID_TYPES = (
     "tetra",
     "tetra10",
@@ -32,17 +32,23 @@ class Mesh:
 
     nodes: Array  #: (n_nodes, 3), in the length unit of the model
     cells: Mapping[str, IntArray]  #: solid cells by type in `SOLID_TYPES`, (n_cells, nodes per cell)
-    cell_sets: Mapping[str, Mapping[str, IntArray]] = field(default_factory=dict)  #: group -> type -> rows of `cells`
-    faces: Mapping[str, IntArray] = field(default_factory=dict)  #: two-dimensional cells by type: they only select
-    face_sets: Mapping[str, Mapping[str, IntArray]] = field(default_factory=dict)  #: group -> type -> rows of `faces`
-    node_sets: Mapping[str, IntArray] = field(default_factory=dict)  #: group -> nodes
+    #: rows of `cells` of each group, by cell type
+    cell_sets: Mapping[str, Mapping[str, IntArray]] = field(default_factory=dict)
+    #: two-dimensional cells by type; they only serve to select nodes
+    faces: Mapping[str, IntArray] = field(default_factory=dict)
+    #: rows of `faces` of each group, by face type
+    face_sets: Mapping[str, Mapping[str, IntArray]] = field(default_factory=dict)
+    node_sets: Mapping[str, IntArray] = field(default_factory=dict)  #: nodes of each group
     source: str = ""  #: file it was read from, or how it was made
     digest: str = ""  #: sha256 of that file
-    included: Mapping[str, str] = field(default_factory=dict, kw_only=True)  #: files that it includes -> their sha256
-    node_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))  #: in the file, (n_nodes,); or none
-    cell_numbers: Mapping[str, IntArray] = field(default_factory=dict)  #: type -> numbers in the file, (n_cells,)
-    notes: tuple[str, ...] = ()  #: what the reader left out or changed, in words
-    origin: Mapping[str, str] = field(default_factory=dict)  #: label -> what it was made of, such as a geometry's size
+    #: sha256 of each file that the source includes
+    included: Mapping[str, str] = field(default_factory=dict, kw_only=True)
+    #: numbers in the file, (n_nodes,); empty: none
+    node_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
+    cell_numbers: Mapping[str, IntArray] = field(default_factory=dict)  #: numbers in the file, (n_cells,), by cell type
+    notes: tuple[str, ...] = ()  #: descriptions of what the reader left out or changed
+    #: origin of the mesh by label, such as the size of a geometry
+    origin: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         put = object.__setattr__

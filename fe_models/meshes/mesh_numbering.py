@@ -1,4 +1,4 @@
-"""What the user's mesh calls its nodes, elements and sets, as the numbering of the body that is made of it."""
+"""The user's names of nodes, elements and sets of a mesh, as the `Numbering` of the body."""
 
 from collections.abc import Mapping
 
@@ -18,9 +18,9 @@ CellSets = Mapping[str, Mapping[str, IntArray]]
 
 
 def solid_numbering(mesh: Mesh) -> Numbering:
-    """Return the numbering of the body of a mesh of solids: its nodes, the cells behind the boundary triangles, sets.
+    """Return the numbering of the body of a solid mesh: its nodes, the cells of the boundary triangles, and the sets.
 
-    Groups of faces are sets of their nodes.
+    Groups of faces become sets of their nodes.
     """
     cell_of = boundary_owners(mesh)
     of_faces = {
@@ -48,7 +48,7 @@ def shell_numbering(mesh: ShellMesh, mover: IntArray, cell_of: IntArray) -> Numb
     mover
         Node that moves each point of the skin, (n_skin,).
     cell_of
-        Cell behind each triangle of the skin, numbered through, (n_tri,).
+        Cell of each triangle of the skin, numbered through all types, (n_tri,).
     """
     return Numbering(
         nodes=np.concatenate([mesh.node_numbers, mesh.node_numbers[mover]]) if mesh.node_numbers.size else NO_NUMBERS,
@@ -71,7 +71,7 @@ def line_numbering(mesh: LineMesh, mover: IntArray, line_of: IntArray) -> Number
     mover
         Node that moves each point of the skin, (n_skin,).
     line_of
-        Line behind each triangle of the skin, (n_tri,).
+        Line of each triangle of the skin, (n_tri,).
     """
     sets = {group: {"line": rows} for group, rows in mesh.line_sets.items()}
     return Numbering(
@@ -86,12 +86,12 @@ def line_numbering(mesh: LineMesh, mover: IntArray, line_of: IntArray) -> Number
 
 
 def skin_flags(n_nodes: int, n_skin: int) -> IntArray:
-    """Return 0 for nodes and 1 for the points of a skin behind them, (n_nodes + n_skin,)."""
+    """Return 0 for each node, followed by 1 for each skin point, (n_nodes + n_skin,)."""
     return np.repeat(np.arange(2), [n_nodes, n_skin])
 
 
 def node_sets(sets: Mapping[str, IntArray], mover: IntArray | None = None, n_nodes: int = 0) -> list[NamedSet]:
-    """Return sets of nodes, with the points of a skin that their nodes move."""
+    """Return sets of nodes, including the skin points that their nodes move."""
     made = []
     for name, nodes in sets.items():
         members = np.unique(nodes)
@@ -102,7 +102,7 @@ def node_sets(sets: Mapping[str, IntArray], mover: IntArray | None = None, n_nod
 
 
 def cell_sets(sets: CellSets, counts: Mapping[str, int], cell_of: IntArray) -> list[NamedSet]:
-    """Return sets of cells by the triangles that they made; cells are numbered through, type by type."""
+    """Return sets of cells as sets of their triangles; cells are numbered through all types."""
     first = dict(zip(counts, np.cumsum([0, *counts.values()]), strict=False))
     made = []
     for name, by_type in sets.items():
@@ -114,7 +114,7 @@ def cell_sets(sets: CellSets, counts: Mapping[str, int], cell_of: IntArray) -> l
 
 
 def cell_numbers(mesh: Mesh | ShellMesh) -> IntArray:
-    """Return the numbers of all cells, type by type, (n_cells,); `NONE` where a type has none."""
+    """Return the numbers of all cells, type by type, (n_cells,); `NONE` for types without numbers."""
     return np.concatenate(
         [mesh.cell_numbers.get(kind, np.full(len(cells), NONE)) for kind, cells in mesh.cells.items()]
     )

@@ -1,4 +1,4 @@
-"""Nodes of a model whose elements stay with another program: places, numbers, and the groups that select them."""
+"""Nodes of a model whose elements stay in another program: positions, numbers, and groups for selection."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,16 +14,20 @@ __all__ = ["NodeCloud"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class NodeCloud:
-    """Nodes of any elements, solids, shells, beams or unknown ones: all of them can be selected."""
+    """Nodes of solids, shells, beams or unknown elements; all nodes can be selected."""
 
     nodes: Array  #: (n_nodes, 3), in the length unit of the model
-    node_sets: Mapping[str, IntArray] = field(default_factory=dict)  #: group -> nodes, those of lines and points too
-    face_sets: Mapping[str, Mapping[str, IntArray]] = field(default_factory=dict)  #: group -> type -> nodes of faces
+    #: nodes of each group, including groups of lines and points
+    node_sets: Mapping[str, IntArray] = field(default_factory=dict)
+    #: nodes of the faces of each group, by face type
+    face_sets: Mapping[str, Mapping[str, IntArray]] = field(default_factory=dict)
     source: str = ""  #: file it was read from
     digest: str = ""  #: sha256 of that file
-    included: Mapping[str, str] = field(default_factory=dict, kw_only=True)  #: files that it includes -> their sha256
-    node_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))  #: in the file, (n_nodes,); or none
-    notes: tuple[str, ...] = ()  #: what the reader left out or changed, in words
+    #: sha256 of each file that the source includes
+    included: Mapping[str, str] = field(default_factory=dict, kw_only=True)
+    #: numbers in the file, (n_nodes,); empty: none
+    node_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
+    notes: tuple[str, ...] = ()  #: descriptions of what the reader left out or changed
 
     def __post_init__(self) -> None:
         put = object.__setattr__

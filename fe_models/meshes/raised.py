@@ -1,4 +1,4 @@
-"""The same mesh with cells of the next order, and how its nodes lie between the old ones."""
+"""The same mesh with cells of the next order, and the interpolation from its old nodes to its new nodes."""
 
 import numpy as np
 import scipy.sparse as sp
@@ -10,17 +10,18 @@ from fe_models.meshes.mesh import Mesh
 __all__ = ["FIRST_ORDER", "raised_mesh", "tetrahedra_of"]
 
 FIRST_ORDER = ("tetra", "hexahedron", "wedge", "pyramid")  #: solid cells with corner nodes only
-RAISED = {"tetra": "tetra10", "hexahedron": "hexahedron27"}  #: whose field holds that of the first order
+#: raised cell type, whose field contains that of the first-order cell
+RAISED = {"tetra": "tetra10", "hexahedron": "hexahedron27"}
 
 
 def raised_mesh(mesh: Mesh) -> tuple[Mesh, sp.csr_array]:
-    """Return a mesh of tetrahedra or bricks with their middle nodes added, on straight edges.
+    """Return a mesh of tetrahedra or bricks with middle nodes added on straight edges.
 
     Returns
     -------
     tuple
-        The mesh, its first nodes those of the old one; and the values at its nodes from those at the old ones,
-        (n_new_nodes, n_nodes): the same field.
+        The mesh, whose first nodes are the old ones; and the matrix that interpolates values at the old nodes to all
+        nodes, (n_new_nodes, n_nodes).
     """
     n, cells, parents = len(mesh.nodes), {}, []
     for kind, rows in mesh.cells.items():
@@ -46,15 +47,15 @@ def raised_mesh(mesh: Mesh) -> tuple[Mesh, sp.csr_array]:
 
 
 def tetrahedra_of(mesh: Mesh) -> tuple[Mesh, sp.csr_array, IntArray]:
-    """Return the mesh with every brick, wedge and pyramid cut into tetrahedra that meet in its centre.
+    """Return the mesh with every brick, wedge and pyramid divided into tetrahedra that meet at its centre.
 
-    Faces of four nodes are cut from their node of the lowest number, so that neighbours agree.
+    Four-node faces are divided from their node with the lowest number, so that neighbours agree.
 
     Returns
     -------
     tuple
-        The mesh; the values at its nodes from those at the old ones, (n_new_nodes, n_nodes); and the old cell of each
-        tetrahedron, counted through all types, (n_tetra,).
+        The mesh; the matrix that interpolates values at the old nodes to all nodes, (n_new_nodes, n_nodes); and the old
+        cell of each tetrahedron, numbered through all types, (n_tetra,).
     """
     n = len(mesh.nodes)
     parts, owner, centres = [], [], [sp.eye_array(n, format="csr")]
@@ -76,7 +77,7 @@ def tetrahedra_of(mesh: Mesh) -> tuple[Mesh, sp.csr_array, IntArray]:
             if face.shape[1] == 4:
                 turn = (face.argmin(axis=1)[:, None] + np.arange(4)) % 4
                 face = np.take_along_axis(face, turn, axis=1)
-            for triangle in ([0, 2, 1], [0, 3, 2])[: face.shape[1] - 2]:  # seen from inside
+            for triangle in ([0, 2, 1], [0, 3, 2])[: face.shape[1] - 2]:  # orientation as seen from inside
                 parts.append(np.column_stack([face[:, triangle], centre]))
                 owner.append(numbers)
     P = sp.vstack(centres, format="csr")

@@ -1,4 +1,4 @@
-"""The same body with every cell divided: tetrahedra into eight, bricks into eight, curved as they are."""
+"""Refinement of a mesh: every tetrahedron and brick is divided into eight cells and keeps its curvature."""
 
 from functools import cache
 
@@ -13,17 +13,17 @@ __all__ = ["DIVIDED", "refined_mesh"]
 
 #: cells that can be divided: tetrahedra and bricks of any order
 DIVIDED = tuple(name for name, shape in CELL_SHAPES.items() if shape.dim == 3 and len(shape.corners) in (4, 8))
-PARTS = 64  #: weights of corners are whole numbers of this, at a quarter of each direction
+PARTS = 64  #: corner weights are whole multiples of 1/64, at a quarter of each direction
 
 
 def refined_mesh(mesh: Mesh) -> Mesh:
-    """Return the mesh with every edge halved; the surface keeps its curvature, groups of cells their names.
+    """Return the mesh with every edge halved; the surface keeps its curvature, and groups of cells keep their names.
 
-    (1) the nodes of the parts by their weights over the corners of the old cell, which neighbours share: the weights
-        say which nodes are the same, so that cracks stay open
-    (2) their places by the shape functions of the old cell
+    (1) identify the nodes of the parts by their weights over the corners of the old cell, which neighbours share;
+        coincident nodes on two sides of a crack therefore stay separate
+    (2) compute their positions with the shape functions of the old cell
 
-    Faces, groups of faces and of nodes are left out.
+    Faces, and groups of faces and nodes, are dropped.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def refined_mesh(mesh: Mesh) -> Mesh:
 
 @cache
 def division(kind: str) -> tuple[IntArray, Array, IntArray]:
-    """Return how a cell is divided.
+    """Return the subdivision of a cell type.
 
     Returns
     -------
@@ -97,7 +97,7 @@ def tetrahedron_pieces() -> list[Array]:
     def middle(i: int, j: int) -> Array:
         return np.asarray((corners[i] + corners[j]) / 2)
 
-    start, end = middle(0, 2), middle(1, 3)  # one diagonal of the octahedron
+    start, end = middle(0, 2), middle(1, 3)  # end points of one diagonal of the octahedron
     ring = [middle(0, 1), middle(1, 2), middle(2, 3), middle(0, 3)]
     for k in range(4):
         piece = np.array([start, end, ring[k], ring[(k + 1) % 4]])

@@ -1,4 +1,4 @@
-"""Selections: ways to say which nodes of a mesh are meant, by group or by geometry."""
+"""Selections of mesh nodes, by group or by geometry."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -27,18 +27,18 @@ AnyMesh = Mesh | LineMesh | ShellMesh | NodeCloud
 
 
 class Selection(Protocol):
-    """Something that chooses nodes of a mesh."""
+    """A rule that selects nodes of a mesh."""
 
     def members(self, mesh: AnyMesh) -> IntArray:
-        """Return the chosen nodes, ascending; `InterfaceError` if there are none."""
+        """Return the selected nodes, ascending; raise `InterfaceError` if there are none."""
 
 
 @dataclass(frozen=True)
 class FaceGroup:
-    """The nodes of a named group of faces, or of cells of a shell; or of several groups together.
+    """The nodes of one or more named groups of faces, or of groups of shell cells.
 
-    Where the faces are facets of the solid, the nodes are those of the complete facets, so that linear triangles
-    written over quadratic tetrahedra select the middle nodes too.
+    If the faces are facets of the solid, the nodes are those of the complete facets. Linear triangles over quadratic
+    tetrahedra therefore select the middle nodes too.
     """
 
     name: str
@@ -49,14 +49,14 @@ class FaceGroup:
         return np.unique(np.concatenate([rows.ravel() for rows in self.facets(mesh).values()]))
 
     def facets(self, mesh: AnyMesh) -> dict[str, IntArray]:
-        """Return face type -> faces of the groups, as complete facets of the solid where they are such."""
+        """Return the faces of the groups by type; faces that are facets of the solid become complete facets."""
         if isinstance(mesh, LineMesh):
             raise InterfaceError(f"face group {self.name!r}: a mesh of lines has no faces; select nodes")
         found: dict[str, list[IntArray]] = {}
         for name in (self.name, *self.also):
             for kind, rows in _faces_of_group(mesh, name).items():
                 found.setdefault(kind, []).append(rows)
-        if isinstance(mesh, NodeCloud):  # whose groups hold the nodes of the faces themselves
+        if isinstance(mesh, NodeCloud):  # groups of a node cloud hold the nodes of their faces
             return {kind: np.unique(np.concatenate(parts), axis=0) for kind, parts in found.items()}
         kept = {kind: mesh_faces(mesh)[kind][np.unique(np.concatenate(parts))] for kind, parts in found.items()}
         if isinstance(mesh, ShellMesh):
@@ -67,12 +67,12 @@ class FaceGroup:
 
 
 def mesh_faces(mesh: Mesh | ShellMesh) -> Mapping[str, IntArray]:
-    """Return the faces that groups count: of a solid mesh those beside it, of a shell its cells."""
+    """Return the faces to which the groups refer: the `faces` of a solid mesh, or the cells of a shell."""
     return mesh.cells if isinstance(mesh, ShellMesh) else mesh.faces
 
 
 def _faces_of_group(mesh: Mesh | ShellMesh | NodeCloud, name: str) -> dict[str, IntArray]:
-    """Return face type -> what one group holds."""
+    """Return the faces of one group, by type."""
     is_shell = isinstance(mesh, ShellMesh)
     groups = mesh.cell_sets if isinstance(mesh, ShellMesh) else mesh.face_sets
     what = "group of cells" if is_shell else "face group"
@@ -107,7 +107,7 @@ class NodeSet:
 
 @dataclass(frozen=True)
 class NodeNumbers:
-    """Nodes by their numbers in the file they were read from."""
+    """Nodes selected by their numbers in the file."""
 
     numbers: tuple[int, ...]
 
@@ -135,8 +135,9 @@ class Plane:
     """The surface nodes on a plane."""
 
     point: Vector  #: [m]
-    normal: Vector  #: any length
-    tolerance: float | None = None  #: distance [m]; None: 1e-6 of the diagonal of the bounding box
+    normal: Vector  #: normal vector of any length
+    #: largest distance from the plane [m]; None: 1e-6 of the diagonal of the bounding box
+    tolerance: float | None = None
 
     def members(self, mesh: AnyMesh) -> IntArray:
         """Return the surface nodes within the tolerance, ascending."""
@@ -159,16 +160,17 @@ class Plane:
 class Cylinder:
     """The surface nodes on the curved surface of a cylinder."""
 
-    point: Vector  #: on the axis [m]
-    axis: Vector  #: any length
+    point: Vector  #: point on the axis [m]
+    axis: Vector  #: axis vector of any length
     radius: float  #: [m]
     span: tuple[float, float] | None = None  #: range along the axis from `point` [m]; None: no limit
-    tolerance: float | None = None  #: difference to the radius [m]; None: 1e-3 of the radius
+    tolerance: float | None = None  #: largest difference from the radius [m]; None: 1e-3 of the radius
 
     def members(self, mesh: AnyMesh) -> IntArray:
         """Return the surface nodes within the tolerance, ascending.
 
-        Middle nodes on straight edges lie inside a coarse hole by its sagitta: give a larger tolerance for those.
+        Middle nodes on straight edges of a coarse hole lie inside the cylinder by the sagitta; a larger tolerance
+        selects them.
         """
         if not self.radius > 0:
             raise InterfaceError(f"cylinder: radius: expected a length above zero, got {self.radius}")
@@ -197,13 +199,13 @@ class Cylinder:
 
 @dataclass(frozen=True)
 class Box:
-    """The surface nodes inside a box along the axes."""
+    """The surface nodes inside a box whose edges are parallel to the mesh axes."""
 
     lo: Vector  #: [m]
     hi: Vector  #: [m]
 
     def members(self, mesh: AnyMesh) -> IntArray:
-        """Return the surface nodes inside, ascending; the walls, widened by 1e-9 of the body, belong to the box."""
+        """Return the surface nodes inside the box, ascending; its walls are moved outward by 1e-9 of the body size."""
         lo, hi = _point("box", self.lo), _point("box", self.hi)
         if (lo > hi).any():
             raise InterfaceError(f"box: expected lo <= hi, got {_text(self.lo)} and {_text(self.hi)}")
@@ -235,12 +237,12 @@ class NearestNode:
 
 
 def candidates(mesh: AnyMesh) -> IntArray:
-    """Return the nodes that geometry can select: of the surface of a solid, all of any other mesh; ascending."""
+    """Return the nodes that geometry can select, ascending: surface nodes of a solid, all nodes of any other mesh."""
     return boundary_nodes(mesh) if isinstance(mesh, Mesh) else np.arange(len(mesh.nodes))
 
 
 def selected_facets(mesh: AnyMesh, selection: Selection) -> dict[str, IntArray]:
-    """Return face type -> facets of a selection: those of a face group, else boundary facets with all nodes chosen.
+    """Return the facets of a selection by type: those of a face group, else boundary facets with all nodes selected.
 
     The facets of a shell are its cells.
     """
@@ -256,7 +258,7 @@ def selected_facets(mesh: AnyMesh, selection: Selection) -> dict[str, IntArray]:
 
 
 def _complete(mesh: Mesh, faces: Mapping[str, IntArray]) -> dict[str, IntArray]:
-    """Return the facets of the boundary with the same corners; the faces themselves unless all are found."""
+    """Return the boundary facets with the same corners; the faces themselves unless all facets are found."""
     result: dict[str, list[IntArray]] = {}
     for kind, rows in faces.items():
         n_corners = CORNERS[kind]
@@ -290,7 +292,7 @@ def _require_on_solid(mesh: AnyMesh, what: str, nodes: IntArray) -> None:
 
 
 def _other_kind(mesh: AnyMesh, name: str, wanted: str) -> str:
-    """Say that the name is that of another kind of group."""
+    """Say so if the name belongs to another kind of group."""
     if isinstance(mesh, LineMesh):
         return f" ({name!r} is a group of lines)" if name in mesh.line_sets else ""
     kinds = {"node set": mesh.node_sets} | ({} if isinstance(mesh, NodeCloud) else {"cell group": mesh.cell_sets})

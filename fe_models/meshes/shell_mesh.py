@@ -1,4 +1,4 @@
-"""The mesh of a shell body: nodes, triangles and quads, lines of stiffeners, and the groups that name them."""
+"""The mesh of a shell body: nodes, triangles, quads, lines of stiffeners, and their groups."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -22,22 +22,27 @@ class ShellMesh:
     Raises
     ------
     ShellError
-        If shapes do not fit, a cell names a node that does not exist, or a coordinate is not finite.
+        If shapes do not fit, a cell refers to an unknown node, or a coordinate is not finite.
     """
 
     nodes: Array  #: (n_nodes, 3), in the length unit of the model
     cells: Mapping[str, IntArray]  #: by type in `FLAT_TYPES`, (n_cells, 3) and (n_cells, 4)
-    cell_sets: Mapping[str, Mapping[str, IntArray]] = field(default_factory=dict)  #: group -> type -> rows of `cells`
-    lines: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))  #: ends of stiffeners, (n_lines, 2)
-    line_sets: Mapping[str, IntArray] = field(default_factory=dict)  #: group -> rows of `lines`
-    node_sets: Mapping[str, IntArray] = field(default_factory=dict)  #: group -> nodes
+    #: rows of `cells` of each group, by cell type
+    cell_sets: Mapping[str, Mapping[str, IntArray]] = field(default_factory=dict)
+    #: end nodes of stiffeners, (n_lines, 2)
+    lines: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
+    line_sets: Mapping[str, IntArray] = field(default_factory=dict)  #: rows of `lines` of each group
+    node_sets: Mapping[str, IntArray] = field(default_factory=dict)  #: nodes of each group
     source: str = ""  #: file it was read from, or how it was made
     digest: str = ""  #: sha256 of that file
-    included: Mapping[str, str] = field(default_factory=dict, kw_only=True)  #: files that it includes -> their sha256
-    node_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))  #: in the file, (n_nodes,); or none
-    cell_numbers: Mapping[str, IntArray] = field(default_factory=dict)  #: type -> numbers in the file, (n_cells,)
-    line_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))  #: in the file, (n_lines,); or none
-    notes: tuple[str, ...] = ()  #: what the reader left out or changed, in words
+    #: sha256 of each file that the source includes
+    included: Mapping[str, str] = field(default_factory=dict, kw_only=True)
+    #: numbers in the file, (n_nodes,); empty: none
+    node_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
+    cell_numbers: Mapping[str, IntArray] = field(default_factory=dict)  #: numbers in the file, (n_cells,), by cell type
+    #: numbers in the file, (n_lines,); empty: none
+    line_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
+    notes: tuple[str, ...] = ()  #: descriptions of what the reader left out or changed
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -83,7 +88,7 @@ class ShellMesh:
         return sum(len(cells) for cells in self.cells.values())
 
     def cell_name(self, kind: str, row: int) -> str:
-        """Return what to call a cell in a message: its number in the file where there is one."""
+        """Return the name of a cell in messages, with its number in the file if it has one."""
         return f"{kind} {self.cell_numbers[kind][row] if kind in self.cell_numbers else row}"
 
 
@@ -92,15 +97,17 @@ def mapped_shell(
 ) -> ShellMesh:
     """Return a grid of n_u × n_v quads, or twice as many triangles, on a surface over the unit square.
 
-    Its cells are the group `name`, the nodes of its sides the node sets "u0", "u1", "v0", "v1". The normal is that of
-    (u, v): ∂X/∂u × ∂X/∂v. Diagonals of triangles alternate.
+    The cells form the group `name`; the nodes of the sides form the node sets "u0", "u1", "v0", "v1". The normal is
+    along ∂X/∂u × ∂X/∂v. Diagonals of triangles alternate.
 
     Parameters
     ----------
     surface
-        (u, v), (n,) each in 0..1 -> X, (n, 3) [m].
+        Maps (u, v), (n,) each in 0..1, to X, (n, 3) [m].
     n_u, n_v
-        Cells along u and v.
+        Numbers of cells along u and v.
+    name
+        Name of the group of cells.
     kind
         "quad" or "triangle".
     """

@@ -1,4 +1,4 @@
-"""Cell types as scikit-fem has them: its elements, and the order of its nodes."""
+"""Cell types of scikit-fem: elements and node order."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ SKFEM_ELEMENTS = {
     "hexahedron20": "ElementHexS2",
     "hexahedron27": "ElementHex2",
     "wedge": "ElementWedge1",
-}  #: cell type -> element of scikit-fem with the same nodes; of others the monomials of their shapes make the functions
+}  #: scikit-fem element with the same nodes, by cell type; other cell types use the monomials of their shapes
 
 
 def skfem_node_order(kind: str) -> IntArray:

@@ -1,7 +1,7 @@
-"""Cutting a mesh into parts one behind the other, each with the nodes of its cuts in node sets.
+"""Division of a mesh into consecutive parts; the nodes of each cut form a node set in both parts.
 
-A linear frame holds for small deflections of a body in itself; a slender body in several parts, each with a frame of
-its own, carries large ones.
+A floating frame describes small deflections of its body relative to the frame. A slender body with large deflections
+can be described by several parts, each with its own frame.
 """
 
 from collections.abc import Mapping
@@ -28,10 +28,10 @@ SomeMesh = Mesh | LineMesh | ShellMesh
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """Where two parts meet."""
+    """Common boundary of two parts."""
 
-    name: str  #: of the node set in both parts
-    point: Array  #: area centroid of the facets they share, mean of the nodes of lines, (3,) [m]
+    name: str  #: name of the node set in both parts
+    point: Array  #: area centroid of the common facets, or the mean of the nodes for lines, (3,) [m]
     n_nodes: int
 
     def __post_init__(self) -> None:
@@ -58,25 +58,25 @@ def cut_name(k: int) -> str:
 def split_mesh(
     mesh: AnyMesh, n: int | None = None, *, at: ArrayLike | None = None, axis: ArrayLike | None = None
 ) -> Split[AnyMesh]:
-    """Cut a mesh into parts along an axis, of equal length or at given places; a cell is where its centre is.
+    """Divide a mesh into parts along an axis, of equal length or at given positions, by the centres of the cells.
 
     Parameters
     ----------
     mesh
-        Solid cells, lines, or the cells of a shell with its stiffeners. Groups are kept, less what is in other parts;
-        empty ones are dropped.
+        Solid cells, lines, or shell cells with stiffeners. Groups keep their members in each part; empty groups are
+        dropped.
     n
         Number of parts of equal length, 2 or more.
     at
-        Instead of a number: places of the cuts along the axis, from the origin of the mesh, ascending, (n - 1,) [m].
+        Positions of the cuts along the axis, instead of n, from the origin of the mesh, ascending, (n - 1,) [m].
     axis
-        A direction, (3,); default: that of the greatest extent of the nodes.
+        Direction, (3,); None: the direction of the greatest extent of the nodes.
 
     Raises
     ------
     MeshError
-        If a part has no cell, is in pieces that do not meet its neighbours, or meets another one than its neighbours:
-        the parts are shorter than the cells, or the body runs back along the axis.
+        If a part has no cell, is not connected to its neighbours, or meets a part that is not its neighbour. The parts
+        are then shorter than the cells, or the body turns back along the axis.
     """
     direction = longest_direction(mesh.nodes) if axis is None else unit("split: axis", axis)
     places_of_cuts = cut_places(mesh, direction, n, at)
@@ -116,7 +116,7 @@ def split_mesh(
 
 
 def cut_places(mesh: SomeMesh, axis: Array, n: int | None, at: ArrayLike | None) -> Array:
-    """Return the places of the cuts along an axis, ascending, (n - 1,)."""
+    """Return the positions of the cuts along an axis, ascending, (n - 1,)."""
     low, high = mesh_extent(mesh, axis)
     words = f"along ({', '.join(f'{x:.4g}' for x in axis)})"
     if not high - low > 1e-12 * np.abs(mesh.nodes).max():
@@ -144,7 +144,7 @@ def longest_direction(nodes: Array) -> Array:
 
 
 def unit(where: str, vector: ArrayLike) -> Array:
-    """Return a direction as unit vector, (3,)."""
+    """Return a direction as a unit vector, (3,)."""
     v = np.asarray(vector, dtype=float)
     if v.shape != (3,) or not np.isfinite(v).all() or not v.any():
         raise MeshError(f"{where}: expected a direction, three finite numbers that are not all zero, got {vector!r}")
@@ -152,38 +152,38 @@ def unit(where: str, vector: ArrayLike) -> Array:
 
 
 def cells_of(mesh: SomeMesh) -> Mapping[str, IntArray]:
-    """Return type -> nodes of the cells, (n_cells, nodes per cell)."""
+    """Return the nodes of the cells, (n_cells, nodes per cell), by cell type."""
     return {"line": mesh.lines} if isinstance(mesh, LineMesh) else mesh.cells
 
 
 def cell_centers(mesh: SomeMesh) -> dict[str, Array]:
-    """Return type -> mean of the nodes of each cell, (n_cells, 3)."""
+    """Return the mean of the nodes of each cell, (n_cells, 3), by cell type."""
     return {kind: mesh.nodes[cells].mean(axis=1) for kind, cells in cells_of(mesh).items()}
 
 
 def mesh_extent(mesh: SomeMesh, axis: Array) -> tuple[float, float]:
-    """Return the least and greatest place of the nodes of cells along an axis."""
+    """Return the smallest and largest position of cell nodes along an axis."""
     used = np.unique(np.concatenate([cells.ravel() for cells in cells_of(mesh).values()]))
     s = mesh.nodes[used] @ axis
     return float(s.min()), float(s.max())
 
 
 def nodes_of(mesh: SomeMesh, kept: Mapping[str, Array]) -> IntArray:
-    """Return the nodes of the cells that are kept, ascending."""
+    """Return the nodes of the kept cells, ascending."""
     return np.unique(np.concatenate([cells[kept[kind]].ravel() for kind, cells in cells_of(mesh).items()]))
 
 
 def restricted(mesh: SomeMesh, kept: Mapping[str, Array], behind: IntArray, what: str) -> SomeMesh:
-    """Return the mesh of the cells that are kept, everything renumbered.
+    """Return the mesh of the kept cells, with everything renumbered.
 
     Parameters
     ----------
     kept
-        Type of cells -> which, (n_cells,) bool.
+        Whether to keep each cell, (n_cells,) bool, by cell type.
     behind
-        Nodes of the cut to the next part, which has what lies in the cut.
+        Nodes of the cut to the next part. Cells and lines within the cut go to the next part.
     what
-        Of the mesh it is, in words.
+        Description of the part, for the source of the mesh.
     """
     source = f"{mesh.source}, {what}" if mesh.source else what
     if isinstance(mesh, LineMesh):
@@ -192,7 +192,7 @@ def restricted(mesh: SomeMesh, kept: Mapping[str, Array], behind: IntArray, what
 
 
 def lines_kept(mesh: LineMesh, kept: Mapping[str, Array], source: str) -> LineMesh:
-    """Return the mesh of some lines."""
+    """Return the mesh of the kept lines."""
     rows, nodes = kept["line"], nodes_of(mesh, kept)
     place, line_place = places(len(mesh.nodes), nodes), places(len(mesh.lines), np.flatnonzero(rows))
     return replace(
@@ -210,7 +210,7 @@ def lines_kept(mesh: LineMesh, kept: Mapping[str, Array], source: str) -> LineMe
 
 
 def shell_kept(mesh: ShellMesh, kept: Mapping[str, Array], behind: IntArray, source: str) -> ShellMesh:
-    """Return the mesh of some flat cells with the stiffeners between their nodes, but for those on the cut behind."""
+    """Return the mesh of the kept shell cells, with their stiffeners except those in the cut to the next part."""
     nodes = nodes_of(mesh, kept)
     place = places(len(mesh.nodes), nodes)
     own = np.zeros(len(mesh.nodes), dtype=bool)
@@ -237,7 +237,7 @@ def shell_kept(mesh: ShellMesh, kept: Mapping[str, Array], behind: IntArray, sou
 
 
 def cells_kept(mesh: Mesh, kept: Mapping[str, Array], source: str) -> Mesh:
-    """Return the mesh of some solid cells."""
+    """Return the mesh of the kept solid cells."""
     cells = {kind: mesh.cells[kind][rows] for kind, rows in kept.items() if rows.any()}
     part = drop_unused_nodes(
         replace(
@@ -251,13 +251,13 @@ def cells_kept(mesh: Mesh, kept: Mapping[str, Array], source: str) -> Mesh:
         part,
         face_sets={group: by_type for group, by_type in part.face_sets.items() if by_type},
         node_sets=without_empty(part.node_sets),
-        notes=mesh.notes,  # nodes of other parts are no finding
+        notes=mesh.notes,  # nodes of other parts are not worth a note
         source=source,
     )
 
 
 def cell_sets_kept(mesh: Mesh | ShellMesh, kept: Mapping[str, Array]) -> dict[str, dict[str, IntArray]]:
-    """Return the groups of cells that have some left, with their new numbers."""
+    """Return the groups of cells that still have members, with the new indices."""
     place = {kind: places(len(mesh.cells[kind]), np.flatnonzero(rows)) for kind, rows in kept.items()}
     sets = {
         group: without_empty({kind: moved(place[kind], m) for kind, m in by_type.items()})
@@ -267,25 +267,25 @@ def cell_sets_kept(mesh: Mesh | ShellMesh, kept: Mapping[str, Array]) -> dict[st
 
 
 def places(n: int, kept: IntArray) -> IntArray:
-    """Return the new number of each of n things, -1 for those that go, (n,)."""
+    """Return the new index of each of n items, (n,); -1 for items that are dropped."""
     place = np.full(n, -1, np.int64)
     place[kept] = np.arange(len(kept))
     return place
 
 
 def moved(place: IntArray, members: IntArray) -> IntArray:
-    """Return the new numbers of those members that stay."""
+    """Return the new indices of the members that are kept."""
     new = place[members]
     return new[new >= 0]
 
 
 def without_empty(groups: Mapping[str, IntArray]) -> dict[str, IntArray]:
-    """Return the groups that have members."""
+    """Return the groups that are not empty."""
     return {name: members for name, members in groups.items() if members.size}
 
 
 def center_of_cut(part: SomeMesh, name: str) -> Array:
-    """Return the area centroid of the facets on a cut, the mean of its nodes where there are none, (3,)."""
+    """Return the area centroid of the facets of a cut, or the mean of its nodes if it has no facets, (3,)."""
     nodes = part.node_sets[name]
     if isinstance(part, Mesh):
         on_cut = np.zeros(len(part.nodes), dtype=bool)

@@ -1,4 +1,4 @@
-"""Nodes that belong to no solid cell: they would make the stiffness singular, so they leave the mesh."""
+"""Removal of nodes that belong to no solid cell; they would make the stiffness singular."""
 
 from dataclasses import replace
 
@@ -19,10 +19,10 @@ def used_nodes(mesh: Mesh) -> np.ndarray:
 
 
 def drop_unused_nodes(mesh: Mesh) -> Mesh:
-    """Return the mesh without the nodes that belong to no solid cell, everything renumbered.
+    """Return the mesh without the nodes that belong to no solid cell, with everything renumbered.
 
-    Faces with such a node go too; groups that become empty stay, empty. `Mesh.notes` says how many. A
-    mesh without unused nodes is returned as it is.
+    Faces with such a node are dropped too; groups that become empty are kept. `Mesh.notes` reports the numbers. A mesh
+    without unused nodes is returned unchanged.
     """
     used = used_nodes(mesh)
     n_unused = int((~used).sum())
