@@ -1,1 +1,1 @@
-"""What every package stands on: arrays, units, words, errors, files, threads; imports nothing of ours."""
+"""Foundation of all packages: arrays, units, message texts, errors, files, threads. It imports no other package."""

@@ -1,4 +1,4 @@
-"""Arrays as the frozen types hold them: float64, C order, finite, read-only."""
+"""Arrays of the frozen types: float64, C order, finite, read-only."""
 
 from typing import Any
 
@@ -13,11 +13,11 @@ __all__ = ["Array", "IntArray", "frozen", "frozen_int", "require_finite", "requi
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-SYMMETRY_DEFECT = 1e-8  #: largest |A - A.T| / |A| that is taken for rounding of a symmetric matrix
+SYMMETRY_DEFECT = 1e-8  #: largest |A - A.T| / |A| that counts as rounding
 
 
 def frozen(values: Any) -> Array:
-    """Return a read-only float64 array in C order (a copy only where one is needed)."""
+    """Return a read-only float64 array in C order; the values are copied only if necessary."""
     array = np.ascontiguousarray(values, dtype=np.float64)
     if array.flags.writeable:
         array = array.view()
@@ -26,7 +26,7 @@ def frozen(values: Any) -> Array:
 
 
 def frozen_int(values: Any) -> IntArray:
-    """Return a read-only int64 array in C order (a copy only where one is needed)."""
+    """Return a read-only int64 array in C order; the values are copied only if necessary."""
     array = np.ascontiguousarray(values, dtype=np.int64)
     if array.flags.writeable:
         array = array.view()
@@ -35,7 +35,7 @@ def frozen_int(values: Any) -> IntArray:
 
 
 def require_finite(where: str, array: Array) -> None:
-    """Raise `BodyError` naming `where` if the array holds a NaN or an infinity."""
+    """Raise `BodyError` that names `where` if the array contains a NaN or an infinity."""
     bad = ~np.isfinite(array)
     if bad.any():
         first = tuple(int(i) for i in np.argwhere(bad)[0])
@@ -43,14 +43,14 @@ def require_finite(where: str, array: Array) -> None:
 
 
 def require_shape(where: str, array: Array, shape: tuple[int, ...]) -> None:
-    """Raise `BodyError` naming `where` unless the array has that shape."""
+    """Raise `BodyError` that names `where` unless the array has that shape."""
     if array.shape != shape:
         raise BodyError(f"{where}: expected shape {shape}, got {array.shape}")
 
 
 def symmetric_csc(where: str, matrix: Any, n: int) -> sp.csc_array:
-    """Return the matrix as CSC (n, n) with sorted indices after checking shape, finiteness and symmetry."""
-    # the compressed rows of a symmetric matrix are its compressed columns
+    """Return the matrix as CSC, (n, n), with sorted indices, after checks of shape, finiteness and symmetry."""
+    # for a symmetric matrix, compressed rows equal compressed columns
     csc = sp.csc_array(matrix.T if sp.issparse(matrix) and matrix.format == "csr" else matrix)
     require_shape(where, csc, (n, n))
     if not csc.has_canonical_format:
@@ -67,18 +67,18 @@ def symmetric_csc(where: str, matrix: Any, n: int) -> sp.csc_array:
 def symmetry_defect(csc: sp.csc_array) -> float:
     """Return max |(A - A.T) x| / max |A| for a fixed random vector x.
 
-    Two products instead of a transposed copy: a copy of the stiffness of a million dofs costs a gigabyte.
+    Two products avoid a transposed copy, which takes a gigabyte for the stiffness of a million dofs.
     """
     if csc.nnz == 0:
         return 0.0
-    scale = max(csc.data.max(), -csc.data.min())  # the largest in size, without an array of sizes
+    scale = max(csc.data.max(), -csc.data.min())  # the largest magnitude, without an array of magnitudes
     x = np.random.default_rng(0).uniform(0.5, 1.5, csc.shape[0])
     defect = np.abs(csc @ x - csc.T @ x).max()
     return float(defect / scale) if scale else 0.0
 
 
 def tilde(a: Array) -> Array:
-    """Return the matrix of a cross product, (..., 3, 3), of vectors (..., 3): tilde(a) @ b = a × b."""
+    """Return the matrices of the cross product, (..., 3, 3), for vectors a, (..., 3): tilde(a) @ b = a × b."""
     a = np.asarray(a)
     S = np.zeros((*a.shape, 3), np.result_type(a, float))
     S[..., 2, 1], S[..., 0, 2], S[..., 1, 0] = a[..., 0], a[..., 1], a[..., 2]

@@ -1,6 +1,6 @@
 """Frozen data classes whose pickled and deep copies are frozen too.
 
-NumPy gives copies of read-only arrays that can be written to, and a mapping proxy cannot be pickled at all.
+NumPy makes writable copies of read-only arrays, and a mapping proxy cannot be pickled at all.
 """
 
 from collections.abc import Iterator, Mapping
@@ -18,7 +18,7 @@ Item = TypeVar("Item")
 
 
 class FrozenMapping(Mapping[Key, Item]):
-    """A mapping that cannot be changed, and whose copies cannot either."""
+    """An immutable mapping whose copies are immutable too."""
 
     __slots__ = ("_items",)
 
@@ -48,12 +48,12 @@ class FrozenMapping(Mapping[Key, Item]):
 
 
 def restored_mapping(items: dict[Any, Any]) -> "FrozenMapping[Any, Any]":
-    """Return a mapping whose arrays are read-only again."""
+    """Return the mapping from its pickled items, with read-only arrays."""
     return FrozenMapping({key: read_only(value) for key, value in items.items()})
 
 
 def frozen_copies(kind: Class) -> Class:
-    """Decorate a frozen data class: copies hold its fields alone, nothing derived from them, and arrays read-only."""
+    """Decorate a frozen data class: copies hold only its fields, without cached values, and arrays are read-only."""
 
     def state(self: Any) -> dict[str, Any]:
         return {part.name: getattr(self, part.name) for part in fields(self)}
@@ -68,7 +68,7 @@ def frozen_copies(kind: Class) -> Class:
 
 
 def read_only(value: Any) -> Any:
-    """Return a value whose arrays cannot be written to, also those in tuples and sparse matrices."""
+    """Return the value with read-only arrays, also in tuples and sparse matrices."""
     if isinstance(value, np.ndarray):
         value.flags.writeable = False
     elif isinstance(value, tuple):

@@ -1,4 +1,4 @@
-"""A short mark of the content of a file."""
+"""A short fingerprint of the content of a file."""
 
 import hashlib
 from pathlib import Path
@@ -7,7 +7,7 @@ __all__ = ["file_digest"]
 
 
 def file_digest(path: str | Path) -> str:
-    """Return the sha256 of a file, read in pieces; "" if it is not there."""
+    """Return the sha256 of a file, read in blocks; "" if the file does not exist."""
     if not path or not Path(path).is_file():
         return ""
     with Path(path).open("rb") as file:

@@ -1,8 +1,8 @@
-"""The root of all errors, and those that every package may raise.
+"""The root of all errors, and the errors that every package may raise.
 
-Each package has a root of its own below it: `FeModelsError`, `CmsError`, `FloatframeError`. Leaves are also the
-built-in kind that a caller would expect. What is raised on the ground about bodies and units has both roots, of
-`fe_models`, where it is raised, and of `cms`, whose callers catch it.
+Each package has a root of its own below this one: `FeModelsError`, `CmsError`, `FloatframeError`. Leaves also derive
+from the built-in error that a caller would expect. Errors about bodies and units derive from the roots of both
+`fe_models`, which raises them, and `cms`, whose callers catch them.
 """
 
 from typing import Any
@@ -11,39 +11,39 @@ __all__ = ["BodyError", "CmsError", "FeModelsError", "ModalFileError", "Reported
 
 
 class ReportedError(Exception):
-    """Root of every error that is raised on purpose; its text is meant for the user."""
+    """Root of every intentional error; its text is written for the user."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Copies have the same text and attributes, whatever arguments the error was made with."""
+        """Make copies with the same text and attributes, whatever the arguments of the constructor."""
         return remade, (type(self), self.args, self.__dict__)
 
 
 def remade(kind: type[ReportedError], arguments: tuple[Any, ...], attributes: dict[str, Any]) -> ReportedError:
-    """Return an error of a kind as it was."""
+    """Restore an error from its class, arguments and attributes."""
     error = kind.__new__(kind, *arguments)
     error.__dict__.update(attributes)
     return error
 
 
 class FeModelsError(ReportedError):
-    """Root of every error that `fe_models` raises on purpose."""
+    """Root of every intentional error of `fe_models`."""
 
 
 class CmsError(ReportedError):
-    """Root of every error that `cms` raises on purpose."""
+    """Root of every intentional error of `cms`."""
 
 
 class BodyError(FeModelsError, CmsError, ValueError):
-    """A finite element body, coupling or interface is not what it claims to be."""
+    """A finite element body, coupling or interface is invalid."""
 
 
 class UnitsError(FeModelsError, CmsError, ValueError):
-    """An unknown unit system, or units that do not fit together."""
+    """The unit system is unknown, or units do not fit together."""
 
 
 class StorageError(FeModelsError, CmsError, RuntimeError):
-    """Arrays that should go to disk find no room there."""
+    """There is not enough disk space for arrays that should go to disk."""
 
 
 class ModalFileError(CmsError, ValueError):
-    """A file is not a readable modal file."""
+    """The file is not a readable modal file."""

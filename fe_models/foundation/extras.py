@@ -1,4 +1,4 @@
-"""Libraries that only some users need: imported when they are used, named with the extra that installs them."""
+"""Optional libraries: imported only when used; a missing one is reported with the extra that installs it."""
 
 from importlib import import_module
 from types import ModuleType
@@ -21,17 +21,17 @@ def extra_module(name: str, *, extra: str, purpose: str) -> ModuleType:
         Dotted name of the module.
     extra
         The extra of this project that installs it.
-    purpose
+    What needs the library, as the beginning of the message: "OP2 files".
         What needs it, as the beginning of the message: "OP2 files".
 
     Raises
     ------
     MissingExtraError
-        If it is not installed, or broken; with the line that installs it.
+        If the library is not installed or does not load. The message contains the command that installs it.
     """
     try:
         return import_module(name)
-    except (ImportError, OSError) as error:  # OSError: a shared library that the wheel expects is missing
+    except (ImportError, OSError) as error:  # OSError: a shared library that the package needs is missing
         missing = isinstance(error, ModuleNotFoundError) and name.startswith(f"{error.name}")
         reason = "which is not installed" if missing else f"which does not load ({error})"
         raise MissingExtraError(

@@ -1,4 +1,4 @@
-"""What is known about a file format of a neighbouring program: one record, for messages, `cms formats` and the docs."""
+"""Record of a file format of another program, used in messages, by `cms formats` and in the docs."""
 
 from dataclasses import dataclass
 
@@ -7,15 +7,15 @@ __all__ = ["FileFormat"]
 
 @dataclass(frozen=True)
 class FileFormat:
-    """One format of files, as far as it is read or written here."""
+    """One file format, with what this project reads or writes of it."""
 
-    name: str  #: as its program names it
+    name: str  #: name of the format in its own program
     program: str
-    holds: str  #: mesh, deck, matrices, geometry, reduced body, state space, motion unit
+    holds: str  #: content: mesh, deck, matrices, geometry, reduced body, state space or motion unit
     suffixes: tuple[str, ...]
     reads: bool = False
     writes: bool = False
-    key: str = ""  #: its name in `--to` and `format =`; empty where the suffix or the content says it
-    tried: str = ""  #: programs and versions whose files were read, or that read ours
-    lost: str = ""  #: what it cannot hold, or what is not taken over
-    extra: str = ""  #: the extra of this project that it needs
+    key: str = ""  #: value for `--to` and `format =`; empty if the suffix or the content identifies the format
+    tried: str = ""  #: programs and versions whose files were read here, or which read our files
+    lost: str = ""  #: content that the format cannot hold, or that is not read
+    extra: str = ""  #: the extra of this project that the format needs

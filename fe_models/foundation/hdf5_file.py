@@ -1,9 +1,9 @@
-"""HDF5 files that are written whole or not at all, under a seal, and read without trust.
+"""HDF5 files that are written completely or not at all, with a seal, and read without trust in their content.
 
-Writing: HDF5 writes through `Storage`, which keeps the first failure of the disk to itself: the library never meets a
-full disk, on which it can crash, and the caller gets the plain OSError. Reading: only what lies in the file itself and
-is as large as it says is taken (`own_items`): no links to other files, no virtual or external datasets, no shapes
-that the bytes of the file cannot fill.
+Writing: HDF5 writes through `Storage`, which records the first disk error. The library itself never meets a full disk,
+on which it can crash, and the caller gets the plain OSError. Reading: only items that lie in the file itself and have
+the declared size are read (`own_items`). Links to other files, virtual or external datasets, and shapes that the bytes
+of the file cannot fill are rejected.
 """
 
 import hashlib
@@ -35,11 +35,11 @@ __all__ = [
 
 DIGEST = "digest"  #: name of the root attribute
 SHA256 = "sha256"  #: name of the attribute of a dataset
-MOST_COMPRESSED = 1032  #: the most that deflate can make of a byte, where a tool has repacked a file
-BLOCK_VALUES = 1 << 20  #: values that are hashed at once
-LARGE = 1 << 20  #: bytes of an array from which deflate is tried
-PAYS = 0.75  #: part of its size that deflate has to leave of an array at most: dense numbers are not worth its time
-SAMPLES, SAMPLE = 16, 4096  #: places in an array at which it is tried, and values at each
+MOST_COMPRESSED = 1032  #: largest compression ratio of deflate, for files that another tool has repacked
+BLOCK_VALUES = 1 << 20  #: number of values that are hashed at a time
+LARGE = 1 << 20  #: size of an array, in bytes, above which compression is tried
+PAYS = 0.75  #: largest share of its size that a compressed array may have; dense numbers do not compress enough
+SAMPLES, SAMPLE = 16, 4096  #: number of samples of an array that are compressed on trial, and number of values in each
 Attribute = str | int | float
 
 
@@ -47,7 +47,7 @@ Attribute = str | int | float
 
 
 class Storage:
-    """An open file as HDF5 takes it; after a write has failed it takes everything and keeps nothing."""
+    """The open file that HDF5 writes to; after a failed write it discards all further data."""
 
     def __init__(self, file: BinaryIO) -> None:
         self.file = file
@@ -55,7 +55,7 @@ class Storage:
         self.failure: OSError | None = None
 
     def guarded(self, action: Callable[[], Any]) -> None:
-        """Run an action of the disk unless one has failed already."""
+        """Run a disk operation, unless an earlier one has failed."""
         if self.failure is None:
             try:
                 action()
@@ -103,26 +103,26 @@ class Storage:
         return size
 
     def flush(self) -> None:
-        """Write what is kept back."""
+        """Write buffered data."""
         self.guarded(self.file.flush)
 
 
 def write_sealed_file(path: Path, kind: Kind, fill: Callable[[Any], None], *, part: Path) -> None:
-    """Write an HDF5 file under the name `part`, seal it, make it durable, and give it its own name in one step.
+    """Write an HDF5 file under the temporary name `part`, seal it, flush it to disk, and rename it in one step.
 
     Parameters
     ----------
     path, part
-        Its name, and the one it has while it is written; a file that was there under the second is overwritten.
+        Final name, and temporary name during writing. An existing file with the temporary name is overwritten.
     kind
-        What the seal says.
+        Kind of file, for the seal.
     fill
         Writes the content into the open `h5py.File`.
 
     Raises
     ------
     OSError
-        If the disk does not take it; a file that was there is unchanged.
+        If the disk cannot take the file. An existing file at `path` is then unchanged.
     """
     import h5py
 
@@ -147,10 +147,10 @@ def write_sealed_file(path: Path, kind: Kind, fill: Callable[[Any], None], *, pa
 
 
 class Manifest:
-    """Writes attributes and datasets into a file, and at the end the digest over all of them.
+    """Writes attributes and datasets into a file, and finally the digest over all of them.
 
-    The digest, an attribute of the root, is the sha256 over paths, types, shapes and sha256 of all contents: it does
-    not depend on how HDF5 lays them out, so it survives repacking and tells whether two files say the same.
+    The digest, a root attribute, is the sha256 over the paths, types, shapes and sha256 of all contents. It does not
+    depend on the layout of HDF5. It therefore survives repacking, and equal digests mean equal contents.
     """
 
     def __init__(self, file: Any) -> None:
@@ -158,7 +158,7 @@ class Manifest:
         self.lines: list[str] = []
 
     def attributes(self, path: str, values: Mapping[str, Attribute]) -> None:
-        """Write the attributes of a group, which is made where it is missing."""
+        """Write the attributes of a group, which is created if it does not exist."""
         item = self.file.require_group(path)
         self.lines += [put_attribute(item, path, name, value) for name, value in values.items()]
 
@@ -173,12 +173,12 @@ class Manifest:
     def rows(
         self, path: str, shape: tuple[int, ...], parts: Iterable[Any], attributes: Mapping[str, Attribute]
     ) -> None:
-        """Write a float64 dataset of that shape from parts of its rows, which are not held together.
+        """Write a float64 dataset of that shape from successive blocks of its rows, without holding them all.
 
         Raises
         ------
         ValueError
-            If the parts do not fill it.
+            If the blocks do not fill the dataset.
         """
         item = self.file.create_dataset(path, shape=shape, dtype="<f8", track_times=False)
         digest, first = hashlib.sha256(), 0
@@ -200,10 +200,10 @@ class Manifest:
 
 
 def filters_for(stored: Any) -> dict[str, Any]:
-    """Return how a dataset is stored: as it is, or, where that is much less, in chunks by shuffle and deflate.
+    """Return the HDF5 filters of a dataset: none, or chunks with shuffle and deflate if these save much space.
 
-    Both belong to every HDF5. Of large arrays of numbers a few places are tried; diagonal matrices, and blocks of
-    zeros, come out a hundredth of their size.
+    Both filters belong to every HDF5 installation. Large arrays are compressed on trial at a few places. Diagonal
+    matrices and blocks of zeros shrink to a hundredth of their size.
     """
     if stored.dtype.kind not in "fi" or stored.nbytes < LARGE:
         return {}
@@ -218,7 +218,7 @@ def filters_for(stored: Any) -> dict[str, Any]:
 
 
 def chunk_of(shape: tuple[int, ...], itemsize: int) -> tuple[int, ...]:
-    """Return the largest part of an array in C order that is about `LARGE` bytes: ones, then a few rows, then all."""
+    """Return the largest chunk of about `LARGE` bytes of an array in C order: 1, ..., 1, a few rows, then full axes."""
     chunk, room = list(shape), max(1, LARGE // itemsize)
     for axis in range(len(shape)):
         inner = int(np.prod(shape[axis + 1 :]))
@@ -229,13 +229,13 @@ def chunk_of(shape: tuple[int, ...], itemsize: int) -> tuple[int, ...]:
 def described(path: str, values: Any) -> tuple[Any, Any, str, str]:
     """Return the values as stored, their HDF5 type, their sha256, and their line of the manifest.
 
-    The line is path, kind, shape and sha256 with tabs between; the sha256 is that of the little-endian values in C
-    order, or of the UTF-8 bytes of each string followed by a zero byte.
+    The line holds path, type, shape and sha256, separated by tabs. The sha256 covers the little-endian values in C
+    order, or the UTF-8 bytes of each string followed by a zero byte.
 
     Raises
     ------
     ValueError
-        If a text holds a zero byte, or what UTF-8 cannot hold.
+        If a text contains a zero byte, or characters that UTF-8 cannot encode.
     """
     import h5py
 
@@ -281,12 +281,12 @@ def digest_of_lines(lines: list[str]) -> str:
 
 @contextmanager
 def opened(path: Path, kind: Kind, *, has_seal: bool) -> Iterator[Any]:
-    """Open the HDF5 part of a file whose seal was looked at, and tell every fault of it as one of the file.
+    """Open the HDF5 part of a file whose seal was checked, and report every fault in it as a fault of the file.
 
     Raises
     ------
     Exception
-        The error of the kind, if it is no HDF5 file, lost its seal, or cannot be read.
+        The error of the kind, if the file is not HDF5, has lost its seal, or cannot be read.
     """
     import h5py
 
@@ -297,7 +297,8 @@ def opened(path: Path, kind: Kind, *, has_seal: bool) -> Iterator[Any]:
         )
     try:
         with h5py.File(path, "r") as file:
-            if file.userblock_size and not has_seal:  # only a repacked file may lack one, and then has no block
+            # only a repacked file may lack a seal, and then it has no user block
+            if file.userblock_size and not has_seal:
                 raise altered(path, kind, "its seal is damaged")
             yield file
     except kind.error:
@@ -307,12 +308,12 @@ def opened(path: Path, kind: Kind, *, has_seal: bool) -> Iterator[Any]:
 
 
 def own_items(file: Any, path: Path, kind: Kind) -> dict[str, Any]:
-    """Return the groups and datasets of a file by their paths, all of which lie in the file itself.
+    """Return the groups and datasets of a file by path, after a check that all of them lie in the file itself.
 
     Raises
     ------
     Exception
-        The error of the kind, if there is a link to elsewhere, an object of another sort, a virtual or external
+        The error of the kind, if there is a link to another file, an object of another type, a virtual or external
         dataset, or a shape that the bytes of the file cannot fill.
     """
     import h5py
@@ -340,7 +341,7 @@ def own_items(file: Any, path: Path, kind: Kind) -> dict[str, Any]:
 
 
 def require_stored(item: Any, where: str, path: Path, kind: Kind) -> None:
-    """Raise unless the values of a dataset are in the file, before memory is taken for them."""
+    """Raise the error of the kind unless the file holds the values of a dataset; no memory is allocated before."""
     import h5py
 
     plan = item.id.get_create_plist()
@@ -356,7 +357,7 @@ def require_stored(item: Any, where: str, path: Path, kind: Kind) -> None:
 
 
 def require_digest(items: Mapping[str, Any], path: Path, kind: Kind) -> None:
-    """Raise unless all attributes and datasets are those that were written; values are read a part at a time."""
+    """Raise the error of the kind unless attributes and datasets match the digest; values are read in blocks."""
     import h5py
 
     lines = []
@@ -379,7 +380,7 @@ def require_digest(items: Mapping[str, Any], path: Path, kind: Kind) -> None:
 
 
 def sha256_of(item: Any) -> str:
-    """Return the sha256 of the numbers of a dataset, which is read a part at a time."""
+    """Return the sha256 of the numbers of a dataset, which is read in blocks."""
     digest = hashlib.sha256()
     kind = "<i8" if item.dtype.kind in "iu" else "<f8"
     if not item.shape:
@@ -392,7 +393,7 @@ def sha256_of(item: Any) -> str:
 
 
 def as_attribute(value: Any) -> Any:
-    """Return an attribute as str, int or float; None stays None, anything else is left as it is."""
+    """Return an attribute as str, int or float; None and values of other types are returned unchanged."""
     if isinstance(value, bytes):
         return value.decode("utf-8")
     return value.item() if isinstance(value, np.generic) else value

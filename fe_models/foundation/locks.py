@@ -1,4 +1,4 @@
-"""A lock that ends with the process that holds it, however it ends."""
+"""A file lock that ends with the process that holds it, however the process ends."""
 
 import logging
 import os
@@ -14,25 +14,25 @@ log = logging.getLogger(__name__)
 
 
 class LockedError(ReportedError, OSError):
-    """Another process (or another call in this one) holds the lock; its text says which."""
+    """Another process, or another call in this process, holds the lock; the message names it."""
 
 
 class FileLock:
-    """The lock of a file: at most one holder at a time, on this machine and where the file system locks over a network.
+    """Lock of a file with at most one holder, on this machine and on network file systems that support locks.
 
-    The system gives it back when the process ends, even by SIGKILL, so that a file left behind locks nothing.
+    The operating system releases it when the process ends, even by SIGKILL, so a file left behind locks nothing.
 
     Parameters
     ----------
     path
-        The file, which is made where it is missing; it tells who holds the lock. Its folder must be there.
+        The lock file, which is created if missing and names the holder. Its folder must exist.
 
     Raises
     ------
     LockedError
-        If another one holds it.
+        If another process or call holds the lock.
     OSError
-        If the file cannot be made.
+        If the file cannot be created.
     """
 
     def __init__(self, path: Path) -> None:
@@ -46,35 +46,37 @@ class FileLock:
                 holder = os.read(descriptor, 200).decode("utf-8", "replace").strip()
                 os.close(descriptor)
                 raise LockedError(holder or "another process") from None
-            except OSError as error:  # a file system without locks
-                log.warning("%s: cannot be locked (%s); see that no second run writes there", path, error.strerror)
+            except OSError as error:  # the file system does not support locks
+                log.warning("%s: cannot be locked (%s); ensure that no second run writes there", path, error.strerror)
             self.descriptor = descriptor
-            if not self.is_held():  # the holder before removed it while we waited: that was its lock, not ours
+            # the previous holder removed the file while we waited, so we locked a file that no longer exists
+            if not self.is_held():
                 self.release()
         os.ftruncate(self.descriptor, 0)
         words = f"process {os.getpid()} on {socket.gethostname()} since {time.strftime('%Y-%m-%d %H:%M:%S')}\n"
         os.write(self.descriptor, words.encode())
 
     def is_held(self) -> bool:
-        """Whether the lock is ours and its file is still the one of that name."""
+        """Whether we hold the lock, and its file still has this name."""
         try:
             return self.descriptor >= 0 and os.path.samestat(os.fstat(self.descriptor), os.stat(self.path))
         except FileNotFoundError:
             return False
 
     def release(self) -> None:
-        """Give the lock back; the file stays."""
+        """Release the lock; the file stays."""
         if self.descriptor >= 0:
             os.close(self.descriptor)
             self.descriptor = -1
 
 
 def lock(descriptor: int) -> None:
-    """Take the lock of an open file, or raise `BlockingIOError` at once."""
+    """Lock an open file, or raise `BlockingIOError` immediately."""
     if os.name == "posix":
         import fcntl
 
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)  # of the open file: two calls in a process exclude, too
+        # flock belongs to the open file, so two calls in one process exclude each other too
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         return
     import msvcrt
 

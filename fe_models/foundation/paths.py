@@ -1,4 +1,4 @@
-"""Paths: words about a missing file, and files that are replaced whole or not at all; devices and pipes never are."""
+"""Paths: hints about missing files, and atomic replacement of files, but never of devices and pipes."""
 
 import os
 import re
@@ -21,7 +21,7 @@ STANDARD = {"/dev/stdout": 1, "/dev/stderr": 2}
 
 
 def near_file(path: Path) -> str:
-    """Return the tail of a message about a missing file: the name in its folder that was probably meant."""
+    """Return the end of a message about a missing file: the most similar name in its folder."""
     if not path.parent.is_dir():
         return f"; the folder {path.parent} does not exist"
     hint = nearest(path.name, [p.name for p in path.parent.iterdir()])
@@ -29,25 +29,25 @@ def near_file(path: Path) -> str:
 
 
 def own_descriptor(path: Path) -> int | None:
-    """Return the open file of this process that a path such as /dev/stdout means, None if it means another file."""
+    """Return the open file descriptor to which a path such as /dev/stdout refers; None for an ordinary path."""
     text = os.path.abspath(path)
     found = OWN_DESCRIPTOR.fullmatch(text)
     return int(found[1]) if found else STANDARD.get(text)
 
 
 def is_stream(path: Path) -> bool:
-    """Whether a path is written to as it stands, and never replaced: a device, a pipe, a socket, /dev/stdout."""
+    """Whether a path is written directly and never replaced: a device, a pipe, a socket, /dev/stdout."""
     if own_descriptor(path) is not None:
         return True
     try:
-        mode = path.stat().st_mode  # through links
+        mode = path.stat().st_mode  # follows links
     except OSError:
         return False
     return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
 
 
 def file_identity(path: Path) -> tuple[int, int] | Path:
-    """Return what all paths of one file have in common, through links too, also where it is not there yet."""
+    """Return an identifier that all paths to one file share, also through links, even if it does not exist yet."""
     try:
         found = path.stat()
     except OSError:
@@ -56,43 +56,43 @@ def file_identity(path: Path) -> tuple[int, int] | Path:
 
 
 def same_file(path: Path, other: Path) -> bool:
-    """Whether two paths are one file, through links too, or would be one if they were there."""
+    """Whether two paths refer to the same file, also through links, or would do so if it existed."""
     return file_identity(path) == file_identity(other)
 
 
 def replace_file(path: Path, *parts: bytes | memoryview) -> None:
-    """Write the parts beside `path`, make them durable, and give them its name in one step.
+    """Write the parts to a temporary file beside `path`, flush it to disk, and rename it in one step.
 
-    A device or a pipe gets the bytes instead, and stays what it is.
+    A device or a pipe receives the bytes directly.
 
     Raises
     ------
     OSError
-        If that fails; a file that was there is unchanged, and nothing is left beside it.
+        If writing fails. An existing file is then unchanged, and no temporary file is left.
     """
     if is_stream(path):
         write_stream(path, *parts)
         return
-    path = path.resolve()  # through a link, so that the link stays one
+    path = path.resolve()  # resolve a link, so that it remains a link
     part = part_of(path)
     try:
         write_part(part, *parts)
         os.replace(part, path)
-    except BaseException:  # also an interrupt: the half-written file goes, the old one stays
+    except BaseException:  # also on an interrupt: remove the half-written file and keep the old one
         part.unlink(missing_ok=True)
         raise
     sync_folder(path.parent)
 
 
 def replace_files(contents: Mapping[Path, bytes]) -> None:
-    """Write files that belong together: all are complete and durable beside their names before the first gets its name.
+    """Write files that belong together: all are complete on disk under temporary names before the first is renamed.
 
-    A device or a pipe gets its bytes after the files have their names.
+    A device or a pipe receives its bytes after the files have been renamed.
 
     Raises
     ------
     OSError
-        If one cannot be written; then none is changed, and nothing is left beside them.
+        If a file cannot be written. No file is then changed, and no temporary file is left.
     """
     files = {path.resolve(): data for path, data in contents.items() if not is_stream(path)}
     parts = {path: part_of(path) for path in files}
@@ -113,18 +113,18 @@ def replace_files(contents: Mapping[Path, bytes]) -> None:
 
 
 def part_of(path: Path) -> Path:
-    """Return the name beside a file under which its new content is written."""
+    """Return the temporary name under which new content of a file is written."""
     return path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
 
 
 def remove_parts(path: Path) -> None:
-    """Remove what processes that were killed while they wrote a file have left beside it."""
+    """Remove temporary files that killed processes have left."""
     for part in path.parent.glob(f".{escape(path.name)}.????????.part"):
         part.unlink(missing_ok=True)
 
 
 def write_part(part: Path, *parts: bytes | memoryview) -> None:
-    """Write a new file and make it durable."""
+    """Write a new file and flush it to disk."""
     descriptor = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
     with open(descriptor, "wb") as file:
         for data in parts:
@@ -134,7 +134,7 @@ def write_part(part: Path, *parts: bytes | memoryview) -> None:
 
 
 def write_stream(path: Path, *parts: bytes | memoryview) -> None:
-    """Write the parts to a device or a pipe, or after what was written to standard output before."""
+    """Write the parts to a device or a pipe; for standard output, after earlier output."""
     own = own_descriptor(path)
     for stream in (sys.stdout, sys.stderr):
         stream.flush()
@@ -145,7 +145,7 @@ def write_stream(path: Path, *parts: bytes | memoryview) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Make the new name durable where the system can (not on Windows)."""
+    """Flush the directory entry of a new file to disk where the system supports it (not on Windows)."""
     if os.name == "posix":
         descriptor = os.open(folder, os.O_RDONLY)
         try:

@@ -1,7 +1,8 @@
-"""The seal of a file: 512 bytes of text before its HDF5 part that tell every change of a byte behind them.
+"""The seal of a file: 512 bytes of text before its HDF5 part, which reveal every change of a later byte.
 
-HDF5 readers skip these bytes (its "user block"). They hold the length of the file and the sha256 of all that follows,
-which are compared before HDF5 touches the file: HDF5 may hang, crash or take all memory on damaged structures.
+HDF5 readers skip these bytes (the "user block"). They hold the length of the file and the sha256 of all bytes that
+follow. Both are compared before HDF5 opens the file, because HDF5 may hang, crash or use all memory on damaged
+structures.
 """
 
 import hashlib
@@ -14,22 +15,22 @@ from fe_models.foundation.paths import near_file
 
 __all__ = ["SEAL_SIZE", "Kind", "altered", "check_seal", "newer", "reason", "seal_of", "truncated"]
 
-SEAL_SIZE = 512  #: bytes of the seal; the smallest user block that HDF5 knows
-BLOCK = 1 << 20  #: bytes that are hashed at once
+SEAL_SIZE = 512  #: bytes of the seal; the smallest user block of HDF5
+BLOCK = 1 << 20  #: number of bytes that are hashed at a time
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of sealed file, and how its faults are told."""
+    """A kind of sealed file, and the error that reports its faults."""
 
-    format: str  #: its name in the seal and in messages, one word
-    version: int  #: of the format; a reader refuses greater ones
-    error: type[Exception]  #: what is raised; its text is meant for the user
-    writer: str  #: what writes such files, in words
+    format: str  #: name of the format in the seal and in messages, one word
+    version: int  #: version of the format; a reader rejects later versions
+    error: type[Exception]  #: error class; its text is written for the user
+    writer: str  #: command or function that writes such files, for messages
 
 
 def seal_of(file: IO[bytes], kind: Kind) -> bytes:
-    """Return the seal of an open file that has 512 bytes of room before its HDF5 part."""
+    """Return the seal of an open file that has 512 free bytes before its HDF5 part."""
     file.seek(SEAL_SIZE)
     digest, n_bytes = hashlib.sha256(), SEAL_SIZE
     while block := file.read(BLOCK):
@@ -39,7 +40,7 @@ def seal_of(file: IO[bytes], kind: Kind) -> bytes:
 
 
 def seal_text(format: str, version: int, n_bytes: int, sha256: str) -> bytes:
-    """Return the seal, 512 bytes of ASCII: four lines, filled up with spaces."""
+    """Return the seal: four lines of ASCII, padded with spaces to 512 bytes."""
     text = (
         f"floatframe {format} {version}\n"
         f"bytes {n_bytes}\n"
@@ -50,15 +51,15 @@ def seal_text(format: str, version: int, n_bytes: int, sha256: str) -> bytes:
 
 
 def check_seal(path: Path, kind: Kind) -> bool:
-    """Compare the seal with the file and raise if it is broken; return False if there is none that could be broken.
+    """Compare the file with its seal, and raise an error if they differ; return False if the file has no seal.
 
     Raises
     ------
     Exception
-        The error of the kind, if the file is missing, of a newer version, truncated or altered.
+        The error of the kind, if the file is missing, of a later version, truncated or altered.
     """
     try:
-        if path.exists() and not path.is_file():  # a pipe would wait, a device may have no end
+        if path.exists() and not path.is_file():  # a pipe would block, and a device may have no end
             what = "a folder" if path.is_dir() else "a device or a pipe"
             raise kind.error(f"{path}: cannot be read: expected a {kind.format}, got {what}")
         with open(path, "rb") as file:
@@ -79,7 +80,7 @@ def check_seal(path: Path, kind: Kind) -> bool:
                 f"{path}: expected a {kind.format}, got a {other[1].decode()}; a {kind.format} is written by "
                 f"{kind.writer}"
             )
-        return False  # repacked, or with a damaged seal: the HDF5 part tells
+        return False  # a repacked file or a damaged seal; the check of the HDF5 part decides
     stated = re.match(rb"(\d{1,9})\nbytes (\d{1,18})\n", head[len(magic) :])
     if stated and int(stated[1]) > kind.version:
         raise newer(path, kind, int(stated[1]))
@@ -102,7 +103,7 @@ def truncated(path: Path, kind: Kind, expected: str, n_bytes: int) -> Exception:
 
 
 def altered(path: Path, kind: Kind, detail: str) -> Exception:
-    """Return the error of a file that is not as it was written."""
+    """Return the error of a file that was changed after it was written."""
     return kind.error(
         f"{path}: this {kind.format} was altered since it was written: {detail}; copy it again or write it again"
     )
@@ -117,6 +118,6 @@ def newer(path: Path, kind: Kind, got: int) -> Exception:
 
 
 def reason(error: BaseException) -> str:
-    """Return the first line of an error's own words."""
+    """Return the first line of the text of an error."""
     text = str(getattr(error, "strerror", None) or error or type(error).__name__)
     return text.splitlines()[0][:200]

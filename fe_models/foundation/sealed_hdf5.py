@@ -1,7 +1,7 @@
-"""HDF5 files that show every change of a byte and never exist half written.
+"""HDF5 files that reveal every change of a byte and never exist half written.
 
-Two checks stand one behind the other: the seal (seal.py), compared before HDF5 touches the file, and the digest
-over all contents (hdf5_file.py), which survives repacking and tells whether two files say the same.
+There are two checks: the seal (seal.py), compared before HDF5 opens the file, and the digest over all contents
+(hdf5_file.py), which survives repacking and shows whether two files have equal contents.
 """
 
 import io
@@ -32,12 +32,12 @@ from fe_models.foundation.tall.on_disk import release
 
 __all__ = ["Attribute", "Content", "Dataset", "read_sealed", "write_sealed"]
 
-LARGE = 1 << 26  #: bytes of numbers from which a file is not made in memory first
+LARGE = 1 << 26  #: bytes of numbers above which the file is written directly, not first in memory
 
 
 @dataclass(frozen=True, eq=False)
 class Dataset:
-    """An array with the unit and the words that describe it in the file."""
+    """An array with its unit and description in the file."""
 
     values: Any  #: float64 or int64 array, or a tuple of strings
     unit: str = "1"
@@ -46,7 +46,7 @@ class Dataset:
 
 @dataclass(frozen=True, eq=False)
 class Content:
-    """What a file says: datasets by path, and attributes by path of their group and name."""
+    """Content of a file: datasets by path, and attributes by name for each group path."""
 
     format: str
     version: int
@@ -55,25 +55,25 @@ class Content:
 
 
 def write_sealed(content: Content, path: str | os.PathLike[str]) -> None:
-    """Write the content to a temporary name in the same folder, make it durable, and move it into place.
+    """Write the content to a temporary file in the same folder, flush it to disk, and rename it.
 
     Raises
     ------
     ModalFileError
-        If the file cannot be written (no folder, no permission, disk full); an old file of that name is unchanged.
+        If the file cannot be written (no folder, no permission, disk full). An existing file is unchanged.
     """
     path = Path(path)
     kind = Kind(content.format, content.version, ModalFileError, "")
     try:
-        if size_of(content) >= LARGE and not is_stream(path):  # a large image would be memory for nothing
-            whole = path.resolve()  # through a link, so that the link stays one
+        if size_of(content) >= LARGE and not is_stream(path):  # a large image in memory would be wasteful
+            whole = path.resolve()  # resolve a link, so that it remains a link
             write_sealed_file(whole, kind, lambda file: fill(file, content), part=part_of(whole))
             return
         image = hdf5_image(content)
         seal = seal_of(image, kind)
         with image.getbuffer() as data:
             replace_file(path, seal, data[SEAL_SIZE:])
-    except ValueError as error:  # a text that no file can hold
+    except ValueError as error:  # a text that cannot be stored
         raise ModalFileError(str(error)) from error
     except OSError as error:
         old = "; the file that was there is unchanged" if path.is_file() else "; nothing was written"
@@ -81,12 +81,12 @@ def write_sealed(content: Content, path: str | os.PathLike[str]) -> None:
 
 
 def read_sealed(path: str | os.PathLike[str], kind: Kind) -> Content:
-    """Read a file of this kind, up to its version, after checking its seal and its digest.
+    """Read a file of this kind, up to its version, after checks of its seal and its digest.
 
     Raises
     ------
     Exception
-        The error of the kind, if the file is missing, of another kind, of a newer version, truncated or altered.
+        The error of the kind, if the file is missing, of another kind, of a later version, truncated or altered.
     """
     path = Path(path)
     with opened(path, kind, has_seal=check_seal(path, kind)) as file:
@@ -101,7 +101,7 @@ def read_sealed(path: str | os.PathLike[str], kind: Kind) -> Content:
 
 
 def hdf5_image(content: Content) -> io.BytesIO:
-    """Return the HDF5 file in memory, with room for the seal: the 1.8 layout is read by every tool."""
+    """Return the HDF5 file in memory, with space for the seal. Its 1.8 layout is readable by every tool."""
     import h5py
 
     image = io.BytesIO()
@@ -111,7 +111,7 @@ def hdf5_image(content: Content) -> io.BytesIO:
 
 
 def fill(file: Any, content: Content) -> None:
-    """Write the content into an open `h5py.File`; what lies on disk is given back after it was read."""
+    """Write the content into an open `h5py.File`; memory of arrays on disk is released after use."""
     attributes = {name: dict(group) for name, group in content.attributes.items()}
     attributes["/"] = {"format": content.format, "version": content.version, **attributes.get("/", {})}
     manifest = Manifest(file)
@@ -124,12 +124,12 @@ def fill(file: Any, content: Content) -> None:
 
 
 def size_of(content: Content) -> int:
-    """Return the size of the numbers of a content [bytes]."""
+    """Return the size of all numbers of the content [bytes]."""
     return sum(each.values.nbytes for each in content.datasets.values() if isinstance(each.values, np.ndarray))
 
 
 def walk(file: Any, path: Path, kind: Kind) -> tuple[dict[str, Dataset], dict[str, dict[str, Attribute]]]:
-    """Return all datasets and all attributes of groups; raise if one of them is not as it was written."""
+    """Return all datasets and all group attributes; raise the error of the kind if one differs from its digest."""
     import h5py
 
     datasets, groups, lines = {}, {}, []
@@ -158,7 +158,7 @@ def walk(file: Any, path: Path, kind: Kind) -> tuple[dict[str, Dataset], dict[st
 
 
 def as_values(value: Any) -> Any:
-    """Return a dataset as float64 or int64 array or as a tuple of strings."""
+    """Return a dataset as a float64 or int64 array, or as a tuple of strings."""
     array = np.asarray(value)
     if array.dtype.kind in "SO":
         return tuple(word.decode("utf-8") if isinstance(word, bytes) else str(word) for word in array.ravel())

@@ -1,7 +1,7 @@
-"""What a solver of large sparse symmetric systems is: it factorises a matrix once and solves for many columns.
+"""Protocol of a solver for large sparse symmetric systems: factorise once, then solve for many columns.
 
-Packages above keep the solvers by name (`cms.solvers.registry`); whatever factorises asks for a `Solver` and holds
-a `Factor`.
+Higher packages keep the solvers by name (`cms.solvers.registry`). Code that factorises takes a `Solver` and keeps a
+`Factor`.
 """
 
 from collections.abc import Callable
@@ -17,7 +17,7 @@ __all__ = ["Factor", "MakeFactor", "MakeSpreadFactor", "Solver"]
 
 
 class Factor(Protocol):
-    """The factor of a symmetric matrix, in the solver's own memory until `close`."""
+    """The factor of a symmetric matrix, in the solver's own memory until `close` is called."""
 
     is_open: bool
 
@@ -27,33 +27,33 @@ class Factor(Protocol):
 
     @property
     def n_negative(self) -> int:
-        """Negative pivots, 0 of a positive definite matrix; -1: the solver cannot tell."""
+        """Number of negative pivots, 0 for a positive definite matrix; -1 if the solver does not report it."""
 
     @property
     def n_perturbed(self) -> int:
-        """Pivots within rounding of zero, which the solver raised."""
+        """Number of pivots that were zero to rounding and that the solver perturbed."""
 
     @property
     def n_positive(self) -> int:
-        """Positive pivots; -1: the solver cannot tell."""
+        """Number of positive pivots; -1 if the solver does not report it."""
 
     @property
     def n_factor_entries(self) -> int:
-        """Stored entries of the factor; 8 bytes each."""
+        """Number of stored entries of the factor, 8 bytes each."""
 
     @property
     def description(self) -> str:
-        """Solver, its version and settings, in words for the provenance."""
+        """Solver, its version and settings, for the provenance."""
 
     def solve(self, b: Array) -> Array:
-        """Return A⁻¹ b for b (n, k), any order; that of the result is the solver's."""
+        """Return A⁻¹ b for b, (n, k), in any memory order; the solver chooses the memory order of the result."""
 
     def close(self) -> None:
-        """Free the factor; a second time does nothing."""
+        """Free the factor; further calls do nothing."""
 
 
 class MakeFactor(Protocol):
-    """Factorises a matrix; raises the factorisation error of its package where that fails."""
+    """Function that factorises a matrix; it raises the factorisation error of its package if that fails."""
 
     def __call__(self, lower: sp.csc_array, *, definite: bool) -> Factor:
         """Return the factor of the symmetric matrix with this lower triangle.
@@ -61,31 +61,31 @@ class MakeFactor(Protocol):
         Parameters
         ----------
         lower
-            Lower triangle, (n, n), every diagonal entry stored, sorted row indices; it is the solver's, which may empty
-            it.
+            Lower triangle, (n, n), with every diagonal entry stored and sorted row indices. The solver owns it and may
+            empty it.
         definite
-            Whether the matrix must be positive definite; False: any symmetric regular one.
+            Whether the matrix must be positive definite; False: any regular symmetric matrix.
         """
 
 
 class MakeSpreadFactor(Protocol):
-    """Factorises a matrix whose rows lie on many ranks."""
+    """Function that factorises a distributed matrix."""
 
     def __call__(self, lower: SpreadBlock, *, definite: bool) -> Factor:
-        """Return the factor, rows of columns in solution on the ranks that have those of the block.
+        """Return the factor. Right-hand sides and solutions are distributed like the rows of the block.
 
         Parameters
         ----------
         lower, definite
-            As of `MakeFactor`; of the block each rank takes its rows from the diagonal on.
+            As for `MakeFactor`; each rank takes its rows of the upper triangle from the block.
         """
 
 
 @dataclass(frozen=True)
 class Solver:
-    """A way to factorise, by the name that users choose it by."""
+    """A factorisation method under the name by which users choose it."""
 
     name: str
     factor: MakeFactor
-    missing: Callable[[], str] = lambda: ""  #: "" where it can be used, else what is missing and what to install
-    spread: MakeSpreadFactor | None = None  #: None: it takes matrices of one process
+    missing: Callable[[], str] = lambda: ""  #: "" if the solver can be used, else what is missing and what to install
+    spread: MakeSpreadFactor | None = None  #: None: the solver only accepts matrices of a single process

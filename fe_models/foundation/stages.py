@@ -1,4 +1,4 @@
-"""The stages of long work: how far each is, and how many seconds each took."""
+"""Stages of a long computation: progress of each stage, and its duration in seconds."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -9,7 +9,7 @@ __all__ = ["Stages"]
 
 
 class Stages:
-    """The stages of a job: a bar for the one that runs, seconds for those that are done."""
+    """The stages of a job: a progress bar for the current stage, and durations of finished stages [s]."""
 
     def __init__(self, show: Any = None) -> None:
         self.seconds: dict[str, float] = {}
@@ -17,7 +17,7 @@ class Stages:
 
     @contextmanager
     def __call__(self, name: str) -> Iterator[Callable[[float], None]]:
-        """Run a stage; the value is a function that takes the finished fraction, 0 to 1."""
+        """Run a stage; yields a function that receives the finished fraction, 0 to 1."""
         begin = time.perf_counter()
         task = self._show.add_task(name, total=None) if self._show is not None else None
 

@@ -1,4 +1,4 @@
-"""Threads: how many, and keeping the pools of two libraries out of each other's way."""
+"""Number of threads, and separation of the thread pools of two libraries."""
 
 import os
 from collections.abc import Iterator
@@ -7,10 +7,11 @@ from typing import Any
 
 __all__ = ["bounded_threads", "n_processors", "n_threads", "one_blas_thread", "thread_environment"]
 
-MOST_THREADS = 16  #: each holds a workspace over all nodes, and memory traffic limits them well before
+#: each thread has a workspace over all nodes, and memory bandwidth limits the speed at fewer threads already
+MOST_THREADS = 16
 LIBRARIES = ("OMP", "MKL", "OPENBLAS", "NUMBA")
 
-bound: int | None = None  #: of this process, set by `bounded_threads`
+bound: int | None = None  #: limit of this process, set by `bounded_threads`
 
 
 def n_processors() -> int:
@@ -19,18 +20,18 @@ def n_processors() -> int:
 
 
 def n_threads() -> int:
-    """Return the number of threads for one piece of work: of processors, at most `MOST_THREADS`, or as bounded."""
+    """Return the number of threads for one task: of processors, limited by `MOST_THREADS` and the set bound."""
     return min(n_processors(), MOST_THREADS, bound or MOST_THREADS)
 
 
 def thread_environment(n: int) -> dict[str, str]:
-    """Return the variables that hold the libraries of a process to n threads, if they are set before it begins."""
+    """Return the environment variables that limit the libraries of a new process to n threads."""
     return {f"{name}_NUM_THREADS": str(n) for name in LIBRARIES}
 
 
 @contextmanager
 def bounded_threads(n: int | None) -> Iterator[None]:
-    """Hold this process to n threads: ours, and those of the libraries loaded so far; None: leave them."""
+    """Limit this process to n threads, its own and those of the libraries loaded so far; None: no limit."""
     global bound
     before, bound = bound, n if n is not None else bound
     limits: Any = nullcontext()
@@ -47,9 +48,9 @@ def bounded_threads(n: int | None) -> Iterator[None]:
 
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
-    """Keep NumPy's own BLAS (OpenBLAS) to one thread while another library solves in turns with it.
+    """Limit NumPy's own BLAS (OpenBLAS) to one thread while another library solves in alternation with it.
 
-    Its threads wait for their next task on the processor for some 50 ms, which the solver then lacks: block solves of
+    Threads of OpenBLAS poll for the next task for about 50 ms and block the processors for the solver. Block solves of
     48 thousand dofs took 0.11 s instead of 0.05 s.
     """
     from threadpoolctl import ThreadpoolController

@@ -1,7 +1,7 @@
-"""TOML files at the border: read, checked against a pydantic model, every problem told at once in the user's words.
+"""TOML files: read and checked against a pydantic model; all problems are reported at once, in the user's terms.
 
-A model's field descriptions say what is expected ("a number above 0, Young's modulus"); a message is made of the key
-path, the value that was found and that description.
+The field descriptions of a model state what is expected ("a number above 0, Young's modulus"). A message consists of
+the key path, the value found, and that description.
 """
 
 import copy
@@ -24,19 +24,19 @@ __all__ = [
 
 
 class Table(BaseModel):
-    """A table of a TOML file: no unknown keys, no conversion of types, no NaN or infinity."""
+    """A table of a TOML file that rejects unknown keys, type conversions, NaN and infinity."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
 
 Model = TypeVar("Model", bound=Table)
-DEEPEST = 20  #: levels of tables and lists in a file
-GREATEST = 1e100  #: number in a file: products of three stay finite, and nothing physical is greater
-MOST_PROBLEMS = 20  #: told at once
+DEEPEST = 20  #: largest depth of nested tables and lists in a file
+GREATEST = 1e100  #: largest number in a file: products of three stay finite, and no physical quantity is larger
+MOST_PROBLEMS = 20  #: largest number of problems in one message
 
 
 def read_toml(path: Path, error: type[Exception]) -> dict[str, Any]:
-    """Return the content of a TOML file; raise `error` with the place and the reason if it is none."""
+    """Return the content of a TOML file; raise `error` with the position and the reason if it is not valid TOML."""
     if is_stream(path):
         raise error(f"{path}: expected a file, got a device or a pipe")
     try:
@@ -51,7 +51,7 @@ def read_toml(path: Path, error: type[Exception]) -> dict[str, Any]:
         ) from None
     except RecursionError:
         raise too_deep(path, error) from None
-    except ValueError as problem:  # a TOMLDecodeError, or a whole number of thousands of digits
+    except ValueError as problem:  # a TOMLDecodeError, or an integer with thousands of digits
         words = f"{problem}" if isinstance(problem, tomllib.TOMLDecodeError) else "a number has too many digits"
         raise error(f"{path}: not valid TOML: {shortened(words, 200)}") from None
     require_usable(content, path, error)
@@ -59,12 +59,12 @@ def read_toml(path: Path, error: type[Exception]) -> dict[str, Any]:
 
 
 def too_deep(path: Path, error: type[Exception]) -> Exception:
-    """Return the error of a file that is nested beyond all measure."""
+    """Return the error of a file with too deeply nested tables or lists."""
     return error(f"{path}: tables and lists are nested too deeply; expected up to {DEEPEST} levels")
 
 
 def require_usable(content: Any, path: Path, error: type[Exception]) -> None:
-    """Raise `error` if a number is too great to be reckoned with, or tables and lists are nested too deeply."""
+    """Raise `error` if a number is too large, or tables and lists are nested too deeply."""
     level: list[tuple[tuple[str | int, ...], Any]] = [((), content)]
     for _ in range(DEEPEST):
         inner: list[tuple[tuple[str | int, ...], Any]] = []
@@ -83,7 +83,7 @@ def require_usable(content: Any, path: Path, error: type[Exception]) -> None:
 def validated(
     model: type[Model], data: Mapping[str, Any], path: Path, error: type[Exception], context: Any = None
 ) -> Model:
-    """Return the checked model; raise `error` with every problem on a line of its own."""
+    """Return the validated model; raise `error` that lists every problem on a line of its own."""
     try:
         return model.model_validate(data, context=context)
     except ValidationError as problem:
@@ -97,7 +97,7 @@ def validated(
 
 
 def files_named(value: Any) -> tuple[Path, ...]:
-    """Return all files that a checked model names, at whatever depth."""
+    """Return all files that a validated model names, at any depth."""
     if isinstance(value, Path):
         return (value,)
     if isinstance(value, BaseModel):
@@ -126,7 +126,7 @@ def describe(model: type[BaseModel], detail: ErrorDetails) -> str:
 
 
 def key_path(location: Sequence[str | int]) -> str:
-    """Return the location as TOML writes it: materials.steel.young."""
+    """Return the location in TOML notation: materials.steel.young."""
     return ".".join(
         shortened(str(part)) if str(part).replace("_", "").replace("-", "").isalnum() else f'"{shortened(str(part))}"'
         for part in location
@@ -152,13 +152,13 @@ def shown(value: Any) -> str:
     """Return a value as the user wrote it, shortened."""
     if isinstance(value, bool):
         return "true" if value else "false"
-    if isinstance(value, int) and abs(value) > GREATEST:  # Python does not write whole numbers of thousands of digits
+    if isinstance(value, int) and abs(value) > GREATEST:  # Python does not print integers with thousands of digits
         return "a whole number of more than 100 digits"
     return shortened(f'"{value}"' if isinstance(value, str) else str(value), 60)
 
 
 def choice(what: str, choices: Callable[[], Sequence[str]]) -> Any:
-    """Return the type of a string that must be one of the choices; the message has the nearest one."""
+    """Return the type of a string that must be one of the choices; the message suggests the nearest choice."""
 
     def check(value: Any) -> Any:
         names = choices()
@@ -170,7 +170,7 @@ def choice(what: str, choices: Callable[[], Sequence[str]]) -> Any:
 
 
 def numbers(value: Any, count: int = 3) -> tuple[float, ...]:
-    """Return so many finite numbers as floats."""
+    """Return `count` finite numbers as floats."""
     if not isinstance(value, list | tuple) or len(value) != count or any(is_no_number(x) for x in value):
         raise ValueError({2: "expected two numbers, [from, to]", 3: "expected three numbers, [x, y, z]"}[count])
     return tuple(float(x) for x in value)
@@ -185,10 +185,10 @@ def interval(value: Any) -> tuple[float, ...]:
 
 
 def is_no_number(value: Any) -> bool:
-    """Whether a TOML value is anything but a number that is finite as a float."""
+    """Whether a TOML value is not a number, or not finite as a float."""
     try:
         return isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value)
-    except OverflowError:  # a whole number of hundreds of digits
+    except OverflowError:  # an integer with hundreds of digits
         return True
 
 
@@ -210,15 +210,15 @@ Matrix3 = Annotated[tuple[Vector3, Vector3, Vector3], BeforeValidator(rows)]
 def changed(
     content: Mapping[str, Any], changes: Mapping[str, Any], where: str, error: type[Exception]
 ) -> dict[str, Any]:
-    """Return the content of a file with other values at some key paths.
+    """Return the content of a file with changed values at some key paths.
 
-    The table that holds a key must be in the file; the key itself may be a new one. Names with dots are found, too:
-    the longest key that fits is taken.
+    The table that holds a key must be in the file; the key itself may be new. Keys that contain dots are found too: the
+    longest matching key is used.
 
     Raises
     ------
     error
-        If a table or an index on the way is not there.
+        If a table or an index of the path does not exist.
     """
     result = copy.deepcopy(dict(content))
     for path, value in changes.items():
@@ -228,7 +228,7 @@ def changed(
 
 
 def value_of(content: Mapping[str, Any], path: str, where: str, error: type[Exception]) -> Any:
-    """Return the value at a key path of the content of a file; `error` with the nearest name if there is none."""
+    """Return the value at a key path of a file's content; raise `error` with the nearest name if it does not exist."""
     holder, key = holder_of(dict(content), path, where, error)
     if isinstance(holder, dict) and key not in holder:
         raise error(f"{where}: the key path {path!r}: there is no {quoted(key)}{nearest(key, list(holder))}")
@@ -236,7 +236,7 @@ def value_of(content: Mapping[str, Any], path: str, where: str, error: type[Exce
 
 
 def holder_of(content: dict[str, Any], path: str, where: str, error: type[Exception]) -> tuple[Any, Any]:
-    """Return the table or list that holds the value at a key path, and its key, which may be new, or index."""
+    """Return the table or list that holds the value at a key path, and its key (which may be new) or index."""
     here: Any = content
     left = path
     while True:
@@ -258,7 +258,7 @@ def holder_of(content: dict[str, Any], path: str, where: str, error: type[Except
 
 
 def first_key(here: dict[str, Any] | list[Any], path: str) -> tuple[Any, str | None]:
-    """Return the key with which a path goes on and what is left; (None, path) if none fits, (None, None) at its end."""
+    """Return the first key of a path and the rest: (None, path) if no key fits, (None, None) at the end of the path."""
     if isinstance(here, list):
         key, _, rest = path.partition(".")
         if not rest:

@@ -1,4 +1,4 @@
-"""Coherent unit systems: numbers are stored as the model has them, the system is named beside them."""
+"""Coherent unit systems: numbers are stored in the units of the model, together with the name of the system."""
 
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -14,7 +14,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Units:
-    """A coherent unit system: force = mass * length / time², nothing is converted inside.
+    """A coherent unit system: force = mass * length / time². Nothing is converted internally.
 
     The factors give the SI value of one unit: a length of 1 in this system is `length` metres.
     """
@@ -30,7 +30,7 @@ class Units:
     stress_symbol: str
 
     def to_si(self, *, length: int = 0, mass: int = 0, time: int = 0) -> float:
-        """SI value of one unit with the given exponents, e.g. density: `to_si(mass=1, length=-3)`."""
+        """Return the SI value of one unit with the given exponents, e.g. density: `to_si(mass=1, length=-3)`."""
         return self.length**length * self.mass**mass * self.time**time
 
 
@@ -68,13 +68,13 @@ class Dimensions:
     time: float = 0.0
 
     def factor(self, old: Units, new: Units) -> float:
-        """Return what numbers in old units are multiplied by to be in new ones."""
+        """Return the factor that converts numbers from the old unit system to the new one."""
         ratio = (old.mass / new.mass) ** self.mass * (old.length / new.length) ** self.length
         return float(ratio * (old.time / new.time) ** self.time)
 
 
 def unit_text(units: Units, dimensions: Dimensions) -> str:
-    """Return a unit in ASCII, such as 't^(1/2) mm' or 's^-2'; '1' if there is none."""
+    """Return a unit in ASCII, such as 't^(1/2) mm' or 's^-2'; '1' if it is dimensionless."""
     parts = []
     for field in fields(dimensions):
         power, symbol = getattr(dimensions, field.name), getattr(units, f"{field.name}_symbol")
@@ -85,7 +85,7 @@ def unit_text(units: Units, dimensions: Dimensions) -> str:
 
 
 def unit_words(units: Units, dimensions: Dimensions) -> str:
-    """Return a unit by the names of force and stress where it is one, such as 'N mm' or 'MPa', else as `unit_text`."""
+    """Return a unit with the names of force and stress if it has such a name ('N mm', 'MPa'), else as `unit_text`."""
     if (dimensions.mass, dimensions.time) != (1.0, -2.0):
         return unit_text(units, dimensions)
     if dimensions.length == -1:
@@ -96,7 +96,7 @@ def unit_words(units: Units, dimensions: Dimensions) -> str:
 
 SI = unit_system("m-kg-s")
 LENGTH, TIME = Dimensions(length=1), Dimensions(time=1)
-SPEED, RATE = Dimensions(length=1, time=-1), Dimensions(time=-1)  #: of places, of angles
+SPEED, RATE = Dimensions(length=1, time=-1), Dimensions(time=-1)  #: rates of positions, and of angles
 
 
 class Quantity(float):
@@ -114,6 +114,6 @@ class Quantity(float):
         return Quantity, (float(self), self.dimensions)
 
     def in_units(self, units: Units, *, of_angle: bool = False) -> float:
-        """Return the number in the units of a system; of an angle, its length is one radian."""
+        """Return the number in the units of a system; for an angle, the dimension length means radian."""
         dimensions = replace(self.dimensions, length=0) if of_angle else self.dimensions
         return float(self) * dimensions.factor(SI, units)

@@ -1,4 +1,4 @@
-"""Words for messages: the choices there are, and the one that was probably meant."""
+"""Texts for messages: lists of choices, and the choice that was probably meant."""
 
 from collections.abc import Callable, Iterable
 from difflib import get_close_matches
@@ -8,16 +8,17 @@ from numpy.typing import NDArray
 
 __all__ = ["damage", "nearest", "node_list", "quoted", "shortened"]
 
-LONGEST = 80  #: characters of a name or value in a message
-MOST_CHOICES = 40  #: names in a message
+LONGEST = 80  #: largest number of characters of a name or value in a message
+MOST_CHOICES = 40  #: largest number of names in a message
 
 
 def nearest(name: str, choices: Iterable[str]) -> str:
-    """Return the tail of a message about an unknown name: '; did you mean X? Choices: A, B, C'."""
+    """Return the end of a message about an unknown name: '; did you mean X? Choices: A, B, C'."""
     names = sorted(str(choice) for choice in choices)
     if not names:
         return "; there are no choices"
-    short = [choice for choice in names if len(choice) <= 2 * LONGEST]  # comparing takes the square of the length
+    # the cost of a comparison grows with the square of the length
+    short = [choice for choice in names if len(choice) <= 2 * LONGEST]
     close = get_close_matches(str(name)[: 2 * LONGEST], short, n=1)
     hint = f"; did you mean {quoted(close[0])}?" if close else ";"
     shown = [shortened(choice) for choice in names[:MOST_CHOICES]]
@@ -26,26 +27,26 @@ def nearest(name: str, choices: Iterable[str]) -> str:
 
 
 def shortened(text: str, longest: int = LONGEST) -> str:
-    """Return a text, cut where it is longer than a line of a message should be."""
+    """Return a text, cut to the given number of characters."""
     return text if len(text) <= longest else f"{text[: longest - 3]}..."
 
 
 def node_list(nodes: Iterable[int], positions: NDArray[np.float64], called: Callable[[int], str] = str) -> str:
-    """Return 'node 3 at (0, 1, 2.5), node 7 at (…)' for a message; called: what the user calls a node."""
+    """Return 'node 3 at (0, 1, 2.5), node 7 at (…)' for a message; called: gives the user's name of a node."""
     return ", ".join(f"node {called(n)} at ({', '.join(f'{x:.6g}' for x in positions[n])})" for n in nodes)
 
 
 def quoted(value: object) -> str:
-    """Return a value of the user as it is shown in a message: in quotes where it is text, at most 80 characters."""
+    """Return a value of the user for a message: text in quotes, at most 80 characters."""
     try:
         text = repr(value)
-    except (RecursionError, ValueError):  # nested too deeply, or a whole number of thousands of digits
+    except (RecursionError, ValueError):  # nested too deeply, or an integer with thousands of digits
         return f"<{type(value).__name__}>"
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]}...{text[-1]}"
 
 
 def damage(error: BaseException) -> str:
-    """Return the tail of a message about a file on which its reader failed: what it may be, what the reader said."""
+    """Return the end of a message about a file that its reader could not read: the probable cause, and its error."""
     lines = str(error).strip().splitlines()
     said = f": {lines[0][:200]}" if lines else ""
     return f"it is damaged or of another kind ({type(error).__name__}{said})"

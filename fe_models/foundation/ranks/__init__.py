@@ -1,1 +1,1 @@
-"""Several processes that work on one body together: what they are, alone or under MPI."""
+"""Several processes (ranks) that work on one body together: a single process, or processes under MPI."""

@@ -1,4 +1,4 @@
-"""Ranks under MPI (mpi4py): rank 0 sends the name of a function, all call it, and all say how it ended."""
+"""Ranks under MPI (mpi4py): rank 0 broadcasts the name of a function, all ranks call it and report the outcome."""
 
 import os
 import sys
@@ -13,12 +13,12 @@ from fe_models.foundation.ranks.ranks import OneRank, RankError, Ranks, started_
 
 __all__ = ["MpiRanks", "all_ranks"]
 
-NAP = 5e-4  #: seconds between looks whether all ranks are there
-FAILED = 2  #: exit code of all ranks where one of them failed
+NAP = 5e-4  #: seconds between checks whether all ranks have arrived
+FAILED = 2  #: exit code of all ranks if one of them failed
 
 
 class MpiRanks:
-    """The processes that `mpirun -n N` started, as `Ranks`."""
+    """The processes started by `mpirun -n N`; implements `Ranks`."""
 
     def __init__(self) -> None:
         if find_spec("mpi4py") is None:
@@ -33,13 +33,13 @@ class MpiRanks:
         self._is_over = False
 
     def everywhere(self, function: Callable[..., Any], *arguments: Any) -> list[Any]:
-        """Call function(ranks, *arguments) on all ranks at once; return their answers in the order of ranks."""
+        """Call function(ranks, *arguments) on all ranks at once; return their results in the order of the ranks."""
         self._wake()
         self.comm.bcast((function, arguments), root=0)
         return self._call(function, arguments)
 
     def serve(self) -> None:
-        """Do what rank 0 asks for until it has ended."""
+        """Execute requests of rank 0 until it ends."""
         while True:
             self._wake()
             asked = self.comm.bcast(None, root=0)
@@ -48,33 +48,33 @@ class MpiRanks:
             self._call(*asked)
 
     def end(self) -> None:
-        """Let the other ranks end."""
+        """Tell the other ranks to end."""
         if not self._is_over:
             self._is_over = True
             self._wake()
             self.comm.bcast(None, root=0)
 
     def _wake(self) -> None:
-        """Wait for rank 0 asleep: MPI's own waiting takes a processor, which the threads of rank 0 then lack."""
+        """Wait for rank 0 in sleep. MPI waits by polling, which takes processors from the threads of rank 0."""
         waiting = self.comm.Ibarrier()
         while not waiting.Test():
             time.sleep(NAP)
 
     def abort(self, words: str) -> None:
-        """Say once what happened, and end all ranks."""
-        # no command line hears of it any more: the next call ends this process
+        """Print the reason once, and end all ranks."""
+        # print here, because the next call ends this process before the command line can report the error
         sys.stderr.write(f"error: rank {self.rank} of {self.size}: {words}; all ranks end, no file is written\n")
         sys.stderr.flush()
         self.comm.Abort(FAILED)
         os._exit(FAILED)
 
     def _call(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> list[Any]:
-        """Call it here; an error that not all ranks have leaves the others in the middle of their work: all end."""
+        """Call the function here. If only some ranks raise an error, the others are stuck, so all ranks are ended."""
         answer: Any = None
         error: ReportedError | None = None
         try:
             answer = function(self, *arguments)
-        except ReportedError as told:  # the same everywhere: functions agree on what they report
+        except ReportedError as told:  # the same error on all ranks: functions agree on the errors that they report
             error = told
         except BaseException as fault:
             self.abort(f"{type(fault).__name__}: {fault}")
@@ -91,7 +91,7 @@ _ranks: list[Ranks] = []
 
 
 def all_ranks() -> Ranks:
-    """Return the ranks of this run: of MPI where its launcher started several processes, else this one alone."""
+    """Return the ranks of this run: those of MPI if its launcher started several processes, else a single rank."""
     if not _ranks:
         _ranks.append(MpiRanks() if started_ranks() > 1 else OneRank())
     return _ranks[0]

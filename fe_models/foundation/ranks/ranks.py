@@ -1,4 +1,4 @@
-"""What a rank context is: one program on rank 0, and others beside it that do what it asks of all of them at once."""
+"""The rank context: rank 0 runs the program, and the other ranks execute the functions that it requests of all."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -9,41 +9,41 @@ from fe_models.foundation.tasks.installation import differences, installation
 
 __all__ = ["OneRank", "RankError", "Ranks", "require_agreement", "started_ranks"]
 
-#: variables by which the launchers of MPI say how many processes they started
+#: environment variables in which MPI launchers give the number of processes
 SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS")
 
 
 class RankError(ReportedError, RuntimeError):
-    """The ranks of a run do not do for one another, or one of them failed."""
+    """The ranks of a run are not compatible with each other, or one of them failed."""
 
 
 class Ranks(Protocol):
-    """The processes of a run. Rank 0 runs the program; the others wait in `serve` for what it asks of all.
+    """The processes of a run. Rank 0 runs the program; the other ranks wait in `serve` for requests.
 
-    `store` keeps what a function of `everywhere` leaves on a rank for the next one, by a key of its own.
+    `store` keeps data between functions of `everywhere`, on each rank, under a key that the function chooses.
     """
 
     rank: int
     size: int
     store: dict[str, Any]
-    comm: Any  #: of mpi4py, for functions that run everywhere; None where there is no MPI
+    comm: Any  #: communicator of mpi4py, for functions that run on all ranks; None without MPI
 
     def everywhere(self, function: Callable[..., Any], *arguments: Any) -> list[Any]:
-        """Call function(ranks, *arguments) on all ranks at once, from rank 0; return their answers in order.
+        """Call function(ranks, *arguments) on all ranks at once, from rank 0; return their results in order.
 
-        The function stands at the top level of a module. An error of rank 0 alone, or the same of all, is raised; any
-        other ends all ranks, because those left would wait for ever.
+        The function must be at the top level of a module. An error that all ranks raise, or only rank 0, is raised
+        here. Any other error ends all ranks, because the remaining ranks would wait for ever.
         """
 
     def serve(self) -> None:
-        """Do what rank 0 asks for until it has ended; on the other ranks."""
+        """Execute requests of rank 0 until it ends; called on the other ranks."""
 
     def end(self) -> None:
-        """Let the other ranks end; from rank 0."""
+        """Tell the other ranks to end; called on rank 0."""
 
 
 class OneRank:
-    """The rank context of a process that is alone."""
+    """The rank context of a single process."""
 
     rank, size = 0, 1
     comm = None
@@ -56,14 +56,14 @@ class OneRank:
         return [function(self, *arguments)]
 
     def serve(self) -> None:
-        """Nobody asks."""
+        """Do nothing: there is no rank 0 to serve."""
 
     def end(self) -> None:
-        """Nobody waits."""
+        """Do nothing: there are no other ranks."""
 
 
 def started_ranks() -> int:
-    """Return how many processes the launcher of MPI started this one among; 1 without a launcher."""
+    """Return how many processes the MPI launcher started, including this one; 1 without a launcher."""
     sizes = (os.environ.get(name, "") for name in SIZES)
     return next((int(text) for text in sizes if text.isdigit()), 1)
 
@@ -74,7 +74,8 @@ def require_agreement(ranks: Ranks, question: Sequence[str]) -> None:
     Parameters
     ----------
     question
-        What this rank was asked, such as the digest of its job file; called on all ranks at once, not by `everywhere`.
+        Input of this rank, such as the digest of its job file. Call this function on all ranks at once, not by
+        `everywhere`.
     """
     own = installation() | {f"input {k}": text for k, text in enumerate(question)}
     all_of_them = [own] if ranks.comm is None else ranks.comm.allgather(own)

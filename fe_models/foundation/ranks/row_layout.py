@@ -1,4 +1,4 @@
-"""Where rows of matrices and tall columns lie among the ranks, and how all of these are asked at once."""
+"""Distribution of the rows of matrices and tall columns over the ranks, and requests to all of these ranks."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,16 +15,16 @@ from fe_models.foundation.ranks.rows import Rows
 __all__ = ["RowLayout", "asked", "dropped", "new_key"]
 
 numbers = count()
-dropped: list[str] = []  #: keys that nobody names any more; told with the next question
+dropped: list[str] = []  #: keys without references; ranks drop their data with the next request
 
 
 @dataclass(frozen=True, eq=False)
 class RowLayout:
-    """Which row of all lies where: the k-th as they lie on the ranks, one after another, is row order[k] of all."""
+    """Assignment of rows to ranks: position k, counted through all ranks in order, holds row order[k]."""
 
     ranks: Ranks
     order: IntArray  #: (n,)
-    rows: Rows  #: which of the places each rank has
+    rows: Rows  #: which positions each rank holds
 
     @property
     def n(self) -> int:
@@ -33,24 +33,24 @@ class RowLayout:
 
     @cached_property
     def position(self) -> np.ndarray:
-        """The place of each row, (n,) int32."""
+        """Position of each row, (n,) int32."""
         position = np.empty(len(self.order), np.int32)
         position[self.order] = np.arange(len(self.order), dtype=np.int32)
         return position
 
     def is_like(self, other: "RowLayout") -> bool:
-        """Return whether rows of both lie alike."""
+        """Return whether both layouts assign rows identically."""
         if self is other:
             return True
         return self.rows == other.rows and (self.order is other.order or np.array_equal(self.order, other.order))
 
     def ask(self, function: Callable[..., Any], *arguments: Any) -> list[Any]:
-        """Call function(ranks, *arguments) on all ranks, after they have forgotten what has no name."""
+        """Call function(ranks, *arguments) on all ranks, after they have dropped data without references."""
         return asked(self.ranks, function, *arguments)
 
 
 def asked(ranks: Ranks, function: Callable[..., Any], *arguments: Any) -> list[Any]:
-    """Call function(ranks, *arguments) on all ranks, after they have forgotten what has no name."""
+    """Call function(ranks, *arguments) on all ranks, after they have dropped data without references."""
     return ranks.everywhere(asked_here, [dropped.pop() for _ in range(len(dropped))], function, *arguments)
 
 
@@ -60,7 +60,7 @@ def new_key() -> str:
 
 
 def asked_here(ranks: Ranks, forgotten: list[str], function: Callable[..., Any], *arguments: Any) -> Any:
-    """Forget what nobody names, then call the function."""
+    """Drop data without references, then call the function."""
     for key in forgotten:
         ranks.store.pop(key, None)
     return function(ranks, *arguments)

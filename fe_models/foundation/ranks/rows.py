@@ -1,4 +1,4 @@
-"""Rows of tall arrays and matrices, from rank 0 to the ranks that work on them, and back."""
+"""Transfer of the rows of tall arrays and matrices from rank 0 to the other ranks, and back."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -10,12 +10,12 @@ from fe_models.foundation.ranks.ranks import Ranks
 
 __all__ = ["Rows", "collected", "even_rows", "own_rows", "spread"]
 
-PIECE = 2**24  #: numbers in a message; MPI counts bytes in 32 bits
+PIECE = 2**24  #: numbers in one message; MPI counts bytes with 32 bits
 
 
 @dataclass(frozen=True)
 class Rows:
-    """Which rows each rank has: rank r those from starts[r] to starts[r + 1]."""
+    """The rows of each rank: rank r holds the rows from starts[r] to starts[r + 1]."""
 
     starts: tuple[int, ...]
 
@@ -34,13 +34,13 @@ class Rows:
 
 
 def even_rows(indptr: np.ndarray, size: int) -> Rows:
-    """Return so many parts of about as many stored entries each."""
+    """Return `size` consecutive parts with about equally many stored entries."""
     cuts = np.searchsorted(indptr, np.linspace(0, int(indptr[-1]), size + 1)[1:-1])
     return Rows((0, *(int(cut) for cut in cuts), len(indptr) - 1))
 
 
 def own_rows(ranks: Ranks, rows: Rows, x: Array | None) -> Array:
-    """Return this rank's rows of a tall array that rank 0 has, (n_own, k), in Fortran order."""
+    """Return this rank's rows of a tall array that rank 0 holds, (n_own, k), in Fortran order."""
     k = 0 if x is None else x.shape[1]
     if ranks.size == 1:
         assert x is not None
@@ -55,7 +55,7 @@ def own_rows(ranks: Ranks, rows: Rows, x: Array | None) -> Array:
 
 
 def collected(ranks: Ranks, rows: Rows, own: Array) -> Array | None:
-    """Return the tall array whose rows the ranks have, in Fortran order, on rank 0; None on the others."""
+    """Return the tall array from its distributed rows, in Fortran order, on rank 0; None on other ranks."""
     if ranks.size == 1:
         return np.asfortranarray(own)
     if ranks.rank:
@@ -75,7 +75,7 @@ def collected(ranks: Ranks, rows: Rows, own: Array) -> Array | None:
 def spread(
     ranks: Ranks, rows: Rows, arrays: tuple[np.ndarray, np.ndarray, np.ndarray] | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return indptr, indices (int32), data of this rank's rows of compressed rows that rank 0 has."""
+    """Return indptr, indices (int32) and data of this rank's rows of a compressed matrix that rank 0 holds."""
     if arrays is not None:
         indptr, indices, data = arrays
         for other in range(1, ranks.size):
@@ -88,7 +88,7 @@ def spread(
         entries = slice(0, int(indptr[stop]))
         if ranks.size == 1:
             return np.asarray(indptr, np.int32), np.asarray(indices, np.int32), data
-        # copies: parts of the arrays would hold all of them
+        # copies, because views would keep the complete arrays in memory
         return indptr[: stop + 1].astype(np.int32), indices[entries].astype(np.int32), data[entries].copy()
     own_indptr = receive(ranks, rows.count(ranks.rank) + 1, np.int64)
     nnz = int(own_indptr[-1])
@@ -103,7 +103,7 @@ def send(ranks: Ranks, x: np.ndarray, other: int) -> None:
 
 
 def receive(ranks: Ranks, count: int, dtype: Any, other: int = 0) -> np.ndarray:
-    """Receive so many numbers in pieces."""
+    """Receive an array of `count` numbers in pieces."""
     flat = np.empty(count, dtype)
     for first in range(0, count, PIECE):
         ranks.comm.Recv(flat[first : first + PIECE], source=other)

@@ -1,7 +1,7 @@
-"""Tall columns by rows on all ranks: rank 0 has its own rows of them, and a name for the rest.
+"""Tall columns distributed by rows over all ranks: rank 0 holds its own rows, and a key for the others.
 
-Their rows lie as those of the matrices of a body (`SpreadMatrix`), so that products with these take them where they
-are. What is asked of columns, such as Xᵀ Y, all ranks do with their rows at once; rank 0 sums the small results.
+The rows are distributed like those of the matrices of a body (`SpreadMatrix`), so products need no redistribution. All
+ranks compute operations such as Xᵀ Y with their own rows at once, and rank 0 sums the small results.
 """
 
 import operator
@@ -22,11 +22,11 @@ __all__ = [
     "spread_with",
 ]  # fmt: skip
 
-COLUMNS = 4  #: that pass through rank 0 at once
+COLUMNS = 4  #: number of columns that pass through rank 0 at a time
 
 
 class Part(NamedTuple):
-    """Columns of what every rank keeps its rows of under a key."""
+    """Columns of which every rank keeps its rows under a key."""
 
     key: str
     first: int
@@ -34,29 +34,29 @@ class Part(NamedTuple):
 
 
 class SpreadColumns:
-    """Columns whose rows lie on all ranks, (n, k), in an order of their own; with the last name of them they go.
+    """Distributed columns, (n, k), with their own order of rows; freed when the last reference is dropped.
 
-    Rows are counted in the order of the dofs. `X[:, a:b]` is a part of the same columns, `X[:, index]` a copy;
+    Rows are indexed in the order of the dofs. `X[:, a:b]` is a view of the same columns; `X[:, index]` is a copy;
     `X[rows]` is an array of rank 0, and so is `X.whole()`.
     """
 
-    __array_ufunc__ = None  #: NumPy leaves sums and products to it
+    __array_ufunc__ = None  #: makes NumPy leave sums and products to this class
     ndim = 2
 
     def __init__(self, layout: RowLayout, part: Part, source: object = None) -> None:
-        """Name columns that all ranks keep; source: what owns them, where they are part of another's."""
+        """Refer to columns that all ranks keep; source: the owner of the columns, if these are a part of others."""
         self.layout, self.part, self.source = layout, part, source
         self.shape = (layout.n, part.last - part.first)
         if source is None:
             weakref.finalize(self, dropped.append, part.key).atexit = False
 
-    __iter__ = None  #: row by row nobody wants them
+    __iter__ = None  #: no iteration over rows
 
     def __len__(self) -> int:
         return self.shape[0]
 
     def __array__(self, dtype: Any = None, copy: Any = None) -> Array:
-        """Return `whole()`, for callers that know arrays alone."""
+        """Return `whole()`, for callers that only accept arrays."""
         return self.whole() if dtype is None else self.whole().astype(dtype)
 
     def __getitem__(self, index: Any) -> Any:
@@ -92,17 +92,17 @@ class SpreadColumns:
         return spread_with(self.layout, self.shape[1], operator.sub, self, other)
 
     def __mul__(self, factors: Any) -> "SpreadColumns":
-        """Return columns times a number, or each times its factor, (k,)."""
+        """Return the columns times a number, or times one factor each, (k,)."""
         return spread_with(self.layout, self.shape[1], operator.mul, self, factors)
 
     __rmul__ = __mul__
 
     def __truediv__(self, factors: Any) -> "SpreadColumns":
-        """Return columns over a number, or each over its factor, (k,)."""
+        """Return the columns divided by a number, or by one factor each, (k,)."""
         return spread_with(self.layout, self.shape[1], operator.truediv, self, factors)
 
     def parts(self, width: int = COLUMNS) -> Iterator[tuple[slice, Array]]:
-        """Yield some columns at a time as arrays of rank 0, (n, width), and which they are."""
+        """Yield blocks of columns as arrays of rank 0, (n, width), with the slice of their columns."""
         for first in range(0, self.shape[1], width):
             some = slice(first, min(first + width, self.shape[1]))
             lying = self.layout.ask(collected_here, self.layout.rows, self[:, some].part)[0]
@@ -111,7 +111,7 @@ class SpreadColumns:
             yield some, x
 
     def whole(self) -> Array:
-        """Return them as an array of rank 0, (n, k)."""
+        """Return all columns as an array of rank 0, (n, k)."""
         X = np.empty(self.shape)
         for some, x in self.parts():
             X[:, some] = x
@@ -119,18 +119,18 @@ class SpreadColumns:
 
 
 def spread_columns(layout: RowLayout, X: Any) -> SpreadColumns:
-    """Return columns of rank 0, (n, k), by rows on all ranks; those that lie so already themselves."""
+    """Distribute columns of rank 0, (n, k), by rows; distributed columns are returned unchanged."""
     return X if isinstance(X, SpreadColumns) else spread_beside(layout, X)
 
 
 def spread_beside(layout: RowLayout, *blocks: Any) -> SpreadColumns:
-    """Return columns, of rank 0 or on all ranks, side by side on all ranks, (n, k)."""
+    """Return columns side by side, distributed, (n, k); the blocks may lie on rank 0 or be distributed."""
     return spread_parts(layout, sum(X.shape[1] for X in blocks), blocks)
 
 
 def spread_parts(layout: RowLayout, k: int, blocks: Iterable[Any]) -> SpreadColumns:
-    """Return columns, k in all, which come one block after another."""
-    found = SpreadColumns(layout, Part(new_key(), 0, k))  # first of all: where a block fails, they go with their name
+    """Distribute k columns that arrive in consecutive blocks."""
+    found = SpreadColumns(layout, Part(new_key(), 0, k))  # created first, so that a failing block frees them
     key = found.part.key
     layout.ask(room_here, key, layout.rows, k)
     at = 0
@@ -146,26 +146,26 @@ def spread_parts(layout: RowLayout, k: int, blocks: Iterable[Any]) -> SpreadColu
 
 
 def on_rows(layout: RowLayout, function: Callable[..., Any], *arguments: Any) -> list[Any]:
-    """Call function(*arguments) on all ranks, each with its own rows of `SpreadColumns`; return their answers."""
+    """Call function(*arguments) on all ranks, each with its own rows of `SpreadColumns`; return the results."""
     return layout.ask(called_here, function, named(arguments))
 
 
 def spread_with(layout: RowLayout, k: int, function: Callable[..., Array], *arguments: Any) -> SpreadColumns:
-    """Return the columns, (n, k), whose rows function(*arguments) returns on all ranks, as `on_rows` calls it."""
+    """Return the columns, (n, k), whose rows function(*arguments) returns on each rank; see `on_rows`."""
     found = SpreadColumns(layout, Part(new_key(), 0, k))
     layout.ask(kept_here, found.part.key, function, named(arguments))
     return found
 
 
 def rows_of(X: SpreadColumns, index: IntArray) -> Array:
-    """Return some rows of columns, (len(index), k), on rank 0."""
+    """Return some rows of the columns, (len(index), k), on rank 0."""
     place = X.layout.position[index]
     result: Array = X.layout.ask(rows_here, X.part, place, X.layout.rows)[0]
     return result
 
 
 def named(arguments: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Return arguments with the names of columns in their place."""
+    """Return the arguments with distributed columns replaced by their keys."""
     return tuple(each.part if isinstance(each, SpreadColumns) else each for each in arguments)
 
 
@@ -174,54 +174,54 @@ def own_part(ranks: Ranks, part: Part) -> Array:
     kept = ranks.store[part.key]
     if isinstance(kept, np.ndarray):
         return kept[:, part.first : part.last]
-    columns: Array = kept.columns(part.first, part.last)  # of a basis that grows
+    columns: Array = kept.columns(part.first, part.last)  # columns of a basis that grows
     return columns
 
 
 def owned(ranks: Ranks, arguments: tuple[Any, ...]) -> list[Any]:
-    """Return arguments with own rows in the place of names."""
+    """Return the arguments with keys replaced by this rank's rows."""
     return [own_part(ranks, each) if isinstance(each, Part) else each for each in arguments]
 
 
 def called_here(ranks: Ranks, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-    """Call a function with own rows."""
+    """Call a function with this rank's rows."""
     return function(*owned(ranks, arguments))
 
 
 def kept_here(ranks: Ranks, key: str, function: Callable[..., Array], arguments: tuple[Any, ...]) -> None:
-    """Keep the rows that a function returns of own rows."""
+    """Keep the rows that a function returns for this rank's rows."""
     ranks.store[key] = np.asfortranarray(function(*owned(ranks, arguments)))
 
 
 def chosen(X: Array, columns: IntArray) -> Array:
-    """Return some columns."""
+    """Return some columns of this rank's rows."""
     return X[:, columns]
 
 
 def room_here(ranks: Ranks, key: str, rows: Rows, k: int) -> None:
-    """Make room for rows of columns."""
+    """Allocate this rank's rows of new columns."""
     give_back()
     ranks.store[key] = np.zeros((rows.count(ranks.rank), k), order="F")
 
 
 def put_here(ranks: Ranks, key: str, first: int, X: Part) -> None:
-    """Write own rows of columns from this column on."""
+    """Write this rank's rows of columns, starting at a column."""
     ranks.store[key][:, first : first + X.last - X.first] = own_part(ranks, X)
 
 
 def given_here(ranks: Ranks, key: str, rows: Rows, first: int) -> None:
-    """Write own rows of columns that rank 0 has, from this column on."""
+    """Write this rank's rows of columns that rank 0 holds, starting at a column."""
     x = own_rows(ranks, rows, ranks.store.pop("columns", None))
     ranks.store[key][:, first : first + x.shape[1]] = x
 
 
 def collected_here(ranks: Ranks, rows: Rows, X: Part) -> Array | None:
-    """Return columns on rank 0, in the order in which they lie."""
+    """Return the columns on rank 0, in the order of distribution."""
     return collected(ranks, rows, own_part(ranks, X))
 
 
 def rows_here(ranks: Ranks, X: Part, place: np.ndarray, rows: Rows) -> Array | None:
-    """Return rows at some places on rank 0, to which each rank sends its own."""
+    """Return the rows at some positions on rank 0; each rank sends its own."""
     mine, k = own_part(ranks, X), X.last - X.first
     owner = np.searchsorted(rows.starts, place, side="right") - 1
     where = [np.flatnonzero(owner == rank) for rank in range(ranks.size)]

@@ -1,7 +1,7 @@
-"""A symmetric sparse matrix by rows on all ranks: rank 0 has its own rows, and a name for the rest.
+"""A symmetric sparse matrix distributed by rows: rank 0 holds its own rows, and a key for the others.
 
-Rows lie in an order in which neighbours are near (`order`), so that a rank needs few rows of others in a product, and
-rows of a principal block are those of the same ranks: the factor and the search for modes take them where they are.
+The row order (`order`) places neighbours near each other, so that a rank needs few remote rows in a product. Rows of a
+principal block stay on their ranks, so factorisation and eigensolver use them without redistribution.
 """
 
 import weakref
@@ -23,12 +23,12 @@ from fe_models.foundation.ranks.trim import give_back
 
 __all__ = ["OwnRows", "SpreadMatrix", "largest_entry", "spread_sum", "whole_matrix"]
 
-COLUMNS = 32  #: of a product at once
+COLUMNS = 32  #: number of columns of a product at a time
 
 
 @dataclass(frozen=True, eq=False)
 class OwnRows:
-    """Compressed rows of a matrix that a rank has, columns of all."""
+    """Compressed rows of a matrix that one rank holds, over all columns."""
 
     indptr: np.ndarray  #: (n_own + 1,) int32
     indices: np.ndarray  #: ascending in each row, (n_entries,) int32
@@ -36,27 +36,27 @@ class OwnRows:
 
 
 class SpreadMatrix:
-    """A symmetric matrix, (n, n), whose rows lie on all ranks; with the last name of it they go.
+    """A distributed symmetric matrix, (n, n); freed when the last reference is dropped.
 
-    Columns x and products A x are arrays of rank 0 in the order of the dofs, or both lie on all ranks
-    (`SpreadColumns`). What is not offered here needs the whole matrix: `whole`.
+    Columns x and products A x are either arrays of rank 0 in the order of the dofs, or both distributed
+    (`SpreadColumns`). Operations that this class does not offer need the complete matrix: `whole`.
     """
 
-    __array_ufunc__ = None  #: NumPy leaves products to it
+    __array_ufunc__ = None  #: makes NumPy leave products to this class
 
     def __init__(
         self, ranks: Ranks, order: IntArray, rows: Rows, function: Callable[..., Any], *arguments: Any
     ) -> None:
-        """Let every rank keep its rows.
+        """Let every rank create and keep its rows.
 
         Parameters
         ----------
         order
-            The dof of each row as they lie on the ranks, (n,).
+            The dof of each row, in the order of distribution, (n,).
         rows
-            Which of them each rank has.
+            Which rows each rank holds.
         function
-            Called on all ranks at once with the arguments; returns `OwnRows`, columns in the same order as rows.
+            Called on all ranks at once with the arguments. Returns `OwnRows`, with columns in the order of the rows.
         """
         self.layout = RowLayout(ranks, order, rows)
         self.ranks, self.order, self.rows, self.key = ranks, order, rows, new_key()
@@ -64,7 +64,7 @@ class SpreadMatrix:
         weakref.finalize(self, dropped.append, self.key).atexit = False
         found = self._ask(made_here, self.key, rows, function, *arguments)
         self.nnz = sum(entries for entries, _ in found)
-        self.largest = max(largest for _, largest in found)  #: in size of all entries
+        self.largest = max(largest for _, largest in found)  #: largest magnitude of all entries
         self._diagonal: Array | None = None
 
     @property
@@ -73,7 +73,7 @@ class SpreadMatrix:
         return len(self.order), len(self.order)
 
     def _ask(self, function: Callable[..., Any], *arguments: Any) -> list[Any]:
-        """Call function(ranks, *arguments) on all ranks, after they have forgotten what has no name."""
+        """Call function(ranks, *arguments) on all ranks, after they have dropped data without references."""
         return self.layout.ask(function, *arguments)
 
     def diagonal(self) -> Array:
@@ -83,7 +83,7 @@ class SpreadMatrix:
         return self._diagonal.copy()
 
     def __matmul__(self, x: Any) -> Any:
-        """Return A x of one column, (n,), or many, (n, k), some at a time; columns on all ranks stay there."""
+        """Return A x for one column, (n,), or many, (n, k), in blocks; distributed x gives a distributed product."""
         if isinstance(x, SpreadColumns):
             return self._on_ranks(x)
         x = np.asarray(x)
@@ -104,7 +104,7 @@ class SpreadMatrix:
         return product
 
     def __getitem__(self, index: tuple[slice, IntArray]) -> sp.csc_array:
-        """Return columns of it, A[:, dofs], (n, k), as a matrix of rank 0."""
+        """Return the columns A[:, dofs], (n, k), as a matrix of rank 0."""
         every, dofs = index
         if not isinstance(every, slice) or every != slice(None):
             raise IndexError("SpreadMatrix: expected A[:, dofs]; take whole() for other parts")
@@ -112,11 +112,11 @@ class SpreadMatrix:
         return sp.csc_array(sp.vstack(parts, format="csr")[self.position])
 
     def ordered(self, dofs: IntArray) -> IntArray:
-        """Return some dofs in the order of the rows."""
+        """Return the dofs sorted in the order of the rows."""
         return dofs[np.argsort(self.position[dofs])]
 
     def block(self, dofs: IntArray) -> "SpreadBlock | None":
-        """Return A[dofs][:, dofs] by rows on the same ranks; None where the dofs are not in the order of the rows."""
+        """Return A[dofs][:, dofs], distributed over the same ranks; None if dofs are not in the order of the rows."""
         where = self.position[dofs]
         if not (where[1:] > where[:-1]).all():
             return None
@@ -134,45 +134,45 @@ class SpreadMatrix:
 
 
 class SpreadBlock:
-    """A principal block of a matrix by rows on all ranks."""
+    """A principal block of a distributed matrix."""
 
     def __init__(self, matrix: SpreadMatrix, where: np.ndarray) -> None:
-        """Choose rows, ascending."""
+        """Select the rows, ascending."""
         self.matrix, self.is_chosen = matrix, np.zeros(len(matrix.order), bool)
         self.is_chosen[where] = True
         before = np.concatenate([[0], np.cumsum(self.is_chosen)])
-        self.rows = Rows(tuple(int(before[start]) for start in matrix.rows.starts))  #: of the block on each rank
+        self.rows = Rows(tuple(int(before[start]) for start in matrix.rows.starts))  #: rows of the block on each rank
 
     def keep(self, key: str, *, upper: bool = False) -> int:
-        """Let every rank keep its `OwnRows` under a key, of all columns or from the diagonal on; return how many."""
+        """Let every rank keep its `OwnRows` under a key, with all columns or the upper triangle; return how many."""
         return sum(self.matrix._ask(block_here, key, self.matrix.key, self.is_chosen, self.rows, upper))
 
     def expanded(self, x: SpreadColumns) -> SpreadColumns:
-        """Return columns over all rows of the matrix, zero where it is not the block; x has rows as the block has."""
+        """Return columns over all rows of the matrix, zero outside the block; x is distributed like the block."""
         layout, key = self.matrix.layout, new_key()
         layout.ask(expanded_here, key, x.part, self.is_chosen, layout.rows)
         return SpreadColumns(layout, Part(key, 0, x.shape[1]))
 
 
 def spread_sum(A: SpreadMatrix, B: SpreadMatrix, factor: float) -> SpreadMatrix:
-    """Return A + factor B of matrices whose rows lie alike, by rows on all ranks."""
+    """Return A + factor B for matrices with the same distribution, distributed likewise."""
     if not A.layout.is_like(B.layout):
         raise BodyError(f"spread_sum: rows of matrices {A.shape} and {B.shape} lie otherwise on the ranks")
     return SpreadMatrix(A.ranks, A.order, A.rows, added_here, A.key, B.key, factor)
 
 
 def whole_matrix(A: Any) -> sp.csc_array:
-    """Return a matrix that rank 0 has, or collect it there."""
+    """Return the complete matrix on rank 0; a distributed matrix is collected there."""
     return A.whole() if isinstance(A, SpreadMatrix) else A
 
 
 def largest_entry(A: Any) -> float:
-    """Return the largest entry of a matrix in size; 0 without entries."""
+    """Return the largest magnitude of the entries of a matrix; 0 if it has no entries."""
     return A.largest if isinstance(A, SpreadMatrix) else float(np.abs(A.data).max(initial=0.0))
 
 
 def made_here(ranks: Ranks, key: str, rows: Rows, function: Callable[..., Any], *arguments: Any) -> tuple[int, float]:
-    """Keep this rank's rows; return how many entries they have, and the largest in size."""
+    """Create and keep this rank's rows; return the number of entries and their largest magnitude."""
     own: OwnRows = function(ranks, *arguments)
     product = RowsProduct(ranks, rows, own.indptr, own.indices, own.data)
     del own
@@ -183,42 +183,42 @@ def made_here(ranks: Ranks, key: str, rows: Rows, function: Callable[..., Any], 
 
 
 def added_here(ranks: Ranks, key: str, other_key: str, factor: float) -> OwnRows:
-    """Return own rows of A + factor B."""
+    """Return this rank's rows of A + factor B."""
     A = sp.csr_array(ranks.store[key].rows_of_all() + factor * ranks.store[other_key].rows_of_all())
     A.sort_indices()
     return OwnRows(A.indptr.astype(np.int32), A.indices.astype(np.int32), A.data)
 
 
 def diagonal_here(ranks: Ranks, key: str) -> Array:
-    """Return the diagonal of these rows; the first columns are the own ones."""
+    """Return the diagonal entries of this rank's rows; the first columns are the own ones."""
     return np.asarray(ranks.store[key].A.diagonal())
 
 
 def multiplied_here(ranks: Ranks, key: str, rows: Rows) -> Array | None:
-    """Return A x of columns that rank 0 has, there."""
+    """Return A x on rank 0 for columns that rank 0 holds."""
     x = own_rows(ranks, rows, ranks.store.pop("columns", None))
     return collected(ranks, rows, ranks.store[key] @ x)
 
 
 def product_here(ranks: Ranks, key: str, matrix_key: str, x: Part) -> None:
-    """Keep rows of A x of columns on all ranks."""
+    """Keep this rank's rows of A x for distributed columns."""
     ranks.store[key] = ranks.store[matrix_key] @ own_part(ranks, x)
 
 
 def expanded_here(ranks: Ranks, key: str, x: Part, is_chosen: np.ndarray, rows: Rows) -> None:
-    """Keep own rows of a block among those of the matrix."""
+    """Keep this rank's rows of a block, expanded to the rows of the matrix."""
     whole = np.zeros((rows.count(ranks.rank), x.last - x.first), order="F")
     whole[is_chosen[rows.of(ranks.rank)]] = own_part(ranks, x)
     ranks.store[key] = whole
 
 
 def columns_here(ranks: Ranks, key: str, columns: np.ndarray) -> sp.csr_array:
-    """Return some columns of these rows, (n_own, k)."""
+    """Return some columns of this rank's rows, (n_own, k)."""
     return sp.csr_array(ranks.store[key].rows_of_all()[:, columns])
 
 
 def block_here(ranks: Ranks, key: str, matrix_key: str, is_chosen: np.ndarray, rows: Rows, upper: bool) -> int:
-    """Keep the chosen rows and columns of these rows."""
+    """Keep the selected rows and columns of this rank's rows."""
     A, own = ranks.store[matrix_key].rows_of_all(), rows.of(ranks.rank)
     number = np.cumsum(is_chosen, dtype=np.int32) - np.int32(1)
     number[~is_chosen] = -1
@@ -235,7 +235,7 @@ def block_here(ranks: Ranks, key: str, matrix_key: str, is_chosen: np.ndarray, r
 
 
 def with_diagonal(upper: sp.csr_array, first: int) -> OwnRows:
-    """Return rows from the diagonal on, the first of them the given one, with every diagonal entry stored."""
+    """Return the rows of the upper triangle, starting with row `first`, with every diagonal entry stored."""
     indptr, indices, data = upper.indptr, upper.indices, upper.data
     lacks = np.diff(indptr) == 0
     full = np.flatnonzero(~lacks)
@@ -248,7 +248,7 @@ def with_diagonal(upper: sp.csr_array, first: int) -> OwnRows:
 
 
 def collected_here(ranks: Ranks, key: str, rows: Rows) -> sp.csr_array | None:
-    """Return the whole matrix in the order of the rows on rank 0."""
+    """Return the complete matrix in the order of the rows on rank 0."""
     A = ranks.store[key].rows_of_all()
     if ranks.rank:
         for x in (A.indptr.astype(np.int64), A.indices, A.data):

@@ -1,4 +1,4 @@
-"""Memory that was freed, given back to the machine: glibc keeps it, and peaks of one rank then add up."""
+"""Return of freed memory to the operating system; glibc keeps it, so that peaks of several ranks would add up."""
 
 import ctypes
 
@@ -6,6 +6,6 @@ __all__ = ["give_back"]
 
 
 def give_back() -> None:
-    """Let the allocator return what is free; nothing where it is not that of glibc."""
+    """Make the allocator return free memory; does nothing if the allocator is not glibc's."""
     if trim := getattr(ctypes.CDLL(None), "malloc_trim", None):
         trim(0)

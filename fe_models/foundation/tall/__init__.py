@@ -1,1 +1,1 @@
-"""Tall arrays, of many rows, that lie on disk and are worked on a slice of rows at a time."""
+"""Tall arrays (with many rows) that lie on disk and are processed in slices of rows."""

@@ -1,9 +1,9 @@
-"""Tall arrays on disk: mapped from a file without a name, which the system removes with the process.
+"""Tall arrays on disk: memory maps of unnamed files, which the system removes when the process ends.
 
-They are NumPy arrays as others are. What was touched of a mapped array counts as memory of the process until it is
-given back (`release`); so work goes by slices of rows (`row_slices`), after each of which it is. What is made of an
-array on disk, and is large, goes there as well (`zeros_like`): nobody has to hand on where arrays lie. `in_memory`,
-`copied` and `beside` also take columns whose rows lie on many ranks (`SpreadColumns`).
+They behave like other NumPy arrays. Pages of a map that were touched count as memory of the process until they are
+released (`release`). Computations therefore go through slices of rows (`row_slices`) and release each slice. Large
+results computed from an array on disk also go to disk (`zeros_like`), so callers need not pass the location on.
+`in_memory`, `copied` and `beside` also accept distributed columns (`SpreadColumns`).
 """
 
 import mmap
@@ -22,17 +22,22 @@ __all__ = ["beside", "copied", "in_memory", "is_on_disk", "on_disk", "release", 
 
 Array = NDArray[np.float64]
 
-SLICE_BYTES = 32e6  #: of rows that are worked on at once
-LARGE = 64e6  #: bytes from which what is made of an array on disk goes there too
+SLICE_BYTES = 32e6  #: size of the slice of rows that is processed at a time
+LARGE = 64e6  #: size above which a result computed from an array on disk also goes to disk
 
 
 def on_disk(shape: tuple[int, ...]) -> Array:
-    """Return an array of zeros in a file in the folder for temporary files, (shape), C order.
+    """Return an array of zeros in a file in the folder for temporary files, in C order.
+
+    Parameters
+    ----------
+    shape
+        Shape of the array.
 
     Raises
     ------
     StorageError
-        If the folder has too little room: that is reserved at once, so that the work does not stop in its midst.
+        If the folder has too little space. The space is reserved immediately, so that a computation cannot fail later.
     """
     size = 8 * int(np.prod(shape))
     if not size:
@@ -53,7 +58,7 @@ def on_disk(shape: tuple[int, ...]) -> Array:
 
 
 def mapped(X: Any) -> mmap.mmap | None:
-    """Return the map that an array, or what it is a view of, lies in; None for one in memory."""
+    """Return the memory map of an array, or of the array of which it is a view; None for an array in memory."""
     while isinstance(X, np.ndarray):
         X = X.base
     return X if isinstance(X, mmap.mmap) else None
@@ -65,27 +70,27 @@ def is_on_disk(X: Array) -> bool:
 
 
 def release(X: Array) -> None:
-    """Give back the memory of an array on disk; its numbers stay."""
+    """Release the memory of an array on disk; its values stay on disk."""
     found = mapped(X)
     if found is not None and hasattr(mmap, "MADV_DONTNEED"):
         found.madvise(mmap.MADV_DONTNEED)
 
 
 def zeros_like(X: Array, shape: tuple[int, ...]) -> Array:
-    """Return zeros for what is made of X: on disk where X is, and they are large; else in memory. C order."""
+    """Return zeros for a result computed from X: on disk if X is on disk and the result is large; C order."""
     is_large = 8 * int(np.prod(shape)) >= LARGE
     return on_disk(shape) if is_large and is_on_disk(X) else np.zeros(shape)
 
 
 def row_slices(rows: slice | int, *arrays: Array) -> Iterator[slice]:
-    """Yield slices of rows, all at once where no array is on disk; memory of those that are is given back after each.
+    """Yield slices of rows and release the memory after each; without an array on disk, a single slice.
 
     Parameters
     ----------
     rows
-        The rows as a slice, or how many from the first.
+        The rows as a slice, or the number of rows.
     arrays
-        All of as many rows or more.
+        Arrays with at least that many rows.
     """
     whole = rows if isinstance(rows, slice) else slice(0, rows)
     stored = [X for X in arrays if is_on_disk(X)]
@@ -100,14 +105,14 @@ def row_slices(rows: slice | int, *arrays: Array) -> Iterator[slice]:
 
 
 def copied(X: Any) -> Any:
-    """Return a copy, on disk or on the ranks where X is."""
+    """Return a copy in the same place: in memory, on disk or distributed."""
     return beside(X)
 
 
 def beside(*arrays: Any) -> Any:
-    """Return arrays of as many rows side by side, (n, k).
+    """Return arrays with equally many rows side by side, (n, k).
 
-    On disk where one of them is and they are large; on all ranks where one of them is.
+    The result is on disk if one array is on disk and the result is large; it is distributed if one array is.
     """
     if found := [X for X in arrays if isinstance(X, SpreadColumns)]:
         return spread_beside(found[0].layout, *arrays)
@@ -120,7 +125,7 @@ def beside(*arrays: Any) -> Any:
 
 
 def in_memory(X: Any) -> Array:
-    """Return an array itself, or, of one on disk or on many ranks, a copy in memory in C order."""
+    """Return the array itself, or a copy in memory in C order if it is on disk or distributed."""
     if isinstance(X, SpreadColumns):
         return X.whole()
     if not is_on_disk(X):
@@ -132,5 +137,5 @@ def in_memory(X: Any) -> Array:
 
 
 def of_this_process(X: Any) -> Array:
-    """Return an array itself, in memory or on disk, or, of columns on many ranks, a copy in memory."""
+    """Return the array itself, in memory or on disk, or a copy in memory of distributed columns."""
     return X.whole() if isinstance(X, SpreadColumns) else X

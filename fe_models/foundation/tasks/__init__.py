@@ -1,4 +1,4 @@
-"""Many values of one function: here, in processes beside, or on a Dask cluster; a journal of what is done.
+"""Evaluation of one function at many values: in this process, in local processes, or on a Dask cluster.
 
-Work that is interrupted by its user ends (`interrupts`).
+A journal records finished values. Ctrl-C interrupts the work reliably (`interrupts`).
 """

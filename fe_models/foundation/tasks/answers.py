@@ -1,4 +1,4 @@
-"""What a worker gives back: the result of a call, or its error, as bytes that can be read in another process."""
+"""The answer of a worker: the result of a call, or its error, as bytes that another process can read."""
 
 import pickle
 from functools import lru_cache
@@ -18,18 +18,18 @@ def answer(function: bytes, value: bytes) -> bytes:
         return sendable(WorkerError(f"the function cannot be loaded in another process: {words}"))
     try:
         return pickle.dumps((call(pickle.loads(value)),))
-    except BaseException as error:  # SystemExit too: it is the answer of one value
+    except BaseException as error:  # SystemExit included: it is the answer for a single value
         return sendable(error)
 
 
 @lru_cache(1)
 def loaded(function: bytes) -> Any:
-    """Return the function of some bytes; what it keeps in memory stays for the next value."""
+    """Return the function from its bytes; the function stays cached, so its memory persists between values."""
     return pickle.loads(function)
 
 
 def read_answer(data: bytes) -> Any:
-    """Return a tuple with the result, or the error; `WorkerError` is raised, for it is no matter of one value."""
+    """Return a tuple with the result, or the error; `WorkerError` is raised, because it concerns all values."""
     try:
         found = pickle.loads(data)
     except Exception as error:
@@ -40,7 +40,7 @@ def read_answer(data: bytes) -> Any:
 
 
 def sendable(error: BaseException) -> bytes:
-    """Return an error as bytes; one that cannot be sent and read again is replaced by its words."""
+    """Return an error as bytes; an error that cannot be pickled and read again is replaced by its text."""
     try:
         data = pickle.dumps(error)
         if isinstance(error, Exception) and type(pickle.loads(data)) is type(error):

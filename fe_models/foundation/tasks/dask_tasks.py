@@ -1,9 +1,9 @@
-"""The map over tasks on a Dask cluster: one made here, or one whose scheduler is reached at an address.
+"""The task map on a Dask cluster: a cluster started here, or one whose scheduler is reached at an address.
 
-(1) every worker is asked for its installation before any work; it must be that of this process
-(2) every task asks again: workers may join later; and for the files it needs
-(3) a task whose worker ends is given to another one, by the scheduler as often as it is set to do so, then from here;
-    at last alone, so that no other task has to answer for it
+(1) before any work, every worker must report the same installation as this process
+(2) every task repeats this check, because workers may join later, and checks that it sees the files it needs
+(3) a task whose worker ends is given to another worker, first by the scheduler as its settings say, then from here; the
+    last attempt runs alone, so that it cannot affect other tasks
 """
 
 import logging
@@ -29,15 +29,15 @@ __all__ = ["DaskTasks", "dask_at", "dask_here"]
 log = logging.getLogger(__name__)
 
 EXTRA = {"extra": "cluster", "purpose": "workers on a Dask cluster"}
-CONNECT = 5.0  #: [s] in which a scheduler has to answer
+CONNECT = 5.0  #: time within which a scheduler must answer [s]
 LONGEST_GREETING = 1_000_000  #: bytes
-START = 60.0  #: [s] in which a cluster made here has to have its workers
+START = 60.0  #: time within which a cluster started here must have its workers [s]
 MARK = "fe_models.foundation.tasks.installation:INSTALLATION"
 SAME = "install the same version of the project and its libraries on all workers and start them anew"
 
 
 def dask_here(n: int, threads: int = 1) -> "DaskTasks":
-    """Return the map over tasks on a cluster of n processes on this machine, which ends with it.
+    """Return the task map on a cluster of n processes on this machine; the cluster ends with the map.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def dask_here(n: int, threads: int = 1) -> "DaskTasks":
     distributed = extra_module("distributed", **EXTRA)
     dask = extra_module("dask", **EXTRA)
     settings = {
-        "distributed.scheduler.allowed-failures": 0,  # (3) is done from here
+        "distributed.scheduler.allowed-failures": 0,  # retries, step (3), are done from here
         "distributed.scheduler.worker-saturation": 1.0,
         "distributed.nanny.pre-spawn-environ": thread_environment(threads),
         "distributed.comm.timeouts.connect": START,
@@ -58,7 +58,8 @@ def dask_here(n: int, threads: int = 1) -> "DaskTasks":
         try:
             cluster = distributed.LocalCluster(
                 n_workers=n, threads_per_worker=1, processes=True, dashboard_address=None, memory_limit=0,
-                scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # else two clusters want port 8787
+                # otherwise two clusters would compete for port 8787
+                scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
                 silence_logs=logging.CRITICAL,
             )  # fmt: skip
         except Exception as error:
@@ -76,7 +77,7 @@ def dask_here(n: int, threads: int = 1) -> "DaskTasks":
 
 @contextmanager
 def interrupts_ignored() -> Iterator[None]:
-    """Ignore Ctrl-C, as do the processes that begin now: this one ends them, and tells it in one line."""
+    """Ignore Ctrl-C here and in processes started meanwhile; this process ends them and reports the interrupt."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -88,20 +89,21 @@ def interrupts_ignored() -> Iterator[None]:
 
 
 def dask_at(host: str, port: int) -> "DaskTasks":
-    """Return the map over tasks on a cluster that runs, by the address of its scheduler.
+    """Return the task map on a running cluster, given the address of its scheduler.
 
     Raises
     ------
     MissingExtraError
         If Dask is not installed.
     WorkerError
-        If no scheduler answers within seconds.
+        If no scheduler answers within a few seconds.
     """
     distributed = extra_module("distributed", **EXTRA)
     told = f"workers = dask://{host}:{port}"
     try:
         listen(host.strip("[]"), port)
-        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # a lost scheduler is told here, in one line
+        # a lost scheduler is reported here, in one line
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
         client = distributed.Client(f"tcp://{host}:{port}", timeout=CONNECT, set_as_default=False)
     except Exception as error:
         raise WorkerError(
@@ -112,9 +114,9 @@ def dask_at(host: str, port: int) -> "DaskTasks":
 
 
 def listen(host: str, port: int) -> None:
-    """Raise `OSError` if nobody at an address begins to speak as a scheduler does, who says a length of 8 bytes first.
+    """Raise `OSError` unless a scheduler listens at the address; it sends the length of a message in 8 bytes first.
 
-    The client of Dask waits without end for one who takes the connection and says nothing.
+    The client of Dask waits for ever if a program accepts the connection and sends nothing.
     """
     with socket.create_connection((host, port), timeout=CONNECT) as connection:
         heard = b""
@@ -128,7 +130,7 @@ def listen(host: str, port: int) -> None:
 
 
 def reason_of(error: BaseException) -> str:
-    """Return the first line of the innermost reason."""
+    """Return the first line of the innermost cause."""
     while error.__cause__ is not None:
         error = error.__cause__
     return (str(error).strip().splitlines() or [""])[0][:200] or type(error).__name__
@@ -140,11 +142,11 @@ class DaskTasks:
     Parameters
     ----------
     client
-        Of `distributed`; it is closed with the map.
+        Client of `distributed`; it is closed with the map.
     told
-        How messages begin.
+        Beginning of messages.
     cluster
-        That was started for this map, and ends with it.
+        Cluster that was started for this map and ends with it.
 
     Raises
     ------
@@ -169,7 +171,7 @@ class DaskTasks:
         self.end()
 
     def end(self) -> None:
-        """Leave the scheduler; end the cluster if it was started for this map."""
+        """Disconnect from the scheduler; end the cluster if it was started for this map."""
         try:
             self.client.close(timeout=CONNECT)
         finally:
@@ -177,7 +179,7 @@ class DaskTasks:
                 self.cluster.close(timeout=CONNECT)
 
     def check_workers(self) -> None:
-        """(1) Raise `WorkerError` if a worker has another version of the project; tell where there is none yet."""
+        """(1) Raise `WorkerError` if a worker has another version of the project; warn if there is no worker yet."""
         from pkgutil import resolve_name
 
         found = self.client.run(resolve_name, MARK, on_error="return")
@@ -218,7 +220,7 @@ class DaskTasks:
 
 
 class Work:
-    """One call of `map`: what is sent, what came back."""
+    """One call of `map`: the values sent and the answers received."""
 
     def __init__(
         self,
@@ -231,7 +233,7 @@ class Work:
         files: tuple[str, ...],
     ) -> None:
         self.client, self.told = tasks.client, tasks.told
-        self.n_tries = MOST_TRIES if tasks.cluster is not None else 2  # a scheduler that runs has tried by itself
+        self.n_tries = MOST_TRIES if tasks.cluster is not None else 2  # a running scheduler has retried by itself
         self.values, self.failed, self.progress, self.done = values, failed, progress, done
         try:
             code = extra_module("cloudpickle", **EXTRA).dumps(function)
@@ -257,11 +259,11 @@ class Work:
         return [self.found[k] for k in range(len(self.values))]
 
     def is_over(self) -> bool:
-        """Whether an error has come that nothing stands for."""
+        """Whether an error occurred for which no replacement was given."""
         return bool(self.errors) and self.failed is None
 
     def gather(self, numbers: Sequence[int]) -> list[int]:
-        """Compute some values; return the numbers of those whose workers ended again and again."""
+        """Compute some values; return the indices of the values whose workers ended repeatedly."""
         distributed = extra_module("distributed", **EXTRA)
         if self.is_over() or not numbers:
             return []
@@ -288,7 +290,7 @@ class Work:
         return sorted(suspects)
 
     def take(self, k: int, answered: Any) -> None:
-        """Keep what came back of a value."""
+        """Keep the answer for a value."""
         if isinstance(answered, Exception):
             self.errors[k] = answered
             if self.failed is not None:
@@ -301,14 +303,14 @@ class Work:
             self.progress(len(self.found), len(self.values))
 
     def cancel(self) -> None:
-        """Take back what has not been computed."""
+        """Cancel tasks that have not been computed."""
         left, self.futures = list(self.futures), {}
         if left and self.client.status == "running":
             self.client.cancel(left, force=True)
 
 
 def lost(error: Exception) -> str:
-    """Say in words what it means that a task has no answer at all."""
+    """Describe why a task has no answer at all."""
     if isinstance(error, ImportError | AttributeError):
         return f"a worker has no such version of the project ({error}); {SAME}"
     return (
@@ -317,12 +319,12 @@ def lost(error: Exception) -> str:
     )
 
 
-one_at_a_time = threading.Lock()  #: threads of a worker share the libraries' threads and caches
-for_good = ExitStack()  #: of a worker, never closed
+one_at_a_time = threading.Lock()  #: threads of one worker share the libraries' threads and caches
+for_good = ExitStack()  #: contexts of a worker, never closed
 
 
 def call(value: bytes, common: tuple[dict[str, str], tuple[str, ...], bytes]) -> bytes:
-    """Return the answer of a value; runs in a worker."""
+    """Return the answer for a value; runs in a worker."""
     expected, files, function = common
     words = differences(expected, installation())
     if words:
@@ -339,12 +341,12 @@ def call(value: bytes, common: tuple[dict[str, str], tuple[str, ...], bytes]) ->
 
 @cache
 def bind_threads() -> None:
-    """Hold this worker for good to the threads that its environment gives the libraries."""
+    """Limit this worker permanently to the number of threads in its environment variables."""
     threads = os.environ.get("OMP_NUM_THREADS", "")
     if threads.isdigit() and int(threads) > 0:
         for_good.enter_context(bounded_threads(int(threads)))
 
 
 def here() -> str:
-    """Say which process this is."""
+    """Return the host and id of this process, for messages."""
     return f"{os.getpid()} on {socket.gethostname()}"

@@ -1,4 +1,4 @@
-"""Which project, and which libraries that its numbers depend on, a process has: workers need those of the caller."""
+"""Version of the project, and of libraries that affect results, in a process; workers must match the caller."""
 
 import hashlib
 import platform
@@ -15,7 +15,7 @@ LIBRARIES = ("numpy", "scipy", "numba", "h5py")
 
 @cache
 def source_mark() -> str:
-    """Return twelve digits of the digest of all sources of the project; a checkout and its installation agree."""
+    """Return twelve digits of the digest of all sources of the project; equal for a checkout and its installation."""
     digest = hashlib.sha256()
     for package in PACKAGES:
         for path in sorted((ROOT / package).rglob("*.py")):
@@ -26,7 +26,7 @@ def source_mark() -> str:
 
 @cache
 def installation() -> dict[str, str]:
-    """Return name -> version of this project, Python, and libraries."""
+    """Return the versions of this project, Python and the libraries, by name."""
     found = {"project": f"{version('floatframe')} (sources {source_mark()})", "python": platform.python_version()}
     return found | {name: version(name) for name in LIBRARIES}
 
@@ -40,13 +40,13 @@ def version(name: str) -> str:
 
 
 def differences(expected: dict[str, str], got: dict[str, str]) -> str:
-    """Return in words how two installations differ; "" where they do not."""
+    """Describe how two installations differ; "" if they do not."""
     names = [name for name in expected if expected[name] != got.get(name)]
     return "; ".join(f"{name}: expected {expected[name]}, got {got.get(name, 'none')}" for name in names)
 
 
 def __getattr__(name: str) -> dict[str, str]:
-    """INSTALLATION is that of the process that asks: another one can be asked for it by this name."""
+    """Compute INSTALLATION in the process that asks; another process can be asked for it by this name."""
     if name == "INSTALLATION":
         return installation()
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,4 +1,4 @@
-"""Ctrl-C that is not lost: Python drops an exception that is raised while an object is being freed."""
+"""Reliable Ctrl-C: Python loses an exception that is raised while an object is being freed."""
 
 import signal
 import threading
@@ -12,17 +12,17 @@ __all__ = ["heeded_interrupts"]
 
 @contextmanager
 def heeded_interrupts() -> Iterator[Callable[[], None]]:
-    """Within this, every Ctrl-C (SIGINT) is remembered as well as raised where it comes.
+    """Record every Ctrl-C (SIGINT) within this context, in addition to raising it.
 
-    Python raises `KeyboardInterrupt` between any two of its instructions. Where these are of a weak reference that
-    vanishes, or of a `__del__`, the exception is printed and dropped, and the work goes on. Here it is not raised at
-    such places; work in a long loop calls what this gives at every turn.
+    Python raises `KeyboardInterrupt` between any two of its instructions. If these belong to the callback of a weak
+    reference or to a `__del__`, the exception is printed and lost, and the work goes on. In such places it is not
+    raised here. Work in a long loop must call the yielded function in every iteration.
 
     Yields
     ------
     Callable
-        Raises `KeyboardInterrupt` if one has come. Never does outside the main thread, or where the program has a
-        handler of its own: Python and that handler decide then.
+        Raises `KeyboardInterrupt` if a Ctrl-C was recorded. It never raises outside the main thread, or if the program
+        has its own handler; Python and that handler decide then.
     """
     has_come = False
 
@@ -48,7 +48,7 @@ def heeded_interrupts() -> Iterator[Callable[[], None]]:
 
 
 def is_freeing(frame: FrameType | None) -> bool:
-    """Whether a frame, or one that called it, runs while an object is being freed."""
+    """Whether a frame, or one of its callers, runs while an object is being freed."""
     while frame is not None:
         if frame.f_code.co_name == "__del__" or frame.f_code.co_filename == weakref.__file__:
             return True

@@ -1,7 +1,7 @@
-"""A journal of tasks: every result is a line as soon as it is known, for a second call to go on with.
+"""A journal of tasks: every result is written as a line as soon as it is known, so that a later run can continue.
 
-The first line holds the kind of the journal and the digest of all that the results depend on; a line that was cut off
-by an interruption counts as not written.
+The first line holds the kind of the journal and the digest of all inputs that affect the results. A line that an
+interruption cut off counts as not written.
 """
 
 import json
@@ -15,14 +15,14 @@ __all__ = ["TaskJournal", "open_task_journal"]
 
 
 class TaskJournal:
-    """A file to which records are appended, and those that it held when it was opened."""
+    """A file to which records are appended, and the records that it contained when it was opened."""
 
     def __init__(self, path: Path, records: list[dict[str, Any]]) -> None:
         self.path = path
         self.records = records
 
     def append(self, record: dict[str, Any]) -> None:
-        """Write a record and see that it is on the disk."""
+        """Write a record and flush it to disk."""
         with open(self.path, "a", encoding="utf-8") as file:
             file.write(json.dumps(record) + "\n")
             file.flush()
@@ -30,30 +30,30 @@ class TaskJournal:
 
 
 def open_task_journal(path: Path, kind: str, digest: str, source: str, error: type[ReportedError]) -> TaskJournal:
-    """Return the journal at a path, new or with what it holds.
+    """Open the journal at a path, a new one or an existing one with its records.
 
     Parameters
     ----------
     path
-        Of the file, which is made where it is missing.
+        Path of the file, which is created if missing.
     kind
-        Name of the command, "floatframe sweep", and number of the format of its records.
+        Name of the command, such as "floatframe sweep", and version of its record format.
     digest
-        Of all that the results depend on.
+        Digest of all inputs that affect the results.
     source
-        File that asks for the work now, for messages.
+        File that requests the work, for messages.
     error
-        Kind of the error that is raised.
+        Class of the error to raise.
 
     Raises
     ------
     error
-        If the file is no such journal, or one of other work; it is left as it is.
+        If the file is not such a journal, or belongs to other work; it is left unchanged.
     """
     command = kind.rpartition(" journal ")[0]
     whole = path.read_bytes() if path.is_file() else b""
     lines = whole.split(b"\n")
-    if len(lines) < 2:  # no first line that is complete
+    if len(lines) < 2:  # there is no complete first line
         if whole and not whole.startswith(b'{"kind"'):
             raise error(f"{path}: expected a journal of {command}, got another file; name another")
         path.write_text(json.dumps({"kind": kind, "digest": digest}) + "\n", encoding="utf-8")
@@ -78,7 +78,7 @@ def open_task_journal(path: Path, kind: str, digest: str, source: str, error: ty
             continue
         if isinstance(record, dict):
             records.append(record)
-    if not whole.endswith(b"\n"):  # the next line begins anew
+    if not whole.endswith(b"\n"):  # the last line was cut off: start a new line
         with open(path, "ab") as file:
             file.write(b"\n")
     return TaskJournal(path, records)

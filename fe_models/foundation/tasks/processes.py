@@ -1,7 +1,7 @@
-"""A function at many values in processes beside this one, none of which can take the others along when it ends.
+"""Evaluation of a function at many values in local processes; a process that ends does not affect the others.
 
-A worker that is killed gives its value to another one; a value whose workers all ended, or an answer that cannot be
-sent, is the error of one value. Workers end with this process, however it ends (also by SIGTERM, SIGHUP or SIGKILL).
+If a worker is killed, another worker takes its value. A value whose workers all ended, or whose answer cannot be sent,
+is an error of that value alone. Workers end with this process, however it ends (also by SIGTERM, SIGHUP or SIGKILL).
 """
 
 import os
@@ -21,12 +21,12 @@ from fe_models.foundation.threads import bounded_threads, thread_environment
 
 __all__ = ["MOST_TRIES", "WorkerPool"]
 
-MOST_FALSE_STARTS = 3  #: workers that end before their first value
-MOST_TRIES = 3  #: of one value whose worker ends
+MOST_FALSE_STARTS = 3  #: largest number of workers that may end before their first value
+MOST_TRIES = 3  #: largest number of attempts at a value whose worker ends
 
 
 class Worker:
-    """A process, the pipe to it, and the number of the value it works on."""
+    """A process, the pipe to it, and the index of the value on which it works."""
 
     def __init__(self, threads: int) -> None:
         context = get_context("spawn")
@@ -34,10 +34,10 @@ class Worker:
         self.process = context.Process(target=serve, args=(other, threads), daemon=True)
         with environment(thread_environment(threads)):
             self.process.start()
-        other.close()  # so that its end here is its end everywhere
+        other.close()  # so that closing the remaining end is noticed on the other side
         self.number: int | None = None
         self.is_ready = False
-        self.function = b""  #: that it has
+        self.function = b""  #: function that the process has received
 
     def end(self) -> None:
         """End the process if it still runs."""
@@ -46,7 +46,7 @@ class Worker:
         self.pipe.close()
 
     def fate(self) -> str:
-        """Say how the process ended."""
+        """Describe how the process ended."""
         self.process.join(1.0)
         code = self.process.exitcode
         if code is None or code >= 0:
@@ -58,7 +58,7 @@ class Worker:
 
 @contextmanager
 def environment(variables: dict[str, str]) -> Iterator[None]:
-    """Set variables for a process that begins now."""
+    """Set environment variables for processes started within this context."""
     before = {name: os.environ.get(name) for name in variables}
     os.environ.update(variables)
     try:
@@ -72,14 +72,14 @@ def environment(variables: dict[str, str]) -> Iterator[None]:
 
 
 class WorkerPool:
-    """A `TaskMap` of processes beside this one.
+    """A `TaskMap` of local processes.
 
     Parameters
     ----------
     n
-        How many processes at once.
+        Number of processes.
     threads
-        How many threads each may take.
+        Number of threads that each process may use.
     """
 
     def __init__(self, n: int, threads: int = 1) -> None:
@@ -94,7 +94,7 @@ class WorkerPool:
         self.end()
 
     def end(self) -> None:
-        """End all processes; a later `map` starts others."""
+        """End all processes; a later `map` starts new ones."""
         for worker in self.workers:
             worker.end()
         self.workers.clear()
@@ -109,7 +109,7 @@ class WorkerPool:
         done: Done | None = None,
         files: Sequence[str] = (),
     ) -> list[Any]:
-        """Return function(value) for every value, as `TaskMap.map` does; files are seen as here."""
+        """Return function(value) for every value, as `TaskMap.map` does; local processes see the same files."""
         try:
             code = pickle.dumps(function)
         except Exception as error:
@@ -119,13 +119,13 @@ class WorkerPool:
         try:
             return self.answers(code, values, failed, progress, done)
         except BaseException:
-            self.end()  # some are at work on values nobody waits for any more
+            self.end()  # some still work on values that are no longer needed
             raise
 
     def answers(
         self, code: bytes, values: Sequence[Any], failed: Failed | None, progress: Progress | None, done: Done | None
     ) -> list[Any]:
-        """Return the answers in the order of the values; raise the first error if nothing stands for it."""
+        """Return the answers in the order of the values; raise the first error if it has no replacement."""
         results: dict[int, Any] = {}
         errors: dict[int, Exception] = {}
         waiting = deque(range(len(values)))
@@ -133,7 +133,7 @@ class WorkerPool:
         workers = self.workers
         false_starts = 0
         while waiting or any(worker.number is not None for worker in workers):
-            for worker in workers:  # of an earlier call, or without work until another one was lost
+            for worker in workers:  # workers of an earlier call, or workers that were idle until another one was lost
                 if worker.is_ready and worker.number is None:
                     give(worker, code, values, waiting, errors)
             while len(workers) < min(self.n, len(waiting) + sum(worker.number is not None for worker in workers)):
@@ -186,7 +186,7 @@ class WorkerPool:
 def give(
     worker: Worker, code: bytes, values: Sequence[Any], waiting: "deque[int]", errors: dict[int, Exception]
 ) -> None:
-    """Send the next value to a worker, if there is one, and before it the function where that is another one."""
+    """Send the next value, if there is one, to a worker, and before it the function if the worker has another one."""
     worker.number = None
     if not waiting:
         return
@@ -200,12 +200,13 @@ def give(
     try:
         worker.pipe.send_bytes(pickle.dumps((None if worker.function == code else code, data)))
         worker.function = code
-    except (BrokenPipeError, ConnectionResetError):  # it has just ended: the pipe tells at the next turn
+    # the worker has just ended, which the pipe reports in the next iteration
+    except (BrokenPipeError, ConnectionResetError):
         pass
 
 
 def received(pipe: "Connection[Any, Any]") -> Any:
-    """Return the answer of a worker: a tuple with the result, or an error; `EOFError` if it has ended."""
+    """Return the answer of a worker: a tuple with the result, or an error; raise `EOFError` if it has ended."""
     try:
         data = pipe.recv_bytes()
     except (EOFError, OSError):
@@ -214,8 +215,8 @@ def received(pipe: "Connection[Any, Any]") -> Any:
 
 
 def serve(pipe: "Connection[Any, Any]", threads: int) -> None:
-    """Answer values with results or errors until the pipe is closed; the main function of a worker."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that asks is interrupted, and ends this one
+    """Answer values with results or errors until the pipe is closed; this is the main function of a worker."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process handles the interrupt and ends this one
     threading.Thread(target=end_with_parent, daemon=True).start()
     function = b""
     pipe.send_bytes(pickle.dumps(None))
@@ -230,7 +231,7 @@ def serve(pipe: "Connection[Any, Any]", threads: int) -> None:
 
 
 def end_with_parent() -> None:
-    """Wait for the end of the process that started this one, and end at once."""
+    """Wait for the end of the parent process, then end immediately."""
     parent = parent_process()
     if parent is not None:
         wait([parent.sentinel])

@@ -1,6 +1,6 @@
-"""What a map over tasks is: function(value) for many values, wherever that is computed.
+"""Protocol of a task map: function(value) for many values, wherever it is computed.
 
-`tasks_of` in `fe_models.foundation.tasks.workers` makes one from what a user asked for: a number, dask, dask://host:port.
+`tasks_of` in `fe_models.foundation.tasks.workers` makes one from the user's choice: a number, dask, dask://host:port.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,15 +16,15 @@ Done = Callable[[int, Any], None]
 
 
 class ProcessError(ReportedError, RuntimeError):
-    """Every process that had this value ended before it gave an answer, or value or answer cannot be sent."""
+    """Every process that received this value ended without an answer, or value or answer cannot be sent."""
 
 
 class WorkerError(ReportedError, RuntimeError):
-    """No work can be done: there are no workers, or they are not those of this project; it ends the whole map."""
+    """No worker is usable: there are none, or they have another version of the project; this ends the whole map."""
 
 
 class TaskMap(Protocol):
-    """Computes a function at many values; stays for several calls, and ends what it started when it is left."""
+    """Computes a function at many values; serves several calls, and ends its workers when the context is left."""
 
     def map(
         self,
@@ -41,30 +41,31 @@ class TaskMap(Protocol):
         Parameters
         ----------
         function
-            At the top level of a module: it is sent to other processes by name.
+            Function at the top level of a module, because it is sent to other processes by name.
         values
-            What to call it with.
+            Arguments of the calls.
         failed
-            What stands in the place of a value whose call failed; None: the error of the first one in order is raised.
+            Returns the replacement for a value whose call failed; None: the first error, in order of the values, is
+            raised.
         progress
-            Called with the numbers of values done and of all values.
+            Called with the number of finished values and the number of all values.
         done
-            Called with the number of a value and its result as soon as that is known, in no order.
+            Called with the index of a value and its result as soon as it is known, in any order.
         files
-            Absolute paths that the function reads or writes beside; every worker must see them.
+            Absolute paths of the files that the function reads or writes; every worker must see them.
 
         Raises
         ------
         WorkerError
-            If workers cannot be had, have another version of the project, or do not see the files.
+            If workers are not available, have another version of the project, or do not see the files.
         ProcessError
             If the function cannot be sent.
         Exception
-            Without `failed`: what the function raised.
+            The error of the function, if `failed` is not given.
         """
 
     def end(self) -> None:
-        """End all workers that this map started; a later `map` starts others."""
+        """End all workers that this map started; a later `map` starts new ones."""
 
     def __enter__(self) -> Self: ...
 

@@ -1,4 +1,4 @@
-"""The map over tasks that needs no other process: one value after the other."""
+"""The task map without other processes: one value after the other."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, Self
@@ -10,12 +10,12 @@ __all__ = ["ThisProcess"]
 
 
 class ThisProcess:
-    """A `TaskMap` in this process, where the function may be any callable.
+    """A `TaskMap` in this process; the function may be any callable.
 
     Parameters
     ----------
     threads
-        How many threads a value may take; None: as many as without a map.
+        Number of threads that a value may use; None: no limit set by the map.
     """
 
     def __init__(self, threads: int | None = 1) -> None:
@@ -28,7 +28,7 @@ class ThisProcess:
         self.end()
 
     def end(self) -> None:
-        """Nothing was started."""
+        """Do nothing, because no process was started."""
 
     def map(
         self,

@@ -1,4 +1,4 @@
-"""Where tasks are computed, as a user says it: a number of processes, dask, dask:4, dask://host:port."""
+"""The user's choice of where tasks are computed: a number of processes, dask, dask:4, dask://host:port."""
 
 import re
 from contextlib import AbstractContextManager, nullcontext
@@ -11,20 +11,20 @@ from fe_models.foundation.words import quoted
 
 __all__ = ["WORKERS_HELP", "Workers", "checked_workers", "tasks_of"]
 
-Workers = int | str | TaskMap | None  #: None: one process a processor
+Workers = int | str | TaskMap | None  #: None: one process per processor
 
 WORKERS_HELP = "a number of processes, dask (a local cluster; dask:4 of 4 workers), or dask://host:port of a scheduler"
-PORT = 8786  #: where a scheduler listens unless told otherwise
+PORT = 8786  #: default port of a scheduler
 ADDRESS = re.compile(r"dask://(?P<host>\[[0-9a-fA-F:.]+\]|[\w.-]+)(?::(?P<port>\d{1,5}))?/?")
 
 
 def checked_workers(text: int | str) -> int | str:
-    """Return what a user wrote as a number, or as it stands where it is of Dask.
+    """Return the user's text as a number of processes, or unchanged if it names Dask.
 
     Raises
     ------
     WorkerError
-        If it is neither.
+        If the text is neither.
     """
     word = str(text).strip()
     if re.fullmatch(r"[1-9]\d{0,3}", word):
@@ -40,22 +40,22 @@ def checked_workers(text: int | str) -> int | str:
 def tasks_of(
     workers: Workers, n_values: int | None = None, *, threads: int | None = 1
 ) -> AbstractContextManager[TaskMap]:
-    """Return the map over tasks that is meant; one that is a map already is not ended by this context.
+    """Return the chosen task map; a map that is passed in is not ended by this context.
 
     Parameters
     ----------
     workers
-        As `checked_workers` takes it, a map, or None: a process a processor.
+        A value that `checked_workers` accepts, a task map, or None for one process per processor.
     n_values
-        How many values there are at most: no more workers than that are started.
+        Largest number of values; no more workers than that are started.
     threads
-        How many threads a task may take; None: an equal share of the processors. Workers of a cluster that runs already
-        have those that it gave them.
+        Number of threads that a task may use; None: an equal share of the processors. Workers of a running cluster keep
+        the number that the cluster gave them.
 
     Raises
     ------
     WorkerError
-        If the words are not understood, or the cluster cannot be reached or started.
+        If the text is not understood, or the cluster cannot be reached or started.
     """
     if workers is not None and not isinstance(workers, int | str):
         return nullcontext(workers)
