@@ -1,4 +1,4 @@
-"""Linear constraints between components of nodes: rigid groups, mean motions, equations; and their elimination."""
+"""Linear constraints between components of nodes (rigid groups, mean motions, equations), and their elimination."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -14,12 +14,13 @@ from fe_models.foundation.errors import BodyError
 __all__ = ["MeanMotion", "NodeEquation", "RigidNodes", "eliminated"]
 
 ALL = (0, 1, 2, 3, 4, 5)
-NEGLIGIBLE = 1e-14  #: part of the largest coefficient of an equation below which its first one does not give way
+#: share of the largest coefficient of an equation, below which its first component cannot be eliminated
+NEGLIGIBLE = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
 class RigidNodes:
-    """Nodes that move rigidly with one node, in the components given."""
+    """Nodes that move rigidly with one node, in the given components."""
 
     name: str
     node: int
@@ -34,50 +35,52 @@ class MeanMotion:
     name: str
     node: int
     members: IntArray  #: (n_members,)
-    weights: Array  #: of translations, (n_members,), or of each component, mesh axes, (n_members, 6)
+    weights: Array  #: weights of the translations, (n_members,), or of each component, mesh axes, (n_members, 6)
     components: tuple[int, ...] = ALL
 
 
 @dataclass(frozen=True)
 class NodeEquation:
-    """Σ coefficient × component = 0; the first term gives way."""
+    """Σ coefficient × component = 0; the component of the first term is eliminated."""
 
     name: str
     terms: tuple[tuple[int, int, float], ...]  #: node, component, coefficient
 
 
 Constraint = RigidNodes | MeanMotion | NodeEquation
-Row = tuple[int, list[int], list[float], str]  #: dof that follows, dofs it follows, coefficients, name
+#: dependent dof, dofs on which it depends, coefficients, name of the constraint
+Row = tuple[int, list[int], list[float], str]
 
 
 def eliminated(
     constraints: Iterable[Constraint], points: Array, dof_of: IntArray, n_dof: int
 ) -> tuple[IntArray, sp.csr_array]:
-    """Return the dofs that follow others, and their rows over all dofs.
+    """Return the dependent dofs, and their rows over all dofs.
 
-    (1) every constraint says which dofs follow which: u_s = C u
-    (2) dofs that follow dofs that follow are put in until none is left: T = C + C_s C + ..., C_s its followers' columns
+    (1) every constraint gives rows u_s = C u for its dependent dofs
+    (2) dependent dofs on the right-hand side are substituted until none is left: T = C + C_s C + ..., where C_s holds
+        the columns of dependent dofs
 
     Parameters
     ----------
     constraints
-        In any order.
+        Constraints in any order.
     points
-        Of the nodes, (n_nodes, 3) [m].
+        Positions of the nodes, (n_nodes, 3) [m].
     dof_of
-        Dof of each component of each node, -1 where there is none, (n_nodes, 6).
+        Dof of each component of each node, (n_nodes, 6); -1 if the node has no such dof.
     n_dof
         Number of dofs.
 
     Returns
     -------
     tuple
-        Followers, (n_s,), and T_s, (n_s, n_dof), zero in the columns of followers.
+        Dependent dofs, (n_s,), and T_s, (n_s, n_dof), which is zero in the columns of dependent dofs.
 
     Raises
     ------
     BodyError
-        If a dof follows two constraints, constraints follow each other round, or a node lacks a dof.
+        If two constraints determine one dof, constraints form a loop, or a node lacks a dof.
     """
     rows = [row for constraint in constraints for row in _rows(constraint, points, dof_of)]
     by: dict[int, str] = {}
@@ -106,11 +109,11 @@ def eliminated(
         T.eliminate_zeros()
         if abs(T).max() > 1e8:
             break
-    raise BodyError(f"constraints: some follow each other round a ring, such as {rows[0][3]}; open the ring")
+    raise BodyError(f"constraints: some form a loop, such as {rows[0][3]}; open the loop")
 
 
 def _rows(constraint: Constraint, points: Array, dof_of: IntArray) -> list[Row]:
-    """Step (1) for one constraint."""
+    """Return the rows of one constraint: step (1)."""
     makers = {RigidNodes: _rigid, MeanMotion: _mean, NodeEquation: _equation}
     made: list[Row] = makers[type(constraint)](constraint, points, dof_of)  # type: ignore[operator]
     return made

@@ -1,13 +1,13 @@
-"""Bodies that share nodes become one: translations and rotations of a shared node are one and the same.
+"""Joining of bodies with shared nodes into one body, with common translations and rotations at shared nodes.
 
-(1) matrices of the parts side by side; every node of the whole has the components that any part gives it, and all six
-    where it leads others
-(2) u_parts = S u, S a selection: K = Sᵀ diag(K_parts) S
+(1) the matrices of the parts are placed side by side; every node of the joined body has the components that any part
+    gives it, and all six if it leads other nodes
+(2) u_parts = S u, where S is a selection matrix, gives K = Sᵀ diag(K_parts) S
 (3) constraints are eliminated, u = T u_rest (`fe_models.assemblies.constraints`)
-(4) rotations that nothing holds and that have no mass are no dofs of the whole
+(4) rotations without stiffness and without mass are dropped from the dofs
 
-The recovery has a row for each dof of the parts and, behind them, for each component that only a constraint gives a
-node (all six of a leader that is no node of a part): it moves in pictures and sensors as its interface says.
+The recovery has a row for each dof of the parts. It also has rows for components that only a constraint gives to a node
+(all six of a leader that belongs to no part). Such a node moves in pictures and sensors as its interface does.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -30,18 +30,18 @@ __all__ = ["Joined", "Part", "join"]
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A body without interfaces, and which nodes of the whole its first nodes are."""
+    """A body without interfaces, and the nodes of the joined body that are its first nodes."""
 
     body: FEBody
-    nodes: IntArray  #: numbers in the whole, (n,); nodes of the body beyond n are its own (skin)
+    nodes: IntArray  #: numbers in the joined body, (n,); nodes of the part beyond n are its own (skin)
 
 
 @dataclass(frozen=True, eq=False)
 class Joined:
-    """The whole, and where its nodes are among those of the body."""
+    """The joined body, and the position of each given node among its nodes."""
 
     body: FEBody
-    place: IntArray  #: node of the body for each node of the whole, -1 where it has none, (n_nodes,)
+    place: IntArray  #: node of the body for each given node, -1 if it has none, (n_nodes,)
 
 
 def join(
@@ -58,17 +58,17 @@ def join(
     Parameters
     ----------
     name
-        Of the whole.
+        Name of the joined body.
     parts
-        In one unit system and the same axes.
+        Parts, in one unit system and with the same axes.
     points
-        Of all nodes of the whole, used or not, (n_nodes, 3) [m].
+        Positions of all nodes, used or not, (n_nodes, 3) [m].
     constraints
-        Between nodes of the whole.
+        Constraints between these nodes.
     numbers
-        The user's numbers of the nodes of the whole, (n_nodes,); None: they have none.
+        The user's numbers of these nodes, (n_nodes,); None: they have no numbers.
     node_sets
-        Sets of nodes of the whole.
+        Sets of these nodes.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def join(
 
 
 def _kept(part: Part, begin: int, place: IntArray) -> IntArray:
-    """Return the nodes that a part keeps, where they are shared the one copy that stands for all."""
+    """Return the nodes that a part keeps, as nodes of the joined body; shared nodes have one copy."""
     kept = part.body.kept
     is_shared = kept < len(part.nodes)
     return np.concatenate([place[part.nodes[kept[is_shared]]], begin + kept[~is_shared]])
@@ -106,13 +106,13 @@ def _kept(part: Part, begin: int, place: IntArray) -> IntArray:
 def _numbering(
     parts: Sequence[Part], added: IntArray, numbers: IntArray | None, node_sets: Mapping[str, IntArray]
 ) -> Numbering:
-    """Return the numbering of the whole: every part has its own copy of a node that it shares, of the same number.
+    """Return the numbering of the joined body; each part has its own copy of a shared node, with the same number.
 
-    Points of a skin have the node that moves them: their parts number nodes by those of the whole.
+    Skin points refer to the node that moves them, which their part numbers like the joined body.
     """
     side = []
     for part in parts:
-        own = part.body.numbering.nodes  # rows of the whole: what its mesh was numbered by
+        own = part.body.numbering.nodes  # indices of the joined body, with which the mesh of the part was numbered
         at = np.full(len(part.body.nodes), NONE) if not own.size else np.array(own)
         at[: len(part.nodes)] = part.nodes
         on_skin = (np.arange(len(at)) >= len(part.nodes)).astype(np.int64)
@@ -132,14 +132,14 @@ def _numbering(
 
 
 def _leaders(constraints: list[Constraint]) -> IntArray:
-    """Return the nodes that need six dofs: those that lead rigid groups or follow mean motions."""
+    """Return the nodes that need six dofs: leaders of rigid groups, and nodes that follow mean motions."""
     return np.unique([c.node for c in constraints if isinstance(c, RigidNodes | MeanMotion)]).astype(np.int64)
 
 
 def _shared_dofs(
     parts: Sequence[Part], first_node: IntArray, place: IntArray, leaders: IntArray
 ) -> tuple[IntArray, sp.csr_array, IntArray]:
-    """Steps (1) and (2): dofs of the whole, S, and the dof of each component of each node, (n_nodes, 6)."""
+    """Steps (1) and (2): return the joined dofs, S, and the dof of each component of each node, (n_nodes, 6)."""
     keys, own = [], []
     for part, begin in zip(parts, first_node[:-1], strict=True):
         node, component = part.body.dofs.T
@@ -168,7 +168,7 @@ def _side_by_side(name: str, bodies: list[FEBody], S: sp.csr_array, dofs: IntArr
         Recovery(sp.eye_array(body.n_dof, format="csr"), body.dofs) if body.recovery is None else body.recovery
         for body in bodies
     ]
-    loose = np.flatnonzero(np.diff(S.tocsc().indptr) == 0)  # dofs of leaders that no part has
+    loose = np.flatnonzero(np.diff(S.tocsc().indptr) == 0)  # dofs of leaders that belong to no part
     own = sp.csr_array((np.ones(len(loose)), (np.arange(len(loose)), loose)), shape=(len(loose), len(dofs)))
     n_mesh_dof = tuple(int(recovery.matrix.shape[0]) for recovery in recoveries)
     models = [body.element_model for body in bodies]
@@ -216,15 +216,15 @@ def _side_by_side(name: str, bodies: list[FEBody], S: sp.csr_array, dofs: IntArr
 
 
 def recovered_dofs(body: FEBody) -> IntArray:
-    """Return (node, component) of the dofs of the mesh behind a body, (n_mesh_dof, 2)."""
+    """Return (node, component) of the mesh dofs of a body, (n_mesh_dof, 2)."""
     return body.dofs if body.recovery is None else body.recovery.dofs
 
 
 def _without_idle_rotations(body: FEBody, n_of_parts: int) -> FEBody:
-    """Step (4); a rotation with mass and no stiffness stays, and shows as a motion without frequency.
+    """Step (4). A rotation with mass but without stiffness stays, and appears as a motion of zero frequency.
 
-    Rows of the recovery beyond those of the parts that are rotations of this kind are no motion of their node: they
-    lose their component, as its rotation is not zero but unknown.
+    If a recovery row beyond those of the parts belongs to such a rotation, it does not give the motion of its node. It
+    loses its component, because the rotation is not zero but unknown.
     """
     is_idle = body.dofs[:, 1] >= 3
     for A in (body.K, body.M):

@@ -1,4 +1,4 @@
-"""Nodes without elements, as a part of a body: reference nodes that carry no mass, no stress and no force."""
+"""Nodes without elements, as a part of a body: reference nodes without mass, stress and force."""
 
 from dataclasses import dataclass
 
@@ -12,23 +12,23 @@ __all__ = ["MasslessNodes"]
 
 @dataclass(frozen=True)
 class MasslessNodes:
-    """The element model of nodes that only constraints know (`fe_models.body.fe_body.ElementModel`): all zero."""
+    """Element model of nodes in constraints only (`fe_models.body.fe_body.ElementModel`); all results are zero."""
 
     n_mesh_dof: int
     n_nodes: int
 
     @property
     def has_nodal_stress(self) -> bool:
-        """No: there is no material at these nodes."""
+        """False, because there is no material at these nodes."""
         return False
 
     def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
-        """Return NaN, (n, 3, k): there is no element at these nodes."""
+        """Return NaN, (n, 3, k), because there is no element at these nodes."""
         return np.full((len(nodes), 3, np.shape(u)[1]), np.nan)
 
     @property
     def has_geometric_stiffness(self) -> bool:
-        """Yes: it is zero."""
+        """True; the geometric stiffness is zero."""
         return True
 
     def mass_gram(self, u: Array) -> Array:

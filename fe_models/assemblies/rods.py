@@ -1,7 +1,7 @@
-"""Rods of a truss: lines that carry force along themselves only, as a body of translations.
+"""Rods of a truss: lines with axial force only, as a body with translational dofs.
 
-(1) stretch of a rod: e = t · (u_2 - u_1), t its direction; energy ½ E A / L e²
-(2) displacement is linear along it: kinetic energy ½ rho A L / 6 (2 v_1² + 2 v_1 · v_2 + 2 v_2²)
+(1) elongation of a rod: e = t · (u_2 - u_1) with direction t; energy ½ E A / L e²
+(2) displacement is linear along the rod: kinetic energy ½ rho A L / 6 (2 v_1² + 2 v_1 · v_2 + 2 v_2²)
 """
 
 from collections.abc import Mapping
@@ -23,28 +23,28 @@ __all__ = ["Rod", "rod_body"]
 
 @dataclass(frozen=True)
 class Rod:
-    """Material and area of rods."""
+    """Material and cross-section area of rods."""
 
     material: Material
     area: float  #: [m²]
 
 
 def rod_body(mesh: LineMesh, rods: Mapping[str, Rod], *, name: str, units: Units) -> FEBody:
-    """Return the body of the rods of a truss, three translations at each node, with consistent mass.
+    """Return the body of the rods of a truss, with three translations at each node and consistent mass.
 
     Parameters
     ----------
     mesh
-        Its lines are the rods.
+        Mesh whose lines are the rods.
     rods
-        Group of lines -> material and area.
+        Material and area of each group of lines.
     name, units
-        Of the body.
+        Name and unit system of the body.
 
     Raises
     ------
     BodyError
-        If a line has no area, two, or no length, or an area is not above zero.
+        If a line has no area, two areas or no length, or an area is not positive.
     """
     of_line: list[Rod | None] = [None] * len(mesh.lines)
     for group, rod in rods.items():

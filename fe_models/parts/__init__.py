@@ -1,4 +1,4 @@
-"""Parametric parts, meshed with gmsh, and the meshes that are shipped."""
+"""Parametric parts, meshed with gmsh, and meshes that are part of the package."""
 
 from fe_models.errors import MeshingError
 from fe_models.parts.bracket import Bracket, mesh_bracket

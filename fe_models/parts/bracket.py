@@ -17,22 +17,22 @@ __all__ = ["Bracket", "mesh_bracket"]
 class Bracket:
     """Dimensions of an L-shaped bracket, in any one length unit (defaults in mm).
 
-    The foot lies on z = 0 and reaches from x = 0 along +x, the upright stands on x = 0..thickness along +z, the bracket
-    is symmetric about y = 0. Four bolts go through the foot along z, the bore through the upright along x.
+    The foot lies on z = 0 and extends from x = 0 along +x. The upright stands on x = 0..thickness along +z. The bracket
+    is symmetric about y = 0. Four bolts pass through the foot along z, and the bore passes through the upright along x.
     """
 
-    foot_length: float = 90.0  #: along x, the upright's thickness included
+    foot_length: float = 90.0  #: along x, including the thickness of the upright
     width: float = 70.0  #: along y
     height: float = 110.0  #: along z
-    thickness: float = 10.0  #: of foot and upright
+    thickness: float = 10.0  #: thickness of foot and upright
     fillet: float = 8.0  #: radius in the inner corner
     bolt: float = 9.0  #: diameter of the bolt holes
-    bolt_edge: float = 14.0  #: from a bolt axis to the edge of the foot or to the upright
+    bolt_edge: float = 14.0  #: distance from a bolt axis to the edge of the foot, or to the upright
     bore: float = 32.0  #: diameter
-    bore_height: float = 80.0  #: of the bore axis over z = 0
+    bore_height: float = 80.0  #: height of the bore axis above z = 0
     rib_thickness: float = 8.0  #: along y
-    rib_length: float = 55.0  #: along the foot, from the upright's inner face
-    rib_height: float = 42.0  #: along the upright, from the foot's upper face
+    rib_length: float = 55.0  #: along the foot, from the inner face of the upright
+    rib_height: float = 42.0  #: along the upright, from the upper face of the foot
 
     def __post_init__(self) -> None:
         require_lengths(self)
@@ -101,7 +101,7 @@ class Bracket:
 
     @property
     def bolt_axes(self) -> tuple[tuple[float, float], ...]:
-        """(x, y) of the bolts 1 to 4: the inner row first, -y before +y."""
+        """Positions (x, y) of bolts 1 to 4: inner row first, -y before +y."""
         y = self.width / 2 - self.bolt_edge
         return tuple((x, side * y) for x in self.bolt_x for side in (-1, 1))
 
@@ -146,7 +146,7 @@ def mesh_bracket(bracket: Bracket | None = None, *, size: float = 8.0, order: in
 
 
 def draw(gmsh: ModuleType, bracket: Bracket) -> None:
-    """Draw the solid: (1) L with its fillet, (2) rib on it, (3) holes and bore cut out."""
+    """Draw the solid: (1) the L-shape with its fillet, (2) the rib on it, (3) cut out the holes and the bore."""
     occ = gmsh.model.occ
     t, f, w = bracket.thickness, bracket.fillet, bracket.width
 
@@ -161,7 +161,7 @@ def draw(gmsh: ModuleType, bracket: Bracket) -> None:
     lines += [arc, occ.addLine(p[4], p[5]), occ.addLine(p[5], p[6]), occ.addLine(p[6], p[0])]
     ell = extrude_y(occ, lines, w)  # (1)
     y = -bracket.rib_thickness / 2
-    inside = t / 2  # the rib starts inside both plates, so that no faces merely touch
+    inside = t / 2  # the rib starts inside both plates, so that faces do not merely touch
     corners = (
         (inside, inside),
         (t + bracket.rib_length, inside),
@@ -180,6 +180,6 @@ def draw(gmsh: ModuleType, bracket: Bracket) -> None:
 
 
 def extrude_y(occ: ModuleType, lines: list[int], depth: float) -> tuple[int, int]:
-    """Return the solid over a closed run of curves in a plane y = const, along +y."""
+    """Return the solid between a closed loop of curves in a plane y = const and its copy moved along +y."""
     bodies = occ.extrude([(2, occ.addPlaneSurface([occ.addCurveLoop(lines)]))], 0, depth, 0)
     return next((dim, tag) for dim, tag in bodies if dim == 3)

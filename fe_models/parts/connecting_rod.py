@@ -15,15 +15,15 @@ __all__ = ["SLENDER_ROD", "ConnectingRod", "mesh_connecting_rod"]
 
 Point = tuple[float, float]
 
-ROOT_ANGLE = np.deg2rad(30.0)  #: between fillet and ring; at 0 the shank's face would end in a cusp
+ROOT_ANGLE = np.deg2rad(30.0)  #: angle between fillet and ring; at 0 the face of the shank would end in a cusp
 
 
 @dataclass(frozen=True)
 class ConnectingRod:
     """Dimensions of a connecting rod, in any one length unit (defaults: a passenger car's rod in mm).
 
-    The big end's centre is the origin, the small end lies on +x, the bores run along z. The rod is symmetric about
-    y = 0 and z = 0.
+    The centre of the big end is the origin, the small end is on +x, and the bores are along z. The rod is symmetric
+    about y = 0 and z = 0.
     """
 
     centre_distance: float = 140.0  #: from bore axis to bore axis
@@ -33,13 +33,13 @@ class ConnectingRod:
     small_bore: float = 22.0  #: diameter
     small_outer: float = 34.0  #: diameter
     small_width: float = 24.0  #: along z
-    shank_height_big: float = 32.0  #: along y, the taper extended to the big end's axis
-    shank_height_small: float = 22.0  #: along y, the taper extended to the small end's axis
+    shank_height_big: float = 32.0  #: along y, where the taper extended reaches the axis of the big end
+    shank_height_small: float = 22.0  #: along y, where the taper extended reaches the axis of the small end
     shank_width: float = 16.0  #: along z
-    web: float = 5.0  #: thickness between the two pockets along z; equal to shank_width: no pockets
+    web: float = 5.0  #: thickness along z between the two pockets; equal to shank_width: no pockets
     flange: float = 4.5  #: thickness beside the pockets, in the plane
-    fillet: float = 14.0  #: radius in the plane where the shank runs into the ends
-    bolt: float = 8.0  #: diameter of the cap's bolt holes; 0: neither holes nor bosses
+    fillet: float = 14.0  #: radius of the fillet between shank and ends, in the plane
+    bolt: float = 8.0  #: diameter of the bolt holes of the cap; 0: neither holes nor bosses
     boss: float = 18.0  #: diameter of the bolt bosses
     boss_length: float = 46.0  #: along x
 
@@ -106,7 +106,7 @@ class ConnectingRod:
 
     @property
     def bolt_offset(self) -> float:
-        """Distance of a bolt axis from the rod's axis, along y: the boss just touches the bore."""
+        """Distance of a bolt axis from the rod axis, along y, at which the boss just touches the bore."""
         return (self.big_bore + self.boss) / 2
 
 
@@ -114,14 +114,14 @@ def shank_outline(rod: ConnectingRod) -> tuple[Point, Point, Point, Point, Point
     """Return the tangent points of the upper outline and the centres of its two fillets, in the plane.
 
     The upper edge of the shank is the line n·p = d, n = (sin a, cos a). A fillet of radius f touches it from above, so
-    that its centre c has n·c = d + f, and crosses the outer circle (centre o, radius R) at `ROOT_ANGLE`, by the law of
-    cosines |c - o|² = R² + f² + 2 R f cos(ROOT_ANGLE): it touches the circle of radius |c - o| - f inside the ring.
+    its centre c has n·c = d + f. It crosses the outer circle (centre o, radius R) at `ROOT_ANGLE`, so that |c - o|² =
+    R² + f² + 2 R f cos(ROOT_ANGLE) by the law of cosines. It touches the circle of radius |c - o| - f inside the ring.
 
     Returns
     -------
     tuple
-        inside the big ring, on the line (big side), on the line (small side), inside the small ring, centre big,
-        centre small.
+        The point inside the big ring, the points on the line at the big and the small end, the point inside the small
+        ring, and the centres of the fillets at the big and the small end.
     """
     a, d = taper(rod)
     found = []
@@ -145,7 +145,7 @@ def taper(rod: ConnectingRod) -> tuple[float, float]:
 
 
 def pocket_circles(rod: ConnectingRod) -> tuple[tuple[float, float], tuple[float, float]] | None:
-    """Return (x, radius) of the two end circles of a pocket, one flange inside the shank and off the rings; or None."""
+    """Return (x, radius) of the two end circles of a pocket, one flange from the outline and the rings; or None."""
     a, d = taper(rod)
     inside = d - rod.flange
     x_big = (rod.big_outer / 2 + rod.flange + inside) / (1 + sin(a))
@@ -191,7 +191,7 @@ def mesh_connecting_rod(
 
 
 def draw(gmsh: ModuleType, rod: ConnectingRod) -> None:
-    """Draw the solid: (1) plate with the outline, (2) rings and bosses on it, (3) bores, holes and pockets cut out."""
+    """Draw the solid: (1) a plate with the outline, (2) rings and bosses, (3) cut out bores, holes and pockets."""
     occ = gmsh.model.occ
     L, z = rod.centre_distance, rod.shank_width / 2
     plate = extrude(occ, outline_wire(occ, rod, -z), rod.shank_width)  # (1)
@@ -222,7 +222,7 @@ def draw(gmsh: ModuleType, rod: ConnectingRod) -> None:
 def outline_wire(occ: ModuleType, rod: ConnectingRod, z: float) -> int:
     """Return the closed outline of the plate in the plane z: bore centre, fillet, edge, fillet, bore centre, mirrored.
 
-    Inside the rings the plate ends in wedges: an outline along the outer circles would leave seams on the rings.
+    Inside the rings the plate ends in wedges. An outline along the outer circles would leave seams on the rings.
     """
     ring_big, line_big, line_small, ring_small, c_big, c_small = shank_outline(rod)
 
@@ -247,7 +247,7 @@ def outline_wire(occ: ModuleType, rod: ConnectingRod, z: float) -> int:
 
 
 def slot_wire(occ: ModuleType, circles: tuple[tuple[float, float], tuple[float, float]], z: float) -> int:
-    """Return the hull of two circles (x, radius) on the x axis, in the plane z."""
+    """Return the convex hull of two circles (x, radius) on the x axis, in the plane z."""
     (x_1, r_1), (x_2, r_2) = circles
     n_x = (r_1 - r_2) / hypot(x_2 - x_1, 0.0)
     n = (n_x, sqrt(1 - n_x**2))  # unit normal of the upper common tangent
@@ -270,7 +270,7 @@ def slot_wire(occ: ModuleType, circles: tuple[tuple[float, float], tuple[float, 
 
 
 def boss(occ: ModuleType, rod: ConnectingRod, side: int) -> tuple[int, int]:
-    """Return a bolt boss along x at y = side * bolt_offset: round outside, open toward the ring."""
+    """Return a bolt boss along x at y = side * bolt_offset: round on the outside, open toward the ring."""
     x, y, r = -rod.boss_length / 2, side * rod.bolt_offset, rod.boss / 2
     corners = [occ.addPoint(x, yy, zz) for yy, zz in ((0, -r), (y, -r), (y + side * r, 0), (y, r), (0, r))]
     centre = occ.addPoint(x, y, 0)
@@ -288,7 +288,7 @@ def boss(occ: ModuleType, rod: ConnectingRod, side: int) -> tuple[int, int]:
 
 
 def extrude(occ: ModuleType, wire: int, height: float) -> tuple[int, int]:
-    """Return the solid over the plane face of a wire, along z."""
+    """Return the solid between the plane face of a wire and its copy moved along z."""
     bodies = occ.extrude([(2, occ.addPlaneSurface([wire]))], 0, 0, height)
     return next((dim, tag) for dim, tag in bodies if dim == 3)
 
@@ -308,4 +308,4 @@ SLENDER_ROD = ConnectingRod(
     flange=1.0,
     fillet=8.0,
     bolt=0.0,
-)  #: cut from a plate of 10 mm, in mm: so slender that its own inertia bends it visibly at 2400 turns a minute
+)  #: cut from a plate of 10 mm; so slender that its own inertia visibly bends it at 2400 turns a minute

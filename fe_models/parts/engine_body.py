@@ -1,7 +1,7 @@
-"""A parametric body of a four-axle railway engine: shells on beams, equipment as masses, the seats of its suspension.
+"""A parametric body of a four-axle locomotive: shells on beams, equipment as masses, seats of the suspension.
 
-x points forwards, y to the left, z up from the top of the rails; the body is symmetric about x = 0 and y = 0. Its walls
-are swept along stations of x, y and z that hold every edge, so that a finer mesh keeps the shape.
+x points forward, y to the left, z up from the top of the rails. The body is symmetric about x = 0 and y = 0. Its walls
+are swept along stations of x, y and z that contain every edge, so that a finer mesh keeps the shape.
 """
 
 import itertools
@@ -23,7 +23,7 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class EngineBody:
-    """Dimensions of the body in m, heights over the rails."""
+    """Dimensions of the body in m; heights are above the rails."""
 
     length: float = 18.0  #: between the end walls
     width: float = 2.9
@@ -31,15 +31,15 @@ class EngineBody:
     waist: float = 2.05  #: lower edge of the windows
     window_top: float = 2.75
     cantrail: float = 3.4  #: height where side walls meet the roof
-    rise: float = 0.5  #: of the roof over the cantrails
-    pivot: float = 5.2  #: of the bogies, from the middle
-    seat: float = 1.05  #: of the secondary springs, from the middle across
-    bulkhead: float = 6.7  #: wall between machine room and cab, from the middle
-    window_start: float = 7.3  #: of the side windows of the cabs, from the middle
+    rise: float = 0.5  #: height of the roof above the cantrails
+    pivot: float = 5.2  #: distance of the bogie pivots from the middle
+    seat: float = 1.05  #: distance of the secondary springs from the middle, along y
+    bulkhead: float = 6.7  #: distance of the wall between machine room and cab from the middle
+    window_start: float = 7.3  #: start of the side windows of the cabs, from the middle
     window_end: float = 8.2
-    inner: float = 1.4  #: mounts of the transformer, and the frames there, from the middle
-    outer: float = 3.4  #: mounts of the converters
-    pitch: float = 0.75  #: largest distance of frames
+    inner: float = 1.4  #: distance of the transformer mounts, and of the frames there, from the middle
+    outer: float = 3.4  #: distance of the converter mounts from the middle
+    pitch: float = 0.75  #: largest distance between frames
 
     def __post_init__(self) -> None:
         require_lengths(self)
@@ -55,24 +55,24 @@ class EngineBody:
             )
 
     def frames(self) -> Array:
-        """Return places x >= 0 of the frames, ascending; every edge has one."""
+        """Return positions x >= 0 of the frames, ascending; every edge has a frame."""
         edges = (self.inner, self.outer, self.pivot, self.bulkhead, self.window_start, self.window_end)
         return divided((0.0, *edges, self.length / 2), self.pitch)
 
     def stations(self, size: float) -> tuple[Array, Array, Array]:
-        """Return x, y and z (of the side walls) of the nodes, ascending; cells are no longer than `size`."""
+        """Return x, y and z (of the side walls) of the nodes, ascending; cells are not longer than `size`."""
         x = divided(tuple(self.frames()), size)
         y = divided((0.0, self.seat, self.width / 2), size)
         z = divided((self.floor, self.waist, self.window_top, self.cantrail), size)
         return np.concatenate([-x[:0:-1], x]), np.concatenate([-y[:0:-1], y]), z
 
     def roof(self, y: Array) -> Array:
-        """Return heights of the roof over places across, a parabola."""
+        """Return heights of the roof at positions y: a parabola."""
         return self.cantrail + self.rise * (1 - (2 * y / self.width) ** 2)
 
 
 def divided(edges: tuple[float, ...], size: float) -> Array:
-    """Return edges and equal parts between them that are no longer than `size`, ascending."""
+    """Return the edges and, between them, equal divisions that are not longer than `size`, ascending."""
     parts = [
         np.linspace(a, b, max(int(np.ceil((b - a) / size - 1e-9)), 1) + 1)[:-1] for a, b in itertools.pairwise(edges)
     ]
@@ -80,13 +80,13 @@ def divided(edges: tuple[float, ...], size: float) -> Array:
 
 
 def engine_body_mesh(part: EngineBody | None = None, *, size: float = 0.5) -> ShellMesh:
-    """Return quads and lines of the body.
+    """Return the mesh of the body: quads and lines.
 
-    Groups of cells: "floor", "side", "roof", "end", "bulkhead". Groups of lines: "solebar" and "cantrail" (along the
-    edges of floor and roof), "stringer" (along sides and roof), "post" (of end walls and bulkheads), "bolster" (across
-    the floor at the pivots), "crossbeam" (across the floor at the other frames), "frame" (up the sides and over the
-    roof). Node sets of one node: "seat_1_left", "seat_1_right", "seat_2_left", "seat_2_right" (bogie 1 in front),
-    "pivot_1", "pivot_2", mounts of the equipment, and places to look at.
+    The groups of cells are "floor", "side", "roof", "end" and "bulkhead". The groups of lines are "solebar" and
+    "cantrail" (along the edges of floor and roof), "stringer" (along sides and roof), "post" (of end walls and
+    bulkheads), "bolster" (across the floor at the pivots), "crossbeam" (across the floor at the other frames) and
+    "frame" (up the sides and over the roof). Node sets with one node are "seat_1_left", "seat_1_right", "seat_2_left",
+    "seat_2_right" (bogie 1 in front), "pivot_1", "pivot_2", the mounts of the equipment, and points of observation.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def engine_body_mesh(part: EngineBody | None = None, *, size: float = 0.5) -> Sh
     Raises
     ------
     PartError
-        If the size is not above zero.
+        If the size is not positive.
     """
     part = part or EngineBody()
     require(part, 0 < size < np.inf, f"a size above zero, got {size:g}", "choose one of 0.2 to 1 m")
@@ -154,7 +154,7 @@ def engine_body_mesh(part: EngineBody | None = None, *, size: float = 0.5) -> Sh
 def _places(
     part: EngineBody, x: Array, y: Array, floor: IntArray, roof: IntArray, left: IntArray, right: IntArray
 ) -> dict[str, int]:
-    """Return name -> node: where the suspension, the equipment and the looks of a user are."""
+    """Return the nodes of suspension, equipment and points of observation, by name."""
     found: dict[str, int] = {}
     seats, edge = (("left", _at(y, part.seat)), ("right", _at(y, -part.seat))), (("left", -1), ("right", 0))
     for number, sign in ((1, 1), (2, -1)):
@@ -182,7 +182,7 @@ def _at(stations: Array, value: float) -> int:
 
 
 class _Grid:
-    """Nodes that walls share, cells and lines under construction."""
+    """Nodes shared by walls, and cells and lines during construction."""
 
     def __init__(self, part: EngineBody) -> None:
         self.part = part
@@ -193,13 +193,13 @@ class _Grid:
         self.line_groups: dict[str, list[int]] = {}
 
     def nodes(self, points: Array) -> IntArray:
-        """Return the numbers of points (..., 3); points that are there keep theirs."""
+        """Return the node numbers of points (..., 3); existing points keep their number."""
         keys = [tuple(row) for row in np.round(points.reshape(-1, 3), 6).tolist()]
         found = [self.number.setdefault(key, len(self.number)) for key in keys]
         return np.array(found, dtype=np.int64).reshape(points.shape[:-1])
 
     def quads(self, group: str, index: IntArray, *, kept: BoolArray | None = None, outwards: bool = True) -> None:
-        """Add the cells of a grid of nodes; `outwards` as its two directions turn by the right hand."""
+        """Add the cells of a grid of nodes; with `outwards` the normal is right-handed about its two directions."""
         cells = np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]], axis=-1)
         cells = cells[kept] if kept is not None else cells.reshape(-1, 4)
         first = sum(len(rows) for rows in self.cells)
@@ -207,15 +207,15 @@ class _Grid:
         self.cell_groups.setdefault(group, []).extend(range(first, first + len(cells)))
 
     def line(self, group: str, nodes: IntArray) -> None:
-        """Add the lines from each node to the next."""
+        """Add lines between consecutive nodes."""
         ends = [(int(a), int(b)) for a, b in itertools.pairwise(nodes)]
         self.line_groups.setdefault(group, []).extend(range(len(self.lines), len(self.lines) + len(ends)))
         self.lines += ends
 
     def mesh(self, sets: dict[str, int], source: str) -> ShellMesh:
-        """Return what was made."""
+        """Return the mesh."""
         cells, lines = np.concatenate(self.cells), np.array(self.lines, dtype=np.int64)
-        used = np.unique(np.concatenate([cells.ravel(), lines.ravel()]))  # others lie within a window
+        used = np.unique(np.concatenate([cells.ravel(), lines.ravel()]))  # other nodes lie inside a window
         place = np.full(len(self.number), -1)
         place[used] = np.arange(len(used))
         return ShellMesh(
@@ -230,7 +230,7 @@ class _Grid:
 
 
 def mesh_deck(mesh: ShellMesh) -> str:
-    """Return quads, lines and their groups as text of the mesh of an Abaqus deck, numbers from 1; lines after quads."""
+    """Return quads, lines and groups as the mesh part of an Abaqus deck; numbers start at 1, lines after quads."""
     return "\n".join(_deck(mesh)) + "\n"
 
 

@@ -1,4 +1,4 @@
-"""The gmsh model of a parametric part: opened, meshed and written with its groups."""
+"""The gmsh model of a parametric part: opened, meshed, and written with its groups."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,18 +16,18 @@ __all__ = ["PartMesh", "cylinder_faces", "mesh_and_write", "part_model"]
 
 @dataclass(frozen=True)
 class PartMesh:
-    """A meshed part: the file, and what its geometry and its worst element are."""
+    """A meshed part: its file, its exact volume, and the quality of its worst element."""
 
     path: Path
-    volume: float  #: of the exact geometry, before meshing [length³]
+    volume: float  #: volume of the exact geometry, before meshing [length³]
     n_nodes: int
     n_elements: int
-    worst_quality: float  #: smallest scaled inverse condition number of an element, 1 is best, <= 0 is inverted
+    worst_quality: float  #: smallest scaled inverse condition number of an element; 1 is best, <= 0 is inverted
 
 
 @contextmanager
 def part_model(name: str, size: float, order: int) -> Iterator[ModuleType]:
-    """Open an empty gmsh model for one part, and close it whatever happens; options come back as they were."""
+    """Open an empty gmsh model for one part, and always close it; gmsh options are restored."""
     if not (np.isfinite(size) and size > 0):
         raise MeshError(f"part {name!r}: size: expected a positive element size, got {size}")
     if order not in (1, 2):
@@ -66,7 +66,7 @@ def mesh_and_write(gmsh: ModuleType, *, name: str, groups: dict[str, list[int]],
     volume = float(gmsh.model.occ.getMass(3, volumes[0]))
     try:
         gmsh.model.mesh.generate(3)
-    except Exception as error:  # gmsh raises bare Exception
+    except Exception as error:  # gmsh raises a bare Exception
         raise MeshError(f"part {name!r}: gmsh could not mesh it ({error}); try another size") from error
     gmsh.model.mesh.renumberNodes()
     gmsh.model.mesh.renumberElements()

@@ -1,4 +1,4 @@
-"""Meshes that come with the package."""
+"""Meshes that are part of the package."""
 
 from importlib.resources import files
 from pathlib import Path
@@ -7,17 +7,17 @@ from fe_models.parts.errors import PartError
 
 __all__ = ["SHIPPED_MESHES", "shipped_mesh"]
 
-#: name -> file, in mm: the default dimensions of `ConnectingRod`, and `SLENDER_ROD` in elements of 7 mm
+#: file of each mesh, in mm: `ConnectingRod` with default dimensions, and `SLENDER_ROD` in elements of 7 mm
 SHIPPED_MESHES = {"connecting_rod": "connecting_rod.msh", "slender_rod": "slender_rod.msh"}
 
 
 def shipped_mesh(name: str) -> Path:
-    """Return the path of a shipped mesh, such as "connecting_rod" (tet10, in mm, groups as its mesher names them).
+    """Return the path of a mesh of the package, such as "connecting_rod" (tet10, mm, groups of its mesher).
 
     Raises
     ------
     PartError
-        If there is no such mesh, with the choices; or if the package was installed in a form without plain files.
+        If there is no such mesh, or the package was installed without unpacked files.
     """
     if name not in SHIPPED_MESHES:
         raise PartError(f"shipped_mesh: no mesh {name!r}; choices: {', '.join(SHIPPED_MESHES)}")

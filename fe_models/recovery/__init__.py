@@ -1,1 +1,1 @@
-"""What elements carry in a displacement field, as rows that are linear in it: section forces, resultants, strains."""
+"""Element results as linear functions of the displacements: section forces, resultants, strains."""

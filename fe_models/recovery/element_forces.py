@@ -1,7 +1,7 @@
-"""Forces and strains in elements from a displacement field: sections of beams, shells, springs, centres of solids.
+"""Forces and strains in elements: beam sections, shell cells, springs, and centres of solid cells.
 
-Each group of elements of one kind says which numbers it has and how they are named; groups of a body of several parts
-stand side by side, in the order of the parts.
+Each group holds elements of one kind with their numbers and names. The groups of a body of several parts are listed in
+the order of the parts.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -38,26 +38,27 @@ SPRING = ("fx", "fy", "fz", "mx", "my", "mz")
 
 @dataclass(frozen=True, eq=False)
 class ElementGroup:
-    """Elements of one kind and the forces in them.
+    """Elements of one kind, and the forces or strains in them.
 
-    "beam force": on the face whose normal is the local +x, about the centroid, local axes, at both ends
-    (`BeamModel.section_forces`). "shell resultant": in local axes, the mean of the points of its stiffness
-    (`ShellCells.resultants`). "spring force": stiffness times the motion of the second side against the first, in the
-    axes of the spring: a tension is positive. "beam strain", "shell strain": what these forces do in the material
-    (`element_strains`). "element stress", "element strain": of solids, at the centre, mesh axes.
+    "beam force": on the face with normal local +x, about the centroid, in local axes, at both ends
+    (`BeamModel.section_forces`). "shell resultant": in local axes, averaged over the points of the stiffness
+    (`ShellCells.resultants`). "spring force": stiffness times the motion of the second side relative to the first, in
+    the axes of the spring; tension is positive. "beam strain", "shell strain": the strains that belong to these forces
+    (`element_strains`). "element stress", "element strain": of solid cells, at the centre, in mesh axes.
     """
 
     quantity: str
-    part: str  #: kind of cells, and the part of a body of several; "" where it need not be told
-    names: tuple[str, ...]  #: what the user calls each element; "part 1 3", its index, where it has no number
-    numbers: IntArray  #: of the user, -1 for none, (n,)
-    groups: Mapping[str, IntArray]  #: sets of the user -> elements that are in them
+    part: str  #: cell type, and the part in a body of several parts; "" if not needed
+    names: tuple[str, ...]  #: the user's name of each element; if it has no number, "part 1 3" with its index
+    numbers: IntArray  #: the user's numbers, -1 for none, (n,)
+    groups: Mapping[str, IntArray]  #: elements that belong to each set of the user
     components: tuple[str, ...]
-    dimensions: tuple[Dimensions, ...]  #: of each component
-    forces: Callable[[Array, IntArray], Array]  #: of columns over the mesh dofs and elements, (n, n_components, k)
-    source: "ShellCells | BeamModel | SolidModel"  #: whose elements they are
-    rows: slice  #: of the mesh dofs of the body: those of the model behind them
-    first_node: int  #: of the body: where the nodes of that model begin
+    dimensions: tuple[Dimensions, ...]  #: dimensions of each component
+    #: function of columns over the mesh dofs and of elements, (n, n_components, k)
+    forces: Callable[[Array, IntArray], Array]
+    source: "ShellCells | BeamModel | SolidModel"  #: element model that computes the values
+    rows: slice  #: rows of the element model among the mesh dofs of the body
+    first_node: int  #: index in the body of the first node of the element model
 
     @property
     def count(self) -> int:
@@ -65,14 +66,14 @@ class ElementGroup:
         return len(self.names)
 
     def members(self, at: str | int, *, is_only: bool) -> IntArray:
-        """Return the elements that a name or number means; none if the group has none.
+        """Return the elements with this name or number; none if the group has none.
 
         Parameters
         ----------
         at
-            The number of an element; the name of an element, a set or the part.
+            Number or name of an element, or name of a set or of the part.
         is_only
-            Whether no other group is asked: then a number is the index where elements have no numbers.
+            Whether this is the only group. A number is then an index if the elements have no numbers.
         """
         if isinstance(at, str):
             if at in self.groups:
@@ -85,23 +86,23 @@ class ElementGroup:
 
 @dataclass(frozen=True)
 class _Place:
-    """Where the model of a part stands in the body."""
+    """Position of the element model of a part in the body."""
 
     part: str
-    rows: slice  #: of the mesh dofs
+    rows: slice  #: rows among the mesh dofs
     first_node: int
     n_nodes: int
 
 
 def element_groups(body: FEBody) -> tuple[ElementGroup, ...]:
-    """Return the groups of elements of a body whose forces are known; none of bare matrices and solids."""
+    """Return the groups of elements of a body whose forces are known; none for bare matrices."""
     if body.element_model is None:
         return ()
     return tuple(_groups(body, body.element_model, _Place("", slice(None), 0, len(body.nodes))))
 
 
 def _groups(body: FEBody, model: object, at: _Place) -> Iterator[ElementGroup]:
-    """Yield the groups of a model."""
+    """Yield the groups of an element model."""
     if isinstance(model, WeldedModel):
         first = np.cumsum([0, *model.n_nodes]).tolist()
         for k, (each, rows) in enumerate(zip(model.parts, mesh_rows(model.n_mesh_dof), strict=True)):
@@ -159,7 +160,7 @@ def _groups(body: FEBody, model: object, at: _Place) -> Iterator[ElementGroup]:
 
 
 def _named_cells(part: str, model: SolidModel, kind: str) -> tuple[tuple[str, ...], IntArray, Mapping[str, IntArray]]:
-    """Return names, numbers and sets of the solid cells of a type, inside the body too."""
+    """Return names, numbers and sets of the solid cells of a type, including cells inside the body."""
     n = len(model.mesh.cells[kind])
     numbers = np.asarray(model.mesh.cell_numbers.get(kind, np.full(n, NONE)))
     names = tuple(f"{part} {k}" if number == NONE else str(number) for k, number in enumerate(numbers.tolist()))
@@ -168,17 +169,17 @@ def _named_cells(part: str, model: SolidModel, kind: str) -> tuple[tuple[str, ..
 
 
 def _triangles(body: FEBody, at: _Place, element_of: IntArray, count: int) -> IntArray:
-    """Return a triangle of the surface of the body for each element of a part, -1 where it made none, (count,)."""
+    """Return a surface triangle of the body for each element of a part, -1 if it has none, (count,)."""
     found = np.full(count, NONE)
     inside = (body.surface >= at.first_node) & (body.surface < at.first_node + at.n_nodes)
     own = np.flatnonzero(inside.all(axis=1))
-    if len(own) == len(element_of):  # else another part shares its nodes, and which is whose is not known
+    if len(own) == len(element_of):  # otherwise another part shares the nodes, and the owner of a triangle is unknown
         found[element_of[::-1]] = own[::-1]
     return found
 
 
 def _named(body: FEBody, part: str, triangles: IntArray) -> tuple[tuple[str, ...], IntArray, Mapping[str, IntArray]]:
-    """Return names, numbers and sets of elements by the triangle of each."""
+    """Return names, numbers and sets of elements from the triangle of each element."""
     numbering = body.numbering
     numbers = np.full(len(triangles), NONE)
     has = triangles != NONE

@@ -1,11 +1,11 @@
-"""Stress points of elements: ends of beams at the points of their section, corners of shells on both faces.
+"""Stress points of elements: ends of beams at their section points, corners of shells on both faces.
 
-The stress at a node is a mean over the elements about it: where a frame branches, a bending moment is led in or a
-surface turns, parts of it cancel. An assessment looks at each element by itself:
+The stress at a node is an average over the adjoining elements. Where a frame branches, a bending moment is applied or a
+surface bends, parts of it cancel. A strength assessment looks at each element separately:
 
-(1) beams: every point of the section at both ends, from the section forces of that element,
-    sigma_xx = N/A + My z/Iy - Mz y/Iz, tau of shear forces and Saint-Venant torsion; warping stresses are left out
-(2) shells: every corner of every cell at top and bottom, from the resultants carried linearly to the corner
+(1) beams: every section point at both ends, from the section forces of that element, sigma_xx = N/A + My z/Iy - Mz
+    y/Iz, tau from shear forces and Saint-Venant torsion; warping stress is neglected
+(2) shells: every corner of every cell at top and bottom, from the resultants extrapolated linearly to the corner
 """
 
 from collections.abc import Iterable
@@ -33,16 +33,16 @@ NOTE = "stress points"  #: key of the provenance
 
 @dataclass(frozen=True, eq=False)
 class BeamEnds:
-    """Points of the sections at both ends of lines; one section after the other."""
+    """Section points at both ends of lines, one section after the other."""
 
     model: BeamModel
     lines: IntArray  #: (n,)
     names: tuple[str, ...]
     positions: Array
-    rows: slice  #: of the mesh dofs
+    rows: slice  #: rows among the mesh dofs
 
     def stress(self, u: Array) -> Array:
-        """Return (1), (n_points, 6, k) [Pa]."""
+        """Return the stress of step (1), (n_points, 6, k) [Pa]."""
         forces = self.model.section_forces(u[self.rows])
         parts = []
         for own in lines_by_section(self.model, self.lines):
@@ -53,16 +53,16 @@ class BeamEnds:
 
 @dataclass(frozen=True, eq=False)
 class ShellCorners:
-    """Corners of cells at the top, then at the bottom, cell by cell."""
+    """Corners of cells, first at the top and then at the bottom of each cell."""
 
     cells: ShellCells
     chosen: IntArray  #: (n,)
     names: tuple[str, ...]
     positions: Array
-    rows: slice  #: of the mesh dofs
+    rows: slice  #: rows among the mesh dofs
 
     def stress(self, u: Array) -> Array:
-        """Return (2), (n_points, 6, k) [Pa]."""
+        """Return the stress of step (2), (n_points, 6, k) [Pa]."""
         of_mesh, k = np.asarray(u[self.rows]), np.shape(u)[1]
         parts = []
         for rows in self.cells.chunks():
@@ -76,44 +76,44 @@ class ShellCorners:
 
 @dataclass(frozen=True, eq=False)
 class ElementPoints:
-    """Stress points of elements, after those that the body had (`fe_models.body.fe_body.StressPointModel`)."""
+    """Stress points of elements, after the existing ones of the body (`fe_models.body.fe_body.StressPointModel`)."""
 
     parts: tuple[BeamEnds | ShellCorners, ...]
     before: StressPointModel | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
-        """One per point: "beam 17 end A point 3", "shell 21 node 5 top", (n_points,)."""
+        """Name of each point: "beam 17 end A point 3", "shell 21 node 5 top", (n_points,)."""
         own = () if self.before is None else tuple(self.before.names)
         return (*own, *(name for part in self.parts for name in part.names))
 
     @property
     def positions(self) -> Array:
-        """Undeformed, mesh axes, (n_points, 3) [m]."""
+        """Undeformed positions in mesh axes, (n_points, 3) [m]."""
         own = [] if self.before is None else [self.before.positions]
         return frozen(np.concatenate([*own, *(part.positions for part in self.parts)]))
 
     def stress(self, u: Array) -> Array:
-        """Return the stress, (n_points, 6, k) [Pa], xx yy zz yz xz xy in mesh axes, of columns over the mesh dofs."""
+        """Return the stress of columns over the mesh dofs, (n_points, 6, k) [Pa], xx yy zz yz xz xy in mesh axes."""
         own = [] if self.before is None else [self.before.stress(u)]
         return np.concatenate([*own, *(part.stress(np.asarray(u)) for part in self.parts)])
 
 
 def element_points(body: FEBody, at: Iterable[int | str] = (ALL,)) -> FEBody:
-    """Return the body with stress points at the ends of beams and the corners of shells, each of its element alone.
+    """Return the body with stress points at beam ends and shell corners, each with the stress of its own element.
 
     Parameters
     ----------
     body
-        Of beams or shells, coupled or not, welded, joined or not.
+        Body of beams or shells, coupled or not, welded, joined or neither.
     at
-        Numbers of elements, names of their sets or of the part they belong to; "all".
+        Numbers of elements, or names of sets or parts; "all" selects all elements.
 
     Raises
     ------
     BodyError
-        If the body has no such elements, a name or number is unknown, or the section of a beam is given by its numbers
-        without an outline: its outer fibres are not known.
+        If the body has no such elements, a name or number is unknown, or a beam section is given by its properties
+        without an outline, so that its extreme fibres are unknown.
     """
     groups = [group for group in element_groups(body) if group.quantity in ("beam force", "shell resultant")]
     where = f"body {body.name!r}: stress points"
@@ -155,13 +155,13 @@ def element_points(body: FEBody, at: Iterable[int | str] = (ALL,)) -> FEBody:
 
 
 def lines_by_section(model: BeamModel, lines: IntArray) -> list[IntArray]:
-    """Return some lines, those of one section together."""
+    """Return the lines in groups of one section each."""
     of_line = np.asarray(model.of_line)[lines]
     return [lines[of_line == number] for number in np.unique(of_line)]
 
 
 def beam_ends(where: str, group: ElementGroup, model: BeamModel, lines: IntArray) -> BeamEnds:
-    """Return the points of some lines of a group."""
+    """Return the section points of some lines of a group."""
     names, places = [], []
     for own in lines_by_section(model, lines):
         section = model.sections[model.of_line[own[0]]]

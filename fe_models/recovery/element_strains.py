@@ -1,4 +1,4 @@
-"""Strains in elements: sections of beams, middle surface of shells, centres of solids; stress at these centres."""
+"""Strains in elements: beam sections, middle surfaces of shells, and centres of solid cells with their stress."""
 
 from collections.abc import Callable
 
@@ -16,9 +16,9 @@ Values = Callable[[Array, IntArray], Array]
 
 
 def beam_strains(model: BeamModel, rows: slice) -> Values:
-    """Return eps gamma_y gamma_z kappa_x kappa_y kappa_z at both ends of lines: section forces over stiffnesses.
+    """Return eps gamma_y gamma_z kappa_x kappa_y kappa_z at both ends of lines: section forces divided by stiffness.
 
-    kappa_x is the twist per length, of the torsion about the shear centre; a section without shear deformation has no
+    kappa_x is the twist per length from torsion about the shear centre. A section without shear deformation has zero
     gamma.
     """
 
@@ -42,7 +42,7 @@ def section_stiffness(model: BeamModel, number: int) -> Array:
 def shell_strains(group: ShellCells, rows: slice) -> Values:
     """Return eps_x eps_y gamma_xy, kappa_x kappa_y kappa_xy, gamma_xz gamma_yz of cells, local axes: C⁻¹ (N, M, Q).
 
-    As the resultants they are the mean of the points of the stiffness.
+    Like the resultants, they are averaged over the points of the stiffness.
     """
 
     def values(u: Array, elements: IntArray) -> Array:
@@ -56,17 +56,17 @@ def shell_strains(group: ShellCells, rows: slice) -> Values:
 
 
 def centre_strains(model: SolidModel, kind: str, rows: slice) -> Values:
-    """Return the strain at the centres of solid cells, (n, 6, k), xx yy zz yz xz xy in mesh axes, shears doubled.
+    """Return the strain at the centres of solid cells, (n, 6, k), xx yy zz yz xz xy in mesh axes, engineering shear.
 
-    The symmetric gradient of the displacement there: eps = sym(sum_i u_i grad N_i). Incompatible modes of bricks have
-    no gradient at the centre.
+    It is the symmetric gradient of the displacement, eps = sym(sum_i u_i grad N_i). Incompatible modes of bricks have
+    zero gradient at the centre.
     """
     cells, nodes = model.mesh.cells[kind], model.mesh.nodes
     gradients = reference_centre(kind)  # (n_corners, 3)
 
     def values(u: Array, elements: IntArray) -> Array:
         own = cells[elements]
-        J = np.einsum("nca,cb->nab", nodes[own], gradients)  # dx_a/dxi_b
+        J = np.einsum("nca,cb->nab", nodes[own], gradients)  # derivatives dx_a/dxi_b
         dN = np.einsum("cb,nba->nca", gradients, np.linalg.inv(J))
         of_nodes = u[rows].reshape(len(nodes), 3, -1)[own]  # (n, c, 3, k)
         H = np.einsum("ncik,ncj->nijk", of_nodes, dN)
@@ -78,7 +78,7 @@ def centre_strains(model: SolidModel, kind: str, rows: slice) -> Values:
 
 
 def centre_stress(model: SolidModel, kind: str, rows: slice) -> Values:
-    """Return C eps at the centres of solid cells, (n, 6, k) [Pa]."""
+    """Return the stress C eps at the centres of solid cells, (n, 6, k) [Pa]."""
     strains = centre_strains(model, kind, rows)
     tensors = np.array([material.stiffness for material in model.materials])
 

@@ -1,7 +1,7 @@
-"""Strain at nodes: of solids, and at the outer faces of shells and the outer fibres of beams.
+"""Strain at nodes of solids, on the outer faces of shells and at the extreme fibres of beams.
 
-Each element's own strain is S sigma with the compliance S of its material, so that what a mean over elements shows is
-the mean of their strains: of stress in the plane of a shell, and of one fibre of a beam, lateral contraction included.
+The strain of each element is S sigma with the compliance S of its material, so that an average over elements is the
+average of their strains. Shells use plane stress and beams the stress of one fibre, so lateral contraction is included.
 """
 
 import numpy as np
@@ -21,19 +21,19 @@ __all__ = ["isotropic_compliance", "nodal_strain"]
 
 
 def nodal_strain(body: FEBody, u: Array, nodes: IntArray) -> Array:
-    """Return the strain at nodes, (n, 6, k), xx yy zz yz xz xy in mesh axes, shear strains doubled.
+    """Return the strain at nodes, (n, 6, k), xx yy zz yz xz xy in mesh axes, engineering shear strains.
 
     Parameters
     ----------
     u
         Displacement columns over the dofs of the mesh, (n_mesh_dof, k).
     nodes
-        Of the solids, of the skins of beams and shells, of the middle surface of shells.
+        Nodes of solids, of the skins of beams and shells, or of the middle surface of shells, (n,).
 
     Raises
     ------
     BodyError
-        If a node is of none of them, or of a layup whose faces are not isotropic.
+        If a node belongs to none of these, or to a layup whose faces are not isotropic.
     """
     found = np.zeros((len(nodes), 6, np.shape(u)[1]))
     put(found, np.arange(len(nodes)), body.element_model, np.asarray(u), np.asarray(nodes), f"body {body.name!r}")
@@ -41,7 +41,7 @@ def nodal_strain(body: FEBody, u: Array, nodes: IntArray) -> Array:
 
 
 def put(found: Array, rows: IntArray, model: object, u: Array, nodes: IntArray, where: str) -> None:
-    """Write the strain of nodes of a model into some rows."""
+    """Write the strain at nodes of an element model into rows of `found`."""
     if not len(nodes):
         return
     if isinstance(model, WeldedModel):
@@ -73,7 +73,7 @@ def put(found: Array, rows: IntArray, model: object, u: Array, nodes: IntArray, 
 
 
 def require(ok: bool, where: str, nodes: IntArray) -> None:
-    """Raise `BodyError` unless the nodes are of elements whose strain is known."""
+    """Raise `BodyError` unless the strain at these nodes is known."""
     if not ok:
         raise BodyError(
             f"{where}: strain: node {int(nodes[0])} is of no solid, shell or skin of a beam; ask for its stress, or "
@@ -82,7 +82,7 @@ def require(ok: bool, where: str, nodes: IntArray) -> None:
 
 
 def section_of_skin(model: BeamModel) -> IntArray:
-    """Return the section of each point of the skin, (n_skin,): a ring joins lines of one section only."""
+    """Return the section of each point of the skin, (n_skin,); a ring only joins lines of one section."""
     found = np.zeros(len(model.skin.points), np.int64)
     for line, number in enumerate(np.asarray(model.of_line).tolist()):
         for start in model.skin.ring_start[line].tolist():
@@ -91,7 +91,7 @@ def section_of_skin(model: BeamModel) -> IntArray:
 
 
 def shell_strain(where: str, group: ShellCells, resultants: Array, rows: slice, height: float) -> Array:
-    """Return the strain of cells at a height, as `ShellCells.stress` does, (n, p, 6, k)."""
+    """Return the strain of cells at one height, (n, p, 6, k), in the same form as `ShellCells.stress`."""
     stress = group.stress(resultants, rows, height)
     of_law = np.zeros((len(group.laws), 6, 6))
     for number in np.unique(group.law[rows]):
@@ -107,7 +107,7 @@ def shell_strain(where: str, group: ShellCells, resultants: Array, rows: slice, 
 
 
 def isotropic_compliance(E: float, G: float) -> Array:
-    """Return strain by stress, (6, 6) [1/Pa]; nu = E/(2 G) - 1."""
+    """Return the matrix that maps stress to strain, (6, 6) [1/Pa]; nu = E/(2 G) - 1."""
     S = np.diag([1 / E] * 3 + [1 / G] * 3)
     S[:3, :3] -= (E / (2 * G) - 1) / E * (1 - np.eye(3))
     return S

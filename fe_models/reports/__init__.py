@@ -1,1 +1,1 @@
-"""What a mesh or a frame looks like before it is reduced: counts, quality, units, findings."""
+"""Reports about a mesh or a frame before its reduction: counts, quality, units, findings."""

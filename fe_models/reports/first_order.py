@@ -1,12 +1,12 @@
-"""How much too stiff the cells of first order make a body: its lowest frequencies against cells of the next order.
+"""Stiffness error of first-order cells: lowest frequencies of a body compared with second-order cells.
 
-(1) of a large mesh a piece: the cells nearest, through their facets, to the place where the walls are thinnest
-(2) the lowest elastic modes of the free piece, K phi = lam M phi
-(3) the same piece with cells of second order (bricks of 27 nodes, tetrahedra of ten; wedges, and bricks beside them,
-    cut into such tetrahedra): a few steps of LOBPCG from the field of (2), preconditioned by the factor of (2) and by
-    the blocks of the nodes
-(4) the largest of the ratios of frequencies: every step of (3) lowers its own, so that the figure is a lower bound of
-    what second order gains
+(1) from a large mesh take a piece: the cells that are nearest, through facets, to the thinnest wall
+(2) compute the lowest elastic modes of the free piece, K phi = lam M phi
+(3) take the same piece with second-order cells (27-node bricks, ten-node tetrahedra; wedges, and bricks beside them,
+    are divided into such tetrahedra), and make a few steps of LOBPCG from the field of (2), preconditioned with the
+    factor of (2) and the nodal blocks
+(4) return the largest ratio of frequencies; every step of (3) lowers the second-order frequencies, so the result is a
+    lower bound of the error
 """
 
 import warnings
@@ -30,38 +30,38 @@ from fe_models.solids.assembly import assemble, elastic_properties, expand_scala
 
 __all__ = ["PROVENANCE", "FirstOrderError", "first_order_error"]
 
-LARGEST_PIECE = 1000  #: nodes whose modes are found; with second order eight times as many
-LARGEST_CUT = 400  #: the same of cells that are cut into tetrahedra, which makes it thirty times as many
-SMALL = 900  #: dofs of second order up to which dense matrices are faster
+LARGEST_PIECE = 1000  #: largest number of nodes of the piece; second order has eight times as many
+LARGEST_CUT = 400  #: the same for cells that are divided into tetrahedra, which gives thirty times as many
+SMALL = 900  #: number of second-order dofs up to which dense matrices are faster
 N_MODES, N_GUARDS = 3, 2
-STEPS = 12  #: of LOBPCG
-SMOOTHINGS = 6  #: of the share of nodes on the boundary, over as many neighbours
-SHIFT = 1e-4  #: of the median of K_kk / M_kk: below the elastic modes of a mesh of this size
-PROVENANCE = "first-order error"  #: key of what a body says of it: the figure, then words
-STEEL = Material("any", E=2.1e11, nu=0.3, rho=7850.0)  #: where none is given; E and rho do not matter
+STEPS = 12  #: number of LOBPCG steps
+SMOOTHINGS = 6  #: number of smoothing passes, over neighbours, of the share of boundary nodes
+SHIFT = 1e-4  #: shift relative to the median of K_kk / M_kk; it lies below the elastic modes of a piece of this size
+PROVENANCE = "first-order error"  #: key in the provenance of a body; the value is the error, then a text
+STEEL = Material("any", E=2.1e11, nu=0.3, rho=7850.0)  #: used if no material is given; E and rho do not matter
 
 
 @dataclass(frozen=True)
 class FirstOrderError:
-    """What cells of first order do to the lowest frequencies of a body, or of a piece of it."""
+    """Error of the lowest frequencies of a body, or of a piece of it, due to first-order cells."""
 
-    error: float  #: largest of f / f_second - 1 of the lowest elastic modes, at least
-    n_cells: int  #: of the piece
+    error: float  #: largest f / f_second - 1 of the lowest elastic modes; a lower bound
+    n_cells: int  #: number of cells of the piece
     is_whole: bool  #: whether the piece is the whole mesh
     kinds: tuple[str, ...]  #: types of the cells
 
     @property
     def finding(self) -> str:
-        """What was found, in words."""
+        """Description of the result."""
         piece = "" if self.is_whole else f" of a piece of {self.n_cells} cells, where the walls are thinnest,"
         return f"lowest frequencies{piece} {100 * self.error:.2g} % or more too high against second order"
 
     def provenance(self) -> dict[str, str]:
-        """Return what the provenance of a body keeps of it."""
+        """Return the entries for the provenance of a body."""
         return {PROVENANCE: f"{self.error:.3g} {self.finding}"}
 
     def words(self) -> str:
-        """Say what was found and what to do."""
+        """Describe the result, and what to do."""
         cures = {
             "tetra": "mesh with ten-node tetrahedra (tetra10)",
             "hexahedron": "give bricks incompatible modes, or mesh with 20 or 27 nodes",
@@ -78,21 +78,21 @@ class FirstOrderError:
 def first_order_error(
     mesh: Mesh, materials: AnyMaterial | Mapping[str, AnyMaterial] | None = None, *, incompatible_modes: bool = False
 ) -> FirstOrderError | None:
-    """Measure how much too high the lowest frequencies are for want of order.
+    """Measure how much too high the lowest frequencies are because cells are of first order.
 
     Parameters
     ----------
     mesh
-        Solid cells without errors of the mesh report.
+        Solid cells without errors in the mesh report.
     materials
-        As for `solid_body`; None: one with nu = 0.3.
+        As for `solid_body`; None: a material with nu = 0.3.
     incompatible_modes
-        Whether bricks of eight nodes have them.
+        Whether eight-node bricks have incompatible modes.
 
     Returns
     -------
     FirstOrderError | None
-        None where no cell is of first order, or where all are bricks with incompatible modes.
+        None if no cell is of first order, or all are bricks with incompatible modes.
     """
     kinds = tuple(kind for kind, cells in mesh.cells.items() if len(cells))
     if not set(kinds) <= set(FIRST_ORDER) or (incompatible_modes and kinds == ("hexahedron",)):
@@ -116,7 +116,7 @@ def first_order_error(
 
 
 class LowestModes:
-    """The lowest elastic modes of a free piece, and the factor they were found with.
+    """The lowest elastic modes of a free piece, and the factor with which they were computed.
 
     Attributes
     ----------
@@ -140,16 +140,16 @@ class LowestModes:
         self.omega2, self.Phi = omega2[order], Phi[:, order]
 
     def improved(self, K: sp.csc_array, M: sp.csc_array, nodes: Array, P: sp.csr_array) -> Array:
-        """Return omega² of the same modes in a field of higher order that holds this one, ascending.
+        """Return omega² of the same modes in a higher-order field that contains this one, ascending.
 
         Parameters
         ----------
         K, M
-            Of that field, (3 n_nodes, 3 n_nodes).
+            Stiffness and mass of that field, (3 n_nodes, 3 n_nodes).
         nodes
-            Its nodes, (n_nodes, 3).
+            Positions of its nodes, (n_nodes, 3).
         P
-            Values at its nodes from those at the nodes here, (n_nodes, n_nodes here).
+            Interpolation from the nodes here to its nodes, (n_nodes, n_nodes here).
         """
         if K.shape[0] <= SMALL:
             return np.asarray(la.eigh(K.toarray(), M.toarray(), eigvals_only=True)[6 : 6 + N_MODES])
@@ -167,7 +167,7 @@ class LowestModes:
 
         rigid = rigid_motion_of_points(nodes, nodes.mean(axis=0)).reshape(-1, 6)
         operator = spla.LinearOperator(K.shape, precondition, matmat=precondition, dtype=np.float64)
-        with warnings.catch_warnings():  # that it stops early is meant
+        with warnings.catch_warnings():  # stopping early is intended
             warnings.simplefilter("ignore")
             omega2, _ = spla.lobpcg(
                 K, up @ self.Phi, B=M, M=operator, Y=rigid, largest=False, maxiter=STEPS, tol=1e-4 * self.omega2[0]
@@ -176,7 +176,7 @@ class LowestModes:
 
 
 def piece_of(mesh: Mesh) -> tuple[Mesh, IntArray]:
-    """Return step (1): the piece, and which cells it has, counted through all types, (n,) ascending."""
+    """Step (1): return the piece, and the indices of its cells, counted through all types, ascending, (n,)."""
     pairs = facet_pairs(mesh)
     n = mesh.n_cells
     joined = sp.coo_array(
@@ -211,6 +211,6 @@ def piece_of(mesh: Mesh) -> tuple[Mesh, IntArray]:
 
 
 def by_type(mesh: Mesh, number: IntArray) -> dict[str, IntArray]:
-    """Return type -> numbers of its cells, of numbers counted through all types."""
+    """Split cell indices counted through all types into indices for each type."""
     ends = np.cumsum([len(cells) for cells in mesh.cells.values()])
     return dict(zip(mesh.cells, np.split(number, ends[:-1]), strict=True))

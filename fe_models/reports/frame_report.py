@@ -1,4 +1,4 @@
-"""Numbers of a frame and findings about it, before any solve."""
+"""Report of a frame: its numbers and findings, before any solution."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -16,23 +16,23 @@ from fe_models.reports.unit_check import implausible_units
 
 __all__ = ["FrameReport", "report_frame"]
 
-COINCIDENCE = 1e-6  #: distance of coincident nodes over the diagonal of the bounding box
+COINCIDENCE = 1e-6  #: distance of coincident nodes relative to the diagonal of the bounding box
 
 
 @dataclass(frozen=True, eq=False)
 class FrameReport(Report):
-    """Numbers of a mesh of lines and findings about it."""
+    """Numbers of a mesh of lines, and findings about it."""
 
     source: str
     units: Units
     n_nodes: int
     n_lines: int
-    length: float  #: of all lines [m]
-    n_parts: int  #: parts that no line, link or spring joins
+    length: float  #: total length of all lines [m]
+    n_parts: int  #: number of parts that are not joined by a line, link or spring
     findings: tuple[Finding, ...]
 
     def numbers(self) -> list[tuple[str, str]]:
-        """Return label and value of each number, in words."""
+        """Return label and value of each number, as text."""
         return [
             ("file", self.source),
             ("nodes", str(self.n_nodes)),
@@ -50,18 +50,18 @@ def report_frame(
     springs: Iterable[Spring] = (),
     links: Iterable[RigidLink] = (),
 ) -> FrameReport:
-    """Measure a frame and judge whether it hangs together and its units are plausible.
+    """Measure a frame, and check whether it is connected and its units are plausible.
 
     Parameters
     ----------
     mesh
         Nodes and lines.
     materials
-        Those of the sections.
+        Materials of the sections.
     units
         Declared unit system.
     springs, links
-        They join parts too.
+        Springs and rigid links, which also join parts.
     """
     ends = mesh.nodes[mesh.lines]
     size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))

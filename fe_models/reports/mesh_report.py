@@ -1,4 +1,4 @@
-"""The mesh report: what a mesh is and what is wrong with it, in numbers, before any solve."""
+"""Report of a mesh: its numbers and faults, before any solution."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -26,12 +26,12 @@ from fe_models.reports.unit_check import implausible_units
 
 __all__ = ["CellGeometry", "MeshReport", "cell_geometry", "report_mesh"]
 
-COINCIDENCE = 1e-6  #: distance of coincident nodes over the diagonal of the bounding box
-FLAT = 1e-9  #: volume over the cube of the size of a cell, below which it is degenerate
-ROUNDING = 1e-12  #: Jacobian over its mean, below which it counts as zero
-FIRST_ORDER_NOTED = 0.02  #: error of the lowest frequencies from which cells of first order are a warning
-UNMEASURABLE = {"inverted", "degenerate", "overlap", "transition"}  #: errors of a mesh that has no modes
-_CHUNK = 20_000  #: cells at a time, so that a million dofs need 100 MB
+COINCIDENCE = 1e-6  #: distance of coincident nodes relative to the diagonal of the bounding box
+FLAT = 1e-9  #: volume relative to the cube of the cell size, below which the cell is degenerate
+ROUNDING = 1e-12  #: Jacobian relative to its mean, below which it counts as zero
+FIRST_ORDER_NOTED = 0.02  #: error of the lowest frequencies above which first-order cells give a warning
+UNMEASURABLE = {"inverted", "degenerate", "overlap", "transition"}  #: errors that prevent the computation of modes
+_CHUNK = 20_000  #: number of cells processed at a time, so that a million dofs need 100 MB
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +40,9 @@ class CellGeometry:
 
     volume: Array  #: (n_cells,) [m³]
     moment: Array  #: ∫x over the cell, (n_cells, 3) [m⁴]
-    lowest_inside: Array  #: least Jacobian at the integration points over their mean size, (n_cells,)
-    lowest_at_nodes: Array  #: the same at the nodes, (n_cells,)
-    flatness: Array  #: volume over the cube of the largest extent, (n_cells,)
+    lowest_inside: Array  #: smallest Jacobian at the integration points divided by the mean magnitude, (n_cells,)
+    lowest_at_nodes: Array  #: smallest Jacobian at the nodes divided by the mean magnitude, (n_cells,)
+    flatness: Array  #: volume divided by the cube of the largest extent, (n_cells,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,28 +51,30 @@ class MeshReport(Report):
 
     source: str
     units: Units
-    n_nodes: int  #: of solid cells
+    n_nodes: int  #: number of nodes of solid cells
     n_unused_nodes: int
-    n_cells: Mapping[str, int]  #: by type
+    n_cells: Mapping[str, int]  #: number of cells by type
     lo: Array  #: bounding box of the used nodes, (3,) [m]
     hi: Array  #: (3,) [m]
     volume: float  #: [m³]
-    mass: float | None  #: [kg]; None: no materials given
+    mass: float | None  #: [kg]; None: no material was given
     mass_centre: Array | None  #: (3,) [m]
-    n_parts: int  #: parts with no node in common
-    part_cells: tuple[int, ...]  #: cells of each part, largest first
-    n_coincident: int  #: nodes with another node at the same place
-    inverted: Mapping[str, IntArray]  #: type -> rows of cells with a Jacobian <= 0 at an integration point
-    degenerate: Mapping[str, IntArray]  #: type -> rows of cells without volume
-    distorted: Mapping[str, IntArray]  #: type -> rows of cells with a Jacobian <= 0 at a node only
+    n_parts: int  #: number of parts without a common node
+    part_cells: tuple[int, ...]  #: number of cells of each part, largest first
+    n_coincident: int  #: number of nodes that coincide with another node
+    inverted: Mapping[str, IntArray]  #: rows of cells with a Jacobian <= 0 at an integration point, by type
+    degenerate: Mapping[str, IntArray]  #: rows of cells without volume, by type
+    distorted: Mapping[str, IntArray]  #: rows of cells with a Jacobian <= 0 at a node only, by type
     findings: tuple[Finding, ...]
-    first_order: FirstOrderError | None = None  #: None: no cells of first order, or not measured
-    origin: Mapping[str, str] = field(default_factory=dict)  #: what the mesh was made of, as it says
-    angles: tuple[float, float] = (nan, nan)  #: smallest and largest between neighbouring faces of a cell [degrees]
-    lowest_jacobian: float = nan  #: least Jacobian of a cell over its mean, at integration points and nodes; 1 is best
+    first_order: FirstOrderError | None = None  #: None: no first-order cells, or not measured
+    origin: Mapping[str, str] = field(default_factory=dict)  #: origin of the mesh, as the mesh states it
+    #: smallest and largest angle between neighbouring faces of a cell [degrees]
+    angles: tuple[float, float] = (nan, nan)
+    #: smallest Jacobian of a cell divided by its mean, at integration points and nodes; 1 is best
+    lowest_jacobian: float = nan
 
     def numbers(self) -> list[tuple[str, str]]:
-        """Return label and value of each number, in words."""
+        """Return label and value of each number, as text."""
         length, mass = self.units.length_symbol, self.units.mass_symbol
         cells = ", ".join(f"{count} {kind}" for kind, count in self.n_cells.items())
         rows = [
@@ -102,23 +104,24 @@ def report_mesh(
     units: Units | str = "m-kg-s",
     incompatible_modes: bool = False,
 ) -> MeshReport:
-    """Measure a mesh and judge whether it is fit for a finite element model.
+    """Measure a mesh and check whether it can serve as a finite element model.
 
     Parameters
     ----------
     mesh
-        The mesh, ours or of another library (`fe_models.as_mesh`).
+        The mesh, of this package or of another library (`fe_models.as_mesh`).
     materials
-        One material, or cell group -> material; None: no mass, and density and modulus are not judged.
+        One material, or one for each group of cells; None: no mass is computed, and density and modulus are not
+        checked.
     units
-        The unit system the numbers are meant in.
+        Unit system of the numbers.
     incompatible_modes
-        Whether bricks of eight nodes will have them, as in `solid_body`.
+        Whether eight-node bricks will have incompatible modes, as in `solid_body`.
 
     Raises
     ------
     MaterialError
-        If a material names an unknown group, or cells have no material or two.
+        If a material names an unknown group, or cells have no material or two materials.
     """
     mesh = as_mesh(mesh)
     units = unit_system(units) if isinstance(units, str) else units
@@ -181,7 +184,7 @@ def _first_order(
     incompatible_modes: bool,
     findings: list[Finding],
 ) -> FirstOrderError | None:
-    """Return the error of cells of first order; None also where cells are too bad for a second order."""
+    """Return the error due to first-order cells; None also if cells are too bad to be raised to second order."""
     if UNMEASURABLE & {finding.kind for finding in findings if finding.is_error}:
         return None
     try:
@@ -191,7 +194,7 @@ def _first_order(
 
 
 def cell_geometry(mesh: Mesh, kind: str) -> CellGeometry:
-    """Return volumes, first moments and least Jacobians of all cells of one type."""
+    """Return volumes, first moments and smallest Jacobians of all cells of one type."""
     cells = mesh.cells[kind]
     measure = _measure_tetra10 if kind == "tetra10" else partial(_measure, kind)
     parts = [measure(mesh.nodes[cells[start : start + _CHUNK]]) for start in range(0, len(cells), _CHUNK)]
@@ -199,7 +202,7 @@ def cell_geometry(mesh: Mesh, kind: str) -> CellGeometry:
 
 
 def _measure(kind: str, X: Array) -> tuple[Array, ...]:
-    """Return the fields of `CellGeometry` of cells with these nodes, (n_cells, n_nodes, 3)."""
+    """Return the fields of `CellGeometry` for cells with these nodes, (n_cells, n_nodes, 3)."""
     points, weights = quadrature(kind)
     N, _ = shape_values(kind, points)
     jacobians = cell_jacobians(kind, X, np.vstack([points, CELL_SHAPES[kind].nodes]))
@@ -217,7 +220,7 @@ def _measure(kind: str, X: Array) -> tuple[Array, ...]:
 
 
 def _measure_tetra10(X: Array) -> tuple[Array, ...]:
-    """Measure ten-node tetrahedra; those with straight edges, mostly all, by their corners (constant Jacobian)."""
+    """Measure ten-node tetrahedra; straight-edged ones, usually nearly all, from their corners (constant Jacobian)."""
     middles = np.array(CELL_SHAPES["tetra10"].middles)
     extent = (X.max(axis=1) - X.min(axis=1)).max(axis=1)
     bend = np.abs(2 * X[:, 4:] - X[:, middles[:, 0]] - X[:, middles[:, 1]]).max(axis=(1, 2))

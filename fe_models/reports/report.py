@@ -1,4 +1,4 @@
-"""What every report of a mesh has: its findings, and the judgement whether the mesh is fit."""
+"""Base of all mesh reports: findings, and the decision whether the mesh is usable."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
@@ -11,31 +11,31 @@ __all__ = ["Finding", "Report"]
 
 @dataclass(frozen=True)
 class Finding:
-    """Something wrong with a mesh."""
+    """A fault of a mesh, or a doubt about it."""
 
     kind: str  #: "inverted", "degenerate", "parts", "overlap", "transition", "units"; others only warn
     is_error: bool
-    text: str  #: what, where, what to do
+    text: str  #: what is wrong, where, and what to do
 
 
 class Report(ABC):
-    """Numbers of a mesh and findings about it."""
+    """Numbers of a mesh, and findings about it."""
 
-    source: str  #: the file, or what made the mesh
+    source: str  #: the file, or how the mesh was made
     findings: tuple[Finding, ...]
 
     @property
     def errors(self) -> tuple[Finding, ...]:
-        """Findings that make the mesh unfit."""
+        """Findings that make the mesh unusable."""
         return tuple(finding for finding in self.findings if finding.is_error)
 
     @property
     def warnings(self) -> tuple[Finding, ...]:
-        """Findings to know about."""
+        """Findings that do not make the mesh unusable."""
         return tuple(finding for finding in self.findings if not finding.is_error)
 
     def raise_for_errors(self, *, accept: Iterable[str] = ()) -> None:
-        """Raise `MeshError` with all errors but those of the accepted kinds."""
+        """Raise `MeshError` with all errors except those of the accepted kinds."""
         accepted = set(accept)
         errors = [finding.text for finding in self.errors if finding.kind not in accepted]
         if errors:
@@ -48,10 +48,10 @@ class Report(ABC):
 
     @abstractmethod
     def numbers(self) -> list[tuple[str, str]]:
-        """Return label and value of each number, in words."""
+        """Return label and value of each number, as text."""
 
     def rows(self) -> list[tuple[str, str]]:
-        """Return label and value of each number and each finding, in words, for a table."""
+        """Return label and text of each number and each finding, for a table."""
         return self.numbers() + [("error" if f.is_error else "warning", f.text) for f in self.findings]
 
     def lines(self) -> list[str]:

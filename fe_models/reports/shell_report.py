@@ -1,4 +1,4 @@
-"""Numbers of a shell mesh and findings about it, before any solve."""
+"""Report of a shell mesh: its numbers and findings, before any solution."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -20,28 +20,28 @@ from fe_models.shells.skin import cell_edges
 
 __all__ = ["ShellReport", "report_shell"]
 
-COINCIDENCE = 1e-6  #: distance of coincident nodes over the diagonal of the bounding box
-WARP_NOTED = 10.0  #: angle between the two halves of a quad from which a warning is given [degree]
-ASPECT_NOTED = 20.0  #: longest over shortest side from which a warning is given
+COINCIDENCE = 1e-6  #: distance of coincident nodes relative to the diagonal of the bounding box
+WARP_NOTED = 10.0  #: angle between the two halves of a quad above which a warning is given [degree]
+ASPECT_NOTED = 20.0  #: ratio of longest to shortest side above which a warning is given
 
 
 @dataclass(frozen=True, eq=False)
 class ShellReport(Report):
-    """Numbers of a mesh of shells and findings about it."""
+    """Numbers of a mesh of shells, and findings about it."""
 
     source: str
     units: Units
     n_nodes: int
-    n_cells: dict[str, int]  #: by type
-    n_lines: int  #: of stiffeners
+    n_cells: dict[str, int]  #: number of cells by type
+    n_lines: int  #: number of stiffener lines
     area: float  #: [m²]
-    warp: float  #: largest of all quads [degree]
-    n_parts: int  #: parts that no cell, stiffener, link or spring joins
-    n_free_edges: int  #: edges of one cell only
+    warp: float  #: largest warp of all quads [degree]
+    n_parts: int  #: number of parts that are not joined by a cell, stiffener, link or spring
+    n_free_edges: int  #: number of edges that belong to one cell only
     findings: tuple[Finding, ...]
 
     def numbers(self) -> list[tuple[str, str]]:
-        """Return label and value of each number, in words."""
+        """Return label and value of each number, as text."""
         length = self.units.length_symbol
         return [
             ("file", self.source),
@@ -63,18 +63,18 @@ def report_shell(
     springs: Iterable[Spring] = (),
     links: Iterable[RigidLink] = (),
 ) -> ShellReport:
-    """Measure a shell and judge its cells, whether it hangs together, and whether its units are plausible.
+    """Measure a shell, and check its cells, whether it is connected, and whether its units are plausible.
 
     Parameters
     ----------
     mesh
-        Nodes, cells and lines of stiffeners.
+        Nodes, cells, and lines of stiffeners.
     materials
-        Those of cells and stiffeners.
+        Materials of cells and stiffeners.
     units
         Declared unit system.
     springs, links
-        They join parts too.
+        Springs and rigid links, which also join parts.
     """
     mesh = as_shell_mesh(mesh)
     findings, area, warp = _judge_cells(mesh)
@@ -136,7 +136,7 @@ def report_shell(
 
 
 def _judge_cells(mesh: ShellMesh) -> tuple[list[Finding], float, float]:
-    """Findings about single cells, their area and largest warp."""
+    """Return findings about single cells, their total area, and the largest warp."""
     findings = []
     area = warp = 0.0
     for kind, cells in mesh.cells.items():

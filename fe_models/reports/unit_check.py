@@ -1,4 +1,4 @@
-"""Whether size, density, modulus, frequency and wave speed are plausible in the unit system they are said to be in."""
+"""Check whether size, density, modulus, frequency and wave speed are plausible in the declared unit system."""
 
 from collections.abc import Iterable
 from typing import Protocol
@@ -10,16 +10,17 @@ from fe_models.foundation.units import UNIT_SYSTEMS, Units
 
 __all__ = ["hull_volume", "implausible_matrices", "implausible_motion", "implausible_units"]
 
-SIZE = (1e-4, 1e3)  #: diagonal of a body [m]
+SIZE = (1e-4, 1e3)  #: diagonal of the bounding box of a body [m]
 DENSITY = (10.0, 25_000.0)  #: from rigid foam to osmium [kg/m³]
 MODULUS = (1e3, 2e12)  #: from soft gel to above diamond [Pa]
 WAVE_SPEED = (10.0, 30_000.0)  #: sqrt(E / rho): from soft rubber to above diamond [m/s]
 STEEL = 7850.0  #: [kg/m³]
-LIGHTEST = 1e-3  #: mass over the volume of the convex hull, which is full of air in a frame [kg/m³]
-MESHED_SPEED = (1.0, 3e5)  #: sqrt(K_kk / M_kk) times the distance of nodes: waves times up to ten [m/s]
-SWING_SPEED = (1e-3, 6e4)  #: 2 f L of the first elastic frequency: waves or less, far less in a slender body [m/s]
-FLAT = 1e-6  #: thickness of a cloud of points over its size, below which it has no volume
-LENGTHS = {1e-3: "mm", 1e3: "m", 0.0254: "inches"}  #: by what nodes are multiplied that seem to be in another length
+LIGHTEST = 1e-3  #: mass divided by the volume of the convex hull, which is mostly air in a frame [kg/m³]
+MESHED_SPEED = (1.0, 3e5)  #: sqrt(K_kk / M_kk) times the node distance: wave speed times up to ten [m/s]
+#: 2 f L of the first elastic frequency: at most the wave speed, much less for slender bodies [m/s]
+SWING_SPEED = (1e-3, 6e4)
+FLAT = 1e-6  #: thickness of a point cloud relative to its size, below which it has no volume
+LENGTHS = {1e-3: "mm", 1e3: "m", 0.0254: "inches"}  #: factors that convert nodes that seem to be in another length unit
 
 
 class _Elastic(Protocol):
@@ -52,7 +53,7 @@ def implausible_units(units: Units, size: float, materials: Iterable[_Elastic]) 
     for material in materials:
         rho = material.rho * units.to_si(mass=1, length=-3)
         E = material.E * units.to_si(mass=1, length=-1, time=-2)
-        if rho and not DENSITY[0] <= rho <= DENSITY[1]:  # none is said: springs with a shape
+        if rho and not DENSITY[0] <= rho <= DENSITY[1]:  # zero density is allowed: it stands for springs with a shape
             steel = STEEL / units.to_si(mass=1, length=-3)
             texts.append(
                 (
@@ -88,18 +89,18 @@ def implausible_units(units: Units, size: float, materials: Iterable[_Elastic]) 
 
 
 def implausible_matrices(units: Units, nodes: Array, mass: float, speeds: Array) -> list[tuple[bool, str]]:
-    """Return (is an error, text) for what is implausible about bare matrices and the nodes beside them.
+    """Return (is an error, text) for implausible numbers of bare matrices and their nodes.
 
     Parameters
     ----------
     units
         The declared unit system.
     nodes
-        (n_nodes, 3), in its length unit.
+        Positions, (n_nodes, 3), in the length unit of the system.
     mass
-        Of the body, in its mass unit.
+        Mass of the body, in the mass unit of the system.
     speeds
-        sqrt(K_kk / M_kk) times the distance to the nearest node, of many rows; empty: not known.
+        sqrt(K_kk / M_kk) times the distance to the nearest node, for many rows; empty: unknown.
     """
     texts = _matrix_findings(units, nodes, mass, speeds)
     if not texts:
@@ -145,12 +146,12 @@ def _matrix_findings(units: Units, nodes: Array, mass: float, speeds: Array) -> 
 
 
 def implausible_motion(units: Units, nodes: Array, mass: float, frequency: float | None) -> list[str]:
-    """Return texts about size, density and first elastic frequency of a body that are implausible.
+    """Return texts about implausible size, density or first elastic frequency of a body.
 
     Parameters
     ----------
     frequency
-        Lowest elastic frequency of the free body [Hz]; None: there is none.
+        Lowest elastic frequency of the free body [Hz]; None: it has no elastic modes.
     """
     texts = [text for _, text in _matrix_findings(units, nodes, mass, np.zeros(0))] if len(nodes) else []
     size = float(np.linalg.norm(np.ptp(nodes, axis=0))) * units.length if len(nodes) else 0.0
@@ -174,7 +175,7 @@ def size_findings(units: Units, size: float) -> list[tuple[bool, str]]:
 
 
 def hull_volume(points: Array) -> float:
-    """Volume of the convex hull of points; 0 where they lie in a plane, or on a line."""
+    """Return the volume of the convex hull of points; 0 if they lie in a plane or on a line."""
     from scipy.spatial import ConvexHull
 
     centered = np.asarray(points) - np.mean(points, axis=0)
