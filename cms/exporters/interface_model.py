@@ -31,7 +31,8 @@ from fe_models.foundation.components import MOTION_COMPONENTS
 __all__ = ["BoundaryNode", "InterfaceModel", "interface_model"]
 
 RANK_TOLERANCE = 1e-9  #: singular values of the scaled map below this part of the greatest count as zero
-STILL = 1e-12  #: motion of the interfaces below this part of the largest of a mode is rounding: the frame holds them
+STILL = 1e-12  #: motion of the interfaces below this part of the largest of a mode is rounding: the frame holds them,
+#: rotations times the extent of the body
 MASSLESS = 1e-14  #: mass of a fixed-interface mode of unit stiffness below this part of the greatest: none
 
 
@@ -148,21 +149,24 @@ def boundary_of(body: ReducedBody) -> tuple[tuple[BoundaryNode, ...], Array]:
             count += len(motion)
     width = body.n_q + (0 if body.is_held else 6)
     B = np.concatenate(rows) if rows else np.zeros((0, width))
-    B[:, width - body.n_q :][:, still_modes(body, B[:, width - body.n_q :])] = 0.0
+    components = np.concatenate([node.components for node in nodes]) if nodes else np.zeros(0, dtype=int)
+    B[:, width - body.n_q :][:, still_modes(body, B[:, width - body.n_q :], components)] = 0.0
     return tuple(nodes), B
 
 
-def still_modes(body: ReducedBody, motion: Array) -> Array:
+def still_modes(body: ReducedBody, motion: Array, components: IntArray) -> Array:
     """Return which modes move no interface but by rounding, (n_q,).
+
+    `motion` has a row for each of `components`: 0-2 translations, 3-5 rotations, (n, n_q).
 
     A frame at the only interface lets none of them move it. What is left there, 1e-19 and any direction, would
     otherwise be scaled like a motion and take the place of the rigid ones.
     """
-    if not len(motion) or not len(body.Phi):
+    extent = float(np.ptp(body.nodes, axis=0).max(initial=0.0))
+    if not len(motion) or extent == 0.0:  # a point has no length to measure rotations by
         return np.zeros(body.n_q, dtype=bool)
-    extent = max(float(np.ptp(body.nodes, axis=0).max()), np.finfo(float).tiny)  # rotations by lengths of the body
-    largest = np.abs(body.Phi).max(axis=(0, 1))
-    return np.asarray(np.abs(motion).max(axis=0) <= STILL * largest * max(1.0, 1 / extent))
+    path = np.abs(motion) * np.where(components < 3, 1.0, extent)[:, None]
+    return np.asarray(path.max(axis=0) <= STILL * np.abs(body.Phi).max(axis=(0, 1)))
 
 
 def places_of(body: ReducedBody, interface: ReducedInterface) -> list[tuple[Array, Array]]:

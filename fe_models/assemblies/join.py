@@ -33,7 +33,7 @@ class Part:
     """A body without interfaces, and the nodes of the joined body that are its first nodes."""
 
     body: FEBody
-    nodes: IntArray  #: numbers in the joined body, (n,); nodes of the part beyond n are its own (skin)
+    nodes: IntArray  #: numbers in the joined body, (n,); nodes of the part beyond n are its own (skin), without dofs
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +85,7 @@ def join(
     leaders = _leaders(constraints)
     added = leaders[place[leaders] < 0]
     place[added] = first_node[-1] + np.arange(len(added))
-    dofs, S, dof_of = _shared_dofs(parts, first_node, place, leaders)
+    dofs, S, dof_of = _shared_dofs(parts, place, leaders)
     bodies = [part.body for part in parts]
     whole = _side_by_side(name, bodies, S, dofs, np.concatenate([b.nodes for b in bodies] + [points[added]]))
     kept = np.concatenate([_kept(part, begin, place) for part, begin in zip(parts, first_node, strict=False)])
@@ -136,19 +136,10 @@ def _leaders(constraints: list[Constraint]) -> IntArray:
     return np.unique([c.node for c in constraints if isinstance(c, RigidNodes | MeanMotion)]).astype(np.int64)
 
 
-def _shared_dofs(
-    parts: Sequence[Part], first_node: IntArray, place: IntArray, leaders: IntArray
-) -> tuple[IntArray, sp.csr_array, IntArray]:
+def _shared_dofs(parts: Sequence[Part], place: IntArray, leaders: IntArray) -> tuple[IntArray, sp.csr_array, IntArray]:
     """Steps (1) and (2): return the joined dofs, S, and the dof of each component of each node, (n_nodes, 6)."""
-    keys, own = [], []
-    for part, begin in zip(parts, first_node[:-1], strict=True):
-        node, component = part.body.dofs.T
-        is_shared = node < len(part.nodes)
-        at = np.where(is_shared, place[part.nodes[np.minimum(node, len(part.nodes) - 1)]], begin + node)
-        keys.append(6 * at + component)
-        own.append(is_shared)
     asked = (6 * place[leaders][:, None] + np.arange(6)).ravel()
-    side = np.concatenate(keys)
+    side = np.concatenate([6 * place[part.nodes[part.body.dofs[:, 0]]] + part.body.dofs[:, 1] for part in parts])
     found = np.unique(np.concatenate([side, asked]))
     S = sp.csr_array(
         (np.ones(len(side)), (np.arange(len(side)), np.searchsorted(found, side))), shape=(len(side), len(found))

@@ -36,7 +36,6 @@ class SNCurve:
     slope: Array  #: k_j >= 1, (n_lines,)
     bottom: Array  #: least amplitude of each line, (n_lines,) [Pa]; the last may be 0: no fatigue limit
     greatest: float  #: largest amplitude that the curve is known for [Pa]
-    least: float  #: smallest amplitude of the data [Pa]; below it lines were continued
     stress_ratio: float = -1.0  #: R = least over largest stress in the tests
     notes: tuple[str, ...] = ()  #: factors and conversions that went in
 
@@ -99,7 +98,7 @@ class SNCurve:
             return self
         return replace(
             self, amplitude=factor * self.amplitude, bottom=factor * self.bottom, greatest=factor * self.greatest,
-            least=factor * self.least, notes=(*self.notes, f"{reason}: amplitudes times {factor:.6g}"),
+            notes=(*self.notes, f"{reason}: amplitudes times {factor:.6g}"),
         )  # fmt: skip
 
     def for_survival(self, wanted: float, *, of_curve: float = 0.5, deviation: float) -> "SNCurve":
@@ -171,12 +170,12 @@ def basquin_curve(
     greatest = amplitude * (cycles / least_cycles) ** (1 / slope)
     k_2 = slope_below(slope, below) if second_slope is None else second_slope
     if k_2 is None:
-        return SNCurve([amplitude], [cycles], [slope], [amplitude], greatest, amplitude, stress_ratio)  # type: ignore[arg-type]
+        return SNCurve([amplitude], [cycles], [slope], [amplitude], greatest, stress_ratio)  # type: ignore[arg-type]
     if second_slope is not None and not second_slope >= slope:
         raise FatigueError(f"S-N curve: second_slope: expected at least the slope {slope:g}, got {second_slope:g}")
     return SNCurve(
         [amplitude, amplitude], [cycles, cycles], [slope, k_2], [amplitude, 0.0], greatest,  # type: ignore[arg-type]
-        0.0 if second_slope is not None else amplitude, stress_ratio,
+        stress_ratio,
     )  # fmt: skip
 
 
@@ -214,10 +213,8 @@ def table_curve(
         raise FatigueError(f"S-N table: points {j + 1} and {j + 2}: slope k = {k[j]:.3g}, N ~ S^-k; expected 1 or more")
     k_next = slope_below(float(k[-1]), below)
     if k_next is None:
-        return SNCurve(S[:-1], N[:-1], k, S[1:], float(S[0]), float(S[-1]), stress_ratio)
-    return SNCurve(
-        S, N, np.r_[k, k_next], np.r_[S[1:], 0.0], float(S[0]), float(S[-1]), stress_ratio
-    )  # fmt: skip
+        return SNCurve(S[:-1], N[:-1], k, S[1:], float(S[0]), stress_ratio)
+    return SNCurve(S, N, np.r_[k, k_next], np.r_[S[1:], 0.0], float(S[0]), stress_ratio)
 
 
 def slope_below(slope: float, below: str) -> float | None:

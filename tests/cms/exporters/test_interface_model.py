@@ -9,7 +9,8 @@ from numpy.testing import assert_allclose
 
 import cms
 from cms.errors import ExportError
-from cms.exporters.interface_model import interface_model
+from cms.exporters.interface_model import boundary_of, interface_model
+from fe_models.body.numbering import Numbering
 from fe_models.matrices import body_from_matrices
 from tests.bodies import bar, with_interfaces
 from tests.cms.exporters.small_bodies import RUBBER
@@ -138,3 +139,35 @@ def test_rounding_at_an_interface_that_the_frame_holds_is_no_motion(coupled):
     assert_allclose(rounded.K, exact.K, rtol=0, atol=1e-9 * np.abs(exact.K).max())
     assert_allclose(rounded.M, exact.M, rtol=0, atol=1e-9 * np.abs(exact.M).max())
     assert_allclose(rounded.K[:6], 0, rtol=0, atol=1e-9 * np.abs(exact.K).max())
+
+
+@pytest.mark.parametrize("kind", ["translation", "rotation"])
+@pytest.mark.parametrize("length", [1e-3, 1.0, 1e3])
+def test_what_is_rounding_of_a_motion_is_the_same_in_every_unit_of_length(coupled, modes, kind, length):
+    """A rotation counts by the path at the far end of the body, 1 m long; a mode that moves it by 1e-11 is kept."""
+    reduced = cms.reduce(coupled, modes, frame=cms.NodalFrame("left"), geometric=False)
+    largest, port = np.abs(reduced.Phi).max(axis=(0, 1)), reduced.interface("left")
+    for part, is_kept in ((1e-11, True), (1e-13, False)):
+        Psi = np.zeros((6, reduced.n_q))
+        if kind == "translation":
+            Psi[1] = part * largest * length
+        else:
+            Psi[4] = part * largest
+        scaled = replace(
+            reduced, nodes=reduced.nodes * length, Phi=reduced.Phi * length,
+            interfaces=(replace(port, Psi=Psi, position=length * port.position),),
+        )  # fmt: skip
+        assert boundary_of(scaled)[1][:, 6:].any() == is_kept
+
+
+def test_a_body_that_keeps_one_node_has_the_matrices_of_one_that_keeps_all(coupled, modes):
+    """No length lies between its nodes, by which its rotations were all rounding."""
+    reduced = cms.reduce(coupled, modes, geometric=False)
+    node = reduced.interface("left").members[0]
+    ports = tuple(replace(port, members=np.zeros(0, int)) for port in reduced.interfaces)
+    alone = replace(
+        reduced, nodes=reduced.nodes[[node]], Phi=reduced.Phi[[node]], interfaces=ports,
+        surface=np.zeros((0, 3), int), stress=None, node_ids=reduced.node_ids[[node]], numbering=Numbering(),
+    )  # fmt: skip
+    whole, one = interface_model(reduced), interface_model(alone)
+    assert_allclose(one.K, whole.K, rtol=0, atol=1e-12 * np.abs(whole.K).max())

@@ -11,7 +11,7 @@ from fe_models.beams.beam_property import BeamProperty
 from fe_models.beams.body import beam_body
 from fe_models.beams.sections import Circle
 from fe_models.body.couplings import couple, mean_motion
-from fe_models.body.fe_body import Interface
+from fe_models.body.fe_body import MULTIPLIER, Interface
 from fe_models.body.weighted_motion import weighted_motion
 from fe_models.foundation.errors import BodyError
 from fe_models.foundation.units import unit_system
@@ -181,3 +181,47 @@ def test_a_leader_without_elements_is_seen_to_move_with_the_interface_on_it(at):
         at_node = np.flatnonzero(held.dofs[:, 0] == (place if held is joined.body else ours.dofs[-1, 0]))
         load = nodal_load(held, "f", {place: force})
         assert_allclose(load.f @ u, force @ u[at_node], rtol=1e-12, atol=0)
+
+
+def test_rotations_that_nothing_moves_are_unknown_at_leaders_and_zero_at_nodes_of_parts():
+    """A node of a solid that follows a mean motion in translations alone, and a point mass without inertia."""
+    mesh = box_mesh(3, 1, 1)
+    body = solid_body(mesh, STEEL, name="b", units=UNITS)
+    members, at = mesh.node_sets["right"], np.array([0])
+    follower = int(np.setdiff1d(np.arange(len(mesh.nodes)), [*members, 0])[0])
+    attached = beam_body(
+        LineMesh(mesh.nodes[at], np.zeros((0, 2), np.int64)), {}, name="m", units=UNITS, point_masses=[PointMass(0, 7.0)]
+    )  # fmt: skip
+    coupling = MeanMotion("c", follower, members, np.ones(len(members)), components=(0, 1, 2))
+    parts = [Part(body, np.arange(len(mesh.nodes))), Part(attached, at)]
+    joined = join("j", parts, mesh.nodes, [coupling]).body
+    assert (joined.dofs[:, 1] < 3).all()  # no rotation has mass or stiffness
+    T, dofs = joined.recovery.matrix.toarray(), joined.recovery.dofs
+    n_of_parts = 3 * len(mesh.nodes) + 6
+    assert len(dofs) == n_of_parts + 3  # the rotations of the follower
+    assert_array_equal(dofs[n_of_parts:], [[follower, MULTIPLIER]] * 3)
+    assert_array_equal(dofs[:n_of_parts, 1], [*np.tile([0, 1, 2], len(mesh.nodes)), *range(6)])
+    assert not T[n_of_parts - 3 :].any()
+
+
+@pytest.mark.parametrize("factor", [0.0, 1e-15, -1e-15])
+def test_the_first_coefficient_of_an_equation_must_not_vanish_beside_the_others(factor):
+    mesh = box_mesh(1, 1, 1)
+    part = [Part(solid_body(mesh, STEEL, name="b", units=UNITS), np.arange(8))]
+    for others in ((4e5, 1.0), (1.0, -4e5)):
+        terms = [(0, 0, 4e5 * factor), (1, 0, others[0]), (2, 0, others[1])]
+        with pytest.raises(BodyError, match=r"e: the first coefficient is .*; it must not vanish"):
+            join("j", part, mesh.nodes, [NodeEquation("e", tuple(terms))])
+    with pytest.raises(BodyError, match=r"the first coefficient is 0; it must not vanish"):
+        join("j", part, mesh.nodes, [NodeEquation("e", ((0, 0, 0.0), (1, 0, 0.0)))])
+
+
+@pytest.mark.parametrize("a", [1e-7, -1e-7])
+def test_the_first_coefficient_of_an_equation_may_be_small_in_any_unit(a):
+    """The smaller the first coefficient, the further its dof moves: u_0 = -u_1 / a, in coefficients of 1e-20 too."""
+    mesh = box_mesh(1, 1, 1)
+    body = solid_body(mesh, STEEL, name="b", units=UNITS)
+    for unit in (1.0, 1e-20):
+        equation = NodeEquation("e", ((0, 0, a * unit), (1, 0, unit)))
+        joined = join("j", [Part(body, np.arange(8))], mesh.nodes, [equation]).body
+        assert_allclose(joined.recovery.matrix.toarray()[0], [0, 0, -1 / a, *np.zeros(20)], rtol=1e-14)

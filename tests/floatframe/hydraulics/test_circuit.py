@@ -102,6 +102,17 @@ def test_pressures_along_a_pipe_begin_on_the_line_between_those_of_its_ends():
     assert_allclose(found, [supply + (9e6 - supply) / 3, supply + (9e6 - supply) * 2 / 3, 1e-4], rtol=1e-14)
 
 
+@pytest.mark.parametrize("segments", [1, 2])
+def test_a_pipe_of_one_segment_has_the_name_of_the_pipe_and_segments_have_numbers(segments):
+    pipe = Pipe("line", "supply", "end", 3.0, 1e-4, segments=segments, flow=2e-4)
+    parts = [pipe, Supply("pressure", "supply", 1e6), Tank("outside", "tank")]
+    parts.append(Pump("unit", "end", "tank", GROUND, SHAFT, 3e-6, axis=[0, 1, 0]))
+    law = Circuit("c", OIL, parts, {"end": Node(1e-4, 1e6)}).law(placed(motion()))
+    names = ["flow line"] if segments == 1 else ["flow line 1", "flow line 2"]
+    start = dict(zip(law.states, law.start, strict=True))
+    assert {name: start[name] for name in start if name.startswith("flow")} == dict.fromkeys(names, 2e-4)
+
+
 def test_wrenches_of_a_circuit_balance():
     law = every_component().law(placed(motion()))
     x = motion()
