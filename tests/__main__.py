@@ -5,6 +5,8 @@
     python -m tests --relative   # tests of the engine again, in the coordinates of joints
     python -m tests --external   # beside other programs; those that are not there are skipped, visibly
     python -m tests --campaign   # seeded bad inputs, kills, random motions
+    python -m tests --changed    # lint, and tests that guard what changed since main (or --changed HEAD~3)
+    python -m tests --guards cms/solvers/eigen.py    # which tests guard a module
 
 A group is a row of stages. The checks of a stage run side by side, each as its own process, and each report is printed
 as a whole when its check ends; the first stage in which one fails ends the run. The last line says how long the group
@@ -15,17 +17,17 @@ once). A worker leaves the other processors to the other workers: the libraries 
 machine, unless OMP_NUM_THREADS says otherwise. Results may not depend on either number.
 """
 
+import difflib
 import os
 import subprocess
 import sys
 import tempfile
 import time
 from dataclasses import dataclass
-from pathlib import Path
 
 from tests.floatframe.formulations import SHORT
+from tests.root import ROOT
 
-ROOT = Path(__file__).resolve().parent.parent
 MOST_WORKERS = 4  #: each takes up to 3 GB
 
 n_processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -72,17 +74,26 @@ def main(arguments: list[str]) -> int:
         from tests.campaign import main as campaign
 
         return campaign(arguments[1:])
+    if arguments[:1] == ["--guards"]:
+        return tell_guards(arguments[1:])
+    if arguments[:1] == ["--changed"]:
+        return run_changed(arguments[1:])
     names = [argument.removeprefix("--") for argument in arguments] or ["ci"]
     if len(names) > 1 or names[0] not in GROUPS:
-        choices = ", ".join(f"--{name}" for name in (*GROUPS, "campaign"))
+        choices = ", ".join(f"--{name}" for name in (*GROUPS, "campaign", "changed", "guards"))
         print(f"python -m tests: expected one of {choices}, or nothing for --ci; got {' '.join(arguments)}")
         return 2
-    group, begun = GROUPS[names[0]], time.monotonic()
+    return run_told(names[0], GROUPS[names[0]])
+
+
+def run_told(name: str, group: Group) -> int:
+    """Run a group, and say what became of it and how long it took; return the exit code."""
+    begun = time.monotonic()
     code = run(group)
     minutes = (time.monotonic() - begun) / 60
     verdict = "all checks passed" if code == 0 else f"failed with exit code {code}"
     over = f", OVER its budget of {group.minutes:g}" if minutes > group.minutes else f" of {group.minutes:g}"
-    print(f"\n== group {names[0]}: {verdict}; {minutes:.1f} minutes{over}", flush=True)
+    print(f"\n== group {name}: {verdict}; {minutes:.1f} minutes{over}", flush=True)
     return code
 
 
@@ -93,6 +104,40 @@ def run(group: Group) -> int:
         if code := next((code for code in codes if code), 0):
             return code
     return 0
+
+
+def tell_guards(words: list[str]) -> int:
+    """Print the test files that guard some modules, by how many imports lie between, nearest first."""
+    if not words:
+        print("python -m tests --guards: expected files or modules, such as cms/solvers/eigen.py or cms.solvers.eigen")
+        return 2
+    from tests.import_graph import guards, modules, named_modules
+
+    for word in words:
+        names = named_modules([word])
+        if not names or not (word in names or (ROOT / word).exists()):
+            near = difflib.get_close_matches(word.replace("/", ".").removesuffix(".py"), modules(), 3)
+            print(f"python -m tests --guards: {word}: no such module{'; near: ' + ', '.join(near) if near else ''}")
+            return 2
+        found = guards(names)
+        print(f"{word}: {len(found)} test files, by the imports between")
+        print("".join(f"{n:4d}  {file}\n" for file, n in found.items()), end="", flush=True)
+    return 0
+
+
+def run_changed(words: list[str]) -> int:
+    """Run the linter, and the tests that guard what changed since main or another base."""
+    from tests.import_graph import changed_files, guards, named_modules
+
+    try:
+        files = changed_files(*words)
+    except ValueError as error:
+        print(f"python -m tests --changed: {error}")
+        return 2
+    found = list(guards(named_modules(files)))
+    print(f"{len(files)} files changed since {words[0] if words else 'main'}, {len(found)} test files guard them")
+    tests = ("tests", "pytest", "-q", *SPREAD, "-m", "not long and not external", *found)
+    return run_told("changed", Group(((LINT,), (tests,)) if found else ((LINT,),), GROUPS["ci"].minutes))
 
 
 def environment(command: list[str]) -> dict[str, str]:

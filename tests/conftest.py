@@ -29,7 +29,13 @@ def pytest_configure(config):
         take_relative()
 
 
+LONG = 12000  #: seconds after which a study hangs
+
+
 def pytest_collection_modifyitems(config, items):
+    for item in items:
+        if item.get_closest_marker("long") is not None:
+            item.add_marker(pytest.mark.timeout(LONG))
     if config.getoption("formulation") == "relative":
         from tests.floatframe.formulations import select
 

@@ -6,6 +6,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 
 
-def heed_interrupts() -> None:
-    """A process started in the background of a shell ignores SIGINT, and its children after it; ours must not."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+def heed_signals() -> None:
+    """A process in the background ignores SIGINT, one under nohup SIGHUP, and so do its children; ours must not."""
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)

@@ -6,57 +6,15 @@ All of it is read off the syntax trees: every import counts, those inside functi
 import ast
 import subprocess
 import sys
-from functools import cache
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parent.parent
-PACKAGES = ("fe_models", "cms", "floatframe")  #: each imports itself and those before it
+from tests.import_graph import PACKAGES, files_of, graph, modules
+from tests.root import ROOT
+
 MOST_MODULES = 18  #: of a room, its __init__ not counted
 MOST_AT_THE_TOP = 10  #: of a package
-
-
-def files_of(package: str) -> list[Path]:
-    return sorted((ROOT / package).rglob("*.py"))
-
-
-def module_name(path: Path) -> str:
-    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
-
-
-@cache
-def modules() -> dict[str, Path]:
-    return {module_name(path): path for package in PACKAGES for path in files_of(package)}
-
-
-def stub_names(package: str) -> dict[str, str]:
-    """Public names of a package that are imported when they are first used: name -> module."""
-    stub = modules()[package].with_suffix(".pyi")
-    if not stub.exists():
-        return {}
-    nodes = [node for node in ast.parse(stub.read_text()).body if isinstance(node, ast.ImportFrom)]
-    return {alias.name: f"{package}.{node.module}" for node in nodes for alias in node.names}
-
-
-def imported_modules(path: Path) -> set[str]:
-    """Return our modules that a file imports anywhere in it; a public name of a package counts as its module."""
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            assert not node.level, f"{path}: relative import"
-            for alias in node.names:
-                inner = f"{node.module}.{alias.name}"
-                public = stub_names(node.module) if node.module in modules() else {}
-                found.add(inner if inner in modules() else public.get(alias.name, node.module))
-    return {name for name in found if name.split(".")[0] in PACKAGES}
-
-
-@cache
-def graph() -> dict[str, set[str]]:
-    return {name: imported_modules(path) - {name} for name, path in modules().items()}
 
 
 def circles(arrows: dict[str, set[str]]) -> list[list[str]]:

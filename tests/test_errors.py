@@ -62,7 +62,7 @@ def test_no_error_is_raised_that_is_not_reported():
     """Errors of the packages all derive from the root; classes of errors elsewhere in them too."""
     import ast
 
-    from tests.test_architecture import modules
+    from tests.import_graph import modules
 
     known = {name for name in dir(builtins) if name.endswith("Error") or name == "Exception"}
     strays = []

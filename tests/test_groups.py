@@ -11,6 +11,7 @@ import pytest
 
 from tests.__main__ import GROUPS, Group, main, run
 from tests.floatframe.formulations import EXCEPTIONS, ROOMS, SHORT
+from tests.import_graph import modules, named_modules, used_modules
 from tests.root import ROOT
 
 
@@ -30,6 +31,74 @@ def test_a_test_of_any_markers_is_in_one_check_of_one_group():
 def test_an_unknown_group_is_refused_with_the_choices(capsys):
     assert main(["--slow"]) == 2
     assert "expected one of --ci, --long, --relative, --external, --campaign" in capsys.readouterr().out
+
+
+def test_an_unknown_campaign_is_refused_with_the_choices(capsys):
+    assert main(["--campaign", "nosuch"]) == 2
+    told = capsys.readouterr().out
+    assert "expected families among jobs, meshes, systems, " in told
+    assert "got 'nosuch'" in told
+
+
+def test_guards_of_a_module_are_the_tests_that_import_it_nearest_first(capsys):
+    """A module of one room, whose tests import it themselves, and which no test of another package reaches."""
+    assert main(["--guards", "floatframe/hydraulics/circuit_data.py"]) == 0
+    first, *lines = capsys.readouterr().out.splitlines()
+    found = {line.split()[1]: int(line.split()[0]) for line in lines}
+    assert first == f"floatframe/hydraulics/circuit_data.py: {len(found)} test files, by the imports between"
+    room = "tests/floatframe/hydraulics/test_"
+    assert {f"{room}circuit.py", f"{room}jack.py", "tests/floatframe/laws/test_every_constant.py"} <= set(found)
+    assert next(iter(found)).startswith(room)
+    assert list(found.values()) == sorted(found.values())
+    assert not [name for name in found if name.startswith(("tests/fe_models/", "tests/cms/"))]
+
+
+def test_guards_of_what_is_no_module_are_refused_with_what_is_near(capsys):
+    assert main(["--guards", "cms/solvers/eigne.py"]) == 2
+    assert "no such module; near: cms.solvers.eigen" in capsys.readouterr().out
+
+
+def test_public_names_strings_and_packages_as_a_whole_count_as_imports(tmp_path):
+    """Each way to a module: an import, a name of a package that imports late, its name in a string, `getattr`."""
+    (path := tmp_path / "test_it.py").write_text(
+        """
+        import cms as c, floatframe.joints.screw
+        from cms import write
+        from tests import bodies
+        body = c.reduce(1)
+        LATE = "cms.report.page:main"
+        """.replace("        ", "")
+    )
+    found = used_modules(path)
+    assert {"cms.reduction", "cms.modal_file.file", "floatframe.joints.screw", "tests.bodies"} <= found
+    assert "cms.report.page" in found or "cms.report" in found
+    assert "cms.mode_sets.krylov" not in found
+    path.write_text("import cms\nnames = [getattr(cms, name) for name in cms.__all__]\n")
+    assert {"cms.reduction", "cms.modal_file.file"} <= used_modules(path)
+
+
+def test_data_pages_and_what_every_test_rests_on_stand_for_their_tests():
+    assert named_modules(["cms/report/data/page.css"]) == {
+        name for name in modules() if name.rpartition(".")[0] == "cms.report" or name == "cms.report"
+    } - {name for name, path in modules().items() if path.parent.parent.name == "report"}
+    assert {name.split(".")[1] for name in named_modules(["docs/theory.md"])} == {"docs"}
+    assert len(named_modules(["pyproject.toml"])) > 400
+    assert named_modules(["tests/test_groups.py"]) == {"tests.test_groups"}
+
+
+def test_a_base_that_does_not_exist_is_refused(capsys):
+    assert main(["--changed", "no-such-branch"]) == 2
+    assert "expected a branch or commit to compare with, got 'no-such-branch'" in capsys.readouterr().out
+
+
+def test_the_tests_that_guard_a_change_run(capfd, monkeypatch):
+    monkeypatch.setattr("tests.import_graph.changed_files", lambda: ["README", "fe_models/material.py"])
+    monkeypatch.setattr(
+        "tests.import_graph.guards", lambda names: {"this": 0} if names == {"fe_models.material"} else {}
+    )
+    monkeypatch.setattr("tests.__main__.run", lambda group: print(group.stages[1][0][-1]) or 0)
+    assert main(["--changed"]) == 0
+    assert capfd.readouterr().out.splitlines()[:2] == ["2 files changed since main, 1 test files guard them", "this"]
 
 
 def test_the_first_check_that_fails_ends_a_group_with_its_exit_code(capfd, monkeypatch):

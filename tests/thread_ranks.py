@@ -7,6 +7,8 @@ import numpy as np
 
 from fe_models.foundation.ranks.ranks import OneRank
 
+PATIENCE = 300  #: seconds until a rank that waits for another one hangs
+
 
 class FakeComm:
     """What ranks ask of mpi4py, among threads of one process."""
@@ -18,7 +20,7 @@ class FakeComm:
         self.queues[self.rank, dest].put(np.array(x))
 
     def Recv(self, x, source):
-        x[:] = self.queues[source, self.rank].get(timeout=20)
+        x[:] = self.queues[source, self.rank].get(timeout=PATIENCE)
 
     def bcast(self, value, root):
         n = int(len(self.queues) ** 0.5)
@@ -27,12 +29,12 @@ class FakeComm:
                 if other != root:
                     self.queues[root, other].put(value)
             return value
-        return self.queues[root, self.rank].get(timeout=20)
+        return self.queues[root, self.rank].get(timeout=PATIENCE)
 
     def alltoall(self, values):
         for other, value in enumerate(values):
             self.queues[self.rank, other].put(value)
-        return [self.queues[other, self.rank].get(timeout=20) for other in range(len(values))]
+        return [self.queues[other, self.rank].get(timeout=PATIENCE) for other in range(len(values))]
 
 
 class FakeRanks(OneRank):
@@ -60,7 +62,7 @@ def on_threads(size, work):
     for thread in threads:
         thread.start()
     for thread in threads:
-        thread.join(timeout=30)
+        thread.join(timeout=PATIENCE)
     if errors:
         raise errors[0]
     return answers

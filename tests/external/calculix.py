@@ -144,7 +144,7 @@ def frequencies(deck, body):
 
 def frequencies_of_ccx(path):
     """What ccx prints for the deck [Hz]; none where it finds none."""
-    subprocess.run(["ccx", "-i", path.stem], cwd=path.parent, capture_output=True, timeout=300, check=False)
+    subprocess.run(["ccx", "-i", path.stem], cwd=path.parent, capture_output=True, check=False)
     result = path.with_suffix(".dat")
     text = result.read_text() if result.exists() else ""
     table = text.partition("E I G E N V A L U E   O U T P U T")[2].partition("P A R T I C I P A T I O N")[0]
@@ -177,7 +177,7 @@ def static_difference(name, folder):
     numbers = re.findall(r"^ *(\d+),", text.split("*ELEMENT")[0], re.MULTILINE)
     path = Path(folder) / name
     path.write_text(text.replace("*STEP", "*NSET,NSET=EVERY\n" + ",\n".join(numbers) + "\n*STEP", 1))
-    subprocess.run(["ccx", "-i", path.stem], cwd=path.parent, capture_output=True, timeout=300, check=False)
+    subprocess.run(["ccx", "-i", path.stem], cwd=path.parent, capture_output=True, check=False)
     rows = [line.split() for line in path.with_suffix(".dat").read_text().splitlines()]
     theirs = {int(row[0]): np.array(row[1:], dtype=float) for row in rows if len(row) == 4}
     deck, body = body_of(path)

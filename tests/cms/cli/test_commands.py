@@ -24,7 +24,7 @@ from cms.reduced_basis.frames import TisserandFrame
 from fe_models.foundation.sealed_hdf5 import Content, write_sealed
 from tests.bodies import box_mesh
 from tests.decks import JOB, write_deck
-from tests.root import ROOT, heed_interrupts
+from tests.root import ROOT, heed_signals
 from tests.synthetic import synthetic_reduced_body
 
 PROGRAM = [sys.executable, "-c", "from cms.cli import main; main()"]
@@ -578,7 +578,7 @@ def test_a_killed_run_leaves_the_old_file(folder):
         [*program, "reduce", "bar.toml", "-o", "out.h5"],
         cwd=folder,
         env=ENVIRONMENT,
-        preexec_fn=heed_interrupts,
+        preexec_fn=heed_signals,
         text=True,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -586,7 +586,7 @@ def test_a_killed_run_leaves_the_old_file(folder):
         assert process.stdout.readline() == "ready\n"
         time.sleep(0.1)
         process.send_signal(signal.SIGINT)
-        _, error = process.communicate(timeout=30)
+        _, error = process.communicate()
     assert process.returncode == 130
     assert error.startswith("error: interrupted")
     assert "Traceback" not in error

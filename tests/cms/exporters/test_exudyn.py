@@ -135,7 +135,7 @@ def test_the_archive_holds_what_exudyn_computes_from_the_points():
 def test_the_script_runs_as_it_stands_and_prints_our_motion(exported):
     reduced, path, script = exported
     done = subprocess.run(
-        [sys.executable, "-W", "error", path.with_suffix(".py")], capture_output=True, text=True, timeout=120,
+        [sys.executable, "-W", "error", path.with_suffix(".py")], capture_output=True, text=True,
         cwd=path.parent, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr

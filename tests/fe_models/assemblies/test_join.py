@@ -190,7 +190,8 @@ def test_rotations_that_nothing_moves_are_unknown_at_leaders_and_zero_at_nodes_o
     members, at = mesh.node_sets["right"], np.array([0])
     follower = int(np.setdiff1d(np.arange(len(mesh.nodes)), [*members, 0])[0])
     attached = beam_body(
-        LineMesh(mesh.nodes[at], np.zeros((0, 2), np.int64)), {}, name="m", units=UNITS, point_masses=[PointMass(0, 7.0)]
+        LineMesh(mesh.nodes[at], np.zeros((0, 2), np.int64)), {}, name="m", units=UNITS,
+        point_masses=[PointMass(0, 7.0)],
     )  # fmt: skip
     coupling = MeanMotion("c", follower, members, np.ones(len(members)), components=(0, 1, 2))
     parts = [Part(body, np.arange(len(mesh.nodes))), Part(attached, at)]

@@ -79,7 +79,7 @@ def test_a_parameter_is_the_number_of_the_file(arm, fmu):
 def in_a_process(*words, code=0):
     result = subprocess.run(
         [sys.executable, *map(str, words)], cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True,
-        text=True, timeout=300, check=False,
+        text=True, check=False,
     )  # fmt: skip
     assert result.returncode == code, result.stdout + result.stderr
     return result.stdout + result.stderr

@@ -204,4 +204,4 @@ def test_a_scheduler_that_is_lost_at_work_ends_the_map_with_one_line():
 @pytest.mark.parametrize("name", ["SIGINT", "SIGKILL"])
 def test_workers_end_with_the_process_that_started_them(tmp_path, name):
     send = os.killpg if name == "SIGINT" else os.kill  # a terminal interrupts the whole group
-    require_workers_to_end(tmp_path, "dask:2", lambda process: send(process.pid, signal.Signals[name]), 120)
+    require_workers_to_end(tmp_path, "dask:2", lambda process: send(process.pid, signal.Signals[name]))
