@@ -85,7 +85,7 @@ def craig_bampton_ir(
         return mode_set("craig-bampton-ir", families, blocks, modes=modes, wanted=wanted, options=_free_words(free))
 
 
-def guyan(body: FEBody | Families, *, families: Families | None = None) -> ModeSet:
+def guyan(body: FEBody | Families) -> ModeSet:
     """Guyan-Irons static condensation: constraint modes only (Craig-Bampton with n_modes = 0) [1]_.
 
     References

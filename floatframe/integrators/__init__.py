@@ -41,5 +41,7 @@ INTEGRATORS: dict[str, Callable[..., Integrator]] = {
 #: their classes, by the name in a results file
 CLASSES = {
     cls.__name__: cls
-    for cls in (GeneralizedAlpha, RelativeGeneralizedAlpha, EnergyMomentum, EnergyDecaying, Variational, Ida)
-}
+    for cls in (
+        GeneralizedAlpha, RelativeGeneralizedAlpha, RelativeOde, EnergyMomentum, EnergyDecaying, Variational, Ida,
+    )
+}  # fmt: skip

@@ -19,7 +19,7 @@ from floatframe.integrators.carry import (
     with_angles,
 )
 from floatframe.integrators.remembered_contacts import require_no_remembered_contacts
-from floatframe.kernels.memory import Rows, new_rows
+from floatframe.kernels.memory import WORK_GIVEN, WORK_TAKEN, Rows, new_rows
 from floatframe.kernels.model import COUPLER, USER_FORCE
 from floatframe.kernels.work import Work, new_work
 from floatframe.rotations import euler_parameter_rates
@@ -122,7 +122,7 @@ class Ida:
             if has_stopped:
                 break
             carry = replace(after, power=power, work=carry.work + 0.5 * h * (carry.power + power))
-            row.diagnostics[0, 10:12] = carry.work
+            row.diagnostics[0, [WORK_GIVEN, WORK_TAKEN]] = carry.work
             if k % every == 0:
                 rows.append(row)
             n_good += 1

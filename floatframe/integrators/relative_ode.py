@@ -25,7 +25,7 @@ from floatframe.integrators.carry import (
 )
 from floatframe.integrators.remembered_contacts import require_no_remembered_contacts
 from floatframe.joints.rows import is_held, is_held_length, is_held_position
-from floatframe.kernels.memory import Rows, new_rows
+from floatframe.kernels.memory import WORK_GIVEN, WORK_TAKEN, Rows, new_rows
 from floatframe.kernels.work import Work, new_work
 from floatframe.relative.kernels.tree import new_joint_work, new_tangent_work
 from floatframe.relative.partition import partition_of
@@ -117,7 +117,7 @@ class RelativeOde:
                 if has_stopped:
                     break
                 carry = replace(after, power=power, work=carry.work + 0.5 * h * (carry.power + power))
-                row.diagnostics[0, 10:12] = carry.work
+                row.diagnostics[0, [WORK_GIVEN, WORK_TAKEN]] = carry.work
                 n_good += 1
                 if (first + n_good) % every == 0:
                     rows.append(row)

@@ -20,7 +20,7 @@ from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ConvergenceError, ModelError
 from floatframe.integrators.carry import Carry, turned_on, with_angles
 from floatframe.joints.rows import is_held_velocity
-from floatframe.kernels.memory import Rows
+from floatframe.kernels.memory import WORK_GIVEN, WORK_TAKEN, Rows
 from floatframe.kernels.work import Work, new_work
 from floatframe.motion.integration import head_of, joint_rows
 from floatframe.results.results_file import MemorySource
@@ -113,7 +113,7 @@ def kinematics(
                     carry = turned_on(system, replace(carry, state=now.state), float(time - t[k - 1]))
                     done = done + (time - t[k - 1]) / 2 * (power[0] + power[1])
                 power[0] = power[1]
-                rows.diagnostics[0, 10:12] = done
+                rows.diagnostics[0, [WORK_GIVEN, WORK_TAKEN]] = done
                 rows.angle[0] = carry.angle
                 rows = rows_of_file(compiled, rows)
                 if writer is None:

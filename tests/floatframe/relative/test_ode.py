@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh, expm
 
+import floatframe.motion.integration as integration
 from floatframe import (
     GROUND,
     FixedJoint,
@@ -23,6 +24,8 @@ from floatframe import (
     element_motion,
     integrate,
     linearize,
+    read_results,
+    resume,
     static_equilibrium,
 )
 from floatframe.bodies.mode_choice import with_modes
@@ -193,6 +196,25 @@ def test_friction_by_the_force_in_its_joint_is_solved_with_it():
     fine = integrate(system, GeneralizedAlpha(1.0, 1e-12), 0.2, 5e-5, output_every=2000)
     motion = integrate(system, RelativeOde("Radau", 1e-8, 1e-10), 0.2, 0.1)
     assert_allclose(motion.body("block").r, fine.body("block").r, rtol=0, atol=2e-7)
+
+
+def test_an_interrupted_run_goes_on_to_the_same_motion(tmp_path, monkeypatch):
+    """Work too: it is summed over the outputs, and the record keeps it."""
+    monkeypatch.setattr(integration, "SEGMENT_SECONDS", 0.0)
+    system, path = rubbed_block(), tmp_path / "run.h5"
+
+    def stop(progress):
+        if progress.t > 0.09:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        integrate(system, RelativeOde("BDF", 1e-8, 1e-10), 0.2, 0.01, output=path, progress=stop)
+    assert not read_results(path).is_complete
+    motion, whole = resume(system, path), integrate(system, RelativeOde("BDF", 1e-8, 1e-10), 0.2, 0.01)
+    assert motion.is_complete
+    assert_allclose(motion.body("block").r, whole.body("block").r, rtol=0, atol=1e-6)
+    assert whole.energies.dissipated[-1] > 0.3
+    assert_allclose(motion.energies.dissipated, whole.energies.dissipated, rtol=0, atol=1e-5)
 
 
 def test_elements_that_feel_accelerations_are_refused_by_name():
