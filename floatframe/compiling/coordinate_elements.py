@@ -173,7 +173,14 @@ def add_user_force(
     texts += [(f"rates: {name}", force.rates[name]) for name in force.states]
     for place, text in texts:
         elements.tapes.append(
-            compile_expression(f"{where}: {place}", text, force.inputs, parameters=force.parameters, functions=numbers)
+            compile_expression(
+                f"{where}: {place}",
+                text,
+                force.inputs,
+                parameters=force.parameters,
+                functions=numbers,
+                switches=force.switches,
+            )
         )
 
 

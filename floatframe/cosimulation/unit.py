@@ -20,6 +20,7 @@ from floatframe.motion.events import events_of
 from floatframe.motion.integration import head_of, number_of_steps
 from floatframe.motion.jumps import jumps_of_steps, over_jumps
 from floatframe.motion.restart import carry_of_record, restart_record
+from floatframe.motion.switch_events import switch_events
 from floatframe.motion.validity_watch import ValidityWatch
 from floatframe.results.results_file import MemorySource
 from floatframe.results.sensors import Measurement, sensor_of, sensors_of
@@ -136,6 +137,11 @@ class Unit:
             raise ModelError(
                 f"system {self.system.name!r}: coupler {stops[0]!r} has limits, which cannot be a part of a "
                 "co-simulation; take a force with a table for the stop"
+            )
+        if switches := switch_events(self.system):
+            raise ModelError(
+                f"system {self.system.name!r}: the zeros of {switches[0].name!r} switch a law, which cannot be a part "
+                "of a co-simulation"
             )
         self.system, self.held = with_held_inputs(self.system, self.names)
         compiled = compiled_system(self.system)

@@ -103,6 +103,9 @@ class ElementLaw:
     #: outputs that end a run where they are above zero after a step, with what is then said
     stops: Mapping[str, str] = field(default_factory=dict)
     knots: Sequence[float] = ()  #: times at which the law jumps, where steps of a run end [s]
+    #: outputs at whose zeros the law jumps with its motion. For each of them the engine adds its sign at the end of
+    #: `data`: 1 or -1, which stands still in a step; 0 outside of runs, where the law takes the sign of its own value
+    switches: Sequence[str] = ()
     #: outputs that are gaps, below zero minus the depth of a contact, with the spring of it: steps become short near it
     gaps: Mapping[str, GapSpring] = field(default_factory=dict)
 
@@ -145,6 +148,10 @@ class ElementLaw:
                 raise ModelError(
                     f"law: gaps: expected names of its outputs with a GapSpring each, got {key!r}: {spring!r}"
                 )
+        object.__setattr__(self, "switches", tuple(self.switches))
+        for key in self.switches:
+            if key not in self.outputs:
+                raise ModelError(f"law: switches: expected names of its outputs, got {key!r}")
         for key in self.stops:
             if key not in self.outputs:
                 raise ModelError(f"law: stops: expected names of its outputs, got {key!r}")

@@ -45,6 +45,9 @@ class UserForce:
     functions: Mapping[str, TimeFunction] = field(default_factory=dict, metadata=NOT_OF_TIME)
     function: Callable[..., None] | None = None  #: instead of expressions
     knots: Sequence[float] = ()  #: times at which the function jumps, where steps of a run end [s]
+    #: expressions at whose zeros forces and rates jump with the motion. There their names stand for the sign, 1 (at
+    #: zero too) or -1, which stands still in a step; steps of a run end at the zeros
+    switches: Mapping[str, str] = field(default_factory=dict)
     length: float | None = None  #: over which the function changes [m]; None: the size of the smaller body
 
     def __post_init__(self) -> None:
@@ -56,6 +59,7 @@ class UserForce:
         require_words(where, self.inputs)
         require_words(where, [*self.inputs, *self.parameters])
         require_words(where, [*self.inputs, *self.parameters, *self.functions])
+        require_words(where, [*self.inputs, *self.parameters, *self.functions, *self.switches])
         for part in ("states", "parameters"):
             values = {k: number(f"{where}: {part}: {k}", v) for k, v in getattr(self, part).items()}
             object.__setattr__(self, part, values)
@@ -77,10 +81,10 @@ class UserForce:
         if self.function is not None:
             if not callable(self.function):
                 raise ModelError(f"{where}: function: expected a callable, got {self.function!r}")
-            if isinstance(self.forces, Mapping) or self.rates or self.parameters or self.functions:
+            if isinstance(self.forces, Mapping) or self.rates or self.parameters or self.functions or self.switches:
                 raise ModelError(
                     f"{where}: with a function, forces names coordinates, as in forces=('phi',), and there are no "
-                    "rates, parameters and functions"
+                    "rates, parameters, functions and switches"
                 )
             return
         if not isinstance(self.forces, Mapping):
@@ -107,7 +111,9 @@ class UserForce:
         numbers = {key: k for k, key in enumerate(self.functions)}
         for text in (*self.forces.values(), *self.rates.values()):
             where = f"force {self.name!r}"
-            tape = compile_expression(where, text, self.inputs, parameters=self.parameters, functions=numbers)
+            tape = compile_expression(
+                where, text, self.inputs, parameters=self.parameters, functions=numbers, switches=self.switches
+            )
             parts += time_parts(tape, {0: np.asarray}, list(self.functions.values()))
         return parts
 

@@ -9,7 +9,7 @@ import ast
 import math
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from fe_models.foundation.words import nearest, quoted, shortened
 from floatframe.errors import ModelError
@@ -59,6 +59,7 @@ def compile_expression(
     *,
     parameters: Mapping[str, float] | None = None,
     functions: Mapping[str, int] | None = None,
+    switches: Mapping[str, str] | None = None,
 ) -> Tape:
     """Return the tape of an expression.
 
@@ -74,6 +75,8 @@ def compile_expression(
         Names with a value.
     functions
         Names of functions of one number (tables), and their numbers in the kernels.
+    switches
+        Names of expressions, of which the sign is meant: 1 at zero and above, else -1.
 
     Raises
     ------
@@ -83,11 +86,9 @@ def compile_expression(
     if isinstance(text, str) and len(text) > LONGEST_TEXT:
         raise ModelError(f"{where}: expected up to {LONGEST_TEXT} characters, got {len(text)}: {quoted(text)}")
     try:
-        with warnings.catch_warnings():  # of the parser, about what reads oddly: 1if x<1else 2
-            warnings.simplefilter("ignore", SyntaxWarning)
-            warnings.simplefilter("ignore", DeprecationWarning)
-            tree = ast.parse(text.strip().replace("^", "**"), mode="eval").body
-        writer = Writer(where, text, tuple(inputs), dict(parameters or {}), dict(functions or {}), Tape())
+        tree = parsed(text)
+        known = dict(parameters or {}), dict(functions or {}), dict(switches or {})
+        writer = Writer(where, text, tuple(inputs), *known, Tape())
         writer.write(tree)
     except (SyntaxError, AttributeError, ValueError) as problem:
         if isinstance(problem, ModelError):
@@ -102,6 +103,14 @@ def compile_expression(
     return writer.tape
 
 
+def parsed(text: str) -> ast.expr:
+    """Return the syntax tree of an expression."""
+    with warnings.catch_warnings():  # of the parser, about what reads oddly: 1if x<1else 2
+        warnings.simplefilter("ignore", SyntaxWarning)
+        warnings.simplefilter("ignore", DeprecationWarning)
+        return ast.parse(text.strip().replace("^", "**"), mode="eval").body
+
+
 @dataclass
 class Writer:
     """Writes the nodes of a syntax tree on a tape."""
@@ -111,6 +120,7 @@ class Writer:
     inputs: tuple[str, ...]
     parameters: dict[str, float]
     functions: dict[str, int]
+    switches: dict[str, str]
     tape: Tape
 
     def refuse(self, node: ast.AST, words: str, hint: str = "") -> ModelError:
@@ -159,9 +169,13 @@ class Writer:
         known = {**CONSTANTS, **self.parameters}
         if node.id in known:
             return self.tape.add(CONSTANT, c=float(known[node.id]))
+        if node.id in self.switches:
+            text = self.switches[node.id]
+            return replace(self, text=text, switches={}).write(parsed(f"-1 if ({text}) < 0 else 1"))
         if node.id in self.functions or node.id in FUNCTIONS:
             raise self.refuse(node, f"{node.id!r} is a function; expected {node.id}(...)")
-        raise self.refuse(node, f"unknown name {quoted(node.id)}", nearest(node.id, [*self.inputs, *known]))
+        choices = [*self.inputs, *known, *self.switches]
+        raise self.refuse(node, f"unknown name {quoted(node.id)}", nearest(node.id, choices))
 
     def call(self, node: ast.Call) -> int:
         """Write a call of a function."""

@@ -33,6 +33,7 @@ from floatframe.integrators.generalized_alpha import GeneralizedAlpha
 from floatframe.motion.events import events_of
 from floatframe.motion.integration import number_of_steps
 from floatframe.motion.jumps import jumps_of_steps
+from floatframe.motion.switch_events import switch_events
 from floatframe.state import State
 from floatframe.studies.study import OF_MODES
 from floatframe.system import System
@@ -238,6 +239,10 @@ def require_smooth_run(family: Family, t_start: float, h: float, n_steps: int) -
     stops = [coupler.name for coupler in system.couplers if coupler.limits is not None]
     if stops:
         raise ModelError(f"sensitivities: coupler {stops[0]!r} has limits: motions over impacts are not differentiated")
+    if switches := switch_events(system):
+        raise ModelError(
+            f"sensitivities: {switches[0].name!r} is a switching function: motions over jumps are not differentiated"
+        )
     if system.fmus:
         raise ModelError(f"sensitivities: unit {system.fmus[0].name!r} of another program is not differentiated")
     for each in (system, *(around.system for p in family.parameters for around in p.around)):

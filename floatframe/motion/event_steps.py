@@ -37,6 +37,7 @@ from floatframe.motion.stop_events import (
     stop_values,
     sum_rows,
 )
+from floatframe.motion.switch_events import SwitchEvent, beyond_zero, sign_of, switch_events, with_signs
 from floatframe.motion.watched_values import direct_values
 from floatframe.results.head import Head
 from floatframe.results.results_file import MemorySource
@@ -111,6 +112,7 @@ class EventWatch:
     off: frozenset[str] = field(init=False)  #: forces at zero, couplers not engaged, elements that do nothing
     caught: dict[str, float] = field(default_factory=dict)  #: what couplers that have been engaged hold
     resting: dict[str, str] = field(default_factory=dict)  #: side of the limits at which couplers hold
+    signs: dict[str, int] = field(default_factory=dict)  #: that switching functions have in a step, by their events
     values: Array = field(init=False)  #: of the events at the last time, angles without jumps, (n_events,)
     row: Rows | None = field(init=False, default=None)  #: results at the last time, where sensors measure
     #: the last two rows that were measured, each with itself in the frames of the files
@@ -127,11 +129,13 @@ class EventWatch:
 
     def __post_init__(self) -> None:
         require_events(self.full)
-        self.events = (*events_of(self.full), *stop_events(self.full))
+        self.events = (*events_of(self.full), *stop_events(self.full), *switch_events(self.full))
         released = {coupler.name for coupler in self.full.couplers if not coupler.engaged}
         self.switch(off_at_start(events_of(self.full)) | released)
         self.values = np.zeros(len(self.events))
-        self.direct = [None if isinstance(each, StopEvent) else direct_values(self.full, each) for each in self.events]
+        is_own = [isinstance(each, StopEvent | SwitchEvent) for each in self.events]
+        each_event = zip(self.events, is_own, strict=True)
+        self.direct = [None if own else direct_values(self.full, each) for each, own in each_event]
 
     def switch(self, off: frozenset[str]) -> None:
         """Take these forces and couplers off, all others on, with what couplers have caught and stops hold."""
@@ -140,11 +144,11 @@ class EventWatch:
         limits = {coupler.name: coupler.limits for coupler in self.full.couplers}
         stops = {name: float(getattr(limits[name], side)) for name, side in self.resting.items()}
         held = self.caught | stops
-        key = off, tuple(sorted(held.items()))
+        key = off, tuple(sorted(held.items())), tuple(self.signs.items())
         if key not in self.made:
             if len(self.made) >= MOST_MADE:
                 self.made.clear()
-            self.made[key] = switched(self.full, off, held)
+            self.made[key] = switched(with_signs(self.full, self.signs), off, held)
         self.system = self.made[key]
 
     def begin(self, row: Rows) -> None:
@@ -154,6 +158,9 @@ class EventWatch:
         if is_first and not self.happened:
             self.values = self.measured(row, row)[0]
             require_within_limits(compiled_system(self.full), self.events, self.values)
+            pairs = zip(self.events, self.values, strict=True)
+            self.signs = {each.name: sign_of(float(x)) for each, x in pairs if isinstance(each, SwitchEvent)}
+            self.switch(self.off)
             self.take_inside()
 
     def measured(self, *rows: Rows) -> Array:
@@ -163,6 +170,9 @@ class EventWatch:
         for event, direct in zip(self.events, self.direct, strict=True):
             if isinstance(event, StopEvent):
                 columns.append(stop_values(compiled, event, self.resting, rows))
+                continue
+            if isinstance(event, SwitchEvent) and event.values is not None:
+                columns.append(event.values(rows))
                 continue
             if direct is not None:
                 columns.append(np.concatenate([direct(row) for row in rows]))
@@ -380,6 +390,11 @@ class EventWatch:
             before = self.system
             if isinstance(event, StopEvent):
                 state = self.strike(carry, event, t, h)
+            elif isinstance(event, SwitchEvent):
+                self.add(event, t)
+                self.signs[event.name] = -self.signs[event.name]
+                self.switch(self.off)
+                state = carry.state
             else:
                 self.add(event, t)
                 if event.record and not event.stop:
@@ -497,10 +512,15 @@ class EventWatch:
         return hit.state
 
     def take_inside(self) -> None:
-        """Let limits that are reached, and on which nothing rests, be reached anew by whatever goes beyond them."""
+        """Let limits that are reached, and on which nothing rests, be reached anew by whatever goes beyond them.
+
+        So for the zeros of switching functions, which have the sign of the law.
+        """
         for j, event in enumerate(self.events):
             if isinstance(event, StopEvent) and event.side in INWARD and event.coupler not in self.resting:
                 self.values[j] = just_inside(event, float(self.values[j]))
+            elif isinstance(event, SwitchEvent):
+                self.values[j] = beyond_zero(float(self.values[j]), self.signs[event.name])
 
     def add(self, event: Event, t: float) -> None:
         """Take an event into what has happened."""
@@ -565,16 +585,14 @@ class EventWatch:
 
     def record(self) -> dict[str, Array]:
         """Return what a run needs to go on."""
-        words = json.dumps(
-            {"off": sorted(self.off)}
-            | {name: getattr(self, name) for name in ("happened", "caught", "resting", "calm", "changed", "due")}
-        )
+        names = ("happened", "caught", "resting", "signs", "calm", "changed", "due")
+        words = json.dumps({"off": sorted(self.off)} | {name: getattr(self, name) for name in names})
         return {"event_values": self.values, "events": np.frombuffer(words.encode(), dtype=np.uint8)}
 
     def restore(self, record: Mapping[str, Array]) -> None:
         """Go on from a record."""
         data = json.loads(np.asarray(record["events"], dtype=np.uint8).tobytes().decode())
-        self.caught, self.resting = data.get("caught", {}), data.get("resting", {})
+        self.caught, self.resting, self.signs = (data.get(name, {}) for name in ("caught", "resting", "signs"))
         self.calm = data.get("calm", BLOCK)
         self.changed, self.due = data.get("changed", 0), data.get("due", -1)
         self.switch(frozenset(data["off"]))

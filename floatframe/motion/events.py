@@ -14,6 +14,7 @@ import numpy as np
 
 from fe_models.foundation.words import nearest, quoted
 from floatframe.checked_values import number
+from floatframe.compiling.system import compiled_system
 from floatframe.elements.element import Element
 from floatframe.elements.switched_off import SwitchedOff, off_at_start
 from floatframe.errors import ModelError
@@ -170,8 +171,13 @@ def events_of(system: System) -> tuple[Event, ...]:
 
 
 def has_events(system: System) -> bool:
-    """Whether something may be switched during a motion: events, or stops that are struck."""
-    return bool(events_of(system)) or any(coupler.limits is not None for coupler in system.couplers)
+    """Whether something may be switched during a motion: events, stops that are struck, laws that jump with it."""
+    return (
+        bool(events_of(system))
+        or any(coupler.limits is not None for coupler in system.couplers)
+        or any(getattr(force, "switches", ()) for force in system.forces)
+        or any(placed.law.switches for placed in compiled_system(system).laws)
+    )
 
 
 def require_times_of_events(system: System, t_start: float) -> None:

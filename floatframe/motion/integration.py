@@ -375,7 +375,7 @@ class Run:
         raise_if_interrupted: Callable[[], None],
     ) -> Trajectory:
         """Take the steps that are left, in batches that end where a run can go on; return the motion."""
-        begun = self.system if self.events is None else self.events.system
+        begun = self.acting
         work = new_work(compiled_system(begun).model) if self.events is None else self.events.new_work()
         t_begun = self.t_start + n_done * self.h
         _, row = self.integrator.observe(begun, t_begun, carry, work)  # the iterate to begin from
@@ -398,9 +398,8 @@ class Run:
                 begin, n_happened = carry, self.n_happened
                 n_smooth = min((k - n_done for k in jumps if k >= n_done), default=n_batch)
                 if n_smooth == 0:
-                    acting = self.system if self.events is None else self.events.system
                     carry, rows, work, failure = over_jumps(
-                        self.integrator, acting, carry, work, t=self.t_start + n_done * self.h, h=self.h,
+                        self.integrator, self.acting, carry, work, t=self.t_start + n_done * self.h, h=self.h,
                         jumps=jumps[n_done], events=self.events,
                     )  # fmt: skip
                     n_good = int(failure is None)
@@ -428,9 +427,8 @@ class Run:
                     self.tell(note)
                     is_beyond = self.energy.is_beyond and self.watching == "stop"
                 if is_window and n_smooth and n_good and failure is None and not is_switched:
-                    acting = self.system if self.events is None else self.events.system
                     note = self.steps.take(
-                        acting, begin, carry, t0=self.t_start, h=self.h, first=n_done, n_steps=n_good
+                        self.acting, begin, carry, t0=self.t_start, h=self.h, first=n_done, n_steps=n_good
                     )
                     self.tell(note)
                 elif self.steps.opened:
@@ -441,8 +439,7 @@ class Run:
                         log.warning("system %r: %s", self.system.name, words)
                 safe = self.record_where_due(carry, n_done)
                 if n_done == self.n_total or failure is not None or has_stopped or is_beyond:
-                    acting = self.system if self.events is None else self.events.system
-                    self.tell(self.steps.conclude(acting, carry, n_done, self.t_start, self.h))
+                    self.tell(self.steps.conclude(self.acting, carry, n_done, self.t_start, self.h))
                     self.look()
                 is_batch = n_done % RESTART_STEPS == 0 or n_done - n_told >= batch_steps or n_done == self.n_total
                 if progress is not None and (is_batch or not n_good or self.events is not None):
@@ -452,7 +449,8 @@ class Run:
         except BaseException:
             self.close_segment(safe)
             raise
-        raise_errors_of(compiled_system(self.system).callbacks)
+        for each in (self.system, self.acting):
+            raise_errors_of(compiled_system(each).callbacks)
         if is_beyond and failure is None:
             assert self.energy.note is not None
             raise energetic(self, self.t_start + n_done * self.h)
@@ -472,6 +470,11 @@ class Run:
                 carry.state,
             )
         return self.finished(carry)
+
+    @property
+    def acting(self) -> System:
+        """The system as it is switched."""
+        return self.system if self.events is None else self.events.system
 
     @property
     def n_happened(self) -> int:

@@ -19,6 +19,7 @@ from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.forces import UserForce
 from floatframe.integrators.carry import Carry
 from floatframe.kernels.work import Work, new_work
+from floatframe.motion.switch_events import unknowns_of_force
 from floatframe.start.newton_equations import linearized, set_iterate
 from floatframe.system import System
 
@@ -101,15 +102,12 @@ def asked_laws(system: System, compiled: CompiledSystem) -> Iterator[AskedLaw]:
 
 def asked_force(where: str, compiled: CompiledSystem, u: int, i: int, callback: Callback) -> AskedLaw:
     """Return the function of user force u, element i among couplers and user forces."""
-    model = compiled.model
-    users, elements = model.users, model.elements
-    rows = model.coordinates.row[elements.coordinate0[i] : elements.coordinate0[i + 1]]
-    n_forces, n_states = int(users.n_forces[u]), int(users.n_states[u])
-    unknowns = [*rows, *(rows + 1), *(int(elements.core[i]) + n_forces + 3 * np.arange(n_states))]
+    n_out = int(compiled.model.users.n_forces[u] + compiled.model.users.n_states[u])
+    unknowns = unknowns_of_force(compiled, u, i)
     function = FORCE(callback.address)
 
     def ask(inputs: Array, t: Array) -> Array:
-        values = np.zeros((len(t), n_forces + n_states))
+        values = np.zeros((len(t), n_out))
         at, first, stride = inputs.ctypes.data, values.ctypes.data, values.strides[0]
         for k, time in enumerate(t):
             inputs[0] = time

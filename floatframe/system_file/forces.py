@@ -54,7 +54,7 @@ KEYS_OF_FORCES = {
         "body_a", "marker_a", "triad_a", "body_b", "marker_b",
         *(field.name for field in fields(SphereContact) if field.name not in ("name", "marker_a", "marker_b")),
     ),
-    "user-force": ("coordinates", "forces", "rates", "states", "parameters", "functions"),
+    "user-force": ("coordinates", "forces", "rates", "states", "parameters", "functions", "switches"),
 }  # fmt: skip
 
 
@@ -112,6 +112,9 @@ class ForceSection(Table):
     coordinates: dict[str, CoordinateSection] | None = Field(None, description="tables of coordinates by name")
     forces: dict[str, str] | None = Field(None, description="expressions of forces, text, by coordinate")
     rates: dict[str, str] | None = Field(None, description="expressions of the rates of states, text, by state")
+    switches: dict[str, str] | None = Field(
+        None, description="expressions at whose zeros the forces jump, text, by a name that stands for their sign"
+    )
     states: dict[str, float] | None = Field(None, description="values of states at the start, numbers by state")
     parameters: dict[str, float] | None = Field(None, description="numbers of the expressions, by name")
     functions: dict[str, MotionSection] | None = Field(None, description="tables of functions of one number, by name")
@@ -175,6 +178,7 @@ def user_force_of(name: str, section: ForceSection, signals: Signals = None) -> 
         section.states or {},
         section.parameters or {},
         {key: table.function(signals) for key, table in (section.functions or {}).items()},
+        switches=section.switches or {},
     )
 
 
