@@ -13,6 +13,7 @@ from floatframe.kernels.memory import Memory, Rows, memory_at
 from floatframe.kernels.model import Model
 from floatframe.kernels.work import Work, new_work
 from floatframe.rotations import continued_rotation, rotation_log
+from floatframe.start.newton_equations import displaced
 from floatframe.state import State
 from floatframe.system import System
 
@@ -224,6 +225,17 @@ def turned_on(system: System, carry: Carry, h: float) -> Carry:
     memory = memory_of(carry)
     count_angles(model, new_work(model), memory, h)
     return replace(carry, angle=memory.angle, angle_rate=memory.angle_rate)
+
+
+def coasted(method: Integrator, system: System, t: float, size: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
+    """Return the memory so little later than t that a step would be rounding alone, by its rates, and the results."""
+    compiled = compiled_system(system)
+    state = displaced(compiled.model, carry.state, size * carry.state.u)
+    w, rows = carry.w.copy(), compiled.model.states.row
+    w[rows] += size * w[rows + 1]
+    state = replace(state, u=carry.state.u + size * carry.u_dot)
+    carry = replace(carry, state=state, w=w, work=carry.work + size * carry.power)
+    return method.observe(system, t + size, turned_on(system, carry, size), work)
 
 
 class FollowedRotations:

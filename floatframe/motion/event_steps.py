@@ -18,7 +18,7 @@ from floatframe.compiling.file_frames import rows_of_file, state_of_file
 from floatframe.compiling.public_elements import PlacedLaw
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
-from floatframe.integrators.carry import Carry, Failure, Integrator, carry_of_past, counted_on
+from floatframe.integrators.carry import Carry, Failure, Integrator, carry_of_past, coasted, counted_on
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha
 from floatframe.integrators.ida import Ida
 from floatframe.integrators.relative_ode import RelativeOde
@@ -53,6 +53,7 @@ __all__ = ["EventWatch"]
 
 BLOCK = 400  #: most steps between which what is watched is not measured; blocks end where a multiple of it does
 STANDS = 1e-9  #: change of what is watched in a step, relative to its level or 1, below which it is held or at rest
+SHORT = 1e-7  #: of a step: a rest after an event that is no step of its own, whose accelerations were rounding alone
 MOST_NUMBERS = 2**23  #: in the results of a block
 SHUT = 1e-6  #: of the length of the system, or rad: what a coupler may close that takes hold of a value
 MOST_MADE = 8  #: systems that are kept to switch to
@@ -407,8 +408,10 @@ class EventWatch:
             self.row = row
             self.take_inside()
             size, neighbours = t_end - t, None
-            if size <= 1e-12 * h:
-                return begin, row._replace(t=np.array([t_end])), work, None
+            if size <= SHORT * h:
+                begin, row = coasted(integrator, self.system, t, size, begin, work)
+                self.row = row._replace(t=np.array([t_end]))
+                return begin, self.row, work, None
             carry, row, _, failure = integrator.advance(
                 self.system, begin, work, t0=t, h=size, first=0, n_steps=1, every=1
             )

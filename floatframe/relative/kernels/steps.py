@@ -26,7 +26,7 @@ from floatframe.kernels.generalized_alpha import (
     mean_square,
     ratio_of_steps,
     roundoff_floor,
-    shares,
+    settle_row,
     time_loop,
     write_row,
 )
@@ -379,10 +379,12 @@ def try_tree_step(model, work, memory, others, order, t, h):
 
 @inner
 def write_next_row(model, work, memory, others, t, rows):
-    """Write the next row of the results."""
+    """Write the next row of the results; gaps of loops are known to rounding, as those of all joints in bodies' own."""
     tree, joints, tangent = others
     write_tree_row(model, work, memory, tree, joints, t, rows)
-    if shares(model):
+    if tree.kept.shape[0] > 0:
+        settle_row(model, work, memory, rows)
+    if work.solver.is_due == 1:
         tangent.is_kept = 0  # its factors of the bodies are overwritten
 
 

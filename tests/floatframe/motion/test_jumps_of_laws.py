@@ -169,6 +169,24 @@ def test_a_motor_runs_up_from_when_its_supply_jumps(method, formulation):
     assert_allclose(motion.body("rotor").omega_B[-1, 2], exact, rtol=2e-3)
 
 
+@pytest.mark.parametrize("method", [GeneralizedAlpha(0.8), GeneralizedAlpha(0.5), EnergyMomentum()], ids=str)
+def test_a_current_that_settles_in_less_than_a_step_keeps_its_impulse(method):
+    """It settles in 0.1 ms; a pulse of 3 ms in one step of 20 ms, and beside the ends of steps of 10 ms."""
+    hinge = RevoluteJoint("hinge", Marker(GROUND, position=(1, 2, 3)), Marker("rotor"))
+    rotor = RigidBody("rotor", 1.0, np.eye(3), position=(1, 2, 3))
+    motor = drives.DcMotor("m", Marker(GROUND, position=(1, 2, 3)), Marker("rotor"), resistance=1.0, inductance=1e-4,
+                           constant=1.0, voltage=pulse())  # fmt: skip
+    u, y = SIZE, np.zeros(2)
+    for begin, end in ((FIRST, LAST), (LAST, END)):
+        y = solve_ivp(lambda t, y, u=u: [(u - y[0] - y[1]) / 1e-4, y[0]], (begin, end), y, method="Radau",
+                      rtol=1e-9, atol=1e-12).y[:, -1]  # fmt: skip
+        u = 0.0
+    for h in (H, 0.01, 0.0043):
+        motion = integrate(System([rotor], [hinge], elements=[motor]), method, END, h)
+        assert_allclose(motion.body("rotor").omega_B[-1, 2], y[1], rtol=2e-3)
+        assert not motion.validity
+
+
 def test_jumps_are_found_in_whatever_holds_a_function_of_time():
     """In components of circuits, controllers of drives and motors of joints; not in tables over a way."""
     valve = components.Orifice("valve", "p", "q", area=1e-5, opening=pulse(1.0, (0.2, 0.3)))
