@@ -7,5 +7,5 @@ write(reduce(body, modes, frame=NodalFrame("big_end")), "rod.h5")
 
 import lazy_loader
 
-# the public names stand in __init__.pyi; each module is imported when its name is first used
+# The public names are listed in __init__.pyi. A module is imported when one of its names is first used.
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,4 +1,4 @@
-"""Errors of this package: one root, leaves that are also the built-in kind a caller would expect."""
+"""Errors of this package: one root class, and leaves that also derive from `ValueError` or `RuntimeError`."""
 
 from fe_models.foundation.errors import BodyError, CmsError, ModalFileError, UnitsError
 
@@ -21,40 +21,40 @@ __all__ = [
 
 
 class ModeSetError(CmsError, ValueError):
-    """A mode set cannot be made from this body with these options."""
+    """The mode set cannot be made from this body with these options."""
 
 
 class FactorizationError(CmsError, RuntimeError):
-    """A sparse matrix could not be factorised: singular or indefinite."""
+    """A sparse matrix could not be factorised because it is singular or indefinite."""
 
 
 class FactorRoomError(CmsError, RuntimeError):
-    """Memory or disk have no room for a factor; this says nothing about the matrix."""
+    """There is not enough memory or disk space for a factor; this says nothing about the matrix."""
 
 
 class ForeignBodyError(CmsError, ValueError):
-    """A body that another program has reduced cannot be read truthfully, or lacks what a reduced body needs."""
+    """A body reduced by another program cannot be read without guessing, or lacks data that a reduced body needs."""
 
 
 class CompareError(CmsError, ValueError):
-    """A comparison of mode sets cannot be made as it was asked for."""
+    """The comparison of mode sets cannot be made as requested."""
 
 
 class EigenError(CmsError, RuntimeError):
-    """Vibration modes could not be found to the tolerance, or their number does not agree with the inertia."""
+    """Vibration modes were not found to the tolerance, or their number contradicts the inertia of the matrix."""
 
 
 class JobError(CmsError, ValueError):
-    """A job file is not valid; the text names the key, the value and the choices."""
+    """The job file is invalid; the message names the key, the value and the choices."""
 
 
 class MemoryBudgetError(CmsError, ValueError):
-    """A reduction does not fit into the memory it may take, or that is no size; the text says what would help."""
+    """The reduction does not fit into the given memory, or the size is invalid; the message says what would help."""
 
 
 class ExportError(CmsError, ValueError):
-    """A reduced body cannot be written in the format of another program."""
+    """The reduced body cannot be written in the format of the other program."""
 
 
 class RecoveryError(CmsError, ValueError):
-    """Recovery rows cannot be made as they were asked for, or written."""
+    """Recovery rows cannot be made as requested, or cannot be written."""

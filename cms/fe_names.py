@@ -1,4 +1,4 @@
-"""Names of `fe_models` that `cms` offers too: a script that reduces a body needs no second import for them."""
+"""Names of `fe_models` that `cms` re-exports, so that a script that reduces a body needs only one import."""
 
 from fe_models.body.beam_line import BeamLine
 from fe_models.body.couplings import couple

@@ -1,13 +1,14 @@
-"""A reduced body in another body frame, from what it holds itself, without the finite element model (theory.md §4).
+"""Conversion of a reduced body to another body frame, without the finite element model (theory.md §4).
 
-The motion r = c + Phi q is seen from another frame as phi'_k = phi_k - d_k - theta_k × c: the same deformation without
-the rigid-body motion C = [d; theta] that the new condition takes off. With Z the modes afresh, phi'' = phi' Z; then the
-place, the origin and the axes of the frame change.
+Relative to another frame, the shapes of the motion r = c + Phi q are phi'_k = phi_k - d_k - theta_k × c. This is the
+same deformation without the rigid-body motion C = [d; theta] that the condition of the new frame removes. With new
+modes Z, phi'' = phi' Z. Then origin and axes of the frame change.
 
-(1) C from the condition: [1C; 2C] for Tisserand, the weighted sums for Buckens, the motion of the held dofs for nodal
-(2) M' = M - CᵀY - YᵀC + Cᵀ M_R C with Y = Psi_RᵀMPhi = [1C; 2C]; K does not see rigid motion
-(3) K Z = M' Z omega²
-(4) all that is linear in the shapes follows them; the Gram matrix of the moments goes by congruence, a'' = L a
+(1) C follows from the condition: [1C; 2C] for Tisserand, weighted sums for Buckens, the motion of held dofs for nodal
+(2) M' = M - CᵀY - YᵀC + Cᵀ M_R C with Y = Psi_RᵀMPhi = [1C; 2C]; K is not affected by rigid motion
+(3) new modes from K Z = M' Z omega²
+(4) all quantities that are linear in the shapes are transformed with them; the Gram matrix of the moments is
+    transformed by congruence, a'' = L a
 """
 
 from dataclasses import dataclass, replace
@@ -45,34 +46,34 @@ __all__ = ["Change", "convert_frame", "converted"]
 
 
 def convert_frame(reduced: ReducedBody, frame: Frame, *, damping: Damping | None = None) -> ReducedBody:
-    """Return the same reduced body in another body frame, its modes diagonalised afresh.
+    """Return the same reduced body in another body frame, with newly diagonalised modes.
 
-    Free-free frequencies, stiffness, damping and loads are those of the same body; the motion is the same but for
-    second order in q (theory.md §4). The damping matrix is carried as it is, D'' = Zᵀ D Z, so that a deformation loses
-    the same energy in both frames; it is diagonal no more in general. Quadratic modes need the elements and are left
-    out.
+    Free-free frequencies, stiffness, damping and loads are those of the same body. The motion is the same up to second
+    order in q (theory.md §4). The damping matrix is transformed, D'' = Zᵀ D Z, so that a deformation dissipates the
+    same energy in both frames; in general it is no longer diagonal. Quadratic modes need the elements and are dropped.
 
     Parameters
     ----------
     reduced
         A reduced body, in any frame.
     frame
-        Where to.
+        The new frame.
     damping
-        Replaces the damping by ratios of the new modes, or Rayleigh's of them.
+        Replaces the damping by ratios of the new modes, or by Rayleigh damping.
 
     Raises
     ------
     BodyError
-        If the body does not hold what the frame rests on: an unknown interface, one without rotation, no weighted sums
-        (a file of version 1) for a Buckens frame; if a rigid-body motion is among its shapes; or if it has a geometric
-        stiffness and the reaction of the new frame is no combination of its unit loads (`geometric_conversion`).
+        If the body lacks data that the frame needs (the interface is unknown or has no rotation, or there are no
+        weighted sums for a Buckens frame, as in a file of version 1); if its shapes contain a rigid-body motion; or if
+        it has a geometric stiffness and the reaction of the new frame is not a combination of its unit loads
+        (`geometric_conversion`).
     """
     return converted(reduced, frame, damping=damping)[0]
 
 
 def converted(reduced: ReducedBody, frame: Frame, *, damping: Damping | None = None) -> tuple[ReducedBody, "Change"]:
-    """Return what `convert_frame` returns, and the change that led there."""
+    """Return the result of `convert_frame`, and the change of frame."""
     if reduced.is_held or isinstance(frame, HeldFrame):
         raise BodyError(
             f"reduced body {reduced.name!r}: a body that is held to the ground has the frame of the ground, and a "
@@ -90,15 +91,15 @@ def converted(reduced: ReducedBody, frame: Frame, *, damping: Damping | None = N
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """From one frame B to another: what is taken off, how modes combine, where the new frame lies in the old one."""
+    """Change from one frame B to another: the rigid motion removed, the new modes, and the place of the new frame."""
 
-    C: Array  #: [d; theta] of each old shape about the old origin, old axes, (6, n_q)
-    Z: Array  #: new modes in the old ones, (n_q, n_q)
+    C: Array  #: rigid motion [d; theta] of each old shape about the old origin, old axes, (6, n_q)
+    Z: Array  #: new modes as combinations of the old ones, (n_q, n_q)
     p: Array  #: new origin in the old frame, (3,) [m]
-    R: Array  #: columns: new axes in the old ones, (3, 3)
+    R: Array  #: new axes as columns, in old axes, (3, 3)
 
     def translations(self, Phi: Array, points: Array) -> Array:
-        """Return new shapes at points of the old frame, (n, 3, n_q), of the old ones there."""
+        """Return the new shapes at points of the old frame, (n, 3, n_q), from the old shapes there."""
         off = Phi - rigid_motion_of_points(points, np.zeros(3)) @ self.C
         return np.einsum("ba,nbk->nak", self.R, off @ self.Z)
 
@@ -107,11 +108,11 @@ class Change:
         return (positions - self.p) @ self.R
 
 
-# (1) the condition ---------------------------------------------------------------------------------------------------
+# (1) Condition of the frame ------------------------------------------------------------------------------------------
 
 
 def condition_of(reduced: ReducedBody, frame: Frame) -> tuple[Array, BodyFrame]:
-    """Return what the frame takes off each shape, C (6, n_q) about the present origin, and the new frame."""
+    """Return the rigid motion C that the frame removes from shapes, (6, n_q) about the old origin, and the frame."""
     moments = reduced.moments
     center = in_mesh(reduced.frame, moments.center_of_mass)
     if isinstance(frame, TisserandFrame):
@@ -136,9 +137,9 @@ def condition_of(reduced: ReducedBody, frame: Frame) -> tuple[Array, BodyFrame]:
 
 
 def least(weight: float, c: Array, N_c: Array, U1: Array, U2: Array) -> Array:
-    """Return the rigid motions nearest to shapes in a weighted norm, about the origin, (6, n_q).
+    """Return the rigid motions that fit the shapes best in a weighted norm, about the origin, (6, n_q).
 
-    About the weighted centre c the norm parts into translation and rotation: d_c = U1/w, N_c theta = U2 - c × U1.
+    About the weighted centre c the norm splits into translation and rotation: d_c = U1/w, N_c theta = U2 - c × U1.
     """
     theta = np.linalg.solve(N_c, U2 - np.cross(c, U1, axisb=0, axisc=0))
     return np.vstack([U1 / weight - np.cross(theta, c, axisa=0, axisc=0), theta])
@@ -173,10 +174,10 @@ def nodal_condition(reduced: ReducedBody, frame: NodalFrame) -> tuple[Array, Arr
 
 
 def interface_dofs(reduced: ReducedBody, interface: ReducedInterface) -> tuple[Array, IntArray, Array, Array, IntArray]:
-    """Return the dofs an interface offers to a nodal frame: points, components, rigid motions, shapes, nodes.
+    """Return the dofs that an interface offers to a nodal frame: points, components, rigid motions, shapes, nodes.
 
-    In mesh axes. The six of its reference point; the translations of the members where it has no such node (kind
-    "nodes").
+    All are in mesh axes. They are the six dofs of the reference point, or the translations of the members if there is
+    no such node (kind "nodes").
     """
     A = reduced.frame.axes
     if interface.kind == "nodes" and not (len(interface.members) == 1 and interface.has_rotation):
@@ -190,7 +191,7 @@ def interface_dofs(reduced: ReducedBody, interface: ReducedInterface) -> tuple[A
     position = interface.position
     turn = np.kron(np.eye(2), A)
     motion = turn @ six_motions(position)
-    at = np.flatnonzero((reduced.nodes == position).all(axis=1))  # the reference node is a kept one
+    at = np.flatnonzero((reduced.nodes == position).all(axis=1))  # the reference node is a kept node
     ids = np.full(6, reduced.node_ids[at[-1]] if len(at) else -1)
     return np.tile(in_mesh(reduced.frame, position), (6, 1)), np.arange(6), motion, turn @ interface.Psi, ids
 
@@ -201,7 +202,7 @@ def six_motions(position: Array) -> Array:
     return np.vstack([rigid_motion_of_points(np.asarray(position)[None], np.zeros(3))[0], rotation])
 
 
-# (2), (3) the pencil -------------------------------------------------------------------------------------------------
+# (2), (3) Pencil of the new frame ------------------------------------------------------------------------------------
 
 
 def rigid_mass(moments: Moments) -> tuple[Array, Array]:
@@ -214,7 +215,7 @@ def rigid_mass(moments: Moments) -> tuple[Array, Array]:
 
 
 def modes_of(reduced: ReducedBody, M: Array) -> tuple[Array, np.ndarray]:
-    """Return the modes of K and the new mass in the old shapes, (n_q, n_q), and which have mass."""
+    """Return the modes of K and the new mass as combinations of the old shapes, (n_q, n_q), and which have mass."""
     stiffness, mass = np.diag(reduced.K), np.diag(M)
     omega2_1 = (2 * np.pi * reduced.free_frequencies.min()) ** 2 if len(reduced.free_frequencies) else 0.0
     if not omega2_1 > 0:
@@ -242,11 +243,11 @@ def orienting_rows(reduced: ReducedBody, change: Change) -> Array:
     return np.asarray(reduced.moments.P).reshape(9, -1) @ change.Z
 
 
-# (4) everything else -------------------------------------------------------------------------------------------------
+# (4) Everything that follows the shapes ------------------------------------------------------------------------------
 
 
 def in_mesh(frame: BodyFrame, points: Array) -> Array:
-    """Return points of B in mesh coordinates."""
+    """Convert points of B to mesh coordinates."""
     return np.asarray(frame.origin + points @ frame.axes.T)
 
 
@@ -258,7 +259,7 @@ def relative_place(old: BodyFrame, new: BodyFrame) -> tuple[Array, Array]:
 def changed_body(
     reduced: ReducedBody, frame: BodyFrame, change: Change, is_massive: np.ndarray, damping: Damping | None
 ) -> ReducedBody:
-    """Return the body with all that it holds in the new frame."""
+    """Return the body with all its data in the new frame."""
     Z = change.Z
     M, K = np.diag(is_massive.astype(float)), np.diag(omega2_of(reduced, Z))
     D = Z.T @ reduced.D @ Z if damping is None else modal_damping(damping, M, K, second=reduced.units.time)
@@ -288,7 +289,7 @@ def changed_body(
         geometric=None
         if reduced.geometric is None
         else converted_geometric_stiffness(reduced, frame, C=change.C, Z=Z, p=change.p, R=change.R),
-        quadratic=None,  # its reaction is that of the old frame
+        quadratic=None,  # quadratic modes belong to the reaction of the old frame
         point_stress=None if reduced.point_stress is None else changed_point_stress(reduced.point_stress, change),
         recovery={name: changed_table(table, change) for name, table in reduced.recovery.items()},
     )
@@ -297,14 +298,14 @@ def changed_body(
 def changed_moments(moments: Moments, change: Change) -> Moments:
     """Return the moments in the new frame: L Gram Lᵀ, with a'' = L a for a = [1, c, phi_x, phi_y, phi_z].
 
-    What is missing stays missing. Taking a rotation off the shapes mixes 3C into 4C and 5C, which are lost with it;
-    mass, 1C, 2C and M* of the new frame follow from those of the old one alone.
+    Missing terms stay missing. Removing a rotation from the shapes mixes 3C into 4C and 5C, which are then missing too.
+    Mass, 1C, 2C and M* of the new frame follow from their old values alone.
     """
     n = moments.n_q
     L = np.zeros((4 + 3 * n, 4 + 3 * n))
     L[0, 0] = 1.0
     L[1:4, 0], L[1:4, 1:4] = -change.R.T @ change.p, change.R.T
-    # new shape k, component a: R_ba (phi_b - d_b - eps_bce theta_c c_e), all times Z
+    # new shape k, component a: R_ba (phi_b - d_b - eps_bce theta_c c_e), multiplied by Z
     shapes = L[4:].reshape(3, n, -1)
     off = change.C @ change.Z
     cross = -np.cross(np.eye(3)[:, None], off[3:].T[None])  # [e, k, b] = -(e_e × theta_k)_b = (theta_k × e_e)_b
@@ -316,7 +317,7 @@ def changed_moments(moments: Moments, change: Change) -> Moments:
 
 
 def changed_interface(reduced: ReducedBody, interface: ReducedInterface, change: Change) -> ReducedInterface:
-    """Return an interface in the new frame; without rotation Psi is the translation of the middle of its members."""
+    """Return an interface in the new frame; without rotation, Psi is the translation of the mean of its members."""
     middle = interface.position if interface.has_rotation else reduced.nodes[interface.members].mean(axis=0)
     Psi = (interface.Psi - six_motions(middle) @ change.C) @ change.Z
     rotation = Psi[3:] if interface.has_rotation else np.zeros_like(Psi[3:])
@@ -354,7 +355,7 @@ def changed_load_case(case: ReducedLoadCase, change: Change) -> ReducedLoadCase:
 
 
 def changed_table(table: RecoveryTable, change: Change) -> RecoveryTable:
-    """Return recovery rows in the new frame: z = X z'' (docs/theory.md §11)."""
+    """Return recovery rows in the new frame, which follow from z = X z'' (docs/theory.md §11)."""
     X = np.zeros((6 + table.n_q, 6 + table.n_q))
     X[:6, :6] = six_motions(-change.p) @ np.kron(np.eye(2), change.R)  # d - theta × p, theta
     X[:6, 6:] = -change.C @ change.Z
@@ -363,15 +364,15 @@ def changed_table(table: RecoveryTable, change: Change) -> RecoveryTable:
 
 
 def changed_point_stress(points: PointStress, change: Change) -> PointStress:
-    """Return the stress at named points: rigid motion has none."""
+    """Return the stress at named points in the new frame; rigid motion has no stress."""
     modes = turned_stress(np.asarray(points.modes) @ change.Z, change.R)
     return replace(points, positions=change.points(np.asarray(points.positions)), modes=modes)
 
 
 def changed_labels(reduced: ReducedBody, Z: Array) -> tuple[tuple[str, ...], Array]:
-    """Return label and energy shares of the new modes; without columns on record, by the old modes they are made of.
+    """Return label and energy shares of the new modes; without source columns, in terms of the old modes.
 
-    The energy Z_kᵀ K Z_k parts into Z_lk² K_l without mixed terms, since the old modes are K-orthogonal.
+    The energy Z_kᵀ K Z_k splits into Z_lk² K_l without mixed terms, because the old modes are K-orthogonal.
     """
     if reduced.columns is not None:
         columns: SourceColumns = reduced.columns.of_modes(Z)

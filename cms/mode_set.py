@@ -1,4 +1,4 @@
-"""A mode set: displacement columns that span a reduction basis, each with its origin in words."""
+"""A mode set: displacement columns that span a reduction basis, each with a description of its origin."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -20,14 +20,16 @@ class ModeSet:
     """Columns over all dofs of a coupled body, before the finishing step of `reduce`."""
 
     name: str  #: key in the registry, such as "craig-bampton"
-    columns: Array  #: displacement columns, (n_dof, n_columns); `SpreadColumns` of a body on many ranks
-    labels: tuple[str, ...]  #: one per column, such as "constraint big_end ux", "fixed-interface 3"
-    frequencies: Array  #: of the column's own vibration problem, (n_columns,) [Hz]; NaN for static columns
-    options: Mapping[str, str] = field(default_factory=dict)  #: what was asked for and which solver ran
+    columns: Array  #: displacement columns, (n_dof, n_columns); `SpreadColumns` if the body is distributed over ranks
+    labels: tuple[str, ...]  #: label of each column, such as "constraint big_end ux", "fixed-interface 3"
+    #: frequency of each column in its own eigenvalue problem, (n_columns,) [Hz]; NaN for static columns
+    frequencies: Array
+    options: Mapping[str, str] = field(default_factory=dict)  #: requested options, and the solver that was used
     groups: tuple[
         str, ...
-    ] = ()  #: one per column, such as "constraint big_end"; by default the label but its last word
-    data: Mapping[str, Array] = field(default_factory=dict)  #: numbers about the set, such as Hankel singular values
+    ] = ()  #: group of each column, such as "constraint big_end"; default: the label without its last word
+    #: numerical data of the set, such as Hankel singular values
+    data: Mapping[str, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         columns: Any = self.columns
@@ -53,7 +55,7 @@ class ModeSet:
 
     @property
     def is_static(self) -> np.ndarray:
-        """Which columns are static ones, (n_columns,) bool."""
+        """Whether each column is static, (n_columns,) bool."""
         return np.isnan(self.frequencies)
 
 

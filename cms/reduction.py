@@ -1,4 +1,4 @@
-"""Reduce: a coupled FEBody and a mode set become a ReducedBody in a body frame."""
+"""Reduction of a coupled FEBody by a mode set to a ReducedBody in a body frame."""
 
 import logging
 import platform
@@ -44,7 +44,7 @@ __all__ = ["assembled", "reduce"]
 
 log = logging.getLogger(__name__)
 
-SHAPES_AT_ONCE = 64  #: whose displacements of all nodes are held at once
+SHAPES_AT_ONCE = 64  #: number of shapes whose displacements of all nodes are held at a time
 
 
 def reduce(
@@ -64,29 +64,30 @@ def reduce(
     Parameters
     ----------
     source
-        A coupled body, or the `Families` that made `modes`: the geometric stiffness then takes their factorisation.
+        A coupled body, or the `Families` that made `modes`; the geometric stiffness then reuses their factorisation.
     modes
         A mode set of that body.
     frame
-        Body reference frame; Tisserand (mean axis) by default, of a held body the ground.
+        Body reference frame. Default: Tisserand (mean axis), or the ground for a held body.
     damping
-        Added to the body's own D, which is projected; none by default.
+        Damping added to the body's own D, which is projected; default: none.
     stress
-        Whether to keep the stress of the modes at the kept nodes and the stress points, where the body knows it.
+        Whether to keep the stress of the modes at the kept nodes and the stress points, if the body knows it.
     geometric
-        Whether to add the geometric stiffness of the unit loads (`cms.GeometricStiffness`), with which a multibody
-        system stiffens the body by its spin, accelerations and interface loads; by default where the elements are
-        known and it has 2 GB at most (`cms.second_order.room_for_stiffness`; a warning and the provenance tell if it is
-        left out). It costs a factorisation, if `source` does not bring one, the static solution of 12 + 6 n_interfaces
-        loads and one pass over the elements. Or the static states of the unit loads in this frame (`unit_states`), so
-        that no factorisation is needed any more.
+        Whether to add the geometric stiffness of the unit loads (`cms.GeometricStiffness`). With it, a multibody system
+        stiffens the body by its spin, accelerations and interface loads. Default: True if the elements are known and it
+        needs at most 2 GB (`cms.second_order.room_for_stiffness`); a warning and the provenance say if it is left out.
+        It costs a factorisation, unless `source` brings one, the static solution of 12 + 6 n_interfaces loads, and one
+        pass over the elements. Alternatively, the static states of the unit loads in this frame (`unit_states`), which
+        need no further factorisation.
     quadratic
-        Whether to add quadratic modes, the displacement of second order of every kept node (`quadratic_modes`),
-        with the geometric stiffness that is their inertia. For slender bodies: three static solutions a kept node.
+        Whether to add quadratic modes, the second-order displacement of every kept node (`quadratic_modes`), together
+        with the geometric stiffness that supplies their inertia. They are meant for slender bodies and cost three
+        static solutions per kept node.
     keep
-        Nodes that are kept with translations and rotations beside surface and interfaces: numbers of the user's mesh,
-        names of sets, or positions [x, y, z] in mesh axes (`fe_models.keep_nodes`); nodes of lines and point masses
-        are kept anyway.
+        Nodes to keep with translations and rotations, in addition to surface and interfaces: numbers of the user's
+        mesh, names of sets, or positions [x, y, z] in mesh axes (`fe_models.keep_nodes`). Nodes of lines and point
+        masses are always kept.
     recovery
         Tables of recovery rows to add (`ReducedBody.recovery`): motions, stress, forces in elements and at interfaces,
         with their static part, which needs the factorisation.
@@ -94,12 +95,12 @@ def reduce(
     Raises
     ------
     ModeSetError
-        If the set does not belong to the body, or nothing elastic is left.
+        If the set does not belong to the body, or no elastic shape is left.
     BodyError
-        If the body is a mechanism, the frame cannot be attached, or geometric stiffness is asked of a body without an
-        element model, or does not fit into the memory of this machine.
+        If the body is a mechanism or the frame cannot be attached; or if the geometric stiffness is requested of a body
+        without an element model, or does not fit into the memory of this machine.
     RecoveryError
-        If a recovery row is asked for that the body does not know.
+        If the body does not know a requested recovery row.
     """
     body = body_of(source)
     states = geometric if isinstance(geometric, UnitStates) else None
@@ -154,13 +155,13 @@ def assembled(
     moments: Moments,
     damping: Damping | None = None,
 ) -> ReducedBody:
-    """Return the reduced body of a finished basis at the nodes that are kept, without stress and second order.
+    """Return the reduced body of a finished basis at the kept nodes, without stress and second-order terms.
 
     Parameters
     ----------
-    kept
+    Kept nodes of the body, ascending, (n_kept,); they include the surface and the members of interfaces.
         Nodes of the body, ascending; among them surface and members of interfaces, (n_kept,).
-    moments
+    Moments of the shapes in the frame of `condition`.
         Of the shapes in the frame of `condition`.
     """
     axes, origin = condition.frame.axes, condition.frame.origin
@@ -196,21 +197,21 @@ def assembled(
 
 
 def kept_translations(body: FEBody, Phi: Array, nodes: IntArray, axes: Array) -> Array:
-    """Return the translations of the shapes at some nodes in axes of B, (n, 3, n_q), some shapes at a time."""
-    if isinstance(Phi, SpreadColumns):  # the rows of these nodes alone
+    """Return the translations of the shapes at some nodes in axes of B, (n, 3, n_q), in blocks of shapes."""
+    if isinstance(Phi, SpreadColumns):  # only the rows of these nodes
         moved = rows_times(translation_rows(body, nodes), Phi).reshape(len(nodes), 3, -1)
         return np.einsum("ba,nbk->nak", axes, moved)
     kept = zeros_like(Phi, (len(nodes), 3, Phi.shape[1]))
     for first in range(0, Phi.shape[1], SHAPES_AT_ONCE):
         some = slice(first, first + SHAPES_AT_ONCE)
-        # exact zeros of aligned axes stay exact
+        # exact zeros stay exact if the axes are aligned
         kept[:, :, some] = np.einsum("ba,nbk->nak", axes, body.translations(Phi[:, some])[nodes])
         release(kept)
     return kept
 
 
 def require_states_of(body: FEBody, frame: BodyFrame, states: UnitStates) -> None:
-    """Raise `ModeSetError` unless the static states are those of this body in this frame."""
+    """Raise `ModeSetError` unless the static states belong to this body in this frame."""
     other = states.condition.frame
     is_same = frame.kind == other.kind and np.array_equal(frame.dofs, other.dofs)
     is_same = is_same and np.array_equal(frame.origin, other.origin) and np.array_equal(frame.axes, other.axes)
@@ -222,14 +223,14 @@ def require_states_of(body: FEBody, frame: BodyFrame, states: UnitStates) -> Non
 
 
 def kept_nodes(body: FEBody) -> IntArray:
-    """Return the nodes a reduced body keeps: surface, interfaces with reference nodes, those asked for; ascending."""
+    """Return the nodes that a reduced body keeps: surface, interfaces, reference nodes, requested nodes; ascending."""
     parts = [body.surface.ravel(), body.kept] + [interface.nodes for interface in body.interfaces]
     parts += [body.dofs[interface.dofs, 0] for interface in body.interfaces if interface.dofs is not None]
     return np.unique(np.concatenate(parts))
 
 
 def reduced_moments(body: FEBody, Phi: Array, frame: BodyFrame) -> Moments:
-    """Canonical moments of the shapes in the frame B, by the exact element integrals where the body has them."""
+    """Return the canonical moments of the shapes in B, from exact element integrals if the body has them."""
     if body.element_model is not None:
         gram = body.element_model.mass_gram(body.mesh_displacement(Phi))
     else:
@@ -238,9 +239,9 @@ def reduced_moments(body: FEBody, Phi: Array, frame: BodyFrame) -> Moments:
 
 
 def gram_in_frame(gram: Array, frame: BodyFrame) -> Array:
-    """Return the Gram matrix of a_B, c_B = axesᵀ (c - origin), phi_B = axesᵀ phi, by that of a = [1, c, phi].
+    """Return the Gram matrix of a_B, c_B = axesᵀ (c - origin), phi_B = axesᵀ phi, from that of a = [1, c, phi].
 
-    Components of all shapes are grouped, (4 + 3 n_q, 4 + 3 n_q); the array given is overwritten.
+    Components of all shapes are grouped, (4 + 3 n_q, 4 + 3 n_q). The given array is overwritten.
     """
     n = (len(gram) - 4) // 3
     L = np.eye(4)
@@ -248,7 +249,7 @@ def gram_in_frame(gram: Array, frame: BodyFrame) -> Array:
     L[1:, 1:] = frame.axes.T
     gram[:4] = L @ gram[:4]
     gram[:, :4] = gram[:, :4] @ L.T
-    if not np.array_equal(frame.axes, np.eye(3)):  # exact numbers of aligned axes stay exact
+    if not np.array_equal(frame.axes, np.eye(3)):  # exact numbers stay exact if the axes are aligned
         rows = gram[4:].reshape(3, n * len(gram))
         rows[:] = frame.axes.T @ rows
         for part in np.array_split(gram, max(1, gram.nbytes // 2**26)):
@@ -257,14 +258,14 @@ def gram_in_frame(gram: Array, frame: BodyFrame) -> Array:
 
 
 def reduced_nodal_sums(body: FEBody, Phi: Array, frame: BodyFrame) -> NodalSums | None:
-    """Weighted sums over the nodes in the frame B; None where the nodes do not span a body."""
+    """Return weighted sums over the nodes in the frame B; None if the nodes are too few or collinear."""
     weights = node_weights(body)
     if not weights.any():
         return None
     c = (body.nodes - frame.origin) @ frame.axes
     try:
         U = inner(weighted_rigid_modes(body, frame.origin), Phi)
-    except BodyError:  # nodes on one line, or without translations: no Buckens frame can be had
+    except BodyError:  # nodes are collinear or have no translations, so there is no Buckens frame
         return None
     return NodalSums(
         w=weights.sum(),
@@ -277,7 +278,7 @@ def reduced_nodal_sums(body: FEBody, Phi: Array, frame: BodyFrame) -> NodalSums 
 
 
 def reduced_load_case(body: FEBody, case: LoadCase, Phi: Array, frame: BodyFrame) -> ReducedLoadCase:
-    """Modal forces of a load case, and its resultant about the origin of B."""
+    """Return the modal forces of a load case, and its resultant about the origin of B."""
     wrench = geometric_rigid_modes(body, origin=frame.origin).T @ case.f
     R = frame.axes.T
     h = inner(Phi, case.f[:, None])[:, 0] if isinstance(Phi, SpreadColumns) else Phi.T @ case.f
@@ -287,7 +288,7 @@ def reduced_load_case(body: FEBody, case: LoadCase, Phi: Array, frame: BodyFrame
 def reduced_interface(
     body: FEBody, interface: Interface, Phi: Array, frame: BodyFrame, index_of: IntArray
 ) -> ReducedInterface:
-    """Motion of an interface with the modes: of its reference node, or the mean motion of its nodes."""
+    """Return the motion of an interface with the modes: of its reference node, or the mean motion of its nodes."""
     motion, reference, has_rotation = reference_motion(body, interface)
     Psi = rows_times(motion, Phi)
     R = frame.axes.T
@@ -303,7 +304,7 @@ def reduced_interface(
 
 
 def reduced_damping(body: FEBody, finished: FinishedBasis, damping: Damping | None) -> Array:
-    """Return D* = Phiᵀ D Phi plus the modal or Rayleigh part, (n_q, n_q) [1/s]."""
+    """Return D* = Phiᵀ D Phi plus the modal or Rayleigh damping, (n_q, n_q) [1/s]."""
     D = np.zeros_like(finished.K)
     if body.D is not None:
         Phi = in_memory(finished.Phi)
@@ -317,11 +318,11 @@ def reduced_damping(body: FEBody, finished: FinishedBasis, damping: Damping | No
 def reduction_provenance(
     body: FEBody, modes: ModeSet, finished: FinishedBasis, damping: Damping | None
 ) -> Mapping[str, str]:
-    """Record what the reduced body was made from and by which versions."""
+    """Return from what the reduced body was made, and by which versions."""
     versions = {f"version {name}": metadata.version(name) for name in ("numpy", "scipy")}
     try:
         versions["version floatframe"] = metadata.version("floatframe")
-    except metadata.PackageNotFoundError:  # run from a checkout that is not installed
+    except metadata.PackageNotFoundError:  # a checkout that is not installed
         versions["version floatframe"] = "unknown"
     return {
         **dict(body.provenance),

@@ -1,4 +1,4 @@
-"""A reduced body as the content of a modal file, and back."""
+"""Conversion between a reduced body and the content of a modal file."""
 
 from collections.abc import Mapping
 from dataclasses import fields
@@ -27,9 +27,11 @@ __all__ = ["FORMAT", "Contents", "body_of", "content_of", "require_same_frequenc
 
 FORMAT = "modal-file"
 SI = UNIT_SYSTEMS["m-kg-s"]
-FREQUENCY_DEFECT = 1e-9  #: largest relative difference of a stored frequency from that of K and M
-INVARIANT_DEFECT = 1e-12  #: largest difference of a stored 1C-5C from that of the moments, over the largest entry
-OF_FRAME = UNIT_LOADS[:3]  #: unit loads of the geometric stiffness beside those of the interfaces, which stand there
+FREQUENCY_DEFECT = 1e-9  #: largest relative difference between a stored frequency and that of K and M
+#: largest difference between a stored 1C-5C and that of the moments, relative to the largest entry
+INVARIANT_DEFECT = 1e-12
+#: unit loads of the geometric stiffness except those of the interfaces, which are stored with the interfaces
+OF_FRAME = UNIT_LOADS[:3]
 TURNED, SPREAD = "/geometric/turned", "/geometric/spread"  #: groups
 EPSILON = np.cross(np.eye(3)[:, None], np.eye(3)[None])  #: (a × b)_c = EPSILON_abc a_a b_b, (3, 3, 3)
 NUMBERS = {
@@ -38,7 +40,7 @@ NUMBERS = {
     "/nodes/instance": "node_instance",
     "/surface/element": "elements",
     "/surface/instance": "element_instance",
-}  #: dataset -> field of `Numbering`
+}  #: field of `Numbering` for each dataset
 SET_KEYS = {"name": str, "kind": str, "size": int}  #: attributes of a set
 INVARIANTS = ("J0", "C1", "C2", "C3", "C4", "C5")
 
@@ -47,7 +49,7 @@ INVARIANTS = ("J0", "C1", "C2", "C3", "C4", "C5")
 
 
 def content_of(body: ReducedBody, version: int) -> Content:
-    """Return what the modal file of a body says."""
+    """Return the content of the modal file of a body."""
     values = values_of(body)
     datasets = {}
     for path, value in values.items():
@@ -155,7 +157,7 @@ def values_of(body: ReducedBody) -> dict[str, Any]:
 
 
 def numbering_values(numbering: Numbering) -> dict[str, Any]:
-    """Return the values of the user's numbers and sets by path, of those that are known."""
+    """Return the known user's numbers and sets by path."""
     arrays = {path: getattr(numbering, name) for path, name in NUMBERS.items()}
     values: dict[str, Any] = {path: numbers for path, numbers in arrays.items() if numbers.size}
     if numbering.instances:
@@ -164,7 +166,7 @@ def numbering_values(numbering: Numbering) -> dict[str, Any]:
 
 
 def geometric_values(geometric: GeometricStiffness) -> dict[str, Any]:
-    """Return the values of the geometric stiffness by path; those of the interfaces stand with them."""
+    """Return the values of the geometric stiffness by path; those of interfaces are stored with the interfaces."""
     values: dict[str, Any] = {f"/geometric/{name}": getattr(geometric, name) for name in OF_FRAME}
     values |= {f"/interfaces/{k}/K_geometric": K for k, K in zip(geometric.loaded, geometric.interfaces, strict=True)}
     if geometric.turned is not None:
@@ -177,15 +179,15 @@ def geometric_values(geometric: GeometricStiffness) -> dict[str, Any]:
 
 
 def known_products(missing: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the moments of two factors with a shape that a file holds: none of which a part is missing.
+    """Return the products P and S_kl that a file stores: those without a missing part.
 
-    M* stands for S_kl that is not whole; 2C is among the invariants.
+    M* is stored instead of an incomplete S_kl; 2C is among the invariants.
     """
     return (() if "3C" in missing else ("P",)) + (("M",) if "5C" in missing else ("S_kl",))
 
 
 def known_invariants(missing: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the invariants that a file holds."""
+    """Return the invariants that a file stores."""
     return tuple(name for name in INVARIANTS if name not in {f"C{term[0]}" for term in missing})
 
 
@@ -193,10 +195,10 @@ def known_invariants(missing: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def body_of(content: Content) -> ReducedBody:
-    """Return the body that a file describes; what a file of an older version lacks is None or empty."""
+    """Return the body that a file describes; data that older versions lack are None or empty."""
     contents = Contents(content)
     array, words, attribute = contents.array, contents.words, contents.attribute
-    is_1 = content.version < 2  # the version before held dofs, and rotations told apart
+    is_1 = content.version < 2  # version 1 stored neither dofs nor whether an interface has a rotation
     moments, units = moments_of(contents), units_of(contents)
     return ReducedBody(
         name=attribute("/", "name", str),
@@ -242,7 +244,7 @@ def body_of(content: Content) -> ReducedBody:
 
 
 def numbering_of(contents: Contents) -> Numbering:
-    """Return the user's numbers and sets; empty where the file has none, as all before version 5."""
+    """Return the user's numbers and sets; empty if the file has none, as before version 5."""
     known = contents.content.datasets
     arrays = {name: contents.array(path) if path in known else no_numbers() for path, name in NUMBERS.items()}
     sets = []
@@ -259,7 +261,7 @@ def kept_of(contents: Contents) -> KeptPoints:
 
 
 def moments_of(contents: Contents) -> Moments:
-    """Return the moments; of a body with missing terms made of those invariants that it has."""
+    """Return the moments; if terms are missing, they are made from the stored invariants."""
     missing: tuple[str, ...] = ()
     if "missing" in contents.content.attributes.get("/moments", {}):
         missing = tuple(contents.attribute("/moments", "missing", str).split())
@@ -281,7 +283,7 @@ def moments_of(contents: Contents) -> Moments:
 
 
 def interface_of(contents: Contents, group: str) -> ReducedInterface:
-    """Return one interface; version 1 did not tell a Psi without rotation from one that happens to be zero."""
+    """Return one interface; version 1 did not distinguish a Psi without rotation from one that is zero by chance."""
     kind = contents.attribute(group, "kind", str)
     arrays = contents.arrays(group, "position", "triad", "Psi", "members")
     if contents.content.version < 2:
@@ -307,7 +309,7 @@ def nodal_sums_of(contents: Contents) -> NodalSums:
 
 
 def geometric_of(contents: Contents) -> GeometricStiffness:
-    """Return the geometric stiffness; that of the loaded interfaces stands with them."""
+    """Return the geometric stiffness; that of loaded interfaces is stored with the interfaces."""
     known = contents.content.datasets
     is_loaded = [f"{path}/K_geometric" in known for path in contents.numbered("/interfaces")]
     if contents.content.version < 6:
@@ -337,14 +339,14 @@ def loads_of(
 
 
 def shaped(contents: Contents, path: str, shape: tuple[int, ...]) -> np.ndarray:
-    """Return the numbers of a dataset, which is of that shape."""
+    """Return the numbers of a dataset after a check of its shape."""
     array = contents.array(path)
     require_shape(f"dataset {path}", array, shape)
     return array
 
 
 def units_of(contents: Contents) -> Units:
-    """Return the units of a file; a known name must have its known factors."""
+    """Return the units of a file; the factors of a known system must be the known ones."""
     kinds = {field.name: type(getattr(SI, field.name)) for field in fields(Units)}
     units = Units(**{name: contents.attribute("/units", name, kind) for name, kind in kinds.items()})
     if UNIT_SYSTEMS.get(units.name, units) != units:
@@ -353,7 +355,7 @@ def units_of(contents: Contents) -> Units:
 
 
 def require_same_invariants(content: Content, moments: Moments) -> None:
-    """Raise unless the stored invariants, written for other readers, are those of the moments."""
+    """Raise `ModalFileError` unless the stored invariants, meant for other readers, follow from the moments."""
     for name in known_invariants(moments.missing):
         stored = Contents(content).array(f"/invariants/{name}")
         expected = getattr(moments, name)
@@ -365,7 +367,7 @@ def require_same_invariants(content: Content, moments: Moments) -> None:
 
 
 def require_same_frequencies(content: Content, body: ReducedBody) -> None:
-    """Raise unless the stored frequencies, written for other readers, are those of modal mass and stiffness."""
+    """Raise `ModalFileError` unless the stored frequencies, meant for other readers, follow from K and M."""
     stored, own = Contents(content).array("/modes/frequencies"), body.frequencies
     if stored.shape != own.shape or not np.allclose(stored, own, rtol=FREQUENCY_DEFECT, atol=0.0):
         raise ModalFileError(

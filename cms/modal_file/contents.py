@@ -1,4 +1,4 @@
-"""Datasets and attributes of a file that was read, asked for by path."""
+"""Access to the datasets and attributes of a file by path."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ __all__ = ["Contents"]
 
 
 class Contents:
-    """Datasets and attributes of a file by path, with words for what is missing or of another kind."""
+    """Datasets and attributes of a file by path; missing ones and wrong types raise errors that name the path."""
 
     def __init__(self, content: Content) -> None:
         self.content = content
@@ -25,13 +25,13 @@ class Contents:
         return values
 
     def number(self, path: str) -> float:
-        """Return the one number of a dataset."""
+        """Return the single number of a dataset."""
         values = self.array(path)
         require_shape(f"dataset {path}", values, ())
         return float(values)
 
     def arrays(self, group: str, *names: str) -> dict[str, Any]:
-        """Return the numbers of datasets of a group by name."""
+        """Return the arrays of some datasets of a group, by name."""
         return {name: self.array(f"{group}/{name}") for name in names}
 
     def words(self, path: str) -> tuple[str, ...]:
@@ -42,7 +42,7 @@ class Contents:
         return values
 
     def attribute(self, path: str, name: str, kind: type) -> Any:
-        """Return an attribute of that kind."""
+        """Return an attribute of that type."""
         value = self.content.attributes.get(path, {}).get(name)
         if not isinstance(value, kind):
             got = "nothing" if value is None else repr(value)
@@ -50,17 +50,17 @@ class Contents:
         return value
 
     def numbered(self, group: str) -> tuple[str, ...]:
-        """Return the paths of the groups that a group counts; none if it is not there."""
+        """Return the paths of the numbered groups inside a group; none if the group does not exist."""
         if group not in self.content.attributes:
             return ()
         count = self.attribute(group, "count", int)
         held = sum(path.startswith(f"{group}/") for path in self.content.attributes)
-        if count != held:  # before as many paths are made
+        if count != held:  # checked before that many paths are made
             raise ModalFileError(f"attribute 'count' of {group}: expected {held}, as many as it holds, got {count:g}")
         return tuple(f"{group}/{k}" for k in range(count))
 
     def has(self, group: str, name: str | None = None) -> bool:
-        """Whether an optional group is there, and says so by its attribute where it has one."""
+        """Whether an optional group exists and, if it has such an attribute, is marked as present."""
         there = group in self.content.attributes
         return there and (name is None or bool(self.attribute(group, name, int)))
 

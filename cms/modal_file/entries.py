@@ -1,6 +1,6 @@
-"""What a modal file holds: every dataset with its dimensions and its description (specified in docs/modal_file.md).
+"""All datasets of a modal file with their dimensions and descriptions (specified in docs/modal_file.md).
 
-The shapes are M-orthonormal, Phi.T M Phi = 1, so that a shape has the dimension mass^(-1/2) and q has mass^(1/2)
+The shapes are M-orthonormal, Phi.T M Phi = 1. A shape therefore has the dimension mass^(-1/2), and q has mass^(1/2)
 length.
 """
 
@@ -20,22 +20,22 @@ __all__ = ["ENTRIES", "Dimensions", "Entry", "entry_of", "in_units", "unit_text"
 
 
 NONE, MASS, LENGTH, RATE = Dimensions(), Dimensions(1), Dimensions(0, 1), Dimensions(0, 0, -1)
-SHAPE, TURN = Dimensions(-0.5), Dimensions(-0.5, -1)  #: translation and rotation of a unit of q
+SHAPE, TURN = Dimensions(-0.5), Dimensions(-0.5, -1)  #: dimensions of translation and rotation per unit of q
 VOLUME = Dimensions(0, 3)
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One dataset, or one for each of a numbered group."""
+    """Description of one dataset, or of one dataset in every numbered group."""
 
     dimensions: Dimensions
     description: str
-    last_rows: Dimensions | None = None  #: of rows 3-5, where they are rotations and rows 0-2 translations
-    unit: str = ""  #: in words, where each row or column has its own
+    last_rows: Dimensions | None = None  #: dimensions of rows 3-5, if these are rotations and rows 0-2 translations
+    unit: str = ""  #: text, if each row or column has its own unit
 
 
 def entry(description: str, dimensions: Dimensions = NONE, last_rows: Dimensions | None = None) -> Entry:
-    """Return an entry, without dimension unless one is given."""
+    """Return an entry; dimensionless by default."""
     return Entry(dimensions, description, last_rows)
 
 
@@ -144,12 +144,12 @@ ENTRIES = {
 
 
 def entry_of(path: str) -> Entry | None:
-    """Return the entry of a dataset; None for one that this version does not know."""
+    """Return the entry of a dataset; None if this version does not know it."""
     return ENTRIES.get(re.sub(r"/\d+/", "/<i>/", path))
 
 
 def unit_of(path: str, units: Units) -> str:
-    """Return the unit of a dataset in ASCII; both where the rows differ."""
+    """Return the unit of a dataset in ASCII; both units if its rows differ."""
     found = ENTRIES[re.sub(r"/\d+/", "/<i>/", path)]
     if found.unit:
         return found.unit
@@ -158,9 +158,9 @@ def unit_of(path: str, units: Units) -> str:
 
 
 def in_units(content: Content, old: Units, new: Units) -> Content:
-    """Return the content of a modal file with its numbers in other units.
+    """Return the content of a modal file with its numbers converted to other units.
 
-    Datasets that this version does not know are left out: their dimensions are not known either.
+    Datasets that this version does not know are left out, because their dimensions are unknown.
     """
     attributes = dict(content.attributes) | {"/units": {f.name: getattr(new, f.name) for f in fields(Units)}}
     weights = attributes.get("/nodal_sums", {})
@@ -172,7 +172,8 @@ def in_units(content: Content, old: Units, new: Units) -> Content:
         values = dataset.values
         if isinstance(values, np.ndarray) and values.dtype.kind == "f":
             dimensions = found.dimensions
-            if path.startswith("/nodal_sums/") and not weights.get("is_volume", 1):  # every node counts 1
+            # the weights count nodes and are not volumes
+            if path.startswith("/nodal_sums/") and not weights.get("is_volume", 1):
                 dimensions = Dimensions(dimensions.mass, dimensions.length - VOLUME.length, dimensions.time)
             values = values * dimensions.factor(old, new)
             if found.last_rows is not None:

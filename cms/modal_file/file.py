@@ -13,12 +13,12 @@ from fe_models.foundation.units import Units, unit_system
 
 __all__ = ["FORMAT", "VERSION", "convert_units", "digest", "read", "write"]
 
-VERSION = 6  #: of the format; a reader refuses greater ones, and reads all that are less
+VERSION = 6  #: version of the format; a reader rejects later versions and reads all earlier ones
 KIND = Kind(FORMAT, VERSION, ModalFileError, "`cms reduce` or `cms.write`")
 
 
 def write(reduced: ReducedBody, path: str | os.PathLike[str]) -> None:
-    """Write a reduced body to a modal file; a file of that name is replaced in one step or left as it is.
+    """Write a reduced body to a modal file. An existing file is replaced in one step or stays unchanged.
 
     Raises
     ------
@@ -29,11 +29,11 @@ def write(reduced: ReducedBody, path: str | os.PathLike[str]) -> None:
 
 
 def version_of(reduced: ReducedBody) -> int:
-    """Return the least version that says what the body is, so that older readers take all bodies they can.
+    """Return the earliest version that can store the body, so that older readers accept as many bodies as possible.
 
-    6: loads at some interfaces were left out of the geometric stiffness; 5: nodes or elements have numbers of the user,
-    there are sets, points with rotations, or recovery matrices; 4: how loads turn with the body is known, or inertia
-    terms are missing; 3: the body is held; 2: others.
+    6: geometric stiffness lacks the loads at some interfaces; 5: nodes or elements have user numbers, or there are
+    sets, points with rotations, or recovery matrices; 4: loads that rotate with the body are recorded, or inertia terms
+    are missing; 3: the body is held; 2: all other bodies.
     """
     if reduced.geometric is not None and not all(reduced.geometric.is_loaded):
         return 6
@@ -45,20 +45,20 @@ def version_of(reduced: ReducedBody) -> int:
 
 
 def read(path: str | os.PathLike[str], *, units: Units | str | None = None) -> ReducedBody:
-    """Read a modal file; every array equals the written one bit for bit, unless it is wanted in other units.
+    """Read a modal file; every array is bitwise equal to the written one, unless other units are requested.
 
     Parameters
     ----------
     path
-        File of this or an older version.
+        File of this version or an older one.
     units
-        Unit system of the numbers, or its name; those of the file by default.
+        Unit system of the numbers, or its name; default: that of the file.
 
     Raises
     ------
     ModalFileError
-        If the file is missing, truncated, altered, of another kind or of a newer version, or if what it says does not
-        fit together.
+        If the file is missing, truncated, altered, of another kind or of a later version, or if its data are
+        inconsistent.
     UnitsError
         If the unit system is unknown.
     """
@@ -74,9 +74,10 @@ def read(path: str | os.PathLike[str], *, units: Units | str | None = None) -> R
 
 
 def convert_units(reduced: ReducedBody, units: Units | str) -> ReducedBody:
-    """Return the same body in other units; the body itself if it has them already.
+    """Return the same body in other units; the body itself if it is already in these units.
 
-    q has mass^(1/2) length: modal coordinates, as initial values, are other numbers in other units.
+    q has the unit mass^(1/2) length, so modal coordinates, such as initial values, are different numbers in other
+    units.
 
     Raises
     ------

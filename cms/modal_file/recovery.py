@@ -16,11 +16,11 @@ __all__ = ["GROUP", "recovery_attributes", "recovery_of", "recovery_values"]
 GROUP = "/recovery"
 TEXTS = ("labels", "quantities", "entities", "components", "loads")
 ARRAYS = ("numbers", "dimensions", "dynamic", "load_dimensions", "static")
-UNITS = ("units", "load_units")  #: for other readers; they follow from the dimensions
+UNITS = ("units", "load_units")  #: meant for other readers; they follow from the dimensions
 
 
 def recovery_attributes(tables: Mapping[str, RecoveryTable]) -> dict[str, Mapping[str, Attribute]]:
-    """Return the attributes of the groups; none of a body without tables."""
+    """Return the attributes of the groups; empty for a body without tables."""
     if not tables:
         return {}
     attributes: dict[str, Mapping[str, Attribute]] = {GROUP: {"count": len(tables)}}
@@ -30,7 +30,7 @@ def recovery_attributes(tables: Mapping[str, RecoveryTable]) -> dict[str, Mappin
 
 
 def recovery_values(tables: Mapping[str, RecoveryTable]) -> dict[str, Any]:
-    """Return the values of the datasets by path; texts of no loads are left out, which HDF5 does not hold."""
+    """Return the values of the datasets by path; empty lists of texts are left out, because HDF5 cannot store them."""
     values: dict[str, Any] = {}
     for k, table in enumerate(tables.values()):
         for name in (*TEXTS, *ARRAYS, *UNITS):
@@ -46,7 +46,7 @@ def recovery_of(contents: "Contents", units: Units) -> dict[str, RecoveryTable]:
     Raises
     ------
     ModalFileError
-        If a dataset is missing, or units that stand beside the dimensions do not follow from them.
+        If a dataset is missing, or stored units do not follow from the dimensions.
     """
     tables: dict[str, RecoveryTable] = {}
     for group in contents.numbered(GROUP):

@@ -1,4 +1,4 @@
-"""Mode sets: reduction bases as data, one function each, by name in `MODE_SETS` (docs/theory.md §3)."""
+"""Mode sets: reduction bases as data, one function for each, listed by name in `MODE_SETS` (docs/theory.md §3)."""
 
 from collections.abc import Callable
 

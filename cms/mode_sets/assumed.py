@@ -1,4 +1,4 @@
-"""Assumed modes of a slender body: functions along its axis times the kinematics of a beam's section."""
+"""Assumed modes of a slender body: functions along its axis, combined with the kinematics of a beam section."""
 
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
@@ -21,8 +21,9 @@ if TYPE_CHECKING:
 
 __all__ = ["assumed_modes"]
 
-NEGLIGIBLE = 1e-9  #: largest displacement of a column, of that of its beam field, below which it is left out
-SLENDER_RATIO = 1e-6  #: part by which the least two principal moments of inertia must differ to tell the axis
+NEGLIGIBLE = 1e-9  #: largest displacement of a column relative to its beam field, below which the column is left out
+#: relative difference of the two smallest principal moments of inertia that is needed to identify the axis
+SLENDER_RATIO = 1e-6
 
 
 def assumed_modes(
@@ -39,44 +40,45 @@ def assumed_modes(
 ) -> ModeSet:
     """Assumed-mode set of a slender body: [Psi_R, axial, bending about both section axes, torsion].
 
-    With t the axis, s = t·(c - p) and r = c - p - s t the place in the section, the field of a function
+    With axis t, axial coordinate s = t·(c - p) and position r = c - p - s t in the section, the field of each function
+    is
 
     (1) axial u(s):            u t - [nu u' r]
     (2) bending w(s) along e:  w e - (e·r) w' t + [nu w'' ((e·r) r - (r·r) e / 2)],  rotation w' t × e
         (Euler-Bernoulli: sections stay normal to the bent axis)
     (3) torsion theta(s):      theta t × r, rotation theta t  (Saint-Venant without warping)
 
-    is sampled at the nodes. The terms in brackets are the lateral contraction that a solid needs, or its bending
-    stiffness is that of a bar whose sides are held, (1 - nu) / ((1 + nu) (1 - 2 nu)) times too large. They are tied to
-    the strain if `poisson` is given; otherwise each is a column of its own, with nu = 1 and a free amplitude. Where all
-    nodes lie on one line along the axis, as those of a beam, they are left out. Degrees 0 (and 1 for bending) are
-    rigid-body motion and come as Psi_R. [1]_
+    The fields are sampled at the nodes. The terms in brackets are the lateral contraction. A solid needs them;
+    otherwise its bending stiffness is that of a bar with held sides, too large by the factor (1 - nu) / ((1 + nu) (1 -
+    2 nu)). If `poisson` is given, they are tied to the strain. Otherwise each is a separate column with nu = 1 and a
+    free amplitude. They are left out if all nodes lie on one line along the axis, as for a beam. Degree 0 (and 1 for
+    bending) is rigid-body motion and is covered by Psi_R. [1]_
 
     Parameters
     ----------
     body
-        A coupled body, or its `Families`, which many sets share.
+        A coupled body, or its `Families`, which several sets can share.
     n_modes
-        Functions for each of the four motions where it has no number of its own.
+        Number of functions for each of the four motions that has no number of its own.
     n_axial, n_bending, n_torsion
-        Functions of this motion; n_bending for each of the two directions.
+        Number of functions for this motion; n_bending counts for each of the two directions.
     functions
         "legendre", "monomials" (ill-conditioned beyond about 10) or "splines" (cubic, over equal parts of the span).
     axis, point
-        Direction of the axis and a point on it, (3,) [m]; by default the principal axis of least inertia through the
+        Direction of the axis and a point on it, (3,) [m]; default: the principal axis of least inertia through the
         centre of mass.
     poisson
-        Poisson's ratio nu of one material; None: free contraction columns.
+        Poisson's ratio nu of a single material; None: separate contraction columns.
 
     Raises
     ------
     ModeSetError
-        If numbers are missing or negative, the family is unknown, or the body has no axis of its own.
+        If numbers are missing or negative, the family is unknown, or the body has no distinct axis.
 
     References
     ----------
-    .. [1] The field and its contraction solve the equations of a prismatic bar in tension and in pure bending exactly
-       (Saint-Venant), see docs/theory.md.
+    .. [1] The field with its contraction solves the equations of a prismatic bar in tension and in pure bending exactly
+    (Saint-Venant), see docs/theory.md.
     """
     body = body_of(body)
     body.require_coupled()
@@ -96,7 +98,8 @@ def assumed_modes(
     if not np.ptp(span) > 0:
         raise ModeSetError(f"assumed_modes: body {body.name!r} has no length along ({_numbers(t)})")
 
-    moving = body.dofs[body.dofs[:, 1] >= 0, 0]  # nodes of a beam's skin follow, and have no dofs of their own
+    # skin nodes of a beam follow other nodes, and have no dofs of their own
+    moving = body.dofs[body.dofs[:, 1] >= 0, 0]
     has_sections = bool(np.ptp(r[moving], axis=0).max() > NEGLIGIBLE * np.ptp(span))
 
     columns, labels, groups = [], [], []
@@ -163,7 +166,7 @@ def section_axes(
         t = t / np.linalg.norm(t)
     if p.shape != (3,) or not np.isfinite(p).all():
         raise ModeSetError(f"assumed_modes: point = {point}; expected a point [x, y, z]")
-    # inertia across the axis; the axis itself is put last by its weight
+    # inertia normal to the axis; a weight moves the axis itself to the last place
     across = np.eye(3) - np.outer(t, t)
     _, e = np.linalg.eigh(across @ J @ across + 10 * np.trace(J) * np.outer(t, t))
     e_1 = e[:, 0] * np.sign(e[np.argmax(np.abs(e[:, 0])), 0])
@@ -185,7 +188,7 @@ def _counts(n_modes: int | None, axial: int | None, bending: int | None, torsion
 def _fields(
     motion: str, f: AxisFunctions, k: int, t: Array, e: Array | None, r: Array, poisson: float | None
 ) -> Iterator[tuple[str, tuple[Array, Array]]]:
-    """Beam field and contraction of function k: translations and rotations of all nodes, (n_nodes, 3) each."""
+    """Yield beam field and contraction of function k: translations and rotations of all nodes, (n_nodes, 3) each."""
     value, slope, curvature = (table[:, k, None] for table in (f.values, f.slopes, f.curvatures))
     still = np.zeros_like(r)
     if motion == "torsion":
@@ -205,7 +208,7 @@ def _fields(
 
 
 def _sample(field: tuple[Array, Array], node: Array, component: Array) -> Array:
-    """Values of a field at the dofs, (n_mesh_dof,); multipliers 0."""
+    """Return the values of a field at the dofs, (n_mesh_dof,); zero for multipliers."""
     table = np.concatenate(np.broadcast_arrays(*field), axis=1)
     return np.where(component >= 0, table[node, np.maximum(component, 0)], 0.0)
 

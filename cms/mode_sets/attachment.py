@@ -1,4 +1,4 @@
-"""Attachment sets: responses to unit interface forces with the rigid-body modes, and vibration modes beside them."""
+"""Attachment sets: responses to unit interface forces, rigid-body modes and vibration modes."""
 
 import numpy as np
 
@@ -19,18 +19,18 @@ def attachment(
     body: FEBody | Families,
     n_modes: int | ModeCount,
 ) -> ModeSet:
-    """Attachment mode set: [Psi_R, Psi_A, modes with R held].
+    """Attachment mode set: [Psi_R, Psi_A, modes with R held], where R are six statically determinate boundary dofs.
 
-    (1) Psi_A: unit force on each excess boundary dof E, the determinate dofs R held
-    (2) K phi = omega² M phi with R held and E free, as Psi_A has them
+    (1) Psi_A: a unit force on each excess boundary dof E, with the determinate dofs R held
+    (2) K phi = omega² M phi with the boundary conditions of Psi_A: R held and E free
 
     Parameters
     ----------
     body
-        A coupled body with at least one interface, or its `Families`, which many sets share.
+        A coupled body with at least one interface, or its `Families`, which several sets can share.
     n_modes
-        Number of modes with R held; 0 spans the constraint modes; a `ModeCount` says up to which frequency instead,
-        and whether to prove that none was missed.
+        Number of modes with R held; 0 spans the constraint modes. A `ModeCount` gives a cutoff frequency instead, and
+        whether to prove that no mode was missed.
 
     Raises
     ------
@@ -67,8 +67,8 @@ def unrestrained_attachment(
 ) -> ModeSet:
     """Unrestrained attachment mode set: [Psi_R, Psi_U, free modes]; spans Rubin's set.
 
-    Psi_U: unit force on each boundary dof of the free body, in balance with its rigid-body acceleration. Parameters and
-    errors are those of `attachment`, with the elastic modes of the free body.
+    Psi_U is the response to a unit force on each boundary dof of the free body, in equilibrium with its rigid-body
+    acceleration. Parameters and errors are those of `attachment`, with the elastic modes of the free body.
     """
     with families_of(body) as families:
         body, wanted = families.body, mode_count(n_modes)
@@ -89,6 +89,6 @@ def unrestrained_attachment(
 
 
 def held_words(families: Families) -> list[str]:
-    """Return the determinate dofs in words."""
+    """Return the names of the determinate dofs."""
     labels = families.held_labels("held")
     return [label for dof, label in zip(families.h.tolist(), labels, strict=True) if dof in families.r]

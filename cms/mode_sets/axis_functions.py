@@ -22,13 +22,13 @@ class AxisFunctions:
     values: Array  #: (n_points, n) [-]
     slopes: Array  #: d/ds, (n_points, n) [1/m]
     curvatures: Array  #: d²/ds², (n_points, n) [1/m²]
-    names: tuple[str, ...]  #: one per function, such as "P4"
+    names: tuple[str, ...]  #: name of each function, such as "P4"
 
 
 def _polynomials(
     kind: type[Legendre] | type[Polynomial], letter: str, s: Array, span: Array, n: int, first: int
 ) -> AxisFunctions:
-    """Polynomials of degree first .. first + n - 1 of xi in [-1, 1] over the span."""
+    """Return polynomials of degree first .. first + n - 1 of xi in [-1, 1] over the span."""
     middle, half = span.mean(), np.ptp(span) / 2
     xi = (s - middle) / half
     functions = [kind.basis(degree) for degree in range(first, first + n)]
@@ -39,20 +39,20 @@ def _polynomials(
 
 
 def monomials(s: Array, span: Array, n: int, first: int) -> AxisFunctions:
-    """Monomials xi^first .. of xi in [-1, 1]."""
+    """Return monomials of xi in [-1, 1], degrees `first` and up."""
     return _polynomials(Polynomial, "xi^", s, span, n, first)
 
 
 def legendre(s: Array, span: Array, n: int, first: int) -> AxisFunctions:
-    """Legendre polynomials P_first .. of xi in [-1, 1]."""
+    """Return Legendre polynomials of xi in [-1, 1], degrees `first` and up."""
     return _polynomials(Legendre, "P", s, span, n, first)
 
 
 def cubic_splines(s: Array, span: Array, n: int, first: int) -> AxisFunctions:
-    """Cubic B-splines over equal parts of the span, that span all cubic splines together with degrees below `first`.
+    """Return cubic B-splines over equal parts of the span; with degrees below `first` they span all cubic splines.
 
-    All n + first B-splines contain 1 = sum B_j and s = sum g_j B_j with the distinct Greville points g_j, so the first
-    one (with 1 at hand) or the first and the last one (with 1 and s) can be left out.
+    All n + first B-splines contain 1 = sum B_j and s = sum g_j B_j, where the Greville points g_j are distinct.
+    Therefore the first B-spline (if the set has 1) or the first and the last (if it has 1 and s) can be left out.
     """
     n_all = n + first
     if n_all < CUBIC + 1:
@@ -73,7 +73,7 @@ AXIS_FUNCTIONS = {"legendre": legendre, "monomials": monomials, "splines": cubic
 
 
 def axis_functions(family: str, s: Array, span: Array, n: int, first: int) -> AxisFunctions:
-    """Return n functions of a family, complete with all degrees below `first`, at the points s within the span."""
+    """Return n functions of a family at the points s in the span; they are complete with all degrees below `first`."""
     if family not in AXIS_FUNCTIONS:
         raise ModeSetError(f"assumed_modes: unknown functions {quoted(family)}{nearest(family, AXIS_FUNCTIONS)}")
     return AXIS_FUNCTIONS[family](s, span, n, first)

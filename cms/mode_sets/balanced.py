@@ -1,4 +1,4 @@
-"""Balanced truncation of the second-order system: directions ranked by what the interfaces excite and see."""
+"""Balanced truncation of the second-order system: directions ranked by controllability and observability."""
 
 import logging
 from collections.abc import Sequence
@@ -27,13 +27,13 @@ __all__ = ["balanced_truncation"]
 
 log = logging.getLogger(__name__)
 
-FEWEST_RICH = 60  #: free modes of the rich basis, at least
-LOWER_PART = 0.6  #: of all modes of a small body, that the rich basis takes by default
-RICH_FACTOR = 3  #: free modes of the rich basis for each mode asked for
-NOTHING_LEFT = 1e-7  #: length of a residual attachment mode, of the whole one, below which it is rounding
-STIFF = 1e-12  #: compliance of a boundary dof, of the largest, below which it is rounding
-FEWEST_FOUND = 4  #: free modes without which there is nothing to balance
-REPORTED = 12  #: singular values in the options of the set; all of them are in its data
+FEWEST_RICH = 60  #: smallest number of free modes of the rich basis
+LOWER_PART = 0.6  #: share of all modes of a small body that the rich basis takes by default
+RICH_FACTOR = 3  #: number of free modes of the rich basis per requested mode
+NOTHING_LEFT = 1e-7  #: length of a residual attachment mode relative to the attachment mode, below which it is rounding
+STIFF = 1e-12  #: compliance of a boundary dof relative to the largest, below which it is rounding
+FEWEST_FOUND = 4  #: smallest number of free modes that balancing needs
+REPORTED = 12  #: number of singular values in the options of the set; its data contain all of them
 
 
 def balanced_truncation(
@@ -48,42 +48,42 @@ def balanced_truncation(
 ) -> ModeSet:
     """Balanced truncation of the elastic part of the free body: [Psi_R, balanced directions] [1]_.
 
-    (1) rich basis: free modes and residual attachment modes, M-orthonormal and K-diagonal, in which the Lyapunov
-        equation is small
-    (2) damping: that of the body projected, and a modal ratio, since without damping there is no Gramian
-    (3) loads and responses at all boundary dofs, or at chosen ones, each in the unit in which its own static elastic
-        response is 1, so that a stiff direction and a soft one, a force and a moment, count alike
-    (4) position-velocity balancing (`cms.mode_sets.balancing`): one symmetric projection, ranked by its singular values
+    (1) Rich basis: free modes and residual attachment modes, M-orthonormal and K-diagonal, in which the Lyapunov
+        equation is small.
+    (2) Damping: the projected damping of the body plus a modal ratio, because an undamped mode has no Gramian.
+    (3) Loads and responses at all boundary dofs, or at chosen ones. Each is scaled so that its own static elastic
+        response is 1; stiff and compliant directions, forces and moments then have equal weight.
+    (4) Position-velocity balancing (`cms.mode_sets.balancing`): one symmetric projection, ranked by singular values.
 
-    The number of directions is that of `n_modes`, or as many as leave a part of at most `tolerance` of the sum of the
-    position-velocity singular values. All singular values are in `data` of the set ("hankel", "hankel signs",
-    "position-velocity"). Twice the sum of the Hankel singular values left out bounds the error of first-order balanced
-    truncation; one symmetric projection has no such bound, its error falls alike. The set is not statically complete:
-    add residual vectors where static answers must be exact.
+    The number of directions is `n_modes`, or such that the neglected share of the sum of position-velocity singular
+    values is at most `tolerance`. The `data` of the set contain all singular values ("hankel", "hankel signs",
+    "position-velocity"). Twice the sum of the neglected Hankel singular values bounds the error of first-order balanced
+    truncation. A single symmetric projection has no such bound, but its error decreases similarly. The set is not
+    statically complete; add residual vectors if static responses must be exact.
 
     Parameters
     ----------
     body
-        A coupled body with at least one interface, or its `Families`, which many sets share.
+        A coupled body with at least one interface, or its `Families`, which several sets can share.
     n_modes
         Number of balanced directions.
     tolerance
-        Instead of a number: part of the sum that may be left out, 0 to 1.
+        Share of the sum that may be neglected, 0 to 1, instead of a number.
     damping_ratio
-        Modal damping that is added for the balancing alone, of critical; 1 % by default.
+        Modal damping ratio that is added for balancing only; default 1 % of critical.
     n_rich
-        Free modes of the rich basis; by default 3 n_modes, but 60 at least, and three fifths of all at most; fewer
-        where the eigensolver cannot find so many.
+        Number of free modes of the rich basis. Default: 3 n_modes, at least 60 and at most three fifths of all; fewer
+        if the eigensolver cannot find that many.
     inputs, outputs
-        Where loads act and responses are seen: interfaces, or one component of them, as "big_end" or "big_end uz"; all
-        boundary dofs by default, the inputs as outputs where inputs alone are given. Loads elsewhere, such as those of
-        joints at other interfaces, are then answered by what the chosen ones need.
+        Interfaces at which loads act and responses are measured, or single components, such as "big_end" or "big_end
+        uz". Default: all boundary dofs; if only inputs are given, they are the outputs too. The response to loads
+        elsewhere, such as joints at other interfaces, is only as good as the directions for the chosen dofs.
 
     Raises
     ------
     ModeSetError
         If not exactly one of n_modes and tolerance is given, numbers are out of range, a name is no interface or
-        component, a mode is undamped, or the rich basis cannot be had.
+        component, a mode is undamped, or the rich basis cannot be computed.
 
     References
     ----------
@@ -127,7 +127,7 @@ def balanced_truncation(
         is_symmetric = np.array_equal(into, out_of)
         system = balance(rich.omega2, D, loads[:, into], None if is_symmetric else loads[:, out_of])
         sigma = system.position_velocity
-        sides = 1 if is_symmetric else 2  # directions for each singular value: that of loads and that of responses
+        sides = 1 if is_symmetric else 2  # directions per singular value: one of loads and one of responses
         if n_modes is None:
             left = 1 - np.cumsum(sigma) / sigma.sum()
             n_modes = min(n, sides * (int(np.argmax(left <= (tolerance or 0.0))) + 1))
@@ -152,7 +152,7 @@ def balanced_truncation(
 
 
 def chosen_dofs(body: FEBody, key: str, names: Sequence[str] | None) -> IntArray:
-    """Return which of the boundary dofs are named, ascending, (n,); all of them where nothing is said."""
+    """Return the named boundary dofs, ascending, (n,); all boundary dofs if no names are given."""
     labels = [label.removeprefix("at ") for label in boundary_labels(body, "at")]
     if names is None:
         return np.arange(len(labels), dtype=np.int64)
@@ -179,7 +179,7 @@ class RichBasis:
 def rich_basis(families: Families, n_asked: int | None, n_default: int) -> RichBasis:
     """Return free modes with residual attachment modes (the span of Rubin's set), without massless directions.
 
-    A small body has fewer modes than the default; its highest are no use, and cost the eigensolver its accuracy.
+    A small body has fewer modes than the default. Its highest modes are useless, and reduce the solver's accuracy.
     """
     body = families.body
     n_most = int((body.M.diagonal() > 0).sum()) - families.Psi_R.shape[1]
@@ -197,12 +197,12 @@ def rich_basis(families: Families, n_asked: int | None, n_default: int) -> RichB
 
 
 def most_free_modes(families: Families, n: int) -> EigenResult:
-    """Return n free modes, or as many as the eigensolver finds to its tolerance: the highest of a coarse mesh are hard.
+    """Return n free modes, or as many as the eigensolver finds to its tolerance; the highest ones are difficult.
 
     Raises
     ------
     ModeSetError
-        If it finds none.
+        If it finds no modes.
     """
     while True:
         try:
@@ -218,7 +218,7 @@ def most_free_modes(families: Families, n: int) -> EigenResult:
 
 
 def _stiffness(body: FEBody, u: Array) -> Array:
-    """Strain energy of every column, doubled, (k,)."""
+    """Return twice the strain energy of every column, (k,)."""
     return np.einsum("nk,nk->k", u, body.K @ u)
 
 

@@ -10,18 +10,18 @@ from fe_models.foundation.arrays import Array, frozen
 
 __all__ = ["BalancedSystem", "balance"]
 
-NOTHING_NEW = 1e-6  #: what is left of a unit direction beside those before it, below which it adds nothing
-NEGATIVE = 1e-9  #: part of the largest eigenvalue of a Gramian by which rounding may make another one negative
+NOTHING_NEW = 1e-6  #: remainder of a unit direction after removal of earlier ones, below which it adds nothing
+NEGATIVE = 1e-9  #: share of the largest eigenvalue of a Gramian by which rounding may make another eigenvalue negative
 
 
 @dataclass(frozen=True, eq=False)
 class BalancedSystem:
-    """What balancing tells about 1 q_ddot + D q_dot + diag(omega²) q = B u, y = Cᵀ q."""
+    """Result of balancing 1 q_ddot + D q_dot + diag(omega²) q = B u, y = Cᵀ q."""
 
     hankel: Array  #: Hankel singular values of u -> y, descending, (2 n,)
-    signs: Array  #: +1 or -1 for each: with C = B the system is balanced up to these signs; else +1, (2 n,)
+    signs: Array  #: +1 or -1 for each: if C = B, the system is balanced up to these signs; else +1, (2 n,)
     position_velocity: Array  #: position-velocity singular values, descending, (n,)
-    T: Array  #: balanced directions as columns over q, orthonormal, (n, n)
+    T: Array  #: balanced directions as orthonormal columns over q, (n, n)
 
     def __post_init__(self) -> None:
         for name in ("hankel", "signs", "position_velocity", "T"):
@@ -31,31 +31,31 @@ class BalancedSystem:
 def balance(omega2: Array, D: Array, B: Array, C: Array | None = None) -> BalancedSystem:
     """Balance the position and velocity of a symmetric second-order system with loads B u and responses y = Cᵀ q.
 
-    (1) A P + P Aᵀ + b bᵀ = 0 in the states x = (omega q, q_dot): P is the Gramian of reachability, and P_C that of the
-        loads C
-    (2) the system is symmetric, E x_dot = ..., E = [[D, 1], [1, 0]], so the Gramian of observability is E P_C E, and
-        the Hankel singular values sqrt(eig(P E P_C E)) are the singular values of R_Cᵀ E R, P = R Rᵀ
-    (3) its velocity part is the position part of P_C: positions are balanced against velocities by the singular values
-        sigma of L_Cᵀ L, P_p = L Lᵀ, with the directions L v that loads reach and L_C u that responses see
-    (4) T: both directions in turn, by descending sigma, made orthonormal. Where C is B they are one, T diagonalises
-        P_p = T diag(sigma) Tᵀ. The leading columns of T project M, D and K by one congruence, which keeps them
-        symmetric and definite; with both directions in it the error is of second order, as that of two projections
+    (1) A P + P Aᵀ + b bᵀ = 0 in the states x = (omega q, q_dot), where P is the controllability Gramian of the loads B,
+        and P_C the same for loads C
+    (2) the system is symmetric, E x_dot = ..., E = [[D, 1], [1, 0]], so the observability Gramian is E P_C E, and the
+        Hankel singular values sqrt(eig(P E P_C E)) are the singular values of R_Cᵀ E R with P = R Rᵀ
+    (3) its velocity part is the position part of P_C; positions are balanced against velocities by the singular values
+        sigma of L_Cᵀ L, P_p = L Lᵀ, with controllable directions L v and observable directions L_C u
+    (4) T holds both kinds of directions in turn, by descending sigma, orthonormalised; if C = B they coincide, and T
+        diagonalises P_p = T diag(sigma) Tᵀ; the leading columns of T project M, D and K by one congruence, which keeps
+        them symmetric and definite; with both kinds of directions the error is of second order, as with two projections
 
     Parameters
     ----------
     omega2
-        Squared frequencies of M-orthonormal modes, (n,) [1/s²], all above 0.
+        Squared frequencies of M-orthonormal modes, (n,) [1/s²], all positive.
     D
-        Modal damping, (n, n) [1/s], such that every mode is damped.
+        Modal damping, (n, n) [1/s]; it must damp every mode.
     B
         Modal loads, (n, n_u).
     C
-        Modal responses, (n, n_y); those of the loads by default.
+        Modal responses, (n, n_y); default: B.
 
     Raises
     ------
     ModeSetError
-        If a mode is undamped: its Gramian is infinite; or if the Gramian cannot be found to rounding.
+        If a mode is undamped, so that its Gramian is infinite; or if the Gramian is not accurate to rounding.
     """
     n = len(omega2)
     omega = np.sqrt(omega2)
@@ -97,7 +97,7 @@ def gramian(A: Array, B: Array) -> Array:
 
 
 def root(P: Array) -> Array:
-    """Return R of P = R Rᵀ; eigenvalues below zero by rounding count as zero, more is refused."""
+    """Return R with P = R Rᵀ; negative eigenvalues count as zero if they are rounding, otherwise an error is raised."""
     values, vectors = la.eigh(P)
     if values.min() < -NEGATIVE * values.max():
         raise ModeSetError(
@@ -108,7 +108,7 @@ def root(P: Array) -> Array:
 
 
 def in_turn(reached: Array, seen: Array) -> Array:
-    """Return an orthonormal basis, (n, n), of both kinds of directions in turn; what adds nothing is left out.
+    """Return an orthonormal basis, (n, n), of both kinds of directions in turn; dependent directions are left out.
 
     Parameters
     ----------

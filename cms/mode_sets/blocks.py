@@ -1,4 +1,4 @@
-"""Blocks of columns of one family, and the mode set they make side by side."""
+"""Blocks of columns of one family, and their assembly to a mode set."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ __all__ = [
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Columns of one family with their names."""
+    """Named columns of one family."""
 
     columns: Array  #: (n_dof, k)
     labels: tuple[str, ...]  #: (k,)
@@ -44,7 +44,7 @@ def static_block(columns: Array, labels: Sequence[str], groups: Sequence[str]) -
 
 
 def boundary_block(body: FEBody, columns: Array, family: str) -> Block:
-    """Return static columns of a family, one for each boundary dof."""
+    """Return the static columns of a family, one for each boundary dof."""
     return static_block(columns, boundary_labels(body, family), boundary_groups(body, family))
 
 
@@ -59,7 +59,7 @@ def rigid_block(families: Families) -> Block:
 
 
 def inertia_relief_block(families: Families) -> Block:
-    """Return the static responses to rigid-body accelerations with B held."""
+    """Return the static responses to rigid-body accelerations with the boundary dofs B held."""
     return _rigid_block(families, families.Psi_H, "inertia-relief")
 
 
@@ -69,7 +69,7 @@ def _rigid_block(families: Families, columns: Array, family: str) -> Block:
 
 
 def vibration_block(kind: str, modes: EigenResult, columns: Array | None = None) -> Block:
-    """Return vibration modes, or the columns that were made from them, one each."""
+    """Return a block of vibration modes, or of columns made from them, one for each mode."""
     n = len(modes.frequencies)
     return Block(
         modes.Phi if columns is None else columns,
@@ -89,7 +89,7 @@ def mode_set(
     options: Mapping[str, str] | None = None,
     data: Mapping[str, Array] | None = None,
 ) -> ModeSet:
-    """Put blocks side by side, and record what was asked for and which solver ran."""
+    """Assemble blocks to a mode set, and record the requested options and the solver used."""
     recorded = {"solver": families.fixed.factorization.description}
     if modes is not None:
         recorded |= {"n_modes": str(len(modes.frequencies))}
@@ -109,7 +109,7 @@ def mode_set(
 
 
 def side_by_side(body: FEBody, columns: Sequence[Array]) -> Array:
-    """Return blocks of columns side by side; on all ranks where the matrices of the body lie so."""
+    """Return blocks of columns side by side; distributed if the matrices of the body are."""
     if isinstance(body.K, SpreadMatrix):
         return spread_beside(body.K.layout, *columns)  # type: ignore[return-value]
     return beside(*columns) if len(columns) > 1 else columns[0]

@@ -1,4 +1,4 @@
-"""Characteristic constraint modes: a few modes of an all-node interface instead of its many constraint modes."""
+"""Characteristic constraint modes: a few modes of an interface of kind "nodes" replace its many constraint modes."""
 
 from dataclasses import dataclass, replace
 
@@ -19,8 +19,9 @@ from fe_models.foundation.tall.on_disk import in_memory, of_this_process, releas
 
 __all__ = ["with_characteristic_modes"]
 
-COLUMNS_AT_ONCE = 64  #: that a sparse product copies
-DEPENDENT = 1e-9  #: part of a rigid-body motion of an interface, below which it is one of the others
+COLUMNS_AT_ONCE = 64  #: number of columns that a sparse product copies at a time
+#: remainder of a rigid-body motion of an interface, relative to its size, below which it depends on the others
+DEPENDENT = 1e-9
 
 
 def with_characteristic_modes(
@@ -30,31 +31,31 @@ def with_characteristic_modes(
     *,
     together: bool = False,
 ) -> ModeSet:
-    """Replace the constraint modes of every all-node interface by characteristic constraint modes [1]_.
+    """Replace the constraint modes of every interface of kind "nodes" by characteristic constraint modes [1]_.
 
     (1) pencil of the constraint modes of the interface: K_c = Psi_Cᵀ K Psi_C, M_c = Psi_Cᵀ M Psi_C
-    (2) rigid-body motions R of the interface: kept, so that it still follows every motion of its neighbours exactly
-    (3) K_c z = omega² M_c z among the motions without rigid part, Rᵀ M_c z = 0; the lowest are kept
-    (4) columns Psi_C [R, Z] in the place of Psi_C
+    (2) rigid-body motions R of the interface are kept, so that it still follows rigid motions of its neighbours exactly
+    (3) K_c z = omega² M_c z for motions without a rigid part, Rᵀ M_c z = 0; the lowest modes are kept
+    (4) columns Psi_C [R, Z] replace Psi_C
 
     Parameters
     ----------
     modes
         A mode set with constraint modes (groups "constraint NAME"), such as `craig_bampton`.
     body
-        The body the set was made from.
+        The body from which the set was made.
     n_modes
-        Deforming modes for each interface, or for all of them if `together`; more than there are keeps all.
-        A `ModeCount` says up to which frequency instead.
+        Number of deforming modes for each interface, or for all together if `together`; a larger number than there are
+        keeps all. A `ModeCount` gives a cutoff frequency instead.
     together
-        One pencil for all all-node interfaces instead of one each; the rigid-body motions of each are kept all the
-        same.
+        Whether to use one pencil for all these interfaces instead of one for each. The rigid-body motions of each
+        interface are kept in both cases.
 
     Raises
     ------
     ModeSetError
-        If the body has no interface of kind "nodes" with more than
-        rigid motion, or the set has no constraint modes of it.
+        If the body has no interface of kind "nodes" with more than rigid motion, or the set has no constraint modes of
+        it.
 
     References
     ----------
@@ -95,7 +96,7 @@ def with_characteristic_modes(
         data[f"interface modes {name}"] = frequencies
     release(V)
     n_new = len(labels) - len(kept)
-    # the vibration modes stay last, as in the sets themselves
+    # vibration modes stay last, as in the original sets
     frequencies = np.concatenate([modes.frequencies[kept], np.full(n_new, np.nan)])
     order = np.argsort(~np.isnan(frequencies), kind="stable")
     return replace(
@@ -111,16 +112,16 @@ def with_characteristic_modes(
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """Constraint modes that are treated together."""
+    """Constraint modes that are processed together."""
 
-    names: tuple[str, ...]  #: of the interfaces
-    dofs: IntArray  #: that the constraint modes move, one each, (n,)
-    columns: IntArray  #: their constraint modes in the set, (n,)
+    names: tuple[str, ...]  #: names of the interfaces
+    dofs: IntArray  #: dofs that the constraint modes move, one for each mode, (n,)
+    columns: IntArray  #: their constraint modes, as columns of the set, (n,)
     R: Array  #: rigid-body motions of each interface, (n, n_r)
 
 
 def _columns_of(modes: ModeSet, interface: Interface) -> IntArray:
-    """Columns of the set that are the constraint modes of an interface, in the order of its dofs."""
+    """Return the columns of the set that are constraint modes of an interface, in the order of its dofs."""
     columns = np.flatnonzero([group == f"constraint {interface.name}" for group in modes.groups])
     n = 0 if interface.dofs is None else len(interface.dofs)
     if len(columns) != n:
@@ -132,7 +133,7 @@ def _columns_of(modes: ModeSet, interface: Interface) -> IntArray:
 
 
 def _rigid_motions(body: FEBody, interface: Interface, Psi_R: Array) -> Array:
-    """Independent rigid-body motions of the dofs of an interface, orthonormal, (n, n_r)."""
+    """Return independent rigid-body motions of the dofs of an interface, orthonormal, (n, n_r)."""
     motions = Psi_R[np.asarray(interface.dofs)]
     motions = motions / np.maximum(np.linalg.norm(motions, axis=0), np.finfo(float).tiny)
     U, size, _ = la.svd(motions, full_matrices=False)
@@ -140,7 +141,7 @@ def _rigid_motions(body: FEBody, interface: Interface, Psi_R: Array) -> Array:
 
 
 def _side_of(columns: Array, chosen: IntArray) -> Array:
-    """Return some columns, without a copy where they stand side by side."""
+    """Return some columns, without a copy if they are contiguous."""
     first, last = int(chosen[0]), int(chosen[-1]) + 1
     if np.array_equal(chosen, np.arange(first, last)):
         return columns[:, first:last]
@@ -157,8 +158,8 @@ def _side_by_side(parts: list[_Part]) -> _Part:
 
 
 def _characteristic(body: FEBody, Psi_C: Array, part: _Part, wanted: ModeCount) -> tuple[Array, Array]:
-    """Lowest deforming modes of the constraint modes and their frequencies: (1) to (3)."""
-    # K Psi_C is zero inside, and Psi_C the identity on its own dofs and zero on the others
+    """Return the lowest deforming modes of the constraint modes, and their frequencies: steps (1) to (3)."""
+    # K Psi_C is zero in the interior; Psi_C is the identity on its own boundary dofs and zero on the others
     rows = sp.csr_array(body.K[:, part.dofs].T)
     blocks = range(0, len(part.dofs), COLUMNS_AT_ONCE)
     K_c = np.hstack([rows @ in_memory(Psi_C[:, first : first + COLUMNS_AT_ONCE]) for first in blocks])

@@ -1,4 +1,4 @@
-"""Craig-Bampton and its kin: constraint modes with fixed- or mixed-interface modes, with and without inertia relief."""
+"""Craig-Bampton and related sets: constraint modes with fixed- or mixed-interface modes, and inertia relief."""
 
 from collections.abc import Mapping, Sequence
 
@@ -26,28 +26,27 @@ def craig_bampton(
 ) -> ModeSet:
     """Craig-Bampton mode set: [Psi_C, fixed-interface modes] [1]_.
 
-    (1) Psi_C: interior part -K_II⁻¹ K_IB
+    (1) Psi_C: constraint modes, with interior part -K_II⁻¹ K_IB
     (2) K_II phi = omega² M_II phi, all boundary dofs held
-    (3) with free boundary dofs: phi of the body held at the others, in the columns phi - Psi_C phi_B
+    (3) with free boundary dofs: phi of the body with the other boundary dofs held, as columns phi - Psi_C phi_B
 
     Parameters
     ----------
     body
-        A coupled body with at least one interface, or its `Families`, which many sets share.
+        A coupled body with at least one interface, or its `Families`, which several sets can share.
     n_modes
-        Number of fixed-interface modes; 0 gives Guyan-Irons; a `ModeCount` says up to which frequency instead,
-        and whether to prove that none was missed.
+        Number of fixed-interface modes; 0 gives Guyan-Irons. A `ModeCount` gives a cutoff frequency instead, and
+        whether to prove that no mode was missed.
     free
-        Mixed boundary conditions: interface -> components along its axes that step (2) leaves free, such as
-        {"pin": ["rz"]} for a bearing; they keep their constraint modes.
+        Mixed boundary conditions: for each interface the components along its axes that step (2) leaves free, such as
+        {"pin": ["rz"]} for a bearing. These dofs keep their constraint modes.
 
     Raises
     ------
     ModeSetError
-        If there are fewer interior dofs than modes, or no mode lies
-        below the cutoff.
+        If there are fewer interior dofs than modes, or no mode lies below the cutoff.
     BodyError
-        If the body is a mechanism when its interfaces are held.
+        If the body is a mechanism with its interfaces held.
 
     References
     ----------
@@ -69,9 +68,9 @@ def craig_bampton_ir(
 ) -> ModeSet:
     """Craig-Bampton with inertia relief: [Psi_C, Psi_H, fixed-interface modes] [1]_.
 
-    Psi_H, the static responses to rigid-body accelerations with B held, make the set statically complete: exact for
-    gravity and for every static interface load of the accelerated body, whatever the number of modes. Parameters and
-    errors are those of `craig_bampton`.
+    Psi_H holds the static responses to rigid-body accelerations with the boundary dofs B held. They make the set
+    statically complete: exact for gravity and for every static interface load of the accelerated body, for any number
+    of modes. Parameters and errors are those of `craig_bampton`.
 
     References
     ----------
@@ -104,7 +103,7 @@ def _held_modes(
     wanted: ModeCount,
     free: Mapping[str, Sequence[str]],
 ) -> tuple[Block, EigenResult]:
-    """Return the modes with B held, or with all of B held but its free dofs (zero on B again by Psi_C)."""
+    """Return the modes with B held, or with B held except its free dofs (then made zero on B by means of Psi_C)."""
     body = families.body
     directions = free_directions(body, free)
     if not directions.shape[1]:

@@ -19,18 +19,20 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["EXTRA_COLUMNS", "with_centrifugal", "with_load_cases"]
 
-IN_THE_SPAN = 1e-6  #: part of a response, in the energy norm, below which the set has it already
-ROUNDING = 1e-13  #: energy, of that of the dofs one by one, below which a column is rigid-body motion
+IN_THE_SPAN = 1e-6  #: part of a response, in the energy norm, below which it counts as already in the span
+#: energy of a column, relative to the energy of its dofs taken singly, below which it is rigid-body motion
+ROUNDING = 1e-13
 
 
 def with_load_cases(modes: ModeSet, body: FEBody | Families, *, names: Sequence[str] | None = None) -> ModeSet:
     """Add the static responses to the load cases of a body to a mode set.
 
-    (1) held: K_II⁻¹ f_I, all boundary dofs held; exact under the load in a supported body
-    (2) accelerating: Pᵀ G P f of the free body, in balance with the acceleration the load causes; exact in free motion
-    (3) of each what the set cannot give, u - V (Vᵀ K V)⁺ Vᵀ K u; nothing, where that is less than 1e-6 of it
+    (1) held: K_II⁻¹ f_I with all boundary dofs held; makes the response of a supported body exact
+    (2) accelerating: Pᵀ G P f of the free body, in equilibrium with the acceleration by the load; exact in free motion
+    (3) of each response only the part u - V (Vᵀ K V)⁺ Vᵀ K u that the set lacks is added, if it exceeds 1e-6 of the
+        response
 
-    A statically complete set needs one column for each load case, others two; uniform gravity has no response (2).
+    A statically complete set needs one column per load case, other sets two. Uniform gravity has no response (2).
 
     Parameters
     ----------
@@ -39,12 +41,12 @@ def with_load_cases(modes: ModeSet, body: FEBody | Families, *, names: Sequence[
     body
         A coupled body with load cases, or its `Families`.
     names
-        Of the load cases; all but the centrifugal ones by default.
+        Names of the load cases; default: all except centrifugal ones.
 
     Raises
     ------
     ModeSetError
-        If there are no load cases, or none of that name.
+        If there are no load cases, or no load case of that name.
     """
     source, body = body, body_of(body)
     cases = [case for case in body.load_cases if case.kind != CENTRIFUGAL]
@@ -67,8 +69,8 @@ def with_load_cases(modes: ModeSet, body: FEBody | Families, *, names: Sequence[
 def with_centrifugal(modes: ModeSet, body: FEBody | Families) -> ModeSet:
     """Add the static responses to the six centrifugal fields of steady rotation to a mode set.
 
-    As `with_load_cases`, with the loads of `centrifugal_loads`. A rigid interface eliminates members whose centrifugal
-    field is no rigid motion, so their load must be made before coupling:
+    This works as `with_load_cases` does, with the loads of `centrifugal_loads`. A rigid interface eliminates its
+    members. Their centrifugal field is no rigid motion, so the load must be made before coupling:
 
     >>> body = replace(body, load_cases=(*body.load_cases, *centrifugal_loads(body)))  # doctest: +SKIP
     >>> modes = with_centrifugal(modes, couple(body))                                  # doctest: +SKIP
@@ -76,7 +78,7 @@ def with_centrifugal(modes: ModeSet, body: FEBody | Families) -> ModeSet:
     Raises
     ------
     ModeSetError
-        If the body has rigid interfaces and no centrifugal loads.
+        If the body has rigid interfaces but no centrifugal loads.
     """
     source, body = body, body_of(body)
     cases: Sequence[LoadCase] = [case for case in body.load_cases if case.kind == CENTRIFUGAL]
@@ -129,7 +131,7 @@ def _with_responses(modes: ModeSet, source: FEBody | Families, cases: Sequence[L
 
 
 def _not_in_span(body: FEBody, V: Array, U: Array, F: Array) -> tuple[Array, np.ndarray]:
-    """K-orthonormal parts of the responses U to F that neither V nor those before can give, and which of them count."""
+    """Return K-orthonormal parts of the responses U to F outside the span of V and earlier ones, and which count."""
     K = SymmetricProduct(body.K)
     KV = K @ V
     G = V.T @ KV
@@ -147,7 +149,7 @@ def _not_in_span(body: FEBody, V: Array, U: Array, F: Array) -> tuple[Array, np.
     for k in range(U.shape[1]):
         x = rest[:, [k]] - new @ (new.T @ (K @ rest[:, [k]]))  # responses to proportional loads count once
         left = abs(float(x[:, 0] @ (K @ x)[:, 0]))
-        # a load that rigid-body acceleration balances leaves rounding alone: far less than its dofs would do one by one
+        # A load that is balanced by rigid-body acceleration leaves only rounding, far less than its dofs taken singly.
         is_new[k] = left > IN_THE_SPAN**2 * energy[k] and energy[k] > IN_THE_SPAN**2 * local[k]
         if is_new[k]:
             new = np.hstack([new, x / np.sqrt(left)])

@@ -1,4 +1,4 @@
-"""Free-interface sets: vibration modes of the free body, and what makes them statically complete."""
+"""Free-interface sets: vibration modes of the free body, and columns that make the sets statically complete."""
 
 from dataclasses import replace
 
@@ -26,22 +26,22 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["craig_chang", "dual_craig_bampton", "herting", "macneal", "normal_modes", "rubin"]
 
-DEPENDENT = 1e-12  #: eigenvalue of the scaled residual flexibility against its largest, below which it is rounding
+DEPENDENT = 1e-12  #: eigenvalue of the scaled residual flexibility relative to the largest, below which it is rounding
 
 
 def normal_modes(
     body: FEBody | Families,
     n_modes: int | ModeCount,
 ) -> ModeSet:
-    """Normal modes alone: [Psi_R, free modes]; exact frequencies of the free body, poor under interface loads.
+    """Normal modes only: [Psi_R, free modes]; free-body frequencies are exact, responses to interface loads are poor.
 
     Parameters
     ----------
     body
-        A coupled body; it may have no interface, or its `Families`, which many sets share.
+        A coupled body, which may have no interface, or its `Families`, which several sets can share.
     n_modes
-        Number of elastic free modes; a `ModeCount` says up to which frequency instead,
-        and whether to prove that none was missed.
+        Number of elastic free modes. A `ModeCount` gives a cutoff frequency instead, and whether to prove that no mode
+        was missed.
 
     Raises
     ------
@@ -64,10 +64,10 @@ def rubin(
     """Rubin mode set: [Psi_R, free modes, residual attachment modes] [1]_.
 
     (1) K phi = omega² M phi of the free body
-    (2) residual attachment: Psi_U - Phi Lambda⁻¹ Phi_Bᵀ, the static remainder of the modes that are left out
+    (2) residual attachment: Psi_U - Phi Lambda⁻¹ Phi_Bᵀ, the static contribution of the neglected modes
 
-    Statically complete, and exact to omega² about zero frequency at the interfaces. Parameters and errors are those of
-    `normal_modes`, but the body needs an interface; n_modes = 0 gives [Psi_R, Psi_U].
+    The set is statically complete, and at the interfaces exact to order omega² near zero frequency. Parameters and
+    errors are those of `normal_modes`, but the body needs an interface. n_modes = 0 gives [Psi_R, Psi_U].
 
     References
     ----------
@@ -85,10 +85,10 @@ def macneal(
     body: FEBody | Families,
     n_modes: int | ModeCount,
 ) -> ModeSet:
-    """Span of MacNeal's set, that of `rubin`: his reduction differs in the pencil alone, without residual inertia [1]_.
+    """MacNeal's span, equal to that of `rubin`; his reduction only differs in the pencil (no residual inertia) [1]_.
 
-    A floating frame needs the inertia of every shape, so here it is kept; `reduced_pencil.macneal_pencil` has the
-    pencil itself, to compare. Parameters and errors are those of `rubin`.
+    A floating frame needs the inertia of every shape, so it is kept here. `reduced_pencil.macneal_pencil` gives
+    MacNeal's pencil for comparison. Parameters and errors are those of `rubin`.
 
     References
     ----------
@@ -102,10 +102,10 @@ def dual_craig_bampton(
     body: FEBody | Families,
     n_modes: int | ModeCount,
 ) -> ModeSet:
-    """Span of the dual Craig-Bampton set, that of `rubin`: it differs in its unknowns, which are interface forces [1]_.
+    """Dual Craig-Bampton span, equal to that of `rubin`; the dual method differs in its unknown interface forces [1]_.
 
-    A floating frame needs displacements; `reduced_pencil.dual_craig_bampton_pencil` has the pencil itself, to
-    compare. Parameters and errors are those of `rubin`.
+    A floating frame needs displacements. `reduced_pencil.dual_craig_bampton_pencil` gives the dual pencil for
+    comparison. Parameters and errors are those of `rubin`.
 
     References
     ----------
@@ -121,13 +121,13 @@ def craig_chang(
 ) -> ModeSet:
     """Craig-Chang mode set: Rubin's span in physical interface coordinates [1]_.
 
-    u = Phi q + Psi_d f with the rigid-body and free modes Phi and the residual attachment modes Psi_d; on the boundary
-    u_B = Phi_B q + G_d f, so f = G_d⁻¹ (u_B - Phi_B q), and
+    u = Phi q + Psi_d f with rigid-body and free modes Phi and residual attachment modes Psi_d. On the boundary, u_B =
+    Phi_B q + G_d f, hence f = G_d⁻¹ (u_B - Phi_B q). The columns are
 
     (1) interface columns Psi_d G_d⁻¹: unit displacement of one boundary dof
     (2) free columns Phi - Psi_d G_d⁻¹ Phi_B, which vanish on the boundary
 
-    Where modes are kept in so great a number that G_d is singular, its pseudo-inverse loses nothing: a force without
+    If so many modes are kept that G_d is singular, its pseudo-inverse is used. Nothing is lost, because a force without
     residual displacement at the interfaces has none anywhere. Parameters and errors are those of `rubin`.
 
     References
@@ -153,10 +153,10 @@ def herting(
     body: FEBody | Families,
     n_modes: int | ModeCount,
 ) -> ModeSet:
-    """Herting mode set: [Psi_C, Psi_H, phi - Psi_C phi_B] with phi the free modes [1]_.
+    """Herting mode set: [Psi_C, Psi_H, phi - Psi_C phi_B] with free modes phi [1]_.
 
-    Statically complete as Craig-Bampton with inertia relief, with the exact modes of the free body besides. Parameters
-    and errors are those of `rubin`.
+    The set is statically complete like Craig-Bampton with inertia relief, and also contains the exact modes of the free
+    body. Parameters and errors are those of `rubin`.
 
     References
     ----------
@@ -183,12 +183,13 @@ def _residual_block(families: Families, modes: EigenResult) -> Block:
 
 
 def _pseudo_inverse(G: Array) -> Array:
-    """Return the pseudo-inverse of a symmetric positive semidefinite matrix, scaled by its diagonal."""
+    """Return the pseudo-inverse of a symmetric positive semidefinite matrix, scaled with its diagonal."""
     diagonal = np.diag(G)
     size = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
     scaled = G * np.outer(size, size)
     values, vectors = la.eigh((scaled + scaled.T) / 2)
     kept = values > DEPENDENT * values[-1]
     half = size[:, None] * vectors[:, kept] / np.sqrt(values[kept])
-    half[diagonal <= 0] = 0.0  # a zero diagonal has a zero row, and so has the inverse: no shapes made of rounding
+    # a zero diagonal entry has a zero row, in the inverse too, so that rounding makes no shapes
+    half[diagonal <= 0] = 0.0
     return half @ half.T

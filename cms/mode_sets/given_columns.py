@@ -1,4 +1,4 @@
-"""Over which dofs given columns are: those of the coupled body, or those of its mesh, which may be as many."""
+"""Check whether given columns are over the dofs of the coupled body or of its mesh, which may be equally many."""
 
 import logging
 
@@ -14,19 +14,22 @@ __all__ = ["OVER", "coupled_columns", "tell_frequencies"]
 
 log = logging.getLogger(__name__)
 
-OVER = ("coupled", "mesh")  #: dofs that columns can be given over
+OVER = ("coupled", "mesh")  #: dofs over which columns can be given
 WORDS = {"coupled": "coupled dofs", "mesh": "dofs of the mesh"}
-DEARER = 10.0  #: median omega² of columns over that of the other reading, above which the other one is meant
-NOT_RIGID = 0.1  #: part of the motion of a rigid interface that its members cannot follow, that is told
-APART = 3.0  #: factor between a stated frequency and that of a column's energy, that is told
+#: ratio of the median omega² of the columns to that of the other interpretation, above which the other one is meant
+DEARER = 10.0
+#: share of the motion of a rigid interface that its members cannot follow, above which a warning is given
+NOT_RIGID = 0.1
+APART = 3.0  #: ratio between a stated frequency and that from the energy of its column, above which a warning is given
 
 
 def coupled_columns(where: str, body: FEBody, V: Array, over: str | None) -> tuple[Array, dict[str, str]]:
-    """Bring given columns to the dofs of the coupled body.
+    """Convert given columns to the dofs of the coupled body.
 
-    (1) which dofs the rows are: as told, or as their number tells; where both have as many, it must be told
-    (2) columns over the mesh go the way of `coupled_field`
-    (3) where both readings are possible, that which is told may not be far dearer than the other
+    (1) identify the dofs of the rows, from the argument or from their number; if both have the same number, the
+        argument is needed
+    (2) convert columns over the mesh with `coupled_field`
+    (3) if both interpretations are possible, check that the chosen one does not have a far higher energy than the other
 
     Parameters
     ----------
@@ -35,19 +38,19 @@ def coupled_columns(where: str, body: FEBody, V: Array, over: str | None) -> tup
     V
         Finite columns, (n_dof, k) or (n_mesh_dof, k).
     over
-        One of `OVER`; None: as the number of rows tells.
+        One of `OVER`; None: identify the dofs from the number of rows.
 
     Returns
     -------
     columns
         (n_dof, k).
     options
-        What was done, for the record of the mode set.
+        Description of the conversion, for the record of the mode set.
 
     Raises
     ------
     ModeSetError
-        If the rows fit neither, or both and nothing tells which, or are told to be one and look like the other.
+        If the number of rows fits neither, if it fits both and `over` is None, or if the columns contradict `over`.
     """
     over = told_or_counted(where, body, V, over)  # (1)
     options = {"columns over": f"the {WORDS[over]}"}
@@ -74,7 +77,7 @@ def coupled_columns(where: str, body: FEBody, V: Array, over: str | None) -> tup
 
 
 def told_or_counted(where: str, body: FEBody, V: Array, over: str | None) -> str:
-    """Return over which dofs the columns are."""
+    """Return over which dofs the columns are given."""
     if over is not None and over not in OVER:
         raise ModeSetError(f"{where}: columns_over = {quoted(over)}: unknown{nearest(str(over), OVER)}")
     rows = {"coupled": body.n_dof, "mesh": n_mesh(body)}
@@ -99,31 +102,31 @@ def n_mesh(body: FEBody) -> int:
 
 
 def has_own_mesh(body: FEBody) -> bool:
-    """Whether the dofs of the mesh are others than those of the coupled body, or stand in another order."""
+    """Whether mesh dofs and coupled dofs differ in number or order."""
     return body.recovery is not None and not np.array_equal(body.recovery.dofs, body.dofs)
 
 
 def is_ambiguous(body: FEBody) -> bool:
-    """Whether the number of rows does not tell the dofs of the mesh from those of the coupled body."""
+    """Whether mesh dofs and coupled dofs differ but are equally many."""
     return has_own_mesh(body) and n_mesh(body) == body.n_dof
 
 
 def rayleigh(body: FEBody, X: Array) -> Array:
-    """Rayleigh quotient of every column, (k,) [1/s²]; 0 where there is no mass."""
+    """Return the Rayleigh quotient of every column, (k,) [1/s²]; 0 for columns without mass."""
     mass = np.einsum("nk,nk->k", X, body.M @ X)
     energy = np.maximum(np.einsum("nk,nk->k", X, body.K @ X), 0.0)
     return np.divide(energy, mass, out=np.zeros_like(energy), where=mass > 0)
 
 
 def tell_frequencies(where: str, body: FEBody, X: Array, frequencies: Array) -> None:
-    """Warn of stated frequencies that the energy of their columns is far from: another order, unit or body.
+    """Warn if stated frequencies are far from those of the energy of their columns: order, unit or body may be wrong.
 
     Parameters
     ----------
     X
         Columns over the coupled dofs, (n_dof, k).
     frequencies
-        NaN for static columns, (k,) [Hz].
+        Stated frequencies, NaN for static columns, (k,) [Hz].
     """
     is_stated = np.isfinite(frequencies) & (frequencies > 0)
     own = np.sqrt(rayleigh(body, X[:, is_stated])) / (2 * np.pi)

@@ -1,4 +1,4 @@
-"""Krylov mode set: moments of the transfer function at given frequencies (load-dependent Ritz vectors)."""
+"""Krylov mode set: it matches moments of the transfer function at given frequencies (load-dependent Ritz vectors)."""
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -26,10 +26,10 @@ from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 
 __all__ = ["krylov"]
 
-DEFLATION = 1e-7  #: part of a unit column that is not in the span yet, below which it is left out
-MOST_BLOCKS = 30  #: per shift, where a tolerance decides
-LOSS = 0.02  #: loss factor of the transfer function whose error is estimated: 1 % of critical at resonance
-BAND_POINTS = 60  #: frequencies of a band at which it is compared
+DEFLATION = 1e-7  #: remainder of a unit column outside the span, below which it is left out
+MOST_BLOCKS = 30  #: largest number of blocks per shift, if a tolerance decides
+LOSS = 0.02  #: loss factor of the transfer function in the error estimate: 1 % of critical at resonance
+BAND_POINTS = 60  #: number of frequencies in the band at which transfer functions are compared
 
 
 def krylov(
@@ -42,36 +42,39 @@ def krylov(
     band: tuple[float, float] | None = None,
     load_cases: bool = True,
 ) -> ModeSet:
-    """Krylov mode set: [Psi_R, blocks of moments] of the loads F = [unit loads on the boundary dofs, load cases] [1]_.
+    """Krylov mode set: [Psi_R, blocks of moments] for loads F = [unit loads on boundary dofs, load cases] [1]_.
 
-    (1) shift 0: X_1 = Pᵀ G P F, X_{j+1} = Pᵀ G P M X_j on the elastic flexibility of the free body;
-        inertia loads of rigid-body accelerations need no column, since P M Psi_R = 0 and Psi_R is in the set
+    (1) shift 0: X_1 = Pᵀ G P F, X_{j+1} = Pᵀ G P M X_j with the elastic flexibility of the free body; inertia loads of
+        rigid-body accelerations need no column, because P M Psi_R = 0 and Psi_R is in the set
     (2) shift s, sigma = (2 pi s)²: X_1 = (K - sigma M)⁻¹ F, X_{j+1} = (K - sigma M)⁻¹ M X_j, without rigid-body part
-    (3) every block, shift after shift, is made orthogonal to the span so far in W = K + omega_1² M, twice; columns of
-        which less than 1e-7 (or `tolerance`) is left are deflated, and the recurrence goes on with the others
+    (3) every block, shift after shift, is orthogonalised twice against the span in W = K + omega_1² M; columns with a
+        remainder below 1e-7 (or `tolerance`) are deflated, and the recurrence continues with the others
 
-    The projection is symmetric, so j blocks at a shift match the first 2 j moments
-    m_k = Fᵀ [(K - sigma M)⁻¹ M]^k (K - sigma M)⁻¹ F, k = 0 .. 2 j - 1, of the transfer function Fᵀ (K - omega² M)⁻¹ F
-    there. The options of the set say how many are matched.
+    The projection is symmetric, so j blocks at a shift match the first 2 j moments m_k = Fᵀ [(K - sigma M)⁻¹ M]^k (K -
+    sigma M)⁻¹ F, k = 0 .. 2 j - 1, of the transfer function Fᵀ (K - omega² M)⁻¹ F at that shift. The options of the set
+    give the number of matched moments.
 
     Parameters
     ----------
     body
-        A coupled body with at least one interface, or its `Families`, which many sets share.
+        A coupled body with at least one interface, or its `Families`, which several sets can share.
     n_modes
-        Columns beyond the first block of every shift; 0 gives the static set [Psi_R, Psi_U] where the shift is 0.
+        Number of columns beyond the first block of every shift; 0 gives the static set [Psi_R, Psi_U] if the shift is
+        0.
     n_blocks
-        Instead: blocks at every shift.
+        Number of blocks at every shift, instead of n_modes.
     shifts
-        Expansion frequencies [Hz, or 1/time unit of the body], none a natural frequency of the free body. Each one
-        but 0 costs a factorisation.
+        Expansion frequencies [Hz, or 1/time unit of the body]; none may be a natural frequency of the free body. Each
+        shift except 0 costs a factorisation.
     tolerance
-        Instead of a number, with `band`: blocks are added until the transfer function over the band changes by less
-        than this part (2 % loss factor, elastic part); without: until all columns are in the span but for this part.
+        Instead of a number. With `band`: blocks are added until the relative change of the transfer function over the
+        band is below the tolerance (elastic part, 2 % loss factor). Without `band`: blocks are added until the
+        remainder of all new columns is below the tolerance.
     band
-        Frequencies (from, to) over which the error is estimated [Hz].
+        Range of frequencies (from, to) over which the error is estimated [Hz].
     load_cases
-        Whether the body's load cases are among the loads; centrifugal ones never are, their response is static.
+        Whether the load cases of the body are among the loads. Centrifugal load cases never are: their response is
+        static.
 
     Raises
     ------
@@ -122,22 +125,22 @@ def krylov(
 
 @dataclass(eq=False)
 class _Expansion:
-    """One expansion point: its operator, its first block, and the directions its recurrence goes on with."""
+    """One expansion point: its operator, its first block, and the directions for the next block."""
 
     name: str
     first_block: Callable[[], Array]  #: X_1, (n_dof, n_f)
     apply: Callable[[Array], Array]  #: X -> (K - sigma M)⁻¹ X, or the elastic flexibility
     last: Array | None = None  #: M times the last directions, (n_dof, k); None before the first block
-    ends: tuple[int, ...] = ()  #: number of columns of the span after each of its blocks
+    ends: tuple[int, ...] = ()  #: number of columns of the span after each block of this expansion
 
     @property
     def is_exhausted(self) -> bool:
-        """Whether its last block brought nothing new."""
+        """Whether the last block added no new direction."""
         return self.last is not None and self.last.shape[1] == 0
 
 
 class _Span:
-    """W-orthonormal columns, grown block by block."""
+    """W-orthonormal columns that grow block by block."""
 
     def __init__(self, families: Families, *, deflation: float) -> None:
         self.body, self.families, self.deflation = families.body, families, deflation
@@ -167,7 +170,7 @@ class _Span:
         expansion.ends = (*expansion.ends, self.n)
 
     def _orthonormal(self, X: Array) -> Columns:
-        """Return W-orthonormal directions of elastic columns X that are not in the span: (3)."""
+        """Return W-orthonormal directions of elastic columns X outside the span: step (3)."""
         free = self.families.free
         X = X - free.N @ (free.M_N.T @ X)
         block = self._products(X)
@@ -191,7 +194,8 @@ class _Span:
         Z = np.zeros((len(G), rank))
         Z[pivots[:rank] - 1] = la.solve_triangular(np.triu(factor[:rank, :rank]), np.eye(rank))
         block = self._products(block.X @ Z)
-        block = self._without_span(block)  # the smaller the remainder was, the more of the span its rounding carries
+        # the smaller the remainder, the larger the part of the span in its rounding error
+        block = self._without_span(block)
         G = gram(block.X, block.KX) + self.omega2 * gram(block.X, block.MX)
         return self._products(block.X @ la.solve_triangular(la.cholesky(G), np.eye(rank)))
 
@@ -199,10 +203,11 @@ class _Span:
         return self._products(block.X - self.columns.X @ self.columns.inner(block, self.omega2))
 
     def _products(self, X: Array) -> Columns:
-        return Columns(X, self._K @ X, self._M @ X, np.zeros((0, X.shape[1])))  # nothing asks where a column came from
+        # the coefficients over the mode set are not needed
+        return Columns(X, self._K @ X, self._M @ X, np.zeros((0, X.shape[1])))
 
     def receptance(self, band: tuple[float, float]) -> np.ndarray:
-        """Elastic receptance of the boundary over the band, (n_f, n_b, n_b)."""
+        """Return the elastic receptance of the boundary over the band, (n_f, n_b, n_b)."""
         b = boundary_scale(self.body)[:, None] * self.columns.X[self.body.b]
         K, M = gram(self.columns.X, self.columns.KX), gram(self.columns.X, self.columns.MX)
         return receptance_of_pencil(b, K, M, loss=LOSS, omega2=self.omega2).at(np.linspace(*band, BAND_POINTS))
@@ -216,7 +221,7 @@ def _static_expansion(families: Families, F_extra: Array) -> _Expansion:
 
 
 def _shifted_expansion(families: Families, shift: float, F_extra: Array, stack: ExitStack) -> _Expansion:
-    """Return the expansion at a shift; the stack holds its factorisation."""
+    """Return the expansion at a shift; the stack keeps its factorisation open."""
     body = families.body
     sigma = (2 * np.pi * shift) ** 2
     order = body.K.order if isinstance(body.K, SpreadMatrix) else np.arange(body.n_dof)
@@ -251,7 +256,7 @@ def _check(
     tolerance: float | None,
     band: tuple[float, float] | None,
 ) -> None:
-    """Refuse contradictory options and numbers out of range."""
+    """Raise `ModeSetError` for contradictory options and numbers out of range."""
     given = {"n_modes": n_modes, "n_blocks": n_blocks, "tolerance": tolerance}
     if sum(value is not None for value in given.values()) != 1:
         raise ModeSetError(
@@ -293,6 +298,6 @@ def _mode_set(
     columns = static_block(span.columns.X[:, :n_kept], span.labels[:n_kept], span.groups[:n_kept])
     rigid = rigid_block(families)
     modes = mode_set("krylov", families, [rigid, columns], options=options)
-    # columns that n_modes does not count: with fewer of the others it is the set of fewer modes
+    # columns not counted by n_modes; smaller sets of this kind contain them too
     n_static = np.array([float(rigid.columns.shape[1] + min(n_first, n_kept))])
     return replace(modes, data={"omega2": np.array(span.omega2), "n_static": n_static})

@@ -1,4 +1,4 @@
-"""Benfield-Hruda: constraint modes and the modes of the body with the mass and stiffness of its neighbours."""
+"""Benfield-Hruda: constraint modes, and modes of the body with mass and stiffness of its neighbours."""
 
 from collections.abc import Sequence
 
@@ -25,23 +25,23 @@ def benfield_hruda(
     *,
     loads: Sequence[InterfaceLoad] = (),
 ) -> ModeSet:
-    """Benfield-Hruda mode set: [Psi_C, phi - Psi_C phi_B], phi the loaded-interface modes [1]_.
+    """Benfield-Hruda mode set: [Psi_C, phi - Psi_C phi_B] with loaded-interface modes phi [1]_.
 
-    (1) (K + K_load) phi = omega² (M + M_load) phi, with the mass and stiffness of the neighbours on the boundary
-    (2) phi - Psi_C phi_B spans the same beside Psi_C, and stays well-conditioned with it
+    (1) (K + K_load) phi = omega² (M + M_load) phi, with mass and stiffness of the neighbours on the boundary
+    (2) phi - Psi_C phi_B has the same span together with Psi_C, and is well-conditioned
 
-    The modes of (1) are near those of the assembled system, so few of them do. Rigid-body motions that the loads leave
-    free are in the span of Psi_C and not counted.
+    The modes of (1) are close to those of the assembled system, so few are needed. Rigid-body motions that the loads
+    leave free are in the span of Psi_C and are not counted.
 
     Parameters
     ----------
     body
-        A coupled body with at least one interface, or its `Families`, which many sets share.
+        A coupled body with at least one interface, or its `Families`, which several sets can share.
     n_modes
-        Number of elastic loaded-interface modes; a `ModeCount` says up to which frequency instead,
-        and whether to prove that none was missed.
+        Number of elastic loaded-interface modes. A `ModeCount` gives a cutoff frequency instead, and whether to prove
+        that no mode was missed.
     loads
-        Mass and stiffness per interface (`point_load`, `InterfaceLoad`), or of neighbours across interfaces
+        Mass and stiffness at an interface (`point_load`, `InterfaceLoad`), or of neighbours across several interfaces
         (`condensed_load`).
 
     Raises

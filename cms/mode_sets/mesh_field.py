@@ -1,4 +1,4 @@
-"""A displacement field given at the mesh, brought to the dofs of the coupled body."""
+"""Conversion of a displacement field over the mesh to the dofs of the coupled body."""
 
 from dataclasses import dataclass
 
@@ -13,24 +13,24 @@ __all__ = ["CoupledField", "coupled_field"]
 
 @dataclass(frozen=True, eq=False)
 class CoupledField:
-    """Columns over the dofs of a coupled body, and how well rigid interfaces can follow them."""
+    """Columns over the dofs of a coupled body, and the part of the motion that rigid interfaces cannot follow."""
 
     columns: Array  #: (n_dof, k)
-    departure: dict[str, float]  #: rigid interface -> largest part of its members' motion that is not rigid, 0 to 1
+    departure: dict[str, float]  #: largest non-rigid share of the motion of the members of each rigid interface, 0 to 1
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "columns", frozen(self.columns))
 
 
 def coupled_field(body: FEBody, u_mesh: Array) -> CoupledField:
-    """Bring displacement columns over the mesh to the dofs of a coupled body.
+    """Convert displacement columns over the mesh to the dofs of a coupled body.
 
-    (1) dofs of the mesh that stay: as they are
-    (2) rigid interface: the rigid motion of its reference node nearest to that of the members (least squares,
-        rotations of members scaled by the body length)
-    (3) distributing interface: the weighted mean motion of the members, exact by definition
-    (4) reference nodes inside the body, where parts are welded: the nearest motion, as in (2)
-    (5) multipliers: zero; a field that satisfies the constraint has the same energy with any multiplier
+    (1) mesh dofs that stay in the body are copied
+    (2) a rigid interface takes the rigid motion that fits the motion of its members best (least squares, rotations of
+        members scaled with the body length)
+    (3) a distributing interface takes the weighted mean motion of its members, which is exact by definition
+    (4) reference nodes inside the body, where parts are welded, take the best-fitting motion, as in (2)
+    (5) multipliers are zero; a field that satisfies the constraint has the same energy for any multiplier
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def coupled_field(body: FEBody, u_mesh: Array) -> CoupledField:
 
 
 def _nearest_rigid(body: FEBody, interface: Interface, u_mesh: Array) -> tuple[Array, float]:
-    """Motion of the reference node nearest to that of the members, (6, k), and the relative rest."""
+    """Return the motion of the reference node that fits the members best, (6, k), and the relative remainder."""
     assert body.recovery is not None
     rows = np.flatnonzero(np.isin(body.recovery.dofs[:, 0], interface.nodes))
     scale = np.where(body.recovery.dofs[rows, 1] >= 3, body.length, 1.0)[:, None]
@@ -84,7 +84,7 @@ def _nearest_rigid(body: FEBody, interface: Interface, u_mesh: Array) -> tuple[A
 
 
 def _member_translations(body: FEBody, interface: Interface, u_mesh: Array) -> Array:
-    """Translations of the members, (3 n_members, k), node-major."""
+    """Return the translations of the members, (3 n_members, k), node-major."""
     assert body.recovery is not None
     dofs = body.recovery.dofs
     table = np.full((len(body.nodes), 3), -1, np.int64)

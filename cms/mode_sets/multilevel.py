@@ -1,4 +1,4 @@
-"""Craig-Bampton for large bodies and many modes: its modes by multilevel substructures (AMLS)."""
+"""Craig-Bampton for large bodies and many modes: modes by automated multilevel substructuring (AMLS)."""
 
 from contextlib import nullcontext
 from multiprocessing import current_process
@@ -33,10 +33,10 @@ def multilevel(
     cutoff_factor: float | None = None,
     workers: Workers = None,
 ) -> ModeSet:
-    """Craig-Bampton whose fixed-interface modes come from multilevel substructures: [Psi_C, (Psi_H,) modes] [1]_.
+    """Craig-Bampton with fixed-interface modes from multilevel substructuring: [Psi_C, (Psi_H,) modes] [1]_.
 
-    Constraint modes are exact, by the same tree, which stands for the factorisation of the body from then on.
-    Frequencies are never below the true ones; an estimate of the error of each stands in `data["frequency error"]`, NaN
+    The constraint modes are exact. They use the same tree, which then serves as the factorisation of the body.
+    Frequencies are never below the true ones. `data["frequency error"]` holds an error estimate for each mode, and NaN
     for static columns.
 
     Parameters
@@ -44,16 +44,15 @@ def multilevel(
     body
         A coupled body whose interfaces hold it, or its `Families`.
     n_modes
-        Number of fixed-interface modes, or a `ModeCount`: all up to a cutoff, proven or not.
+        Number of fixed-interface modes, or a `ModeCount` for all modes up to a cutoff, with or without proof.
     inertia_relief
-        Whether the static responses to rigid-body accelerations stand after the constraint modes, as in
+        Whether to add the static responses to rigid-body accelerations after the constraint modes, as in
         `craig_bampton_ir`.
     tolerance
-        Largest relative error of a frequency, 1e-10 to 0.1; a warning says what is above it.
+        Largest relative error of a frequency, 1e-10 to 0.1; a warning names the frequencies with a larger error.
     cutoff_factor
-        Substructures keep their modes up to so many times the cutoff (of a number of modes: times its highest
-        frequency), 1.2 or more; None: 20 for shells and beams, 14 where there are at
-        most 400 interior dofs for each wanted mode, 4 for solids.
+        Substructures keep their modes up to this factor times the cutoff, or times the highest wanted frequency; 1.2 or
+        more. None: 20 for shells and beams, 14 if there are at most 400 interior dofs per wanted mode, 4 for solids.
     workers
         Where subtrees are eliminated: a number of processes, dask, or dask://host:port; None: threads of this process.
 
@@ -61,11 +60,11 @@ def multilevel(
     ------
     ModeSetError
         If there are fewer interior dofs than modes, no mode lies below the cutoff, the interfaces do not hold the body,
-        or tolerance or cutoff_factor are out of range.
+        or tolerance or cutoff_factor is out of range.
     BodyError
-        If the body is a mechanism when its interfaces are held.
+        If the body is a mechanism with its interfaces held.
     EigenError
-        If the substructures kept fewer modes than are wanted, or the proof fails.
+        If the substructures kept fewer modes than wanted, or the proof fails.
 
     References
     ----------
@@ -111,12 +110,12 @@ def multilevel(
 def _modes_of(
     families: Families, wanted: ModeCount, tolerance: float, cutoff_factor: float | None, workers: Workers
 ) -> MultilevelResult:
-    """Find the modes over all dofs; the tree becomes the factorisation of the families, if they have none yet."""
+    """Compute the modes over all dofs; the tree becomes the factorisation of the families if they have none."""
     body = families.body
     i = body.i
     K, M = principal_block(body.K, i), principal_block(body.M, i)
     interior = Interior(K, M, body.dofs[i, 0], body.nodes, body.dofs[i, 1] == MULTIPLIER)
-    if current_process().daemon:  # a task of a fleet or sweep: it may start no processes
+    if current_process().daemon:  # a task of a fleet or sweep may not start processes
         workers = None
     with nullcontext() if workers is None else tasks_of(workers) as tasks:
         try:
@@ -125,14 +124,14 @@ def _modes_of(
                 rows=(body.n_dof, i), solver=families.solver,
             )  # fmt: skip
         except FactorizationError:
-            families.fixed  # noqa: B018 - says where the mechanism is
+            families.fixed  # noqa: B018 - raises an error that names the mechanism
             raise
     families.adopt(FixedInterfaceBody(body, i, body.b, Factorization(found.tree, families.solver)))
     return found
 
 
 def _words(result: MultilevelResult, tolerance: float) -> dict[str, str]:
-    """Return what was done and what error is left, for the provenance."""
+    """Describe the method and the remaining error, for the provenance."""
     above = np.flatnonzero(result.errors > tolerance) + 1
     return {
         "cutoff factor": f"{result.cutoff_factor:g}",

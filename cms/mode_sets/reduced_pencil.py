@@ -1,4 +1,4 @@
-"""Reduced pencils (M, K) of mode sets, to compare reductions that no floating frame can take (docs/theory.md §3)."""
+"""Reduced pencils (M, K) of mode sets, to compare reductions that a floating frame cannot use (docs/theory.md §3)."""
 
 from dataclasses import dataclass
 
@@ -33,16 +33,16 @@ DEPENDENT = 1e-10  #: squared remainder of a unit column, below which it is left
 
 @dataclass(frozen=True, eq=False)
 class ReducedPencil:
-    """Equations of motion (K - omega² M) x = Lᵀ f of a reduced body, with u_B = L x at its boundary dofs.
+    """Equations of motion (K - omega² M) x = Lᵀ f of a reduced body, with boundary displacement u_B = L x.
 
-    Where interface forces are unknowns themselves (`is_dual`), x = (displacement coordinates, f) and the equations are
-    (K - omega² M) x = -Lᵀ u_B with L = [0, 1], which picks f.
+    If interface forces are unknowns (`is_dual`), x = (displacement coordinates, f) and the equations are (K - omega² M)
+    x = -Lᵀ u_B with L = [0, 1], which selects f.
     """
 
     name: str
     M: Array  #: (n, n)
     K: Array  #: (n, n)
-    labels: tuple[str, ...]  #: one per coordinate, (n,)
+    labels: tuple[str, ...]  #: label of each coordinate, (n,)
     interface: Array  #: L, (n_b, n), rows in the order of the boundary dofs of the body
     is_dual: bool = False
 
@@ -72,11 +72,11 @@ def macneal_pencil(
 
     (1) x = (rigid-body q_r, free modes q, residual attachment f): u = Psi_R q_r + Phi q + Psi_d f
     (2) K = diag(0, Lambda, G_d),  M = diag(Psi_Rᵀ M Psi_R, 1, 0),  G_d = Psi_d,B
-    (3) u_B = L x with L = [Psi_R,B, Phi_B, G_d]: the interfaces see f statically, which makes M singular
+    (3) u_B = L x with L = [Psi_R,B, Phi_B, G_d]: the interfaces follow f statically, which makes M singular
 
     Parameters
     ----------
-    n_modes, cutoff, families
+    body, n_modes
         As for `rubin`.
     """
     with families_of(body) as families:
@@ -104,17 +104,17 @@ def dual_craig_bampton_pencil(
     body: FEBody | Families,
     n_modes: int | ModeCount,
 ) -> ReducedPencil:
-    """Dual Craig-Bampton reduction: interface forces f as unknowns, so that bodies are assembled by equal forces.
+    """Dual Craig-Bampton reduction with interface forces f as unknowns; bodies are assembled by equal forces.
 
     (1) u = Psi_R q_r + Phi q + Psi_d f in the symmetric equations of (u, -f), K u - f_B = 0, u_B given
     (2) K = [0 0 -R_Bᵀ; 0 Lambda -Phi_Bᵀ; -R_B -Phi_B -G_d],  M = diag(Psi_Rᵀ M Psi_R, 1, M_d),  M_d = Psi_dᵀ M Psi_d
-    (3) the last row reads u_B = R_B q_r + Phi_B q + (G_d + omega² M_d) f: the residual flexibility to omega²
+    (3) the last row is u_B = R_B q_r + Phi_B q + (G_d + omega² M_d) f, with the residual flexibility to order omega²
 
-    K is indefinite. Without M_d the last row is MacNeal's.
+    K is indefinite. Without M_d the last row equals MacNeal's.
 
     Parameters
     ----------
-    n_modes, cutoff, families
+    body, n_modes
         As for `rubin`.
     """
     with families_of(body) as families:
@@ -157,8 +157,8 @@ def receptance(pencil: ReducedPencil, omega: float) -> Array:
 
 
 def free_frequencies(pencil: ReducedPencil) -> Array:
-    """Return the finite frequencies with free interfaces, ascending, rigid-body motions as 0 [Hz]."""
-    if pencil.is_dual:  # no interface forces
+    """Return the finite frequencies with free interfaces, ascending, with rigid-body motions as 0 [Hz]."""
+    if pencil.is_dual:  # interface forces are zero
         free = np.flatnonzero(~pencil.interface.any(axis=0))
         return _frequencies(pencil.K[np.ix_(free, free)], pencil.M[np.ix_(free, free)])
     return _frequencies(pencil.K, pencil.M)
@@ -167,8 +167,8 @@ def free_frequencies(pencil: ReducedPencil) -> Array:
 def fixed_frequencies(pencil: ReducedPencil) -> Array:
     """Return the finite frequencies with all boundary dofs held, ascending [Hz].
 
-    The dual pencil holds them by f, so its eigenvalues are taken as they come: those that are not positive are dropped,
-    and they are no bounds.
+    The dual pencil holds them through f. Its eigenvalues that are not positive are dropped, and the others are no
+    bounds.
     """
     if not pencil.is_dual:
         Z = la.null_space(pencil.interface / np.abs(pencil.interface).max(axis=1, keepdims=True))
@@ -179,7 +179,7 @@ def fixed_frequencies(pencil: ReducedPencil) -> Array:
 
 
 def _frequencies(K: Array, M: Array) -> Array:
-    """Finite frequencies of a semidefinite pencil.
+    """Return the finite frequencies of a semidefinite pencil.
 
     An eigenvalue mu of omega_0² M in the norm of K + omega_0² M is omega_0² / (omega² + omega_0²).
     """

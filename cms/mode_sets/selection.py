@@ -1,4 +1,4 @@
-"""What every mode set with vibration modes asks first: how many of them, and is that possible."""
+"""Checks common to all mode sets with vibration modes: how many modes are wanted, and whether that is possible."""
 
 from typing import Protocol
 
@@ -11,13 +11,13 @@ __all__ = ["checked_modes", "require_interfaces"]
 
 
 class Finder(Protocol):
-    """A method of `Families` that finds vibration modes."""
+    """A method of `Families` that computes vibration modes."""
 
     def __call__(self, n_modes: ModeCount) -> EigenResult: ...
 
 
 def require_interfaces(name: str, body: FEBody) -> None:
-    """Refuse a body without interfaces in a set that is made of interface modes."""
+    """Raise `ModeSetError` if the body has no interface but the set consists of interface modes."""
     if len(body.b) == 0:
         raise ModeSetError(f"{name}: body {body.name!r} has no interface; give it at least one, or take free modes")
 
@@ -29,18 +29,18 @@ def checked_modes(
     body: FEBody,
     wanted: ModeCount,
 ) -> EigenResult:
-    """Find the modes a set asks for.
+    """Compute the modes that a set requests.
 
     Parameters
     ----------
     name
-        The set, for messages.
+        Name of the set, for messages.
     kind
-        The modes, for messages, such as "fixed-interface".
+        Kind of modes, for messages, such as "fixed-interface".
     find
-        Finds modes by count or cutoff.
+        Computes modes by number or cutoff.
     wanted
-        How many.
+        Number of modes, or cutoff.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""User basis: columns that came from elsewhere, taken as a mode set."""
+"""User basis: given columns as a mode set."""
 
 import os
 from collections.abc import Sequence
@@ -29,30 +29,30 @@ def user_basis(
     labels: Sequence[str] | None = None,
     frequencies: Array | None = None,
 ) -> ModeSet:
-    """Take given columns as a mode set.
+    """Make a mode set from given columns.
 
     Parameters
     ----------
     body
-        A coupled body, or its `Families`, which many sets share.
+        A coupled body, or its `Families`, which several sets can share.
     columns
-        Displacement columns over the dofs of the coupled body (n_dof, k), or over those of its mesh (n_mesh_dof, k),
-        which are then brought to the coupled body (`cms.coupled_field`: rigid interfaces take the nearest rigid motion,
-        and how near that is stands in the options of the set). Or a file: .npy with the array, .npz with `columns` and,
-        if need be, `labels` and `frequencies`.
+        Displacement columns over the dofs of the coupled body, (n_dof, k), or of its mesh, (n_mesh_dof, k). Columns
+        over the mesh are converted by `cms.coupled_field`: rigid interfaces take the best-fitting rigid motion, and the
+        options of the set give the remainder. Alternatively a file: .npy with the array, or .npz with `columns` and
+        optionally `labels` and `frequencies`.
     columns_over
-        "coupled" or "mesh": which dofs the rows are. Needed where both have as many, as their order differs even so;
-        else the number of rows tells.
+        "coupled" or "mesh": the dofs of the rows. Needed if both have the same number, because their order differs;
+        otherwise the number of rows decides.
     labels
-        One per column; "user 1", "user 2", … by default, or those of the file.
+        Label of each column; default: those of the file, or "user 1", "user 2", …
     frequencies
-        Of vibration columns, NaN for static ones, (k,) [Hz]; all NaN by default, or those of the file.
+        Frequencies of vibration columns, NaN for static columns, (k,) [Hz]; default: those of the file, or all NaN.
 
     Raises
     ------
     ModeSetError
-        If the file cannot be read, shape, labels or numbers do not fit the body, the rows may be those of the coupled
-        body and of its mesh alike and nothing says which, or they are told to be one and look like the other.
+        If the file cannot be read; if shape, labels or numbers do not fit the body; if the rows may be those of the
+        coupled body or of its mesh and `columns_over` is not given; or if the columns contradict `columns_over`.
     """
     body = body_of(body)
     body.require_coupled()

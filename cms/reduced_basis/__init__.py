@@ -1,1 +1,1 @@
-"""From the columns of a mode set to the basis of a reduced body: rank, frame, moments, stress, damping."""
+"""From a mode set to the basis of a reduced body: rank, frame, moments, stress, damping."""

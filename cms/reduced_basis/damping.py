@@ -1,8 +1,8 @@
 """Damping of the modes of a reduced body: ratios by mode or by frequency, or Rayleigh's mix of mass and stiffness.
 
-A ratio zeta puts D_kk = 2 zeta omega_k M_kk, with omega_k the frequency of mode k in the body frame at hand: a nodal
-frame has those with its nodes held, the mean-axis frame the free-free ones. The same ratios in two frames are two
-dampings.
+A ratio zeta gives D_kk = 2 zeta omega_k M_kk, where omega_k is the frequency of mode k in the given body frame. In a
+nodal frame the nodes of the frame are held; in the mean-axis frame the frequencies are free-free. The same ratios in
+two frames are therefore two different dampings.
 """
 
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ CUSTOMARY_STEPS = ((100.0, 0.01), (1000.0, 0.1))  #: 1 % below 100 Hz, 10 % belo
 class ModalDamping:
     """The same damping ratio for every mode: D = diag(2 ratio omega)."""
 
-    ratio: float  #: of critical damping, 0 <= ratio
+    ratio: float  #: ratio to critical damping, 0 <= ratio
 
     def __post_init__(self) -> None:
         _require_ratios("ratio", (self.ratio,))
@@ -37,9 +37,9 @@ class ModalDamping:
 
 @dataclass(frozen=True)
 class PerModeDamping:
-    """A damping ratio for each mode in the order of the reduced body; the last one holds for all further modes."""
+    """A damping ratio for each mode in the order of the reduced body; the last ratio holds for all further modes."""
 
-    ratios: tuple[float, ...]  #: of critical damping
+    ratios: tuple[float, ...]  #: ratios to critical damping
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "ratios", tuple(float(ratio) for ratio in self.ratios))
@@ -50,13 +50,13 @@ class PerModeDamping:
 
 @dataclass(frozen=True)
 class RampDamping:
-    """Ratios by steps of frequency; by default the customary ones: modes above the band of interest are held still.
+    """Damping ratios in steps of frequency. The default is customary: modes above the band of interest are suppressed.
 
-    A mode below the frequency of a step, and not below that of an earlier one, has its ratio.
+    Each mode has the ratio of the first step whose frequency is above its own.
     """
 
     steps: tuple[tuple[float, float], ...] = CUSTOMARY_STEPS  #: (frequency [Hz], ratio below it), ascending
-    above: float = 1.0  #: ratio from the last frequency on
+    above: float = 1.0  #: ratio at and above the last frequency
 
     def __post_init__(self) -> None:
         steps = tuple((float(frequency), float(ratio)) for frequency, ratio in self.steps)
@@ -88,11 +88,11 @@ def modal_damping(damping: Damping, M: Array, K: Array, *, second: float = 1.0) 
     Parameters
     ----------
     damping
-        Which kind.
+        Kind of damping.
     M, K
-        Diagonal, (n_q, n_q) [1] and [1/s²].
+        Modal mass and stiffness, diagonal, (n_q, n_q) [1] and [1/s²].
     second
-        Time unit of K in seconds: steps of a ramp are in Hz.
+        Time unit of K in seconds; needed because the steps of a ramp are in Hz.
     """
     mass, stiffness = np.diag(M), np.maximum(np.diag(K), 0.0)
     if isinstance(damping, RayleighDamping):

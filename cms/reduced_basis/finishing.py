@@ -1,4 +1,4 @@
-"""The finishing step every mode set passes: rank, body frame, M-orthonormal shapes (docs/theory.md §3)."""
+"""The finishing step of every mode set: rank, body frame, M-orthonormal shapes (docs/theory.md §3)."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -29,40 +29,41 @@ from fe_models.foundation.tall.on_disk import copied, in_memory, row_slices
 
 __all__ = ["FinishedBasis", "finish"]
 
-MASSLESS = 1e-12  #: modal mass times omega_1² of a shape of unit W-length, below which it is static
-ZERO_ENERGY = 1e3  #: strain energy of a shape in units of the rounding of its terms, below which it costs none
-INDEPENDENT = 1e-14  #: least eigenvalue of a pencil's norm, scaled to a unit diagonal
-TRUSTED_ROUNDING = 1e-11  #: in PhiᵀMPhi, below which shapes are formed of the columns of the set themselves
-ORTHONORMAL_DEFECT = 1e-9  #: largest defect of Phi.T M Phi - 1 that is accepted
+MASSLESS = 1e-12  #: modal mass times omega_1² of a shape of unit W-length, below which the shape is static
+ZERO_ENERGY = 1e3  #: strain energy of a shape relative to the rounding of its terms, below which it counts as zero
+INDEPENDENT = 1e-14  #: smallest eigenvalue of the norm of a pencil, scaled to a unit diagonal
+#: rounding error in PhiᵀMPhi, below which shapes are formed directly from the columns of the set
+TRUSTED_ROUNDING = 1e-11
+ORTHONORMAL_DEFECT = 1e-9  #: largest accepted entry of Phi.T M Phi - 1
 
 
 @dataclass(frozen=True, eq=False)
 class FinishedBasis:
-    """M-orthonormal, K-diagonal elastic shapes in the chosen frame, and where they came from."""
+    """M-orthonormal, K-diagonal elastic shapes in the chosen frame, and their origin."""
 
-    Phi: Array  #: (n_dof, n_q); `SpreadColumns` where those of the mode set are
+    Phi: Array  #: (n_dof, n_q); `SpreadColumns` if the columns of the mode set are distributed
     M: Array  #: Phi.T M Phi, (n_q, n_q): identity, zero rows for massless static shapes
     K: Array  #: Phi.T K Phi, (n_q, n_q), diagonal
-    columns: SourceColumns  #: the columns of the mode set and their parts in the energy of each shape
+    columns: SourceColumns  #: the columns of the mode set, and their shares in the energy of each shape
     dropped: tuple[str, ...]  #: labels of redundant columns
-    n_rigid: int  #: independent rigid-body motions the columns contained
+    n_rigid: int  #: number of independent rigid-body motions in the span of the columns
     free_omega2: Array  #: squared elastic frequencies of the unsupported reduced body, ascending
 
 
 def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedBasis:
     """Orthonormalise a mode set in a body frame.
 
-    (1) W-orthonormal columns Q of the set, W = K + omega_1² M; the redundant ones are dropped and named
-    (2) Q' = Q - Psi_R C: rigid part taken off by the frame; Qᵀ K Q stays
-    (3) the rigid-body motions that lie in the span of Q are taken out of it (`elastic_directions`)
-    (4) K z = omega² M z over what is left; Phi = Q' z
+    (1) make W-orthonormal columns Q of the set, W = K + omega_1² M; drop and name redundant columns
+    (2) Q' = Q - Psi_R C removes the rigid part according to the frame; Qᵀ K Q does not change
+    (3) remove the rigid-body motions that lie in the span of Q (`elastic_directions`)
+    (4) solve K z = omega² M z in the remaining space; Phi = Q' z
 
     Raises
     ------
     ModeSetError
-        If nothing elastic is left, or the columns are too ill-conditioned.
+        If no elastic shape is left, or the columns are too ill-conditioned.
     BodyError
-        If a shape other than a rigid-body motion costs no energy: the body is a mechanism.
+        If a shape other than a rigid-body motion has no strain energy, so that the body is a mechanism.
     """
     where = f"mode set {modes.name!r} of body {body.name!r}"
     V, products = modes.columns, Products.of_body(body)
@@ -111,11 +112,11 @@ def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedB
 
 
 def normalised_again(Phi: Array, is_massive: np.ndarray, products: Products) -> tuple[Array, float]:
-    """Return the small matrix that makes formed shapes M-orthonormal, and the defect that is left.
+    """Return the small matrix that makes the formed shapes M-orthonormal, and the remaining defect.
 
-    The modal mass of a shape of light nodes is a small difference in the Gram matrix of the columns, and a sum of small
-    terms in that of the formed shapes. Shapes are taken in the order of their frequency (Gram-Schmidt), so that each
-    changes by slower ones, whose stiffness does not count beside its own.
+    The modal mass of a shape of light nodes is a small difference in the Gram matrix of the columns, but a sum of small
+    terms in that of the formed shapes. Shapes are processed in the order of their frequency (Gram-Schmidt). Each is
+    therefore corrected only by slower shapes, whose stiffness is small compared to its own.
     """
     T = np.eye(len(is_massive))
     for _ in range(2):
@@ -133,15 +134,16 @@ def normalised_again(Phi: Array, is_massive: np.ndarray, products: Products) -> 
 
 @dataclass(frozen=True, eq=False)
 class ElasticPencil:
-    """Shapes of a basis seen from the frame, by small matrices: (2) to (4) of `finish`."""
+    """Shapes of a basis in the frame, as small matrices: steps (2) to (4) of `finish`."""
 
-    X: Array  #: columns of the basis without their rigid part, (n_dof, l), those of a formed one; the shapes: X Q.Z Z
-    Z: Array  #: shapes in the basis, (k, n_q)
-    elastic: Array  #: directions of the basis without rigid-body motion, (k, n_q)
+    #: columns of the basis Q without their rigid part, (n_dof, l); the shapes are X Q.Z Z
+    X: Array
+    Z: Array  #: shapes as combinations of the basis, (k, n_q)
+    elastic: Array  #: directions of the basis without rigid-body motions, (k, n_q)
     is_massive: np.ndarray  #: (n_q,) bool
     free_omega2: Array  #: squared elastic frequencies of the unsupported reduced body, ascending
     defect: float  #: largest entry of Zᵀ G_M Z - 1
-    rounding: float  #: estimate of what rounding of G_M makes of PhiᵀMPhi - 1
+    rounding: float  #: estimated rounding error of PhiᵀMPhi - 1 due to rounding of G_M
 
 
 def elastic_pencil(
@@ -152,7 +154,7 @@ def elastic_pencil(
     Raises
     ------
     ModeSetError
-        If nothing elastic is left, or the columns are too ill-conditioned.
+        If no elastic shape is left, or the columns are too ill-conditioned.
     """
     elastic = elastic_part(body, Q, condition, omega2_1)  # (3)
     if elastic.shape[1] == 0:
@@ -178,7 +180,7 @@ def elastic_pencil(
 
 
 def turn_in_place(Phi: Any, turn: Array) -> None:
-    """Make Phi turn of Phi; where the turn changes only the sign of a mode, no other is touched."""
+    """Replace Phi by Phi turn; modes of which only the sign changes are not mixed with others."""
     if isinstance(Phi, SpreadColumns):
         on_rows(Phi.layout, turn_in_place, Phi, turn)
         return
@@ -192,9 +194,9 @@ def turn_in_place(Phi: Any, turn: Array) -> None:
 
 
 def first_elastic(where: str, V: Array, G_K: Array, G_M: Array, condition: FrameCondition) -> float:
-    """Estimate omega_1² of the free body: the least Rayleigh quotient of a column without its rigid part [1/s²].
+    """Estimate omega_1² of the free body: the smallest Rayleigh quotient of a column without its rigid part [1/s²].
 
-    Each is an upper bound; the smallest is near enough to set the scale of a norm.
+    Each quotient is an upper bound. The smallest is accurate enough to scale a norm.
     """
     rigid = inner(condition.M_Psi_R, V)
     stiffness, mass = np.diag(G_K), np.diag(G_M)
@@ -206,7 +208,7 @@ def first_elastic(where: str, V: Array, G_K: Array, G_M: Array, condition: Frame
 
 
 def elastic_part(body: FEBody, Q: Basis, condition: FrameCondition, omega2_1: float) -> Array:
-    """Return the directions of W-orthonormal columns that hold no rigid-body motion, (k, k - n_rigid)."""
+    """Return the directions of W-orthonormal columns without rigid-body motion, (k, k - n_rigid)."""
     S = orthonormal_motions(condition.Psi_R.T @ condition.M_Psi_R, omega2_1)
     C = omega2_1 * Q.inner(condition.M_Psi_R @ S)
     E = condition.Psi_R @ S - in_memory(Q.combine(C))
@@ -219,21 +221,21 @@ def diagonal_within(G: Array, Z: Array) -> Array:
 
 
 def rounding_of_energy(body: FEBody, u: Array) -> Array:
-    """Size of the rounding in the strain energy of each column: eps times the sum of |K_kk| u_k², (k,)."""
+    """Return the rounding error of the strain energy of each column: eps times the sum of |K_kk| u_k², (k,)."""
     return np.finfo(float).eps * squares(np.abs(body.K.diagonal()), u)
 
 
 def elastic_eigenvectors(G_K: Array, G_M: Array, omega2_1: float) -> tuple[Array, Array]:
-    """Solve K z = omega² M z for a pencil without common null space: one without rigid-body motion.
+    """Solve K z = omega² M z for a pencil without common null space, that is without rigid-body motion.
 
-    (1) basis in which W = K + omega_1² M is the identity, coordinates first scaled to a unit diagonal of W
-    (2) an eigenvalue mu of M there gives omega² = (1 - omega_1² mu) / mu
-    (3) once more in nearly diagonal form: relative accuracy also for the stiff end of the spectrum
+    (1) transform to a basis in which W = K + omega_1² M is the identity, after scaling W to a unit diagonal
+    (2) an eigenvalue mu of M in this basis gives omega² = (1 - omega_1² mu) / mu
+    (3) solve again in nearly diagonal form, for relative accuracy at the stiff end of the spectrum
 
     Returns
     -------
     Z
-        Coefficients by ascending omega², M-normalised (W-normalised where there is no mass), (k, k).
+        Coefficients by ascending omega², M-normalised (W-normalised if there is no mass), (k, k).
     is_massive
         (k,) bool.
 
@@ -264,15 +266,15 @@ def elastic_eigenvectors(G_K: Array, G_M: Array, omega2_1: float) -> tuple[Array
 
 
 def free_elastic(Q: Basis, elastic: Array, condition: FrameCondition, omega2_1: float) -> Array:
-    """Squared elastic frequencies of the reduced body without joints, ascending [1/s²]: its pencil in mean axes.
+    """Return squared elastic frequencies of the unsupported reduced body, ascending [1/s²], from its mean-axis pencil.
 
-    The mean-axis mass QᵀMQ - Yᵀ (Psi_RᵀMPsi_R)⁻¹ Y, Y = Psi_RᵀMQ, from Gram matrices alone.
+    The mean-axis mass QᵀMQ - Yᵀ (Psi_RᵀMPsi_R)⁻¹ Y with Y = Psi_RᵀMQ follows from Gram matrices alone.
     """
     Y = Q.inner(condition.M_Psi_R).T
     rigid_mass = condition.Psi_R.T @ condition.M_Psi_R
     scale = np.sqrt(np.diag(rigid_mass))
     if len(scale) and (not scale.all() or np.linalg.cond(rigid_mass / np.outer(scale, scale)) > 1e12):
-        return np.zeros(0)  # a body without inertia about some axis has no mean axes
+        return np.zeros(0)  # without inertia about some axis, a body has no mean axes
     G_M = Q.G_M - Y.T @ np.linalg.solve(rigid_mass, Y)
     A_K = within(Q.G_K, elastic)
     Z, is_massive = elastic_eigenvectors(A_K, within(G_M, elastic), omega2_1)

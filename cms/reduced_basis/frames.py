@@ -1,7 +1,7 @@
-"""Body reference frames: the condition that tells elastic displacement from rigid-body motion (docs/theory.md §4).
+"""Body reference frames: the condition that separates elastic displacement from rigid-body motion (docs/theory.md §4).
 
-A frame is a condition Wᵀ u = 0 of six rows. Columns v become v - Psi_R (Wᵀ Psi_R)⁻¹ Wᵀ v: the same deformation, seen
-from the frame. K is blind to it, M is not.
+A frame is a condition Wᵀ u = 0 with six rows. It changes columns v to v - Psi_R (Wᵀ Psi_R)⁻¹ Wᵀ v, the same deformation
+relative to the frame. K does not depend on the frame, M does.
 """
 
 from collections.abc import Callable
@@ -27,29 +27,29 @@ __all__ = [
     "determinate_rows", "frame_condition",
 ]  # fmt: skip
 
-RANK_TOLERANCE = 1e-8  #: least pivot of the held dofs: a lever arm over the width of the nodes
+RANK_TOLERANCE = 1e-8  #: smallest pivot of the held dofs: a lever arm divided by the extent of the nodes
 Axes = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 
 
 @dataclass(frozen=True)
 class NodalFrame:
-    """The frame is attached to six dofs that do not deform: those of an interface, given ones, or chosen.
+    """Frame attached to six dofs that do not deform: those of an interface, given ones, or automatically chosen.
 
-    Its origin is the reference point of the interface (the centre of mass where none is named), axes as the mesh. Of
-    an interface of kind "nodes" six determinate dofs are held, chosen by pivoted QR.
+    Its origin is the reference point of the interface (or the centre of mass if none is named); its axes are the mesh
+    axes. Of an interface of kind "nodes" six determinate dofs are held, chosen by pivoted QR.
     """
 
-    at: str | None = None  #: name of the interface; None: given dofs, or six of all boundary dofs
+    at: str | None = None  #: name of the interface; None: given dofs, or six chosen from all boundary dofs
     origin: tuple[float, float, float] | None = None  #: in mesh coordinates [m], instead of the default
     axes: Axes | None = None  #: x, y and z axis of the frame in mesh axes, orthonormal; None: the mesh axes
-    #: six that are statically determinate, each (node, component): a node counted from 0 and a component 0 to 5, or its
-    #: number in the user's mesh (or "INSTANCE.number") and a component by name, "ux" to "rz"
+    #: six statically determinate dofs, each (node, component): the node as an index from 0 with a component 0 to 5, or
+    #: as a number in the user's mesh (or "INSTANCE.number") with a component name "ux" to "rz"
     dofs: tuple[tuple[int | str, int | str], ...] | None = None
 
 
 @dataclass(frozen=True)
 class TisserandFrame:
-    """Mean-axis frame: Psi_Rᵀ M u = 0, least relative kinetic energy; origin at the undeformed centre of mass [1]_.
+    """Mean-axis frame: Psi_Rᵀ M u = 0, smallest relative kinetic energy; origin at the undeformed centre of mass [1]_.
 
     References
     ----------
@@ -62,9 +62,9 @@ class TisserandFrame:
 
 @dataclass(frozen=True)
 class BuckensFrame:
-    """Frame of least deformation: Psi_Rᵀ W u = 0, Σ w |u|² over the nodes is least; origin at their weighted centre.
+    """Frame of least deformation: Psi_Rᵀ W u = 0 minimises Σ w |u|² over the nodes; origin at their weighted centre.
 
-    w is the volume of each node (`FEBody.node_volumes`), or 1 where that is unknown; translations only.
+    w is the volume of each node (`FEBody.node_volumes`), or 1 if it is unknown; only translations count.
     """
 
     origin: tuple[float, float, float] | None = None  #: in mesh coordinates [m], instead of the default
@@ -73,7 +73,7 @@ class BuckensFrame:
 
 @dataclass(frozen=True)
 class HeldFrame:
-    """The frame of a body that is held to the ground: the mesh axes, which no elastic displacement turns or shifts."""
+    """Frame of a body that is held to the ground: the mesh axes, which elastic displacement does not move."""
 
     origin: tuple[float, float, float] | None = None  #: in mesh coordinates [m], instead of the mesh origin
     axes: Axes | None = None  #: x, y and z axis of the frame in mesh axes, orthonormal; None: the mesh axes
@@ -85,18 +85,18 @@ FRAMES: dict[str, type[Frame]] = {"nodal": NodalFrame, "tisserand": TisserandFra
 
 @dataclass(frozen=True, eq=False)
 class FrameCondition:
-    """A frame made ready for one body."""
+    """A frame condition evaluated for one body."""
 
     frame: BodyFrame
-    rigid_part: Callable[[Array], Array]  #: columns (n_dof, k) -> C (6, k): what to take off as Psi_R C
-    Psi_R: Array  #: rigid-body modes about the centre of mass, (n_dof, 6); of a held body (n_dof, 0)
-    M_Psi_R: Array  #: M times them, as wide
-    W: Array  #: W Psi_R, whose rows the condition is: Psi_Rᵀ W u = 0, (n_dof, 6)
-    center: Array  #: the centre of mass, which Psi_R is about, mesh axes, (3,) [m]
+    rigid_part: Callable[[Array], Array]  #: maps columns (n_dof, k) to C (6, k); the frame removes Psi_R C
+    Psi_R: Array  #: rigid-body modes about the centre of mass, (n_dof, 6); (n_dof, 0) for a held body
+    M_Psi_R: Array  #: M times Psi_R, of the same shape
+    W: Array  #: W Psi_R, which defines the condition (W Psi_R)ᵀ u = 0, (n_dof, 6)
+    center: Array  #: centre of mass, reference point of Psi_R, mesh axes, (3,) [m]
 
 
 def frame_condition(body: FEBody, frame: Frame | HeldFrame) -> FrameCondition:
-    """Make the frame ready for a body: the dofs or the mass matrix it rests on, its origin.
+    """Evaluate a frame for a body: its held dofs or mass matrix, and its origin.
 
     Raises
     ------
@@ -159,7 +159,7 @@ def frame_condition(body: FEBody, frame: Frame | HeldFrame) -> FrameCondition:
 
 
 def placed(kind: str, frame: Frame | HeldFrame, default_origin: Array, held: IntArray | None = None) -> BodyFrame:
-    """Return the body frame with its origin and axes, as asked for or the default ones."""
+    """Return the body frame with the requested or default origin and axes."""
     origin = default_origin if frame.origin is None else np.asarray(frame.origin, dtype=float)
     axes = np.eye(3) if frame.axes is None else np.array(frame.axes, dtype=float).T
     if axes.shape != (3, 3) or not np.abs(axes.T @ axes - np.eye(3)).max() < 1e-8 or np.linalg.det(axes) < 0:
@@ -169,7 +169,7 @@ def placed(kind: str, frame: Frame | HeldFrame, default_origin: Array, held: Int
 
 
 def nodal_rows(body: FEBody, frame: NodalFrame) -> tuple[IntArray, sp.csr_array]:
-    """Return the held dofs of a nodal frame, (node, component), (6, 2), and the rows S of u_held = S u, (6, n_dof)."""
+    """Return the held dofs of a nodal frame, (node, component), (6, 2), and the rows S in u_held = S u, (6, n_dof)."""
     if frame.dofs is not None:
         return given_rows(body, frame)
     candidates = body.b if frame.at is None else body.interface(frame.at).dofs
@@ -184,7 +184,7 @@ def nodal_rows(body: FEBody, frame: NodalFrame) -> tuple[IntArray, sp.csr_array]
 
 
 def given_rows(body: FEBody, frame: NodalFrame) -> tuple[IntArray, sp.csr_array]:
-    """Return the dofs that the user gave, after checking that there are six and that they hold the body."""
+    """Return the dofs given by the user, after a check that they are six and hold the body."""
     where = f"body {body.name!r}: nodal frame"
     held = checked_dofs(frame, where, body.numbering)
     rows = []
@@ -204,14 +204,14 @@ def given_rows(body: FEBody, frame: NodalFrame) -> tuple[IntArray, sp.csr_array]
 
 
 def checked_dofs(frame: NodalFrame, where: str, numbering: Numbering, index: IntArray | None = None) -> IntArray:
-    """Return the given dofs of a nodal frame, (6, 2) of (node counted from 0, component), after checking their form.
+    """Return the given dofs of a nodal frame as (node index, component), (6, 2), after a check of their form.
 
     Parameters
     ----------
     numbering
-        Says what the user's numbers are.
+        Numbering that translates the user's numbers.
     index
-        Node counted from 0 of each row of the numbering; None: the row itself.
+        Node index of each row of the numbering; None: the row itself.
     """
     if frame.at is not None:
         raise BodyError(f"{where}: expected either at (an interface) or dofs, got both")
@@ -236,17 +236,17 @@ def checked_dofs(frame: NodalFrame, where: str, numbering: Numbering, index: Int
 def determinate_rows(points: Array, components: IntArray, where: str) -> IntArray:
     """Choose six of the dofs (point, component) that just prevent rigid-body motion, ascending, (6,).
 
-    Pivoted QR of the rigid-body motions of the dofs about their middle, rotations scaled by their radius. Translations
-    alone where these suffice.
+    Pivoted QR of the rigid-body motions of the dofs about their mean, with rotations scaled by their radius. Only
+    translations are used if they suffice.
 
     Raises
     ------
     BodyError
-        If they leave a rigid-body motion free.
+        If the dofs leave a rigid-body motion free.
     """
     arms = points - points.mean(axis=0)
     radius = float(np.sqrt((arms**2).sum(axis=1).mean())) or 1.0
-    arms = np.round(arms / radius, 9)  # so that rounding does not choose among dofs that are as good as each other
+    arms = np.round(arms / radius, 9)  # rounded, so that rounding errors do not decide between equally good dofs
     motion = np.zeros((len(points), 6))
     is_rotation = components >= 3
     axis = np.eye(3)[components % 3]

@@ -1,12 +1,12 @@
-"""Independent columns of a mode set in the norm of W = K + omega_1² M, and the redundant ones (docs/theory.md §3).
+"""Independent columns of a mode set in the norm W = K + omega_1² M, and the redundant columns (docs/theory.md §3).
 
-A Gram matrix squares the condition of the columns, so a column whose pivot is small in its Gram matrix is not judged
-there: its remainder is formed, measured, and judged itself. This is a pivoted QR in blocks.
+A Gram matrix squares the condition number of the columns. A column with a small pivot in its Gram matrix is therefore
+not judged there: its remainder is formed, measured, and judged separately. This is a pivoted QR in blocks.
 
-The columns of a body with many interfaces are the largest array there is. They are read where they lie: Gram matrices
-are formed from a few products K v and M v at a time, one half of each (`Products`), and a basis is kept as columns
-times a small matrix (`Basis`) until the shapes themselves are wanted. Rows of columns may lie on many ranks
-(`SpreadColumns`); what is done with tall columns here is done there.
+The columns of a body with many interfaces are the largest array of all, so they are not copied. Gram matrices are
+formed from a few products K v and M v at a time, one half of each (`Products`). A basis is stored as columns times a
+small matrix (`Basis`) until the shapes are needed. Columns may be distributed (`SpreadColumns`); operations on them are
+then distributed too.
 """
 
 from dataclasses import dataclass
@@ -27,15 +27,15 @@ __all__ = [
 ]  # fmt: skip
 
 RANK_TOLERANCE = 1e-10  #: remainder of a unit column below which it is redundant (docs/theory.md §3)
-ROUNDING_MARGIN = 30.0  #: times the rounding noise of a column in the W-norm, where that is more
-TRUSTED_PIVOT = 1e-4  #: remainder above which a pivoted Cholesky of the Gram matrix decides by itself
-TRUSTED_CONDITION = 1e4  #: of the Gram matrix of unit columns, below which one Cholesky step of it is enough
-PRODUCT_BYTES = 128e6  #: of the products with K or M that are held at once
+ROUNDING_MARGIN = 30.0  #: factor on the rounding error of a column in the W-norm, if this exceeds the tolerance
+TRUSTED_PIVOT = 1e-4  #: remainder above which a pivoted Cholesky of the Gram matrix is trusted
+TRUSTED_CONDITION = 1e4  #: condition number of the Gram matrix of unit columns, below which one Cholesky step suffices
+PRODUCT_BYTES = 128e6  #: memory for products with K or M
 
 
 @dataclass(eq=False)
 class Columns:
-    """Displacement columns with their products and their origin; blocks of one tall, thin matrix each."""
+    """Displacement columns with their products and their origin; each block is a tall, thin matrix."""
 
     X: Array  #: (n_dof, k)
     KX: Array  #: (n_dof, k)
@@ -49,7 +49,7 @@ class Columns:
         return Columns(self.X[:, index], self.KX[:, index], self.MX[:, index], self.T[:, index])
 
     def beside(self, other: "Columns") -> "Columns":
-        """Return both, side by side."""
+        """Return both blocks side by side."""
         return Columns(*(beside(getattr(self, a), getattr(other, a)) for a in ("X", "KX", "MX", "T")))
 
     def inner(self, other: "Columns", omega2: float) -> Array:
@@ -58,7 +58,7 @@ class Columns:
 
 
 def gram(X: Array, AX: Array) -> Array:
-    """Return Xᵀ A X of a symmetric A, with the rounding of its two halves averaged."""
+    """Return Xᵀ A X for symmetric A, averaging the rounding errors of its two halves."""
     G = inner(X, AX)
     return (G + G.T) / 2
 
@@ -72,7 +72,7 @@ class Products:
 
     @classmethod
     def of_body(cls, body: FEBody) -> "Products":
-        """Return those with the matrices of a body."""
+        """Return the products with the matrices of a body."""
         return cls(SymmetricProduct(body.K), SymmetricProduct(body.M))
 
     def grams(self, X: Array) -> tuple[Array, Array]:
@@ -85,7 +85,7 @@ class Products:
 
 
 def gram_in_blocks(X: Array, A: SymmetricProduct) -> Array:
-    """Return Xᵀ A X, (k, k), of a symmetric A: one half of it, of blocks of A X that are not held together."""
+    """Return Xᵀ A X, (k, k), for symmetric A: one half of it, from blocks of A X that are not all held."""
     n, k = X.shape
     width = max(16, int(PRODUCT_BYTES / (8 * max(n, 1))))
     G = np.zeros((k, k))
@@ -100,14 +100,14 @@ def gram_in_blocks(X: Array, A: SymmetricProduct) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Basis:
-    """W-orthonormal columns Q = X Z of the span of a mode set."""
+    """W-orthonormal columns Q = X Z that span a mode set."""
 
     X: Array  #: (n_dof, l)
     Z: Array  #: (l, k)
     T: Array  #: coefficients of Q over the columns of the mode set, (n_columns, k)
     G_K: Array  #: Qᵀ K Q, (k, k)
     G_M: Array  #: Qᵀ M Q, (k, k)
-    is_formed: bool = True  #: False: X are the columns of the set themselves, which belong to others
+    is_formed: bool = True  #: False: X are the columns of the mode set themselves, which must not be changed
 
     def inner(self, F: Array) -> Array:
         """Return Qᵀ F, (k, n)."""
@@ -124,7 +124,7 @@ class Basis:
         return Q
 
     def with_columns(self, new: Columns) -> "Basis":
-        """Return the basis with W-orthonormal columns beside it that are W-orthogonal to it."""
+        """Return the basis extended by W-orthonormal columns that are W-orthogonal to it."""
         sides = []
         for G, product in ((self.G_K, new.KX), (self.G_M, new.MX)):
             across, own = self.inner(product), inner(new.X, product)
@@ -137,21 +137,21 @@ class Basis:
 
 
 def independent_columns(V: Array, body: FEBody, omega2: float) -> tuple[Columns, IntArray]:
-    """W-orthonormal columns of the same span with their products, and the indices of the redundant columns.
+    """Return W-orthonormal columns of the same span with their products, and the indices of redundant columns.
 
     Parameters
     ----------
     V
         The columns of a mode set, (n_dof, n_columns).
     omega2
-        omega_1² of W = K + omega_1² M [1/s²].
+        omega_1² in W = K + omega_1² M [1/s²].
 
     Returns
     -------
     basis
-        W-orthonormal columns, T says how they are made; none where all columns are zero or rounding.
+        W-orthonormal columns; T expresses them in V. There are none if all columns are zero or rounding.
     redundant
-        Indices of columns whose remainder against the others is below the tolerance, ascending.
+        Indices of columns with a remainder below the tolerance, ascending.
     """
     products = Products.of_body(body)
     basis, redundant = independent_basis(V, *products.grams(V), products, body, omega2)
@@ -161,12 +161,12 @@ def independent_columns(V: Array, body: FEBody, omega2: float) -> tuple[Columns,
 def independent_basis(
     V: Array, G_K: Array, G_M: Array, products: Products, body: FEBody, omega2: float
 ) -> tuple[Basis, IntArray]:
-    """W-orthonormal basis of the span of columns, W = K + omega_1² M, and the indices of the redundant columns.
+    """Return a W-orthonormal basis of the span of columns, W = K + omega_1² M, and the indices of redundant columns.
 
-    (1) pivoted Cholesky of the Gram matrix of unit columns: those whose remainder it can judge are taken
-    (2) where nothing is left and the Gram matrix is well conditioned, its factor is the basis: Q = V Z
-    (3) else Q is formed, and made W-orthonormal once more by its own Gram matrices
-    (4) of the columns that are left the remainder against Q is formed, measured and judged itself, and so on
+    (1) pivoted Cholesky of the Gram matrix of unit columns selects the columns that it can judge
+    (2) if no column is left and the Gram matrix is well conditioned, its factor gives the basis: Q = V Z
+    (3) otherwise Q is formed, and made W-orthonormal once more by its own Gram matrices
+    (4) for the remaining columns the remainder against Q is formed, measured and judged, and so on
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def independent_basis(
     size = length[index]
     noise = _rounding_noise(V, body, omega2)[index]
     tolerance = np.maximum(RANK_TOLERANCE, ROUNDING_MARGIN * noise / size)
-    # tall arrays stay as they are: lengths and the order of pivots go into the small matrices
+    # tall arrays are not changed: lengths and pivot order go into the small matrices
     W = (G_K + omega2 * G_M)[np.ix_(index, index)] / np.outer(size, size)
     taken, left, factor = _pivoted(W)  # (1)
     Z = np.zeros((V.shape[1], len(taken)))
@@ -201,7 +201,8 @@ def independent_basis(
         for _ in range(2):  # twice is enough
             C = basis.inner(rest.KX + omega2 * rest.MX)
             T = rest.T - basis.T @ C
-            rest = products.beside(rest.X - basis.combine(C))  # fresh: the difference lost their leading digits
+            # computed anew, because the difference lost its leading digits
+            rest = products.beside(rest.X - basis.combine(C))
             rest.T = T
         size = _length(rest, omega2)
         remainder = remainder * size
@@ -222,33 +223,33 @@ def independent_basis(
 
 
 def _no_columns(V: Array) -> Basis:
-    """Return the basis of columns that are zero or rounding."""
+    """Return an empty basis, for columns that are zero or rounding."""
     none = np.zeros((0, 0))
     return Basis(V, np.zeros((V.shape[1], 0)), np.zeros((V.shape[1], 0)), none, none, is_formed=False)
 
 
 def _pivoted(W: Array) -> tuple[IntArray, IntArray, Array]:
-    """Return the columns that a pivoted Cholesky of a Gram matrix takes, those it leaves, and the inverse factor."""
+    """Return the columns that a pivoted Cholesky of a Gram matrix selects, the others, and the inverse factor."""
     factor, pivots, rank, _ = dpstrf((W + W.T) / 2, tol=TRUSTED_PIVOT**2, lower=0)
     U = np.triu(factor[:rank, :rank])
     return pivots[:rank] - 1, pivots[rank:] - 1, la.solve_triangular(U, np.eye(rank))
 
 
 def orthonormal_basis(Q: Array, T: Array, products: Products, omega2: float) -> Basis:
-    """Return columns that are nearly W-orthonormal as a basis that is so to rounding."""
+    """Make nearly W-orthonormal columns W-orthonormal to rounding, and return them as a basis."""
     G_K, G_M = products.grams(Q)
     Z = la.solve_triangular(la.cholesky(G_K + omega2 * G_M), np.eye(len(G_K)))
     return Basis(Q, Z, T @ Z, within(G_K, Z), within(G_M, Z))
 
 
 def within(G: Array, Z: Array) -> Array:
-    """Return a Gram matrix over other columns, Zᵀ G Z, symmetric."""
+    """Transform a Gram matrix to other columns: Zᵀ G Z, symmetric."""
     H = Z.T @ G @ Z
     return np.asarray((H + H.T) / 2)
 
 
 def _length(columns: Columns, omega2: float) -> Array:
-    """W-length of every column, (k,)."""
+    """Return the W-length of every column, (k,)."""
     stiff = dots(columns.X, columns.KX)
     return np.sqrt(np.maximum(stiff + omega2 * dots(columns.X, columns.MX), 0.0))
 
@@ -258,7 +259,7 @@ def _unit(columns: Columns, size: Array) -> Columns:
 
 
 def _orthonormalized(products: Products, new: Columns, omega2: float) -> Columns:
-    """Return the columns made W-orthonormal once more, with fresh products: the first step lost digits."""
+    """Make the columns W-orthonormal once more, with recomputed products, because the first step lost digits."""
     fresh = products.beside(new.X)
     fresh.T = new.T
     G = fresh.inner(fresh, omega2)
@@ -266,6 +267,6 @@ def _orthonormalized(products: Products, new: Columns, omega2: float) -> Columns
 
 
 def _rounding_noise(X: Array, body: FEBody, omega2: float) -> Array:
-    """W-length of independent rounding errors eps |x_k| in every column, (k,)."""
+    """Return the W-length of independent rounding errors eps |x_k| in every column, (k,)."""
     diagonal = np.abs(body.K.diagonal()) + omega2 * body.M.diagonal()
     return np.finfo(float).eps * np.sqrt(squares(diagonal, X))

@@ -1,4 +1,4 @@
-"""Rotations of the nodes that a body is asked to keep, over the shapes."""
+"""Rotations of the kept nodes, over the shapes."""
 
 import numpy as np
 
@@ -13,20 +13,21 @@ __all__ = ["kept_points"]
 def kept_points(body: FEBody, Phi: Array, axes: Array, row_of: IntArray) -> KeptPoints | None:
     """Return the points that a body keeps with rotations; None if there are none.
 
-    (1) where all three rotations of the node are dofs of the model (beams, shells, leaders of rigid groups): these
-    (2) else where elements know it: half the curl of the displacement (`fe_models.solids.rotation`)
-    (3) else the rotations that are dofs, the others zero: a model in a plane; a node without any has an unknown one
+    (1) if all three rotations of the node are dofs (beams, shells, leaders of rigid groups): these dofs
+    (2) else, if the elements know the rotation: half the curl of the displacement (`fe_models.solids.rotation`)
+    (3) else the rotations that are dofs, and zero for the others, as in a plane model; without any, the rotation is
+        unknown
 
     Parameters
     ----------
     body
-        Coupled.
+        Coupled body.
     Phi
-        Columns over its dofs, (n_dof, n_q).
+        Shapes over its dofs, (n_dof, n_q).
     axes
-        Columns: axes of B in mesh axes, (3, 3).
+        Axes of B as columns, in mesh axes, (3, 3).
     row_of
-        Row among the kept nodes of every node, (n_nodes,).
+        Row of every node among the kept nodes, (n_nodes,).
     """
     nodes = body.kept
     if not len(nodes):
@@ -46,9 +47,9 @@ def kept_points(body: FEBody, Phi: Array, axes: Array, row_of: IntArray) -> Kept
 
 
 def rotations_of_dofs(body: FEBody, Phi: Array, u: Array, nodes: IntArray) -> tuple[Array, np.ndarray]:
-    """Return rotations that are dofs, (n, 3, n_q), zero where they are none, and which are, (n, 3) bool.
+    """Return rotations that are dofs, (n, 3, n_q), zero for others, and which are dofs, (n, 3) bool.
 
-    A row of the recovery without entries is no motion: a rotation that nothing holds was taken out of the model.
+    A recovery row without entries gives no motion: that rotation had no stiffness and was removed from the model.
     """
     place = np.full(len(body.nodes), -1)
     place[nodes] = np.arange(len(nodes))

@@ -1,7 +1,7 @@
-"""Canonical moments of a body that came as bare matrices, by acceleration fields (docs/theory.md §5).
+"""Canonical moments of a body made of bare matrices, from acceleration fields (docs/theory.md §5).
 
-A linear field u = E c has the nodal values (E c, rotation ½ curl). With nodal inertia the rotation rows ½ … below make
-the products exact where that inertia is isotropic; elsewhere the result is labelled approximate.
+A linear field u = E c has the nodal values (E c, rotation ½ curl). With nodal inertia, these rotations make the
+products below exact if the inertia is isotropic. Otherwise the result is labelled approximate.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ __all__ = ["gram_from_matrices"]
 
 
 def gram_from_matrices(body: FEBody, Phi: Array) -> Array:
-    """Gram matrix ∫ a aᵀ of a = [1, c, phi_x, phi_y, phi_z] from M and the positions of the nodes.
+    """Return the Gram matrix ∫ a aᵀ dm of a = [1, c, phi_x, phi_y, phi_z] from M and the node positions.
 
     (1) m, S, R from the rigid-body mass matrix: exact
     (2) 1C = Psi_tᵀ M Phi: exact
@@ -69,12 +69,12 @@ def gram_from_matrices(body: FEBody, Phi: Array) -> Array:
                 field[:, 3:] += u[:, 3:] / 2
             field[:, 3 + b] -= u[:, 3 + a] / 2
             gram[blocks[a], blocks[b]] = M_Phi.T @ _columns(body, field)
-    # ∫ phi_a,k phi_b,l is the transpose of ∫ phi_b,l phi_a,k; the two routes differ where M is not M_s ⊗ 1
+    # ∫ phi_a,k phi_b,l is the transpose of ∫ phi_b,l phi_a,k; both routes differ if M is not M_s ⊗ 1
     return (gram + gram.T) / 2
 
 
 def _nodal(body: FEBody, columns: Array) -> Array:
-    """Columns as a table (n_nodes, 6, k)."""
+    """Return columns as a table (n_nodes, 6, k)."""
     table = np.zeros((len(body.nodes), 6, columns.shape[1]))
     node, component = body.dofs.T
     has_place = component >= 0
@@ -83,7 +83,7 @@ def _nodal(body: FEBody, columns: Array) -> Array:
 
 
 def _columns(body: FEBody, table: Array) -> Array:
-    """Table (n_nodes, 6, k) as columns over the dofs."""
+    """Return a table (n_nodes, 6, k) as columns over the dofs."""
     node, component = body.dofs.T
     columns = table[node, component]
     columns[component < 0] = 0.0

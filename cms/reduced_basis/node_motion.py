@@ -1,4 +1,4 @@
-"""Motion of nodes and of interfaces, wherever their dofs are: in the body, or in the mesh behind it."""
+"""Motion of nodes and interfaces, whether their dofs are in the body or only in its mesh."""
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,7 +13,7 @@ __all__ = ["are_spread", "interface_node_motion", "is_mean", "node_motion", "ref
 
 
 def node_motion(body: FEBody, node: int) -> sp.csr_array | None:
-    """Return translation and rotation of a node with u, (6, n_dof); None where it has not all six."""
+    """Return translation and rotation of a node as rows over u, (6, n_dof); None if it lacks some of the six."""
     rows = np.flatnonzero((body.dofs[:, 0] == node) & (body.dofs[:, 1] >= 0))
     if len(rows) == 6:
         return sp.csr_array((np.ones(6), (body.dofs[rows, 1], rows)), shape=(6, body.n_dof))
@@ -25,9 +25,9 @@ def node_motion(body: FEBody, node: int) -> sp.csr_array | None:
 
 
 def interface_node_motion(body: FEBody, interface: Interface) -> sp.csr_array | None:
-    """Return the motion of the reference point as a member with six components moves it rigidly, (6, n_dof).
+    """Return the motion of the reference point that a member with six components moves rigidly, (6, n_dof).
 
-    For a rigid interface, or one of a single node; None where no such node is there.
+    This is for a rigid interface or one with a single node; None if there is no such node.
     """
     if interface.kind == "distributing" or (interface.kind == "nodes" and len(interface.nodes) > 1):
         return None
@@ -40,19 +40,19 @@ def interface_node_motion(body: FEBody, interface: Interface) -> sp.csr_array | 
 
 
 def reference_motion(body: FEBody, interface: Interface) -> tuple[sp.csr_array, Array, bool]:
-    """Return how the reference point of an interface moves with the dofs of the body.
+    """Return the motion of the reference point of an interface as rows over the dofs of the body.
 
-    That of its reference node; of a member with six components that carries it rigidly; else the weighted mean motion
-    of the members, or their mean translation where these lie on one line.
+    It is the motion of the reference node, or of a member with six components that moves it rigidly, or else the
+    weighted mean motion of the members. If the members are collinear, it is their mean translation.
 
     Returns
     -------
     motion
         Translation and rotation of the point, mesh axes, (6, n_dof).
     point
-        Where it is, (3,) [m].
+        Position of the point, (3,) [m].
     has_rotation
-        Whether it has a rotation; rows 3-5 are zero without.
+        Whether the motion includes a rotation; otherwise rows 3-5 are zero.
     """
     dofs = interface.dofs
     if dofs is None:
@@ -70,18 +70,18 @@ def reference_motion(body: FEBody, interface: Interface) -> tuple[sp.csr_array, 
 
 
 def is_mean(body: FEBody, interface: Interface) -> bool:
-    """Return whether the reference point is no node of the body and follows several members."""
+    """Return whether the reference point is not a node of the body and follows several members."""
     return not has_reference_node(body, interface) and interface_node_motion(body, interface) is None
 
 
 def has_reference_node(body: FEBody, interface: Interface) -> bool:
-    """Return whether the six boundary dofs of the interface are those of one node."""
+    """Return whether the six boundary dofs of the interface belong to one node."""
     dofs = np.asarray(interface.dofs)
     return len(dofs) == 6 and len(np.unique(body.dofs[dofs, 0])) == 1
 
 
 def translation_rows(body: FEBody, nodes: IntArray) -> sp.csr_array:
-    """Return the translations of nodes, node-major, from the dofs of the body, (3 n, n_dof); zero without dofs."""
+    """Return the translations of nodes, node-major, as rows over the dofs, (3 n, n_dof); zero without dofs."""
     n = len(nodes)
     place = np.full(len(body.nodes), -1, np.int64)
     place[nodes] = np.arange(n)
@@ -89,7 +89,8 @@ def translation_rows(body: FEBody, nodes: IntArray) -> sp.csr_array:
     sources = [(body.dofs, None)] if body.recovery is None else [(body.recovery.dofs, body.recovery.matrix)]
     if body.recovery is not None:
         of_mesh = np.isin(body.dofs[:, 0], body.recovery.dofs[:, 0])
-        sources.append((np.where(of_mesh[:, None], -1, body.dofs), None))  # reference nodes, which the mesh lacks
+        # reference nodes, which the mesh does not have
+        sources.append((np.where(of_mesh[:, None], -1, body.dofs), None))
     for dofs, matrix in sources:
         chosen = np.flatnonzero((dofs[:, 1] >= 0) & (dofs[:, 1] < 3) & (place[dofs[:, 0]] >= 0))
         target = 3 * place[dofs[chosen, 0]] + dofs[chosen, 1]
@@ -105,12 +106,12 @@ def translation_rows(body: FEBody, nodes: IntArray) -> sp.csr_array:
 
 
 def are_spread(points: Array) -> bool:
-    """Return whether points span at least a piece of a plane, so that their mean motion has a rotation."""
+    """Return whether the points are not collinear, so that their mean motion has a rotation."""
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     return bool(len(points) >= 3 and spread[1] > 1e-6 * spread[0])
 
 
 def mean_translation(weights: Array) -> Array:
-    """Weighted mean translation of points, no rotation, (6, 3 n_points), columns node-major."""
+    """Return the matrix of the weighted mean translation of points, without rotation, (6, 3 n_points), node-major."""
     translation = np.kron(weights, np.eye(3))
     return np.vstack([translation, np.zeros_like(translation)])

@@ -1,4 +1,4 @@
-"""Sums over the nodes of a body, weighted by the volume each stands for: the norm of a Buckens frame (theory.md §4)."""
+"""Sums over the nodes of a body, weighted with nodal volume: the norm of a Buckens frame (theory.md §4)."""
 
 import numpy as np
 
@@ -11,9 +11,9 @@ __all__ = ["node_weights", "weighted_rigid_modes"]
 
 
 def node_weights(body: FEBody) -> Array:
-    """Return the weight of each node, (n_nodes,): its volume, or 1; 0 where it lacks a translation of its own.
+    """Return the weight of each node, (n_nodes,): its volume, or 1; 0 if it lacks a translation of its own.
 
-    Reference nodes of couplings have none: they stand for no material.
+    Reference nodes of couplings have weight 0, because they represent no material.
     """
     dofs = mesh_dofs(body)
     has = np.zeros((len(body.nodes), 3), dtype=bool)
@@ -24,17 +24,17 @@ def node_weights(body: FEBody) -> Array:
 
 
 def mesh_dofs(body: FEBody) -> IntArray:
-    """Return (node, component) of the dofs of the mesh, (n_mesh_dof, 2)."""
+    """Return (node, component) of the mesh dofs, (n_mesh_dof, 2)."""
     return body.dofs if body.recovery is None else body.recovery.dofs
 
 
 def weighted_rigid_modes(body: FEBody, origin: Array) -> Array:
-    """Return W Psi_R over the dofs of the body, (n_dof, 6): its product with columns gives their weighted sums.
+    """Return W Psi_R over the dofs of the body, (n_dof, 6); its product with columns gives their weighted sums.
 
     Raises
     ------
     BodyError
-        If no node has three translations, or all of those are on one line.
+        If no node has three translations, or all such nodes are collinear.
     """
     weights, dofs = node_weights(body), mesh_dofs(body)
     used = weights > 0

@@ -1,6 +1,6 @@
-"""Rigid-body motion in the span of columns, found by the rigid-body vectors themselves (docs/theory.md §3).
+"""Rigid-body motion in the span of columns, found from the rigid-body vectors themselves (docs/theory.md §3).
 
-No ratio of energies decides: the slowest elastic shape may be as slow as it likes beside the stiffest one.
+No ratio of energies decides, so the slowest elastic shape may be arbitrarily slow compared to the stiffest shape.
 """
 
 import numpy as np
@@ -10,21 +10,22 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["IN_SPAN", "elastic_directions", "orthonormal_motions"]
 
-IN_SPAN = 1e-6  #: squared W-length of what a span leaves of a unit rigid-body motion, below which it holds the motion
+#: squared W-length of the remainder of a unit rigid-body motion, below which the span contains the motion
+IN_SPAN = 1e-6
 NO_INERTIA = 1e-12  #: eigenvalue of the scaled rigid mass matrix, below which a rigid-body motion has no inertia
 
 
 def orthonormal_motions(rigid_mass: Array, omega2: float) -> Array:
     """Return S, (n_r, k), that makes rigid-body motions R S orthonormal in W = K + omega² M, where K R = 0.
 
-    Motions without inertia have no length there: k is less than n_r by their number.
+    Motions without inertia have zero W-length, so k is smaller than n_r by their number.
 
     Parameters
     ----------
     rigid_mass
         Rᵀ M R, (n_r, n_r).
     omega2
-        omega_1² of W [1/s²].
+        omega_1² in W [1/s²].
     """
     if not rigid_mass.size:
         return np.zeros((0, 0))
@@ -37,17 +38,17 @@ def orthonormal_motions(rigid_mass: Array, omega2: float) -> Array:
 
 
 def elastic_directions(C: Array, rest: Array) -> Array:
-    """Return an orthonormal basis of a span without the rigid-body motions it holds, (k, k - n_held).
+    """Return an orthonormal basis of a span without the rigid-body motions that it contains, (k, k - n_held).
 
-    (1) a motion R v of unit length is held if the span leaves nothing of it: |rest v|_W² < `IN_SPAN`
-    (2) what is orthogonal to the held ones, C v, remains
+    (1) a motion R v of unit length is contained if its remainder outside the span is small: |rest v|_W² < `IN_SPAN`
+    (2) the result is the orthogonal complement of the contained motions, C v
 
     Parameters
     ----------
     C
         Coefficients Qᵀ W R of W-orthonormal rigid-body motions R in a W-orthonormal basis Q of the span, (k, n_r).
     rest
-        Gram matrix of what is left of them, Eᵀ W E with E = R - Q C, formed from E itself, (n_r, n_r).
+        Gram matrix of the remainders, Eᵀ W E with E = R - Q C, computed from E itself, (n_r, n_r).
     """
     k = C.shape[0]
     if not C.size:

@@ -1,4 +1,4 @@
-"""Stress modes: the stress of each mode at kept nodes and at named points, in the axes of the body frame."""
+"""Stress modes: stress of each mode at kept nodes and at named points, in the axes of the body frame."""
 
 import numpy as np
 
@@ -10,11 +10,11 @@ from fe_models.foundation.tall.on_disk import in_memory, is_on_disk, release, ze
 
 __all__ = ["nodal_stress_modes", "point_stress_modes", "turned_stress"]
 
-FEWEST = 16  #: columns at a time, however large the body
-FEWEST_OF_RANKS = 4  #: the same of columns on many ranks, which are there because the body is large
-BYTES_AT_ONCE = 512e6  #: of stress, which is known at all nodes before it is cut to the kept ones
+FEWEST = 16  #: smallest number of columns processed at a time, for any body
+FEWEST_OF_RANKS = 4  #: the same for distributed columns, which belong to large bodies
+BYTES_AT_ONCE = 512e6  #: memory for the stress at all nodes, before the kept nodes are selected
 BYTES_FROM_DISK = (
-    64e6  #: the same where columns lie on disk or on many ranks: with the columns themselves it is five times as much
+    64e6  #: the same if columns lie on disk or are distributed; with the columns themselves it takes five times as much
 )
 
 
@@ -24,13 +24,13 @@ def nodal_stress_modes(body: FEBody, Phi: Array, nodes: IntArray, axes: Array) -
     Parameters
     ----------
     body
-        Coupled or not.
+        Body, coupled or not.
     Phi
         Shapes over its dofs, (n_dof, n_q).
     nodes
-        Indices into `FEBody.nodes`, (n,); reference nodes, which are not of the mesh, have no stress: zero.
+        Indices into `FEBody.nodes`, (n,). Reference nodes are not in the mesh; their stress is zero.
     axes
-        Columns: axes of B in mesh axes, (3, 3).
+        Axes of B as columns, in mesh axes, (3, 3).
     """
     model = body.element_model
     if model is None or not model.has_nodal_stress:
@@ -39,7 +39,8 @@ def nodal_stress_modes(body: FEBody, Phi: Array, nodes: IntArray, axes: Array) -
     is_elsewhere = is_on_disk(Phi) or isinstance(Phi, SpreadColumns)
     room = BYTES_FROM_DISK if is_elsewhere else BYTES_AT_ONCE
     fewest = FEWEST_OF_RANKS if isinstance(Phi, SpreadColumns) else FEWEST
-    width = max(fewest, int(room / (48 * len(body.nodes))))  # wide: the geometry is worked out once for all
+    # wide blocks, because the geometry is computed once per block
+    width = max(fewest, int(room / (48 * len(body.nodes))))
     for begin in range(0, Phi.shape[1], width):
         columns = slice(begin, begin + width)
         everywhere = model.nodal_stress(body.mesh_displacement(in_memory(Phi[:, columns])), nodes=nodes)
@@ -59,7 +60,7 @@ def point_stress_modes(body: FEBody, Phi: Array, origin: Array, axes: Array) -> 
 
 
 def turned_stress(stress: Array, axes: Array) -> Array:
-    """Return stress components in other axes: Rᵀ sigma R, (n, 6, k), R = axes with the new axes as columns."""
+    """Return stress components in other axes: Rᵀ sigma R, (n, 6, k), where R = axes has the new axes as columns."""
     if np.array_equal(axes, np.eye(3)):
         return np.asarray(stress)
     tensor = np.asarray(stress)[:, [[0, 5, 4], [5, 1, 3], [4, 3, 2]]]

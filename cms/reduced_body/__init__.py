@@ -1,1 +1,1 @@
-"""The reduced body, and what it holds: invariants, geometric stiffness, stress, labels."""
+"""The reduced body and its data: invariants, geometric stiffness, stress, labels."""

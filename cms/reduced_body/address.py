@@ -14,21 +14,21 @@ from fe_models.foundation.words import quoted
 __all__ = ["KINDS_OF_ADDRESS", "Address", "FoundNodes"]
 
 KINDS_OF_ADDRESS = ("node", "element", "set", "position")
-NEAREST = 3  #: nodes that a message names
+NEAREST = 3  #: how many nodes a message lists
 
 
 @dataclass(frozen=True, eq=False)
 class FoundNodes:
-    """The kept nodes that an address means."""
+    """The kept nodes that an address selects."""
 
-    asked: str  #: the address in words
-    rows: IntArray  #: rows of `ReducedBody.nodes`, (n,), n >= 1; of a node: itself, or the points of the skin it moves
-    distance: float  #: from the position asked for to the node; 0 where a number or name was given
-    names: tuple[str, ...]  #: what the user calls them, (n,)
-    place: Array  #: mean of their undeformed places in mesh axes, (3,) [m]
+    asked: str  #: text of the address
+    rows: IntArray  #: rows of `ReducedBody.nodes`, (n,), n >= 1; for a node: the node, or the skin points that it moves
+    distance: float  #: distance from the requested position to the node; 0 for a number or name
+    names: tuple[str, ...]  #: the user's names of the nodes, (n,)
+    place: Array  #: mean of the undeformed positions in mesh axes, (3,) [m]
 
     def words(self) -> str:
-        """Say which place is taken, and how far it is from the one asked for."""
+        """Describe the selected place, and its distance from the requested one."""
         x = ", ".join(f"{value:.6g}" for value in self.place)
         if len(self.rows) == 1 and self.asked == f"node {self.names[0]}":
             return f"{self.asked} at [{x}]"
@@ -41,19 +41,19 @@ class FoundNodes:
 
 @dataclass(frozen=True, eq=False)
 class Address:
-    """One place on a body: exactly one of node, element, set and position.
+    """One place on a body, given by exactly one of node, element, set and position.
 
     Raises
     ------
     BodyError
-        If there are none or several.
+        If none or several of them are given.
     """
 
-    node: int | str | None = None  #: the user's number; "INSTANCE.number" where instances have the same numbers
-    element: int | str | None = None  #: likewise: the kept nodes on the surface that it made
-    set: str | None = None  #: name of a set: those of its nodes, or of its elements', that are kept
-    position: Any = None  #: in mesh axes, (3,) [m]: the kept node there
-    tolerance: float = TOLERANCE  #: how far that node may be from the position, of the size of the body
+    node: int | str | None = None  #: the user's number; "INSTANCE.number" if several instances have it
+    element: int | str | None = None  #: likewise; selects the kept nodes of the element's surface
+    set: str | None = None  #: name of a set; selects its kept nodes, or the kept nodes of its elements
+    position: Any = None  #: in mesh axes, (3,) [m]; selects the nearest kept node
+    tolerance: float = TOLERANCE  #: largest distance of that node from the position, relative to the size of the body
 
     def __post_init__(self) -> None:
         if self.position is not None:
@@ -72,7 +72,7 @@ class Address:
 
     @property
     def kind(self) -> str:
-        """Which of them it is."""
+        """Name of the field that is given."""
         return next(kind for kind in KINDS_OF_ADDRESS if getattr(self, kind) is not None)
 
     def __str__(self) -> str:
@@ -82,25 +82,25 @@ class Address:
         return f"{self.kind} {quoted(value) if self.kind == 'set' else value}"
 
     def find(self, reduced: ReducedBody, where: str, *, of_stress: bool = False, body: str = "") -> FoundNodes:
-        """Return the kept nodes that are meant.
+        """Return the selected kept nodes.
 
         Parameters
         ----------
         reduced
             The body.
         where
-            Who asks, for messages: "sensor 'tip'".
+            Where the address is used, for messages: "sensor 'tip'".
         of_stress
-            Whether only points with stress count. Nodes of beams and shells have none, but the points of the skin that
-            they move: all of these are meant then.
+            Whether only points with stress count. Nodes of beams and shells have no stress, but the skin points that
+            they move have; all of these are then selected.
         body
-            What the body is called in messages; "": its own name.
+            Name of the body in messages; "": its own name.
 
         Raises
         ------
         BodyError
-            If there is no such node, element or set in the body, or no kept node stands at the position: with the
-            nearest ones, and how to keep what is missing.
+            If the body has no such node, element or set, or no kept node is at the position. The message lists the
+            nearest nodes, and says how to keep missing ones.
         """
         where = f"{where}: body {body or reduced.name!r}"
         distance = 0.0
@@ -150,14 +150,14 @@ class Address:
                 f"nearest: {'; '.join(near)}. Keep the node there (keep = [...] in the [body] of its job, keep= in "
                 "Python), name one of these, or allow a greater distance by tolerance"
             )
-        same = np.flatnonzero(away == away[order[0]])  # copies of a node: that with rotations before the others
+        same = np.flatnonzero(away == away[order[0]])  # of several copies of a node, prefer the one with rotations
         if reduced.kept is not None and len(same) > 1:
             same = np.concatenate([np.intersect1d(same, reduced.kept.nodes), same])
         return np.array([same[0]]), nearest
 
 
 def own_rows(reduced: ReducedBody, rows: IntArray) -> IntArray:
-    """Return the node itself, with rotations where a copy has them; where only its skin is kept, that."""
+    """Return the node itself, as the copy with rotations if there is one; if only its skin is kept, the skin points."""
     flags = reduced.numbering.on_skin
     own = rows[flags[rows] == 0] if flags.size else rows
     if not len(own):
@@ -167,7 +167,7 @@ def own_rows(reduced: ReducedBody, rows: IntArray) -> IntArray:
 
 
 def has_stress(reduced: ReducedBody) -> np.ndarray:
-    """Return which kept nodes have stress of any mode, (n_kept,) bool; all where there is no mode at all."""
+    """Return which kept nodes have stress in any mode, (n_kept,) bool; all nodes if there are no modes."""
     if reduced.stress is None or not reduced.n_q:
         return np.full(len(reduced.nodes), reduced.stress is not None)
     return np.asarray(np.abs(reduced.stress).max(axis=(1, 2)) > 0)

@@ -1,4 +1,4 @@
-"""Reduced geometric stiffness of a body for unit loads: what a linear floating frame leaves out (docs/theory.md §7)."""
+"""Reduced geometric stiffness for unit loads, which a linear floating frame neglects (docs/theory.md §7)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -13,18 +13,19 @@ from fe_models.foundation.units import Units
 
 __all__ = ["SPIN_PAIRS", "UNIT_LOADS", "GeometricStiffness", "SpreadLoads", "TurnedLoads", "stiffness_of_loads"]
 
-UNIT_LOADS = ("translation", "rotation", "spin", "interfaces")  #: of `GeometricStiffness`, an array each
+#: kinds of unit loads; each is an array of `GeometricStiffness`
+UNIT_LOADS = ("translation", "rotation", "spin", "interfaces")
 
-SPIN_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))  #: (a, b) of omega_a omega_b in the order of `spin`
+SPIN_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))  #: (a, b) of omega_a omega_b, in the order of `spin`
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class TurnedLoads:
-    """K_j over a rotation of the whole body and a mode: the work on mode k of the balanced load j, turned with it.
+    """K_j between a rotation of the whole body and a mode: work on mode k of the balanced load j as it rotates too.
 
-    (e_x × c)ᵀ K_geo(sigma_j) phi_k for rotations about the axes x of B, with which K_j goes over to the shapes of
-    another frame, phi - Psi_R C. Of translations it is zero, of two rotations it follows from the load.
+    It is (e_x × c)ᵀ K_geo(sigma_j) phi_k for rotations about the axes x of B. With it, K_j is transformed to the shapes
+    of another frame, phi - Psi_R C. For translations it is zero, and for two rotations it follows from the load.
     """
 
     translation: Array  #: (3, 3, n_q) [sqrt(kg) per q]
@@ -41,16 +42,16 @@ class TurnedLoads:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class SpreadLoads:
-    """Six loads spread over the nodes by their weight w_i, w = Σ w_i: the reaction of a Buckens frame (theory.md §7).
+    """Six loads distributed over the nodes with weights w_i, w = Σ w_i: the reaction of a Buckens frame (theory.md §7).
 
-    Load a = 0-2 is the force (w_i/w) e_a at every node, load 3 + a the force (w_i/w) e_a × c_i; `NodalSums` has their
-    resultants. What a rotation makes of them these do not tell: a node takes what acts on its followers as a force and
-    a moment on itself, and a moment that is turned counts by half.
+    Load a = 0-2 is the force (w_i/w) e_a at every node, and load 3 + a is the force (w_i/w) e_a × c_i. `NodalSums` has
+    their resultants, which do not suffice to rotate the loads: a node transmits forces on its followers as a force and
+    a moment, and a moment counts by half when it is rotated.
     """
 
-    K: Array  #: as those of `GeometricStiffness`, (6, n_q, n_q) [1/(kg m) and 1/kg per q²]
-    turned: Array  #: as those of `TurnedLoads`, (6, 3, n_q) [1/sqrt(kg) and m/sqrt(kg) per q]
-    turned_rigid: Array  #: work of load j alone, turned about an axis, on the rotations e_b × c, (6, 3, 3) [m and m²]
+    K: Array  #: as in `GeometricStiffness`, (6, n_q, n_q) [1/(kg m) and 1/kg per q²]
+    turned: Array  #: as in `TurnedLoads`, (6, 3, n_q) [1/sqrt(kg) and m/sqrt(kg) per q]
+    turned_rigid: Array  #: work of load j alone, rotated about an axis, on the rotations e_b × c, (6, 3, 3) [m and m²]
 
     def __post_init__(self) -> None:
         n = np.asarray(self.K).shape[-1]
@@ -62,11 +63,10 @@ class SpreadLoads:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class GeometricStiffness:
-    """K_j,kl = [Phi.T K_geo(sigma_j) Phi]_kl of unit loads f_j, sigma_j the stress of the static response to f_j [1]_.
+    """K_j,kl = [Phi.T K_geo(sigma_j) Phi]_kl for unit loads f_j; sigma_j is the stress of the static response [1]_.
 
-    All in the frame B of the reduced body, over its modes q, with one support for all loads (theory.md §7); a tensile
-    stress makes K_j positive. Half the quadratic form, 1/2 qᵀ K_j q, is minus the work of f_j on the displacement of
-    second order.
+    All arrays are in the frame B of the reduced body, over its modes q, with the same support for all loads (theory.md
+    §7). A tensile stress makes K_j positive. 1/2 qᵀ K_j q is minus the work of f_j on the second-order displacement.
 
     References
     ----------
@@ -75,16 +75,18 @@ class GeometricStiffness:
 
     translation: Array  #: K_t,a, unit load -rho e_a: frame acceleration minus gravity, (3, n_q, n_q) [1/m per q²]
     rotation: Array  #: K_r,a, unit load -rho e_a × c: angular acceleration, (3, n_q, n_q) [1 per q²]
-    #: K_ab, unit load -rho/2 [e_a × (e_b × c) + e_b × (e_a × c)], (a, b) as `SPIN_PAIRS`, (6, n_q, n_q) [1 per q²]
+    #: K_ab for unit load -rho/2 [e_a × (e_b × c) + e_b × (e_a × c)], (a, b) as in `SPIN_PAIRS`, (6, n_q, n_q) [1 per
+    #: q²]
     spin: Array
-    #: unit force (3) and moment (3) at each loaded interface, axes of B, (n_loaded, 6, n_q, n_q)
-    #: [1/(kg m) and 1/(kg m²) per q²]
+    #: for a unit force (3) and a unit moment (3) at each loaded interface, axes of B, (n_loaded, 6, n_q, n_q) [1/(kg m)
+    #: and 1/(kg m²) per q²]
     interfaces: Array
-    #: with which the matrices go to other frames; None: not on record, then a rotation is taken to turn the loads
+    #: needed to transform the matrices to other frames; None: not recorded, a rotation is then assumed to rotate the
+    #: loads
     turned: TurnedLoads | None = None
-    spread: SpreadLoads | None = None  #: with which they go to a Buckens frame; None: left out, or not on record
-    #: for each of `ReducedBody.interfaces` whether its loads are among `interfaces`: the others were left out, and do
-    #: not stiffen the body; empty: all are
+    spread: SpreadLoads | None = None  #: needed to transform them to a Buckens frame; None: left out, or not recorded
+    #: for each of `ReducedBody.interfaces`, whether its loads are in `interfaces`; loads of other interfaces do not
+    #: stiffen the body; empty: all are included
     is_loaded: tuple[bool, ...] = ()
 
     def __post_init__(self) -> None:
@@ -108,22 +110,22 @@ class GeometricStiffness:
 
     @property
     def n_interfaces(self) -> int:
-        """Number of interfaces, loaded or not."""
+        """Number of interfaces, with and without loads."""
         return len(self.is_loaded)
 
     @property
     def loaded(self) -> IntArray:
-        """The interfaces whose loads are among `interfaces`, in their order, (n_loaded,)."""
+        """The interfaces whose loads are in `interfaces`, in their order, (n_loaded,)."""
         return np.flatnonzero(self.is_loaded)
 
     def of_interface(self, k: int) -> Array:
-        """Return the matrices of interface k, (6, n_q, n_q); zero, without memory, where its loads were left out."""
+        """Return the matrices of interface k, (6, n_q, n_q); zero, without using memory, if its loads were left out."""
         if not self.is_loaded[k]:
             return np.broadcast_to(np.zeros(()), (6, self.n_q, self.n_q))
         return np.asarray(self.interfaces[sum(self.is_loaded[:k])])
 
     def transformed(self, Z: Array) -> "GeometricStiffness":
-        """Return the matrices over other modes, Zᵀ K_j Z, for shapes Phi Z, Z: (n_q, n_new)."""
+        """Return the matrices over other modes, Zᵀ K_j Z, for shapes Phi Z; Z is (n_q, n_new)."""
         return self._changed(lambda K: np.asarray(Z.T @ K @ Z), lambda turned: np.asarray(turned @ Z))
 
     def of_modes(self, modes: IntArray) -> "GeometricStiffness":
@@ -132,7 +134,7 @@ class GeometricStiffness:
         return self._changed(lambda K: K[..., pick[:, None], pick], lambda turned: turned[..., pick])
 
     def _changed(self, squares: Callable[[Array], Array], rows: Callable[[Array], Array]) -> "GeometricStiffness":
-        """Return what is had from each matrix over two modes, and over a rotation and a mode."""
+        """Apply `squares` to the matrices over two modes, and `rows` to those over a rotation and a mode."""
         turned, spread = self.turned, self.spread
         if turned is not None:
             turned = replace(turned, **{name: rows(getattr(turned, name)) for name in UNIT_LOADS})
@@ -144,8 +146,8 @@ class GeometricStiffness:
     def in_units(self, old: Units, new: Units) -> "GeometricStiffness":
         """Return the same matrices in other units; qᵀ K_j q times the amplitude of its load is an energy."""
         length, mass = old.length / new.length, old.mass / new.mass
-        q = np.sqrt(mass) * length  # what a mode less multiplies by
-        force = 1 / (mass * length)  # of a unit force over two modes
+        q = np.sqrt(mass) * length  # change of a matrix for each mode fewer
+        force = 1 / (mass * length)  # for a unit force, over two modes
         of_wrench = force * np.array([1.0, 1, 1, 1 / length, 1 / length, 1 / length])[:, None, None]
         by_load = {"translation": 1 / length, "rotation": 1.0, "spin": 1.0, "interfaces": of_wrench}
         turned, spread = self.turned, self.spread
@@ -159,12 +161,12 @@ class GeometricStiffness:
 
 
 def numbers_of_loads(n_loaded: int) -> dict[str, tuple[int, ...]]:
-    """Return how many unit loads of each kind there are."""
+    """Return the number of unit loads of each kind, as array shapes."""
     return {"translation": (3,), "rotation": (3,), "spin": (6,), "interfaces": (n_loaded, 6)}
 
 
 def put_array(record: object, where: str, name: str, shape: tuple[int, ...], *, is_symmetric: bool = False) -> None:
-    """Put a field of a frozen record in form: of that shape, finite, symmetric in the modes if it has to be."""
+    """Set a field of a frozen record after a check: shape, finite numbers and, if required, symmetry in the modes."""
     array = np.ascontiguousarray(getattr(record, name), dtype=np.float64)
     require_shape(where, array, shape)
     require_finite(where, array)
@@ -174,18 +176,18 @@ def put_array(record: object, where: str, name: str, shape: tuple[int, ...], *, 
 def stiffness_of_loads(
     K: Array, turned: Array | None, turned_rigid: Array | None, *, is_loaded: tuple[bool, ...]
 ) -> GeometricStiffness:
-    """Return the matrices of all unit loads in a row as a record.
+    """Return the record that contains the matrices of all unit loads, given one after the other.
 
     Parameters
     ----------
     K, turned
-        Over two modes, (k, n_q, n_q), and over a rotation and a mode, (k, 3, n_q): 3 translations, 3 rotations, 6
-        products of angular velocities, 6 for each loaded interface, 6 spread over the nodes where `turned_rigid` is
-        given.
+        Matrices over two modes, (k, n_q, n_q), and over a rotation and a mode, (k, 3, n_q). The order is 3
+        translations, 3 rotations, 6 products of angular velocities, 6 for each loaded interface, and, if `turned_rigid`
+        is given, 6 loads distributed over the nodes.
     turned_rigid
-        As that of `SpreadLoads`.
+        As in `SpreadLoads`.
     is_loaded
-        As that of `GeometricStiffness`.
+        As in `GeometricStiffness`.
     """
     spread, n_loaded = None, sum(is_loaded)
     if turned is not None and turned_rigid is not None:
@@ -206,7 +208,7 @@ def by_kind(K: Array, n_loaded: int) -> dict[str, Array]:
 
 
 def symmetrized(where: str, array: Array) -> Array:
-    """Return the symmetric part of each matrix; `BodyError` where the rest is more than rounding."""
+    """Return the symmetric part of each matrix; raise `BodyError` if the rest is more than rounding."""
     other = np.swapaxes(array, -1, -2)
     defect, scale = np.abs(array - other).max(initial=0.0), np.abs(array).max(initial=0.0)
     if defect > SYMMETRY_DEFECT * scale:

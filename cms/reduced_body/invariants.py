@@ -1,4 +1,4 @@
-"""Inertia invariants of a body with deformation modes, all from seven canonical moments (docs/theory.md §5)."""
+"""Inertia invariants of a body with deformation modes, all from canonical moments (docs/theory.md §5)."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -13,8 +13,8 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["INERTIA_TERMS", "Moments", "known_P", "known_S_kl", "moments_from_gram"]
 
-#: what a reduced mass matrix alone does not say: the symmetric part of P; that of S_kl antisymmetric in a, b; that
-#: symmetric in a, b without trace. What is left of P and S_kl is 2C and M*
+#: Terms that a reduced mass matrix alone does not determine: the symmetric part of P; the part of S_kl that is
+#: antisymmetric in a, b; and the part that is symmetric in a, b and traceless. The rest of P and S_kl is 2C and M*.
 INERTIA_TERMS = ("3C", "4C", "5C")
 
 
@@ -23,11 +23,11 @@ INERTIA_TERMS = ("3C", "4C", "5C")
 class Moments:
     """Canonical moments of a body about the origin of its frame B [1]_.
 
-    c: undeformed position, phi_k: shape k (translation), both in B; integrals over mass. Shapes are without unit
-    when q is a length; with M-orthonormal shapes the unit of phi is 1/sqrt(kg) and q has sqrt(kg) m.
+    c is the undeformed position and phi_k the translation of shape k, both in B; integrals are over mass. Shapes are
+    dimensionless if q is a length. With M-orthonormal shapes, phi has the unit 1/sqrt(kg) and q has sqrt(kg) m.
 
-    A body that another program has reduced may not say all of them. Then `missing` names the invariants that do not
-    follow; the parts of P and S_kl they stand for are zero, and asking for the invariant raises `BodyError`.
+    A body reduced by another program may not provide all moments. `missing` then names the invariants that do not
+    follow. The corresponding parts of P and S_kl are zero, and access to such an invariant raises `BodyError`.
 
     References
     ----------
@@ -41,14 +41,14 @@ class Moments:
     P: Array  #: ∫ c_a phi_b,k, (3, 3, n_q) [kg m]
     S_kl: Array  #: ∫ phi_a,k phi_b,l, (3, 3, n_q, n_q) [kg]
     is_exact: bool = True  #: False: from bare matrices that are not M_s ⊗ 1
-    missing: tuple[str, ...] = ()  #: those of `INERTIA_TERMS` that are not known, in their order
+    missing: tuple[str, ...] = ()  #: unknown terms of `INERTIA_TERMS`, in their order
 
     def __post_init__(self) -> None:
         n = np.asarray(self.C1).shape[-1]
         for term in self.missing:
             if term not in INERTIA_TERMS:
                 raise BodyError(f"moments: missing: unknown term {quoted(term)}{nearest(term, INERTIA_TERMS)}")
-        lost = {*self.missing, "5C"} if "4C" in self.missing else {*self.missing}  # 4C is part of 5C
+        lost = {*self.missing, "5C"} if "4C" in self.missing else {*self.missing}  # 4C is contained in 5C
         missing = tuple(term for term in INERTIA_TERMS if term in lost)
         object.__setattr__(self, "missing", missing)
         for name, shape in {"S": (3,), "R": (3, 3), "C1": (3, n), "P": (3, 3, n), "S_kl": (3, 3, n, n)}.items():
@@ -125,7 +125,7 @@ class Moments:
 
     @property
     def trust(self) -> str:
-        """Say what a motion can be trusted for with the terms that are here."""
+        """Describe for which motions the body can be trusted with the known terms."""
         if not self.missing:
             return "every motion"
         exact = "exact: mass, frequencies, static answers, and motions to first order in speeds and deformation"
@@ -141,9 +141,9 @@ class Moments:
 
     @property
     def left_out(self) -> "Moments":
-        """The moments of a motion without what is missing: with constant inertia where nothing is known.
+        """The moments for a motion without the missing terms, that is with constant inertia where nothing is known.
 
-        Terms that are missing are zero, all of 5C with its trace; M* is then that of `ReducedBody.M` alone.
+        Missing terms are zero, including the trace of a missing 5C. M* then only comes from `ReducedBody.M`.
         """
         S_kl = np.array(self.S_kl)
         if "5C" in self.missing:
@@ -152,9 +152,9 @@ class Moments:
 
     @property
     def gram(self) -> Array:
-        """The Gram matrix ∫ a aᵀ, a = [1, c, phi_x, phi_y, phi_z], (4 + 3 n_q, 4 + 3 n_q), of these moments.
+        """The Gram matrix ∫ a aᵀ dm with a = [1, c, phi_x, phi_y, phi_z], (4 + 3 n_q, 4 + 3 n_q), of these moments.
 
-        Its parts that are missing are zero.
+        Missing parts are zero.
         """
         n = self.n_q
         gram = np.zeros((4 + 3 * n, 4 + 3 * n))
@@ -172,15 +172,15 @@ class Moments:
 
 
 def known_P(P: Array, missing: Iterable[str]) -> Array:
-    """Return P, (3, 3, n_q), without what is missing: its antisymmetric part, which is 2C, always stays."""
+    """Return P, (3, 3, n_q), with missing terms set to zero; its antisymmetric part, which is 2C, always stays."""
     if "3C" not in missing:
         return P
     return np.asarray((P - P.swapaxes(0, 1)) / 2)
 
 
 def known_S_kl(S_kl: Array, missing: Iterable[str]) -> Array:
-    """Return S_kl, (3, 3, n_q, n_q), without what is missing; its trace over a, b, which is M*, always stays."""
-    if "5C" not in missing:  # nor 4C then
+    """Return S_kl, (3, 3, n_q, n_q), with missing terms set to zero; its trace over a, b, which is M*, always stays."""
+    if "5C" not in missing:  # 4C is then known too
         return S_kl
     M = np.einsum("aakl->kl", S_kl) / 3
     known = np.zeros_like(S_kl)
@@ -192,19 +192,19 @@ def known_S_kl(S_kl: Array, missing: Iterable[str]) -> Array:
 
 
 def moments_from_gram(gram: Array, *, is_exact: bool = True, missing: tuple[str, ...] = ()) -> Moments:
-    """Cut the canonical moments from the Gram matrix ∫ a aᵀ, a = [1, c, phi_x, phi_y, phi_z].
+    """Extract the canonical moments from the Gram matrix ∫ a aᵀ dm, a = [1, c, phi_x, phi_y, phi_z].
 
     Parameters
     ----------
     gram
-        (4 + 3 n_q, 4 + 3 n_q), components of all shapes grouped: all x, then all y, then all z.
+        (4 + 3 n_q, 4 + 3 n_q); components of all shapes are grouped: all x, then all y, then all z.
     is_exact, missing
         As in `Moments`.
     """
     n = (gram.shape[0] - 4) // 3
 
     def part(rows: slice, columns: slice) -> Array:
-        # symmetric by definition; the product that made it rounds the halves apart
+        # symmetric by definition; the averaged halves differ only by rounding
         return np.asarray((gram[rows, columns] + gram[columns, rows].T) / 2)
 
     one, c, blocks = slice(0, 1), slice(1, 4), [slice(4 + a * n, 4 + (a + 1) * n) for a in range(3)]

@@ -1,4 +1,4 @@
-"""Points that a reduced body keeps with all six motions: nodes of lines, point masses, and those the user names."""
+"""Points that a reduced body keeps with translations and rotations: line nodes, point masses, and requested nodes."""
 
 from dataclasses import dataclass, replace
 
@@ -15,13 +15,13 @@ SOURCES = {
     "dofs": "rotations that are dofs of the model, as of beams and shells",
     "elements": "half the curl of the displacement, by the elements at the node, as of solids",
     "unknown": "not known: bare matrices and rods without rotations",
-}  #: where the rotations of a point come from
+}  #: origin of the rotations of a point
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class KeptPoints:
-    """Rotations of kept nodes over the modes; their translations are those of all kept nodes.
+    """Rotations of kept nodes over the modes; the translations are in `ReducedBody.Phi`, as for all kept nodes.
 
     Raises
     ------
@@ -30,8 +30,8 @@ class KeptPoints:
     """
 
     nodes: IntArray  #: rows of `ReducedBody.nodes`, ascending, (n,)
-    rotation: Array  #: rotation vectors in B, zero where they are unknown, (n, 3, n_q) [1/m]
-    source: tuple[str, ...]  #: one of `SOURCES` each, (n,)
+    rotation: Array  #: rotation vectors in B, zero if unknown, (n, 3, n_q) [1/m]
+    source: tuple[str, ...]  #: one of `SOURCES` for each, (n,)
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -49,12 +49,12 @@ class KeptPoints:
             raise BodyError(f"kept points: unknown source {quoted(word)}{nearest(word, SOURCES)}")
 
     def of_node(self, row: int) -> Array | None:
-        """Return the rotation of a kept node by its row, (3, n_q); None if it has none or it is unknown."""
+        """Return the rotation of a kept node by its row, (3, n_q); None if the node has none or it is unknown."""
         at = np.flatnonzero(self.nodes == row)
         return None if not len(at) or self.source[at[0]] == "unknown" else np.asarray(self.rotation[at[0]])
 
     def of_modes(self, Z: Array) -> "KeptPoints":
-        """Return the points over new modes, whose coordinates in the old ones are the columns of Z, (n_q, n)."""
+        """Return the points over new modes, whose coordinates in the old modes are the columns of Z, (n_q, n)."""
         return replace(self, rotation=self.rotation @ Z)
 
     def moved(self, rotation: Array, R: Array, Z: Array) -> "KeptPoints":
@@ -63,9 +63,9 @@ class KeptPoints:
         Parameters
         ----------
         rotation
-            Of the new frame over the old modes, which leaves the shapes, (3, n_q).
+            Rotation of the new frame over the old modes, which is removed from the shapes, (3, n_q).
         R
-            Columns: axes of the new frame in the old one, (3, 3).
+            Axes of the new frame as columns, in the old frame, (3, 3).
         Z
             As in `of_modes`.
         """

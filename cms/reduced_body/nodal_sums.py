@@ -1,4 +1,4 @@
-"""Sums over the nodes of a body, weighted by the volume each stands for: the norm of a Buckens frame (theory.md §4)."""
+"""Sums over the nodes of a body, weighted with nodal volume: the norm of a Buckens frame (theory.md §4)."""
 
 from dataclasses import dataclass
 
@@ -14,17 +14,17 @@ __all__ = ["NodalSums"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class NodalSums:
-    """Weighted sums over all nodes about the origin of a frame B, w: weight of a node, translations only.
+    """Weighted sums over all nodes about the origin of a frame B; w is the weight of a node; translations only.
 
-    Together they are [1, c]ᵀ W [1, c, Phi] as far as a frame needs them: C of W-least deformation follows from them.
+    They are the parts of [1, c]ᵀ W [1, c, Phi] that a frame needs to compute the C of least weighted deformation.
     """
 
-    w: float  #: sum of the weights [m³, or 1 where the nodes count equally]
-    S: Array  #: Σ w c, (3,) [· m]
-    R: Array  #: Σ w c_a c_b, (3, 3) [· m²]
+    w: float  #: sum of the weights [m³; dimensionless if the nodes count equally]
+    S: Array  #: Σ w c, (3,) [w times m]
+    R: Array  #: Σ w c_a c_b, (3, 3) [w times m²]
     U1: Array  #: Σ w phi_k, (3, n_q)
-    U2: Array  #: Σ w c × phi_k, (3, n_q) [· m]
-    is_volume: bool = True  #: False: every node counts 1
+    U2: Array  #: Σ w c × phi_k, (3, n_q) [U1 times m]
+    is_volume: bool = True  #: False: every node has weight 1
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "w", float(self.w))

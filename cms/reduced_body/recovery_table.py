@@ -1,12 +1,12 @@
-"""Recovery matrices of a reduced body: rows that give motions, stresses and forces from its coordinates and loads.
+"""Recovery matrices of a reduced body: rows that give motions, stress and forces from its coordinates and loads.
 
-With z = (d, theta, q), the small motion of the origin of B and its turn in axes of B, and the modal coordinates,
+With z = (d, theta, q): the small displacement and rotation of B in axes of B, and the modal coordinates,
 
     y = D_0 z + D_1 dz/dt + D_2 d²z/dt² + L p
 
-D_k is `dynamic[k]`, L `static`, p the amplitudes of the loads that `loads` names. D_0 of a stress or a force is the
-mode displacement; D_2 and L of such a row add the static response that the modes lack, to the inertia of the motion
-and to the loads: together the mode acceleration (docs/theory.md §11).
+where D_k is `dynamic[k]`, L is `static`, and p are the amplitudes of the loads named in `loads`. For a stress or a
+force, D_0 is the mode displacement method. D_2 and L then add the static response to inertia and loads that the modes
+lack. Together they are the mode acceleration method (docs/theory.md §11).
 """
 
 from collections.abc import Sequence
@@ -24,35 +24,35 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["N_RIGID", "RecoveryTable", "spin_products"]
 
-N_RIGID = 6  #: coordinates of z before q: d and theta
-ORDERS = ("position", "velocity", "acceleration")  #: of z, in the order of `dynamic`
+N_RIGID = 6  #: number of coordinates of z before q: d and theta
+ORDERS = ("position", "velocity", "acceleration")  #: derivatives of z, in the order of `dynamic`
 TEXTS = ("labels", "quantities", "entities", "components")
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class RecoveryTable:
-    """Named rows of a reduced body; components of rows in mesh axes or those of an element, columns in axes of B.
+    """Named rows of a reduced body; row components are in mesh axes or element axes, columns in axes of B.
 
     Raises
     ------
     BodyError
-        If shapes do not fit, a number is not finite or a label is there twice.
+        If shapes do not fit, a number is not finite, or a label is repeated.
     """
 
     name: str
-    labels: tuple[str, ...]  #: one per row, each once, such as "node 17 acceleration ux"
-    quantities: tuple[str, ...]  #: what each row is, such as "acceleration" or "beam force"
-    entities: tuple[str, ...]  #: what it belongs to: "node", "element", "interface", "point" or "body"
-    numbers: IntArray  #: number of the node or element; -1 where it has a name only, (n_rows,)
-    components: tuple[str, ...]  #: such as "ux", "xx" or "end A My"
+    labels: tuple[str, ...]  #: label of each row, unique, such as "node 17 acceleration ux"
+    quantities: tuple[str, ...]  #: quantity of each row, such as "acceleration" or "beam force"
+    entities: tuple[str, ...]  #: what the row belongs to: "node", "element", "interface", "point" or "body"
+    numbers: IntArray  #: number of the node or element, (n_rows,); -1 if it only has a name
+    components: tuple[str, ...]  #: component of each row, such as "ux", "xx" or "end A My"
     dimensions: Array  #: exponents of mass, length and time of each row, (n_rows, 3)
     dynamic: Array  #: factors of z, dz/dt and d²z/dt², (3, n_rows, 6 + n_q)
-    loads: tuple[str, ...]  #: columns of `static`
+    loads: tuple[str, ...]  #: name of each column of `static`
     load_dimensions: Array  #: exponents of mass, length and time of each amplitude, (n_loads, 3)
-    static: Array  #: residual static response to each load of amplitude one, (n_rows, n_loads)
-    system: Units  #: of all numbers
-    truncated: str = ""  #: what the rows leave out, in words
+    static: Array  #: residual static response to each load of unit amplitude, (n_rows, n_loads)
+    system: Units  #: unit system of all numbers
+    truncated: str = ""  #: description of what the rows neglect
 
     def __post_init__(self) -> None:
         where = f"recovery {self.name!r}"
@@ -102,7 +102,7 @@ class RecoveryTable:
     def values(
         self, z: Array, z_dot: Array | None = None, z_ddot: Array | None = None, p: Array | None = None
     ) -> Array:
-        """Return y of coordinates, rates, accelerations and load amplitudes; those left out count as zero.
+        """Return y for coordinates, rates, accelerations and load amplitudes; omitted arguments count as zero.
 
         Parameters
         ----------
@@ -132,12 +132,12 @@ class RecoveryTable:
         return np.asarray(total)
 
     def rows(self, wanted: str) -> IntArray:
-        """Return the rows with that label or quantity, or whose label begins with it as whole words.
+        """Return the rows with that label or quantity, or whose label begins with these words.
 
         Raises
         ------
         BodyError
-            If there is none.
+            If there is no such row.
         """
         found = [
             k
@@ -163,22 +163,22 @@ class RecoveryTable:
         )
 
     def changed(self, X: Array, R: Array, p: Array) -> "RecoveryTable":
-        """Return the rows over the coordinates of another frame of the same body.
+        """Transform the rows to the coordinates of another frame of the same body.
 
         Parameters
         ----------
         X
-            z = X z_new, (6 + n_q, 6 + n_q); z_ddot likewise, but for the way of the origin about p_new.
+            z = X z_new, (6 + n_q, 6 + n_q); the same for z_ddot, except for the acceleration of the origin about p_new.
         R
-            Columns: the new axes in the old ones, (3, 3).
+            New axes as columns, in old axes, (3, 3).
         p
-            The new origin in the old frame, (3,) [m]: the old one moves about it, d² = ... + omega × (omega × -p).
+            New origin in the old frame, (3,) [m]; the old origin moves about it, d² = ... + omega × (omega × -p).
         """
         static = np.array(self.static)
         index = {name: k for k, name in enumerate(self.loads)}
         for k, name in enumerate(self.loads):
             group, _, component = name.rpartition(" ")
-            is_amount = not self.load_dimensions[k].any()  # of a load case, which no axes turn
+            is_amount = not self.load_dimensions[k].any()  # the amplitude of a load case, which does not depend on axes
             if not is_amount and (component in ("fx", "mx") or name == "gravity x"):
                 three = [index[f"{group} {component[:-1]}{axis}"] for axis in "xyz"]
                 static[:, three] = self.static[:, three] @ R
@@ -204,9 +204,9 @@ class RecoveryTable:
 
 
 def spin_products(omega: Array) -> Array:
-    """Return the amplitudes of the loads "spin xx yy zz xy yz zx", (..., 6), of angular velocities, (..., 3) [rad/s].
+    """Return amplitudes of the loads "spin xx yy zz xy yz zx", (..., 6), for angular velocities, (..., 3) [rad/s].
 
-    omega_a omega_b, those of two axes doubled, as each stands for both orders.
+    The amplitudes are omega_a omega_b; those of two different axes are doubled, because each stands for both orders.
     """
     omega = np.asarray(omega)
     return np.stack([(1.0 if a == b else 2.0) * omega[..., a] * omega[..., b] for a, b in SPIN_PAIRS], axis=-1)
@@ -220,10 +220,10 @@ def spin_accelerations(c: Array) -> Array:
 
 
 def spin_change(R: Array) -> Array:
-    """Return the products in old axes of those in new ones, (6, 6), omega_old = R omega_new."""
+    """Return the matrix from products in new axes to products in old axes, (6, 6), with omega_old = R omega_new."""
     columns = []
     for a, b in SPIN_PAIRS:
-        both = np.outer(R[:, a], R[:, b])  # omega_a omega_b of the new axes as a tensor of the old ones
+        both = np.outer(R[:, a], R[:, b])  # omega_a omega_b of the new axes, as a tensor in old axes
         both = (both + both.T) / 2
         columns.append([both[i, j] * (1.0 if i == j else 2.0) for i, j in SPIN_PAIRS])
     return np.array(columns).T

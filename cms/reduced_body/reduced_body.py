@@ -1,4 +1,4 @@
-"""The reduced body: what the modal file holds and the multibody engine needs, but for pictures free of mesh size."""
+"""The reduced body: content of the modal file and input of the multibody engine. Only pictures depend on mesh size."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -23,11 +23,11 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["BodyFrame", "ReducedBody", "ReducedInterface"]
 
-ORTHONORMAL = 1e-6  #: defect of axes that is taken for digits of another program
+ORTHONORMAL = 1e-6  #: defect of axes that counts as rounding of printed digits
 
 
 def require_finite_rows(where: str, array: Array) -> None:
-    """Raise `BodyError` unless all numbers are finite, a slice of rows of an array on disk at a time."""
+    """Raise `BodyError` unless all numbers are finite; an array on disk is read in slices of rows."""
     for rows in row_slices(len(array), array):
         require_finite(where, array[rows])
 
@@ -42,16 +42,16 @@ def require_orthonormal(where: str, axes: Array) -> None:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class BodyFrame:
-    """The frame B in which the elastic displacement is measured, as it lies in the undeformed mesh.
+    """The frame B in which elastic displacement is measured, as its position in the undeformed mesh.
 
     c_mesh = origin + axes @ c_B.
     """
 
-    kind: str  #: "nodal", "tisserand" or "buckens"; "held": the body is held to the ground, and no frame can move
+    kind: str  #: "nodal", "tisserand", "buckens", or "held": the body is held to the ground, and its frame cannot move
     origin: Array  #: in mesh coordinates, (3,) [m]
-    axes: Array = field(default_factory=lambda: np.eye(3))  #: columns: axes of B in mesh axes, (3, 3)
-    at: str = ""  #: interface that carries a nodal frame; "": other dofs
-    #: dofs that a nodal frame holds, (node of the mesh, component), (6, 2); empty: another kind, or not on record
+    axes: Array = field(default_factory=lambda: np.eye(3))  #: axes of B as columns, in mesh axes, (3, 3)
+    at: str = ""  #: interface that defines a nodal frame; "": other dofs
+    #: dofs that a nodal frame holds, (mesh node, component), (6, 2); empty: another kind, or not recorded
     dofs: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
 
     def __post_init__(self) -> None:
@@ -80,7 +80,7 @@ class ReducedInterface:
     triad: Array  #: undeformed axes as columns in B, (3, 3)
     Psi: Array  #: translation and rotation of the point in B for each mode, (6, n_q) [-, 1/m]
     members: IntArray  #: member nodes, indices into `ReducedBody.nodes`, (n_members,)
-    #: False: Psi has no rotation (rows 3-5 are zero) and is the mean translation of the members, which lie on one line
+    #: False: Psi has no rotation (rows 3-5 are zero) and is the mean translation of the members, which are collinear
     has_rotation: bool = True
 
     def __post_init__(self) -> None:
@@ -99,38 +99,41 @@ class ReducedInterface:
 class ReducedBody:
     """A body as r = c + Phi q in its frame B, with M-orthonormal, K-diagonal shapes (docs/theory.md §3-5).
 
-    Units of q follow from Phi.T M Phi = 1: sqrt(kg) m; Phi q is a length.
+    The unit of q follows from Phi.T M Phi = 1: sqrt(kg) m. Phi q is a length.
     """
 
     name: str
     units: Units
     frame: BodyFrame
-    M: Array  #: Phi.T M Phi, (n_q, n_q): the identity, but for massless static shapes (zero there)
+    M: Array  #: Phi.T M Phi, (n_q, n_q): identity, with zero diagonal entries for massless static shapes
     K: Array  #: Phi.T K Phi, (n_q, n_q): diagonal of omega² [1/s²]
-    D: Array  #: modal damping, (n_q, n_q) [1/s]; zero when none was asked for
-    labels: tuple[str, ...]  #: one per mode: where its energy comes from, in words
-    energy_shares: Array  #: share of each source column group in the mode's energy, (n_q, n_sources)
+    D: Array  #: modal damping, (n_q, n_q) [1/s]; zero if none was requested
+    labels: tuple[str, ...]  #: label of each mode: the sources of its energy
+    energy_shares: Array  #: share of each group of source columns in the energy of each mode, (n_q, n_sources)
     sources: tuple[str, ...]  #: names of the groups of source columns, (n_sources,)
     moments: Moments
-    free_frequencies: Array  #: of the reduced body without joints, elastic only, ascending [Hz]; a held body as held
+    #: elastic frequencies of the unsupported reduced body (of a held body: as held), ascending [Hz]
+    free_frequencies: Array
     nodes: Array  #: kept nodes (surface, interfaces) in B, (n_kept, 3) [m]
-    node_ids: IntArray  #: their indices in the model the body came from, (n_kept,); `numbering` has the user's numbers
+    #: indices of the kept nodes in the original model, (n_kept,); `numbering` has the user's numbers
+    node_ids: IntArray
     Phi: Array  #: translations of the kept nodes in B, (n_kept, 3, n_q)
     surface: IntArray  #: triangles of kept nodes, (n_tri, 3)
     interfaces: tuple[ReducedInterface, ...]
     provenance: Mapping[str, str] = field(default_factory=dict)  #: versions, digests, options, solver
-    columns: SourceColumns | None = None  #: columns of the mode set; None: not on record
-    nodal_sums: NodalSums | None = None  #: what a Buckens frame needs; None: not on record
+    columns: SourceColumns | None = None  #: columns of the mode set; None: not recorded
+    nodal_sums: NodalSums | None = None  #: data for a Buckens frame; None: not recorded
     load_cases: tuple[ReducedLoadCase, ...] = ()
     #: stress of the modes at the kept nodes, xx yy zz yz xz xy in axes of B, (n_kept, 6, n_q) [Pa per unit of q]; None:
-    #: left out, or unknown. Zero at reference nodes, which belong to no element
+    #: left out or unknown. It is zero at reference nodes, which belong to no element
     stress: Array | None = None
     point_stress: PointStress | None = None  #: stress of the modes at named points; None: left out, or there are none
     geometric: GeometricStiffness | None = None  #: for geometric stiffening; None: left out, or not known
     #: g_kl of the kept nodes in B, displacement ½ Σ q_k q_l g_kl, (n_kept, 3, n_q, n_q) [1/(kg m)]; None: left out
     quadratic: Array | None = None
-    numbering: Numbering = field(default_factory=Numbering)  #: the user's numbers of kept nodes and elements, and sets
-    kept: KeptPoints | None = None  #: kept nodes that have rotations too; None: there are none
+    #: the user's numbers of kept nodes and elements, and the sets
+    numbering: Numbering = field(default_factory=Numbering)
+    kept: KeptPoints | None = None  #: kept nodes that have rotations; None: there are none
     recovery: Mapping[str, RecoveryTable] = field(default_factory=dict)  #: recovery matrices by name
 
     def __post_init__(self) -> None:
@@ -217,24 +220,24 @@ class ReducedBody:
 
     @property
     def is_held(self) -> bool:
-        """Whether the body is held to the ground, as it is meant to be; no floating frame can take it."""
+        """Whether the body is intentionally held to the ground; a floating frame rejects it."""
         return self.frame.kind == "held"
 
     @property
     def frequencies(self) -> Array:
-        """Frequencies of the modes in this frame (its origin and axes held), (n_q,) [Hz]; massless: inf."""
+        """Frequencies of the modes with origin and axes of this frame held, (n_q,) [Hz]; inf for massless shapes."""
         mass = np.diag(self.M)
         omega2 = np.divide(np.diag(self.K), mass, out=np.full(self.n_q, np.inf), where=mass > 0)
         return np.sqrt(np.maximum(omega2, 0.0)) / (2 * np.pi)
 
     def node_name(self, row: int) -> str:
-        """Return what the user calls a kept node, by its row: "12", "PART-1-1.12"; without a number "index 7"."""
+        """Return the user's name of a kept node: "12", "PART-1-1.12", or "index 7" if it has no number."""
         if self.numbering.nodes.size and self.numbering.nodes[row] != NONE:
             return self.numbering.node_name(row)
         return f"index {self.node_ids[row]}"
 
     def interface(self, name: str) -> ReducedInterface:
-        """Return the interface of that name; `BodyError` with the choices if there is none."""
+        """Return the interface of that name; raise `BodyError` with the known names if there is none."""
         for interface in self.interfaces:
             if interface.name == name:
                 return interface
@@ -242,7 +245,7 @@ class ReducedBody:
         raise BodyError(f"reduced body {self.name!r}: no interface {quoted(name)}{nearest(name, choices)}")
 
     def load_case(self, name: str) -> ReducedLoadCase:
-        """Return the load case of that name; `BodyError` with the choices if there is none."""
+        """Return the load case of that name; raise `BodyError` with the known names if there is none."""
         for case in self.load_cases:
             if case.name == name:
                 return case

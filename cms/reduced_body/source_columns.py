@@ -1,4 +1,4 @@
-"""Where modes come from: the share of each column of the mode set in the energy of a mode, and a label in words."""
+"""Origin of modes: the share of each column of the mode set in the energy of a mode, and a label."""
 
 from dataclasses import dataclass, replace
 
@@ -14,15 +14,15 @@ __all__ = ["SourceColumns", "source_columns"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class SourceColumns:
-    """The columns a reduced body was made of, and what is needed to tell their shares in any mode.
+    """The columns from which a reduced body was made, with the data that give their shares in any mode.
 
-    With phi_k = Σ_c v_c A_ck and F_ck = v_cᵀ K phi_k the term A_ck F_ck is the part of column c in the energy
-    phi_kᵀ K phi_k. Scaling a column changes neither term; it is scaled so that A and F have the same size and unit.
-    Both are linear in the mode, so they follow the modes into another frame.
+    With phi_k = Σ_c v_c A_ck and F_ck = v_cᵀ K phi_k, the term A_ck F_ck is the contribution of column c to the energy
+    phi_kᵀ K phi_k. It does not change if the column is scaled; the scale is chosen so that A and F have the same size
+    and unit. Both are linear in the mode, so they can be transformed with the modes to another frame.
     """
 
-    labels: tuple[str, ...]  #: one per column, (n_columns,)
-    groups: tuple[str, ...]  #: one per column
+    labels: tuple[str, ...]  #: label of each column, (n_columns,)
+    groups: tuple[str, ...]  #: group of each column
     A: Array  #: coordinates of the modes in the columns, (n_columns, n_q) [1/s]
     F: Array  #: forces of the modes on the columns, (n_columns, n_q) [1/s]
 
@@ -44,9 +44,9 @@ class SourceColumns:
         return tuple(dict.fromkeys(self.groups))
 
     def shares(self) -> Array:
-        """Return |A_ck F_ck| over their sum, (n_q, n_columns), rows sum to 1.
+        """Return |A_ck F_ck| divided by their sum over c, (n_q, n_columns); rows sum to 1.
 
-        The terms alone sum to the energy, but some are negative where columns work against each other.
+        The terms without absolute value sum to the energy, but some are negative if columns work against each other.
         """
         work = np.abs(np.asarray(self.A) * self.F)
         total = work.sum(axis=0)
@@ -57,7 +57,7 @@ class SourceColumns:
         return self.shares() @ np.array([[group == s for s in self.sources] for group in self.groups], dtype=float)
 
     def mode_labels(self) -> tuple[str, ...]:
-        """Say in words which columns carry a mode's energy: the largest one or two with their shares."""
+        """Return a label of each mode: the one or two columns with the largest shares in its energy."""
         return tuple(share_words(self.labels, shares) for shares in self.shares())
 
     def of_modes(self, Z: Array) -> "SourceColumns":
@@ -66,16 +66,16 @@ class SourceColumns:
 
 
 def share_words(labels: tuple[str, ...], shares: Array) -> str:
-    """Return 'constraint left ux (93 %)', or the two greatest where one is not nearly all."""
+    """Return 'constraint left ux (93 %)', or the two largest shares if one is not nearly all."""
     order = np.argsort(shares)[::-1]
     parts = [order[0]] if shares[order[0]] > 0.9 or len(order) < 2 or shares[order[1]] < 0.05 else order[:2]
     return ", ".join(f"{labels[k]} ({100 * shares[k]:.0f} %)" for k in parts)
 
 
 def source_columns(labels: tuple[str, ...], groups: tuple[str, ...], A: Array, F: Array) -> SourceColumns:
-    """Return the columns with A and F scaled to one size, column by column: A_c s and F_c / s, s² = |F_c| / |A_c|.
+    """Return the columns with A and F scaled to equal size, column by column: A_c s and F_c / s, s² = |F_c| / |A_c|.
 
-    A column without forces (a rigid-body motion) has no part in any energy; both rows are then zero.
+    A column without forces (a rigid-body motion) contributes to no energy; both rows are then zero.
     """
     size_A, size_F = np.linalg.norm(A, axis=1), np.linalg.norm(F, axis=1)
     works = (size_A > 0) & (size_F > 0)

@@ -1,4 +1,4 @@
-"""Stress at named points of a reduced body, and what it is compared by."""
+"""Stress at named points of a reduced body, and its von Mises stress."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,15 +10,15 @@ from fe_models.foundation.copies import frozen_copies
 
 __all__ = ["PointStress", "stress_of", "von_mises", "von_mises_of"]
 
-AT_ONCE = 2_000_000  #: numbers of stress held at a time
+AT_ONCE = 2_000_000  #: number of stress values held at a time
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class PointStress:
-    """Stress modes at named points beside the nodes, such as the outer points of beam sections."""
+    """Stress modes at named points that are not nodes, such as the extreme fibres of beam sections."""
 
-    names: tuple[str, ...]  #: one per point
+    names: tuple[str, ...]  #: name of each point
     positions: Array  #: undeformed, in B, (n_points, 3) [m]
     modes: Array  #: stress xx yy zz yz xz xy for each mode, in axes of B, (n_points, 6, n_q) [Pa per unit of q]
 
@@ -33,7 +33,7 @@ class PointStress:
 
 
 def von_mises(stress: Array) -> Array:
-    """Return the von Mises stress sqrt(3/2 s:s), s the deviator, of components xx yy zz yz xz xy on axis 1 [Pa].
+    """Return the von Mises stress sqrt(3/2 s:s), with deviator s, of components xx yy zz yz xz xy on axis 1 [Pa].
 
     Parameters
     ----------
@@ -46,20 +46,20 @@ def von_mises(stress: Array) -> Array:
 
 
 def stress_of(modes: Array, q: Array) -> Array:
-    """Return the stress of modal coordinates: (n, 6) for q (n_q,), (n, 6, k) for q (k, n_q) [Pa].
+    """Return the stress for modal coordinates: (n, 6) for q (n_q,), (n, 6, k) for q (k, n_q) [Pa].
 
     Parameters
     ----------
     modes
         Stress xx yy zz yz xz xy for each mode, (n, 6, n_q) [Pa per unit of q].
     q
-        All modal coordinates, static ones too.
+        All modal coordinates, including static ones.
     """
     return np.asarray(modes @ np.asarray(q).T)
 
 
 def von_mises_of(modes: Array, q: Array) -> Iterator[Array]:
-    """Yield the von Mises stress of many modal coordinates q (k, n_q), a block of rows at a time: (rows, n) [Pa]."""
+    """Yield the von Mises stress of many modal coordinates q (k, n_q) in blocks of rows: (rows, n) [Pa]."""
     rows = max(1, AT_ONCE // max(1, modes[..., 0].size))
     for first in range(0, len(q), rows):
         yield von_mises(stress_of(modes, q[first : first + rows])).T
