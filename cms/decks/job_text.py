@@ -1,4 +1,4 @@
-"""A whole deck as a job file: every table written out, and on top what was not taken over."""
+"""A whole deck as a job file: every table written out, with a header that lists what was not converted."""
 
 import json
 import re
@@ -22,11 +22,11 @@ COLLINEAR = 1e-6
 
 @dataclass(frozen=True)
 class JobRequest:
-    """What the user adds to a deck."""
+    """Data that the user adds to a deck."""
 
-    units: str  #: unit system of its numbers
-    densities: Mapping[str, float]  #: of materials that have none; "" for all of them
-    leave_out: tuple[str, ...] = ()  #: entries of the ledger that carry mass or stiffness and are left out knowingly
+    units: str  #: unit system of the numbers of the deck
+    densities: Mapping[str, float]  #: densities of materials that have none, by material; "" for all such materials
+    leave_out: tuple[str, ...] = ()  #: entries of the ledger with mass or stiffness that are left out intentionally
 
 
 def job_text(deck: Deck, request: JobRequest, deck_path: str) -> str:
@@ -37,16 +37,16 @@ def job_text(deck: Deck, request: JobRequest, deck_path: str) -> str:
     deck
         The deck.
     request
-        Units, densities, what to leave out.
+        Units, densities, and entries to leave out.
     deck_path
-        Of the deck, relative to the job file.
+        Path of the deck relative to the job file.
 
     Raises
     ------
     MeshError
-        If the deck holds mass or stiffness that cannot be taken over and is not left out by name.
+        If the deck contains mass or stiffness that cannot be converted and is not named to be left out.
     JobError
-        If a material lacks a constant, a support or a section names nothing.
+        If a material lacks a constant, or a support or a section refers to nothing.
     """
     deck.ledger.require_whole(request.leave_out)
     if not (deck.solids or deck.shells or deck.lines or deck.rods or deck.springs):
@@ -91,10 +91,10 @@ def materials_in(section: SolidSection | ShellSection | LineSection | RodSection
 
 
 def _materials(deck: Deck, request: JobRequest) -> dict[str, Any]:
-    """Return the materials in use; a density that the deck lacks comes from the request.
+    """Return the materials in use; a missing density is taken from the request.
 
-    Nastran and ANSYS take a density that is not given as zero. So does the job where the deck has other masses, as
-    frames of light beams between point masses; where nothing has mass, the density is asked for.
+    Nastran and ANSYS take a missing density as zero. The job does the same if the deck has other masses, such as frames
+    of light beams between point masses. If nothing has mass, the user must give the density.
     """
     used = dict.fromkeys(name for each in sections_of(deck) for name in materials_in(each))
     for name in request.densities:
@@ -133,7 +133,7 @@ def _materials(deck: Deck, request: JobRequest) -> dict[str, Any]:
 
 
 def _has_mass(deck: Deck, used: Iterable[str]) -> bool:
-    """Whether something of a deck has mass: points, other materials, or sections beside their materials."""
+    """Whether anything in the deck has mass: points, other materials, or sections apart from their materials."""
     return (
         any(mass.mass for mass in deck.masses)
         or any(deck.materials[name].density for name in used if name in deck.materials)
@@ -210,7 +210,7 @@ def _attached(deck: Deck) -> dict[str, Any]:
 
 
 def _interface(deck: Deck, support: Support) -> dict[str, Any]:
-    """Return the interface of a support: rigid where all of its motions are held, else node by node."""
+    """Return the interface of a support: rigid if all its motions are held, otherwise of kind "nodes"."""
     nodes = deck.mesh.node_sets[support.nodes]
     points = deck.mesh.nodes[nodes]
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
@@ -223,7 +223,7 @@ def _interface(deck: Deck, support: Support) -> dict[str, Any]:
 
 
 def _nodes_with_rotations(deck: Deck) -> Any:
-    """Return the rows of nodes of shells, lines and leaders of rigid groups."""
+    """Return the indices of nodes of shells and lines, and of leaders of rigid groups."""
     groups = {each.group for each in sections_of(deck) if not isinstance(each, SolidSection | RodSection)}
     found = [
         block.nodes[block.groups[group]].ravel() for block in deck.mesh.blocks for group in groups & set(block.groups)
@@ -264,7 +264,7 @@ def _free(taken: Iterable[str], name: str) -> str:
 
 
 def toml_text(tables: Mapping[str, Any]) -> str:
-    """Return tables as TOML: [a.b] for tables of tables, one key a line, inner tables in braces."""
+    """Return tables as TOML: [a.b] for tables of tables, one key per line, inner tables in braces."""
     lines: list[str] = []
     for name, table in tables.items():
         if all(isinstance(value, Mapping) for value in table.values()):

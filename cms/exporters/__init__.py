@@ -1,1 +1,1 @@
-"""A reduced body in the files of multibody programs; what a format cannot hold is said in words."""
+"""Writers for the file formats of multibody programs; each reports what its format cannot hold."""

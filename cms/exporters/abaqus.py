@@ -1,4 +1,4 @@
-"""Abaqus: a superelement as a linear user element, the text that substructures are written in."""
+"""Abaqus: a superelement as a linear user element, the text form of substructures."""
 
 from collections.abc import Iterator
 
@@ -13,14 +13,15 @@ from fe_models.foundation.arrays import Array
 __all__ = ["make_abaqus"]
 
 FIRST_MODE = 1000001  #: number of the node whose dof 1 is the first mode
-SAME_PLACE = 1e-9  #: distance of a node from a boundary node, of the size of the body, that is none
-PER_LINE = 4  #: entries of a matrix
+#: distance between a kept node and a boundary node, relative to the body size, below which they coincide
+SAME_PLACE = 1e-9
+PER_LINE = 4  #: matrix entries per line
 
 
 def make_abaqus(request: Request) -> Made:
-    """Return a deck to include: nodes, `*USER ELEMENT, LINEAR` with its dofs and matrices, and the one element.
+    """Return a deck to include: nodes, `*USER ELEMENT, LINEAR` with its dofs and matrices, and a single element.
 
-    Modes are dof 1 of nodes of their own, at the origin. Matrices: column j from row 1 to the diagonal.
+    Each mode is dof 1 of its own node, placed at the origin. Matrices list column j from row 1 to the diagonal.
     """
     model = interface_model(request.body)
     notes = [
@@ -34,7 +35,7 @@ def make_abaqus(request: Request) -> Made:
 
 
 def in_mesh(body: ReducedBody, node: BoundaryNode) -> str:
-    """Say which node of the user's mesh stands at a boundary node: a member of its interface there, if it has one."""
+    """Return text with the node of the user's mesh at a boundary node: a member of its interface, if there is one."""
     interface = next(each for each in body.interfaces if each.name == node.interface)
     place = body.frame.axes.T @ (node.position - body.frame.origin)
     members = interface.members
@@ -47,7 +48,7 @@ def in_mesh(body: ReducedBody, node: BoundaryNode) -> str:
 
 
 def lines_of(model: InterfaceModel) -> Iterator[str]:
-    """Yield the deck behind its comments."""
+    """Yield the deck after its comments."""
     numbers = [k + 1 for k in range(len(model.nodes))] + [FIRST_MODE + k for k in range(model.n_modes)]
     components = [[int(c) + 1 for c in node.components] for node in model.nodes] + [[1]] * model.n_modes
     places = [node.position for node in model.nodes] + [np.zeros(3)] * model.n_modes
@@ -59,7 +60,7 @@ def lines_of(model: InterfaceModel) -> Iterator[str]:
     for first in range(0, len(numbers), 10):
         yield "** " + ", ".join(str(number) for number in numbers[first : first + 10])
     for k, own in enumerate(components):
-        if k == 0 or own != components[k - 1]:  # a line holds for its node and those behind it
+        if k == 0 or own != components[k - 1]:  # a line holds for its node and all following nodes
             yield ", ".join(str(word) for word in (own if k == 0 else [k + 1, *own]))
     for kind, matrix in {"STIFFNESS": model.K, "MASS": model.M, "VISCOUS DAMPING": model.D}.items():
         if np.any(matrix):
@@ -73,7 +74,7 @@ def lines_of(model: InterfaceModel) -> Iterator[str]:
 
 
 def triangle(matrix: Array) -> Iterator[str]:
-    """Yield the upper triangle by columns, each number to its last bit."""
+    """Yield the upper triangle column by column, in full precision."""
     entries = matrix.T[np.tril_indices(len(matrix))].tolist()
     for first in range(0, len(entries), PER_LINE):
         yield ", ".join(f"{value:.16e}" for value in entries[first : first + PER_LINE])

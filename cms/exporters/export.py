@@ -1,4 +1,4 @@
-"""A reduced body in the format of another program: the table of writers, and the one way to use it."""
+"""Export of a reduced body to another program: the table of writers, and the function that uses it."""
 
 import os
 from collections.abc import Mapping
@@ -31,7 +31,7 @@ __all__ = ["WRITERS", "Exported", "export_body"]
 
 OVER_INTERFACES = frozenset(
     {"damping", "rotation", "load cases", "axes in B"}
-)  #: held by all matrices over the interfaces
+)  #: content of all formats with matrices over the interfaces
 WRITERS: dict[str, Writer] = {
     "mbsim": Writer(
         make_mbsim,
@@ -79,16 +79,16 @@ NEEDS = {
     "modes": (lambda body: body.n_q > 0, "has no modes: it is rigid; give the other program its mass and inertia"),
     "nodes": (lambda body: len(body.nodes) > 0, "has no nodes with shapes, of which the format is made"),
     "interfaces": (lambda body: len(body.interfaces) > 0, "has no interfaces, whose motion the format is made of"),
-}  #: key of `Writer.needs` -> whether a body has it, and what is said if not
+}  #: test whether the body meets each key of `Writer.needs`, and the text of the error
 
 
 @dataclass(frozen=True)
 class Exported:
-    """What was written, and what the format could not hold."""
+    """The written files, and what the format could not hold."""
 
     files: tuple[Path, ...]
-    left_out: tuple[str, ...]  #: in words, what the body has and the files do not
-    notes: tuple[str, ...]  #: where the interfaces are, and what else the other program's user has to know
+    left_out: tuple[str, ...]  #: descriptions of what the body has but the files do not
+    notes: tuple[str, ...]  #: positions of the interfaces, and other facts for the user of the other program
 
 
 def export_body(
@@ -100,35 +100,34 @@ def export_body(
     nodes: str = "default",
     loads: Mapping[str, float] | None = None,
 ) -> Exported:
-    """Write a reduced body in the format of another program; files are written whole or not at all.
+    """Write a reduced body in the format of another program; files are written completely or not at all.
 
     Parameters
     ----------
     body
         A reduced body, or its modal file.
     path
-        The file to write, with the suffix of the format where it has none; formats of several files take its stem for
-        the others.
+        The file to write. A missing suffix is added; formats with several files use its stem for the others.
     to
-        Key of the format, as `cms formats` lists it.
+        Key of the format, as listed by `cms formats`.
     units
-        Unit system of the numbers, or its name. It has to be said: most formats do not name their units.
+        Unit system of the numbers, or its name. It is required, because most formats do not record their units.
     nodes
-        Nodes of formats that leave the choice (SID_FEM, MBDyn): "interfaces" or "all"; "default": what is usual there.
+        Nodes in formats that allow a choice (SID_FEM, MBDyn): "interfaces", "all", or "default" for the usual choice.
     loads
-        Amplitudes of load cases that act all the time, by name, in formats that hold such loads (ext_ptfm).
+        Amplitudes of load cases that act permanently, by name, for formats with such loads (ext_ptfm).
 
     Returns
     -------
     exported
-        The files, and in words what the format cannot hold of this body.
+        The files, and a description of what the format cannot hold of this body.
 
     Raises
     ------
     ExportError
-        If the format is unknown, the body lacks what it needs, or the files cannot be written.
+        If the format is unknown, the body lacks data that it needs, or the files cannot be written.
     ModalFileError
-        If the body cannot be read.
+        If the modal file cannot be read.
     UnitsError
         If the unit system is unknown.
     """
@@ -156,12 +155,12 @@ def export_body(
 
 
 def wanted_units(units: Units | str | None, to: str, writer: Writer) -> Units:
-    """Return the unit system that was asked for.
+    """Return the requested unit system.
 
     Raises
     ------
     ExportError
-        If none was, or the program behind the format knows another one only.
+        If no unit system was given, or the other program only accepts another one.
     """
     if units is None:
         raise ExportError(
@@ -177,13 +176,13 @@ def wanted_units(units: Units | str | None, to: str, writer: Writer) -> Units:
 
 
 def with_suffix(path: Path, to: str) -> Path:
-    """Return the path with the suffix of the format where it has none."""
+    """Return the path, with the suffix of the format if it has none."""
     suffix = next(known.suffixes[0] for known in FORMATS if known.key == to)
     return path if path.suffix or is_stream(path) else path.with_suffix(suffix)
 
 
 def require_content(body: ReducedBody, to: str, writer: Writer) -> None:
-    """Raise `ExportError` unless the body has what the format is made of."""
+    """Raise `ExportError` unless the body has the data that the format needs."""
     where = f"export to {to}: body {body.name!r}"
     if body.is_held and not writer.takes_held:
         raise ExportError(

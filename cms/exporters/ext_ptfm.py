@@ -1,4 +1,4 @@
-"""OpenFAST's ExtPtfm: a superelement of one interface node and its fixed-interface modes, in the format FlexASCII."""
+"""OpenFAST's ExtPtfm: a superelement with one interface node and its fixed-interface modes (format FlexASCII)."""
 
 from collections.abc import Iterator, Mapping
 
@@ -12,7 +12,7 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["make_ext_ptfm"]
 
-LAST_TIME = 10000.0  #: [s] the loads are constant, from zero to here
+LAST_TIME = 10000.0  #: the loads are constant from zero to this time [s]
 
 
 def make_ext_ptfm(request: Request) -> Made:
@@ -21,7 +21,7 @@ def make_ext_ptfm(request: Request) -> Made:
     Raises
     ------
     ExportError
-        If the body has not exactly one interface of six dofs, or a load case is unknown.
+        If the body does not have exactly one interface with six dofs, or a load case is unknown.
     """
     body = request.body
     if len(body.interfaces) != 1:
@@ -50,7 +50,7 @@ def make_ext_ptfm(request: Request) -> Made:
 
 
 def load_of(model: InterfaceModel, wanted: Mapping[str, float]) -> Array:
-    """Return the sum of load cases times their amplitudes, (n,)."""
+    """Return the sum of load cases, each times its amplitude, (n,)."""
     f = np.zeros(len(model.K))
     names = [case.name for case in model.body.load_cases]
     for name, amplitude in wanted.items():
@@ -84,5 +84,5 @@ def lines_of(model: InterfaceModel, f: Array, request: Request) -> Iterator[str]
 
 
 def row_of(values: Array) -> str:
-    """Return numbers on one line, each to its last bit."""
+    """Return numbers on one line, in full precision."""
     return " ".join(f"{value:24.16e}" for value in np.asarray(values).tolist())

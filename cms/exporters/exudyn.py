@@ -1,4 +1,4 @@
-"""Exudyn: the archive of its ObjectFFRFreducedOrderInterface, and a script that makes a body of it."""
+"""Exudyn: the archive of its ObjectFFRFreducedOrderInterface, and a script that makes a body from it."""
 
 import io
 from pathlib import Path
@@ -13,9 +13,10 @@ from fe_models.foundation.arrays import Array, tilde
 
 __all__ = ["make_exudyn"]
 
-SPEED = 0.05  #: angular velocity of the script about each axis, times 1, 2, 3, over the lowest frequency
-BENT = 0.01  #: displacement at its start over the size of the body
-FILE_VERSION = 1  #: of the archive, as exudyn 1.9 to 1.13 write it
+#: angular velocity in the script, relative to the lowest frequency; multiplied by 1, 2, 3 for the three axes
+SPEED = 0.05
+BENT = 0.01  #: initial displacement in the script, relative to the size of the body
+FILE_VERSION = 1  #: version of the archive, as exudyn 1.9 to 1.13 write it
 
 
 def make_exudyn(request: Request) -> Made:
@@ -29,10 +30,10 @@ def make_exudyn(request: Request) -> Made:
 
 
 def archive_of(body: ReducedBody) -> dict[str, Any]:
-    """Return the arrays by the names of ObjectFFRFreducedOrderInterface, and those of this project behind a prefix.
+    """Return the arrays of ObjectFFRFreducedOrderInterface by name, and arrays of this project with a prefix.
 
-    With x~ the skew matrix of a vector, all integrals over mass, and shapes side by side in blocks of one or three
-    columns:
+    x~ is the skew matrix of a vector. All integrals are over mass. Shapes are placed side by side in blocks of one or
+    three columns:
 
         mPhitTPsi = 1C,  mPhitTPsiTilde = [1C_k~],  mXRefTildePsi = int c~^T phi_k = -2C
         mXRefTildePsiTilde = int c~^T phi_k~ = 3C_k,  mPsiTildePsi = int phi_k~^T phi_l = 4C_kl,
@@ -40,10 +41,10 @@ def archive_of(body: ReducedBody) -> dict[str, Any]:
     """
     moments, n = body.moments, body.n_q
     stress: dict[str, Any] = {}
-    if body.stress is not None:  # node; six components of the first mode, six of the second, ...
+    if body.stress is not None:  # rows are nodes; columns are six components of the first mode, six of the second, ...
         rows = np.asarray(body.stress).transpose(0, 2, 1).reshape(len(body.nodes), 6 * n)
         stress = {"matrix": rows, "outputVariableType": "OutputVariableType.StressLocal"}
-    post = np.empty((), dtype=object)  # a dict, which exudyn takes out with .item()
+    post = np.empty((), dtype=object)  # a dict, which exudyn extracts with .item()
     post[()] = stress
     ours: dict[str, Any] = {
         "floatframe_damping": body.D,
@@ -57,7 +58,7 @@ def archive_of(body: ReducedBody) -> dict[str, Any]:
     }
     for k, interface in enumerate(body.interfaces):
         ours[f"floatframe_members_{k}"] = interface.members
-    if body.numbering.nodes.size:  # of the user's mesh, -1 where a node has none
+    if body.numbering.nodes.size:  # numbers in the user's mesh, -1 for nodes without a number
         ours["floatframe_node_numbers"] = body.numbering.nodes
     return {
         "modeBasis": body.Phi.reshape(-1, n),
@@ -86,17 +87,17 @@ def archive_of(body: ReducedBody) -> dict[str, Any]:
 
 
 def references(body: ReducedBody) -> list[int | None]:
-    """Return the kept node that is the reference point of each interface, None where there is none."""
+    """Return the kept node at the reference point of each interface; None if there is none."""
     return [reference_row(body, k) for k in range(len(body.interfaces))]
 
 
 def side_by_side(matrices: Array) -> Array:
-    """Return (n, 3, 3) as (3, 3 n)."""
+    """Return matrices (n, 3, 3) side by side, (3, 3 n)."""
     return np.asarray(matrices).transpose(1, 0, 2).reshape(3, -1)
 
 
 def members_words(interface: Any) -> str:
-    """Return how the script attaches an interface."""
+    """Describe to what the script attaches a marker of an interface."""
     return f"marker of {len(interface.members)} mesh nodes"
 
 

@@ -1,4 +1,4 @@
-"""The formats that a reduced body is written in."""
+"""The file formats in which a reduced body can be written."""
 
 from fe_models.foundation.formats import FileFormat
 

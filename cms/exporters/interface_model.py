@@ -1,19 +1,19 @@
-"""A reduced body over the motions of its interfaces and fixed-interface modes, as other programs have superelements.
+"""A reduced body over interface motions and fixed-interface modes, the superelement form of other programs.
 
-The modal file holds diagonalised modes without rigid motion. With the rigid motion (d, theta) of B beside them
+The modal file holds diagonalised modes without rigid motion. Together with the rigid motion (d, theta) of B they give
 
     u(c) = d + theta × c + Phi q,  z = (d, theta, q),  M_z = [M_R, Y; Yᵀ, M],  K_z = diag(0, K),  Y = [1C; 2C]
 
-and the interfaces move by u_b = B z, B from their positions and maps Psi. If B has full row rank, z follows from u_b
-and as many further coordinates as are left (docs/theory.md §2):
+The interfaces move by u_b = B z, where B follows from their positions and maps Psi. If B has full row rank, z follows
+from u_b and the remaining coordinates (docs/theory.md §2):
 
-(1) N: a basis of the motions that hold all interfaces, B N = 0
-(2) constraint modes Z: B Z = 1 with the least energy, so that NᵀK_z Z = 0
-(3) fixed-interface modes N X: of the pencil (Nᵀ K_z N, Nᵀ M_z N), of unit mass
-(4) T = [Z, N X], K = Tᵀ K_z T and so on; loads by Tᵀ of (force, torque, h)
+(1) N is a basis of the motions that hold all interfaces, B N = 0
+(2) constraint modes Z: B Z = 1 with minimal energy, so that NᵀK_z Z = 0
+(3) fixed-interface modes N X of the pencil (Nᵀ K_z N, Nᵀ M_z N), with unit mass
+(4) T = [Z, N X] gives K = Tᵀ K_z T, and M and D likewise; loads are Tᵀ (force, torque, h)
 
-The span is that of the body with its rigid motion: nothing is lost or added. A Craig-Bampton body gives its
-superelement back.
+The span is that of the body with its rigid motion; nothing is lost or added. A Craig-Bampton body gives its original
+superelement.
 """
 
 from dataclasses import dataclass
@@ -30,37 +30,37 @@ from fe_models.foundation.components import MOTION_COMPONENTS
 
 __all__ = ["BoundaryNode", "InterfaceModel", "interface_model"]
 
-RANK_TOLERANCE = 1e-9  #: singular values of the scaled map below this part of the greatest count as zero
-STILL = 1e-12  #: motion of the interfaces below this part of the largest of a mode is rounding: the frame holds them,
-#: rotations times the extent of the body
-MASSLESS = 1e-14  #: mass of a fixed-interface mode of unit stiffness below this part of the greatest: none
+RANK_TOLERANCE = 1e-9  #: singular values of the scaled map below this share of the largest count as zero
+STILL = 1e-12  #: interface motion of a mode below this share of its largest is rounding: the frame holds the interface;
+#: rotations are multiplied by the extent of the body
+MASSLESS = 1e-14  #: mass of a fixed-interface mode of unit stiffness below this share of the largest counts as zero
 
 
 @dataclass(frozen=True, eq=False)
 class BoundaryNode:
-    """A point of an interface and its dofs in the boundary."""
+    """A point of an interface, and its dofs in the boundary."""
 
     interface: str
     position: Array  #: in mesh coordinates, (3,) [m]
     components: IntArray  #: 0-2 translations, 3-5 rotations, mesh axes
-    first: int  #: row of its first dof
+    first: int  #: row of its first dof among the boundary dofs
 
 
 @dataclass(frozen=True, eq=False)
 class InterfaceModel:
-    """Matrices over y = (motions of the boundary nodes in mesh axes, fixed-interface modes of unit mass)."""
+    """Matrices over y = (motions of boundary nodes in mesh axes, fixed-interface modes of unit mass)."""
 
     body: ReducedBody
     nodes: tuple[BoundaryNode, ...]
     K: Array  #: (n, n), symmetric
     M: Array  #: (n, n), symmetric
     D: Array  #: (n, n), symmetric
-    T: Array  #: z = T y: rigid motion of B (six rows; none of a held body), then q, (6 + n_q, n)
-    loads: Array  #: of the load cases, for an amplitude of one, (n, n_load_cases)
+    T: Array  #: z = T y: rigid motion of B (six rows; none for a held body), then q, (6 + n_q, n)
+    loads: Array  #: load cases of unit amplitude, (n, n_load_cases)
 
     @property
     def n_boundary(self) -> int:
-        """Number of dofs of the boundary nodes."""
+        """Number of dofs of all boundary nodes."""
         return sum(len(node.components) for node in self.nodes)
 
     @property
@@ -70,13 +70,13 @@ class InterfaceModel:
 
     @property
     def omega(self) -> Array:
-        """Angular frequencies of the fixed-interface modes, (n_modes,) [rad/s]; infinite without mass."""
+        """Angular frequencies of the fixed-interface modes, (n_modes,) [rad/s]; infinite for massless modes."""
         inner = slice(self.n_boundary, None)
         mass, stiffness = np.diag(self.M)[inner], np.diag(self.K)[inner]
         return np.sqrt(np.divide(stiffness, mass, out=np.full(len(mass), np.inf), where=mass > 0))
 
     def recovery(self) -> Array:
-        """Return the translations of the kept nodes in mesh axes for each of y, (n_kept, 3, n)."""
+        """Return the translations of the kept nodes in mesh axes for unit values of y, (n_kept, 3, n)."""
         body = self.body
         motions = body.Phi
         if not body.is_held:
@@ -84,26 +84,26 @@ class InterfaceModel:
         return np.asarray(body.frame.axes @ motions @ self.T)
 
     def mesh_positions(self) -> Array:
-        """Return the kept nodes in mesh coordinates, (n_kept, 3) [m]."""
+        """Return the positions of the kept nodes in mesh coordinates, (n_kept, 3) [m]."""
         frame = self.body.frame
         return np.asarray(frame.origin + self.body.nodes @ frame.axes.T)
 
 
 def interface_model(body: ReducedBody) -> InterfaceModel:
-    """Return the body over its interfaces.
+    """Return the body as matrices over its interfaces.
 
     Raises
     ------
     ExportError
-        If its modes do not let all dofs of the interfaces move independently (the message names the constraint modes
-        that are missing), or if its interfaces do not hold it.
+        If its modes do not move all interface dofs independently (the message names the missing constraint modes), or
+        if its interfaces do not hold it.
     """
     nodes, B = boundary_of(body)
     M, K, D, loads = free_matrices(body)
     S = 1 / np.maximum(np.abs(B).max(axis=0), np.finfo(float).tiny) if len(B) else np.ones(B.shape[1])
     S[np.abs(B).max(axis=0, initial=0.0) == 0] = 1.0
     rows = 1 / np.maximum(np.linalg.norm(B * S, axis=1), np.finfo(float).tiny)
-    scaled = rows[:, None] * B * S  # columns of one size, then rows
+    scaled = rows[:, None] * B * S  # columns scaled to equal size, then rows
     require_rank(body, nodes, scaled)
     N = S[:, None] * la.qr(scaled.T)[0][:, len(B) :]
     z = S[:, None] * la.lstsq(scaled, np.diag(rows))[0]
@@ -114,7 +114,7 @@ def interface_model(body: ReducedBody) -> InterfaceModel:
     T = np.hstack([Z, N @ X])
     n_b = len(B)
     K_y, M_y, D_y = (symmetric(T.T @ matrix @ T) for matrix in (K, M, D))
-    K_y[:n_b, n_b:] = K_y[n_b:, :n_b] = 0.0  # (2); what stands there is rounding
+    K_y[:n_b, n_b:] = K_y[n_b:, :n_b] = 0.0  # (2); nonzero values are rounding
     for matrix in (K_y, M_y):  # (3)
         inner = matrix[n_b:, n_b:]
         inner[...] = np.diag(np.diag(inner))
@@ -122,7 +122,7 @@ def interface_model(body: ReducedBody) -> InterfaceModel:
 
 
 def free_matrices(body: ReducedBody) -> tuple[Array, Array, Array, Array]:
-    """Return M, K, D and loads over z; of a held body over q alone."""
+    """Return M, K, D and loads over z; for a held body over q alone."""
     M, K, D = (np.array(matrix) for matrix in (body.M, body.K, body.D))
     loads = np.array([case.h for case in body.load_cases]).reshape(-1, body.n_q).T
     if body.is_held:
@@ -136,7 +136,7 @@ def free_matrices(body: ReducedBody) -> tuple[Array, Array, Array, Array]:
 
 
 def boundary_of(body: ReducedBody) -> tuple[tuple[BoundaryNode, ...], Array]:
-    """Return the nodes of all interfaces and the map B from z to their dofs in mesh axes."""
+    """Return the boundary nodes of all interfaces, and the map B from z to their dofs in mesh axes."""
     frame, A = body.frame, body.frame.axes
     nodes: list[BoundaryNode] = []
     rows: list[Array] = []
@@ -155,12 +155,12 @@ def boundary_of(body: ReducedBody) -> tuple[tuple[BoundaryNode, ...], Array]:
 
 
 def still_modes(body: ReducedBody, motion: Array, components: IntArray) -> Array:
-    """Return which modes move no interface but by rounding, (n_q,).
+    """Return which modes move no interface beyond rounding, (n_q,).
 
     `motion` has a row for each of `components`: 0-2 translations, 3-5 rotations, (n, n_q).
 
-    A frame at the only interface lets none of them move it. What is left there, 1e-19 and any direction, would
-    otherwise be scaled like a motion and take the place of the rigid ones.
+    If the frame is at the only interface, no mode moves it. The remaining motion of about 1e-19 in random directions
+    would otherwise be scaled up and replace the rigid motions.
     """
     extent = float(np.ptp(body.nodes, axis=0).max(initial=0.0))
     if not len(motion) or extent == 0.0:  # a point has no length to measure rotations by
@@ -172,7 +172,7 @@ def still_modes(body: ReducedBody, motion: Array, components: IntArray) -> Array
 def places_of(body: ReducedBody, interface: ReducedInterface) -> list[tuple[Array, Array]]:
     """Return points of an interface in B, each with the map from (d, theta, q) to its three or six dofs.
 
-    One point with six dofs; the members with three each where the interface has no reference node of its own.
+    This is one point with six dofs, or the members with three dofs each if the interface has no reference node.
     """
     if interface.kind == "nodes" and not (len(interface.members) == 1 and interface.has_rotation):
         points, Phi = body.nodes[interface.members], body.Phi[interface.members]
@@ -183,7 +183,7 @@ def places_of(body: ReducedBody, interface: ReducedInterface) -> list[tuple[Arra
 
 
 def require_rank(body: ReducedBody, nodes: tuple[BoundaryNode, ...], scaled: Array) -> None:
-    """Raise `ExportError` naming the constraint modes that are missing, unless the map has full row rank."""
+    """Raise `ExportError` that names the missing constraint modes, unless the map has full row rank."""
     names = [f"{node.interface} {MOTION_COMPONENTS[c]}" for node in nodes for c in node.components]
     n_b = len(scaled)
     _, R, order = la.qr(scaled.T, mode="economic", pivoting=True)
@@ -202,7 +202,7 @@ def require_rank(body: ReducedBody, nodes: tuple[BoundaryNode, ...], scaled: Arr
 
 
 def held_factor(body: ReducedBody, K_N: Array) -> tuple[Array, bool]:
-    """Return the Cholesky factor of the stiffness with held interfaces; raise if it leaves motions without energy."""
+    """Return the Cholesky factor of the stiffness with held interfaces; raise `ExportError` if it is singular."""
     energy = la.eigvalsh(K_N) if len(K_N) else np.ones(0)
     free = int((energy <= 1e-12 * energy.max(initial=0.0)).sum())
     if free:
@@ -215,15 +215,15 @@ def held_factor(body: ReducedBody, K_N: Array) -> tuple[Array, bool]:
 
 
 def fixed_modes(K_N: Array, M_N: Array) -> Array:
-    """Return the eigenvectors of the pencil by ascending frequency, of unit mass, or of unit stiffness without mass."""
+    """Return the eigenvectors of the pencil by ascending frequency, with unit mass (massless: unit stiffness)."""
     if not len(K_N):
         return K_N
-    mu, X = la.eigh(symmetric(M_N), symmetric(K_N))  # M x = mu K x: K is definite, M may be singular
+    mu, X = la.eigh(symmetric(M_N), symmetric(K_N))  # M x = mu K x, because K is definite but M may be singular
     mu, X = mu[::-1], X[:, ::-1]
     has_mass = mu > MASSLESS * mu[0]
     return np.asarray(X / np.sqrt(np.where(has_mass, mu, 1.0)))
 
 
 def symmetric(matrix: Array) -> Array:
-    """Return the symmetric part of what is symmetric but for rounding."""
+    """Return the symmetric part of a matrix that is symmetric to rounding."""
     return np.asarray((matrix + matrix.T) / 2)

@@ -1,4 +1,4 @@
-"""MATLAB: matrices of a body over its interfaces in .mat files of version 5 and 7.3, and Simscape's flexible solid."""
+"""MATLAB: matrices of a body over its interfaces in .mat files of version 5 or 7.3, and Simscape's flexible solid."""
 
 import io
 from collections.abc import Mapping
@@ -14,18 +14,18 @@ from fe_models.foundation.arrays import Array
 __all__ = ["make_mat5", "make_mat73", "make_simscape"]
 
 FIRST_MODE = 1000001  #: number of the first mode in the list of dofs
-TEXT_OF_HEADER = 116  #: bytes of words at the beginning of every .mat file
-USER_BLOCK = 512  #: of version 7.3: the header, then HDF5
+TEXT_OF_HEADER = 116  #: bytes of text at the beginning of every .mat file
+USER_BLOCK = 512  #: bytes before HDF5 in version 7.3, which hold the header
 
 
 def make_mat5(request: Request) -> Made:
-    """Return a file of version 5, which MATLAB, Octave and scipy read."""
+    """Return a file of version 5, which MATLAB, Octave and SciPy can read."""
     model = interface_model(request.body)
     return Made({request.path: mat5(variables(model, request), request)}, notes_of(model))
 
 
 def make_mat73(request: Request) -> Made:
-    """Return a file of version 7.3: HDF5 with MATLAB's header and classes."""
+    """Return a file of version 7.3: HDF5 with the header and class attributes of MATLAB."""
     model = interface_model(request.body)
     return Made({request.path: mat73(variables(model, request), request)}, notes_of(model))
 
@@ -33,8 +33,8 @@ def make_mat73(request: Request) -> Made:
 def make_simscape(request: Request) -> Made:
     """Return a file of version 5 with the structure `rom`: P, K, M, C of a Reduced Order Flexible Solid.
 
-    P: origins of the interface frames, a row each, axes those of the mesh; K, M, C: six rows (three translations,
-    three rotations) for each frame in the order of P, then the modes.
+    P holds the origins of the interface frames as rows; their axes are the mesh axes. K, M, C have six rows (three
+    translations, three rotations) for each frame in the order of P, then the modes.
     """
     model = interface_model(request.body)
     for node in model.nodes:
@@ -49,7 +49,7 @@ def make_simscape(request: Request) -> Made:
 
 
 def variables(model: InterfaceModel, request: Request) -> dict[str, Any]:
-    """Return the variables by name; docs/formats.md has the list."""
+    """Return the variables by name, as listed in docs/formats.md."""
     body = model.body
     rows = [(k + 1, c + 1) for k, node in enumerate(model.nodes) for c in node.components]
     rows += [(FIRST_MODE + k, 0) for k in range(model.n_modes)]
@@ -77,7 +77,7 @@ def variables(model: InterfaceModel, request: Request) -> dict[str, Any]:
 
 
 def notes_of(model: InterfaceModel) -> tuple[str, ...]:
-    """Return which rows are which."""
+    """Return a description of the rows."""
     found = [
         f"interface {node.interface}: rows {node.first + 1} to {node.first + len(node.components)}"
         for node in model.nodes
@@ -88,14 +88,14 @@ def notes_of(model: InterfaceModel) -> tuple[str, ...]:
 
 
 def rows_of_text(lines: Any) -> np.ndarray:
-    """Return strings as a column of one length, as MATLAB holds them."""
+    """Return strings as a column of equal length, as MATLAB stores them."""
     ascii_lines = [in_ascii(line) for line in lines]
     width = max([len(line) for line in ascii_lines], default=1) or 1
     return np.array([line.ljust(width) for line in ascii_lines])
 
 
 def mat5(values: Mapping[str, Any], request: Request) -> bytes:
-    """Return the file; its words say whence and not when, so that equal bodies give equal bytes."""
+    """Return the file; its header has no date, so that equal bodies give equal bytes."""
     from scipy.io import savemat
 
     image = io.BytesIO()
@@ -104,7 +104,7 @@ def mat5(values: Mapping[str, Any], request: Request) -> bytes:
 
 
 def mat73(values: Mapping[str, Any], request: Request) -> bytes:
-    """Return the file: arrays with their indices in reverse and the attribute MATLAB_class; text as numbers."""
+    """Return the file: arrays with reversed indices and the attribute MATLAB_class; text as numbers."""
     import h5py
 
     image = io.BytesIO()
@@ -117,17 +117,17 @@ def mat73(values: Mapping[str, Any], request: Request) -> bytes:
             item.attrs.create("MATLAB_class", np.bytes_(b"char" if is_text else b"double"))
             if is_text:
                 item.attrs.create("MATLAB_int_decode", np.int32(2))
-    # words, no subsystem data, version 2.0 of the container, byte order
+    # text, no subsystem data, version 2.0 of the container, byte order
     head = header_words("7.3", request) + bytes(8) + (0x0200).to_bytes(2, "little") + b"IM"
     return head.ljust(USER_BLOCK, b"\0") + image.getvalue()[USER_BLOCK:]
 
 
 def letters(text: np.ndarray) -> Array:
-    """Return rows of text as UTF-16 numbers, (n_rows, width)."""
+    """Return rows of text as UTF-16 code units, (n_rows, width)."""
     return np.array([[ord(letter) for letter in row] for row in text.tolist()], dtype="<u2")
 
 
 def header_words(version: str, request: Request) -> bytes:
-    """Return the words at the beginning of a file."""
+    """Return the header text of a file."""
     words = f"MATLAB {version} MAT-file, {'; '.join(request.header()[:3])}"
     return words.encode("ascii")[:TEXT_OF_HEADER].ljust(TEXT_OF_HEADER)

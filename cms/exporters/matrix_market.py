@@ -1,4 +1,4 @@
-"""Matrix Market: stiffness, mass and damping of a body over its interfaces, one text file a matrix."""
+"""Matrix Market: stiffness, mass and damping of a body over its interfaces, one text file for each matrix."""
 
 import io
 from pathlib import Path
@@ -14,7 +14,7 @@ __all__ = ["make_matrix_market"]
 
 
 def make_matrix_market(request: Request) -> Made:
-    """Return FILE_K.mtx, FILE_M.mtx, FILE_C.mtx and, of load cases, FILE_F.mtx; comments name the rows."""
+    """Return FILE_K.mtx, FILE_M.mtx, FILE_C.mtx and, if there are load cases, FILE_F.mtx; comments name the rows."""
     model = interface_model(request.body)
     names = [f"{node.interface} {MOTION_COMPONENTS[c]}" for node in model.nodes for c in node.components]
     names += [f"fixed-interface mode {k + 1}" for k in range(model.n_modes)]
@@ -29,7 +29,7 @@ def make_matrix_market(request: Request) -> Made:
 
 
 def text_of(matrix: Array, comment: str, symmetry: str) -> bytes:
-    """Return a file in coordinate format, every number to its last bit."""
+    """Return a file in coordinate format, in full precision."""
     from scipy.io import mmwrite
 
     image = io.BytesIO()

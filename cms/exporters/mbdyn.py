@@ -1,4 +1,4 @@
-"""MBDyn's modal joint: the .fem file with masses, modes at nodes, invariants and stress stiffening."""
+"""MBDyn's modal joint: the .fem file with masses, nodal modes, invariants and stress stiffening."""
 
 from collections.abc import Iterable, Iterator
 
@@ -13,17 +13,18 @@ __all__ = ["make_mbdyn"]
 
 
 def make_mbdyn(request: Request) -> Made:
-    """Return the file: all record groups but 3, 4 (start) and 11 (lumped masses, of which MBDyn would form invariants).
+    """Return the file with all record groups except 3, 4 (initial state) and 11 (lumped masses).
 
-    With int over mass, c and phi in the frame of the modal node, x~ the skew matrix:
+    Group 11 is left out, because MBDyn would compute invariants from it. With integrals over mass, c and phi in the
+    frame of the modal node, and x~ the skew matrix:
 
         14  Inv3 = int phi_k = 1C                    15  Inv4 = int c × phi_k = 2C
         16  Inv8_k = -int c~ phi_k~ = 3C_k           17  Inv5_jk = int phi_j × phi_k = 4C_kj
         18  Inv9_jk = int phi_j~ phi_k~ = -5C_jk     12  m, centre of mass, inertia about it
 
-    Group 19 holds K_geo of unit values of omega_x², omega_y², omega_z², omega_x omega_y, omega_y omega_z,
-    omega_z omega_x (products once: twice our K_ab), of the angular acceleration, of the acceleration less gravity, and
-    of force and moment at each node in the order in which the joint names them.
+    Group 19 holds K_geo for unit values of omega_x², omega_y², omega_z², omega_x omega_y, omega_y omega_z, omega_z
+    omega_x (each product appears once, hence twice our K_ab), of the angular acceleration, of acceleration minus
+    gravity, and of force and moment at each node in the order of the joint.
     """
     body = request.body
     nodes = interface_nodes(body) if request.nodes != "all" else all_nodes(body)
@@ -106,6 +107,6 @@ def group(number: int, name: str) -> Iterator[str]:
 
 
 def rows(matrix: Array) -> Iterator[str]:
-    """Yield the rows of a matrix, to the last bit."""
+    """Yield the rows of a matrix in full precision."""
     for row in np.asarray(matrix).tolist():
         yield " ".join(f"{value:.17e}" for value in row)

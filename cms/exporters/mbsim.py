@@ -1,4 +1,4 @@
-"""The input of MBSim's ExternalFlexibleFfrBody: one HDF5 file of integrals over mass and of nodal shapes."""
+"""The input of MBSim's ExternalFlexibleFfrBody: one HDF5 file of mass integrals and nodal shapes."""
 
 import io
 
@@ -11,12 +11,12 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["STRESS_ORDER", "make_mbsim"]
 
-STRESS_ORDER = [0, 1, 2, 5, 3, 4]  #: xx yy zz xy yz zx, from our xx yy zz yz xz xy
+STRESS_ORDER = [0, 1, 2, 5, 3, 4]  #: xx yy zz xy yz zx as indices into our xx yy zz yz xz xy
 UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  #: (a, b) of the blocks of int phi_a phi_b
 
 
 def make_mbsim(request: Request) -> Made:
-    """Return the file; datasets and their orders in docs/formats.md."""
+    """Return the file; docs/formats.md lists the datasets and their index orders."""
     import h5py
 
     body = request.body

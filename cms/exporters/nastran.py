@@ -1,4 +1,4 @@
-"""Nastran: a superelement as OUTPUT4 matrices with its bulk data, or as DMIG cards."""
+"""Nastran: a superelement as OUTPUT4 matrices with bulk data, or as DMIG cards."""
 
 from collections.abc import Iterable, Iterator
 
@@ -19,11 +19,11 @@ SYMMETRIC, RECTANGULAR, DOUBLE = 6, 9, 2  #: IFO and TIN of DMIG
 
 
 def make_op4(request: Request) -> Made:
-    """Return FILE.op4 (KXX, MXX, BXX, PX, MUG1) and FILE.asm, FILE.pch with the order of its rows.
+    """Return FILE.op4 (KXX, MXX, BXX, PX, MUG1), and FILE.asm and FILE.pch with the order of its rows.
 
-    Rows: six (three) of each interface node, then the modes as SPOINTs, as EXTRN in the .pch lists them; all in the
-    basic system. MUG1: six rows of each kept node, in the order of the table TUG1 in the .pch; rotations where they are
-    known, zero elsewhere, as of nodes of solid elements.
+    The rows are six (or three) dofs of each interface node, then the modes as SPOINTs, in the order of EXTRN in the
+    .pch; all in the basic system. MUG1 has six rows for each kept node, in the order of table TUG1 in the .pch. Unknown
+    rotations, as at nodes of solid elements, are zero.
     """
     model = interface_model(request.body)
     matrices = {"KXX": model.K, "MXX": model.M}
@@ -50,7 +50,7 @@ def make_op4(request: Request) -> Made:
 def make_dmig(request: Request) -> Made:
     """Return bulk data: GRIDs, SPOINTs, DMIG KAAX, MAAX, BAAX (one triangle) and PAX, for K2GG = KAAX and so on.
 
-    A field of 16 characters holds 10 digits, which the notes say.
+    A field of 16 characters holds 10 digits; the notes say so.
     """
     model = interface_model(request.body)
     lines = [*comments(request), "$ case control: K2GG = KAAX, M2GG = MAAX, B2GG = BAAX, P2G = PAX"]
@@ -72,18 +72,18 @@ def comments(request: Request) -> list[str]:
 
 
 def load_notes(model: InterfaceModel, name: str) -> list[str]:
-    """Return which column is which load case."""
+    """Return notes that assign columns to load cases."""
     return [f"load case {case.name}: column {k + 1} of {name}" for k, case in enumerate(model.body.load_cases)]
 
 
 def dofs_of(model: InterfaceModel) -> list[tuple[int, int]]:
-    """Return (grid, component from 1) of every row, (scalar point, 0) of the modes."""
+    """Return (grid, component from 1) of every row; (scalar point, 0) for modes."""
     nodes = [(k + 1, int(c) + 1) for k, node in enumerate(model.nodes) for c in node.components]
     return nodes + [(FIRST_SCALAR + k, 0) for k in range(model.n_modes)]
 
 
 def grid_lines(model: InterfaceModel) -> Iterator[str]:
-    """Yield the GRIDs of the interfaces in the basic system, dofs that the model lacks as permanent constraints."""
+    """Yield the GRIDs of the interfaces in the basic system; missing dofs are permanent constraints."""
     for k, node in enumerate(model.nodes):
         held = "".join(str(c + 1) for c in range(6) if c not in node.components)
         yield from grid(k + 1, node.position, held)
@@ -104,7 +104,7 @@ def spoint_lines(model: InterfaceModel) -> Iterator[str]:
 
 
 def superelement_lines(model: InterfaceModel) -> Iterator[str]:
-    """Yield the part of the superelement: order of rows (EXTRN), grids, analysis set, scalar points."""
+    """Yield the superelement part: order of rows (EXTRN), grids, analysis set, scalar points."""
     nodes = [(k + 1, "".join(str(c + 1) for c in node.components)) for k, node in enumerate(model.nodes)]
     pairs = nodes + [(FIRST_SCALAR + k, "0") for k in range(model.n_modes)]
     yield "BEGIN SUPER        1"
@@ -120,9 +120,9 @@ def superelement_lines(model: InterfaceModel) -> Iterator[str]:
 
 
 def recovery_numbers(model: InterfaceModel) -> tuple[IntArray, tuple[str, ...]]:
-    """Return the GRIDs of the kept nodes, and in words whose they are: those of the mesh, or from `FIRST_NODE` on.
+    """Return the GRIDs of the kept nodes, and a note about them: mesh numbers, or numbers from `FIRST_NODE` on.
 
-    They must not be those of the interfaces, 1, 2, ..., nor those of the SPOINTs of the modes.
+    They must differ from the numbers of the interfaces, 1, 2, ..., and from the SPOINTs of the modes.
     """
     numbers, words = user_numbers(model.body)
     plain = FIRST_NODE + np.arange(len(numbers))
@@ -140,7 +140,7 @@ def six_rows(model: InterfaceModel) -> Array:
     n = len(body.nodes)
     nodes = all_nodes(body)
     rotation = nodes.Psi[:n]
-    if not body.is_held:  # the rigid motion turns what turns at all
+    if not body.is_held:  # a rigid rotation changes every node that has a rotation
         rigid = np.zeros((n, 3, 6))
         rigid[nodes.has_rotation[:n], :, 3:] = np.eye(3)
         rotation = np.concatenate([rigid, rotation], axis=2)
@@ -149,7 +149,7 @@ def six_rows(model: InterfaceModel) -> Array:
 
 
 def recovery_table(numbers: IntArray, n_columns: int) -> Iterator[str]:
-    """Yield the table TUG1: head, columns, and the first of six rows of MUG1 for each kept node by its number."""
+    """Yield the table TUG1: head, columns, and the first of six rows of MUG1 for each kept node by number."""
     n_nodes = len(numbers)
     yield from continued("DTI", [f"{word:<8}" for word in ("TUG1", 0, 6 * n_nodes, n_columns, 32767, 0, 7, 0)])
     yield from continued("", [f"{word:<8}" for word in ("", "PHIP", 7, "", "", "REAL", "", 1, "ENDREC")][1:])
@@ -161,7 +161,7 @@ def recovery_table(numbers: IntArray, n_columns: int) -> Iterator[str]:
 
 
 def assembly_lines(model: InterfaceModel) -> Iterator[str]:
-    """Yield the part of the assembly run: the superelement and its points under the numbers they have there."""
+    """Yield the part for the assembly run: the superelement, and its points with their numbers in the assembly."""
     numbers = [k + 1 for k in range(len(model.nodes))] + [FIRST_SCALAR + k for k in range(model.n_modes)]
     yield "SEBULK         1  EXTOP4          MANUAL                       1"
     yield "SECONCT        1       0              NO"
@@ -173,7 +173,7 @@ def assembly_lines(model: InterfaceModel) -> Iterator[str]:
 
 
 def continued(card: str, words: list[str]) -> Iterator[str]:
-    """Yield a card of fields of 8, eight on a line."""
+    """Yield a card with fields of 8 characters, eight fields per line."""
     for k in range(0, len(words), 8):
         yield f"{card if not k else '':8}" + "".join(words[k : k + 8])
 
@@ -188,7 +188,7 @@ def aset_lines(pairs: Iterable[tuple[int, str]]) -> Iterator[str]:
 def dmig_lines(
     name: str, matrix: Array, rows: list[tuple[int, int]], columns: list[tuple[int, int]], form: int
 ) -> Iterator[str]:
-    """Yield a matrix: one triangle of a symmetric one; columns of a rectangular one are (number, 0)."""
+    """Yield a matrix: one triangle if it is symmetric; the columns of a rectangular matrix are (number, 0)."""
     n_col = f"{len(columns):8d}" if form == RECTANGULAR else f"{'':8}"
     yield f"{'DMIG':8}{name:8}{0:8d}{form:8d}{DOUBLE:8d}{0:8d}{'':16}{n_col}".rstrip()
     for j, (point, component) in enumerate(columns):
@@ -201,12 +201,12 @@ def dmig_lines(
 
 
 def real(value: float, letter: str = "E") -> str:
-    """Return a number in 16 columns with as many digits as they hold.
+    """Return a number in 16 columns, with as many digits as fit.
 
     Raises
     ------
     ExportError
-        If it does not fit: an exponent of three digits beyond 1e-99 to 1e99.
+        If the number does not fit, because its exponent is outside 1e-99 to 1e99.
     """
     if value != 0 and not 1e-99 < abs(value) < 1e99:
         raise ExportError(

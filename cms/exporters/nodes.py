@@ -1,4 +1,4 @@
-"""The nodes of a body as formats of multibody programs want them: numbered, the places of its interfaces among them."""
+"""The nodes of a body in the form that multibody formats need: numbered, including the interface points."""
 
 from dataclasses import dataclass
 
@@ -10,23 +10,23 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["NodeList", "all_nodes", "interface_nodes", "reference_row", "user_numbers"]
 
-MOST = 99_999_999  #: eight digits, which all formats hold
+MOST = 99_999_999  #: largest number with eight digits, which all formats can hold
 
 
 @dataclass(frozen=True, eq=False)
 class NodeList:
-    """Nodes in B with the motion of each for a unit of every mode."""
+    """Nodes in B, with the motion of each per unit of every mode."""
 
-    numbers: IntArray  #: (n,), above 0
+    numbers: IntArray  #: numbers above 0, (n,)
     positions: Array  #: (n, 3) [m]
     Phi: Array  #: translation, (n, 3, n_q)
-    Psi: Array  #: rotation, (n, 3, n_q) [1/m]; zero where it is not known
-    has_rotation: np.ndarray  #: whether it is known, (n,)
+    Psi: Array  #: rotation, (n, 3, n_q) [1/m]; zero if unknown
+    has_rotation: np.ndarray  #: whether the rotation is known, (n,)
     of_interface: dict[str, int]  #: row of the reference point of each interface
-    words: tuple[str, ...] = ()  #: whose the numbers are
+    words: tuple[str, ...] = ()  #: notes about the origin of the numbers
 
     def notes(self) -> tuple[str, ...]:
-        """Return 'interface left: node 17', one for each, and what is not known of the others."""
+        """Return 'interface left: node 17' for each interface, and what is unknown at other nodes."""
         at = (f"interface {name}: node {self.numbers[row]}" for name, row in self.of_interface.items())
         found = (*self.words, *at)
         unknown = int((~self.has_rotation).sum())
@@ -54,10 +54,10 @@ def interface_nodes(body: ReducedBody) -> NodeList:
 
 
 def all_nodes(body: ReducedBody) -> NodeList:
-    """Return the kept nodes by their numbers in the user's mesh, and then reference points that are none of them.
+    """Return the kept nodes with their numbers in the user's mesh, then reference points that are not kept nodes.
 
-    Where these numbers are missing or repeated they are 1, 2, ... as they are kept (`user_numbers`). Members of a rigid
-    interface turn with it; so does its reference node, and nodes that are kept with rotations.
+    If these numbers are missing or repeated, nodes are numbered 1, 2, ... (`user_numbers`). Rotations are known for
+    members and reference nodes of rigid interfaces, and for nodes that are kept with rotations.
     """
     n, q = len(body.nodes), body.n_q
     added = interface_nodes(body)
@@ -94,15 +94,15 @@ def all_nodes(body: ReducedBody) -> NodeList:
 
 
 def user_numbers(body: ReducedBody, n_more: int = 0, *, most: int = MOST) -> tuple[IntArray, tuple[str, ...]]:
-    """Return numbers of the kept nodes and of n_more points behind them, and in words whose they are.
+    """Return numbers of the kept nodes and of n_more points after them, and notes about their origin.
 
-    The user's numbers where each kept node has one of its own; nodes without one (reference points) follow the largest.
-    Else 1, 2, ..., which is said.
+    These are the user's numbers if each kept node has its own; nodes without one (reference points) follow the largest.
+    Otherwise the numbers are 1, 2, ..., and a note says so.
 
     Parameters
     ----------
     most
-        The greatest number that the format holds.
+        Largest number that the format can hold.
     """
     n = len(body.nodes)
     own = body.numbering.nodes
@@ -123,7 +123,7 @@ def user_numbers(body: ReducedBody, n_more: int = 0, *, most: int = MOST) -> tup
 
 
 def reference_row(body: ReducedBody, k: int) -> int | None:
-    """Return the kept node that is the reference point of an interface: it lies there and moves with it, to the bit."""
+    """Return the kept node at the reference point of an interface that moves exactly with it; None if there is none."""
     interface = body.interfaces[k]
     if interface.kind == "nodes" and not (len(interface.members) == 1 and interface.has_rotation):
         return None

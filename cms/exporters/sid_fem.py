@@ -13,18 +13,19 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["DIALECTS", "Dialect", "Taylor", "make_sid_fem", "terms_of"]
 
-DIAGONAL, GENERAL, EMPTY = 1, 3, 0  #: values of `structure`; unit (4) and one triangle (2) are read in different ways
-LONGEST_COMMENT = 200  #: readers hold lines in buffers of their own size
-SPIN_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))  #: omega_a omega_b of the columns of Oe
+#: values of `structure`; unit (4) and one triangle (2) are not used, because readers interpret them differently
+DIAGONAL, GENERAL, EMPTY = 1, 3, 0
+LONGEST_COMMENT = 200  #: largest length of a comment; readers have line buffers of various sizes
+SPIN_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))  #: omega_a omega_b for the columns of Oe
 
 
 @dataclass(frozen=True)
 class Dialect:
-    """In which order programs expect the indices."""
+    """Order of indices that a group of programs expects."""
 
-    words: str  #: on the first line of the file
-    column_last: bool  #: m1(row, q, column), else m1(row, column, q)
-    j_is_matrix: bool  #: J (3, 3), else (6, 1): xx, yy, zz, xy, xz, yz
+    words: str  #: text on the first line of the file
+    column_last: bool  #: True: m1(row, q, column); False: m1(row, column, q)
+    j_is_matrix: bool  #: True: J is (3, 3); False: (6, 1): xx, yy, zz, xy, xz, yz
 
 
 DIALECTS = {
@@ -38,11 +39,11 @@ class Taylor:
     """A matrix m0 + sum_l q_l m1_l."""
 
     m0: Array  #: (n_row, n_col)
-    m1: Array = field(default_factory=lambda: np.zeros(0))  #: (n_row, n_col, n_q); empty: of order 0
+    m1: Array = field(default_factory=lambda: np.zeros(0))  #: (n_row, n_col, n_q); empty for a series of order 0
 
 
 def make_sid_fem(request: Request, *, dialect: str) -> Made:
-    """Return the file; nodes are the interfaces unless all are asked for."""
+    """Return the file; its nodes are the interfaces, unless all nodes are requested."""
     body, order = request.body, DIALECTS[dialect]
     nodes = interface_nodes(body) if request.nodes != "all" else all_nodes(body)
     lines = list(lines_of(body, nodes, order))
@@ -52,17 +53,17 @@ def make_sid_fem(request: Request, *, dialect: str) -> Made:
 
 
 def terms_of(body: ReducedBody) -> dict[str, Taylor]:
-    """Return the terms by name, J as a matrix.
+    """Return the terms by name, with J as a matrix.
 
-    The equations of motion of the standard, in axes of B, with a the acceleration less gravity:
+    The equations of motion of the standard, in axes of B, where a is acceleration minus gravity, are
 
         m a + mdCM~ᵀ alpha + Ctᵀ q_ddot + ...                          mdCM = S + 1C q
         mdCM~ a + J alpha + Crᵀ q_ddot + Gr(q_dot) omega + ...         J = J0 + sum_l q_l (3C_l + 3C_lᵀ)
         Ct a + Cr alpha + Me q_ddot + Ge(q_dot) omega + Oe Omega + ...
 
-    Ct_ka = 1C_ak + sum_l q_l K_t,a,kl;  Cr_ka = 2C_ak + sum_l q_l (4C_kl,a + K_r,a,kl);  Gr: three columns
-    2 (3C_k + sum_l q_l 5C_lk) for each k;  Ge: row k, column 3 l + a: 2 4C_kl,a;  Oe: row k, column ab:
-    -(D_k,ab + D_k,ba) + 2 K_ab q without the factor two on the diagonal, D_k = 3C_k + sum_l q_l 5C_lk.
+    Ct_ka = 1C_ak + sum_l q_l K_t,a,kl; Cr_ka = 2C_ak + sum_l q_l (4C_kl,a + K_r,a,kl). Gr has three columns 2 (3C_k +
+    sum_l q_l 5C_lk) for each k. Ge has 2 4C_kl,a in row k, column 3 l + a. Oe has -(D_k,ab + D_k,ba) + 2 K_ab q in row
+    k, column ab (without the factor two on the diagonal), with D_k = 3C_k + sum_l q_l 5C_lk.
     """
     moments, n, K = body.moments, body.n_q, body.geometric
     C3, C4, C5 = moments.C3, moments.C4, moments.C5
@@ -75,7 +76,7 @@ def terms_of(body: ReducedBody) -> dict[str, Taylor]:
         pairs = [(a, b)] if a == b else [(a, b), (b, a)]
         Oe0[:, column] = -sum(C3[:, i, j] for i, j in pairs)
         Oe1[:, column] = -sum(D1[:, i, j] for i, j in pairs)
-        if K is not None:  # columns xz and zx are one
+        if K is not None:  # the columns xz and zx are the same
             Oe1[:, column] += len(pairs) * K.spin[column]
     return {
         "mdCM": Taylor(moments.S[:, None], moments.C1[:, None, :]),
@@ -93,7 +94,7 @@ def terms_of(body: ReducedBody) -> dict[str, Taylor]:
 
 
 def lines_of(body: ReducedBody, nodes: NodeList, order: Dialect) -> Iterator[str]:
-    """Yield the lines behind the first."""
+    """Yield the lines after the first."""
     yield " part"
     yield entry(6, "new modal", "")
     yield f"{'':11}refmod"
@@ -118,9 +119,9 @@ def lines_of(body: ReducedBody, nodes: NodeList, order: Dialect) -> Iterator[str
 
 
 def node_terms(body: ReducedBody, nodes: NodeList, row: int) -> dict[str, Taylor]:
-    """Return the terms of a node, whose axes are those of B.
+    """Return the terms of a node; its axes are those of B.
 
-    A force at an interface stiffens: its phi and psi have the derivative -K_i of the displacement of second order.
+    A force at an interface stiffens the body, so phi and psi have the derivative -K_i of the second-order displacement.
     """
     Phi, Psi = nodes.Phi[row], nodes.Psi[row]
     turned = np.array([np.cross(np.eye(3), Psi[:, k]) for k in range(body.n_q)])  # psi~: rows e_a × psi
@@ -138,13 +139,13 @@ def node_terms(body: ReducedBody, nodes: NodeList, row: int) -> dict[str, Taylor
 
 
 def as_column(term: Taylor) -> Taylor:
-    """Return a symmetric (3, 3) as (6, 1): xx, yy, zz, xy, xz, yz."""
+    """Return a symmetric (3, 3) matrix as (6, 1): xx, yy, zz, xy, xz, yz."""
     a, b = np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2])
     return Taylor(term.m0[a, b][:, None], term.m1[a, b][:, None, :])
 
 
 def taylor_lines(indent: int, name: str, term: Taylor, n_q: int, order: Dialect) -> Iterator[str]:
-    """Yield one Taylor series; entries that are zero are left out, as everywhere in the format."""
+    """Yield one Taylor series; zero entries are left out, as is usual in the format."""
     n_row, n_col = term.m0.shape
     is_diagonal = not term.m1.size and n_row == n_col and not np.any(term.m0 - np.diag(np.diag(term.m0)))
     is_empty = not np.any(term.m0) and not np.any(term.m1)
@@ -166,10 +167,10 @@ def taylor_lines(indent: int, name: str, term: Taylor, n_q: int, order: Dialect)
 
 
 def entry(indent: int, name: str, value: str) -> str:
-    """Return a line 'name = value' with the sign of equality in column 49."""
+    """Return a line 'name = value' with the equals sign in column 49."""
     return f"{'':{indent}}{name:{48 - indent}}={value}"
 
 
 def fortran(value: float) -> str:
-    """Return a number to its last bit, with the exponent letter of Fortran's double precision."""
+    """Return a number in full precision, with the exponent letter of Fortran's double precision."""
     return f"{value:24.16e}".replace("e", "D")

@@ -1,4 +1,4 @@
-"""ParaView: every mode as a deformed surface (.vtu) with displacement and stress, and a collection of them (.pvd)."""
+"""ParaView: every mode as a deformed surface (.vtu) with displacement and stress, and their collection (.pvd)."""
 
 import base64
 from collections.abc import Mapping
@@ -14,17 +14,17 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["make_vtk", "numbers_of_cells", "numbers_of_nodes"]
 
-LARGEST = 0.05  #: displacement of a drawn mode over the size of the body
-STRESS_ORDER = [0, 1, 2, 5, 3, 4]  #: xx yy zz xy yz xz, from our xx yy zz yz xz xy
-TRIANGLE, VERTEX = 5, 1  #: kinds of cells
+LARGEST = 0.05  #: displacement of a drawn mode relative to the size of the body
+STRESS_ORDER = [0, 1, 2, 5, 3, 4]  #: xx yy zz xy yz xz as indices into our xx yy zz yz xz xy
+TRIANGLE, VERTEX = 5, 1  #: codes of cell types
 KINDS = {"f": ("Float64", "<f8"), "i": ("Int64", "<i8"), "u": ("UInt8", "u1")}
 
 
 def make_vtk(request: Request) -> Made:
     """Return FILE.pvd and FILE_1.vtu, FILE_2.vtu, ...: undeformed points in mesh coordinates, fields in mesh axes.
 
-    A mode is shown at the coordinate q that moves some node by a twentieth of the size of the body; stress and
-    displacement are of that q, which stands in the field data with the frequency.
+    The coordinate q of a mode is chosen so that its largest nodal displacement is a twentieth of the body size. Stress
+    and displacement belong to that q, which is stored in the field data together with the frequency.
     """
     body = request.body
     points = body.frame.origin + body.nodes @ body.frame.axes.T
@@ -48,7 +48,7 @@ def make_vtk(request: Request) -> Made:
 
 
 def stress_fields(body: ReducedBody, k: int, q: float) -> dict[str, Array]:
-    """Return stress tensor (mesh axes, order of VTK) and von Mises stress at the nodes, where the body knows them."""
+    """Return stress tensor (mesh axes, order of VTK) and von Mises stress at the nodes, if the body knows them."""
     if body.stress is None:
         return {}
     from cms.reduced_basis.stress_modes import turned_stress
@@ -58,13 +58,13 @@ def stress_fields(body: ReducedBody, k: int, q: float) -> dict[str, Array]:
 
 
 def numbers_of_nodes(body: ReducedBody) -> dict[str, IntArray]:
-    """Return the user's numbers of the kept nodes, -1 for none, and which instance they are of."""
+    """Return the user's numbers of the kept nodes, -1 for none, and their instances."""
     arrays = {"node": body.numbering.nodes, "node instance": body.numbering.node_instance}
     return {name: numbers for name, numbers in arrays.items() if numbers.size}
 
 
 def numbers_of_cells(body: ReducedBody) -> dict[str, IntArray]:
-    """Return the user's numbers of the elements behind the triangles, -1 for none, and which instance they are of."""
+    """Return the user's numbers of the elements of the triangles, -1 for none, and their instances."""
     if not len(body.surface):
         return {}
     arrays = {"element": body.numbering.elements, "element instance": body.numbering.element_instance}
@@ -79,7 +79,7 @@ def unstructured_grid(
     header: tuple[str, ...],
     of_cells: Mapping[str, IntArray],
 ) -> bytes:
-    """Return a .vtu file with numbers in base64: triangles, or the points alone where there are none."""
+    """Return a .vtu file with numbers in base64: triangles, or only points if there are none."""
     cells = np.asarray(triangles) if len(triangles) else np.arange(len(points))[:, None]
     n, per = cells.shape
     kind = TRIANGLE if per == 3 else VERTEX
@@ -99,7 +99,7 @@ def unstructured_grid(
 
 
 def data_array(name: str, values: np.ndarray, *, tuples: bool = False) -> str:
-    """Return an array: its length in bytes and its numbers, both in base64."""
+    """Return a data array: its length in bytes and its numbers, both in base64."""
     array = np.asarray(values)
     word, dtype = KINDS[array.dtype.kind]
     data = np.ascontiguousarray(array, dtype=dtype).tobytes()
@@ -110,5 +110,5 @@ def data_array(name: str, values: np.ndarray, *, tuples: bool = False) -> str:
 
 
 def comment(lines: tuple[str, ...]) -> list[str]:
-    """Return the header as comments of XML, which hold no two hyphens in a row."""
+    """Return the header as XML comments, which must not contain two consecutive hyphens."""
     return [f"<!-- {escape(line).replace('--', '- -')} -->" for line in lines]

@@ -1,4 +1,4 @@
-"""What every writer of a foreign format is: bytes by file, what of the body is left out, a header that says whence."""
+"""Common parts of all writers of foreign formats: request, result, header, and what a format cannot hold."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -14,15 +14,15 @@ from fe_models.foundation.arrays import Array
 __all__ = ["CONTENT", "Made", "Request", "Writer", "in_ascii", "left_out"]
 
 OWN_AXES = "axes of the interfaces that are turned against those of the file"
-TURNED = 1e-12  #: part of a direction cosine that is more than rounding
+TURNED = 1e-12  #: difference of a direction cosine that is more than rounding
 
 
 def is_turned(axes: Array) -> bool:
-    """Return whether axes are others than those they are written in."""
+    """Return whether the axes differ from those in which they are written."""
     return bool(np.abs(axes - np.eye(3)).max() > TURNED)
 
 
-#: what a body may hold beside masses, stiffness and shapes: key -> in words, and whether a body has it
+#: content of a body in addition to masses, stiffness and shapes: description, and whether a body has it
 CONTENT: dict[str, tuple[str, Callable[[ReducedBody], bool]]] = {
     "gyroscopic": (
         "inertia of the deformed body beyond its mass matrix (3C, 4C, 5C: Coriolis and centrifugal terms)",
@@ -40,7 +40,7 @@ CONTENT: dict[str, tuple[str, Callable[[ReducedBody], bool]]] = {
     "point stress": ("stress at named points", lambda body: body.point_stress is not None),
     "surface": ("surface for drawing", lambda body: len(body.surface) > 0),
 }
-#: signs of formulas and units as they are typed where there are no others
+#: ASCII replacements for characters of formulas and units
 IN_ASCII = str.maketrans(
     {"ᵀ": "^T", "²": "^2", "³": "^3", "·": "*", "×": "x", "≤": "<=", "≥": ">=", "−": "-", "–": "-", "ß": "ss", "µ": "u"}
 )
@@ -48,16 +48,16 @@ IN_ASCII = str.maketrans(
 
 @dataclass(frozen=True)
 class Request:
-    """What is to be written: a body in the units asked for, where, and whence it comes."""
+    """What to write: a body in the requested units, the path, and the source of the body."""
 
     body: ReducedBody
-    path: Path  #: the file asked for; further files take its stem
+    path: Path  #: requested file; further files use its stem
     source: str = ""  #: the modal file, with its digest
-    nodes: str = "default"  #: "interfaces" or "all" of the kept nodes, where the format leaves the choice
-    loads: Mapping[str, float] = field(default_factory=dict)  #: amplitudes of load cases, where they act all the time
+    nodes: str = "default"  #: "interfaces" or "all" of the kept nodes, in formats that allow a choice
+    loads: Mapping[str, float] = field(default_factory=dict)  #: amplitudes of load cases that act permanently
 
     def header(self) -> tuple[str, ...]:
-        """Return lines of ASCII: body, source, units, frame, and its provenance."""
+        """Return ASCII lines with body, source, units, frame and provenance."""
         body = self.body
         origin = " ".join(f"{x:.9g}" for x in body.frame.origin)
         place = f"{body.frame.kind} at {body.frame.at}" if body.frame.at else body.frame.kind
@@ -74,7 +74,7 @@ class Request:
 
 @dataclass(frozen=True)
 class Made:
-    """Files as bytes, and what is to be told about them."""
+    """Files as bytes, and notes about them."""
 
     files: Mapping[Path, bytes]
     notes: tuple[str, ...] = ()
@@ -82,24 +82,24 @@ class Made:
 
 @dataclass(frozen=True)
 class Writer:
-    """One format: how it is made and what it can hold."""
+    """One format: its function, and what it can hold."""
 
     make: Callable[[Request], Made]
     holds: frozenset[str] = field(default_factory=frozenset)  #: keys of `CONTENT`
-    takes_held: bool = False  #: a body that is held to the ground makes sense there
-    takes_loads: bool = False  #: constant loads are part of the file
-    units: str = ""  #: the only system its program knows; empty: any
-    needs: tuple[str, ...] = ()  #: "nodes", "interfaces": what a body must have
+    takes_held: bool = False  #: whether it can describe a body that is held to the ground
+    takes_loads: bool = False  #: whether the file can hold constant loads
+    units: str = ""  #: the only unit system that its program accepts; empty: any
+    needs: tuple[str, ...] = ()  #: data that a body must have: "nodes", "interfaces"
 
 
 def left_out(body: ReducedBody, holds: Iterable[str]) -> tuple[str, ...]:
-    """Return in words what a body has and a format that holds this much does not."""
+    """Describe what a body has but a format with this content does not."""
     held = set(holds)
     return tuple(words for key, (words, has) in CONTENT.items() if key not in held and has(body))
 
 
 def in_ascii(text: str, longest: int = 200) -> str:
-    """Return a text on one line of ASCII, for files of programs that know no other; letters lose their accents."""
+    """Return a text as one line of ASCII, for programs that accept nothing else; letters lose their accents."""
     line = " ".join(text.split()).translate(IN_ASCII)
     line = "".join(letter for letter in normalize("NFKD", line) if not combining(letter)).translate(IN_ASCII)
     line = line.encode("ascii", "replace").decode("ascii")

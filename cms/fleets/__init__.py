@@ -1,1 +1,1 @@
-"""Fleets: many jobs reduced by parallel workers, with a journal of those that are done."""
+"""Fleets: many jobs reduced by parallel workers, with a journal of finished jobs."""

@@ -1,4 +1,4 @@
-"""A fleet of jobs: each is reduced to a modal file of its own by one of many workers."""
+"""A fleet of jobs: workers reduce each job to its own modal file."""
 
 import hashlib
 import os
@@ -30,33 +30,33 @@ def reduce_fleet(
     solver: str | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[FleetRow]:
-    """Reduce many jobs, each to a modal file; one that fails is a row with its reason, the others go on.
+    """Reduce many jobs, each to a modal file. A failed job gives a row with its error, and the others continue.
 
     Parameters
     ----------
     jobs
         Job files.
     outputs
-        Modal files, one a job; default: beside the jobs, rod.toml gives rod.h5.
+        Modal file of each job; default: beside the job, rod.toml gives rod.h5.
     workers
-        Where jobs are run (docs/cluster.md), by default one process a processor. Processes of this machine share its
+        Where jobs are run (docs/cluster.md); default: one process per processor. Processes of this machine share its
         processors evenly.
     journal
-        A file that every job that is done is appended to: it is not run again while the files it depends on, the
-        program, and its modal file are the same. None: nothing is written.
+        A file to which every finished job is appended. A finished job is not run again as long as its input files, the
+        program and its modal file are unchanged. None: no journal.
     solver
-        What factorises (`cms.solvers.registry`); goes before those of the jobs.
+        Name of the solver (`cms.solvers.registry`); it overrides the solver of the jobs.
     progress
-        Called with the numbers of jobs done and of all.
+        Receives the number of finished jobs and the number of all jobs.
 
     Raises
     ------
     JobError
-        Before any work: if a job file cannot be read, or an output is an input, or that of another job.
+        Before any work, if a job file cannot be read, or an output is also an input or the output of another job.
     FactorizationError
         If the solver is unknown or not installed.
     WorkerError
-        If no workers can be had.
+        If no workers are available.
     """
     if solver is not None:
         solver_of(solver)
@@ -79,16 +79,17 @@ def reduce_fleet(
             files = sorted({str(folder) for k in missing for folder in (fleet[k].job, fleet[k].output.parent)})
             with tasks_of(workers, len(missing), threads=None) as tasks:
                 tasks.map(reduce_and_write_one, [fleet[k] for k in missing], failed=failed_row, done=keep, files=files)
-    finally:  # a worker that was killed at its writing could not clean up
+    finally:  # a worker that was killed while writing could not clean up
         for k in missing:
             remove_parts(fleet[k].output)
     return [rows[k] for k in range(len(fleet))]
 
 
 def fleet_of(jobs: Sequence[Path], outputs: Sequence[Path], solver: str | None = None) -> list[FleetJob]:
-    """Return the jobs of a fleet, all checked; `JobError` if two files are one."""
+    """Return the checked jobs of a fleet; raise `JobError` if two of their files are the same."""
     inputs = [inputs_of(path, read_job(path)) for path in jobs]
-    digests = {each: file_digest(each) for each in {each for files in inputs for each in files}}  # meshes serve many
+    # several jobs may use the same mesh
+    digests = {each: file_digest(each) for each in {each for files in inputs for each in files}}
     read = {file_identity(each) for each in digests}
     made: dict[object, Path] = {}
     found = []
@@ -105,7 +106,7 @@ def fleet_of(jobs: Sequence[Path], outputs: Sequence[Path], solver: str | None =
 
 
 def known_rows(journal: TaskJournal, fleet: Sequence[FleetJob]) -> dict[int, FleetRow]:
-    """Return number of the job -> row, for those whose inputs and modal file are as the journal says."""
+    """Return the rows of jobs whose inputs and modal file agree with the journal, by index of the job."""
     records = {(str(record.get("job")), str(record.get("output"))): record for record in journal.records}
     rows = {}
     for k, job in enumerate(fleet):
@@ -121,7 +122,7 @@ def known_rows(journal: TaskJournal, fleet: Sequence[FleetJob]) -> dict[int, Fle
 
 
 def record_of(row: FleetRow) -> dict[str, object]:
-    """Return a row as a line of the journal."""
+    """Return a row as a record of the journal."""
     return {
         "job": str(row.job.job), "output": str(row.job.output), "digest": row.job.digest,
         "made": file_digest(row.job.output), "name": row.name, "n_modes": row.n_modes, "seconds": row.seconds,

@@ -1,4 +1,4 @@
-"""One job of a fleet: what a worker is told, what it does, and what it answers."""
+"""One job of a fleet: the request to a worker, its work, and its answer."""
 
 import logging
 import threading
@@ -16,26 +16,26 @@ __all__ = ["FleetJob", "FleetRow", "failed_row", "reduce_and_write_one"]
 
 @dataclass(frozen=True)
 class FleetJob:
-    """A job and the modal file it makes, both by their full paths, and a mark of all files the job depends on."""
+    """A job and its modal file, both by full path, and a fingerprint of all files on which the job depends."""
 
     job: Path
     output: Path
     digest: str
-    solver: str | None = None  #: instead of that of the job
+    solver: str | None = None  #: overrides the solver of the job
 
 
 @dataclass(frozen=True)
 class FleetRow:
-    """What became of a job."""
+    """The result of one job."""
 
     job: FleetJob
-    name: str = ""  #: of the body
+    name: str = ""  #: name of the body
     n_modes: int = 0
     seconds: float = 0.0
-    notes: tuple[str, ...] = ()  #: warnings on the way
-    error: str = ""  #: why there is no file
-    is_lasting: bool = True  #: another try would give the same error
-    is_known: bool = False  #: from the journal
+    notes: tuple[str, ...] = ()  #: warnings during the job
+    error: str = ""  #: reason why there is no file
+    is_lasting: bool = True  #: whether another attempt would give the same error
+    is_known: bool = False  #: whether the row comes from the journal
 
 
 class Kept(logging.Handler):
@@ -54,7 +54,7 @@ class Kept(logging.Handler):
 
 @contextmanager
 def notes_kept() -> Iterator[list[str]]:
-    """Keep warnings for the row, which tells them with the name of the job, from all that would tell them at once."""
+    """Collect warnings for the row, which reports them with the name of the job; they are not printed meanwhile."""
     root, kept = logging.getLogger(), Kept()
     before, root.handlers = root.handlers, [kept]
     try:
@@ -64,7 +64,7 @@ def notes_kept() -> Iterator[list[str]]:
 
 
 def reduce_and_write_one(job: FleetJob) -> FleetRow:
-    """Run a job and write its modal file; runs in a worker."""
+    """Run a job and write its modal file; called in a worker."""
     from cms.jobs.reduce_job import reduce_job
     from cms.modal_file.file import write
 
@@ -76,7 +76,7 @@ def reduce_and_write_one(job: FleetJob) -> FleetRow:
 
 
 def failed_row(job: FleetJob, error: Exception) -> FleetRow:
-    """Return the row of a job that went wrong, its error in words."""
+    """Return the row of a failed job, with the text of its error."""
     words = str(error) if isinstance(error, ReportedError) else f"{type(error).__name__}: {error}"
     is_lasting = isinstance(error, ReportedError) and not isinstance(error, ProcessError)
     return FleetRow(job, error=" ".join(words.split()) or type(error).__name__, is_lasting=is_lasting)

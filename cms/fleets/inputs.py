@@ -9,7 +9,7 @@ __all__ = ["inputs_of"]
 
 
 def inputs_of(path: Path, job: Job) -> list[Path]:
-    """Return the job file and all files it names: meshes, tables, matrices, columns, and those of neighbours' jobs."""
+    """Return the job file and all files that it names: meshes, tables, matrices, columns, and neighbours' files."""
     found = [path]
     for each in files_named(job):
         found += inputs_of(each, read_job(each)) if each.suffix == ".toml" and each not in found else [each]

@@ -1,1 +1,1 @@
-"""The reduction job: the file, the body it describes, and the whole line from it to a reduced body."""
+"""The reduction job: its file, the body it describes, and all steps from the file to a reduced body."""

@@ -1,4 +1,4 @@
-"""Lines of a job: their mesh, sections, interfaces, and what is attached to their nodes."""
+"""Lines of a job: their mesh, sections, interfaces, and the attachments at their nodes."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +25,7 @@ GENERAL_KEYS = {
     "torsion": "J",
     "shear_area_y": "A_sy",
     "shear_area_z": "A_sz",
-}  #: key of the job -> field of `GeneralSection`
+}  #: field of `GeneralSection` for each key of the job
 
 
 def frame_mesh(job: Job) -> "LineMesh":
@@ -42,7 +42,7 @@ def frame_mesh(job: Job) -> "LineMesh":
 
 
 def properties_of(job: Job) -> "dict[str, BeamProperty]":
-    """Return group of lines -> its section, material and theory."""
+    """Return section, material and beam theory for each group of lines."""
     from fe_models.beams.beam_property import BeamProperty
 
     made: dict[str, BeamProperty] = {}
@@ -94,7 +94,8 @@ def attachments_of(job: Job, mesh: "LineMesh | ShellMesh") -> tuple[list[Any], l
             table.stiffness,
             damping=table.damping,
             point=table.point,
-            triad=np.eye(3) if table.triad is None else np.array(table.triad).T,  # the job lists axes, columns are axes
+            # the job lists axes as rows; here they are columns
+            triad=np.eye(3) if table.triad is None else np.array(table.triad).T,
         )
         for name, table in job.springs.items()
     ]
@@ -111,7 +112,7 @@ def attachments_of(job: Job, mesh: "LineMesh | ShellMesh") -> tuple[list[Any], l
 
 
 def one_node(mesh: "LineMesh | ShellMesh", where: str, group: str) -> int:
-    """Return the node of a group that holds just one; `JobError` with the key otherwise."""
+    """Return the node of a group with exactly one node; raise `JobError` with the key otherwise."""
     nodes = nodes_named(mesh, where, group)
     if len(nodes) != 1:
         raise JobError(f'{where} = "{group}": expected a group of one node, got {len(nodes)} nodes')
@@ -131,5 +132,6 @@ def frame_interface(name: str, section: Any, mesh: "LineMesh") -> Interface:
     from fe_models.beams.interfaces import line_interface
 
     chosen = selection_of(section.selection, getattr(section, section.selection))
-    triad = None if section.triad is None else np.array(section.triad).T  # the job lists axes, columns are axes
+    # the job lists axes as rows; here they are columns
+    triad = None if section.triad is None else np.array(section.triad).T
     return line_interface(mesh, name, chosen, kind=section.kind, reference=section.reference, triad=triad)

@@ -1,4 +1,4 @@
-"""The tables of a reduction job that describe beams and what is attached to their nodes (docs/job_file.md)."""
+"""The tables of a reduction job that describe beams and attachments at their nodes (docs/job_file.md)."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any
@@ -11,7 +11,7 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["PLANES", "SHAPE_KEYS", "BeamSection", "LinkSection", "MassSection", "SpringSection", "TieSection"]
 
-PLANES = {"yz": 0, "zx": 1, "xz": 1, "xy": 2}  #: plane -> mesh axis across it
+PLANES = {"yz": 0, "zx": 1, "xz": 1, "xy": 2}  #: mesh axis normal to each plane
 SHAPE_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "circle": (("radius",), ()),
     "tube": (("radius", "thickness"), ()),
@@ -19,7 +19,7 @@ SHAPE_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "box": (("width", "height", "web", "flange"), ()),
     "i": (("width", "height", "web", "flange"), ()),
     "general": (("area", "iy", "iz", "torsion"), ("shear_area_y", "shear_area_z", "shear_center", "outline")),
-}  #: shape -> keys it needs, keys it may have
+}  #: required and optional keys of each shape
 
 Name = Annotated[str, StringConstraints(min_length=1)]
 Positive = Annotated[float, Field(gt=0)]
@@ -27,7 +27,7 @@ Pair = tuple[float, float]
 
 
 def numbers(*counts: int) -> Any:
-    """Return the type of a list of so many numbers, whole numbers taken as such."""
+    """Return the type of a list with one of these numbers of items; integers are accepted."""
 
     def check(value: Any) -> tuple[float, ...]:
         is_list = isinstance(value, list | tuple) and len(value) in counts
@@ -39,7 +39,7 @@ def numbers(*counts: int) -> Any:
 
 
 def names(value: Any) -> Any:
-    """Return one name or a list of names as a tuple of names."""
+    """Return one name, or a list of names, as a tuple."""
     words = [value] if isinstance(value, str) else value
     if not isinstance(words, list | tuple) or not words or not all(isinstance(w, str) and w for w in words):
         raise ValueError('expected the name of a group, or a list of names: "a" or ["a", "b"]')
@@ -47,7 +47,7 @@ def names(value: Any) -> Any:
 
 
 def component_numbers(value: Any) -> tuple[int, ...]:
-    """Return names of components as numbers 0-5."""
+    """Return component names as numbers 0-5."""
     words = names(value)
     for word in words:
         if word not in COMPONENTS:
@@ -56,7 +56,7 @@ def component_numbers(value: Any) -> tuple[int, ...]:
 
 
 def polygon(value: Any) -> tuple[Pair, ...]:
-    """Return a list of points (y, z)."""
+    """Return a list of at least three points (y, z)."""
     is_list = isinstance(value, list | tuple) and len(value) >= 3
     if not is_list or not all(isinstance(p, list | tuple) and len(p) == 2 for p in value):
         raise ValueError("expected three or more points [[y, z], ...]")
@@ -64,7 +64,7 @@ def polygon(value: Any) -> tuple[Pair, ...]:
 
 
 def inertia_numbers(value: Any) -> Any:
-    """Return one number, three, or three rows of three."""
+    """Return one number, three numbers, or three rows of three."""
     rows = value if isinstance(value, list | tuple) else [value]
     flat = [x for row in rows for x in (row if isinstance(row, list | tuple) else [row])]
     if len(flat) not in (1, 3, 9) or not all(isinstance(x, int | float) and not isinstance(x, bool) for x in flat):
@@ -122,7 +122,7 @@ class BeamSection(Table):
 
     @property
     def dimensions(self) -> dict[str, Any]:
-        """The keys of the shape that are given."""
+        """The given keys of the shape."""
         keys = (key for group in SHAPE_KEYS[self.shape] for key in group)
         return {key: getattr(self, key) for key in keys if getattr(self, key) is not None}
 
@@ -187,11 +187,11 @@ ON_SOLIDS = {
     "masses": "a mass on a solid or on matrices sits at an interface: remove the tables, reduce with an interface "
     "there, and add it in the system file, [[bodies.NAME.masses]] (with_masses in Python); or add tables "
     "[sections.NAME]",
-}  #: what to do instead, where there are no beams
+}  #: advice for tables that need beams, if there are no beams
 
 
 def check_beams(sections: Mapping[str, BeamSection], others: Mapping[str, Any], materials: Mapping[str, Any]) -> None:
-    """Raise `ValueError` unless every section has a material and its lines, and nothing is attached to no beams."""
+    """Raise `ValueError` unless every section has material and lines, and every attachment has beams."""
     for kind, tables in others.items():
         if tables and not sections:
             raise ValueError(

@@ -1,4 +1,4 @@
-"""The finite element body of a job: read, checked, assembled, its interfaces coupled."""
+"""The finite element body of a job: read, checked, assembled, with coupled interfaces."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -29,16 +29,16 @@ def job_body(
     mesh: "Mesh | None" = None,
     ranks: Ranks | None = None,
 ) -> FEBody:
-    """Run a job up to the coupled body: read, check, assemble, couple the interfaces.
+    """Run a job up to the coupled body: read, check, assemble, and couple the interfaces.
 
     Parameters
     ----------
     mesh
-        The solid mesh of the job as `checked_mesh` made it for the same job with other numbers: it is neither read nor
-        judged again.
+        The solid mesh of the job, from `checked_mesh` for the same job with other numbers; it is not read or checked
+        again.
     ranks
-        Processes that assemble a body of one solid mesh by its parts (`fe_models.solid_body`); K and M of bodies of
-        other kinds are made here, and their rows go to all ranks.
+        Processes that assemble a body of a single solid mesh in parts (`fe_models.solid_body`). K and M of other bodies
+        are made here, and then distributed over the ranks.
     """
     stages = stages or Stages()
     body = uncoupled_body(job, stages, on_report=on_report, mesh=mesh, ranks=ranks)
@@ -48,13 +48,14 @@ def job_body(
 
 
 def coupled_body(job: Job, body: FEBody) -> FEBody:
-    """Couple the interfaces of the body of a job, and make it planar where that is asked for."""
+    """Couple the interfaces of the body of a job, and make it planar if the job says so."""
     from cms.jobs.beam_tables import PLANES
     from cms.second_order.centrifugal import CENTRIFUGAL, centrifugal_loads
     from fe_models.body.couplings import couple
 
     if CENTRIFUGAL in (job.reduction.extra or ()):
-        body = body.with_load_cases(*centrifugal_loads(body))  # rigid interfaces eliminate what they act on
+        # before coupling, because rigid interfaces eliminate the dofs on which these loads act
+        body = body.with_load_cases(*centrifugal_loads(body))
     if job.body.plane is None:
         return couple(body)
     from fe_models.planar import planar
@@ -70,7 +71,7 @@ def uncoupled_body(
     mesh: "Mesh | None" = None,
     ranks: Ranks | None = None,
 ) -> FEBody:
-    """Run a job up to the body whose interfaces are still to be coupled, with the nodes and points it asks for."""
+    """Run a job up to the body with uncoupled interfaces, with the requested nodes and points."""
     from fe_models.body.kept_nodes import keep_nodes
 
     body = keep_nodes(made_body(job, stages, on_report, mesh, ranks), job.body.keep)
@@ -90,7 +91,7 @@ def made_body(
     mesh: "Mesh | None" = None,
     ranks: Ranks | None = None,
 ) -> FEBody:
-    """Make the body of a job from what it names: a deck, a mesh, tables or matrices."""
+    """Make the body of a job from its source: a deck, a mesh, tables or matrices."""
     if job.body.deck is not None:
         from cms.jobs.deck_body import body_of_deck
 
@@ -113,7 +114,7 @@ def made_body(
 
 
 def is_of_mesh(job: Job) -> bool:
-    """Whether the body of a job is made of a solid mesh, perhaps with beams tied to it."""
+    """Whether the body of a job is made of a solid mesh, possibly with beams tied to it."""
     others = job.body.deck is not None or job.shells or (job.sections and not job.ties)
     return job.body.mesh is not None and not others
 
@@ -121,7 +122,7 @@ def is_of_mesh(job: Job) -> bool:
 def checked_mesh(
     job: Job, stages: Stages, on_report: Callable[[Any], None] | None
 ) -> "tuple[Mesh, FirstOrderError | None]":
-    """Read and judge the solid mesh of a job; return it without unused nodes, and what its first order costs."""
+    """Read and check the solid mesh of a job; return it without unused nodes, and its first-order error."""
     from fe_models.meshes.unused_nodes import drop_unused_nodes
     from fe_models.reports.mesh_report import report_mesh
 
@@ -149,7 +150,7 @@ def body_of_mesh(
     mesh: "Mesh | None" = None,
     ranks: Ranks | None = None,
 ) -> FEBody:
-    """Read and check the mesh, unless that was done, and assemble it with the materials and interfaces of the job."""
+    """Read and check the mesh, unless it is given, and assemble it with the materials and interfaces of the job."""
     from fe_models.solids.body import solid_body
 
     units, first_order = unit_system(job.body.units), None
@@ -167,7 +168,7 @@ def body_of_mesh(
             interfaces=interfaces,
             incompatible_modes=bricks,
             progress=advance,
-            ranks=None if job.ties else ranks,  # beams that are tied to it take K and M apart
+            ranks=None if job.ties else ranks,  # tied beams modify K and M, which must then lie on rank 0
         )
         if first_order is not None:
             body = replace(body, provenance={**body.provenance, **first_order.provenance()})

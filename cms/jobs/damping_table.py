@@ -1,4 +1,4 @@
-"""The table [damping] of a job: which damping the modes get (docs/job_file.md)."""
+"""The table [damping] of a job: the damping of the modes (docs/job_file.md)."""
 
 from typing import Annotated, Any
 
@@ -20,14 +20,14 @@ Ratio = Annotated[float, Field(ge=0)]
 
 
 def ratio_list(value: Any) -> tuple[float, ...]:
-    """Return damping ratios, one per mode."""
+    """Return damping ratios, one for each mode."""
     if not isinstance(value, list | tuple) or not value or any(is_no_number(x) or x < 0 for x in value):
         raise ValueError("expected a list of numbers, 0 or more, one per mode; the last holds for all further modes")
     return tuple(float(x) for x in value)
 
 
 def ramp_steps(value: Any) -> tuple[tuple[float, float], ...]:
-    """Return steps (frequency in Hz, ratio below it); true stands for the customary ones."""
+    """Return steps (frequency in Hz, ratio below it); true selects the customary steps."""
     if value is True:
         return CUSTOMARY_STEPS
     pairs = value if isinstance(value, list | tuple) else ()
@@ -41,7 +41,7 @@ def ramp_steps(value: Any) -> tuple[tuple[float, float], ...]:
 
 
 class DampingSection(Table):
-    """[damping]: ratios of the modes, or Rayleigh."""
+    """[damping]: ratios of the modes, or Rayleigh damping."""
 
     ratio: Ratio | None = Field(None, description="a number, 0 or more, of critical damping (0.01 is 1 %)")
     ratios: Annotated[tuple[float, ...], BeforeValidator(ratio_list)] | None = Field(

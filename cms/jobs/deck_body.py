@@ -1,4 +1,4 @@
-"""The body of a whole deck: solids, shells and lines on shared nodes, with what is attached to them and their links."""
+"""The body of a whole deck: solids, shells and lines on shared nodes, with attachments and links."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
@@ -31,7 +31,7 @@ NO_NODES = np.zeros(0, dtype=np.int64)
 
 
 def body_of_deck(job: Job, path: Path, stages: Stages, on_report: Callable[[Any], None] | None) -> FEBody:
-    """Read the deck, make a body of each kind of elements, join them, and put loads and interfaces on the whole."""
+    """Read the deck, make a body of each kind of elements, join them, and add loads and interfaces."""
     from fe_models.assemblies.join import join
     from fe_models.importers.decks.read_deck import read_deck
     from fe_models.importers.shell_cells import with_centres
@@ -40,7 +40,8 @@ def body_of_deck(job: Job, path: Path, stages: Stages, on_report: Callable[[Any]
         raw = read_deck(path).mesh
         raw = with_centres(raw)
         numbers = raw.node_numbers
-        raw = replace(raw, node_numbers=np.arange(len(raw.nodes)))  # rows of the deck are the numbers of the parts
+        # rows of the deck serve as the node numbers of the parts
+        raw = replace(raw, node_numbers=np.arange(len(raw.nodes)))
     with stages("assemble"):
         parts, meshes = _parts(job, path, raw, on_report)
         means = _mean_interfaces(job, raw)
@@ -65,7 +66,7 @@ def body_of_deck(job: Job, path: Path, stages: Stages, on_report: Callable[[Any]
 def _parts(
     job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], None] | None
 ) -> "tuple[list[Part], list[Mesh]]":
-    """Return the bodies of solids, shells and lines, and of what is attached to nodes alone; meshes of the solids."""
+    """Return the bodies of solids, shells, lines and attachments at single nodes; and the meshes of the solids."""
     from fe_models.assemblies.join import Part
 
     parts: list[Part] = []
@@ -132,7 +133,7 @@ def _is_linked(job: Job) -> bool:
 
 
 def _shells(job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], None] | None) -> "Iterable[Part]":
-    """Yield a body of the shells; more than one where shells lie on the same nodes."""
+    """Yield a body of the shells, or several if shells lie on the same nodes."""
     from cms.jobs.shell_body import shell_properties_of
     from fe_models.assemblies.join import Part
     from fe_models.importers.raw_mesh import chosen_cells
@@ -165,7 +166,7 @@ def _shells(job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], Non
 def _layers(
     raw: "RawMesh", where: str, kinds: tuple[str, ...], properties: Mapping[str, Any]
 ) -> list[tuple[str, ...] | None]:
-    """Return the groups in parts of which none has cells on the same nodes as another; None: all cells."""
+    """Split the groups into parts without two cells on the same nodes; None: all cells."""
     from fe_models.importers.cells_apart import groups_apart
 
     if "all" in properties:
@@ -181,7 +182,7 @@ def _names(name: str, layers: list[Any]) -> list[str]:
 
 
 def _lines(job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], None] | None) -> "Iterable[Part]":
-    """Yield a body of the beams; more than one where beams lie on the same nodes."""
+    """Yield a body of the beams, or several if beams lie on the same nodes."""
     from cms.jobs.attachments_of_job import properties_of
     from fe_models.assemblies.join import Part
     from fe_models.beams.body import beam_body
@@ -205,7 +206,7 @@ def _lines(job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], None
 
 
 def _rods(job: Job, path: Path, raw: "RawMesh") -> "Iterable[Part]":
-    """Yield a body of the rods; more than one where rods lie on the same nodes."""
+    """Yield a body of the rods, or several if rods lie on the same nodes."""
     from fe_models.assemblies.join import Part
     from fe_models.assemblies.rods import Rod, rod_body
     from fe_models.importers.line_cells import line_mesh_from_raw
@@ -218,7 +219,7 @@ def _rods(job: Job, path: Path, raw: "RawMesh") -> "Iterable[Part]":
         rods |= dict.fromkeys(table.lines, rod)
     layers = _layers(raw, "rods.lines", ("line",), rods)
     for name, groups in zip(_names(f"{job.body.name} rods", layers), layers, strict=True):
-        assert groups is not None  # rods name their lines
+        assert groups is not None  # rods must name their lines
         mesh = line_mesh_from_raw(chosen_cells(raw, ("line",), groups), path, "", groups)
         mine = {group: rods[group] for group in groups}
         body = rod_body(mesh, mine, name=name, units=unit_system(job.body.units))
@@ -226,7 +227,7 @@ def _rods(job: Job, path: Path, raw: "RawMesh") -> "Iterable[Part]":
 
 
 def _attached(job: Job, raw: "RawMesh") -> "Part | None":
-    """Return point masses and springs as a body of their nodes alone."""
+    """Return point masses and springs as a body that has only their nodes."""
     from fe_models.assemblies.join import Part
     from fe_models.beams.attachments import PointMass, Spring
     from fe_models.beams.body import beam_body
@@ -268,10 +269,10 @@ def _attached(job: Job, raw: "RawMesh") -> "Part | None":
 
 
 def _mean_interfaces(job: Job, raw: "RawMesh") -> dict[str, str]:
-    """Return interface -> coupling of those that are the reference node of one: a node that follows a mean motion.
+    """Return the coupling of each interface whose node is the reference node of a coupling (a mean motion).
 
-    Such a node has no dofs of its own; as an interface of the kind "distributing" it carries them. The coupling must be
-    of all components, by one weight a member, and nothing else may sit on its node.
+    Such a node has no dofs of its own; an interface of kind "distributing" gives it dofs. The coupling must have all
+    components and one weight per member, and nothing else may be attached to its node.
     """
     couplings = {_one(raw, f"couplings.{k}.node", each.node): k for k, each in job.couplings.items()}
     found: dict[str, str] = {}
@@ -301,7 +302,7 @@ def _mean_interfaces(job: Job, raw: "RawMesh") -> dict[str, str]:
 
 
 def _used_groups(job: Job) -> "list[tuple[str, str]]":
-    """Return (table, group of nodes) of all that is attached to nodes or ties them."""
+    """Return (table, group of nodes) of everything that is attached to nodes or ties them."""
     found = [(f"masses.{k}", each.node) for k, each in job.masses.items()]
     found += [(f"springs.{k}", group) for k, each in job.springs.items() for group in each.nodes]
     found += [(f"links.{k}", group) for k, each in job.links.items() for group in (each.node, *each.followers)]
@@ -312,7 +313,7 @@ def _used_groups(job: Job) -> "list[tuple[str, str]]":
 def _mean_interface(
     name: str, table: InterfaceSection, coupling: str, job: Job, raw: "RawMesh", joined: "Joined"
 ) -> Interface:
-    """Return the interface at the reference node of a coupling: the weighted mean motion of its members."""
+    """Return the interface at the reference node of a coupling, which follows the mean motion of the members."""
     given = job.couplings[coupling]
     groups = [(_group(raw, f"couplings.{coupling}.members", group), weight) for group, weight in given.members.items()]
     members = _placed(joined, np.concatenate([rows for rows, _ in groups]), f"couplings.{coupling}.members")
@@ -403,13 +404,14 @@ def _interface(name: str, table: InterfaceSection, raw: "RawMesh", joined: "Join
         raise JobError(f"interfaces.{name}: with a deck, expected nodes = a group of nodes, got {table.selection}")
     nodes = _placed(joined, _group(raw, f"interfaces.{name}.nodes", table.nodes), f"interfaces.{name}")
     points = joined.body.nodes[nodes]
-    triad = np.eye(3) if table.triad is None else np.array(table.triad).T  # the job lists axes, columns are axes
+    # the job lists axes as rows; here they are columns
+    triad = np.eye(3) if table.triad is None else np.array(table.triad).T
     reference = points.mean(axis=0) if table.reference is None else np.array(table.reference)
     return Interface(name, table.kind, nodes, reference, triad)
 
 
 def _placed(joined: "Joined", nodes: IntArray, where: str) -> IntArray:
-    """Return the nodes of the body for rows of the deck; those that no element has are refused."""
+    """Return the nodes of the body for rows of the deck; raise `JobError` for nodes without elements."""
     place = joined.place[nodes]
     if (place < 0).any():
         raise JobError(f"{where}: {int((place < 0).sum())} of its nodes belong to no element of the body")
@@ -437,7 +439,7 @@ def _require_group(raw: "RawMesh", where: str, group: str) -> None:
 
 
 def _require_used_groups(job: Job, raw: "RawMesh", joined: "Joined") -> None:
-    """Refuse cells of the deck that are in no table: their mass would be lost in silence."""
+    """Raise `JobError` if cells of the deck are in no table, because their mass would be lost silently."""
     tables = [*(t.cells for t in job.solids.values()), *(t.cells for t in job.shells.values())]
     groups = {
         group

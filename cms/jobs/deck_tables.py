@@ -1,4 +1,4 @@
-"""The tables of a reduction job that only a whole deck has (docs/job_file.md): solids, couplings, equations."""
+"""The tables of a reduction job that only apply to a whole deck: solids, couplings, equations (docs/job_file.md)."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any
@@ -52,7 +52,7 @@ class SolidSection(Table):
 
 
 def member_weight(value: Any) -> float | tuple[float, ...]:
-    """Return the weight of translations, or six, of ux uy uz rx ry rz."""
+    """Return one weight for translations, or six for ux uy uz rx ry rz."""
     given = value if isinstance(value, list | tuple) else (value,) * 6
     if len(given) != 6 or any(is_no_number(each) for each in given):
         raise ValueError("expected a number, or a list of six")
@@ -60,7 +60,7 @@ def member_weight(value: Any) -> float | tuple[float, ...]:
 
 
 class RodSection(Table):
-    """[rods.NAME]: lines that carry force along themselves only (trusses)."""
+    """[rods.NAME]: lines with axial force only (trusses)."""
 
     lines: Annotated[tuple[str, ...], BeforeValidator(names)] = Field(
         description="the name of a group of lines, or a list of names"
@@ -69,7 +69,7 @@ class RodSection(Table):
     area: Annotated[float, Field(gt=0)] = Field(description="a number above 0 [length^2]")
 
 
-SixWeights = tuple[float, float, float, float, float, float]  #: of ux uy uz rx ry rz
+SixWeights = tuple[float, float, float, float, float, float]  #: for ux uy uz rx ry rz
 MemberWeight = Annotated[float | SixWeights, BeforeValidator(member_weight)]
 
 
@@ -93,12 +93,12 @@ class EquationSection(Table):
 
 
 def check_deck(job: Any) -> None:
-    """Raise `ValueError` unless tables of a deck stand beside a deck, and name materials and cells that are there.
+    """Raise `ValueError` unless tables of a deck come with a deck, and refer to existing materials and cells.
 
     Parameters
     ----------
     job
-        The job, its tables read.
+        The job, with its tables read.
     """
     tables: Mapping[str, Any] = {
         "solids": job.solids,

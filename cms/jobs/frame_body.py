@@ -27,7 +27,7 @@ def body_of_frame(
     Parameters
     ----------
     interfaces
-        Instead of those of the job; its load cases are then left to the caller, too.
+        Interfaces to use instead of those of the job; load cases are then left to the caller too.
     """
     from cms.jobs.parts_of_job import load_cases_of, part_of_mesh
     from fe_models.beams.body import beam_body

@@ -1,4 +1,4 @@
-"""The reduction job: what `cms reduce` reads (docs/job_file.md)."""
+"""The reduction job, which `cms reduce` reads (docs/job_file.md)."""
 
 import os
 from pathlib import Path
@@ -42,22 +42,22 @@ ACCEPTABLE = (
     "transition",
     "units",
     "warped",
-)  #: errors of the mesh report that may be meant
+)  #: errors of the mesh report that the user may accept
 KEYS_OF_LOADS = {
     "pressure": ("pressure",),
     "gravity": ("acceleration",),
     "force": ("force", "torque", "at", "reference", "each"),
-}  #: keys of a load case by its kind, beside the selections of pressure and force
+}  #: keys of each kind of load case, in addition to the selections for pressure and force
 
 Name = Annotated[str, StringConstraints(min_length=1)]
 Positive = Annotated[float, Field(gt=0)]
 
 
-ROLES = ("K", "M", "D", "dofs")  #: of files of matrices: stiffness, mass, damping, the list of rows
+ROLES = ("K", "M", "D", "dofs")  #: roles of matrix files: stiffness, mass, damping, list of rows
 
 
 def beside_the_job(value: Any, info: ValidationInfo) -> Path:
-    """Return the path of a file that is there, relative to the job file."""
+    """Return the path of an existing file, relative to the job file."""
     if not isinstance(value, str) or not value:
         raise ValueError("expected the path of a file, text")
     path = Path(info.context or ".") / value
@@ -76,7 +76,7 @@ def node_names(value: Any) -> Any:
 
 
 def accepted(value: Any) -> tuple[str, ...]:
-    """Return kinds of findings of the mesh report that the user has looked at and accepts."""
+    """Return the kinds of findings of the mesh report that the user accepts."""
     words = names(value)
     for word in words:
         if word not in ACCEPTABLE:
@@ -85,7 +85,7 @@ def accepted(value: Any) -> tuple[str, ...]:
 
 
 def kept(value: Any) -> tuple[Any, ...]:
-    """Return numbers of nodes, names of sets and positions that name what is kept."""
+    """Return the list of nodes to keep: node numbers, names of sets, and positions."""
     if not isinstance(value, list):
         raise ValueError("expected a list of node numbers, names of sets, and positions [x, y, z]")
     entries: list[Any] = []
@@ -102,7 +102,7 @@ def kept(value: Any) -> tuple[Any, ...]:
 
 
 def elements_named(value: Any) -> tuple[Any, ...]:
-    """Return numbers of elements and names of sets; "all" alone is all of them."""
+    """Return element numbers and set names; "all" selects all elements."""
     entries = value if isinstance(value, list) else [value]
     if not entries or any(isinstance(each, bool) or not isinstance(each, int | str) or each == "" for each in entries):
         raise ValueError('expected "all", or a list of numbers of elements and names of sets')
@@ -118,7 +118,7 @@ Accepted = Annotated[tuple[str, ...], BeforeValidator(accepted)]
 
 
 class PartSection(Table):
-    """[body] part: one of several parts of the mesh, cut across an axis; its cuts are node sets cut_1, cut_2, ..."""
+    """[body] part: one of several parts into which the mesh is cut; the cuts are node sets cut_1, cut_2, ..."""
 
     number: Annotated[int, Field(ge=1)] = Field(description="a whole number from 1, which part")
     of: Annotated[int, Field(ge=2)] | None = Field(
@@ -145,7 +145,7 @@ class PartSection(Table):
 
 
 class BodySection(Table):
-    """[body]: where the model comes from."""
+    """[body]: the source of the model."""
 
     name: Name | None = Field(None, description="the name of the body, text; default: the name of the job file")
     mesh: Path | None = Field(None, description="the path of a mesh or CAD file, relative to the job file")
@@ -204,7 +204,7 @@ class BodySection(Table):
 
     @property
     def brings_interfaces(self) -> bool:
-        """Whether the matrices are an .npz file of our own keys, which has nodes and interfaces."""
+        """Whether the matrices are in an .npz file of this project, which has nodes and interfaces."""
         return isinstance(self.matrices, Path) and self.matrices.suffix.lower() == ".npz" and self.geometry is None
 
     @model_validator(mode="after")
@@ -249,7 +249,7 @@ class CylinderSection(Table):
 
 
 class BoxSection(Table):
-    """Nodes in a box along the axes."""
+    """Nodes in a box whose edges are parallel to the mesh axes."""
 
     lo: Vector3 = Field(description="the corner with the least coordinates, [x, y, z]")
     hi: Vector3 = Field(description="the corner with the greatest coordinates, [x, y, z]")
@@ -262,7 +262,7 @@ class NearestSection(Table):
 
 
 class InterfaceSection(Table):
-    """[interfaces.NAME]: a place where the body meets its neighbours."""
+    """[interfaces.NAME]: a place at which neighbours connect to the body."""
 
     kind: choice("kind", lambda: INTERFACE_KINDS) = Field(  # type: ignore[valid-type]
         description=f"one of {', '.join(INTERFACE_KINDS)}"
@@ -281,7 +281,7 @@ class InterfaceSection(Table):
 
     @property
     def selection(self) -> str:
-        """The key of the selection that is given."""
+        """The key of the given selection."""
         return next(key for key in SELECTIONS if getattr(self, key) is not None)
 
     @model_validator(mode="after")
@@ -316,7 +316,7 @@ class LoadCaseSection(Table):
 
     @property
     def selection(self) -> str | None:
-        """The key of the selection that is given, if one is."""
+        """The key of the given selection; None if there is none."""
         return next((key for key in SELECTIONS if getattr(self, key) is not None), None)
 
     @model_validator(mode="after")
@@ -368,7 +368,7 @@ class Job(Table):
 
     @property
     def materials_of_cells(self) -> dict[str, MaterialSection]:
-        """The materials of solid cells: all, but for those that only sections of beams name; none of shells."""
+        """Materials of solid cells: all, except those that only beam sections use; none for shells."""
         if self.shells or (self.sections and not self.ties):
             return {}
         named = {section.material for section in self.sections.values()}
@@ -426,7 +426,7 @@ class Job(Table):
         return self._names_of_interfaces()
 
     def _names_of_interfaces(self) -> "Job":
-        """Refuse names of interfaces that are not there."""
+        """Raise `ValueError` if an interface is named that does not exist."""
         brings_interfaces = self.body.brings_interfaces
         for where, name in named_interfaces(self.reduction).items():
             if not brings_interfaces and name not in self.interfaces:
@@ -449,7 +449,7 @@ def read_job(path: str | os.PathLike[str]) -> Job:
     Raises
     ------
     JobError
-        With every problem: key path, value, what was expected, choices and the nearest name.
+        The message lists every problem with key path, value, expectation, choices and nearest name.
     """
     path = Path(path)
     job = validated(Job, read_toml(path, JobError), path, JobError, context=path.parent)

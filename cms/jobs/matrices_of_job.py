@@ -1,4 +1,4 @@
-"""Bodies of a job whose elements stay with another program: matrices, the geometry beside them, interfaces on it."""
+"""Bodies whose elements stay in another program: matrices, their geometry, and interfaces on it."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -22,8 +22,8 @@ __all__ = ["body_of_matrices"]
 def body_of_matrices(job: Job, stages: Stages, on_report: Callable[[Any], None] | None = None) -> FEBody:
     """Read mass and stiffness, and make a body with the interfaces and load cases of the job.
 
-    An .npz file of our own keys brings nodes and interfaces along; all others need a deck or mesh beside them unless
-    they say where the nodes are. `on_report` is called with the `MatrixReport` before they are judged.
+    An .npz file of this project contains nodes and interfaces. All other files need a deck or a mesh, unless they
+    contain node positions. `on_report` is called with the `MatrixReport` before the matrices are checked.
     """
     if job.body.brings_interfaces:
         return body_with_its_interfaces(job, stages)
@@ -52,7 +52,7 @@ def body_of_matrices(job: Job, stages: Stages, on_report: Callable[[Any], None] 
 
 
 def body_with_its_interfaces(job: Job, stages: Stages) -> FEBody:
-    """Read a body of bare matrices, which brings its interfaces along."""
+    """Read a body of bare matrices whose file contains the interfaces."""
     from pathlib import Path
 
     from fe_models.matrices import body_from_npz
@@ -67,7 +67,7 @@ def body_with_its_interfaces(job: Job, stages: Stages) -> FEBody:
 
 
 def interfaces_on(job: Job, geometry: "Mesh | NodeCloud") -> tuple[Interface, ...]:
-    """Return the interfaces of the job: on a mesh of solids as on any, else on nodes of unknown elements."""
+    """Return the interfaces of the job, on a solid mesh or on nodes of unknown elements."""
     from fe_models.beams.interfaces import node_interface
     from fe_models.meshes.boundary import facet_weights
     from fe_models.meshes.mesh import Mesh
@@ -81,7 +81,8 @@ def interfaces_on(job: Job, geometry: "Mesh | NodeCloud") -> tuple[Interface, ..
         chosen = selection_of(section.selection, getattr(section, section.selection))
         facets = selected_facets(geometry, chosen)
         weights = facet_weights(geometry.nodes, facets) if facets else np.ones(len(geometry.nodes))
-        triad = None if section.triad is None else np.array(section.triad).T  # the job lists axes, columns are axes
+        # the job lists axes as rows; here they are columns
+        triad = None if section.triad is None else np.array(section.triad).T
         interfaces.append(
             node_interface(geometry, name, chosen, section.kind, section.reference, triad, np.maximum(weights, 0.0))
         )

@@ -1,4 +1,4 @@
-"""The solid mesh of a job: read from a mesh file, or made of a CAD file."""
+"""The solid mesh of a job, read from a mesh file or made of a CAD file."""
 
 from typing import TYPE_CHECKING
 
@@ -12,12 +12,12 @@ __all__ = ["is_cad", "solid_mesh_of"]
 
 
 def is_cad(job: Job) -> bool:
-    """Whether the body comes from a CAD file and is meshed here."""
+    """Whether the body comes from a CAD file, which is meshed here."""
     return job.mesh_size is not None
 
 
 def solid_mesh_of(job: Job) -> "Mesh":
-    """Return the mesh of solid cells, whole, with the faces that interfaces and loads choose as groups."""
+    """Return the complete solid mesh; faces that interfaces and loads select are groups."""
     from fe_models.importers import read_mesh
 
     if job.body.mesh is None:

@@ -1,4 +1,4 @@
-"""Beams of a job welded to its solid."""
+"""Beams of a job that are welded to its solid."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -23,7 +23,7 @@ def body_of_mixed(job: Job, stages: Stages, solid: FEBody, solid_mesh: Any, on_r
     solid
         The solid without interfaces.
     solid_mesh
-        Its mesh, to select on.
+        Mesh of the solid, for selections.
     """
     from cms.jobs.parts_of_job import interface_of, selection_of
     from fe_models.beams.interfaces import NodeIndices, line_interface

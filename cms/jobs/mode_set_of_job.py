@@ -1,4 +1,4 @@
-"""The mode set a job asks for, with its options as the functions take them."""
+"""The mode set that a job requests, with its options as function arguments."""
 
 import logging
 from typing import Any
@@ -22,7 +22,7 @@ __all__ = ["job_mode_set", "reduction_of"]
 
 log = logging.getLogger(__name__)
 
-COUNT_KEYS = ("n_modes", "cutoff", "verify")  #: how many modes
+COUNT_KEYS = ("n_modes", "cutoff", "verify")  #: keys for the number of modes
 
 
 def job_mode_set(body: FEBody | Families, reduction: ReductionSection) -> ModeSet:
@@ -64,10 +64,10 @@ def job_mode_set(body: FEBody | Families, reduction: ReductionSection) -> ModeSe
 
 
 def reduction_of(job: Job, body: FEBody) -> ReductionSection:
-    """Return the table [reduction], for a part of a body with no more modes than the part can have.
+    """Return the table [reduction]; for a part of a body with at most as many modes as the part can have.
 
-    All parts of a body have one number of modes in their jobs; a small one may have fewer interior dofs. Each
-    multiplier of a distributing interface takes one of them.
+    The jobs of all parts of a body have the same number of modes, but a small part may have fewer interior dofs. Each
+    multiplier of a distributing interface reduces them by one.
     """
     n_i = body.n_dof - len(body.b) - 2 * int((body.dofs[:, 1] == MULTIPLIER).sum())
     asked = job.reduction.n_modes
@@ -81,7 +81,7 @@ def reduction_of(job: Job, body: FEBody) -> ReductionSection:
 
 
 def with_additions(families: Families, modes: ModeSet, reduction: ReductionSection) -> ModeSet:
-    """Reduce all-node interfaces to their characteristic modes and add extra columns, as the job asks for."""
+    """Reduce interfaces of kind "nodes" to characteristic modes, and add extra columns, as the job requests."""
     if reduction.interface_modes is not None or reduction.interface_cutoff is not None:
         cutoff = None if reduction.interface_cutoff is None else reduction.interface_cutoff * families.body.units.time
         wanted = ModeCount(reduction.interface_modes, cutoff)
@@ -92,7 +92,7 @@ def with_additions(families: Families, modes: ModeSet, reduction: ReductionSecti
 
 
 def set_options(body: FEBody, reduction: ReductionSection) -> dict[str, Any]:
-    """Return the options of the set as its function takes them: frequencies in cycles per time unit of the body."""
+    """Return the options of the set as function arguments, with frequencies in cycles per time unit of the body."""
     options: dict[str, Any] = {}
     time = body.units.time
     is_auto = reduction.n_modes == AUTO

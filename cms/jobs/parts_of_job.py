@@ -1,4 +1,4 @@
-"""What a job says of one thing each: materials, interfaces, selections, load cases, the body frame."""
+"""Conversion of single tables of a job: materials, interfaces, selections, load cases, body frame."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +26,7 @@ __all__ = [
 
 
 def part_of_mesh(job: Job, mesh: "AnyMesh") -> "AnyMesh":
-    """Return the part of the mesh that the job asks for, by default all of it."""
+    """Return the part of the mesh that the job requests; default: the whole mesh."""
     from fe_models.meshes.split import split_mesh
 
     part = job.body.part
@@ -34,7 +34,7 @@ def part_of_mesh(job: Job, mesh: "AnyMesh") -> "AnyMesh":
 
 
 def materials_of(job: Job) -> "AnyMaterial | dict[str, AnyMaterial]":
-    """Return one material for all cells, or group of cells -> material."""
+    """Return one material for all cells, or the material of each group of cells."""
     made = {name: material_of(name, section) for name, section in job.materials_of_cells.items()}
     if [section.cells for section in job.materials_of_cells.values()] == [("all",)]:
         return next(iter(made.values()))
@@ -60,12 +60,13 @@ def interface_of(name: str, section: InterfaceSection, mesh: "Mesh") -> Interfac
         "nodes": interfaces.nodes_interface,
     }
     chosen = selection_of(section.selection, getattr(section, section.selection))
-    triad = None if section.triad is None else np.array(section.triad).T  # the job lists axes, columns are axes
+    # the job lists axes as rows; here they are columns
+    triad = None if section.triad is None else np.array(section.triad).T
     return makers[section.kind](mesh, name, chosen, reference=section.reference, triad=triad)
 
 
 def selection_of(key: str, given: Any) -> Any:
-    """Return the selection that a key of the job names, with the options given."""
+    """Return the selection for a key of the job and its options."""
     from fe_models.meshes import selections
 
     types = {
@@ -95,7 +96,7 @@ def load_cases_of(
 def load_case_of(
     name: str, section: LoadCaseSection, body: FEBody, mesh: "Mesh | LineMesh | ShellMesh | NodeCloud | None"
 ) -> LoadCase:
-    """Return one load case; the job has checked that its keys fit its kind."""
+    """Return one load case; the job has already checked that its keys fit its kind."""
     from fe_models import loads
 
     if section.acceleration is not None:
@@ -112,7 +113,7 @@ def load_case_of(
 
 
 def frame_of(job: Job, *, held: bool = False) -> "Frame | HeldFrame":
-    """Return the body frame of the job; of a held body it is the ground, and no other may be asked for."""
+    """Return the body frame of the job; a held body has the ground as its frame, and no other may be requested."""
     from cms.reduced_basis.frames import HeldFrame
 
     reduction = job.reduction
@@ -128,7 +129,7 @@ def frame_of(job: Job, *, held: bool = False) -> "Frame | HeldFrame":
 
 
 def moving_frame_of(job: Job) -> "Frame":
-    """Return the body frame of the job for a body that is free."""
+    """Return the body frame of the job for a free body."""
     from cms.reduced_basis.frames import FRAMES, NodalFrame
 
     reduction = job.reduction

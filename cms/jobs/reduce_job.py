@@ -1,4 +1,4 @@
-"""The whole line of a reduction job: mesh or matrices, interfaces, mode set, reduced body."""
+"""All steps of a reduction job: mesh or matrices, interfaces, mode set, reduced body."""
 
 import logging
 from collections.abc import Callable
@@ -28,9 +28,9 @@ __all__ = ["reduce_job"]
 
 log = logging.getLogger(__name__)
 
-GUESSED_MODES = 50  #: where a cutoff or "auto" says how many, for the forecast of memory
+GUESSED_MODES = 50  #: assumed number of modes for the memory estimate, if a cutoff or "auto" determines it
 
-#: mode sets with a column for each boundary dof
+#: mode sets with one column for each boundary dof
 OF_INTERFACES = (
     "craig-bampton", "craig-bampton-ir", "guyan", "herting", "benfield-hruda", "rubin", "macneal", "craig-chang",
     "dual-craig-bampton", "attachment", "unrestrained-attachment", "multilevel",
@@ -50,22 +50,22 @@ def reduce_job(
     Parameters
     ----------
     job
-        A job file, or a job that was read.
+        A job file, or a job that has been read.
     stages
-        Takes the time of each stage and shows its progress; none by default.
+        Receives durations and progress of the stages; None: neither is reported.
     solver
-        What factorises, by name (`cms.solvers.registry`); goes before the one of the job, whose default is the fastest
-        that is installed.
+        Name of the solver (`cms.solvers.registry`); overrides the solver of the job. Default: the fastest installed
+        solver.
     memory
-        The most memory the process may take, such as "8GB", or bytes: above it the factor goes to disk, and what does
-        not fit even then is refused before the factorisation. Goes before the one of the job; no bound by default.
+        Largest memory of the process, such as "8GB" or a number of bytes. Above it, the factor goes to disk; a job that
+        still does not fit fails before the factorisation. Overrides the value of the job. Default: no limit.
     on_report
-        Called with the mesh report, before it is judged.
+        Receives the mesh report before it is checked.
 
     Raises
     ------
     CmsError, FeModelsError
-        If the job, the mesh, a material, an interface, the mode set or the solver does not do.
+        If the job, the mesh, a material, an interface, the mode set or the solver is invalid.
 
     Examples
     --------
@@ -76,7 +76,7 @@ def reduce_job(
 
     job = job if isinstance(job, Job) else read_job(Path(job))
     stages = stages or Stages()
-    chosen = solver_of(solver or job.reduction.solver)  # one that is not installed is told before the work
+    chosen = solver_of(solver or job.reduction.solver)  # a solver that is not installed is reported before any work
     allowed = memory if memory is not None else job.reduction.memory
     budget = None if allowed is None else memory_bytes(allowed)
     if budget is not None and (asked := solver or job.reduction.solver) not in (None, "cholesky"):
@@ -97,18 +97,18 @@ def reduce_job(
     if job.recovery:
         with Families(
             coupled, announce=not reduces_interfaces(job), solver=chosen, to_disk=to_disk
-        ) as families:  # the static part of recovery rows needs the factorisation
+        ) as families:  # recovery rows need the factorisation for their static part
             return reduced(job, families, stages, *modes_and_states(job, families, stages))
     return reduced(job, coupled, stages, *with_own_factorisation(job, coupled, chosen, stages, to_disk))
 
 
 def announce_stiffness(job: Job, body: FEBody) -> None:
-    """Say before the long work what the geometric stiffness costs, or that it will be left out; refuse it without room.
+    """Log the cost of the geometric stiffness before the long work, or that it will be left out.
 
     Raises
     ------
     BodyError
-        If it is asked for, and the elements do not know it, an interface is unknown, or the machine has no room.
+        If it is requested, but the elements do not know it, an interface is unknown, or the memory does not suffice.
     """
     from cms.second_order import room_for_stiffness as room
     from cms.second_order.unit_states import has_geometric_stiffness, loaded_interfaces, require_geometric_stiffness
@@ -127,7 +127,7 @@ def announce_stiffness(job: Job, body: FEBody) -> None:
 
 
 def shape_of(job: Job, body: FEBody) -> ReductionShape:
-    """Return what the peak of memory of a job follows from."""
+    """Return the data that determine the peak memory of a job."""
     n_modes = job.reduction.n_modes if isinstance(job.reduction.n_modes, int) else GUESSED_MODES
     return ReductionShape(body.n_dof, len(body.b) + n_modes, n_modes, resident_bytes())
 
@@ -165,7 +165,7 @@ def reduced(
 def with_own_factorisation(
     job: Job, coupled: FEBody, solver: Solver, stages: Stages, to_disk: bool
 ) -> "tuple[ModeSet, UnitStates | None]":
-    """Make what needs the factorisation, which is freed before the reduction: that needs the memory."""
+    """Make all results that need the factorisation, and free it, because the reduction needs the memory."""
     from cms.families.families import Families
 
     announce = not reduces_interfaces(job)
@@ -174,9 +174,9 @@ def with_own_factorisation(
 
 
 def modes_and_states(job: Job, families: "Families", stages: Stages) -> "tuple[ModeSet, UnitStates | None]":
-    """Return the mode set and the static states of unit loads.
+    """Return the mode set, and the static states of unit loads.
 
-    These are for the geometric stiffness; None where it is left out or not known.
+    The states are for the geometric stiffness; None if it is left out or unknown.
     """
     from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
     from cms.second_order.room_for_stiffness import makes_stiffness
@@ -184,7 +184,7 @@ def modes_and_states(job: Job, families: "Families", stages: Stages) -> "tuple[M
 
     with stages(f"mode set {job.reduction.set}"):
         modes = job_mode_set(families, reduction_of(job, families.body))
-    # of one that is too large `reduce` says that it is left out
+    # if it is too large, `reduce` reports that it is left out
     wanted = makes_stiffness(job.reduction.geometric_stiffness, families.body, len(modes.labels))
     if not wanted and not job.reduction.quadratic_modes:
         return modes, None
@@ -199,12 +199,12 @@ def modes_and_states(job: Job, families: "Families", stages: Stages) -> "tuple[M
 
 
 def reduces_interfaces(job: Job) -> bool:
-    """Return whether a job asks for fewer modes of all-node interfaces."""
+    """Return whether a job requests fewer modes for interfaces of kind "nodes"."""
     return job.reduction.interface_modes is not None or job.reduction.interface_cutoff is not None
 
 
 def expected_columns(job: Job, body: FEBody) -> int:
-    """Return how many columns the mode set of a job has at least, before it is made."""
+    """Return a lower bound of the number of columns of the mode set of a job, before the set is made."""
     from cms.families.interface_cost import few_columns
 
     found = len(body.b)

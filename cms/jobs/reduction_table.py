@@ -32,15 +32,16 @@ __all__ = [
 ]
 
 FRAMES = ("nodal", "tisserand", "buckens")
-MEASURE_NAMES = ("frequency", "frf")  #: of `cms.compare.mode_selection`, whose import would cost every command its time
+#: names of `cms.compare.mode_selection`, whose import would slow down every command
+MEASURE_NAMES = ("frequency", "frf")
 SET_OPTIONS = (
     "n_modes", "cutoff", "verify", "free", "loads", "neighbours", "n_blocks", "shifts", "tolerance", "band",
     "load_cases", "damping_ratio", "n_rich", "functions", "n_axial", "n_bending", "n_torsion", "axis", "point",
     "poisson", "columns", "columns_over", "inputs", "outputs", "inertia_relief", "cutoff_factor",
     "workers",
 )  # fmt: skip
-#: keys that belong to some mode sets
-AUTO = "auto"  #: instead of a number of modes: as few as meet error over band
+#: keys that belong to some mode sets only
+AUTO = "auto"  #: in place of a number of modes: as few modes as meet `error` over `band`
 AUTO_OPTIONS = ("error", "band", "measure")  #: keys that belong to n_modes = "auto"
 
 Name = Annotated[str, StringConstraints(min_length=1)]
@@ -60,7 +61,7 @@ def components(value: Any) -> tuple[str, ...]:
 
 
 def amount(value: Any) -> tuple[float, float, float]:
-    """Return one number for all axes, or three, none negative."""
+    """Return one non-negative number for all axes, or three."""
     values = [value] * 3 if not isinstance(value, list | tuple) else value
     if len(values) != 3 or any(is_no_number(x) or x < 0 for x in values):
         raise ValueError("expected one number, 0 or more, or three, [x, y, z]")
@@ -68,7 +69,7 @@ def amount(value: Any) -> tuple[float, float, float]:
 
 
 def amount_or_matrix(value: Any) -> Rows:
-    """Return one number or three as one row, or six rows of six numbers."""
+    """Return one number or three as a single row, or six rows of six numbers."""
     if isinstance(value, list | tuple) and value and isinstance(value[0], list | tuple):
         if [len(row) for row in value if isinstance(row, list | tuple)] != [6] * 6 or len(value) != 6:
             raise ValueError("expected one number, three, or six rows of six numbers")
@@ -86,7 +87,7 @@ def count_or_auto(value: Any) -> Any:
 
 
 def shift_list(value: Any) -> tuple[float, ...]:
-    """Return one expansion frequency or a list of them."""
+    """Return one expansion frequency, or a list of them."""
     values = value if isinstance(value, list | tuple) else [value]
     if not values or any(is_no_number(x) or x < 0 for x in values):
         raise ValueError("expected a list of frequencies, 0 or more, in Hz")
@@ -94,7 +95,7 @@ def shift_list(value: Any) -> tuple[float, ...]:
 
 
 def places(value: Any) -> tuple[str, ...]:
-    """Return one name or a list of names of interfaces, with a component or without."""
+    """Return one name or a list of names of interfaces, each with or without a component."""
     words = [value] if isinstance(value, str) else value
     if not isinstance(words, list | tuple) or not words or any(not isinstance(w, str) or not w for w in words):
         raise ValueError('expected a list of interfaces, or with a component, such as "big_end uz"')
@@ -102,7 +103,7 @@ def places(value: Any) -> tuple[str, ...]:
 
 
 def extras(value: Any) -> tuple[str, ...]:
-    """Return one kind of extra columns or a list of kinds."""
+    """Return one kind of extra columns, or a list of kinds."""
     words = [value] if isinstance(value, str) else value
     if not isinstance(words, list | tuple) or not words or len(set(map(str, words))) < len(words):
         raise ValueError(f"expected a list, each once, of {', '.join(EXTRA_COLUMNS)}")
@@ -113,7 +114,7 @@ def extras(value: Any) -> tuple[str, ...]:
 
 
 def workers_key(value: Any) -> int | str:
-    """Return a number of processes, or words about a Dask cluster."""
+    """Return a number of processes, or the text that names a Dask cluster."""
     if isinstance(value, bool) or not isinstance(value, int | str):
         raise ValueError(f"expected {WORKERS_HELP}")
     try:
@@ -133,7 +134,7 @@ Places = Annotated[tuple[str, ...], BeforeValidator(places)]
 
 
 def memory_size(value: Any) -> Any:
-    """Return a size of memory with its unit, checked."""
+    """Return a checked memory size with its unit."""
     if not isinstance(value, str):
         raise ValueError('expected a number with a unit, text, such as "8GB"')
     memory_bytes(value)
@@ -202,7 +203,7 @@ def held_dofs(value: Any) -> tuple[tuple[int | str, int | str], ...]:
 
 
 def is_dof(node: Any, component: Any) -> bool:
-    """Whether this is a node counted from 0 with a component 0 to 5, or a number with the name of a component."""
+    """Whether the pair is a node index with a component 0 to 5, or a node number with a component name."""
     if component in MOTION_COMPONENTS:
         return (type(node) is int and node >= 0) or isinstance(node, str)
     return type(node) is int and type(component) is int and node >= 0 and 0 <= component <= 5
@@ -336,7 +337,7 @@ class ReductionSection(Table):
         return self
 
     def _options_of_auto(self) -> tuple[str, ...]:
-        """Return the keys that n_modes = "auto" takes; refuse them without it, and it without them."""
+        """Return the keys that n_modes = "auto" needs; raise `ValueError` if one is missing or needless."""
         if self.n_modes == AUTO:
             for key in ("error", "band"):
                 if getattr(self, key) is None:
@@ -349,7 +350,7 @@ class ReductionSection(Table):
 
 
 def mode_set_options(name: str) -> tuple[str, ...]:
-    """Return the options of a mode set that a job can give."""
+    """Return the options of a mode set that a job can set."""
     takes = set(signature := inspect.signature(MODE_SETS[name]).parameters)
     if "n_modes" in takes and signature["n_modes"].annotation == int | ModeCount:
         takes |= {"cutoff", "verify"}
@@ -359,7 +360,7 @@ def mode_set_options(name: str) -> tuple[str, ...]:
 
 
 def named_interfaces(reduction: ReductionSection) -> Mapping[str, str]:
-    """Return where the table names interfaces of the body: key path -> name."""
+    """Return the interfaces of the body that the table names, by key path."""
     named = {} if reduction.at is None else {f'at = "{reduction.at}"': reduction.at}
     named |= {f"free.{name}": name for name in reduction.free or {}}
     named |= {f"loads.{name}": name for name in reduction.loads or {}}

@@ -1,4 +1,4 @@
-"""Shells of a reduction job: a body of triangles and quads, with stiffeners and what is attached to its nodes."""
+"""The body of the shells of a job: triangles and quads, with stiffeners and attachments."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -58,9 +58,9 @@ def body_of_shell(job: Job, stages: Stages, on_report: Callable[[Any], None] | N
 
 
 def shell_mesh(job: Job) -> "ShellMesh":
-    """Read all triangles and quads of the mesh, and the lines of its stiffeners; `shell_body` asks all for a thickness.
+    """Read all triangles and quads of the mesh, and the lines of its stiffeners; `shell_body` checks their thickness.
 
-    Only those of the groups that the job names where it accepts that others are left out.
+    If the job accepts that others are left out, only the cells of the groups that it names are read.
     """
     from fe_models.importers.read_mesh import read_shell_mesh
 
@@ -71,7 +71,7 @@ def shell_mesh(job: Job) -> "ShellMesh":
 
 
 def shell_properties_of(job: Job) -> "dict[str, AnyShellProperty]":
-    """Return group of cells -> its thickness and material, or its layers."""
+    """Return thickness and material, or layers, for each group of cells."""
     from fe_models.shells.shell_property import ShellProperty
 
     made: dict[str, AnyShellProperty] = {}
@@ -112,5 +112,6 @@ def shell_interface_of(name: str, section: InterfaceSection, mesh: "ShellMesh") 
     from fe_models.shells.interfaces import shell_interface
 
     chosen = selection_of(section.selection, getattr(section, section.selection))
-    triad = None if section.triad is None else np.array(section.triad).T  # the job lists axes, columns are axes
+    # the job lists axes as rows; here they are columns
+    triad = None if section.triad is None else np.array(section.triad).T
     return shell_interface(mesh, name, chosen, kind=section.kind, reference=section.reference, triad=triad)

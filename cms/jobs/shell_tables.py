@@ -50,14 +50,14 @@ class ShellSection(Table):
 def check_shells(
     shells: Mapping[str, ShellSection], sections: Mapping[str, BeamSection], body: Any, materials: Mapping[str, Any]
 ) -> None:
-    """Raise `ValueError` unless every shell has a mesh, its layers and its cells, and every stiffener its lines.
+    """Raise `ValueError` unless every shell has a mesh, layers and cells, and every stiffener has lines.
 
     Parameters
     ----------
     shells, sections, materials
-        Tables of the job by name.
+        Tables of the job, by name.
     body
-        Its table [body].
+        The table [body] of the job.
     """
     if not shells:
         return

@@ -1,1 +1,1 @@
-"""How much memory a reduction takes, told before the work, and kept within what it may take."""
+"""Memory of a reduction: an estimate before the work, and a limit."""

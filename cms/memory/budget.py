@@ -1,19 +1,19 @@
-"""A solver that keeps a reduction within a budget: its factor in memory, on disk, or a refusal before the work.
+"""A solver that keeps a reduction within a memory budget: factor in memory, factor on disk, or an early error.
 
-The peak is the largest of three stages. n: dofs, c: columns of the mode set, m: vibration modes, b: their block,
-h: what the process holds when the stage begins.
+The peak is the largest of three stages. Symbols: n dofs, c columns of the mode set, m vibration modes, b their block
+size, k static columns, h memory of the process at the start of the stage.
 
-(1) factorisation: h + permuted matrix + fronts at work and waiting (`Blocks.n_working`) + factor, if in memory
-(2) vibration and static modes: h + factor, or its largest part for each thread + 8 n columns of
-    (4 m + 8 b + k) while modes are searched; basis: 3 m + 6 b columns
-    (k + c + m) while the set is put together of the k = c - m static columns and the modes
-(3) finish, moments and stress, the factor freed: what the coupled body held + 6.2 arrays of (n, c)
+(1) factorisation: h + permuted matrix + active and waiting fronts (`Blocks.n_working`) + factor, if in memory
+(2) vibration and static modes: h + factor (or its largest part for each thread) + 8 n times the columns
+    (4 m + 8 b + k) during the mode search; basis: 3 m + 6 b columns
+    (k + c + m) while the set is assembled from the k = c - m static columns and the modes
+(3) finishing, moments and stress, with the factor freed: memory of the coupled body + 6.2 arrays of (n, c)
 
-Where (3) does not fit, the columns lie on disk (`fe_models.foundation.tall`). Then of (2) k and c go, and (3) is
+If (3) does not fit, the columns are put on disk (`fe_models.foundation.tall`). Then k and c drop out of (2), and (3) is
 
-(3') what the coupled body held + 54 matrices (c, c) + products of 400 MB
+(3') memory of the coupled body + 54 matrices (c, c) + 400 MB of products
 
-The numbers 3 m + 6 b, 6.2, 54 and 400 MB are measured (docs/memory.md); all else follows from shapes.
+The numbers 3 m + 6 b, 6.2, 54 and 400 MB are measured (docs/memory.md); all others follow from array shapes.
 """
 
 import logging
@@ -36,22 +36,22 @@ __all__ = ["Peak", "ReductionShape", "columns_within", "peak_of", "solver_within
 
 log = logging.getLogger(__name__)
 
-PERMUTED = 12.0  #: bytes an entry of the lower triangle in the new order
-TALL = 6.2  #: arrays of all columns that are held in the third stage
-SQUARES = 54.0  #: matrices over all columns that are held where those lie on disk: Gram matrices, moments, invariants
-SLICES = 4e8  #: bytes of slices and products that are held then
-ON_DISK = 6.0  #: arrays of all columns that lie on disk at most
+PERMUTED = 12.0  #: bytes per entry of the lower triangle in the new order
+TALL = 6.2  #: number of arrays with all columns that are held in the third stage
+SQUARES = 54.0  #: number of (c, c) matrices held if the columns are on disk: Gram matrices, moments, invariants
+SLICES = 4e8  #: bytes of slices and products held in that case
+ON_DISK = 6.0  #: largest number of arrays with all columns on disk
 
 
 @dataclass(frozen=True)
 class ReductionShape:
-    """What the peak of a reduction follows from, beside the matrix."""
+    """Data that determine the peak memory of a reduction, in addition to the matrix."""
 
     n_dof: int
-    n_columns: int  #: of the mode set
-    n_modes: int  #: vibration modes among them
-    held: float  #: by the process with the coupled body [bytes]
-    to_disk: bool = False  #: whether the columns lie on disk
+    n_columns: int  #: number of columns of the mode set
+    n_modes: int  #: number of vibration modes among them
+    held: float  #: memory of the process with the coupled body [bytes]
+    to_disk: bool = False  #: whether the columns are on disk
 
 
 @dataclass(frozen=True)
@@ -64,25 +64,25 @@ class Peak:
 
     @property
     def most(self) -> float:
-        """The largest [bytes]."""
+        """Largest peak of the three stages [bytes]."""
         return max(self.factorisation, self.modes, self.reduction)
 
 
 def peak_of(shape: ReductionShape, fronts: Fronts, n_entries: int, held: float, *, on_disk: bool) -> Peak:
-    """Return the peaks of a reduction.
+    """Return the peak memory of a reduction.
 
     Parameters
     ----------
     shape
-        Of the reduction.
+        Data of the reduction.
     fronts
-        Of the interior stiffness.
+        Fronts of the interior stiffness.
     n_entries
-        Of its lower triangle.
+        Number of entries of its lower triangle.
     held
-        By the process before the factorisation [bytes].
+        Memory of the process before the factorisation [bytes].
     on_disk
-        Whether the factor is.
+        Whether the factor is on disk.
     """
     blocks, threads = blocks_of(fronts), n_threads()
     stored = np.diff(blocks.stored)
@@ -106,7 +106,7 @@ def reduction_peak(shape: ReductionShape) -> float:
 
 
 def columns_within(budget: float, shape: ReductionShape) -> ReductionShape:
-    """Return the shape with its columns on disk where they do not fit, but fit better there; say so."""
+    """Return the shape with its columns on disk if they do not fit in memory but fit better there; log this."""
     stored = replace(shape, to_disk=True)
     if reduction_peak(shape) <= budget or reduction_peak(stored) >= reduction_peak(shape):
         return shape
@@ -121,9 +121,9 @@ def columns_within(budget: float, shape: ReductionShape) -> ReductionShape:
 
 
 def solver_within(budget: float, shape: ReductionShape) -> Solver:
-    """Return the solver of a reduction that may take `budget` bytes, the process and all it holds included.
+    """Return the solver of a reduction that may take `budget` bytes, including everything the process holds.
 
-    Its `factor` raises `MemoryBudgetError` before any factorisation where neither way fits.
+    Its `factor` raises `MemoryBudgetError` before any factorisation if the factor fits neither in memory nor on disk.
     """
 
     def factor(lower: sp.csc_array, *, definite: bool) -> Factor:
@@ -151,7 +151,7 @@ def solver_within(budget: float, shape: ReductionShape) -> Solver:
 
 
 def refusal(budget: float, inside: Peak, outside: Peak) -> str:
-    """Say what is missing, and what would help."""
+    """Return the message that says what is missing and what would help."""
     stages = {
         "the factorisation": (outside.factorisation, "fewer dofs (a coarser mesh), or cms split"),
         "the modes": (outside.modes, "fewer modes, or fewer columns (interface_modes for interfaces of many nodes)"),
@@ -165,5 +165,5 @@ def refusal(budget: float, inside: Peak, outside: Peak) -> str:
 
 
 def gigabytes(size: float) -> str:
-    """Return a size in words."""
+    """Return a size as text."""
     return f"{size / 1e9:.3g} GB" if size >= 1e9 else f"{np.ceil(size / 1e6):.0f} MB"

@@ -1,4 +1,4 @@
-"""Sizes of memory in words, such as "8GB"."""
+"""Sizes of memory as text, such as "8GB"."""
 
 import re
 import sys
@@ -11,16 +11,16 @@ UNITS = {
     "": 1.0, "B": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12, "KiB": 2.0**10, "MiB": 2.0**20, "GiB": 2.0**30,
     "TiB": 2.0**40,
 }  # fmt: skip
-LEAST = 5e7  #: bytes; less is a slip of the unit: Python alone takes it
+LEAST = 5e7  #: bytes; a smaller size is probably a wrong unit, because Python alone needs more
 
 
 def memory_bytes(text: str | float) -> float:
-    """Return a size in bytes from words such as "8GB", "800 MB" or "7.5GiB", or from a number of bytes.
+    """Return a size in bytes from a text such as "8GB", "800 MB" or "7.5GiB", or from a number of bytes.
 
     Raises
     ------
     MemoryBudgetError
-        If it is no size, its unit is unknown, or it is less than any run takes.
+        If it is not a size, its unit is unknown, or it is smaller than any run needs.
 
     Examples
     --------
@@ -42,7 +42,7 @@ def memory_bytes(text: str | float) -> float:
 
 
 def resident_bytes() -> float:
-    """Return the memory this process holds now [bytes]; on systems that do not tell, the most it has held."""
+    """Return the current memory of this process [bytes]; the peak memory if the system does not report the current."""
     try:
         with open("/proc/self/statm") as file:
             pages = int(file.read().split()[1])

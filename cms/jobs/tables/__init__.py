@@ -1,1 +1,1 @@
-"""Tables of a reduction job that name nothing but numbers: materials and mesh sizes."""
+"""Tables of a reduction job that do not refer to other tables: materials and mesh sizes."""

@@ -23,24 +23,24 @@ SHEAR = "three numbers above 0, the shear moduli G_12, G_13, G_23, where young h
 
 
 def moduli(value: Any) -> float | Three:
-    """Return a modulus or three, above zero."""
+    """Return one positive modulus, or three."""
     return _one_or_three(value, YOUNG, lambda x: x > 0, lambda x: x > 0)
 
 
 def ratios(value: Any) -> float | Three:
-    """Return one of Poisson's ratios within its limits, or three, whose limits depend on the moduli."""
+    """Return one Poisson's ratio within its limits, or three ratios, whose limits depend on the moduli."""
     return _one_or_three(value, POISSON, lambda x: -1 < x < 0.5, lambda x: True)
 
 
 def shear_moduli(value: Any) -> Three:
-    """Return three moduli above zero."""
+    """Return three positive moduli."""
     found = _one_or_three(value, SHEAR, lambda x: False, lambda x: x > 0)
-    assert isinstance(found, tuple)  # one number is refused
+    assert isinstance(found, tuple)  # a single number has been rejected
     return found
 
 
 def tensor(value: Any) -> Tensor:
-    """Return six rows of six numbers; whether they are symmetric and positive definite the material finds out."""
+    """Return six rows of six numbers; the material checks whether they are symmetric and positive definite."""
     is_list = isinstance(value, list | tuple) and len(value) == 6
     if not is_list or any(
         not isinstance(row, list | tuple) or len(row) != 6 or any(is_no_number(x) for x in row) for row in value
@@ -58,7 +58,7 @@ def _one_or_three(value: Any, expected: str, one: Any, each: Any) -> Any:
 
 
 class MaterialSection(Table):
-    """[materials.NAME]: a material and the cells that have it."""
+    """[materials.NAME]: a material, and the cells that have it."""
 
     young: Annotated[float | Three, BeforeValidator(moduli)] | None = Field(None, description=YOUNG)
     poisson: Annotated[float | Three, BeforeValidator(ratios)] | None = Field(None, description=POISSON)
@@ -74,7 +74,7 @@ class MaterialSection(Table):
 
     @property
     def is_orthotropic(self) -> bool:
-        """Whether it has three moduli."""
+        """Whether the material has three moduli."""
         return isinstance(self.young, tuple)
 
     @model_validator(mode="after")
@@ -104,7 +104,7 @@ def material_of(name: str, table: MaterialSection) -> "AnyMaterial":
     Raises
     ------
     MaterialError
-        If some strain would have negative energy, or the axes are none.
+        If some strain would have negative energy, or the axes are invalid.
     """
     from fe_models.material import AnisotropicMaterial, Material, OrthotropicMaterial
 
@@ -120,12 +120,12 @@ def material_of(name: str, table: MaterialSection) -> "AnyMaterial":
 
 
 def isotropic_of(name: str, table: MaterialSection, what: str) -> "Material":
-    """Return the material of a table for `what`, such as beams, that take isotropic ones only.
+    """Return the isotropic material of a table for `what`, such as beams, which need isotropic materials.
 
     Raises
     ------
     JobError
-        If it is orthotropic.
+        If the material is not isotropic.
     """
     from fe_models.material import Material
 

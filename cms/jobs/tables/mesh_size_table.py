@@ -1,4 +1,4 @@
-"""The table [mesh_size] of a reduction job: how fine a CAD file is meshed (docs/job_file.md)."""
+"""The table [mesh_size] of a reduction job: element sizes for a CAD file (docs/job_file.md)."""
 
 from pathlib import Path
 from typing import Annotated
@@ -14,7 +14,7 @@ Positive = Annotated[float, Field(gt=0)]
 
 
 class MeshSizeSection(Table):
-    """[mesh_size]: largest element, and how it follows the geometry."""
+    """[mesh_size]: largest element size, and adaptation to the geometry."""
 
     size: Positive = Field(description="a number above 0, the largest edge of an element")
     smallest: Positive | None = Field(None, description="a number above 0, the least edge that curvature asks for")
@@ -34,12 +34,12 @@ class MeshSizeSection(Table):
 
 
 def check_mesh_size(table: MeshSizeSection | None, mesh: Path | None, *, has_others: bool) -> None:
-    """Raise `ValueError` unless a CAD file has its table and nothing else has one.
+    """Raise `ValueError` unless a CAD file has its table, and no other source has one.
 
     Parameters
     ----------
     mesh
-        File of the body.
+        Source file of the body.
     has_others
         Whether the job has shells or beams.
     """

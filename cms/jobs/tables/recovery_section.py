@@ -1,4 +1,4 @@
-"""The tables [recovery.NAME] of a reduction job: rows that a table of the modal file has (docs/job_file.md)."""
+"""The tables [recovery.NAME] of a reduction job: the rows of recovery tables in the modal file (docs/job_file.md)."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any
@@ -53,7 +53,7 @@ class RowsSection(Table):
 
     @property
     def rows(self) -> Rows:
-        """The rows that are asked for."""
+        """The requested rows."""
         return Rows(self.quantity, self.at, self.components, self.about)
 
 
@@ -67,18 +67,18 @@ class RecoverySection(Table):
 
 
 class RecoveryFile(Table):
-    """A file that has tables [recovery.NAME] alone."""
+    """A file that only contains tables [recovery.NAME]."""
 
     recovery: dict[str, RecoverySection] = Field(min_length=1, description="tables [recovery.NAME] with rows")
 
 
 def requests_of(sections: Mapping[str, RecoverySection]) -> tuple[RecoveryRequest, ...]:
-    """Return what the tables ask for.
+    """Return the requests of the tables.
 
     Raises
     ------
     RecoveryError
-        If rows name no place where they need one, or a point that they have no use for.
+        If rows lack a place that they need, or give a point that they do not use.
     """
     return tuple(
         RecoveryRequest(name, tuple(each.rows for each in section.rows), section.loads_at)
