@@ -46,31 +46,31 @@ log = logging.getLogger(__name__)
 
 
 class Families:
-    """The mode families of a body, each computed once, when first asked for; a context manager that frees the factor.
+    """The mode families of a body; each is computed once, when first used. The context manager frees the factor.
 
     >>> with Families(body) as families:                                   # doctest: +SKIP
     ...     sets = [rubin(families, n_modes=k) for k in range(20)]
 
-    Held dofs h: the boundary dofs, and interior ones where those leave a rigid-body motion free (theory.md §1). With
-    them held the interior stiffness K_II is factorised, once; static and vibration modes for every boundary condition
-    follow by the condensed stiffness S of h.
+    The held dofs h are the boundary dofs, plus interior dofs if the boundary dofs leave a rigid-body motion free
+    (theory.md §1). The interior stiffness K_II with h held is factorised once. Static and vibration modes for every
+    boundary condition then follow by means of the condensed stiffness S of h.
     """
 
     def __init__(
         self, body: FEBody, *, announce: bool = True, solver: str | Solver | None = None, to_disk: bool = False
     ) -> None:
-        """Prepare the families of a coupled body; nothing is computed yet.
+        """Prepare the families of a coupled body, without any computation.
 
         Parameters
         ----------
         body
             A coupled body.
         announce
-            Whether a warning says, before the work, what interfaces with very many dofs cost and what is cheaper.
+            Whether to warn in advance of the cost of interfaces with very many dofs, and of cheaper options.
         solver
-            What factorises, one of `cms.solvers.registry.SOLVERS` by name; by default the fastest installed.
+            Name of the solver, one of `cms.solvers.registry.SOLVERS`; default: the fastest installed solver.
         to_disk
-            Whether the constraint modes, and large arrays that are made of them, lie on disk.
+            Whether the constraint modes, and large arrays made from them, are put on disk.
 
         Raises
         ------
@@ -95,19 +95,19 @@ class Families:
         self.close()
 
     def close(self) -> None:
-        """Free the factorisation; what was computed stays."""
+        """Free the factorisation; computed families stay."""
         self._is_open = False
         self._stack.close()
 
     def forget_vibration_modes(self) -> None:
-        """Search vibration modes anew when they are asked for; how many were asked for before changes roundoff."""
+        """Compute vibration modes anew when they are next requested; the number requested before affects roundoff."""
         self._modes.clear()
 
-    # -- partition -------------------------------------------------------------------------------------------------
+    # -- Partition -------------------------------------------------------------------------------------------------
 
     @property
     def Psi_R(self) -> Array:
-        """Rigid-body modes about the mean of the nodes, independent ones only, (n_dof, n_r)."""
+        """Independent rigid-body modes about the mean of the nodes, (n_dof, n_r)."""
         return self._rigid[0]
 
     @cached_property
@@ -120,7 +120,7 @@ class Families:
 
     @property
     def r(self) -> IntArray:
-        """Determinate dofs R, (n_r,), ascending; interior ones among them where B leaves a rigid motion free."""
+        """Determinate dofs R, (n_r,), ascending; some are interior dofs if B leaves a rigid-body motion free."""
         return self._partition[0]
 
     @cached_property
@@ -143,15 +143,15 @@ class Families:
         return self._stack.enter_context(fix_interfaces(self.body, self._partition[1], solver=self.solver))
 
     def adopt(self, fixed: FixedInterfaceBody) -> None:
-        """Take an interior factorisation that exists, unless there is one here; it ends with these families."""
+        """Take over an existing interior factorisation, unless there is one here; it is freed with these families."""
         if "fixed" not in vars(self):
             vars(self)["fixed"] = self._stack.enter_context(fixed)
 
-    # -- static families -------------------------------------------------------------------------------------------
+    # -- Static families -------------------------------------------------------------------------------------------
 
     @cached_property
     def Psi_C(self) -> Array:
-        """Constraint modes of the held dofs, (n_dof, n_h); `SpreadColumns` of a body on many ranks."""
+        """Constraint modes of the held dofs, (n_dof, n_h); `SpreadColumns` if the body is distributed."""
         return constraint_modes(self.fixed, to_disk=self._to_disk)
 
     @cached_property
@@ -163,7 +163,7 @@ class Families:
 
     @cached_property
     def condensed(self) -> CondensedBody:
-        """The parts every flexibility is made from."""
+        """The parts from which every flexibility is made."""
         return CondensedBody(self.fixed, self.Psi_C, self.S, self.Psi_R)
 
     @cached_property
@@ -173,7 +173,7 @@ class Families:
         Raises
         ------
         BodyError
-            If the body is held to the ground: K times its rigid-body modes is not zero.
+            If the body is held to the ground, so that K times its rigid-body modes is not zero.
         """
         self._require_free()
         r = np.flatnonzero(np.isin(self.h, self.r))
@@ -200,7 +200,7 @@ class Families:
         return unrestrained_attachment_modes(self.free)
 
     def residual_attachment(self, free_modes: EigenResult) -> Array:
-        """Return Psi_U without the part of the kept free modes, (n_dof, n_b)."""
+        """Return Psi_U minus the contribution of the kept free modes, (n_dof, n_b)."""
         return residual_attachment_modes(self.body, self.Psi_U, free_modes)
 
     def static(self, F: Array) -> Array:
@@ -208,28 +208,28 @@ class Families:
         return self.free.held(F)
 
     def project(self, F: Array) -> Array:
-        """Return P F, loads in balance with the rigid-body accelerations they cause, (n_dof, k)."""
+        """Return P F, load columns in equilibrium with the rigid-body accelerations that they cause, (n_dof, k)."""
         return F - self.free.M_N @ (self.free.N.T @ F)
 
     def flexibility(self, F: Array) -> Array:
         """Return Pᵀ G_R P F, the elastic response of the free body to load columns, (n_dof, k)."""
         return self.free.solve(F)
 
-    # -- vibration families ----------------------------------------------------------------------------------------
+    # -- Vibration families ----------------------------------------------------------------------------------------
 
     def fixed_modes(self, n_modes: int | ModeCount) -> EigenResult:
-        """Vibration modes with B held, over all dofs; without the rigid-body motions B may leave free."""
+        """Return vibration modes with B held, over all dofs, without rigid-body motions that B may leave free."""
         if len(self.h) > len(self.body.b):
             directions = np.eye(len(self.h))[:, len(self.body.b) :]
             return self.elastic_modes(BoundaryConditions(directions), n_modes)
         return self._cached(b"fixed", mode_count(n_modes), lambda wanted: fixed_interface_modes(self.fixed, wanted))
 
     def free_modes(self, n_modes: int | ModeCount) -> EigenResult:
-        """Elastic vibration modes of the free body, over all dofs."""
+        """Return elastic vibration modes of the free body, over all dofs."""
         return self._cached(b"free", mode_count(n_modes), lambda wanted: elastic_modes(self.free, wanted))
 
     def elastic_modes(self, conditions: BoundaryConditions, n_modes: int | ModeCount) -> EigenResult:
-        """Elastic vibration modes under these conditions of the held dofs, over all dofs."""
+        """Return elastic vibration modes under these conditions of the held dofs, over all dofs."""
         return self._cached(
             conditions.key,
             mode_count(n_modes),
@@ -244,18 +244,18 @@ class Families:
         return self._flexibilities[conditions.key]
 
     def without_boundary(self, Phi: Any) -> Any:
-        """Return Phi - Psi_C Phi_h: beside Psi_C the same span, and zero on the held dofs, (n_dof, k)."""
+        """Return Phi - Psi_C Phi_h, (n_dof, k): zero on the held dofs, and with the same span together with Psi_C."""
         at_rest = combine(self.Psi_C, Phi[self.h])
         return Phi - (at_rest if isinstance(Phi, SpreadColumns) else of_this_process(at_rest))
 
-    # -- words -----------------------------------------------------------------------------------------------------
+    # -- Labels ----------------------------------------------------------------------------------------------------
 
     def rigid_labels(self, family: str) -> tuple[str, ...]:
-        """Return one label per rigid-body mode, such as 'rigid-body rx'."""
+        """Return a label for each rigid-body mode, such as 'rigid-body rx'."""
         return tuple(f"{family} {MOTION_COMPONENTS[k]}" for k in self._rigid[1])
 
     def held_labels(self, family: str) -> tuple[str, ...]:
-        """Return one label per held dof."""
+        """Return a label for each held dof."""
         extra = self.body.dofs[self._partition[1]]
         return (
             *boundary_labels(self.body, family),
@@ -266,14 +266,14 @@ class Families:
         )
 
     def held_groups(self, family: str) -> tuple[str, ...]:
-        """Return one group per held dof."""
+        """Return a group for each held dof."""
         return (*boundary_groups(self.body, family), *[f"{family} determinate"] * len(self._partition[1]))
 
-    # -- inside ----------------------------------------------------------------------------------------------------
+    # -- Internals -------------------------------------------------------------------------------------------------
 
     def _require_free(self) -> None:
         if self.body.is_held:
-            return  # as it is meant to be: it has no rigid-body motion
+            return  # the body is intentionally held, and has no rigid-body motion
         force = np.abs(self.body.K @ self.Psi_R).max(axis=0)
         scale = largest_entry(self.body.K) * np.abs(self.Psi_R).max(axis=0)
         if (force > GROUNDED * scale).any():
@@ -300,7 +300,7 @@ class Families:
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """Modes found before, to take fewer of them."""
+    """Modes computed earlier, of which fewer may be requested later."""
 
     modes: EigenResult
     cutoff: float | None

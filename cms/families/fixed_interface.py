@@ -1,4 +1,4 @@
-"""The body with all boundary dofs held: its interior stiffness, factorised once, serves many columns."""
+"""The body with all boundary dofs held; its interior stiffness is factorised once and used for many columns."""
 
 from dataclasses import dataclass
 
@@ -22,11 +22,11 @@ ZERO_ENERGY = 1e-8  #: |K u| / (|K|_max |u|) below which u is a motion without e
 
 @dataclass(frozen=True, eq=False)
 class FixedInterfaceBody:
-    """Interior partition of a coupled body and the factorisation of K_II; use as a context manager to free it."""
+    """Interior partition of a coupled body, and the factorisation of K_II; the context manager frees it."""
 
     body: FEBody
-    i: IntArray  #: interior dofs: all others, in an order in which neighbours are near, (n_i,)
-    b: IntArray  #: held dofs: the boundary dofs in the order of `body.b`, then extra ones, (n_b,)
+    i: IntArray  #: interior dofs, which are all others, ordered so that neighbours are near, (n_i,)
+    b: IntArray  #: held dofs: boundary dofs in the order of `body.b`, then extra dofs, (n_b,)
     factorization: Factorization  #: of K_ii
 
     def __enter__(self) -> "FixedInterfaceBody":
@@ -37,17 +37,17 @@ class FixedInterfaceBody:
 
     @property
     def K_ii(self) -> sp.csc_array:
-        """Interior stiffness, (n_i, n_i) [N/m], cut out anew: a large body does not hold it beside K."""
+        """Interior stiffness, (n_i, n_i) [N/m]; recomputed, because a large body cannot hold it in addition to K."""
         return principal_block(self.body.K, self.i)
 
     @property
     def M_ii(self) -> sp.csc_array:
-        """Interior mass, (n_i, n_i) [kg], cut out anew."""
+        """Interior mass, (n_i, n_i) [kg]; recomputed."""
         return principal_block(self.body.M, self.i)
 
     @property
     def n_multipliers(self) -> int:
-        """Number of multiplier dofs: interior dofs without mass that make K_ii indefinite."""
+        """Number of multipliers: massless interior dofs that make K_ii indefinite."""
         return int((self.body.dofs[:, 1] == MULTIPLIER).sum())
 
 
@@ -59,16 +59,16 @@ def fix_interfaces(
     Parameters
     ----------
     extra
-        More dofs to hold, where the interfaces alone leave a rigid-body motion free (`determinate_partition`).
+        Further dofs to hold, if the interfaces alone leave a rigid-body motion free (`determinate_partition`).
     solver
-        What factorises (`cms.solvers.registry`); by default the fastest installed.
+        Solver, or its name (`cms.solvers.registry`); default: the fastest installed solver.
 
     Raises
     ------
     ModeSetError
-        If no dof is held (the body has no interface).
+        If no dof is held, because the body has no interface.
     BodyError
-        If it moves without energy while its interfaces are held: a mechanism; the text says where.
+        If the body is a mechanism with its interfaces held; the message says where it moves.
     """
     body.require_coupled()
     chosen = solver_of(solver)
@@ -89,13 +89,14 @@ def fix_interfaces(
 
 
 def _mechanism_message(body: FEBody, i: IntArray, K_ii: sp.csc_array, M_ii: sp.csc_array, solver: Solver) -> str:
-    """Say which nodes move without energy while the interfaces are held."""
+    """Describe which nodes move without energy while the interfaces are held."""
     from cms.solvers.eigen import eigenmodes
 
     start = f"body {body.name!r}: with all interfaces held its stiffness is singular"
     try:
         modes = eigenmodes(K_ii, M_ii, n_modes=min(7, len(i) - 1), solver=solver)
-    except (EigenError, FactorizationError):  # the message about the mechanism matters more than why its picture failed
+    # the mechanism matters more than the reason why its motion could not be computed
+    except (EigenError, FactorizationError):
         return f"{start}; it has a mechanism, or a part that no interface holds"
     energy = np.abs(K_ii @ modes.Phi).max(axis=0) / (np.abs(K_ii.data).max() * np.abs(modes.Phi).max(axis=0))
     is_free = energy < ZERO_ENERGY
@@ -109,9 +110,9 @@ def _mechanism_message(body: FEBody, i: IntArray, K_ii: sp.csc_array, M_ii: sp.c
 
 
 def moving_nodes(body: FEBody, rows: IntArray, Phi: Array) -> str:
-    """Name the three nodes that move most in these motions over the given dofs, with their positions."""
+    """Name the three nodes with the largest motion in these columns over the given dofs, with their positions."""
     is_translation = (body.dofs[rows, 1] >= 0) & (body.dofs[rows, 1] < 3)
     chosen = is_translation if is_translation.any() else np.ones(len(rows), bool)
     size = np.bincount(body.dofs[rows[chosen], 0], (Phi[chosen] ** 2).sum(axis=1), minlength=len(body.nodes))
-    order = np.argsort(-np.round(size / size.max(), 6), kind="stable")  # nodes that move alike: in their order
+    order = np.argsort(-np.round(size / size.max(), 6), kind="stable")  # nodes with equal motion keep their order
     return node_list(order[: min(3, np.count_nonzero(size))].tolist(), body.nodes)

@@ -1,8 +1,9 @@
 """The inverse of K under any boundary conditions of the interfaces, from one factorisation of K_II (docs/theory.md §2).
 
-Whatever is fixed, free, sprung or loaded at the interfaces changes only the boundary: the condensed stiffness
-S = K_BB - K_BI K_II⁻¹ K_IB, which is small and dense. Rigid-body motions that stay free are projected out, so that the
-operator is the elastic flexibility Pᵀ G P of the body as it is held, and vibration modes need no other factorisation.
+Boundary conditions, springs and loads at the interfaces only change the boundary block: the condensed stiffness S =
+K_BB - K_BI K_II⁻¹ K_IB, which is small and dense. Rigid-body motions that remain free are projected out. The operator
+is then the elastic flexibility Pᵀ G P of the body under these conditions, and vibration modes need no other
+factorisation.
 """
 
 from dataclasses import dataclass
@@ -26,16 +27,16 @@ from fe_models.foundation.tall.on_disk import of_this_process
 __all__ = ["BoundaryConditions", "CondensedBody", "Flexibility"]
 
 RIGID_ENERGY = 1e-14  #: squared motion against the conditions, below which a rigid-body motion is free
-COUNTED = 1e-11  #: eigenvalue of the scaled boundary block against its largest, above which its sign is certain
-SINGULAR = 1e-13  #: least eigenvalue of the scaled condensed stiffness, below which there is a mechanism
+COUNTED = 1e-11  #: eigenvalue of the scaled boundary block relative to its largest, above which its sign is certain
+SINGULAR = 1e-13  #: smallest eigenvalue of the scaled condensed stiffness, below which there is a mechanism
 
 
 @dataclass(frozen=True, eq=False)
 class CondensedBody:
-    """A body with its held dofs h: the boundary B, and what else it takes to hold it (`determinate_partition`)."""
+    """A body with its held dofs h: the boundary B, and further dofs needed to hold it (`determinate_partition`)."""
 
     fixed: FixedInterfaceBody  #: interior factorisation; `fixed.b` are the held dofs h
-    Psi_C: Array  #: constraint modes, (n_dof, n_h); `SpreadColumns` of a body on many ranks
+    Psi_C: Array  #: constraint modes, (n_dof, n_h); `SpreadColumns` if the body is distributed
     S: Array  #: Psi_Cᵀ K Psi_C = K_hh + K_hI Psi_C,I, (n_h, n_h) [N/m]
     Psi_R: Array  #: independent rigid-body modes, (n_dof, n_r)
 
@@ -47,7 +48,7 @@ class CondensedBody:
 
 @dataclass(frozen=True, eq=False)
 class BoundaryConditions:
-    """What the held dofs may do: u_h = Z z, with springs and masses of the neighbours on them."""
+    """Admissible motion of the held dofs, u_h = Z z, with springs and masses of the neighbours on them."""
 
     Z: Array  #: free directions, orthonormal columns, (n_h, n_z)
     K_load: Array | None = None  #: stiffness of the neighbours over the held dofs, (n_h, n_h) [N/m]
@@ -55,30 +56,31 @@ class BoundaryConditions:
 
     @classmethod
     def free(cls, n_h: int) -> "BoundaryConditions":
-        """Return those of a free body."""
+        """Return the conditions of a free body."""
         return cls(np.eye(n_h))
 
     @property
     def key(self) -> bytes:
-        """What tells these conditions from others."""
+        """Bytes that identify these conditions."""
         parts = (self.Z, self.K_load, self.M_load)
         return b"|".join(b"" if part is None else np.ascontiguousarray(part).tobytes() for part in parts)
 
 
 class Flexibility:
-    """x = G f on the dofs that are free under the conditions: the interior ones and z, u = T x (n_dof, n).
+    """x = G f on the dofs that are free under the conditions: the interior dofs and z, u = T x (n_dof, n).
 
-    (1) f <- P f, P = 1 - M N Nᵀ: in balance with the acceleration of the M-orthonormal rigid-body motions N left free
+    (1) f <- P f, P = 1 - M N Nᵀ: equilibrium with the acceleration of the free M-orthonormal rigid-body motions N
     (2) v = K_II⁻¹ f_I;  g = Zᵀ (f_h - K_hI v)
-    (3) (Zᵀ (S + K_load) Z)_ee z_e = g_e, z = 0 at as many pivots r as there are rigid-body motions
+    (3) (Zᵀ (S + K_load) Z)_ee z_e = g_e, with z = 0 at as many pivots r as there are rigid-body motions
     (4) u_h = Z z;  u_I = v + Psi_C,I u_h
     (5) u <- Pᵀ u, so that Nᵀ M u = 0
 
-    M and K include the load of the neighbours. Symmetric; its null space is M N. The solver of `eigenmodes`.
+    M and K include the load of the neighbours. The operator is symmetric, and its null space is M N. `eigenmodes` uses
+    it as solver.
     """
 
     def __init__(self, condensed: CondensedBody, conditions: BoundaryConditions, r: IntArray | None = None) -> None:
-        """Make the operator; r names pivots among the columns of Z instead of a choice by pivoted QR."""
+        """Make the operator; r gives pivots among the columns of Z, instead of a choice by pivoted QR."""
         self.condensed, self.conditions = condensed, conditions
         body, h, Z = condensed.body, condensed.fixed.b, conditions.Z
         self._K_hi = sp.csr_array(body.K[:, h].T)[:, condensed.fixed.i]
@@ -99,7 +101,7 @@ class Flexibility:
 
     @property
     def numbering(self) -> IntArray | None:
-        """Of the rows, whatever the order of the interior dofs (`eigenmodes`), (n,); None: as they lie."""
+        """Numbers of the rows, independent of the order of interior dofs (see `eigenmodes`), (n,); None: as stored."""
         if self.T is None:
             return None
         i = self.condensed.fixed.i
@@ -107,17 +109,17 @@ class Flexibility:
 
     @property
     def description(self) -> str:
-        """Solver in words for the provenance."""
+        """Name and settings of the solver, for the provenance."""
         return f"{self.condensed.fixed.factorization.description}, boundary by its condensed stiffness"
 
     @property
     def solver(self) -> Solver:
-        """What factorised the interior stiffness."""
+        """The solver that factorised the interior stiffness."""
         return self.condensed.fixed.factorization.solver
 
     @property
     def inertia(self) -> Inertia:
-        """Of K - sigma M at a shift between the rigid-body motions and the first elastic mode."""
+        """Inertia of K - sigma M at a shift between the rigid-body motions and the first elastic mode."""
         n_negative = self.condensed.fixed.n_multipliers + self.n_rigid
         return Inertia(n_negative, 0, self.n - n_negative)
 
@@ -145,15 +147,15 @@ class Flexibility:
         return u if self.T is None else np.concatenate([u[i], z])
 
     def solve_boundary(self, g: Array) -> Array:
-        """Return z_e of the loads g_e on the condensed stiffness, (n_e, k)."""
+        """Return z_e for loads g_e on the condensed stiffness, (n_e, k)."""
         size, factor = self._factor
         return g * 0.0 if not len(size) else size[:, None] * la.cho_solve(factor, size[:, None] * g)
 
     def count_below(self, sigma: float) -> int:
-        """Elastic modes below sigma [1/s²], by the inertia of K - sigma M, block by block.
+        """Count the elastic modes below sigma [1/s²] from the inertia of K - sigma M, block by block.
 
-        Negative eigenvalues of K_II - sigma M_II, which one more factorisation counts, and of the rest condensed onto
-        z, which is small and dense; less those of the multipliers and the rigid-body motions.
+        The count is the number of negative eigenvalues of K_II - sigma M_II, from one more factorisation, plus those of
+        the remainder condensed onto z, which is small and dense, minus those of multipliers and rigid-body motions.
 
         Raises
         ------
@@ -186,7 +188,7 @@ class Flexibility:
         return x if self.T is None else self.T @ x
 
     def _with_load(self, A: sp.csc_array, load: Array | None) -> sp.csc_array:
-        """Return Tᵀ (A + load) T; of a matrix by rows on many ranks there."""
+        """Return Tᵀ (A + load) T; distributed if A is distributed."""
         if load is None and self.T is None:
             return A
         fixed = self.condensed.fixed
@@ -206,7 +208,7 @@ class Flexibility:
         return A
 
     def _orthonormal(self, motions: Array) -> tuple[Array, Array]:
-        """Return the rigid-body motions M-orthonormal, and M times them."""
+        """Return M-orthonormal rigid-body motions, and M times them."""
         if not motions.shape[1]:
             return motions, motions
         M_N = self.M @ motions
@@ -223,11 +225,11 @@ class Flexibility:
 
 
 def _free_motions(condensed: CondensedBody, conditions: BoundaryConditions) -> Array:
-    """Return the rigid-body motions the conditions leave free, (n_dof, n_n)."""
+    """Return the rigid-body motions that the conditions leave free, (n_dof, n_n)."""
     h, Z = condensed.fixed.b, conditions.Z
     Psi_R = condensed.Psi_R
     if not Psi_R.shape[1]:
-        return Psi_R  # a held body has none
+        return Psi_R  # a held body has no rigid-body motions
     size = _lengths(condensed.body, h, np.eye(len(h)))
     scaled = Psi_R[h] / size[:, None]
     column = np.abs(scaled).max(axis=0)
@@ -248,14 +250,14 @@ def _free_motions(condensed: CondensedBody, conditions: BoundaryConditions) -> A
 
 
 def _lengths(body: FEBody, h: IntArray, Z: Array) -> Array:
-    """Unit of every direction: 1 for translations, 1 / body length for rotations, (n_z,)."""
+    """Return the unit of every direction: 1 for translations, 1 / body length for rotations, (n_z,)."""
     is_rotation = (body.dofs[h, 1] >= 3).astype(float)
     turned = Z.T**2 @ is_rotation > 0.5
     return np.where(turned, 1 / (body.length or 1.0), 1.0)
 
 
 def _pivots(motions: Array) -> IntArray:
-    """Return as many rows as there are motions, which hold them, ascending."""
+    """Return as many rows as there are motions, such that holding them prevents the motions, ascending."""
     n = motions.shape[1]
     if n == 0:
         return np.zeros(0, np.int64)
@@ -264,7 +266,7 @@ def _pivots(motions: Array) -> IntArray:
 
 
 def _cholesky(condensed: CondensedBody, Z: Array, S_z: Array, e: IntArray) -> tuple[Array, tuple[Array, bool]]:
-    """Factorise S_ee, scaled by its diagonal; refuse a mechanism."""
+    """Factorise S_ee, scaled with its diagonal; raise `BodyError` for a mechanism."""
     S_ee = S_z[np.ix_(e, e)]
     if not len(e):
         return np.zeros(0), (S_ee, True)
@@ -295,7 +297,7 @@ def _boundary_entries(A: SpreadMatrix, fixed: FixedInterfaceBody, Z: Array) -> s
 
 
 def _expansion(condensed: CondensedBody, Z: Array) -> sp.csc_array:
-    """T of u = T x, x = (interior, z), (n_dof, n_i + n_z)."""
+    """Return T in u = T x, x = (interior, z), (n_dof, n_i + n_z)."""
     fixed = condensed.fixed
     n_i = len(fixed.i)
     row, column = np.nonzero(Z)

@@ -1,4 +1,4 @@
-"""What interfaces with very many dofs cost, told before the work: columns, memory, file, processor time."""
+"""Cost of interfaces with very many dofs, reported before the work: columns, memory, file size, processor time."""
 
 import time
 from dataclasses import dataclass
@@ -9,26 +9,26 @@ from fe_models.body.fe_body import FEBody, Interface
 
 __all__ = ["ReductionCost", "few_columns", "large_interfaces", "reduction_cost"]
 
-MANY = 600  #: boundary dofs of one interface from which its cost is announced
-PROPOSED = 20  #: modes of a large interface that the announcement proposes
-SQUARES = 26  #: matrices over the modes in a modal file: moments, invariants, M, K, D, columns
-TALL = 3  #: arrays over all dofs and all columns that are held at once: columns, shapes, displacement of the mesh
-TALL_PRODUCTS = 10.0  #: of two such arrays: Gram matrices, shapes, moments
-CUBES = 100.0  #: operations in eigenproblems and products of matrices over the columns, by the cube of their number
+MANY = 600  #: boundary dofs of one interface from which its cost is reported
+PROPOSED = 20  #: number of interface modes that the report proposes
+SQUARES = 26  #: number of matrices over the modes in a modal file: moments, invariants, M, K, D, columns
+TALL = 3  #: number of arrays over all dofs and columns held at the same time: columns, shapes, mesh displacement
+TALL_PRODUCTS = 10.0  #: number of products of two such arrays: Gram matrices, shapes, moments
+CUBES = 100.0  #: operations of eigenproblems and matrix products, per cubed number of columns
 
 
 @dataclass(frozen=True)
 class ReductionCost:
-    """Estimates, without the geometric stiffness."""
+    """Estimated cost, without the geometric stiffness."""
 
     n_columns: int
     memory: float  #: [bytes]
     file: float  #: [bytes]
-    seconds: float  #: of one processor, without factorisation and solves
+    seconds: float  #: [s] of one processor, without factorisation and solves
 
     @property
     def words(self) -> str:
-        """In one line."""
+        """Description in one line."""
         return (
             f"{self.n_columns} columns, about {self.memory / 1e9:.2g} GB of memory, a file of {self.file / 1e9:.2g} GB "
             f"and {duration(self.seconds)} of processor time"
@@ -36,18 +36,18 @@ class ReductionCost:
 
 
 def reduction_cost(body: FEBody, n_columns: int, *, stress: bool = True, n_constraint_modes: int = 0) -> ReductionCost:
-    """Estimate what a mode set of so many columns costs from the columns to the file.
+    """Estimate the cost of a mode set with this number of columns, from the columns to the file.
 
     Parameters
     ----------
     body
         A coupled body.
     n_columns
-        Of the mode set.
+        Number of columns of the mode set.
     stress
         Whether the file holds the stress of the modes.
     n_constraint_modes
-        From which a few columns are combined: they are held twice, and one Gram matrix of them is formed.
+        Number of constraint modes that are combined to fewer columns: they are held twice, and have one Gram matrix.
     """
     n, k = body.n_dof, n_columns
     n_kept = len(np.unique(np.concatenate([body.surface.ravel(), *(each.nodes for each in body.interfaces)])))
@@ -59,7 +59,7 @@ def reduction_cost(body: FEBody, n_columns: int, *, stress: bool = True, n_const
 
 
 def few_columns(body: FEBody, interface_modes: int) -> int:
-    """Return the number of constraint modes left when interfaces of kind "nodes" keep so many modes each."""
+    """Return the number of constraint modes that remain if interfaces of kind "nodes" keep this number of modes."""
     return sum(
         min(n_b, 6 + interface_modes) if interface.kind == "nodes" else n_b
         for interface in body.interfaces
@@ -68,7 +68,7 @@ def few_columns(body: FEBody, interface_modes: int) -> int:
 
 
 def large_interfaces(body: FEBody) -> list[str]:
-    """Say what interfaces with very many boundary dofs cost, and what is cheaper, one text for each."""
+    """Describe the cost of interfaces with very many boundary dofs, and cheaper options, one text for each."""
     large = [interface for interface in body.interfaces if n_boundary(interface) >= MANY]
     if not large:
         return []
@@ -90,7 +90,7 @@ def n_boundary(interface: Interface) -> int:
 
 
 def operations_per_second() -> float:
-    """Return how many floating-point operations a second a dense product makes here; takes some milliseconds."""
+    """Measure the floating-point operations per second of a dense product here; takes a few milliseconds."""
     A = np.ones((384, 384))
     fastest = np.inf
     for _ in range(3):
@@ -101,7 +101,7 @@ def operations_per_second() -> float:
 
 
 def duration(seconds: float) -> str:
-    """Return a time in words."""
+    """Return a duration as text."""
     if seconds < 90:
         return f"{seconds:.2g} s"
     return f"{seconds / 60:.2g} minutes" if seconds < 5400 else f"{seconds / 3600:.2g} hours"

@@ -1,4 +1,4 @@
-"""Mass and stiffness of the neighbours of a body, as they load its interfaces (Benfield-Hruda, docs/theory.md §3)."""
+"""Mass and stiffness of neighbouring bodies as loads of the interfaces (Benfield-Hruda, docs/theory.md §3)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,15 +14,15 @@ from fe_models.foundation.tall.on_disk import of_this_process
 
 __all__ = ["InterfaceLoad", "boundary_load", "condensed_load", "point_load"]
 
-INDEFINITE = 1e-10  #: negative eigenvalue of a scaled load against its largest, which is more than rounding
-COLLINEAR = 1e-6  #: as in the couplings: second radius of the members against the first
+INDEFINITE = 1e-10  #: negative eigenvalue of a scaled load relative to its largest that is more than rounding
+COLLINEAR = 1e-6  #: second radius of the members relative to the first, as for couplings
 
 
 @dataclass(frozen=True, eq=False)
 class InterfaceLoad:
-    """Mass and stiffness over the motions of one interface, or across several that a neighbour joins.
+    """Mass and stiffness over the motions of one interface, or of several interfaces that a neighbour connects.
 
-    The motion of an interface is that of its reference point: three translations, three rotations, along its own axes
+    The motion of an interface is that of its reference point: three translations and three rotations along its own axes
     (its triad). Rows and columns follow the order of `interfaces`.
     """
 
@@ -48,18 +48,18 @@ def point_load(
     stiffness: float | Sequence[float] = 0.0,
     rotational_stiffness: float | Sequence[float] = 0.0,
 ) -> InterfaceLoad:
-    """Load of a point mass at the reference point of an interface, and of springs from there to the ground.
+    """Return the load of a point mass at the reference point of an interface, and of springs from there to the ground.
 
     Parameters
     ----------
     mass
-        [kg].
+        Mass [kg].
     inertia
-        About the reference point: one number for all axes or three for those of the interface [kg m²].
+        Moment of inertia about the reference point: one number for all axes, or three for the interface axes [kg m²].
     stiffness
-        One number or three [N/m].
+        Translational stiffness: one number or three [N/m].
     rotational_stiffness
-        One number or three [N m].
+        Rotational stiffness: one number or three [N m].
 
     Raises
     ------
@@ -73,22 +73,22 @@ def point_load(
 
 
 def condensed_load(neighbour: FEBody, interfaces: Mapping[str, str]) -> InterfaceLoad:
-    """Load of a neighbouring body, condensed statically (Guyan) to the interfaces it shares.
+    """Return the load of a neighbouring body, condensed statically (Guyan) to the shared interfaces.
 
-    Its other interfaces are free. Its interfaces must be rigid or distributing, with the reference points and axes of
-    the interfaces they are joined to.
+    Its other interfaces are free. Its shared interfaces must be rigid or distributing, with the reference points and
+    axes of the interfaces to which they are joined.
 
     Parameters
     ----------
     neighbour
         A coupled body in the same units.
     interfaces
-        Our interface -> the neighbour's.
+        Name of the neighbour's interface for each of our interfaces.
 
     Raises
     ------
     BodyError
-        If the neighbour lacks such an interface, or it is one of kind "nodes".
+        If the neighbour lacks such an interface, or it is of kind "nodes".
     """
     from dataclasses import replace
 
@@ -105,7 +105,7 @@ def condensed_load(neighbour: FEBody, interfaces: Mapping[str, str]) -> Interfac
     with Families(replace(neighbour, interfaces=shared)) as families:
         Psi = of_this_process(families.Psi_C[:, : 6 * len(shared)]) @ to_motion.T
         rigid = to_motion @ families.Psi_R[families.body.b]
-    # a free body has no energy in its rigid-body motions: rounding there would be a spring, or a negative one
+    # a free body has no energy in its rigid-body motions; rounding there would act as a spring, perhaps a negative one
     size = np.where(np.arange(len(rigid)) % 6 < 3, 1.0, 1 / neighbour.length)
     elastic = la.null_space((rigid / size[:, None]).T)
     keep = (size[:, None] * elastic) @ (elastic.T / size)
@@ -117,14 +117,14 @@ def condensed_load(neighbour: FEBody, interfaces: Mapping[str, str]) -> Interfac
 def boundary_load(body: FEBody, loads: Sequence[InterfaceLoad]) -> tuple[Array, Array]:
     """Return K_load and M_load over the boundary dofs of a coupled body, (n_b, n_b) each.
 
-    The loads of an interface of kind "nodes" act on the mean motion of its nodes.
+    Loads of an interface of kind "nodes" act on the mean motion of its nodes.
 
     Raises
     ------
     BodyError
         If a load names an unknown interface.
     ModeSetError
-        If there is no load at all, or all of them are zero.
+        If there is no load, or all loads are zero.
     """
     b = body.b
     position = {dof: k for k, dof in enumerate(b.tolist())}
@@ -145,9 +145,9 @@ def boundary_load(body: FEBody, loads: Sequence[InterfaceLoad]) -> tuple[Array, 
 
 
 def interface_motion(body: FEBody, interface: Interface) -> Array:
-    """Return A with [d; theta] = A u, along the axes of the interface, u its boundary dofs, (6, n).
+    """Return A in [d; theta] = A u, (6, n), along the axes of the interface, where u are its boundary dofs.
 
-    The motion of its one node, or the mean motion of its nodes (their mean translation if they are on one line).
+    This is the motion of its single node, or the mean motion of its nodes (mean translation if they are collinear).
     """
     dofs = np.asarray(interface.dofs)
     node, component = body.dofs[dofs].T

@@ -1,4 +1,4 @@
-"""Mixed boundary conditions: interface dofs that stay free while the others of the boundary are held (theory.md §3)."""
+"""Mixed boundary conditions: some interface dofs are free while the other boundary dofs are held (theory.md §3)."""
 
 from collections.abc import Mapping, Sequence
 
@@ -15,15 +15,15 @@ __all__ = ["free_directions"]
 
 
 def free_directions(body: FEBody, free: Mapping[str, Sequence[str]]) -> Array:
-    """Directions over the boundary dofs that the fixed-interface problem leaves free, orthonormal columns, (n_b, k).
+    """Return the directions over boundary dofs that the fixed-interface problem leaves free, orthonormal, (n_b, k).
 
     Parameters
     ----------
     body
         A coupled body.
     free
-        Interface -> components ux uy uz rx ry rz along the axes of the interface, such as {"pin": ["rz"]}; at an
-        interface of kind "nodes" they are those of every node.
+        For each interface its free components ux uy uz rx ry rz along the interface axes, such as {"pin": ["rz"]}. At
+        an interface of kind "nodes" they apply to every node.
 
     Raises
     ------

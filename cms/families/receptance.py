@@ -1,4 +1,4 @@
-"""Receptance of the boundary: displacement of every boundary dof per unit force on every other, by frequency."""
+"""Receptance of the boundary: displacement of every boundary dof per unit force on every other, over frequency."""
 
 from dataclasses import dataclass
 
@@ -12,16 +12,16 @@ __all__ = ["Receptance", "boundary_scale", "largest_error", "receptance_of_modes
 
 
 def boundary_scale(body: FEBody) -> Array:
-    """Length of the lever that makes every boundary dof a translation: 1, or the body length for rotations, (n_b,).
+    """Return the lever that converts every boundary dof to a translation: 1, or the body length for rotations, (n_b,).
 
-    A moment F times this length and a rotation times it compare with forces F and translations.
+    A rotation times this length is comparable to a translation, and a moment divided by it is comparable to a force.
     """
     return np.where(body.dofs[body.b, 1] >= 3, body.length or 1.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Receptance:
-    """Sum of modes: H(omega) = Σ_k b_k b_kᵀ / ((1 + i eta) k_k - omega² m_k), k and m diagonal."""
+    """Sum over modes: H(omega) = Σ_k b_k b_kᵀ / ((1 + i eta) k_k - omega² m_k) with diagonal k and m."""
 
     b: Array  #: modes at the boundary dofs, scaled, (n_b, n)
     k: Array  #: modal stiffness, (n,)
@@ -54,12 +54,12 @@ def receptance_of_pencil(b: Array, K: Array, M: Array, *, loss: float, omega2: f
     K, M
         Pencil of the columns, (n, n); K + omega² M positive definite.
     omega2
-        A positive number in between their scales [1/s²], as the first elastic omega².
+        A positive number between the scales of K and M [1/s²], such as the first elastic omega².
     """
     mu, Y = la.eigh(M, K + omega2 * M)
     return Receptance(b @ Y, 1 - omega2 * mu, np.maximum(mu, 0.0), loss)
 
 
 def largest_error(H: np.ndarray, reference: np.ndarray) -> float:
-    """Largest over the frequencies of |H - H_ref| / |H_ref| in the Frobenius norm."""
+    """Return the largest |H - H_ref| / |H_ref| over the frequencies, in the Frobenius norm."""
     return float((np.linalg.norm(H - reference, axis=(1, 2)) / np.linalg.norm(reference, axis=(1, 2))).max())

@@ -1,4 +1,4 @@
-"""Rigid-body modes of a free body by three routes that must span the same space (docs/theory.md §2)."""
+"""Rigid-body modes of a free body, computed in three ways that must give the same space (docs/theory.md §2)."""
 
 import numpy as np
 import scipy.linalg as la
@@ -18,17 +18,18 @@ __all__ = [
     "static_rigid_modes",
 ]
 
-HOLDS = 1e-4  #: pivot above which a dof holds a motion well enough to rest a factorisation on it
-RANK_TOLERANCE = 1e-8  #: of rigid-body modes restricted to some dofs, rotations scaled by the body length
+HOLDS = 1e-4  #: pivot above which a dof holds a motion well enough for a factorisation
+#: tolerance for rigid-body modes restricted to some dofs, with rotations scaled by the body length
+RANK_TOLERANCE = 1e-8
 
 
 def geometric_rigid_modes(body: FEBody, *, origin: Array | None = None) -> Array:
-    """Rigid-body modes from the positions of the nodes: u = d + theta × c, rotations theta, multipliers 0.
+    """Return rigid-body modes from node positions: u = d + theta × c; rotations are theta, multipliers are 0.
 
     Parameters
     ----------
     origin
-        Point the rotations are about, (3,) [m]; the origin of the mesh by default.
+        Reference point of the rotations, (3,) [m]; default: origin of the mesh.
 
     Returns
     -------
@@ -41,7 +42,8 @@ def geometric_rigid_modes(body: FEBody, *, origin: Array | None = None) -> Array
 def determinate_dofs(body: FEBody, candidates: IntArray) -> IntArray:
     """Choose six of the candidate dofs that just prevent rigid-body motion (the set R of docs/theory.md §1).
 
-    Pivoted QR of the rigid-body modes restricted to the candidates, rotations scaled by the body length.
+    The choice uses pivoted QR of the rigid-body modes restricted to the candidates, rotations scaled by the body
+    length.
 
     Raises
     ------
@@ -49,8 +51,8 @@ def determinate_dofs(body: FEBody, candidates: IntArray) -> IntArray:
         If the candidates leave a rigid-body motion free.
     """
     Psi_R = geometric_rigid_modes(body, origin=body.nodes.mean(axis=0))[candidates]
-    Psi_R[:, 3:] /= body.length  # theta of one per body length: comparable to a unit translation
-    Psi_R[body.dofs[candidates, 1] >= 3] *= body.length  # a rotation dof counts as the translation at that length
+    Psi_R[:, 3:] /= body.length  # theta of one per body length, comparable to a unit translation
+    Psi_R[body.dofs[candidates, 1] >= 3] *= body.length  # a rotational dof counts as the translation at that length
     _, R, pivots = la.qr(Psi_R.T, mode="economic", pivoting=True)
     pivot_sizes = np.abs(np.diag(R))
     rank = int((pivot_sizes > RANK_TOLERANCE * max(pivot_sizes.max(initial=0.0), 1.0)).sum())
@@ -63,14 +65,14 @@ def determinate_dofs(body: FEBody, candidates: IntArray) -> IntArray:
 
 
 def independent_rigid_modes(body: FEBody) -> tuple[Array, IntArray]:
-    """Rigid-body modes about the mean of the nodes, without those the body's dofs do not know; none of a held body.
+    """Return rigid-body modes about the mean of the nodes, without those that the dofs cannot make; none if held.
 
     Returns
     -------
     Psi_R
-        (n_dof, n_r): n_r is 6 in space, 3 for a body of plane dofs, 1 for a row of masses; columns d [-], theta [m].
+        (n_dof, n_r); n_r is 6 in space, 3 for a body with plane dofs, 1 for a row of masses; columns d [-], theta [m].
     components
-        Which of d_x d_y d_z theta_x theta_y theta_z they are, (n_r,).
+        Index of each mode among d_x d_y d_z theta_x theta_y theta_z, (n_r,).
 
     Raises
     ------
@@ -92,10 +94,10 @@ def independent_rigid_modes(body: FEBody) -> tuple[Array, IntArray]:
 
 
 def determinate_partition(body: FEBody, Psi_R: Array) -> tuple[IntArray, IntArray]:
-    """Choose the statically determinate dofs R among the boundary dofs, and interior ones where those do not suffice.
+    """Choose the statically determinate dofs R among the boundary dofs, and interior dofs if those do not suffice.
 
     (1) pivoted QR of the rigid-body modes restricted to B, rotations scaled by the body length
-    (2) where their rank there is below n_r: the same over the interior dofs for the motions B leaves free
+    (2) if their rank is below n_r: the same over the interior dofs, for the motions that B leaves free
 
     Parameters
     ----------
@@ -107,7 +109,7 @@ def determinate_partition(body: FEBody, Psi_R: Array) -> tuple[IntArray, IntArra
     r
         Determinate dofs, (n_r,), ascending.
     extra
-        Those of them that are interior dofs; empty for a body whose interfaces hold it.
+        Those of R that are interior dofs; empty if the interfaces hold the body.
     """
     if not Psi_R.shape[1]:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
@@ -127,16 +129,16 @@ def determinate_partition(body: FEBody, Psi_R: Array) -> tuple[IntArray, IntArra
 
 
 def _in_lengths(body: FEBody, Psi_R: Array) -> Array:
-    """Return rigid-body modes with rotation dofs counted as the translation at one body length."""
+    """Return rigid-body modes in which a rotational dof counts as the translation at one body length."""
     scaled = Psi_R.copy()
     scaled[body.dofs[:, 1] >= 3] *= body.length or 1.0
     return scaled
 
 
 def static_rigid_modes(body: FEBody, r: IntArray) -> Array:
-    """Rigid-body modes as static solutions for a unit displacement of each of the determinate dofs r, (n_dof, 6).
+    """Return rigid-body modes as static solutions for unit displacements of the determinate dofs r, (n_dof, 6).
 
-    Interior part -K_ff⁻¹ K_fr with f all dofs but r: a route through the stiffness matrix only.
+    The interior part is -K_ff⁻¹ K_fr, where f are all dofs except r. This uses only the stiffness matrix.
     """
     from cms.solvers.factorization import factorize
 
@@ -150,7 +152,7 @@ def static_rigid_modes(body: FEBody, r: IntArray) -> Array:
 
 
 def null_space_rigid_modes(body: FEBody) -> Array:
-    """Rigid-body modes as the zero-frequency vibration modes of the free body, (n_dof, 6), M-orthonormal."""
+    """Return rigid-body modes as zero-frequency vibration modes of the free body, (n_dof, 6), M-orthonormal."""
     from cms.solvers.eigen import eigenmodes
 
     return eigenmodes(body.K, body.M, n_modes=6).Phi

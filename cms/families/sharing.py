@@ -1,4 +1,4 @@
-"""A body, or in its place the families of the body, which many mode sets share: one factorisation serves them all."""
+"""A body, or in its place its `Families`, which several mode sets share to use one factorisation."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,7 +11,7 @@ __all__ = ["body_of", "families_of"]
 
 @contextmanager
 def families_of(body: FEBody | Families) -> Iterator[Families]:
-    """Give the families that are shared, or new ones of the body, which end with this block."""
+    """Yield the shared families, or new families of the body that are closed at the end of the block."""
     if isinstance(body, Families):
         yield body
         return
@@ -20,5 +20,5 @@ def families_of(body: FEBody | Families) -> Iterator[Families]:
 
 
 def body_of(body: FEBody | Families) -> FEBody:
-    """Return the body itself, where its families may be given in its place."""
+    """Return the body, from the body itself or from its families."""
     return body.body if isinstance(body, Families) else body

@@ -1,4 +1,4 @@
-"""Static modes of a body by its boundary dofs (docs/theory.md §2)."""
+"""Static modes of a body, defined by its boundary dofs (docs/theory.md §2)."""
 
 from collections.abc import Iterator
 
@@ -26,17 +26,18 @@ __all__ = [
     "unrestrained_attachment_modes",
 ]
 
-STIFF = 1e-14  #: compliance over the largest one (rotations times the body length squared), below which it is rounding
-STILL = 1e-24  #: the same of the energy of a response to inertia loads, where both factors are rounding
-BLOCK = 60  #: right-hand sides solved at once; wider blocks gain nothing measurable and cost memory
-BLOCK_OF_RANKS = 16  #: the same of a body on many ranks, whose columns pass through rank 0
+STIFF = 1e-14  #: compliance relative to the largest (rotations times body length squared), below which it is rounding
+STILL = 1e-24  #: the same for the energy of a response to inertia loads, where both factors are rounding
+BLOCK = 60  #: right-hand sides solved at a time; wider blocks are not faster and need more memory
+BLOCK_OF_RANKS = 16  #: the same for a distributed body, whose columns pass through rank 0
 
 
 def constraint_modes(fixed: FixedInterfaceBody, *, to_disk: bool = False) -> Array:
-    """Constraint modes Psi_C: unit displacement of one boundary dof, the other boundary dofs held.
+    """Return constraint modes Psi_C: unit displacement of one boundary dof, with the other boundary dofs held.
 
-    Interior part -K_II⁻¹ K_IB; columns in the order of the held dofs `fixed.b`; `BLOCK` are solved at once, and lie on
-    disk (`fe_models.foundation.tall.on_disk`) where that is asked for, on all ranks (`SpreadColumns`) where K does.
+    The interior part is -K_II⁻¹ K_IB; columns have the order of the held dofs `fixed.b`. They are solved in blocks of
+    `BLOCK`. They are put on disk (`fe_models.foundation.tall.on_disk`) if requested, and distributed (`SpreadColumns`)
+    if K is.
 
     Returns
     -------
@@ -56,7 +57,7 @@ def constraint_modes(fixed: FixedInterfaceBody, *, to_disk: bool = False) -> Arr
 
 
 def _blocks_of_constraint_modes(fixed: FixedInterfaceBody, width: int) -> Iterator[Array]:
-    """Yield constraint modes, at most so many at once, (n_dof, width)."""
+    """Yield constraint modes in blocks of at most `width`, (n_dof, width)."""
     K_b, i, b = fixed.body.K[:, fixed.b], fixed.i, fixed.b
     for first in range(0, len(b), width):
         last = min(first + width, len(b))
@@ -67,12 +68,12 @@ def _blocks_of_constraint_modes(fixed: FixedInterfaceBody, width: int) -> Iterat
 
 
 def redundant_constraint_modes(free: Flexibility) -> Array:
-    """Redundant constraint modes Psi_RC: unit displacement of one E dof, the other E dofs and R held.
+    """Return redundant constraint modes Psi_RC: unit displacement of one E dof, with the other E dofs and R held.
 
     Parameters
     ----------
     free
-        The flexibility of the free body, whose pivots are R.
+        Flexibility of the free body, whose pivots are R.
 
     Returns
     -------
@@ -83,7 +84,7 @@ def redundant_constraint_modes(free: Flexibility) -> Array:
 
 
 def attachment_modes(free: Flexibility) -> Array:
-    """Attachment modes Psi_A: unit force on one E dof, R held; Psi_A = Psi_C,E S_EE⁻¹.
+    """Return attachment modes Psi_A: unit force on one E dof, with R held; Psi_A = Psi_C,E S_EE⁻¹.
 
     Returns
     -------
@@ -94,9 +95,9 @@ def attachment_modes(free: Flexibility) -> Array:
 
 
 def inertia_relief_modes(fixed: FixedInterfaceBody, Psi_R: Array) -> Array:
-    """Inertia-relief modes Psi_H: static response to the loads M Psi_R of rigid-body accelerations, all of B held.
+    """Return inertia-relief modes Psi_H: static response to the loads M Psi_R of rigid accelerations, with B held.
 
-    Interior part K_II⁻¹ (M Psi_R)_I.
+    The interior part is K_II⁻¹ (M Psi_R)_I.
 
     Parameters
     ----------
@@ -106,8 +107,8 @@ def inertia_relief_modes(fixed: FixedInterfaceBody, Psi_R: Array) -> Array:
     Returns
     -------
     Array
-        (n_dof, n_r), translations per acceleration [s²] or per angular acceleration [m s²]; zero, not rounding, where
-        the body does not give way (a planar one, out of its plane).
+        (n_dof, n_r), translations per acceleration [s²] or per angular acceleration [m s²]. Exactly zero, not rounding,
+        if the body does not deform (such as a planar body, out of its plane).
     """
     Psi_H = np.zeros(Psi_R.shape)
     F = (fixed.body.M @ Psi_R)[fixed.i]
@@ -119,16 +120,16 @@ def inertia_relief_modes(fixed: FixedInterfaceBody, Psi_R: Array) -> Array:
 
 
 def unrestrained_attachment_modes(free: Flexibility) -> Array:
-    """Unrestrained attachment modes Psi_U = Pᵀ G_R P F_B: unit force on each boundary dof of the free body.
+    """Return unrestrained attachment modes Psi_U = Pᵀ G_R P F_B: unit force on each boundary dof of the free body.
 
-    The force is in balance with the rigid-body acceleration it causes, so the choice of R does not matter.
-    G_R P F_B = Psi_C,E S_EE⁻¹ F_E - (G_R M N) N_Bᵀ with M-orthonormal rigid-body modes N: six solves, whatever n_b.
+    The force is in equilibrium with the rigid-body acceleration that it causes, so the choice of R does not matter. G_R
+    P F_B = Psi_C,E S_EE⁻¹ F_E - (G_R M N) N_Bᵀ with M-orthonormal rigid-body modes N needs six solves for any n_b.
 
     Returns
     -------
     Array
-        (n_dof, n_b), with Psi_Rᵀ M Psi_U = 0; translations per force [m/N] or per moment [1/N]. Zero, not rounding,
-        where the free body answers a load by acceleration alone.
+        (n_dof, n_b), with Psi_Rᵀ M Psi_U = 0; translations per force [m/N] or per moment [1/N]. Exactly zero, not
+        rounding, if the free body responds to a load by acceleration alone.
     """
     n_b, h = len(free.condensed.body.b), free.condensed.fixed.b
     on_boundary = np.zeros((len(h), n_b))  # u_h of the unit forces with R held
@@ -143,14 +144,14 @@ def unrestrained_attachment_modes(free: Flexibility) -> Array:
 
 
 def residual_attachment_modes(body: FEBody, Psi_U: Array, free_modes: EigenResult) -> Array:
-    """Residual attachment modes: Psi_U - Phi Lambda⁻¹ Phi_Bᵀ, the unrestrained ones without the part of the kept modes.
+    """Return residual attachment modes Psi_U - Phi Lambda⁻¹ Phi_Bᵀ: Psi_U minus the contribution of kept modes.
 
     Parameters
     ----------
     Psi_U
         Unrestrained attachment modes, (n_dof, n_b).
     free_modes
-        Elastic modes of the free body that are kept.
+        Kept elastic modes of the free body.
 
     Returns
     -------
@@ -160,17 +161,17 @@ def residual_attachment_modes(body: FEBody, Psi_U: Array, free_modes: EigenResul
     if not len(free_modes.omega2):
         return Psi_U
     residual = Psi_U - combine(free_modes.Phi, (free_modes.Phi[body.b] / free_modes.omega2).T)
-    residual[:, ~Psi_U.any(axis=0)] = 0.0  # what does not give way leaves nothing
+    residual[:, ~Psi_U.any(axis=0)] = 0.0  # a load without elastic response leaves no residual
     return residual
 
 
 def _unit(body: FEBody, is_rotation: np.ndarray) -> Array:
-    """What makes compliances comparable: the body length squared for rotations, else 1."""
+    """Return the factors that make compliances comparable: the body length squared for rotations, else 1."""
     return np.where(is_rotation, body.length**2 or 1.0, 1.0)
 
 
 def boundary_labels(body: FEBody, family: str) -> tuple[str, ...]:
-    """Return one label per boundary dof, such as 'constraint big_end ux' or 'constraint bolts node 12 uz'."""
+    """Return a label for each boundary dof, such as 'constraint big_end ux' or 'constraint bolts node 12 uz'."""
     labels = []
     for interface in body.interfaces:
         for dof in interface.dofs if interface.dofs is not None else ():
@@ -182,7 +183,7 @@ def boundary_labels(body: FEBody, family: str) -> tuple[str, ...]:
 
 
 def boundary_groups(body: FEBody, family: str) -> tuple[str, ...]:
-    """Return one group per boundary dof, such as 'constraint big_end'."""
+    """Return a group for each boundary dof, such as 'constraint big_end'."""
     return tuple(
         f"{family} {interface.name}"
         for interface in body.interfaces

@@ -18,15 +18,15 @@ __all__ = ["elastic_modes", "fixed_interface_modes", "no_modes"]
 
 
 def fixed_interface_modes(fixed: FixedInterfaceBody, wanted: ModeCount) -> EigenResult:
-    """Vibration modes with all boundary dofs held: K_II phi = omega² M_II phi, phi over all dofs (n_dof, k)."""
-    if not len(fixed.i):  # every dof is one of an interface
+    """Return vibration modes with all boundary dofs held, K_II phi = omega² M_II phi, over all dofs (n_dof, k)."""
+    if not len(fixed.i):  # every dof belongs to an interface
         return no_modes(fixed.body.n_dof)
     blocks = PrincipalBlock(fixed.body.K, fixed.i), PrincipalBlock(fixed.body.M, fixed.i)
     numbering = np.searchsorted(np.sort(fixed.i), fixed.i)
     modes = eigenmodes(*blocks, wanted, factorization=fixed.factorization, numbering=numbering)
     if isinstance(modes.Phi, SpreadColumns):
         block = blocks[0].spread()
-        assert block is not None  # the modes lie as it does
+        assert block is not None  # the modes are distributed like the block
         return replace(modes, Phi=block.expanded(modes.Phi))
     Phi = np.zeros((fixed.body.n_dof, modes.Phi.shape[1]))
     Phi[fixed.i] = modes.Phi
@@ -34,10 +34,10 @@ def fixed_interface_modes(fixed: FixedInterfaceBody, wanted: ModeCount) -> Eigen
 
 
 def elastic_modes(flexibility: Flexibility, wanted: ModeCount) -> EigenResult:
-    """Elastic vibration modes of a body under any boundary conditions of its interfaces, phi over all dofs (n_dof, k).
+    """Return elastic vibration modes under any boundary conditions of the interfaces, over all dofs (n_dof, k).
 
-    Free modes are those of a free boundary, loaded modes those of K + K_load, M + M_load, mixed ones hold some boundary
-    dofs. Rigid-body motions the conditions leave free are known beforehand, so they are not among them.
+    Free modes belong to a free boundary, loaded modes to K + K_load, M + M_load, and mixed modes hold some boundary
+    dofs. The rigid-body motions that the conditions leave free are known in advance, and are not among the modes.
     """
     K, M, numbering = flexibility.K, flexibility.M, flexibility.numbering
     modes = eigenmodes(K, M, replace(wanted, verify=False), factorization=flexibility, numbering=numbering)
@@ -47,15 +47,15 @@ def elastic_modes(flexibility: Flexibility, wanted: ModeCount) -> EigenResult:
 
 
 def _proven(flexibility: Flexibility, modes: EigenResult, asked: ModeCount) -> EigenResult:
-    """Return the modes once their number agrees with the inertia, which counts them boundary and interior apart.
+    """Return the modes after their number agrees with the inertia, counted for boundary and interior separately.
 
-    The proof of `eigenmodes` factorises K - sigma M as a whole. At the reference node of a distributing interface that
-    has neither mass nor stiffness, only multipliers, and its pivots there are zero.
+    The proof of `eigenmodes` factorises K - sigma M as a whole. The reference node of a distributing interface has
+    neither mass nor stiffness, only multipliers, so that its pivots there are zero.
     """
     k = len(modes.omega2)
     wanted = Wanted(k, None) if asked.cutoff is None else Wanted.of(asked)
     last, sigma = counting_shift(modes.omega2, k, wanted, 0.0)
-    for n_extra in (4, 12, 36):  # a gap to count in lies beyond the modes that were asked for
+    for n_extra in (4, 12, 36):  # a gap in which to count lies beyond the requested modes
         try:
             more = eigenmodes(
                 flexibility.K, flexibility.M, k + n_extra, factorization=flexibility, numbering=flexibility.numbering
@@ -75,6 +75,6 @@ def _proven(flexibility: Flexibility, modes: EigenResult, asked: ModeCount) -> E
 
 
 def no_modes(n_dof: int) -> EigenResult:
-    """Return the result of asking for no modes at all."""
+    """Return an empty result, for a request of no modes."""
     none: Array = np.zeros(0)
     return EigenResult(none, none, np.zeros((n_dof, 0)), none, 0, "none asked for", is_proven=False)

@@ -1,1 +1,1 @@
-"""Reduced bodies of straight beams from assumed functions, without a mesh."""
+"""Reduced bodies of straight beams without a mesh, from assumed functions."""

@@ -1,4 +1,4 @@
-"""A reduced body of a straight beam from assumed functions along its axis, without a mesh."""
+"""A reduced body of a straight beam without a mesh, from assumed functions along its axis."""
 
 import platform
 from collections.abc import Mapping
@@ -60,48 +60,51 @@ def beam_from_assumed_modes(
 ) -> ReducedBody:
     """Return a beam whose displacement is a sum of functions along its axis (Ritz), reduced and ready for a system.
 
-    Energies and inertia integrals of all orders are integrals of polynomials along x: Gauss points take them exactly.
+    Energies and inertia integrals of all orders are integrals of polynomials along x, which Gauss points integrate
+    exactly.
 
-    (1) columns: axial, torsion, bending and shear along y and z (`beam_fields`), less the rigid motion
-        that the frame takes
-    (2) W = K + omega_1² M as A_Wᵀ A_W with the rows A_W of strain and motion at the Gauss points; pivoted QR of A_W,
-        which does not square its condition, gives independent columns
-    (3) K z = omega² M z over them; shapes M-orthonormal, K-diagonal
+    (1) make the columns: axial, torsion, bending and shear along y and z (`beam_fields`), minus the rigid motion that
+        the frame removes
+    (2) write W = K + omega_1² M as A_Wᵀ A_W, where the rows of A_W are strain and motion at the Gauss points; pivoted
+        QR of A_W, which does not square the condition number, gives independent columns
+    (3) solve K z = omega² M z over them; the shapes are M-orthonormal and K-diagonal
 
     Parameters
     ----------
     line
-        Mass and stiffness along x; the mesh axes of the body are those of the beam, origin at its start.
+        Mass and stiffness along x. The mesh axes of the body are the beam axes, with the origin at the start of the
+        beam.
     name, units
-        Of the body.
+        Name and unit system of the body.
     n_axial, n_bending, n_torsion
-        Functions of each motion; n_bending along y and along z each.
+        Number of functions for each motion; n_bending counts for y and z separately.
     n_shear
-        Functions of the rotation by shear, along y and z each; default n_bending + 1, none where shear is rigid.
+        Number of functions for the shear rotation, for y and z separately; default: n_bending + 1, or none if shear is
+        rigid.
     functions
         "legendre", "monomials" or "splines".
     stations
-        Interfaces of the body: name -> place x; default: "start" and "end".
+        Position x of each interface, by name; default: "start" and "end".
     frame
-        Tisserand (free: mean axes) by default; `NodalFrame("start")` for functions clamped there, or
-        `NodalFrame(dofs=...)` of six (station, component).
+        Default: Tisserand (mean axes, for a free beam). `NodalFrame("start")` gives functions clamped there;
+        `NodalFrame(dofs=...)` holds six (station, component).
     damping
-        None by default.
+        Damping; default: none.
     geometric
         Whether to add the geometric stiffness of the unit loads, with which a system stiffens the body.
 
     Returns
     -------
     ReducedBody
-        n_axial + n_torsion + 2 (n_bending + n_shear) modes, less those that repeat others (named in `provenance`).
-        Its skin is an elliptic tube with the radii of gyration of the section, to be drawn.
+        It has n_axial + n_torsion + 2 (n_bending + n_shear) modes, minus redundant ones (named in `provenance`). Its
+        skin for drawing is an elliptic tube with the radii of gyration of the section.
 
     Raises
     ------
     ModeSetError
-        If a number is negative, no function is asked for, or the family is unknown.
+        If a number is negative, no function is requested, or the family is unknown.
     BodyError
-        If a law is not positive, a station lies beside the beam, or the frame cannot be attached.
+        If a law is not positive, a station is not on the beam, or the frame cannot be attached.
     """
     where = f"beam_from_assumed_modes: {name!r}"
     if functions not in AXIS_FUNCTIONS:
@@ -135,7 +138,7 @@ def beam_from_assumed_modes(
     nodes_x = np.concatenate([x_station, x_skin])
 
     def shapes(at: Array) -> Array:
-        """Motion of the sections with the modes, (n, 6, n_q)."""
+        """Return the motion of the sections for the modes, (n, 6, n_q)."""
         motion = beam_fields(functions, counts, line, at).motion
         return np.asarray((motion - rigid_fields(at, np.zeros(3)) @ C) @ T)
 
@@ -186,7 +189,7 @@ def beam_from_assumed_modes(
 
 
 def require_rotary_inertia(where: str, line: BeamLine, x: Array, counts: Mapping[str, int]) -> None:
-    """Raise `BodyError` where torsion or shear would move without mass: the eigenvalues would be infinite."""
+    """Raise `BodyError` if torsion or shear would move without mass, which gives infinite eigenvalues."""
     has_y, has_z = line.at("rho_Iy", x).any(), line.at("rho_Iz", x).any()
     if counts["torsion"] and not (has_y or has_z):
         raise BodyError(
@@ -203,7 +206,7 @@ def require_rotary_inertia(where: str, line: BeamLine, x: Array, counts: Mapping
 def stiffening(
     line: BeamLine, functions: str, counts: Mapping[str, int], C: Array, T: Array, x_station: Array, frame: BodyFrame
 ) -> GeometricStiffness:
-    """Return the geometric stiffness of the modes T; section forces jump at the stations."""
+    """Return the geometric stiffness of the modes T; section forces have jumps at the stations."""
     x, weight = gauss_points(line, functions, counts, breaks=x_station, more=CUBIC + 1)
     fields = beam_fields(functions, counts, line, x)
     motion = (fields.motion - rigid_fields(x, np.zeros(3)) @ C) @ T
@@ -211,7 +214,7 @@ def stiffening(
 
 
 def station_places(where: str, line: BeamLine, places: Mapping[str, float]) -> Array:
-    """Return the places of the stations, (n_stations,), after checking them."""
+    """Return the checked positions of the stations, (n_stations,)."""
     x = np.array([float(value) for value in places.values()])
     outside = [name for name, value in places.items() if not 0 <= float(value) <= line.length]
     if outside:
@@ -261,7 +264,7 @@ def frame_of_beam(
 
 
 def held_dofs(where: str, frame: NodalFrame, x_station: Array, names: list[str]) -> IntArray:
-    """Return six (station, component) that a nodal frame holds, (6, 2)."""
+    """Return the six (station, component) that a nodal frame holds, (6, 2)."""
     points = np.column_stack([x_station, np.zeros((len(x_station), 2))])
     if frame.dofs is not None:
         held = checked_dofs(frame, f"{where}: nodal frame", Numbering())
@@ -275,7 +278,7 @@ def held_dofs(where: str, frame: NodalFrame, x_station: Array, names: list[str])
 
 
 def rigid_part(frame: BodyFrame, rigid_rows: Array, rows: Array, at_stations: tuple[Array, Array]) -> Array:
-    """Return C, (6, n_columns): what the frame takes off the columns as rigid motion about x = 0."""
+    """Return C, (6, n_columns): the rigid motion about x = 0 that the frame removes from the columns."""
     if frame.kind == "tisserand":
         return np.asarray(np.linalg.lstsq(rigid_rows, rows, rcond=None)[0])
     x_station, motion = at_stations
@@ -286,7 +289,7 @@ def rigid_part(frame: BodyFrame, rigid_rows: Array, rows: Array, at_stations: tu
 
 
 def elastic_modes(fields: BeamFields, A_K: Array, A_M: Array) -> tuple[Array, Array, tuple[str, ...]]:
-    """(2), (3): return the modes over the columns, (n_columns, n_q), their omega², and labels of redundant columns."""
+    """Steps (2), (3): return the modes over the columns, (n_columns, n_q), their omega², and redundant labels."""
     mass, stiffness = (np.einsum("nk,nk->k", A, A) for A in (A_M, A_K))
     omega2_1 = float((stiffness / mass).min())
     A_W = np.vstack([A_K / np.sqrt(omega2_1), A_M])
@@ -305,7 +308,7 @@ def elastic_modes(fields: BeamFields, A_K: Array, A_M: Array) -> tuple[Array, Ar
 
 
 def free_frequencies(line: BeamLine, integral: tuple[Array, Array, Array], fields: BeamFields, A_K: Array) -> Array:
-    """Return the frequencies of the unsupported beam, ascending [Hz]; none where it has no inertia about x."""
+    """Return the frequencies of the unsupported beam, ascending [Hz]; empty if it has no inertia about x."""
     x, weight, rigid = integral
     rows = inertia_rows(line, x, weight, rigid)
     if not np.linalg.norm(rows[:, 3]) > 0:
@@ -317,7 +320,7 @@ def free_frequencies(line: BeamLine, integral: tuple[Array, Array, Array], field
 
 
 def provenance(line: BeamLine, functions: str, counts: Mapping[str, int], dropped: tuple[str, ...]) -> dict[str, str]:
-    """Record what the body was made from."""
+    """Return a record of how the body was made."""
     laws = {name: getattr(line, name) for name in ("rho_A", "EA", "EIy", "EIz", "GJ", "rho_Iy", "rho_Iz", "GAy", "GAz")}
     return {
         "mode set": "assumed-modes of a beam without a mesh",

@@ -1,12 +1,12 @@
-"""Displacement fields of a straight beam: functions along x times the kinematics of its sections.
+"""Displacement fields of a straight beam: functions along x, combined with the kinematics of its sections.
 
-At a place x the section has the motion (u_x, u_y, u_z, theta_x, theta_y, theta_z) and the strains
+At position x the section has the motion (u_x, u_y, u_z, theta_x, theta_y, theta_z) and the strains
 
     u_x',   u_y' - theta_z,   u_z' + theta_y,   theta_x',   theta_y',   theta_z'
 
-axial u(x): u_x;  bending v(x): u_y = v, theta_z = v' (along z: u_z = v, theta_y = -v');  torsion theta(x): theta_x;
-shear psi(x): theta_z (along z: -theta_y) alone. With v of degree p, bending and shear columns together span all
-(v, theta) with theta of degree p - 1, so that a thin beam does not lock.
+The fields are: axial u(x): u_x; bending v(x): u_y = v, theta_z = v' (along z: u_z = v, theta_y = -v'); torsion
+theta(x): theta_x; shear psi(x): theta_z (along z: -theta_y) alone. With v of degree p, bending and shear columns
+together span all (v, theta) with theta of degree p - 1, so a thin beam does not lock.
 """
 
 from collections.abc import Mapping
@@ -23,32 +23,32 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["BeamFields", "beam_fields", "beam_moments", "inertia_rows", "rigid_fields", "strain_rows"]
 
-PLANES = (("y", 1, 5, 1.0), ("z", 2, 4, -1.0))  #: name, translation, rotation and its sign by the slope
+PLANES = (("y", 1, 5, 1.0), ("z", 2, 4, -1.0))  #: name, translation, rotation, and sign of the rotation per slope
 
 
 @dataclass(frozen=True, eq=False)
 class BeamFields:
-    """Columns at places along the beam."""
+    """Columns at positions along the beam."""
 
-    motion: Array  #: of the sections, (n, 6, n_columns)
+    motion: Array  #: motion of the sections, (n, 6, n_columns)
     strain: Array  #: (n, 6, n_columns)
-    labels: tuple[str, ...]  #: one per column
-    groups: tuple[str, ...]  #: one per column
+    labels: tuple[str, ...]  #: label of each column
+    groups: tuple[str, ...]  #: group of each column
 
 
 def beam_fields(family: str, counts: Mapping[str, int], line: BeamLine, x: Array) -> BeamFields:
-    """Return the fields of a family of functions at the places x, rigid-body motion left out.
+    """Return the fields of a family of functions at positions x, without rigid-body motion.
 
     Parameters
     ----------
     family
-        Of `cms.mode_sets.axis_functions.AXIS_FUNCTIONS`.
+        Key of `cms.mode_sets.axis_functions.AXIS_FUNCTIONS`.
     counts
         Number of functions for "axial", "bending" (each direction), "shear" (each direction) and "torsion".
     line
         The beam.
     x
-        Places, (n,) [m].
+        Positions, (n,) [m].
     """
     x, span = np.asarray(x, dtype=float), np.array([0.0, line.length])
     motion: list[Array] = []
@@ -112,7 +112,7 @@ def inertia_rows(line: BeamLine, x: Array, weight: Array, motion: Array) -> Arra
 def strain_rows(line: BeamLine, x: Array, weight: Array, strain: Array) -> Array:
     """Return A with AᵀA = ∫ EA u'² + GA gamma² + GJ theta_x'² + EI kappa², (6 n, n_columns).
 
-    Where shear is rigid its strain must be zero.
+    If shear is rigid, its strain must be zero.
     """
     laws = [line.at(name, x) for name in ("EA", "GAy", "GAz", "GJ", "EIy", "EIz")]
     stiffness = np.where(np.isfinite(laws), laws, 0.0).T

@@ -1,8 +1,8 @@
-"""Geometric stiffness of a straight beam without a mesh: section forces by equilibrium, integrals (theory.md §7).
+"""Geometric stiffness of a straight beam without a mesh, from section forces in equilibrium (theory.md §7).
 
-n(x), m(x) are what the part beyond x exerts on the part before it: the loads beyond x, those per mass, those on
-stations and the reaction of the support. They work on the second order of the strains of a section, n·e_x besides on
-that of its twisted fibres, and the loads off the axis on the second order of the rotation of their section:
+n(x), m(x) are the forces that the part beyond x exerts on the part before it. They result from loads per unit mass,
+loads on stations and the support reaction beyond x. They do work on the second-order strains of a section, and n·e_x
+also on those of its twisted fibres. Loads off the axis do work on the second-order rotation of their section:
 
     Gamma = u' - theta × e  +  [-theta × u' + ½ theta × (theta × e)],   kappa = theta'  +  [-½ theta × theta']
 """
@@ -26,7 +26,7 @@ E_X = np.array([1.0, 0.0, 0.0])
 
 @dataclass(frozen=True, eq=False)
 class BeamLoads:
-    """Loads per mass and wrenches on stations, side by side; a load j is the sum of both."""
+    """Loads per unit mass and wrenches on stations; load j is the sum of both."""
 
     mass: MassLoads  #: k loads
     x_station: Array  #: (n_stations,) [m]
@@ -45,11 +45,12 @@ def beam_geometric_stiffness(
     points
         Gauss points and weights with breaks at the stations, (n,) each [m].
     motion, strain
-        Of the sections with the modes at the points, (n, 6, n_q), see `cms.meshless_beams.beam_fields`.
+        Motion and strain of the sections for the modes at the points, (n, 6, n_q), see
+        `cms.meshless_beams.beam_fields`.
     x_station
-        Places of the interfaces, (n_stations,) [m].
+        Positions of the interfaces, (n_stations,) [m].
     frame
-        A Tisserand or nodal frame, the support of all loads.
+        A Tisserand or nodal frame, which is the support of all loads.
     """
     loads = balanced(line, unit_loads(x_station, frame), frame)
     K = work_of_second_order(line, points, motion, strain, loads)
@@ -62,7 +63,7 @@ def beam_geometric_stiffness(
 
 
 def unit_loads(x_station: Array, frame: BodyFrame) -> BeamLoads:
-    """Return the 12 loads per mass, then six for each station, along the axes of B."""
+    """Return the 12 loads per unit mass, then six for each station, along the axes of B."""
     e, k = frame.axes.T, 12 + 6 * len(x_station)  # e[a]: axis a of B
     A, b = np.zeros((k, 3, 3)), np.zeros((k, 3))
     b[:3] = -e
@@ -78,7 +79,7 @@ def unit_loads(x_station: Array, frame: BodyFrame) -> BeamLoads:
 
 
 def balanced(line: BeamLine, loads: BeamLoads, frame: BodyFrame) -> BeamLoads:
-    """Return each load with the reaction of the support: inertia of a rigid motion, or forces on the held dofs."""
+    """Return each load with the reaction of the support: inertia of a rigid motion, or forces on held dofs."""
     x, weight = line.points(2)
     rigid = rigid_fields(x, np.zeros(3))
     q, mu, _ = densities(line, x, loads.mass)
@@ -97,7 +98,7 @@ def balanced(line: BeamLine, loads: BeamLoads, frame: BodyFrame) -> BeamLoads:
 
 
 def densities(line: BeamLine, x: Array, mass: MassLoads) -> tuple[Array, Array, Array]:
-    """Return force, couple, (n, 3, k), and V = Σ f oᵀ, (n, 3, 3, k), per length at the places x."""
+    """Return force and couple, (n, 3, k), and V = Σ f oᵀ, (n, 3, 3, k), per length at positions x."""
     centers = np.column_stack([x, np.zeros((len(x), 2))])
     q = line.at("rho_A", x)[:, None, None] * mass.at(centers)
     E = np.stack([np.zeros(len(x)), line.at("rho_Iz", x), line.at("rho_Iy", x)], axis=1)
@@ -106,12 +107,12 @@ def densities(line: BeamLine, x: Array, mass: MassLoads) -> tuple[Array, Array, 
 
 
 def axial(V: Array) -> Array:
-    """Return Σ o × f of V = Σ f oᵀ, (n, 3, k)."""
+    """Return Σ o × f from V = Σ f oᵀ, (n, 3, k)."""
     return np.stack([V[:, 2, 1] - V[:, 1, 2], V[:, 0, 2] - V[:, 2, 0], V[:, 1, 0] - V[:, 0, 1]], axis=1)
 
 
 def section_forces(line: BeamLine, x: Array, loads: BeamLoads) -> tuple[Array, Array]:
-    """Return n and m at the places x, (n, 3, k) each: the loads beyond x, moments about x."""
+    """Return n and m at positions x, (n, 3, k) each: loads beyond x, moments about x."""
     cuts = np.array([0.0, *line.breaks, line.length])
     xi, weight = np.polynomial.legendre.leggauss(line.degree // 2 + 2)
     k = loads.mass.k

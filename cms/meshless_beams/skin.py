@@ -1,4 +1,4 @@
-"""A skin for beams that have no mesh: an elliptic tube with the radii of gyration of the sections."""
+"""A skin for beams without a mesh: an elliptic tube with the radii of gyration of the sections."""
 
 import numpy as np
 
@@ -8,11 +8,11 @@ from fe_models.foundation.arrays import Array, IntArray
 __all__ = ["tube"]
 
 N_RINGS, N_CORNERS = 21, 8
-THINNEST = 5e-3  #: radius of the skin of a beam without rotary inertia, part of its length
+THINNEST = 5e-3  #: radius of the skin relative to the length, for a beam without rotary inertia
 
 
 def tube(line: BeamLine) -> tuple[Array, Array, IntArray]:
-    """Return places x, offsets (y, z) and triangles of an elliptic tube with the radii of gyration of the sections."""
+    """Return positions x, offsets (y, z) and triangles of an elliptic tube with the sections' radii of gyration."""
     x = np.linspace(0.0, line.length, N_RINGS)
     mass = line.at("rho_A", x)
     # semi-axes of an ellipse: 2 sqrt(I/A)

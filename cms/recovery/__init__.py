@@ -1,1 +1,1 @@
-"""Recovery matrices: rows for motions, stresses, element forces and interface forces of a reduced body, and files."""
+"""Recovery matrices: rows for motions, stress, element forces and interface forces of a reduced body; files."""

@@ -1,11 +1,12 @@
-"""Craig-Bampton matrices of a reduced body, with the rigid part, and recovery rows over the same coordinates.
+"""Craig-Bampton matrices of a reduced body with its rigid part, and recovery rows over the same coordinates.
 
-y = (u_b, eta): motions of the interfaces in mesh axes, then fixed-interface modes of unit mass (`interface_model`).
-With z = T y the rows of a table become, p_b the loads at interfaces and p the others,
+The coordinates are y = (u_b, eta): motions of the interfaces in mesh axes, then fixed-interface modes of unit mass
+(`interface_model`). With z = T y, the rows of a table become
 
     rows = D_0 T y + D_1 T y' + D_2 T y'' + L_b p_b + L p,   p_b = f_b of the rows of interface forces
 
-In a body on a driven base p_b is no input: f_b = (M y'' + D y' + K y - G p)_b is put in its place.
+where p_b are the loads at interfaces and p the others. If the base is driven, p_b is no input: it is replaced by f_b =
+(M y'' + D y' + K y - G p)_b.
 """
 
 from dataclasses import dataclass
@@ -29,31 +30,31 @@ __all__ = ["CraigBampton", "InterfaceRows", "craig_bampton_matrices"]
 class InterfaceRows:
     """Rows over (u_b, eta): `displacement` @ y + `velocity` @ y' + `acceleration` @ y'' + `load` @ p."""
 
-    table: RecoveryTable  #: whose rows they are: labels, quantities, units
+    table: RecoveryTable  #: table of the rows: labels, quantities, units
     displacement: Array  #: (n_rows, n_b + n_modes)
     velocity: Array  #: (n_rows, n_b + n_modes)
     acceleration: Array  #: (n_rows, n_b + n_modes)
-    loads: tuple[str, ...]  #: those of the table that do not act at interfaces
+    loads: tuple[str, ...]  #: loads of the table that do not act at interfaces
     load: Array  #: (n_rows, n_loads)
 
     def values(self, y: Array, y_dot: Array, y_ddot: Array, p: Array | None = None) -> Array:
-        """Return the rows of motions (..., n_b + n_modes) and amplitudes (..., n_loads), (..., n_rows)."""
+        """Return the rows, (..., n_rows), for motions, (..., n_b + n_modes), and amplitudes, (..., n_loads)."""
         total = y @ self.displacement.T + y_dot @ self.velocity.T + y_ddot @ self.acceleration.T
         return np.asarray(total if p is None else total + np.asarray(p) @ self.load.T)
 
 
 @dataclass(frozen=True, eq=False)
 class CraigBampton:
-    """Mass, stiffness and damping over (u_b, eta), and what a rigid motion is there."""
+    """Mass, stiffness and damping over (u_b, eta), and rigid motions in these coordinates."""
 
     body: ReducedBody
     M: Array  #: (n, n), n = n_b + n_modes
-    K: Array  #: (n, n), nothing between boundary and modes
+    K: Array  #: (n, n), without coupling between boundary and modes
     D: Array  #: (n, n)
     T: Array  #: z = T y, (6 + n_q, n)
-    boundary: tuple[str, ...]  #: one per boundary dof, such as "tip ux", (n_b,)
-    about: Array  #: point of the rigid motions, mesh coordinates, (3,) [m]
-    rigid: Array  #: motions of the boundary dofs under the six rigid motions about it, mesh axes, (n_b, 6)
+    boundary: tuple[str, ...]  #: name of each boundary dof, such as "tip ux", (n_b,)
+    about: Array  #: reference point of the rigid motions, mesh coordinates, (3,) [m]
+    rigid: Array  #: motions of the boundary dofs under the six rigid motions, mesh axes, (n_b, 6)
 
     @property
     def n_b(self) -> int:
@@ -62,31 +63,31 @@ class CraigBampton:
 
     @property
     def M_rigid(self) -> Array:
-        """Mass matrix of the rigid motions, (6, 6): that of the reduced boundary, exact where the set holds them."""
+        """Mass matrix of the rigid motions, (6, 6), from the reduced boundary; exact if the mode set contains them."""
         b = slice(self.n_b)
         return np.asarray(self.rigid.T @ self.M[b, b] @ self.rigid)
 
     @property
     def frequencies(self) -> Array:
-        """Frequencies of the fixed-interface modes, (n_modes,), cycles per time unit; infinite without mass."""
+        """Frequencies of the fixed-interface modes, (n_modes,), cycles per time unit; infinite for massless modes."""
         inner = slice(self.n_b, None)
         mass, stiffness = np.diag(self.M)[inner], np.diag(self.K)[inner]
         omega2 = np.divide(stiffness, mass, out=np.full(len(mass), np.inf), where=mass > 0)
         return np.asarray(np.sqrt(omega2) / (2 * np.pi))
 
     def recover(self, table: RecoveryTable | str) -> InterfaceRows:
-        """Return the rows of a table over (u_b, eta), the loads at interfaces put in by the equations of the body.
+        """Return the rows of a table over (u_b, eta); interface loads are replaced by the equations of motion.
 
         Parameters
         ----------
         table
-            One of this body, or its name in `ReducedBody.recovery`.
+            A table of this body, or its name in `ReducedBody.recovery`.
 
         Raises
         ------
         RecoveryError
-            If the table is of another body, a load acts at a node that is not kept, or an interface takes no
-            wrench of one node (kind "nodes" of several).
+            If the table belongs to another body, a load acts at a node that is not kept, or an interface does not
+            transmit the wrench of a single node (kind "nodes" with several nodes).
         """
         if isinstance(table, str):
             if table not in self.body.recovery:
@@ -108,9 +109,9 @@ class CraigBampton:
         return InterfaceRows(table, position, rate, acceleration, loads, load)
 
     def _split(self, table: RecoveryTable, T: Array) -> tuple[Array, list[int], Array]:
-        """Return the static part over f_b, the other columns, and the forces on y of these, (n, n_other).
+        """Return the static part over f_b, the other columns, and the forces of the other loads on y, (n, n_other).
 
-        A wrench at an interface is that of its one node, in axes of B.
+        A wrench at an interface acts on its single node, in axes of B.
         """
         A = self.body.frame.axes
         turn = np.kron(np.eye(2), A.T)
@@ -140,12 +141,12 @@ def craig_bampton_matrices(body: ReducedBody, *, about: tuple[float, float, floa
     Parameters
     ----------
     about
-        Point that the rigid motions are about, mesh coordinates [m].
+        Reference point of the rigid motions, mesh coordinates [m].
 
     Raises
     ------
     RecoveryError
-        If its modes do not let the dofs of the interfaces move independently, or the interfaces do not hold it.
+        If its modes do not move the interface dofs independently, or the interfaces do not hold the body.
     """
     try:
         model = interface_model(body)
@@ -158,7 +159,7 @@ def craig_bampton_matrices(body: ReducedBody, *, about: tuple[float, float, floa
 
 
 def boundary_words(model: InterfaceModel) -> tuple[str, ...]:
-    """Return what the boundary dofs are called."""
+    """Return the names of the boundary dofs."""
     return tuple(
         f"{word} {MOTION_COMPONENTS[component]}"
         for node, word in zip(model.nodes, node_words(model.nodes), strict=True)

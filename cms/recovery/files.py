@@ -1,7 +1,7 @@
-"""Recovery matrices in files for other programs: npz, mat, op4 and csv, with their names and units.
+"""Recovery matrices in files for other programs (npz, mat, op4, csv), with names and units.
 
-Over z = (d, theta, q) or over (u_b, eta): rows = displacement @ x + velocity @ x' + acceleration @ x'' + load @ p, with
-mass M, damping D and stiffness K over x beside them.
+The coordinates x are z = (d, theta, q) or (u_b, eta). Rows = displacement @ x + velocity @ x' + acceleration @ x'' +
+load @ p. Mass M, damping D and stiffness K over x are included.
 """
 
 import csv
@@ -38,15 +38,15 @@ LENGTH, NONE, MODAL, UNIT_MASS = Dimensions(0, 1), Dimensions(), Dimensions(0.5,
 
 @dataclass(frozen=True, eq=False)
 class RecoveryFiles:
-    """What was written."""
+    """The written files."""
 
     files: tuple[Path, ...]
-    notes: tuple[str, ...]  #: in words, where names and units are, and what was left out
+    notes: tuple[str, ...]  #: where the names and units are, and what was left out
 
 
 @dataclass(frozen=True, eq=False)
 class _Content:
-    """Matrices of a table over x, and the names of their rows and columns."""
+    """Matrices of a table over x, with the names of their rows and columns."""
 
     table: RecoveryTable
     matrices: Mapping[str, Array]  #: displacement, velocity, acceleration, load
@@ -66,24 +66,25 @@ def write_recovery(
     over: str = "modes",
     units: Units | str | None = None,
 ) -> RecoveryFiles:
-    """Write a recovery table of a body; files are written whole or not at all.
+    """Write a recovery table of a body; files are written completely or not at all.
 
     Parameters
     ----------
     path
-        With the suffix of the format, one of `RECOVERY_FORMATS`; op4 has its names in two .csv files beside it.
+        Path with the suffix of the format, one of `RECOVERY_FORMATS`. op4 has its names in two .csv files beside it.
     table
-        Name of the table; None: the only one.
+        Name of the table; None: the only table.
     over
-        "modes": over z = (d, theta, q) in axes of B; "interfaces": over the motions of the interfaces in mesh axes and
-        the fixed-interface modes, the forces at the interfaces put in (`CraigBampton.recover`).
+        "modes": over z = (d, theta, q) in axes of B. "interfaces": over the interface motions in mesh axes and the
+        fixed-interface modes, with the interface forces eliminated (`CraigBampton.recover`).
     units
-        Unit system of the numbers; that of the body by default.
+        Unit system of the numbers; default: that of the body.
 
     Raises
     ------
     RecoveryError
-        If there is no such table, format or way, the body has no such coordinates, or the file cannot be written.
+        If the table, format or kind of coordinates does not exist, the body has no such coordinates, or the file cannot
+        be written.
     """
     path = Path(path)
     if path.suffix.lower() not in RECOVERY_FORMATS:
@@ -104,7 +105,7 @@ def write_recovery(
 
 
 def chosen(body: ReducedBody, name: str | None) -> RecoveryTable:
-    """Return the table of that name, or the only one."""
+    """Return the table of that name, or the only table."""
     known = list(body.recovery)
     if not known:
         raise RecoveryError(
@@ -118,7 +119,7 @@ def chosen(body: ReducedBody, name: str | None) -> RecoveryTable:
 
 
 def content_of(body: ReducedBody, table: RecoveryTable, over: str) -> _Content:
-    """Return the matrices over z or over the interfaces."""
+    """Return the matrices over z or over the interface coordinates."""
     if over == "modes":
         M, D, K = on_coordinates(body)
         names = (*(f"d {a}" for a in "xyz"), *(f"theta {a}" for a in "xyz"), *(f"q {k + 1}" for k in range(body.n_q)))
@@ -146,7 +147,7 @@ Files = tuple[dict[Path, bytes], tuple[str, ...]]
 
 
 def arrays_of(content: _Content) -> dict[str, Any]:
-    """Return all that npz and mat hold, texts as tuples."""
+    """Return the arrays for npz and mat files; texts are tuples."""
     table = content.table
     return {
         **content.matrices,
@@ -169,7 +170,7 @@ def arrays_of(content: _Content) -> dict[str, Any]:
 
 
 def npz_files(path: Path, content: _Content) -> Files:
-    """Return an archive of NumPy; texts are arrays of fixed length, nothing is pickled."""
+    """Return a NumPy archive; texts are arrays of fixed length, and nothing is pickled."""
     buffer = io.BytesIO()
     arrays: dict[str, Any] = {
         name: np.array(value, dtype=str) if isinstance(value, tuple) else value
@@ -180,7 +181,7 @@ def npz_files(path: Path, content: _Content) -> Files:
 
 
 def mat_files(path: Path, content: _Content) -> Files:
-    """Return a MAT-file of version 5, texts as cells."""
+    """Return a MAT-file of version 5; texts are cell arrays."""
     from scipy.io import savemat
 
     def cells(texts: tuple[str, ...]) -> Any:
@@ -229,7 +230,7 @@ def row_words(table: RecoveryTable) -> list[tuple[Any, ...]]:
 
 
 def column_words(content: _Content) -> list[tuple[str, int, str, str]]:
-    """Return matrix, number, name and unit of each column; units of coordinates, whose rates are per time."""
+    """Return matrix, number, name and unit of each column; the units are those of the coordinates, not their rates."""
     of_x = zip(content.coordinates, content.coordinate_units, strict=True)
     of_loads = zip(content.loads, content.load_units, strict=True)
     words = [("DRMD DRMV DRMA", k + 1, name, unit) for k, (name, unit) in enumerate(of_x)]
@@ -237,7 +238,7 @@ def column_words(content: _Content) -> list[tuple[str, int, str, str]]:
 
 
 def csv_files(path: Path, content: _Content) -> Files:
-    """Return one table: names, number and unit of each row, then its entries; matrices of zeros are left out."""
+    """Return one table: names, number and unit of each row, then its entries; zero matrices are left out."""
     head, blocks = list(ROW_HEAD), []
     left: list[str] = []
     for name, matrix in content.matrices.items():

@@ -1,12 +1,12 @@
-"""Forces that act on a reduced body at its interfaces, from its motion: rows of M, D and K over the interfaces.
+"""Rows for the forces on a reduced body at its interfaces, computed from its motion with M, D and K.
 
-M_z z'' + D_z z' + K_z z = Bᵀ f_b + G p over z = (d, theta, q), with f_b the forces at the interfaces and G p all other
-loads. With the constraint modes Z of `interface_model`, B Z = 1 and those forces on which nothing else depends,
+M_z z'' + D_z z' + K_z z = Bᵀ f_b + G p over z = (d, theta, q), where f_b are the interface forces and G p all other
+loads. The constraint modes Z of `interface_model` satisfy B Z = 1, so that
 
     f_b = Zᵀ (M_z z'' + D_z z' + K_z z - G p).
 
-The net force of all interfaces needs no such modes: it is what the rigid motions leave, M_R and Y, less the resultant
-of the other loads.
+The net force of all interfaces needs no such modes: it is the rigid-motion part of the inertia forces, M_R and Y, minus
+the resultant of the other loads.
 """
 
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ FORCE, MOMENT = Dimensions(1, 1, -2), Dimensions(1, 2, -2)
 
 @dataclass(frozen=True, eq=False)
 class PartOfTable:
-    """Rows of a table with their numbers."""
+    """Some rows of a table, with their coefficients."""
 
     names: tuple[RowName, ...]
     dynamic: Array  #: (3, n_rows, 6 + n_q)
@@ -50,7 +50,7 @@ def interface_part(body: ReducedBody, rows: Rows, loads: LoadColumns, forces: Ar
     Raises
     ------
     RecoveryError
-        If an interface is unknown, or the modes do not tell the forces of single interfaces apart.
+        If an interface is unknown, or the modes do not separate the forces of single interfaces.
     """
     known = [interface.name for interface in body.interfaces]
     for name in rows.at:
@@ -75,7 +75,7 @@ def interface_part(body: ReducedBody, rows: Rows, loads: LoadColumns, forces: Ar
 
 
 def single_forces(body: ReducedBody, others: Array) -> tuple[tuple[BoundaryNode, ...], Array, Array]:
-    """Return the nodes of the interfaces, and the rows of f_b, (3, n_b, 6 + n_q) and (n_b, n_loads)."""
+    """Return the interface nodes, and the rows of f_b, (3, n_b, 6 + n_q) and (n_b, n_loads)."""
     try:
         model = interface_model(body)
     except ExportError as error:
@@ -90,7 +90,7 @@ def single_forces(body: ReducedBody, others: Array) -> tuple[tuple[BoundaryNode,
 
 
 def node_words(nodes: tuple[BoundaryNode, ...]) -> list[str]:
-    """Return what the nodes of interfaces are called: by the interface, counted where it has several."""
+    """Return the names of interface nodes: the interface, with a counter if it has several nodes."""
     names = [node.interface for node in nodes]
     count = dict.fromkeys(names, 0)
     words = []
@@ -126,7 +126,7 @@ def net_part(body: ReducedBody, rows: Rows, others: Array) -> PartOfTable:
 
 
 def wrench_about(node: BoundaryNode, about: Array) -> Array:
-    """Return force and moment about a point of the forces of a boundary node, (6, n_components)."""
+    """Return the map from the forces of a boundary node to force and moment about a point, (6, n_components)."""
     motion = np.zeros((6, 6))
     motion[:3] = rigid_motion_of_points(node.position[None], about)[0]
     motion[3:, 3:] = np.eye(3)

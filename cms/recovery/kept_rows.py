@@ -1,4 +1,4 @@
-"""Recovery rows at the nodes that a reduced body keeps, from its shapes and stress modes."""
+"""Recovery rows at the kept nodes of a reduced body, from its shapes and stress modes."""
 
 import numpy as np
 
@@ -57,7 +57,7 @@ def kept_part(body: ReducedBody, rows: Rows, loads: LoadColumns) -> PartOfTable:
 
 
 def motion_rows(body: ReducedBody, rows: Rows, order: int, loads: LoadColumns) -> tuple[list[RowName], Array, Array]:
-    """Return motions over z in mesh axes, of accelerations omega × (omega × c) of a spin beside them."""
+    """Return motions over z in mesh axes; accelerations also have the part omega × (omega × c) of a spin."""
     A = body.frame.axes
     names: list[RowName] = []
     values, static = [np.zeros((0, N_RIGID + body.n_q))], [np.zeros((0, len(loads.names)))]
@@ -94,7 +94,7 @@ def motion_rows(body: ReducedBody, rows: Rows, order: int, loads: LoadColumns) -
 
 
 def stress_rows(body: ReducedBody, rows: Rows) -> tuple[list[RowName], Array]:
-    """Return stress over z in mesh axes."""
+    """Return rows of stress over z in mesh axes."""
     names: list[RowName] = []
     modes = [np.zeros((0, 6, body.n_q))]
     points: tuple[str, ...] = () if body.point_stress is None else body.point_stress.names
@@ -124,12 +124,12 @@ def stress_rows(body: ReducedBody, rows: Rows) -> tuple[list[RowName], Array]:
 
 
 def kept_nodes(body: ReducedBody, at: str | int, *, skin: bool = False) -> IntArray:
-    """Return the rows of a kept node by its number, of a set, of the members of an interface.
+    """Return the rows of a kept node given by number, of a set, or of the members of an interface.
 
     Parameters
     ----------
     skin
-        Whether the points of a skin that move with the nodes are among them.
+        Whether to include skin points that move with the nodes.
     """
     where = f"body {body.name!r}: recovery"
     interface = next((each for each in body.interfaces if each.name == at), None)
@@ -155,7 +155,7 @@ def kept_nodes(body: ReducedBody, at: str | int, *, skin: bool = False) -> IntAr
 
 
 def name_of(body: ReducedBody, row: int) -> str:
-    """Return what a kept node is called; a point of a skin by its node and its count among those that are kept."""
+    """Return the name of a kept node; a skin point is named by its node and its index among the kept points there."""
     numbering, name = body.numbering, body.node_name(row)
     if numbering.on_skin.size and numbering.on_skin[row]:
         same = np.flatnonzero((numbering.nodes == numbering.nodes[row]) & (numbering.on_skin == 1))
@@ -164,7 +164,7 @@ def name_of(body: ReducedBody, row: int) -> str:
 
 
 def number_of(body: ReducedBody, row: int) -> int:
-    """Return the user's number of a kept node, its index in the model where there is none."""
+    """Return the user's number of a kept node, or its index in the model if it has none."""
     return int(body.numbering.nodes[row] if body.numbering.nodes.size else body.node_ids[row])
 
 

@@ -1,7 +1,7 @@
-"""The loads that recovery rows answer: gravity, spin, wrenches at interfaces, load cases, forces at nodes.
+"""Loads to which recovery rows respond: gravity, spin, wrenches at interfaces, load cases, forces at nodes.
 
-In axes of B, wrenches at the reference points of the interfaces. What they do to the coordinates z = (d, theta, q) is
-Gᵀ F over the rigid motions and modes; of a reduced body it follows from the moments.
+All are in axes of B; wrenches act at the reference points of the interfaces. The generalised forces on z = (d, theta,
+q) are Gᵀ F with the rigid motions and modes G. For a reduced body they follow from its moments.
 """
 
 from collections.abc import Iterable, Sequence
@@ -39,19 +39,19 @@ ACCELERATION, RATE2, FORCE, MOMENT = (0.0, 1.0, -2.0), (0.0, 0.0, -2.0), (1.0, 1
 
 @dataclass(frozen=True, eq=False)
 class LoadColumns:
-    """Loads of amplitude one, by name."""
+    """Named loads of unit amplitude."""
 
     names: tuple[str, ...]
     dimensions: Array  #: exponents of mass, length and time of the amplitudes, (n_loads, 3)
-    is_interface: np.ndarray  #: whether it acts at an interface, (n_loads,) bool
+    is_interface: np.ndarray  #: whether each load acts at an interface, (n_loads,) bool
 
     def column(self, name: str) -> int:
-        """Return the place of a load."""
+        """Return the column of a load."""
         return self.names.index(name)
 
 
 class _Columns:
-    """Collects names, dimensions and what else belongs to each load."""
+    """Collects the names, dimensions and flags of loads."""
 
     def __init__(self) -> None:
         self.names: list[str] = []
@@ -72,7 +72,7 @@ class _Columns:
 def loads_of_body(body: ReducedBody) -> tuple[LoadColumns, Array]:
     """Return the loads that a reduced body knows, and their forces on z, (6 + n_q, n_loads).
 
-    Spin is left out where the moments that its inertia forces need are missing.
+    Spin is left out if the moments for its inertia forces are missing.
     """
     columns, forces = _Columns(), []
     n_q = body.n_q
@@ -95,12 +95,12 @@ def loads_of_body(body: ReducedBody) -> tuple[LoadColumns, Array]:
 
 
 def forces_of_loads(body: ReducedBody, names: Sequence[str]) -> Array:
-    """Return the forces of loads on z by their names, (6 + n_q, n): those the body knows, and at nodes it keeps.
+    """Return the forces on z of named loads, (6 + n_q, n): loads that the body knows, or loads at kept nodes.
 
     Raises
     ------
     RecoveryError
-        If a load acts at a node that the body does not keep, or a moment where its rotation is not known.
+        If a load acts at a node that is not kept, or a moment acts at a node whose rotation is unknown.
     """
     known, forces = loads_of_body(body)
     columns = [np.zeros((len(forces), 0))]
@@ -136,7 +136,7 @@ def node_force(body: ReducedBody, name: str) -> Array:
 
 
 def spin_forces(body: ReducedBody) -> Array:
-    """Return the forces of the loads A c of `unit_mass_loads` on z, of amplitude one, (6 + n_q, 6)."""
+    """Return the forces on z of the loads A c of `unit_mass_loads`, unit amplitude, (6 + n_q, 6)."""
     moments = body.moments
     columns = []
     for A in unit_mass_loads(BodyFrame("", np.zeros(3))).A[6:]:
@@ -147,7 +147,7 @@ def spin_forces(body: ReducedBody) -> Array:
 
 
 def on_q_alone(forces: Array, *, held: bool) -> Array:
-    """Return forces on z, without those on the rigid motions that a held body has not."""
+    """Return forces on z; for a held body, those on the rigid motions, which it does not have, are set to zero."""
     forces = np.array(forces)
     if held:
         forces[:N_RIGID] = 0.0
@@ -185,14 +185,14 @@ def loads_of_model(body: FEBody, frame: BodyFrame, request: RecoveryRequest) -> 
 
 
 def nodes_of_loads(body: FEBody, requests: Iterable[RecoveryRequest]) -> IntArray:
-    """Return the nodes at which forces of `loads_at` act, which the reduced body keeps for their work, (n,)."""
+    """Return the nodes in `loads_at`, (n,); the reduced body keeps them to compute the work of the loads."""
     places = Places(body)
     found = [places.nodes(at) for request in requests for at in request.loads_at]
     return np.concatenate([np.zeros(0, np.int64), *found])
 
 
 def on_coordinates(body: ReducedBody) -> tuple[Array, Array, Array]:
-    """Return M, D and K over z = (d, theta, q), (6 + n_q, 6 + n_q) each; zero on the rigid motions of a held body."""
+    """Return M, D and K over z = (d, theta, q), (6 + n_q, 6 + n_q) each; zero for rigid motions of a held body."""
     M, K, D, _ = free_matrices(body)
     if not body.is_held:
         return M, D, K
@@ -205,6 +205,6 @@ def on_coordinates(body: ReducedBody) -> tuple[Array, Array, Array]:
 
 
 def rigid_rows(body: ReducedBody) -> Array:
-    """Return force and torque about the origin of B that accelerations of z take, (6, 6 + n_q)."""
+    """Return the matrix from accelerations of z to force and torque about the origin of B, (6, 6 + n_q)."""
     Y, M_R = rigid_mass(body.moments)
     return np.hstack([M_R, Y])

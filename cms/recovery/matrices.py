@@ -1,13 +1,13 @@
-"""Recovery tables of a reduced body: from what it holds itself, or from its finite element model while it is reduced.
+"""Recovery tables of a reduced body, from its own data, or from its finite element model during the reduction.
 
-Of the model, for every row R over its dofs (docs/theory.md §11):
+For every row R over the dofs of the model (docs/theory.md §11):
 
 (1) mode displacement: R [Psi_B, Phi], over z
-(2) u_j = G (F_j - W Psi_R (Psi_Rᵀ W Psi_R)⁻¹ Psi_Rᵀ F_j): static response to each load in balance, in the frame
-(3) residual response: u_j - Phi K⁻¹ Phiᵀ F_j, what the modes lack of it
-(4) the same of the inertia forces -M [Psi_B, Phi], over z''
-(5) rows of displacements, stresses and forces of elements take (3) and (4) beside (1); velocities and accelerations
-    (1) alone, and accelerations omega × (omega × c) of a spin
+(2) u_j = G (F_j - W Psi_R (Psi_Rᵀ W Psi_R)⁻¹ Psi_Rᵀ F_j): static response to each balanced load, in the frame
+(3) residual response: u_j - Phi K⁻¹ Phiᵀ F_j, the part that the modes lack
+(4) the same for the inertia forces -M [Psi_B, Phi], over z''
+(5) rows of displacement, stress and element force use (1), (3) and (4); rows of velocity and acceleration use only (1),
+    and accelerations also the part omega × (omega × c) of a spin
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -45,15 +45,16 @@ OF_BODY = (
 def recovery_matrices(
     body: ReducedBody, requests: RecoveryRequest | Iterable[RecoveryRequest]
 ) -> Mapping[str, RecoveryTable]:
-    """Return tables of rows that a reduced body knows without its model.
+    """Return tables of the rows that a reduced body knows without its model.
 
-    Motions and stress of kept nodes, motions of interfaces, interface forces and net forces. What the modes leave out
-    of displacement and stress stays out; `reduce(..., recovery=requests)` adds it, and has the other quantities.
+    These are motions and stress of kept nodes, motions of interfaces, interface forces and net forces. The static part
+    of displacement and stress that the modes lack is missing. `reduce(..., recovery=requests)` adds it, and offers the
+    other quantities.
 
     Raises
     ------
     RecoveryError
-        If a row is asked for that the body does not know.
+        If the body does not know a requested row.
     """
     loads, forces = loads_of_body(body)
     tables = {}
@@ -74,7 +75,7 @@ def recovery_matrices(
 
 
 def unique(requests: RecoveryRequest | Iterable[RecoveryRequest]) -> tuple[RecoveryRequest, ...]:
-    """Return the requests, each name once."""
+    """Return the requests after a check that their names are unique."""
     found = (requests,) if isinstance(requests, RecoveryRequest) else tuple(requests)
     names = [request.name for request in found]
     if len(set(names)) != len(names):
@@ -85,7 +86,7 @@ def unique(requests: RecoveryRequest | Iterable[RecoveryRequest]) -> tuple[Recov
 def table_of(
     body: ReducedBody, name: str, parts: Sequence[PartOfTable], loads: LoadColumns, truncated: str
 ) -> RecoveryTable:
-    """Return the table of its parts, in their order."""
+    """Assemble the table from its parts, in their order."""
     names = [each for part in parts for each in part.names]
     return RecoveryTable(
         name=name,
@@ -119,21 +120,21 @@ def recovery_of_model(
     reduced: ReducedBody,
     requests: RecoveryRequest | Iterable[RecoveryRequest],
 ) -> Mapping[str, RecoveryTable]:
-    """Return the tables of a body that is being reduced.
+    """Return the tables of a body during its reduction.
 
     Parameters
     ----------
     source
-        The coupled body, or its families, whose factorisation is then taken.
+        The coupled body, or its `Families`, whose factorisation is then reused.
     Phi
-        Its shapes in the frame of `condition`, (n_dof, n_q).
+        Shapes of the body in the frame of `condition`, (n_dof, n_q).
     reduced
         The reduced body with these shapes.
 
     Raises
     ------
     RecoveryError
-        If a row is asked for that the body does not know.
+        If the body does not know a requested row.
     """
     body = body_of(source)
     tables: dict[str, RecoveryTable] = {}
@@ -164,7 +165,7 @@ def recovery_of_model(
 
 
 def residual_response(families: Families, condition: FrameCondition, Phi: Array, K: Array, F: Array) -> Array:
-    """Return steps (2) and (3): what the modes lack of the static response to load columns, (n_dof, k)."""
+    """Return the static response to load columns that the modes lack, (n_dof, k): steps (2) and (3)."""
     if condition.Psi_R.shape[1]:
         F = F - condition.W @ np.linalg.solve(condition.Psi_R.T @ condition.W, condition.Psi_R.T @ F)
     u = families.static(F)
@@ -174,12 +175,12 @@ def residual_response(families: Families, condition: FrameCondition, Phi: Array,
 
 
 def part_of_block(block: Block, columns: Array, reduced: ReducedBody, loads: LoadColumns) -> PartOfTable:
-    """Return step (5).
+    """Return the rows of one block: step (5).
 
     Parameters
     ----------
     columns
-        [Psi_B, Phi], residual responses to the loads, to the inertia forces, (n_dof, .).
+        [Psi_B, Phi], residual responses to the loads, and residual responses to the inertia forces, (n_dof, .).
     """
     width, n_loads = N_RIGID + reduced.n_q, len(loads.names)
     n = len(block.names)
@@ -195,7 +196,7 @@ def part_of_block(block: Block, columns: Array, reduced: ReducedBody, loads: Loa
 
 
 def spin_part(places: tuple[Array, Array], reduced: ReducedBody, loads: LoadColumns) -> Array:
-    """Return the acceleration omega × (omega × c) of rows at points in directions, (n_rows, n_loads)."""
+    """Return the acceleration omega × (omega × c) of rows at positions in directions, (n_rows, n_loads)."""
     static = np.zeros((len(places[0]), len(loads.names)))
     if SPIN[0] in loads.names:
         first = loads.column(SPIN[0])

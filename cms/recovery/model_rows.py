@@ -21,7 +21,7 @@ from fe_models.recovery.strain import nodal_strain
 __all__ = ["chosen_components", "model_block", "node_rows"]
 
 STRESS, STRAIN = Dimensions(1, -1, -2), Dimensions()
-COLUMNS_AT_ONCE = 16  #: stress is known at all nodes before it is cut to those asked for
+COLUMNS_AT_ONCE = 16  #: the stress is computed at all nodes before the requested nodes are selected
 
 
 def model_block(body: FEBody, rows: Rows) -> Block:
@@ -30,7 +30,7 @@ def model_block(body: FEBody, rows: Rows) -> Block:
     Raises
     ------
     RecoveryError
-        If a place, a component or the quantity itself is not known of the body.
+        If the body does not know a place, a component or the quantity.
     """
     if rows.quantity in OF_MOTION:
         block = motion_block(body, rows)
@@ -42,7 +42,7 @@ def model_block(body: FEBody, rows: Rows) -> Block:
 
 
 def chosen_components(block: Block, rows: Rows, where: str) -> Block:
-    """Return the rows whose components were asked for; all if none were."""
+    """Return the rows of the requested components; all rows if none are requested."""
     if not rows.components:
         return block
     known = tuple(dict.fromkeys(name.component for name in block.names))
@@ -91,9 +91,10 @@ def motion_block(body: FEBody, rows: Rows) -> Block:
 
 
 def node_rows(body: FEBody, node: int) -> tuple[sp.csr_array, IntArray]:
-    """Return the motion of a node over the dofs of the body, and which components it has, (n, n_dof) and (n,).
+    """Return the motion of a node as rows over the dofs, (n, n_dof), and its components, (n,).
 
-    Of the mesh behind the body where that has the node, else its own dofs; rotations that nothing moves are none.
+    They come from the mesh if it contains the node, else from the dofs of the body. Rotations that no dof moves are
+    left out.
     """
     if body.recovery is not None:
         dofs = body.recovery.dofs
@@ -113,7 +114,7 @@ def node_rows(body: FEBody, node: int) -> tuple[sp.csr_array, IntArray]:
 
 
 def stress_block(body: FEBody, rows: Rows) -> Block:
-    """Return stress or strain at nodes, stress at named points too, in mesh axes."""
+    """Return stress or strain at nodes, and stress at named points, in mesh axes."""
     model = body.element_model
     places = Places(body)
     is_strain = rows.quantity == "strain"
@@ -140,12 +141,12 @@ def stress_block(body: FEBody, rows: Rows) -> Block:
     rows_of_nodes = np.array(nodes, dtype=np.int64)
     values = strain_values(body, rows_of_nodes) if is_strain else stress_values(body, rows_of_nodes, points)
     if is_strain:
-        values(np.zeros((body.n_dof, 1)))  # whether it is known at all of them
+        values(np.zeros((body.n_dof, 1)))  # checks that the strain is known at all nodes
     return Block(tuple(names), 0, values)
 
 
 def strain_values(body: FEBody, nodes: IntArray) -> Callable[[Array], Array]:
-    """Return the function of displacement columns, (6 n_nodes, k)."""
+    """Return the strain as a function of displacement columns, (6 n_nodes, k)."""
 
     def values(u: Array) -> Array:
         parts = []
@@ -158,7 +159,7 @@ def strain_values(body: FEBody, nodes: IntArray) -> Callable[[Array], Array]:
 
 
 def stress_values(body: FEBody, nodes: IntArray, points: list[int]) -> Callable[[Array], Array]:
-    """Return the function of displacement columns, (6 (n_nodes + n_points), k)."""
+    """Return the stress as a function of displacement columns, (6 (n_nodes + n_points), k)."""
     wanted = np.unique(nodes)
 
     def values(u: Array) -> Array:
@@ -179,12 +180,12 @@ def stress_values(body: FEBody, nodes: IntArray, points: list[int]) -> Callable[
 
 
 def shown(body: FEBody, places: Places, at: str | int, nodes: IntArray) -> IntArray:
-    """Return those of some nodes that show stress when the body deforms: no reference nodes, no axes of beams.
+    """Return the nodes that have stress when the body deforms, without reference nodes and beam axes.
 
     Raises
     ------
     RecoveryError
-        If there is none.
+        If no node has stress.
     """
     u = np.random.default_rng(0).standard_normal((body.n_dof, 1))
     assert body.element_model is not None
@@ -204,7 +205,7 @@ def shown(body: FEBody, places: Places, at: str | int, nodes: IntArray) -> IntAr
 
 
 def element_block(body: FEBody, rows: Rows) -> Block:
-    """Return forces, strains or stress of elements; a name among the places is that of a part or a kind of cells."""
+    """Return forces, strains or stress of elements; a name among the places is a part or a cell type."""
     groups = [group for group in element_groups(body) if group.quantity == rows.quantity]
     if not groups:
         known = tuple(dict.fromkeys(group.quantity for group in element_groups(body)))
@@ -228,9 +229,9 @@ def element_block(body: FEBody, rows: Rows) -> Block:
 
 
 def elements_of(body: FEBody, rows: Rows, groups: list[ElementGroup]) -> list[tuple[ElementGroup, IntArray]]:
-    """Return the elements of each group that were asked for, in their order: all, by name or number, by set or part.
+    """Return the requested elements of each group, in their order: all, by name or number, by set or part.
 
-    Where elements have no numbers, a number is the index in the only group there is.
+    If elements have no numbers, a number is an index into the only group.
     """
     if not rows.at:
         return [(group, np.arange(group.count)) for group in groups]

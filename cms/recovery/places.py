@@ -1,4 +1,4 @@
-"""Nodes, interfaces and stress points of a body by the names and numbers of its user."""
+"""Look-up of nodes, interfaces and stress points of a body by the user's names and numbers."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ __all__ = ["Places"]
 
 
 class Places:
-    """Where rows are asked for, on one body."""
+    """Look-up of the places of one body for which rows are requested."""
 
     def __init__(self, body: FEBody) -> None:
         self.body = body
@@ -22,23 +22,23 @@ class Places:
         return next((interface for interface in self.body.interfaces if interface.name == at), None)
 
     def points(self, at: str | int) -> list[int]:
-        """Return the stress points of that name, or whose names begin with it as whole words."""
+        """Return the stress points with that name, or whose names begin with these words."""
         return [k for k, name in enumerate(self.point_names) if name == at or name.startswith(f"{at} ")]
 
     def nodes(self, at: str | int, *, skin: bool = False) -> IntArray:
-        """Return the rows of a node by its number, of a set, of the members of an interface.
+        """Return the rows of a node given by number, of a set, or of the members of an interface.
 
         Parameters
         ----------
         at
-            The user's number, or the index where the body knows no numbers; "INSTANCE.number"; a name.
+            The user's number, or the index if the body has no numbers; "INSTANCE.number"; or a name.
         skin
-            Whether the points of a skin that move with the nodes are among them.
+            Whether to include skin points that move with the nodes.
 
         Raises
         ------
         RecoveryError
-            If there is none.
+            If there is no such place.
         """
         numbering, where = self.body.numbering, f"body {self.body.name!r}: recovery"
         if isinstance(at, int) and not numbering.nodes.size:
@@ -76,7 +76,7 @@ class Places:
         raise RecoveryError(f"{where}: no node set or interface {quoted(at)}{nearest(at, choices)}")
 
     def word(self, node: int) -> str:
-        """Return what a node is called; a point of a skin by its node and its count among those there."""
+        """Return the name of a node; a skin point is named by its node and its index among the points there."""
         numbering = self.body.numbering
         name = numbering.node_name(node)
         if numbering.on_skin.size and numbering.on_skin[node]:
@@ -85,6 +85,6 @@ class Places:
         return name
 
     def number(self, node: int) -> int:
-        """Return the user's number of a node, its index where the body knows none."""
+        """Return the user's number of a node, or its index if the body has no numbers."""
         numbers = self.body.numbering.nodes
         return int(numbers[node]) if numbers.size else node

@@ -1,4 +1,4 @@
-"""What recovery rows are asked for."""
+"""Requests for recovery rows."""
 
 from dataclasses import dataclass, field
 
@@ -8,7 +8,7 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["OF_ELEMENTS", "OF_NODES", "QUANTITIES", "RecoveryRequest", "Rows", "motion_dimensions"]
 
-OF_MOTION = ("displacement", "velocity", "acceleration")  #: in the order of the derivatives of z
+OF_MOTION = ("displacement", "velocity", "acceleration")  #: in the order of the time derivatives of z
 OF_NODES = (*OF_MOTION, "stress", "strain")
 OF_ELEMENTS = (
     "beam force", "shell resultant", "spring force", "beam strain", "shell strain", "element stress", "element strain",
@@ -25,16 +25,16 @@ class Rows:
 
     Raises
     ------
-    RecoveryError
+    If the quantity is unknown, or does not fit the other fields.
         If the quantity is unknown, or does not go with what is given.
     """
 
     quantity: str  #: one of `QUANTITIES`
-    #: nodes or elements by number, node sets or groups, interfaces, stress points by name; empty: all there are, which
-    #: rows of nodes refuse
+    #: nodes or elements by number; node sets or groups, interfaces, stress points by name; empty: all places, which is
+    #: not allowed for rows of nodes
     at: tuple[Place, ...] = ()
-    components: tuple[str, ...] = ()  #: such as "uz" or "xx"; empty: all that are there
-    about: tuple[float, float, float] | None = None  #: of net forces: the point, mesh coordinates [m]
+    components: tuple[str, ...] = ()  #: components such as "uz" or "xx"; empty: all
+    about: tuple[float, float, float] | None = None  #: reference point of net forces, mesh coordinates [m]
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "at", (self.at,) if isinstance(self.at, str | int) else tuple(self.at))
@@ -55,17 +55,18 @@ class Rows:
 
 @dataclass(frozen=True)
 class RecoveryRequest:
-    """Rows that make one table, in their order, and what their static part answers beside the interfaces.
+    """Rows of one table, in their order, and further loads for their static part.
 
     Raises
     ------
     RecoveryError
-        If there is no row.
+        If there are no rows.
     """
 
     name: str
     rows: tuple[Rows, ...]
-    loads_at: tuple[Place, ...] = field(default=())  #: nodes or node sets at which forces act too
+    #: nodes or node sets at which forces act, in addition to the interfaces
+    loads_at: tuple[Place, ...] = field(default=())
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "rows", tuple(self.rows))

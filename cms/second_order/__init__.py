@@ -1,1 +1,1 @@
-"""Second order of small deflections: unit loads, geometric stiffness, quadratic modes."""
+"""Second-order effects of small deflections: unit loads, geometric stiffness, quadratic modes."""

@@ -10,25 +10,27 @@ __all__ = ["CENTRIFUGAL", "centrifugal_loads"]
 
 CENTRIFUGAL = "centrifugal"  #: kind of these load cases
 PRODUCTS = ("xx", "yy", "zz", "yz", "xz", "xy")  #: omega_a omega_b, one load each
-COLUMNS = 60  #: unit displacements whose moments are asked for at once
+COLUMNS = 60  #: number of unit displacements whose moments are computed at a time
 
 
 def centrifugal_loads(body: FEBody) -> tuple[LoadCase, ...]:
-    """Return the loads -∫ ρ [e_a × (e_b × c) + e_b × (e_a × c)] / 2 of the products omega_a omega_b, a load case each.
+    """Return the loads -∫ ρ [e_a × (e_b × c) + e_b × (e_a × c)] / 2 for the products omega_a omega_b, one case each.
 
-    (1) solid nodes: the field is linear in the position c, which isoparametric elements interpolate exactly, so f = M u
-        with its nodal values is exact for consistent mass; it has no curl, nodal rotations take none of it
-    (2) nodes with rotations, where the elements are known: f_ab · u = (a = b) ∫ c · u - ∫ (c_a u_b + c_b u_a) / 2 for
-        every unit displacement u, from the moments of the elements; this has the couples of the cross-sections, such as
-        the torque on a flat blade
+    (1) solid nodes: the field is linear in the position c, which isoparametric elements interpolate exactly. With a
+        consistent mass, f = M u with the nodal values u is therefore exact. The field has no curl, so nodal rotations
+        get no load.
+    (2) nodes with rotations, if the elements are known: f_ab · u = (a = b) ∫ c · u - ∫ (c_a u_b + c_b u_a) / 2 for
+        every unit displacement u, from the moments of the elements. This includes the couples of cross-sections, such
+        as the torque on a flat blade.
 
-    A rotation ω loads the body with Σ over a, b of omega_a omega_b f_ab: the mixed ones count twice. The origin does
-    not matter to the elastic response: another one adds a uniform field, which a rigid-body acceleration balances.
+    A rotation ω loads the body with Σ over a, b of omega_a omega_b f_ab, so mixed products count twice. The elastic
+    response does not depend on the origin: another origin adds a uniform field, which a rigid-body acceleration
+    balances.
 
     Parameters
     ----------
     body
-        Before coupling, where it will have rigid interfaces.
+        The body; before coupling, if it will have rigid interfaces.
     """
     node, component = body.dofs.T
     is_translation = (component >= 0) & (component < 3)
@@ -47,7 +49,7 @@ def centrifugal_loads(body: FEBody) -> tuple[LoadCase, ...]:
 
 
 def _moments(body: FEBody, dofs: IntArray) -> Array:
-    """Moments ∫ c_a u_b over mass of the unit displacement of each of these dofs, (3, 3, n_dofs)."""
+    """Return the moments ∫ c_a u_b over mass of unit displacements of these dofs, (3, 3, n_dofs)."""
     assert body.element_model is not None
     parts = []
     for first in range(0, len(dofs), COLUMNS):

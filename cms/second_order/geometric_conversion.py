@@ -1,15 +1,16 @@
-"""The geometric stiffness of a reduced body in another body frame, from what it holds itself (docs/theory.md §7).
+"""Conversion of the geometric stiffness of a reduced body to another body frame, from its own data (theory.md §7).
 
-A load is a load per mass A c + b, a wrench at each interface and amounts of six loads spread over the nodes. With its
-reaction it is in balance; the stress of a balanced load does not depend on the support: its matrix is the same
-combination of the matrices of the old unit loads.
+A load consists of a load per unit mass A c + b, a wrench at each interface, and amplitudes of six loads distributed
+over the nodes. With its reaction it is balanced. The stress of a balanced load does not depend on the support, so its
+matrix is the same linear combination of the matrices of the old unit loads.
 
-(1) the unit loads of the new frame, in old coordinates
-(2) the reaction of the new frame: that of a rigid-body acceleration (Tisserand), a wrench at its interface (nodal), a
-    load spread over the nodes (Buckens)
-(3) the matrices of the balanced loads, from the old ones
-(4) over the new shapes (phi - Psi_R C) Z, and over rotations and them: of two rotations K follows from the loads, which
-    a rotation turns; of a rotation and a shape it is on record, where it is not it is taken to follow likewise
+(1) express the unit loads of the new frame in old coordinates
+(2) add the reaction of the new frame: a rigid-body acceleration (Tisserand), a wrench at its interface (nodal), or a
+    load distributed over the nodes (Buckens)
+(3) combine the matrices of the balanced loads from the old ones
+(4) transform to the new shapes (phi - Psi_R C) Z; the matrices between two rotations follow from the loads, which a
+    rotation rotates; those between a rotation and a shape are stored, and where they are missing the same rule is
+    assumed
 """
 
 import logging
@@ -29,20 +30,20 @@ __all__ = ["converted_geometric_stiffness", "require_convertible"]
 
 log = logging.getLogger(__name__)
 
-OF_A_SHELL = re.compile(r"(^|: )shell \d+$")  #: key of the provenance that names a thickness
+OF_A_SHELL = re.compile(r"(^|: )shell \d+$")  #: key of the provenance for the thickness of a shell
 
 
 @dataclass(frozen=True, eq=False)
 class Loads:
-    """k loads of a reduced body, in axes of its frame and about its origin."""
+    """k loads on a reduced body, in axes of its frame and about its origin."""
 
     mass: MassLoads
     wrenches: Array  #: force and moment at every loaded interface, (k, n_loaded, 6)
-    spread: Array  #: amounts of the loads spread over the nodes, (k, 6); (k, 0) for a body without
+    spread: Array  #: amplitudes of the loads distributed over the nodes, (k, 6); (k, 0) if the body has none
 
 
 def require_convertible(reduced: ReducedBody, frame: BodyFrame) -> None:
-    """Raise `BodyError` where the reaction of the new frame is no combination of unit loads on record."""
+    """Raise `BodyError` if the reaction of the new frame is not a combination of stored unit loads."""
     if reduced.geometric is None or frame.kind == "tisserand":
         return
     names = [interface.name for interface in reduced.interfaces]
@@ -72,7 +73,7 @@ def require_convertible(reduced: ReducedBody, frame: BodyFrame) -> None:
 
 
 def is_node(reduced: ReducedBody, name: str) -> bool:
-    """Return whether an interface is one node with six dofs."""
+    """Return whether an interface is a single node with six dofs."""
     interface = reduced.interface(name)
     return interface.has_rotation and (interface.kind != "nodes" or len(interface.members) == 1)
 
@@ -87,7 +88,7 @@ def converted_geometric_stiffness(
     frame
         The new frame.
     C, Z, p, R
-        As `cms.frame_conversion.Change`: rigid part of each shape, new shapes in the old ones, place of the new frame.
+        As in `cms.frame_conversion.Change`: rigid part of each shape, new shapes, and place of the new frame.
     """
     old, moments = reduced.geometric, reduced.moments
     assert old is not None
@@ -107,7 +108,7 @@ def converted_geometric_stiffness(
     K = K + np.einsum("ak,jab,bl->jkl", C_theta, on_rigid, C_theta, optimize=True)
     K = Z.T @ ((K + K.transpose(0, 2, 1)) / 2) @ Z
     on_modes = R.T @ (on_modes - on_rigid @ C_theta) @ Z
-    for zero in (K, on_modes):  # the loads that are the reaction of the new frame itself
+    for zero in (K, on_modes):  # loads that equal the reaction of the new frame have zero matrices
         if frame.kind == "tisserand":
             zero[:6] = 0.0
         if frame.kind == "buckens":
@@ -127,7 +128,7 @@ def loaded_of(reduced: ReducedBody) -> list[ReducedInterface]:
 
 
 def warn_of_old_shells(reduced: ReducedBody) -> None:
-    """Log that a rotation does not quite turn the loads in shells, where the body has some."""
+    """Warn that, in old files, a rotation does not exactly rotate the loads in shells."""
     if any(OF_A_SHELL.search(key) for key in reduced.provenance):
         log.warning(
             "body %r: its file is from before version 4 and it has shells, whose geometric stiffness in another frame "
@@ -136,7 +137,7 @@ def warn_of_old_shells(reduced: ReducedBody) -> None:
 
 
 def new_unit_loads(reduced: ReducedBody, p: Array, R: Array) -> Loads:
-    """Return step (1): loads of the new axes about the new origin: per mass, unit wrenches, spread over the nodes."""
+    """Step (1): return loads in new axes about the new origin: per unit mass, unit wrenches, distributed over nodes."""
     assert reduced.geometric is not None
     n, n_spread = len(reduced.geometric.interfaces), 0 if reduced.geometric.spread is None else 6
     k = 12 + 6 * n + n_spread
@@ -150,14 +151,14 @@ def new_unit_loads(reduced: ReducedBody, p: Array, R: Array) -> Loads:
 
 
 def placed_spread(p: Array, R: Array) -> Array:
-    """Return the spread loads e, e × (c - p) of other axes about another origin in the old ones, (6, 6)."""
+    """Return distributed loads e, e × (c - p) of other axes and origin as combinations of the old ones, (6, 6)."""
     amounts = np.kron(np.eye(2), R.T)
     amounts[3:, :3] = -np.cross(R.T, p)
     return np.asarray(amounts, np.float64)
 
 
 def with_reaction(reduced: ReducedBody, loads: Loads, frame: BodyFrame) -> Loads:
-    """Return step (2): the loads and what keeps each in balance."""
+    """Step (2): return the loads together with the reaction that balances each."""
     force, torque = resultants(reduced, loads)
     if frame.kind == "tisserand":
         m, S, J0 = reduced.moments.m, reduced.moments.S, reduced.moments.J0
@@ -176,7 +177,7 @@ def with_reaction(reduced: ReducedBody, loads: Loads, frame: BodyFrame) -> Loads
 
 
 def resultants(reduced: ReducedBody, loads: Loads) -> tuple[Array, Array]:
-    """Return force and torque about the origin of each load, (k, 3) each."""
+    """Return force and torque about the origin for each load, (k, 3) each."""
     moments, A, b = reduced.moments, loads.mass.A, loads.mass.b
     force = moments.m * b + A @ moments.S
     V = np.einsum("jab,bc->jac", A, moments.R) + b[:, :, None] * moments.S  # ∫ f cᵀ
@@ -191,7 +192,7 @@ def resultants(reduced: ReducedBody, loads: Loads) -> tuple[Array, Array]:
 
 
 def spread_resultants(reduced: ReducedBody) -> Array:
-    """Return force and torque about the origin of the six loads spread over the nodes, a row each, (6, 6)."""
+    """Return force and torque about the origin of the six distributed loads, one row each, (6, 6)."""
     sums = reduced.nodal_sums
     assert sums is not None
     center, R = sums.S / sums.w, sums.R / sums.w
@@ -200,11 +201,11 @@ def spread_resultants(reduced: ReducedBody) -> Array:
 
 
 def of_balanced(old: GeometricStiffness | TurnedLoads, loads: Loads, spread: Array | None) -> Array:
-    """Return step (3): matrices of balanced loads over the old shapes, (k, ...), from those of the old unit loads.
+    """Step (3): return the matrices of balanced loads over the old shapes, (k, ...), from those of the old unit loads.
 
-    A c + b is a combination of the unit loads: b of translations, the antisymmetric part of A of rotations, the
-    symmetric one of products of angular velocities, whose A is 1 - e_a e_aᵀ or -½ (e_a e_bᵀ + e_b e_aᵀ). `spread` has
-    the matrices of the loads spread over the nodes.
+    A c + b is a combination of the unit loads: b gives translations, the antisymmetric part of A gives rotations, and
+    the symmetric part gives products of angular velocities, whose A is 1 - e_a e_aᵀ or -½ (e_a e_bᵀ + e_b e_aᵀ).
+    `spread` holds the matrices of the loads distributed over the nodes.
     """
     A, b = loads.mass.A, loads.mass.b
     K = np.tensordot(-b, old.translation, axes=1) + np.tensordot(-axial(A) / 2, old.rotation, axes=1)
@@ -218,20 +219,21 @@ def of_balanced(old: GeometricStiffness | TurnedLoads, loads: Loads, spread: Arr
 
 
 def changed_rigid(reduced: ReducedBody, turned_rigid: Array, p: Array, R: Array) -> Array:
-    """Return `turned_rigid` of the spread loads of the new frame, on rotations e_b × c - e_b × p about its origin."""
+    """Return `turned_rigid` for the distributed loads of the new frame, on rotations e_b × (c - p) about its origin."""
     forces = spread_resultants(reduced)[:, :3]
-    turned = -np.cross(forces[:, None], np.eye(3))  # e_x × F of each load, (6, 3, 3): its work on translations
+    # e_x × F for each load, (6, 3, 3), which is its work on translations
+    turned = -np.cross(forces[:, None], np.eye(3))
     work = turned_rigid - turned @ np.cross(np.eye(3), p).T
     return np.einsum("ji,ixb->jxb", placed_spread(p, R), R.T @ work @ R)
 
 
 def turned_work(loads: Loads, C1: Array, P: Array, Psi: Array) -> Array:
-    """Return the work on shapes of the loads turned about each axis, moments by half, (k, 3, n).
+    """Return the work on shapes of the loads when rotated about each axis, (k, 3, n); moments count by half.
 
     Parameters
     ----------
     C1, P
-        ∫ phi_a,k (3, n) and ∫ c_a phi_b,k (3, 3, n) of the shapes.
+        ∫ phi_a,k, (3, n), and ∫ c_a phi_b,k, (3, 3, n), of the shapes.
     Psi
         Motion of the loaded interfaces, (n_loaded, 6, n).
     """
@@ -256,5 +258,5 @@ def rotation_moments(reduced: ReducedBody) -> tuple[Array, Array, Array]:
 
 
 def axial(V: Array) -> Array:
-    """Return Σ o × f of V = Σ f oᵀ, (..., 3); twice theta of V = theta~."""
+    """Return Σ o × f from V = Σ f oᵀ, (..., 3); this is twice theta if V = theta~."""
     return np.stack([V[..., 2, 1] - V[..., 1, 2], V[..., 0, 2] - V[..., 2, 0], V[..., 1, 0] - V[..., 0, 1]], axis=-1)

@@ -1,10 +1,10 @@
-"""Geometric stiffness of a reduced body from its elements: a static solution and a matrix per unit load (theory.md §7).
+"""Geometric stiffness of a reduced body from its elements: one static solution and matrix per unit load (theory.md §7).
 
-(1) unit loads f_j, balanced by the support of the frame: P f_j (`cms.second_order.unit_loads`)
-(2) static states u_j = G_R P f_j, by the factorisation that gave the modes; only their stress counts
-(3) Phiᵀ K_geo(sigma_j) Phi of the elements, and over the rotations of the body, with which other frames are reached
-(4) rigid links: the forces on followers, internal less applied, on the second order of the rotation they follow
-(5) interfaces that are a mean of their members: the applied loads on the second order of the mean
+(1) balance the unit loads f_j with the support of the frame: P f_j (`cms.second_order.unit_loads`)
+(2) compute static states u_j = G_R P f_j with the factorisation of the mode set; only their stress counts
+(3) compute Phiᵀ K_geo(sigma_j) Phi of the elements, also for rotations of the body, as needed for other frames
+(4) add rigid links: forces on followers, internal minus applied, do work on their second-order motion
+(5) add interfaces that follow the mean of their members: the applied loads do work on the second-order mean motion
 """
 
 import numpy as np
@@ -27,7 +27,7 @@ from fe_models.foundation.tall.on_disk import beside
 
 __all__ = ["elastic_part", "reduced_geometric_stiffness", "stiffness_of_states"]
 
-LOADS_AT_ONCE = 60  #: whose displacements over the mesh are held at once
+LOADS_AT_ONCE = 60  #: number of loads whose mesh displacements are held at a time
 
 
 def reduced_geometric_stiffness(body: FEBody | Families, Phi: Array, condition: FrameCondition) -> GeometricStiffness:
@@ -40,20 +40,20 @@ def reduced_geometric_stiffness(body: FEBody | Families, Phi: Array, condition: 
     Phi
         Shapes over its dofs that satisfy the condition of the frame, (n_dof, n_q).
     condition
-        The frame; it is the support of all loads.
+        The frame condition, which is also the support of all loads.
 
     Raises
     ------
     BodyError
-        If the body has no element model that knows its geometric stiffness.
+        If the body has no element model with geometric stiffness.
     """
     return stiffness_of_states(body_of(body), Phi, states_of(body, condition))
 
 
 def stiffness_of_states(body: FEBody, Phi: Array, states: UnitStates) -> GeometricStiffness:
-    """Return steps (3) to (5) of the static states of the unit loads; the factorisation is needed no more.
+    """Steps (3) to (5) for the static states of the unit loads; the factorisation is no longer needed.
 
-    Over the rotations about the axes of B and the shapes: what is left over a rotation and a shape is `TurnedLoads`.
+    The matrices are computed over shapes and rotations about the axes of B; the mixed part becomes `TurnedLoads`.
     """
     frame = states.condition.frame
     rotations = geometric_rigid_modes(body, origin=frame.origin)[:, 3:] @ frame.axes
@@ -72,7 +72,7 @@ def stiffness_of_states(body: FEBody, Phi: Array, states: UnitStates) -> Geometr
 
 
 def elastic_part(body: FEBody, u: Array, mass: MassLoads, Phi: Array) -> Array:
-    """Return steps (3) and (4) of static states u, (n_dof, k), under their loads per mass, (k, n, n)."""
+    """Return the result of steps (3) and (4) for static states u, (n_dof, k), under loads per unit mass, (k, n, n)."""
     model = body.element_model
     assert model is not None
     u_mesh = body.mesh_displacement(u)
@@ -90,11 +90,11 @@ def elastic_part(body: FEBody, u: Array, mass: MassLoads, Phi: Array) -> Array:
 
 
 def mean_part(body: FEBody, on_dofs: Array, Phi: Array, axes: Array, is_loaded: tuple[bool, ...]) -> Array:
-    """Return step (5): work of the loads on the second order of the interfaces' own motion, (k, n, n).
+    """Step (5): return the work of the loads on the second-order motion of the interfaces, (k, n, n).
 
-    A distributing interface hands what acts on its reference node to its members. The other ones that are no node of
-    the body are read off several members, or by a lever: that counts for their own unit loads, 12 + 6 i + c, i among
-    the loaded ones.
+    A distributing interface transmits the load on its reference node to its members. The other interfaces that are not
+    nodes of the body follow several members, or a lever. This only matters for their own unit loads, with indices 12 +
+    6 i + c, where i counts the loaded interfaces.
     """
     work = distributing_part(body, on_dofs, Phi)
     turn = np.kron(np.eye(2), axes)
@@ -114,7 +114,7 @@ def mean_part(body: FEBody, on_dofs: Array, Phi: Array, axes: Array, is_loaded: 
 
 
 def distributing_part(body: FEBody, on_dofs: Array, Phi: Array) -> Array:
-    """Return the work of loads on reference nodes that are the mean of their members, (k, n, n)."""
+    """Return the work of loads on reference nodes that follow the mean of their members, (k, n, n)."""
     n = Phi.shape[1]
     work = np.zeros((on_dofs.shape[1], n, n))
     for interface in body.interfaces:
@@ -126,7 +126,7 @@ def distributing_part(body: FEBody, on_dofs: Array, Phi: Array) -> Array:
 
 
 def members_second_order(body: FEBody, interface: Interface, Phi: Array, turns: bool) -> Array:
-    """Return the second order of the mean motion of the members with the shapes, (6, n, n), mesh axes."""
+    """Return the second-order mean motion of the members for the shapes, (6, n, n), mesh axes."""
     rows = translation_rows(body, interface.nodes)
     v = rows_times(rows, Phi).reshape(len(interface.nodes), 3, -1)
     weights = np.asarray(interface.weights)

@@ -1,7 +1,7 @@
-"""Second order of rigid links: what follows a rotation off its axis moves to second order too (docs/theory.md §7).
+"""Second-order motion of rigid links: a follower away from the axis of a rotation moves to second order (theory.md §7).
 
-A recovery u_mesh = T u has the lever of every follower in its columns of rotations: u_s = u + B theta with B = -a~. As
-a rotation vector, theta also moves it by ½ theta × (B theta). Forces on followers work on that.
+In a recovery u_mesh = T u, the rotation columns hold the lever of every follower: u_s = u + B theta with B = -a~. If
+theta is a rotation vector, the follower also moves by ½ theta × (B theta). Forces on followers do work on this motion.
 """
 
 import numpy as np
@@ -13,22 +13,22 @@ __all__ = ["followers", "link_work"]
 
 
 def followers(T: sp.csr_array, row_dofs: IntArray, column_dofs: IntArray) -> IntArray:
-    """Return the nodes whose translation follows a rotation, by the rows and columns (node, component) of T."""
+    """Return the nodes whose translation follows a rotation, given (node, component) of the rows and columns of T."""
     entries = _levers(T, row_dofs, column_dofs)
     return np.unique(row_dofs[entries.row, 0]).astype(np.int64)
 
 
 def link_work(T: sp.csr_array, row_dofs: IntArray, column_dofs: IntArray, forces: Array, Phi: Array) -> Array:
-    """Return the work of forces on the second order of the links, forces·½ [theta_k × (B theta_l) + …], (k, n, n).
+    """Return the work of forces on the second-order motion of links, forces·½ [theta_k × (B theta_l) + …], (k, n, n).
 
     Parameters
     ----------
     T
-        From the dofs of the body to rows, such as those of the mesh, (n_rows, n_dof).
+        Matrix from the dofs of the body to rows, such as the mesh dofs, (n_rows, n_dof).
     row_dofs, column_dofs
         (node, component) of rows and columns, (n_rows, 2) and (n_dof, 2).
     forces
-        On the rows, (n_rows, k) [N].
+        Forces on the rows, (n_rows, k) [N].
     Phi
         Displacement columns over the dofs of the body, (n_dof, n).
     """
@@ -37,7 +37,7 @@ def link_work(T: sp.csr_array, row_dofs: IntArray, column_dofs: IntArray, forces
     components = np.zeros((len(row_dofs) and int(row_dofs[:, 0].max()) + 1, 3, n_loads))
     is_translation = (row_dofs[:, 1] >= 0) & (row_dofs[:, 1] < 3)
     components[row_dofs[is_translation, 0], row_dofs[is_translation, 1]] = forces[is_translation]
-    at = components[row_dofs[levers.row, 0]]  # of the whole node, (n_levers, 3, n_loads)
+    at = components[row_dofs[levers.row, 0]]  # components of the complete node, (n_levers, 3, n_loads)
     is_loaded = at.any(axis=(1, 2))
     row, column, value, at = levers.row[is_loaded], levers.col[is_loaded], levers.data[is_loaded], at[is_loaded]
     masters, index = np.unique(column_dofs[column, 0], return_inverse=True)
@@ -55,7 +55,7 @@ def link_work(T: sp.csr_array, row_dofs: IntArray, column_dofs: IntArray, forces
 
 
 def _levers(T: sp.csr_array, row_dofs: IntArray, column_dofs: IntArray) -> sp.coo_array:
-    """Entries that move a translation with a rotation."""
+    """Return the entries that move a translation by a rotation."""
     entries = sp.coo_array(T)
     row, column = row_dofs[entries.row, 1], column_dofs[entries.col, 1]
     chosen = (row >= 0) & (row < 3) & (column >= 3) & (entries.data != 0)

@@ -1,13 +1,13 @@
-"""Second order of a mean motion: what a distributing interface leaves out when its members turn (docs/theory.md §7).
+"""Second-order mean motion, which a linear distributing interface neglects when its members rotate (theory.md §7).
 
-The mean motion of members is the rigid motion nearest to theirs in least squares with weights w. With x from their
-weighted centre and v their displacement, Σ w (x + v) × (R x) = 0. In first order J theta = Σ w x × v with
-J = Σ w (x² 1 - x xᵀ); in second order, beside what the linear mean makes of the second order of the members,
+The mean motion of members is the rigid motion that fits theirs best in least squares with weights w. With positions x
+from their weighted centre and displacements v, Σ w (x + v) × (R x) = 0. To first order J theta = Σ w x × v with J = Σ w
+(x² 1 - x xᵀ). To second order, in addition to the linear mean of the second-order motion of the members,
 
     J gamma_kl = -Σ w { v_k × (theta_l × x) + v_l × (theta_k × x)
                         + ½ x × [theta_k × (theta_l × x) + theta_l × (theta_k × x)] }
 
-and the reference point, at a lever rho from the centre, has gamma × rho and the second order of theta × rho.
+The reference point, at a lever rho from the centre, moves by gamma × rho and by the second-order part of theta × rho.
 """
 
 import numpy as np
@@ -19,20 +19,20 @@ __all__ = ["mean_second_order"]
 
 
 def mean_second_order(points: Array, weights: Array, reference: Array, v: Array, *, turns: bool = True) -> Array:
-    """Return the bilinear second order of translation and rotation of the reference point, (6, n, n).
+    """Return the bilinear second-order translation and rotation of the reference point, (6, n, n).
 
     Parameters
     ----------
     points
-        Undeformed members, (m, 3) [m].
+        Undeformed positions of the members, (m, 3) [m].
     weights
-        Sum 1, (m,).
+        Weights with sum 1, (m,).
     reference
         Reference point, (3,) [m].
     v
         Translations of the members, (m, 3, n) [m].
     turns
-        False: members on one line, whose mean has no rotation; the second order is zero.
+        False: the members are collinear, so their mean has no rotation and the second-order motion is zero.
     """
     n = v.shape[2]
     gamma = np.zeros((6, n, n))

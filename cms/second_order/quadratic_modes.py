@@ -1,10 +1,11 @@
-"""Quadratic modes: the displacement of second order in q of every kept node, such as the shortening of a bent beam.
+"""Quadratic modes: second-order displacement of every kept node in q, such as the shortening of a bent beam.
 
     r = c + Phi q + ½ Σ q_k q_l g_kl
 
-The geometric stiffness of a unit force at a node is minus its displacement of second order, K_kl = -e·g_kl (theory.md
-§7): g is had node by node from the same static solutions and the same pass over the elements, and it is the field whose
-inertia the geometric stiffness of the other unit loads carries. So the two are one, and never counted twice.
+The geometric stiffness of a unit force at a node is minus its second-order displacement, K_kl = -e·g_kl (theory.md §7).
+g therefore follows node by node from the same static solutions and the same pass over the elements. It is the field
+whose inertia the geometric stiffness of the other unit loads contains. The two belong together, and are never counted
+twice.
 """
 
 import numpy as np
@@ -24,12 +25,12 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["MOST_NUMBERS", "quadratic_modes"]
 
-NODES_AT_ONCE = 60  #: three static solutions each
-MOST_NUMBERS = 2.5e7  #: of the field, 200 MB
+NODES_AT_ONCE = 60  #: nodes processed at a time; each needs three static solutions
+MOST_NUMBERS = 2.5e7  #: largest number of values of the field, 200 MB
 
 
 def quadratic_modes(source: FEBody | Families, Phi: Array, condition: FrameCondition, nodes: IntArray) -> Array:
-    """Return g of some nodes in the frame B, (n_nodes, 3, n_q, n_q), symmetric in the modes [m per q²].
+    """Return g at some nodes in the frame B, (n_nodes, 3, n_q, n_q), symmetric in the modes [m per q²].
 
     Parameters
     ----------
@@ -38,9 +39,9 @@ def quadratic_modes(source: FEBody | Families, Phi: Array, condition: FrameCondi
     Phi
         Shapes over its dofs that satisfy the condition of the frame, (n_dof, n_q).
     condition
-        The frame.
+        The frame condition.
     nodes
-        Indices of nodes, (n_nodes,). Each costs three static solutions.
+        Indices of nodes, (n_nodes,); each costs three static solutions.
 
     Raises
     ------
@@ -69,12 +70,12 @@ def unit_force_stiffness(
 ) -> Array:
     """Return the geometric stiffness of unit forces along the axes of B at nodes, (n_nodes, 3, n_q, n_q)."""
     axes = condition.frame.axes
-    along_b = np.kron(np.eye(len(nodes)), axes)  # columns: components in mesh axes, node by node
+    along_b = np.kron(np.eye(len(nodes)), axes)  # components in mesh axes as columns, node by node
     on_dofs = np.asarray(translation_rows(body, nodes).T @ along_b)
     loads = balanced(body, together(body, MassLoads.none(on_dofs.shape[1]), on_dofs), condition)
     K = elastic_part(body, families.flexibility(loads.F), loads.mass, Phi)
     K -= distributing_part(body, loads.on_dofs, Phi)
-    if body.recovery is not None:  # a node that follows a rotation moves by its second order too
+    if body.recovery is not None:  # a node that follows a rotation also has a second-order motion
         dofs = body.recovery.dofs
         applied = np.zeros((len(dofs), on_dofs.shape[1]))
         place = np.full(len(body.nodes), -1, np.int64)

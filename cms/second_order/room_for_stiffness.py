@@ -1,9 +1,9 @@
-"""How large the geometric stiffness of a body with many interfaces would be, and whether it is made.
+"""Memory of the geometric stiffness of a body with many interfaces, and the decision whether to compute it.
 
-A matrix over all modes belongs to each unit load: 12 of the frame, 6 spread over the nodes, and 6 of each interface; an
-interface of kind "nodes" has these 6 too, of the mean motion of its nodes, however many nodes it has. With forty
-interfaces and two thousand modes that is 9 GB, which nobody asked for. Fewer modes make it small (interface reduction),
-or the loads of chosen interfaces alone; loads at the others then do not stiffen the body.
+Each unit load has a matrix over all modes: 12 loads of the frame, 6 distributed over the nodes, and 6 for each
+interface (for kind "nodes", of the mean motion of its nodes). Forty interfaces and two thousand modes need 9 GB, which
+is too much for a default. Fewer modes (interface reduction) or loads of chosen interfaces only make it small; loads at
+the other interfaces then do not stiffen the body.
 """
 
 import os
@@ -19,12 +19,12 @@ __all__ = [
     "stiffness_words",
 ]  # fmt: skip
 
-UNASKED = 2e9  #: bytes of geometric stiffness up to which it is made without being asked for
-HELD = 4.0  #: times its size: what is held at once while it is made
-SPARSE = 10.0  #: times as long as one of a dense product an operation of a sparse one takes
-NAMED = 5  #: interfaces that a note names
+UNASKED = 2e9  #: size of the geometric stiffness [bytes] up to which it is computed by default
+HELD = 4.0  #: peak memory during the computation, relative to its size
+SPARSE = 10.0  #: time of an operation of a sparse product relative to a dense product
+NAMED = 5  #: number of interfaces that a note names
 
-Asked = bool | Sequence[str] | None  #: whether it is made, or the interfaces whose loads it has
+Asked = bool | Sequence[str] | None  #: whether to compute it, or the interfaces whose loads it includes
 
 
 def n_loads(body: FEBody, asked: Asked = None) -> int:
@@ -33,25 +33,25 @@ def n_loads(body: FEBody, asked: Asked = None) -> int:
 
 
 def stiffness_bytes(body: FEBody, n_modes: int, asked: Asked = None) -> float:
-    """Return the size of the geometric stiffness of a body over so many modes [bytes]."""
+    """Return the size of the geometric stiffness of a body with this number of modes [bytes]."""
     return 8.0 * n_loads(body, asked) * n_modes**2
 
 
 def stiffness_seconds(body: FEBody, n_modes: int, asked: Asked = None) -> float:
-    """Estimate the time of one processor for it [s]: Phiᵀ (S Phi) with a sparse S over the nodes for each load."""
+    """Estimate its processor time [s]: Phiᵀ (S Phi) with a sparse S over the nodes for each load."""
     each = float(body.n_dof) * n_modes**2 + SPARSE * (2 * body.K.nnz / 9) * 3 * n_modes
     return n_loads(body, asked) * each / operations_per_second()
 
 
 def makes_stiffness(asked: Asked, body: FEBody, n_modes: int) -> bool:
-    """Return whether the geometric stiffness is made: as asked, else where the elements know it and it is not large."""
+    """Return whether to compute the geometric stiffness: as requested, else if the elements know it and it is small."""
     if asked is not None:
         return asked is not False
     return has_geometric_stiffness(body) and not left_out_words(body, n_modes)
 
 
 def left_out_words(body: FEBody, n_modes: int) -> str:
-    """Say that the geometric stiffness was not made, as nobody asked for one so large; nothing where it is small."""
+    """Return a note that the geometric stiffness was left out because it is large; "" if it is small."""
     size = stiffness_bytes(body, n_modes)
     if size <= UNASKED:
         return ""
@@ -63,7 +63,7 @@ def left_out_words(body: FEBody, n_modes: int) -> str:
 
 
 def stiffness_words(body: FEBody, n_modes: int, asked: Asked) -> str:
-    """Say before the work what a geometric stiffness that was asked for costs; nothing where it is small."""
+    """Return a note about the cost of a requested geometric stiffness, before the work; "" if it is small."""
     size = stiffness_bytes(body, n_modes, asked)
     if size <= UNASKED:
         return ""
@@ -76,7 +76,7 @@ def stiffness_words(body: FEBody, n_modes: int, asked: Asked) -> str:
 
 
 def chosen_words(body: FEBody, asked: Asked) -> str:
-    """Say at which interfaces loads do not stiffen the body, as a job has chosen some; nothing where all do."""
+    """Return a note that names the interfaces whose loads do not stiffen the body; "" if all do."""
     if asked is None or isinstance(asked, bool):
         return ""
     others = [interface.name for interface in body.interfaces if interface.name not in asked]
@@ -90,7 +90,7 @@ def chosen_words(body: FEBody, asked: Asked) -> str:
 
 
 def remedies(body: FEBody, n_modes: int) -> str:
-    """Say what makes the geometric stiffness small, with the lines to write."""
+    """Describe how to make the geometric stiffness small, with the lines to write."""
     few = few_columns(body, PROPOSED) + max(0, n_modes - len(body.b))
     reduced = ""
     if few < n_modes:
@@ -107,7 +107,7 @@ def remedies(body: FEBody, n_modes: int) -> str:
 
 
 def require_room_for_stiffness(body: FEBody, n_modes: int, asked: Asked = None) -> None:
-    """Raise `BodyError` if the geometric stiffness over so many modes does not fit into the memory of this machine."""
+    """Raise `BodyError` if the geometric stiffness with this number of modes does not fit into the machine's memory."""
     size, memory = stiffness_bytes(body, n_modes, asked), machine_memory()
     if HELD * size > memory:
         raise BodyError(
@@ -118,7 +118,7 @@ def require_room_for_stiffness(body: FEBody, n_modes: int, asked: Asked = None) 
 
 
 def machine_memory() -> float:
-    """Return the memory of this machine [bytes]; without bound where the system does not tell."""
+    """Return the memory of this machine [bytes]; infinite if the system does not report it."""
     try:
         return float(os.sysconf("SC_PAGE_SIZE")) * float(os.sysconf("SC_PHYS_PAGES"))
     except (AttributeError, ValueError, OSError):

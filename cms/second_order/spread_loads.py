@@ -1,4 +1,4 @@
-"""Six loads spread over the nodes of a body by their weight, what a rotation makes of them (docs/theory.md §7)."""
+"""Six loads distributed over the nodes of a body by weight, and their work when they are rotated (theory.md §7)."""
 
 import numpy as np
 
@@ -13,9 +13,9 @@ __all__ = ["spread_forces", "turned_rigid_work"]
 
 
 def spread_forces(body: FEBody, frame: BodyFrame) -> Array | None:
-    """Return the loads (w_i/w) e_a and (w_i/w) e_a × c_i of the axes and the origin of B, over the dofs, (n_dof, 6).
+    """Return the loads (w_i/w) e_a and (w_i/w) e_a × c_i, axes and origin of B, over the dofs, (n_dof, 6).
 
-    None where no Buckens frame can be had: nodes on one line, or without translations.
+    None if there is no Buckens frame, because nodes are collinear or have no translations.
     """
     weights = node_weights(body)
     if not weights.any():
@@ -28,14 +28,14 @@ def spread_forces(body: FEBody, frame: BodyFrame) -> Array | None:
 
 
 def turned_rigid_work(body: FEBody, forces: Array, frame: BodyFrame) -> Array:
-    """Return the work of loads, turned about the axes of B, on the rotations about them and its origin, (k, 3, 3).
+    """Return the work of loads, rotated about the axes of B, on the rotations about its axes and origin, (k, 3, 3).
 
-    Of a node, e_x × f works on its translation and ½ e_x × m on its rotation.
+    At a node, e_x × f does work on the translation, and ½ e_x × m on the rotation.
 
     Parameters
     ----------
     forces
-        Over the dofs of the body, (n_dof, k) [N, N m].
+        Loads over the dofs of the body, (n_dof, k) [N, N m].
     """
     node, component = body.dofs.T
     own = np.flatnonzero(component >= 0)

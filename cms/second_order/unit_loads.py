@@ -1,9 +1,9 @@
-"""Unit loads of a body and their balance: what the geometric stiffness of a floating frame is made for (theory.md §7).
+"""Unit loads of a body, balanced by the frame, for which the geometric stiffness is computed (theory.md §7).
 
-Per mass, about the origin of the frame B and along its axes: -e_a of the acceleration of its origin, -e_a × c of the
-angular acceleration, -½ [e_a × (e_b × c) + e_b × (e_a × c)] of the products of angular velocities; then a unit force
-and a unit moment at every interface, or at chosen ones; last, where they are wanted, six loads spread over the nodes
-(`cms.second_order.spread_loads`). All are balanced by the same support, W Psi_R of the condition of the frame.
+Loads per unit mass, about the origin and along the axes of the frame B: -e_a for the acceleration of the origin, -e_a ×
+c for the angular acceleration, -½ [e_a × (e_b × c) + e_b × (e_a × c)] for products of angular velocities. Then a unit
+force and a unit moment at every interface, or at chosen interfaces. Optionally, six loads distributed over the nodes
+(`cms.second_order.spread_loads`). All are balanced by the same support, W Psi_R of the frame condition.
 """
 
 from dataclasses import dataclass
@@ -20,25 +20,26 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["UnitLoads", "balanced", "unit_loads", "unit_mass_loads"]
 
-BALANCED = 1e-10  #: of a load: what is left of it when its support carries all of it
+#: remainder of a load, relative to the load, that counts as zero, because the support carries all of it
+BALANCED = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class UnitLoads:
-    """Loads per mass and loads on dofs, side by side; a load j is the sum of both."""
+    """Loads per unit mass and loads on dofs; load j is the sum of both."""
 
     mass: MassLoads  #: k loads
     on_dofs: Array  #: over the dofs of the body, (n_dof, k) [N, N m]
-    F: Array  #: both together, over the dofs of the body, (n_dof, k)
-    is_zero: np.ndarray  #: whether nothing is left of the load, (k,) bool
+    F: Array  #: sum of both over the dofs of the body, (n_dof, k)
+    is_zero: np.ndarray  #: whether the remaining load is zero, (k,) bool
 
 
 def unit_loads(
     body: FEBody, frame: BodyFrame, spread: Array | None = None, is_loaded: tuple[bool, ...] = ()
 ) -> UnitLoads:
-    """Return the 12 loads per mass, then six for each loaded interface, then those given over the dofs, (n_dof, 6).
+    """Return the 12 loads per unit mass, then six for each loaded interface, then the given ones, (n_dof, 6).
 
-    Without `is_loaded` all interfaces are.
+    Without `is_loaded`, all interfaces are loaded.
     """
     mass = unit_mass_loads(frame)
     turn = np.kron(np.eye(2), frame.axes)
@@ -54,7 +55,7 @@ def unit_loads(
 
 
 def unit_mass_loads(frame: BodyFrame) -> MassLoads:
-    """Return the 12 loads per mass of a frame: 3 translations, 3 rotations, 6 products in the order `SPIN_PAIRS`."""
+    """Return the 12 loads per unit mass of a frame: 3 translations, 3 rotations, 6 products as in `SPIN_PAIRS`."""
     e = frame.axes.T  # e[a]: axis a of B
     A, b = np.zeros((12, 3, 3)), np.zeros((12, 3))
     b[:3] = -e
@@ -69,7 +70,7 @@ def unit_mass_loads(frame: BodyFrame) -> MassLoads:
 def balanced(body: FEBody, loads: UnitLoads, condition: FrameCondition) -> UnitLoads:
     """Return P f = f - W Psi_R (Psi_Rᵀ W Psi_R)⁻¹ Psi_Rᵀ f: each load with the reaction of the support.
 
-    Where the support is the mass itself (a Tisserand frame), the reaction is the load of a rigid-body acceleration.
+    If the support is the mass itself (Tisserand frame), the reaction is the load of a rigid-body acceleration.
     """
     amounts = np.asarray(np.linalg.solve(condition.Psi_R.T @ condition.W, condition.Psi_R.T @ loads.F), np.float64)
     if condition.frame.kind == "tisserand":
@@ -77,18 +78,19 @@ def balanced(body: FEBody, loads: UnitLoads, condition: FrameCondition) -> UnitL
     else:
         after = together(body, loads.mass, loads.on_dofs - condition.W @ amounts)
     is_zero = np.abs(after.F).max(axis=0) <= BALANCED * np.abs(loads.F).max(axis=0)
-    is_zero &= _size(body, after.mass) <= BALANCED * _size(body, loads.mass)  # sections are loaded even so
+    # a load per unit mass may load sections even if its nodal forces vanish
+    is_zero &= _size(body, after.mass) <= BALANCED * _size(body, loads.mass)
     return UnitLoads(after.mass, after.on_dofs, after.F, is_zero)
 
 
 def _size(body: FEBody, mass: MassLoads) -> Array:
-    """Largest force per mass at the nodes and over a length of the body, (k,)."""
+    """Return the largest force per unit mass at the nodes and over a length of the body, (k,)."""
     at_nodes = np.abs(mass.at(body.nodes)).max(axis=(0, 1))
     return np.asarray(at_nodes + np.abs(mass.A).max(axis=(1, 2)) * body.length)
 
 
 def together(body: FEBody, mass: MassLoads, on_dofs: Array) -> UnitLoads:
-    """Return both kinds of loads with their sum over the dofs of the body."""
+    """Return both kinds of loads, and their sum over the dofs of the body."""
     assert body.element_model is not None
     on_mesh = body.element_model.mass_forces(mass)
     F = on_dofs + (on_mesh if body.recovery is None else body.recovery.matrix.T @ on_mesh)

@@ -1,4 +1,4 @@
-"""Static states of the unit loads of a body: what its geometric stiffness needs of the factorisation (theory.md §7)."""
+"""Static states of the unit loads of a body: the part of its geometric stiffness that needs the factorisation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,20 +27,20 @@ __all__ = [
 
 @dataclass(frozen=True, eq=False)
 class UnitStates:
-    """The balanced unit loads of a body in one frame, and the static response to those that load it."""
+    """The balanced unit loads of a body in one frame, and the static responses to them."""
 
     body: FEBody
-    condition: FrameCondition  #: the frame, which is the support of all loads
-    mass: MassLoads  #: loads per mass, k
+    condition: FrameCondition  #: the frame condition, which is also the support of all loads
+    mass: MassLoads  #: k loads per unit mass
     on_dofs: Array  #: loads on the dofs of the body, (n_dof, k) [N, N m]
-    loaded: IntArray  #: which of the k loads leave something, (n_loaded,)
-    u: Array  #: their responses, up to a rigid motion, (n_dof, n_loaded)
-    spread: Array | None = None  #: the last six loads before they were balanced, (n_dof, 6); None: left out
-    is_loaded: tuple[bool, ...] = ()  #: for each interface whether its loads are among them; empty: all are
+    loaded: IntArray  #: indices of the loads that are not zero, (n_loaded,)
+    u: Array  #: responses to the loaded ones, up to a rigid motion, (n_dof, n_loaded)
+    spread: Array | None = None  #: the last six loads before balancing, (n_dof, 6); None: left out
+    is_loaded: tuple[bool, ...] = ()  #: for each interface, whether its loads are included; empty: all are
 
     @property
     def names(self) -> list[str]:
-        """Interfaces whose loads are among them."""
+        """Names of the interfaces whose loads are included."""
         chosen = self.is_loaded or (True,) * len(self.body.interfaces)
         return [each.name for each, is_chosen in zip(self.body.interfaces, chosen, strict=True) if is_chosen]
 
@@ -54,27 +54,27 @@ def unit_states(
 ) -> UnitStates:
     """Return the static states of the unit loads of a body in a frame, for `reduce(..., geometric=states)`.
 
-    Made while the factorisation of the mode set is there, they let it be freed before the reduction, which then needs
-    the memory for itself: that matters from some hundred thousand dofs on.
+    They are computed while the factorisation of the mode set exists, which can then be freed before the reduction needs
+    the memory. This matters from several hundred thousand dofs on.
 
     Parameters
     ----------
     body
         A coupled body with an element model, or its `Families`.
     frame
-        Body reference frame of the reduction; Tisserand (mean axis) by default.
+        Body reference frame of the reduction; default: Tisserand (mean axis).
     spread
-        Whether the six loads spread over the nodes are among them, without which the geometric stiffness cannot be
-        carried to a Buckens frame.
+        Whether to include the six loads distributed over the nodes. Without them the geometric stiffness cannot be
+        converted to a Buckens frame.
     interfaces
-        Names of those whose loads are among them, for a body with very many: loads at the others then do not stiffen
-        it, wherever they come from; None: all.
+        Names of the interfaces whose loads are included, for a body with very many interfaces; loads at the others then
+        do not stiffen it. None: all interfaces.
 
     Raises
     ------
     BodyError
-        If the body has no element model that knows its geometric stiffness, or the frame cannot be attached, or an
-        interface is unknown.
+        If the body has no element model with geometric stiffness, the frame cannot be attached, or an interface is
+        unknown.
     """
     require_geometric_stiffness(body_of(body))
     condition = frame_condition(body_of(body), frame or TisserandFrame())
@@ -88,7 +88,7 @@ def states_of(
     spread: bool = True,
     interfaces: Sequence[str] | None = None,
 ) -> UnitStates:
-    """Return the static states for a frame made ready."""
+    """Return the static states for an evaluated frame condition."""
     body = body_of(source)
     require_geometric_stiffness(body)
     is_loaded = loaded_interfaces(body, interfaces)
@@ -101,7 +101,7 @@ def states_of(
 
 
 def loaded_interfaces(body: FEBody, names: Sequence[str] | None) -> tuple[bool, ...]:
-    """Return for each interface whether it is among these names, all for None; `BodyError` for an unknown one."""
+    """Return for each interface whether it is among these names (None: all); raise `BodyError` for an unknown name."""
     known = [interface.name for interface in body.interfaces]
     for name in names or ():
         if name not in known:
@@ -112,7 +112,7 @@ def loaded_interfaces(body: FEBody, names: Sequence[str] | None) -> tuple[bool, 
 
 
 def has_geometric_stiffness(body: FEBody) -> bool:
-    """Return whether the elements behind the body know their geometric stiffness."""
+    """Return whether the elements of the body know their geometric stiffness."""
     return not body.is_held and body.element_model is not None and body.element_model.has_geometric_stiffness
 
 
@@ -127,7 +127,7 @@ def require_geometric_stiffness(body: FEBody) -> None:
 
 
 def static_states(families: Families, F: Array) -> Array:
-    """Return the response to balanced loads with R held, (n_dof, k); it needs no inertia, as P would.
+    """Return the response to balanced loads with R held, (n_dof, k). Unlike P, this needs no inertia.
 
     v = K_II⁻¹ f_I;  S_ee z_e = (f_h - K_hI v)_e with z = 0 at R;  u = v + Psi_C z.
     """
@@ -156,7 +156,7 @@ def static_states(families: Families, F: Array) -> Array:
 
 
 def embedded(v: Array, rows: IntArray, n: int) -> Array:
-    """Return v in some rows of n, zero in the others."""
+    """Return v in some rows of an array with n rows, zero in the others."""
     whole = np.zeros((n, v.shape[1]))
     whole[rows] = v
     return whole
