@@ -36,6 +36,11 @@ SPREAD = ("-n", str(min(n_processors, MOST_WORKERS)), "--dist", "loadfile")
 LINT = ("lint", "ruff", "check", ".")
 TYPES = ("types", "mypy")
 KERNELS = ("kernels", "floatframe.cli.compile_kernels", "relative", "schemes")  # else by each worker
+#: the same motions with kernels compiled by plain numba, as with a numba that the lean compiler does not know
+PLAIN = (
+    "kernels by plain numba", "pytest", "-q", "-m", "not long", "tests/floatframe/kernels",
+    "tests/floatframe/integrators/test_pendulum.py",
+)  # fmt: skip
 TESTS = ("tests", "pytest", "-q", *SPREAD, "-m", "not long and not external", "tests")
 LONG = ("long tests", "pytest", "-q", "--durations=0", "-m", "long and not external", "tests")
 RELATIVE = (
@@ -61,7 +66,7 @@ class Group:
 
 
 GROUPS = {
-    "ci": Group(((LINT,), (TYPES, KERNELS, DOCUMENTATION), (TESTS,), (RELATIVE_IN_SHORT,), (NOTEBOOKS,)), 20),
+    "ci": Group(((LINT,), (TYPES, KERNELS, DOCUMENTATION, PLAIN), (TESTS,), (RELATIVE_IN_SHORT, NOTEBOOKS)), 20),
     "long": Group(((LONG,), (RELATIVE,)), 90),
     "relative": Group(((KERNELS,), (RELATIVE,)), 15),
     "external": Group(((EXTERNAL,),), 10),
@@ -140,10 +145,11 @@ def run_changed(words: list[str]) -> int:
     return run_told("changed", Group(((LINT,), (tests,)) if found else ((LINT,),), GROUPS["ci"].minutes))
 
 
-def environment(command: list[str]) -> dict[str, str]:
+def environment(check: Check) -> dict[str, str]:
     """Return the environment of a check; its workers, if there are several, have one thread each."""
-    threads = {"OMP_NUM_THREADS": "1"} if set(SPREAD) <= set(command) else {}
-    return {**threads, **os.environ, "PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"}
+    threads = {"OMP_NUM_THREADS": "1"} if set(SPREAD) <= set(check) else {}
+    compiler = {"FLOATFRAME_COMPILER": "plain"} if check is PLAIN else {}
+    return {**threads, **os.environ, **compiler, "PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"}
 
 
 def run_alone(check: Check) -> int:
@@ -151,7 +157,7 @@ def run_alone(check: Check) -> int:
     name, *command = check
     print(f"\n== {name}: {' '.join(command)}", flush=True)
     begun = time.monotonic()
-    done = subprocess.run([sys.executable, "-m", *command], cwd=ROOT, env=environment(command), check=False)
+    done = subprocess.run([sys.executable, "-m", *command], cwd=ROOT, env=environment(check), check=False)
     conclude(name, done.returncode, begun)
     return done.returncode
 
@@ -159,12 +165,11 @@ def run_alone(check: Check) -> int:
 def run_side_by_side(checks: tuple[Check, ...]) -> list[int]:
     """Run checks at the same time, print the report of each when it ends; return their exit codes in order of ends."""
     begun, running, codes = time.monotonic(), {}, []
-    for name, *command in checks:
+    for check in checks:
+        name, *command = check
         report = tempfile.TemporaryFile()
         started = [sys.executable, "-m", *command]
-        process = subprocess.Popen(
-            started, cwd=ROOT, env=environment(command), stdout=report, stderr=subprocess.STDOUT
-        )
+        process = subprocess.Popen(started, cwd=ROOT, env=environment(check), stdout=report, stderr=subprocess.STDOUT)
         running[name] = process, report, command
     while running:
         name = next((name for name, (process, *_) in running.items() if process.poll() is not None), None)

@@ -86,7 +86,7 @@ def used_modules(path: Path) -> set[str]:
     A package that is used as a whole, such as `getattr(cms, name)`, counts with all of its public names.
     """
     known = modules().keys() | test_modules().keys()
-    tree = ast.parse(path.read_text())
+    nodes = list(ast.walk(ast.parse(path.read_text())))
     found: set[str] = set()
     packages: dict[str, str] = {}  # name here -> package whose names are imported when they are first used
 
@@ -95,7 +95,7 @@ def used_modules(path: Path) -> set[str]:
         if public_names(name):
             packages[local] = name
 
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Import):
             for alias in node.names:
                 add(alias.name if alias.asname else alias.name.split(".")[0], alias.asname or alias.name.split(".")[0])
@@ -110,13 +110,13 @@ def used_modules(path: Path) -> set[str]:
                 parts = words.split(".")
                 found |= {".".join(parts[:k]) for k in range(2, len(parts) + 1)}
     by_name = set()
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in packages:
             package = packages[node.value.id]
             inner = f"{package}.{node.attr}"
             found.add(inner if inner in known else public_names(package).get(node.attr, package))
             by_name.add(node.value)
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Name) and node.id in packages and node not in by_name:
             found |= set(public_names(packages[node.id]).values())
     return found & known

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, IntArray
 from floatframe.kernels.model import MASS, STIFFNESS, Model
 from floatframe.kernels.work import Work
 from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_matrix
@@ -71,44 +71,56 @@ def linearized(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> 
     for m in model.bodies.ends:
         i, c, o = int(model.markers.body[m]), int(model.markers.connection[m]), int(model.markers.x0[m])
         n, size = 6 + int(model.bodies.n_q[i]), int(model.connections.size[c])
-        R4 = np.kron(np.eye(4), work.state.R[i])
-        column = work.solver.J_column[6 * o : 6 * (o + n)].reshape(6, n)
-        row = work.solver.J_row[12 * o : 12 * (o + n)].reshape(12, n)
+        R = work.state.R[i]  # turns each three rows of what follows
+        column = work.solver.J_column[6 * o : 6 * (o + n)].reshape(2, 3, n)
+        row = work.solver.J_row[12 * o : 12 * (o + n)].reshape(4, 3, n)
         w0, u0 = int(model.connections.w0[c]), int(model.bodies.u0[i])
-        carried = model.markers.sign[m] * (R4[:6, :6] @ column)
+        carried = model.markers.sign[m] * (R @ column).reshape(6, n)
         for part, place in ((0, int(model.markers.force[m])), (3, int(model.markers.moment[m]))):
             if place >= 0:
                 J_parts.append((carried[part : part + 3], w0 + place, u0))
-        G_parts.append((work.connections.P[m, :size] @ R4 @ row, w0, u0))
+        G_parts.append((work.connections.P[m, :size] @ (R @ row).reshape(12, n), w0, u0))
         accelerated = int(model.markers.accelerated[m])
         if accelerated >= 0:
             o = int(model.markers.a0[m])
-            row_a = work.solver.J_a[6 * o : 6 * (o + n)].reshape(6, n)
-            G_parts.append((work.connections.P_a[accelerated, :size] @ R4[:6, :6] @ row_a, w0, u0))
-    blocks = [work.connections.V[c, :size, :size].copy() for c, size in enumerate(model.connections.size)]
-    V = sp.csr_array(sp.block_diag(blocks)) if blocks else sp.csr_array((0, 0))
+            row_a = work.solver.J_a[6 * o : 6 * (o + n)].reshape(2, 3, n)
+            G_parts.append((work.connections.P_a[accelerated, :size] @ (R @ row_a).reshape(6, n), w0, u0))
+    connections = model.connections
+    places = zip(connections.size.tolist(), connections.w0.tolist(), strict=False)
+    V = summed([(work.connections.V[c, :size, :size], w0, w0) for c, (size, w0) in enumerate(places)], (n_w, n_w))
+    V.eliminate_zeros()
     return Linearized(tuple(H), summed(J_parts, (n_w, n_u)), summed(G_parts, (n_w, n_u)), V)
 
 
 def summed(parts: list[tuple[Array, int, int]], shape: tuple[int, int]) -> sp.csr_array:
     """Return the sparse sum of dense blocks, each with its first row and column."""
+    if not parts:
+        return sp.csr_array(shape)
+    values, rows, columns = entries(parts)
+    return sp.csr_array(sp.coo_array((values, (rows, columns)), shape=shape))
+
+
+def entries(parts: list[tuple[Array, int, int]]) -> tuple[Array, IntArray, IntArray]:
+    """Return values, rows and columns of the entries of dense blocks, each with its first row and column."""
     rows = [np.repeat(np.arange(first, first + len(block)), block.shape[1]) for block, first, _ in parts]
     columns = [np.tile(np.arange(first, first + block.shape[1]), len(block)) for block, _, first in parts]
     values = [block.ravel() for block, _, _ in parts]
-    if not parts:
-        return sp.csr_array(shape)
-    place = (np.concatenate(rows), np.concatenate(columns))
-    return sp.csr_array(sp.coo_array((np.concatenate(values), place), shape=shape))
+    return np.concatenate(values), np.concatenate(rows), np.concatenate(columns)
 
 
 def solve(H: tuple[Array, ...], parts: Linearized, forces: Array, rows: Array) -> tuple[Array, Array]:
     """Solve H y - Jᵀ w = forces, G y + V w = rows; return y, (n_u,), and w, (n_w,)."""
-    top = sp.block_diag(H)
-    if len(rows) == 0:
-        return splu(sp.csc_array(top)).solve(forces), np.zeros(0)
-    matrix = sp.csc_array(sp.block_array([[top, -parts.J.T], [parts.G, parts.V]]))
-    solution = splu(matrix).solve(np.concatenate([forces, rows]))
-    return solution[: len(forces)], solution[len(forces) :]
+    n_u, n = len(forces), len(forces) + len(rows)
+    first = np.cumsum([0, *(len(block) for block in H)]).tolist()
+    values, row, column = entries([(block, k, k) for block, k in zip(H, first, strict=False)])
+    is_there = values != 0
+    J, G, V = parts.J, parts.G, parts.V
+    J_row, G_row, V_row = (np.repeat(np.arange(len(rows)), np.diff(A.indptr)) for A in (J, G, V))
+    values = np.concatenate([values[is_there], -J.data, G.data, V.data])
+    row = np.concatenate([row[is_there], J.indices, n_u + G_row, n_u + V_row])
+    column = np.concatenate([column[is_there], n_u + J_row, G.indices, n_u + V.indices])
+    solution = splu(sp.csc_array((values, (row, column)), shape=(n, n))).solve(np.concatenate([forces, rows]))
+    return solution[:n_u], solution[n_u:]
 
 
 def modal_diagonals(model: Model, i: int, which: int) -> Array:

@@ -10,11 +10,31 @@ from tests.floatframe.discrete.element_parts import ELEMENT_PARTS
 from tests.floatframe.discrete.part_table import REFUSED
 from tests.floatframe.discrete.parts import METHODS, PARTS
 
-__all__ = ["assert_runs_or_is_refused"]
+__all__ = ["ALL", "BY_IDA", "assert_runs_or_is_refused", "cells"]
 
 FINE, DIVIDED = GeneralizedAlpha(0.95, 1e-12), 40
 ALL = PARTS | ELEMENT_PARTS
 EXACT = 1e-5  #: by which schemes that control their error may differ from the fine steps
+#: what every change runs by IDA, beside all that it refuses; it serves to check the other schemes, and takes a second a
+#: part, so that the rest are long tests
+BY_IDA = (
+    "joint revolute", "joint sliding", "joint prismatic (driven)", "joints that repeat constraints",
+    "stiffened flexible body", "gravity", "spring-damper", "elastic contact", "law of three points",
+    "clearances.hinge", "rails.wheelset",
+)  # fmt: skip
+
+
+def cells(parts):
+    """Return (scheme, part) of all schemes with some parts, as parameters of a test."""
+    return [
+        pytest.param(name, part, marks=pytest.mark.long) if is_study(name, part) else (name, part)
+        for name in METHODS for part in parts
+    ]  # fmt: skip
+
+
+def is_study(name, part):
+    """Return whether a cell runs among the long tests alone."""
+    return name == "`Ida`" and part not in BY_IDA and part not in REFUSED[name]
 
 
 @cache

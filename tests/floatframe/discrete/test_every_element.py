@@ -6,13 +6,11 @@ from pkgutil import iter_modules
 import pytest
 
 import floatframe
-from tests.floatframe.discrete.compared import assert_runs_or_is_refused
+from tests.floatframe.discrete.compared import assert_runs_or_is_refused, cells
 from tests.floatframe.discrete.element_parts import ELEMENT_PARTS
-from tests.floatframe.discrete.parts import METHODS
 
 
-@pytest.mark.parametrize("part", ELEMENT_PARTS)
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize(("name", "part"), cells(ELEMENT_PARTS))
 def test_an_element_acts_as_by_generalized_alpha_or_is_refused_by_name(name, part):
     assert_runs_or_is_refused(name, part)
 

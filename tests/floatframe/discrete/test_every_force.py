@@ -3,12 +3,11 @@
 import pytest
 
 import floatframe.forces as forces
-from tests.floatframe.discrete.compared import assert_runs_or_is_refused, system_of
-from tests.floatframe.discrete.parts import FORCES, METHODS
+from tests.floatframe.discrete.compared import assert_runs_or_is_refused, cells, system_of
+from tests.floatframe.discrete.parts import FORCES
 
 
-@pytest.mark.parametrize("part", FORCES)
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize(("name", "part"), cells(FORCES))
 def test_a_force_acts_as_by_generalized_alpha_or_is_refused_by_name(name, part):
     assert_runs_or_is_refused(name, part)
 

@@ -7,13 +7,12 @@ import pytest
 
 from floatframe.integrators import CLASSES
 from floatframe.joints import JOINTS
-from tests.floatframe.discrete.compared import assert_runs_or_is_refused
+from tests.floatframe.discrete.compared import ALL, BY_IDA, assert_runs_or_is_refused, cells
 from tests.floatframe.discrete.part_table import PAGE, REFUSED, table
 from tests.floatframe.discrete.parts import FORCES, METHODS, PARTS
 
 
-@pytest.mark.parametrize("part", [part for part in PARTS if part not in FORCES])
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize(("name", "part"), cells([part for part in PARTS if part not in FORCES]))
 def test_a_part_moves_as_by_generalized_alpha_or_is_refused_by_name(name, part):
     assert_runs_or_is_refused(name, part)
 
@@ -21,6 +20,7 @@ def test_a_part_moves_as_by_generalized_alpha_or_is_refused_by_name(name, part):
 def test_every_joint_and_scheme_has_its_cells():
     assert {f"joint {kind}" for kind in JOINTS} <= set(PARTS)
     assert set(CLASSES) <= {type(method).__name__ for method in METHODS.values()}
+    assert set(BY_IDA) <= ALL.keys() - REFUSED["`Ida`"].keys()
 
 
 def test_the_page_says_what_every_scheme_takes():

@@ -29,7 +29,10 @@ from tests.floatframe.generation.calls import (
     wheels,
 )
 
-few_case = Case(few())
+
+@pytest.fixture(scope="module")
+def few_case():
+    return Case(few())
 
 
 @pytest.fixture(scope="module", params=SYSTEMS)
@@ -46,7 +49,7 @@ def test_python_has_the_numbers_of_the_model(case, what):
 
 @pytest.mark.parametrize("language", LANGUAGES)
 @pytest.mark.parametrize("what", ROUTINES)
-def test_every_routine_is_the_same_in_every_language(what, language, tmp_path):
+def test_every_routine_is_the_same_in_every_language(few_case, what, language, tmp_path):
     """That of Python against the model above and below; here all others against it."""
     case = few_case
     code = generate(case.system, what=what, language=language)

@@ -11,6 +11,7 @@ import numba
 import pytest
 
 from floatframe.kernels.compiler.choice import CHOICES, KNOWN_VERSIONS, VARIABLE
+from tests.__main__ import GROUPS, KERNELS, PLAIN, environment
 from tests.root import ROOT
 
 CODE = "from floatframe.kernels.compiler.choice import is_lean, words; print(is_lean, words())"
@@ -79,11 +80,12 @@ def test_the_pendulum_moves_with_the_oldest_numba(tmp_path):
     assert "skipped" not in done.stdout
 
 
-def test_ci_runs_kernels_and_pendulum_plainly_too():
-    """The line that does it stands in the script of continuous integration, and names tests that exist."""
-    lines = [line for line in (ROOT / ".ci" / "run").read_text().splitlines() if f"{VARIABLE}=plain" in line]
-    assert len(lines) == 1
-    paths = [word for word in lines[0].split() if word.startswith("tests/")]
+def test_every_change_runs_kernels_and_pendulum_plainly_too():
+    """A check of the group `ci` does it, by a variable that it alone has, and names tests that exist."""
+    assert any(PLAIN in stage for stage in GROUPS["ci"].stages)
+    assert environment(PLAIN)[VARIABLE] == "plain"
+    assert environment(KERNELS).get(VARIABLE) == os.environ.get(VARIABLE)
+    paths = [word for word in PLAIN if word.startswith("tests/")]
     assert any("pendulum" in path for path in paths)
     assert "tests/floatframe/kernels" in paths
     assert all(Path(ROOT / path).exists() for path in paths)
