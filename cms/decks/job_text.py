@@ -55,6 +55,8 @@ def job_text(deck: Deck, request: JobRequest, deck_path: str) -> str:
         "body": {"name": deck.path.stem, "deck": deck_path, "units": request.units},
         "materials": _materials(deck, request),
     }
+    if deck.plane is not None:
+        tables["body"]["plane"] = ("yz", "zx", "xy")[deck.plane]
     tables |= _sections(deck) | _attached(deck)
     left_out = [name for name in request.leave_out]
     if _has_cells_without_table(deck):

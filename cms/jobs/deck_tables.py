@@ -111,8 +111,8 @@ def check_deck(job: Any) -> None:
             if given:
                 raise ValueError(f"{name}: belong to a whole deck; give [body] deck, or remove the tables")
         return
-    if job.ties or job.body.part or job.body.plane or job.body.incompatible_modes:
-        raise ValueError("body.deck: ties, part, plane and incompatible_modes belong to a mesh; remove them")
+    if job.ties or job.body.part or job.body.incompatible_modes:
+        raise ValueError("body.deck: ties, part and incompatible_modes belong to a mesh; remove them")
     if not (job.solids or job.shells or job.sections or job.rods or job.springs):
         raise ValueError(
             "body.deck: expected tables [solids.NAME], [shells.NAME], [sections.NAME], [rods.NAME] or [springs.NAME]"

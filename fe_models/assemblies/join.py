@@ -93,7 +93,9 @@ def join(
     slaves, T_s = eliminated(constraints, points, dof_of, whole.n_dof)
     if len(slaves):
         whole = eliminate_dofs(whole, slaves, T_s)
-    return Joined(_without_idle_rotations(whole, sum(len(recovered_dofs(body)) for body in bodies)), place)
+    references = place[[c.node for c in constraints if isinstance(c, MeanMotion)]]
+    n_of_parts = sum(len(recovered_dofs(body)) for body in bodies)
+    return Joined(_without_idle_dofs(whole, n_of_parts, references), place)
 
 
 def _kept(part: Part, begin: int, place: IntArray) -> IntArray:
@@ -211,13 +213,14 @@ def recovered_dofs(body: FEBody) -> IntArray:
     return body.dofs if body.recovery is None else body.recovery.dofs
 
 
-def _without_idle_rotations(body: FEBody, n_of_parts: int) -> FEBody:
+def _without_idle_dofs(body: FEBody, n_of_parts: int, references: IntArray) -> FEBody:
     """Step (4). A rotation with mass but without stiffness stays, and appears as a motion of zero frequency.
 
-    If a recovery row beyond those of the parts belongs to such a rotation, it does not give the motion of its node. It
-    loses its component, because the rotation is not zero but unknown.
+    The reference of a mean motion that follows in some components only has no other motion, so its other translations
+    are idle too. If a recovery row beyond those of the parts belongs to an idle dof, it does not give the motion of its
+    node. It loses its component, because the motion is not zero but unknown.
     """
-    is_idle = body.dofs[:, 1] >= 3
+    is_idle = (body.dofs[:, 1] >= 3) | np.isin(body.dofs[:, 0], references)
     for A in (body.K, body.M):
         is_idle &= np.asarray(abs(A).sum(axis=0)).ravel() == 0
     idle = np.flatnonzero(is_idle)

@@ -29,10 +29,10 @@ ELEMENT_TYPES: dict[str, dict[int, tuple[str, list[int] | None]]] = {
     "CPYRAM": {5: ("pyramid", None), 13: ("pyramid13", None)},
     "CTRIA3": {3: ("triangle", None)},
     "CTRIAR": {3: ("triangle", None)},
-    "CTRIA6": {6: ("triangle6", None)},
+    "CTRIA6": {3: ("triangle", None), 6: ("triangle6", None)},
     "CQUAD4": {4: ("quad", None)},
     "CQUADR": {4: ("quad", None)},
-    "CQUAD8": {8: ("quad8", None)},
+    "CQUAD8": {4: ("quad", None), 8: ("quad8", None)},
     "CROD": {2: ("line", None)},
     "CBAR": {2: ("line", None)},
     "CBEAM": {2: ("line", None)},
@@ -117,7 +117,7 @@ def nodes_of(here: str, card: str, given: list[str]) -> tuple[int, list[str]]:
     counts = sorted(ELEMENT_TYPES[card])
     filled = [bool(word) for word in given[: counts[-1]]]
     for count in reversed(counts):
-        if all(filled[:count]) and (card not in _SOLID_CARDS or not any(filled[count:])):
+        if all(filled[:count]) and not any(filled[count:]):
             return count, given[:count]
     raise MeshError(
         f"{here}: expected {' or '.join(str(c) for c in counts)} nodes, got {sum(filled)}; elements with "

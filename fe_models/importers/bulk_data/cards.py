@@ -124,6 +124,8 @@ def read_cards(where: str, text: str) -> Iterator[Card]:
             if name:
                 yield Card(name, tuple(fields), here)
             name = first.rstrip("* ").upper()
+            if name[0].isdigit():
+                raise MeshError(f"{where}, line {number}: expected the name of a card, got {first!r}")
             here = f"{where}, line {number}: {name}"
             fields = data
         mark = following
@@ -145,8 +147,9 @@ def _replicated(here: str, fields: list[str], steps: list[str]) -> list[str]:
             made.append(word)
         else:
             try:
+                before = before or ("0" if step[1].lstrip("+-").isdigit() else "0.")  # blank is zero
                 is_whole = before.lstrip("+-").isdigit() and step[1].lstrip("+-").isdigit()
-                value = int(before) + int(step[1]) if is_whole else real_of(before or "0") + real_of(step[1])
+                value = int(before) + int(step[1]) if is_whole else real_of(before) + real_of(step[1])
             except ValueError:
                 raise MeshError(f"{here}: {word}: expected a number in the card before, got {before!r}") from None
             made.append(repr(value))

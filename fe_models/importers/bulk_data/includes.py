@@ -46,6 +46,9 @@ def bulk_text(where: str, path: Path, text: str, included: dict[str, str], files
             try:
                 inner = other.read_bytes()
             except OSError as error:
+                if is_first and any(each.lstrip().upper().startswith("CEND") for each in lines[k:]):
+                    k += 1  # statements above CEND run the program: what they include is no part of a body
+                    continue
                 raise MeshError(
                     f"{where}: INCLUDE {name}: {other} cannot be read: {error.strerror or error}{near_file(other)}"
                 ) from error

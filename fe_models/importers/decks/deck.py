@@ -201,3 +201,4 @@ class Deck:
     supports: tuple[Support, ...] = ()
     loads: tuple[Load, ...] = ()
     rods: tuple[RodSection, ...] = ()
+    plane: int | None = None  #: axis across the plane in which the deck holds all of its points; None: space

@@ -110,6 +110,28 @@ READ: dict[str, tuple[str, dict[str, str | None]]] = {
         {"EID": None, "G": "1", "CID": "0", "M": "4.", "X1": ".2", "X2": ".1", "X3": ".2", "I11": "1.1", "I21": ".2",
          "I22": "2.2", "I31": ".3", "I32": ".1", "I33": "3.3"},
     ),
+    "CONM1": (
+        BAR + "\nCONM1,7,2,7,3.,0.,3.,0.,0.\n,3.,0.,-.9,.6,1.39,.9,0.,-.3\n,-.06,2.3,-.6,.3,0.,-.09,-.18,3.15",
+        {"EID": None, "G": "1", "CID": "0", **{f"M{i}{j}": "1.5" for i in range(1, 7) for j in range(1, i + 1)}},
+    ),
+    "CBUSH1D": (
+        TWO + "CBUSH1D,7,9,2,9,7\nPBUSH1D,9,1.+5,20.", {"EID": None, "PID": None, "GA": "1", "GB": "10", "CID": "0"}
+    ),
+    "PBUSH1D": (
+        TWO + "CBUSH1D,7,9,2,9,7\nPBUSH1D,9,1.+5,20.", {"PID": None, "K": "2.+5", "C": "30.", "M": "1."}
+    ),
+    "CGAP": (
+        TWO + "CGAP,7,9,2,9,,,,7\nPGAP,9,0.,,1.+6,,2.+5,.1",
+        {"EID": None, "PID": None, "GA": "1", "GB": "10", "CID": "0"},
+    ),
+    "PGAP": (
+        TWO + "CGAP,7,9,2,9,,,,7\nPGAP,9,0.,,1.+6,,2.+5,.1",
+        {"PID": None, "U0": "1.", "KA": "2.+6", "KB": None, "KT": "3.+5", "MU1": None},
+    ),
+    "RROD": (
+        FRAME.replace("RBE2,99,2,123456,3", "RROD,99,2,3,1"),
+        {"EID": None, "GA": "1", "GB": "4", "CMA": None, "CMB": "1"},
+    ),
     "CBUSH": (
         TWO + "CBUSH,7,9,2,9,,,,7\nPBUSH,9,K,1.+5,2.+5,3.+5,4.+3,5.+3,6.+3",
         {"EID": None, "PID": None, "GA": "1", "GB": "10", "GO/X1": None, "X2": None, "X3": None, "CID": "0", "S": None},
@@ -215,7 +237,7 @@ def model_of(tmp_path, text):
         "K": body.K.toarray(),
         "D": D,
         "nodes": body.nodes,
-        "interfaces": [(i.name, i.kind, tuple(i.nodes)) for i in body.interfaces],
+        "interfaces": [(i.name, i.kind, tuple(i.nodes), np.round(i.triad, 9).tolist()) for i in body.interfaces],
         "loads": np.array([case.f for case in body.load_cases]),
         "notes": deck.ledger.rows(),
     }

@@ -34,6 +34,12 @@ def test_continuations_join_and_comments_end_a_line():
     assert [card.integer(k) for k in (*range(4, 10), 9, 10)] == [4, 5, 6, 7, 8, 9, 9, 10]
 
 
+def test_a_blank_field_that_is_counted_up_begins_at_zero():
+    cards = list(read_cards("deck", "GRID,1,,1.,2.,3.\n=,*(1),=,=,=,*(.5),*(7)\n=(1)\n"))
+    assert [card.integer(6, 0) for card in cards] == [0, 7, 14]
+    assert [card.real(5) for card in cards] == [3.0, 3.5, 4.0]
+
+
 def test_case_control_is_not_bulk_data_and_enddata_ends_it():
     text = "SOL 103\nCEND\nSPC = 3\nBEGIN BULK\nSPOINT,1\nENDDATA\nSPOINT,2\n"
     assert [card.fields[0] for card in read_cards("deck", text)] == ["1"]
@@ -43,6 +49,7 @@ def test_case_control_is_not_bulk_data_and_enddata_ends_it():
     ("text", "word"),
     [
         ("+A,1,2", "continuation without a card"),
+        ("GRID,1\n1054,1,2", "line 2: expected the name of a card, got '1054'"),
         ("RBE2,1,2,123,4,5,6,7,8,+A\n+B,9", "asks for the continuation 'A', but line 2 has 'B'"),
         ("GRID,x", "field 2: expected an integer, got 'x'"),
         ("GRID,1,,a", "field 4: expected a real number"),

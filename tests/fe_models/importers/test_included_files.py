@@ -8,6 +8,7 @@ from cms.decks.job_text import JobRequest, job_text
 from cms.jobs.body_of_job import uncoupled_body
 from cms.jobs.job import read_job
 from fe_models import Material, read_mesh, solid_body, unit_system
+from fe_models.errors import MeshError
 from fe_models.foundation.stages import Stages
 from fe_models.importers.decks.read_deck import read_deck
 from fe_models.importers.read_mesh import read_geometry
@@ -46,3 +47,14 @@ def test_included_files_are_on_record(tmp_path, name):
         assert {key: value for key, value in made.provenance.items() if key.startswith("file ")} == {
             f"file {each}": digest for each, digest in expected.items()
         }
+
+
+def test_what_statements_above_cend_include_may_be_missing(tmp_path):
+    """They run the program and describe no body; a file that bulk data include must be there."""
+    grids = "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\n"
+    path = tmp_path / "bar.bdf"
+    path.write_text(f"SOL 101\nINCLUDE 'dmap.alter'\nCEND\nBEGIN BULK\n{grids}ENDDATA\n")
+    assert len(read_deck(path).mesh.nodes) == 2
+    path.write_text(f"SOL 101\nCEND\nBEGIN BULK\nINCLUDE 'dmap.alter'\n{grids}ENDDATA\n")
+    with pytest.raises(MeshError, match=r"INCLUDE dmap\.alter"):
+        read_deck(path)

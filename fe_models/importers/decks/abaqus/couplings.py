@@ -1,9 +1,8 @@
 """Couplings of Abaqus and CalculiX: equations, rigid bodies, kinematic and distributing couplings."""
 
 import numpy as np
-from scipy.linalg import qr
 
-from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.arrays import IntArray
 from fe_models.importers.abaqus_deck import DeckBlock
 from fe_models.importers.decks.abaqus.assembly import TURNED
 from fe_models.importers.decks.abaqus.draft import Draft
@@ -11,10 +10,9 @@ from fe_models.importers.decks.abaqus.elements import faces_of
 from fe_models.importers.decks.abaqus.multipoint import LINEARISED, read_linearised
 from fe_models.importers.decks.abaqus.ties import read_tie
 from fe_models.importers.decks.deck import Coupling, Equation, RigidGroup
+from fe_models.importers.decks.equations import Row, solved_equations
 
 __all__ = ["equations_in_basic_axes", "read_coupling", "surface_nodes"]
-
-NEGLIGIBLE = 1e-14  #: part of the largest coefficient below which a term turned to basic axes is none
 
 
 def read_coupling(here: str, block: DeckBlock, draft: Draft) -> None:
@@ -72,43 +70,33 @@ def equations_in_basic_axes(draft: Draft) -> None:
     (2) equations of which the first terms are components of one such node are solved together for as many of its
         components in basic axes, those that are determined best, so that these give way
     """
-    together: dict[tuple[int, int], list[dict[tuple[int, int], float]]] = {}
-    for k, (terms, of_instance) in enumerate(draft.raw_equations):
+    turned: list[tuple[tuple[int, int], Row]] = []
+    for terms, of_instance in draft.raw_equations:
         node, component, _ = terms[0]
-        row: dict[tuple[int, int], float] = {}
+        row: Row = {}
         for other, c, a in terms:
             first = c - c % 3
             axes = draft.transformed.get(other, of_instance)
             parts = [(c, 1.0)] if axes is None else [(first + j, float(axes[c % 3, j])) for j in range(3)]
             for j, r in parts:
                 row[other, j] = row.get((other, j), 0.0) + a * r  # (1)
-        is_turned = node in draft.transformed or of_instance is not None
-        key = (node, component // 3) if is_turned else (-1 - k, 0)
-        together.setdefault(key, []).append(row)
-    for (node, block), rows in together.items():
-        if node < 0:
-            _keep(draft, list(rows[0]), np.array(list(rows[0].values())))
-            continue
-        own = [(node, 3 * block + j) for j in range(3)]
-        names = own + [name for name in dict.fromkeys(name for row in rows for name in row) if name not in own]
-        A = np.array([[row.get(name, 0.0) for name in names] for row in rows])
-        order = qr(A[:, :3], pivoting=True, mode="r")[1][: len(rows)]
-        if len(rows) > 3 or np.linalg.matrix_rank(A[:, :3]) < len(rows):
-            why = f"equations that say more of a node (first: {node}) than its components, or the same twice"
-            draft.ledger.refuse("*EQUATION", why, count=len(rows))
-            continue
-        A = np.linalg.solve(A[:, order], A)  # (2)
-        A[np.abs(A) < NEGLIGIBLE * np.abs(A).max()] = 0.0
-        rest = [k for k in range(len(names)) if k not in order]
-        for k, slave in enumerate(order):
-            _keep(draft, [names[slave], *(names[j] for j in rest)], A[k, [slave, *rest]])
+        if node in draft.transformed or of_instance is not None:
+            turned.append(((node, component - component % 3), row))
+        else:
+            _keep(draft, row)
+    made, refused = solved_equations(turned)  # (2)
+    for node, count in refused:
+        why = f"equations that say more of a node (first: {node}) than its components, or the same twice"
+        draft.ledger.refuse("*EQUATION", why, count=count)
+    for row in made:
+        _keep(draft, row)
 
 
-def _keep(draft: Draft, names: list[tuple[int, int]], coefficients: Array) -> None:
+def _keep(draft: Draft, row: Row) -> None:
     """Add one equation; terms that vanish are left out, but for the first."""
     terms = [
         (draft.node_group(draft.where, [node]), c, float(a))
-        for k, ((node, c), a) in enumerate(zip(names, coefficients, strict=True))
+        for k, ((node, c), a) in enumerate(row.items())
         if a != 0 or k == 0
     ]
     draft.equations.append(Equation(tuple(terms)))

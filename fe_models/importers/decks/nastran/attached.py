@@ -4,17 +4,19 @@ import numpy as np
 
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.components import MOTION_COMPONENTS
 from fe_models.importers.bulk_data.cards import Card, real_of
-from fe_models.importers.decks.deck import Coupling, DeckMass, DeckSpring, Equation, Load, RigidGroup, Support, Vector
-from fe_models.importers.decks.nastran.model import NastranModel, components_of, numbers_of
+from fe_models.importers.decks.deck import Coupling, DeckMass, Load, RigidGroup
+from fe_models.importers.decks.equations import Row, solved_equations
+from fe_models.importers.decks.nastran.model import ALL, NastranModel, components_of
+from fe_models.importers.decks.nastran.springs import read_springs, scalar_ends, springs_to_ground
+from fe_models.importers.decks.nastran.supports import in_basic, make_supports, selected_sets
 from fe_models.meshes.cell_shapes import CELL_SHAPES
 
 __all__ = ["read_attached"]
 
+SAME = 1e-9  #: part of the largest entry of a mass matrix below which entries are equal
+
 _FACED = {"CTETRA": ("tetra", 4), "CPENTA": ("wedge", 6), "CHEXA": ("hexahedron", 8)}  #: card -> kind, corner grids
-ALL = (0, 1, 2, 3, 4, 5)
-ALONG = 1e-9  #: part of a vector across a line, below which it is along it
 
 
 def read_attached(model: NastranModel) -> None:
@@ -22,18 +24,19 @@ def read_attached(model: NastranModel) -> None:
     for card in model.of("CONM2"):
         _mass(model, card)
     _scalar_masses(model)
-    for card in model.of("CBUSH"):
-        _bush(model, card)
-    for card in model.of("CELAS1", "CELAS2", "CDAMP1", "CDAMP2"):
-        _scalar_spring(model, card)
-    for card in model.of("CVISC"):
-        _axial_damper(model, card)
+    for card in model.of("CONM1"):
+        _mass_matrix(model, card)
+    read_springs(model)
     for card in model.of("RBE2", "RBAR"):
         _rigid(model, card)
+    for card in model.of("RROD"):
+        _rod_of_constant_length(model, card)
     for card in model.of("RBE3"):
         _mean(model, card)
     _equations(model)
-    _supports(model)
+    _close_equations(model)
+    springs_to_ground(model)
+    make_supports(model)
     _loads(model)
 
 
@@ -50,6 +53,30 @@ def _mass(model: NastranModel, card: Card) -> None:
     model.masses.append(DeckMass(model.group(card, [node]), card.real(4, 0.0) * model.wtmass, rows, where))
 
 
+def _mass_matrix(model: NastranModel, card: Card) -> None:
+    """CONM1: a mass matrix that is one of a rigid piece, along axes of CID; others are refused.
+
+    With v_c = v + omega × r the piece has M_tt = m, M_rt = m [r]×, M_rr = J - m [r]× [r]×.
+    """
+    node = card.integer(2)
+    axes = model.system(card, card.integer(3, 0), model.point(card, node))
+    M = np.zeros((6, 6))
+    M[np.tril_indices(6)] = [card.real(k, 0.0) for k in range(4, 25)]
+    M = M + np.tril(M, -1).T
+    m, arm = float(M[0, 0]), M[3:, :3]
+    r = np.array([arm[2, 1], arm[0, 2], arm[1, 0]]) / m if m else np.zeros(3)
+    S = np.array([[0, -r[2], r[1]], [r[2], 0, -r[0]], [-r[1], r[0], 0]])
+    scale = np.abs(M).max()
+    if np.abs(M[:3, :3] - m * np.eye(3)).max() > SAME * scale or np.abs(arm - m * S).max() > SAME * scale:
+        why = "no mass matrix of a rigid piece: another mass along each axis, or no centre of mass"
+        model.ledger.refuse("CONM1", why)
+        return
+    J = axes @ (M[3:, 3:] + m * S @ S) @ axes.T * model.wtmass
+    rows = tuple((float(a[0]), float(a[1]), float(a[2])) for a in J)
+    x, y, z = (float(value) for value in axes @ r)
+    model.masses.append(DeckMass(model.group(card, [node]), m * model.wtmass, rows, (x, y, z)))
+
+
 def _scalar_masses(model: NastranModel) -> None:
     """CMASS1 and CMASS2 of one grid point: the same mass along all three axes is a point mass; others are refused."""
     along: dict[int, list[float]] = {}
@@ -59,7 +86,7 @@ def _scalar_masses(model: NastranModel) -> None:
         if m is None:
             model.ledger.refuse(card.name, f"names PMASS {card.text(2)}, which is not defined")
             continue
-        ends = _scalar_ends(model, card)
+        ends = scalar_ends(model, card)
         grids = [end for end in ends if end is not None] if ends is not None else []
         if len(grids) != 1 or grids[0][1] > 2:
             why = "between two points, at a scalar point, or about an axis: no mass that moves with a body frame"
@@ -75,175 +102,6 @@ def _scalar_masses(model: NastranModel) -> None:
         else:
             card = next(card for card in model.cards["GRID"] if card.integer(1) == node)
             model.masses.append(DeckMass(model.group(card, [node]), masses[0]))
-
-
-def _scalar_ends(model: NastranModel, card: Card) -> list[tuple[int, int] | None] | None:
-    """Return (grid point, component) of both ends of a scalar element, None for the ground.
-
-    None in place of the list if a point is scalar.
-    """
-    ends: list[tuple[int, int] | None] = []
-    for k in (3, 5):
-        number, word = card.integer(k, 0), card.text(k + 1) or "0"
-        if number == 0:
-            ends.append(None)
-        elif number in model.points.positions and word in set("123456"):
-            ends.append((number, int(word) - 1))
-        else:
-            return None
-    return ends
-
-
-def _ground(model: NastranModel, card: Card, node: int, components: tuple[int, ...], what: str) -> None:
-    """Note an element to the ground: a body is free here, and gets an interface where it would be attached."""
-    words = ", ".join(MOTION_COMPONENTS[c] for c in components)
-    why = f"ties {words} of grid point {node} to the ground{what}; the body is free here: put it into the system file"
-    model.ledger.note(card.name, why)
-    model.grounded.setdefault(node, set()).update(components)
-
-
-def _axial_damper(model: NastranModel, card: Card) -> None:
-    """CVISC: a damper along and about the line between its grid points."""
-    number = card.integer(2, card.integer(1))
-    for known in model.of("PVISC"):
-        for k in (1, 5):
-            if known.text(k) and known.integer(k) == number:
-                along, about = known.real(k + 1, 0.0), known.real(k + 2, 0.0)
-                ends = [model.point(card, card.integer(n)) for n in (3, 4)]
-                R = _any_axes(ends[1] - ends[0])
-                names = [model.group(card, [card.integer(n)]) for n in (3, 4)]
-                damping = (along, 0.0, 0.0, about, 0.0, 0.0)
-                model.springs.append(DeckSpring((names[0], names[1]), (0.0,) * 6, damping, _rows(R)))
-                return
-    model.ledger.refuse("CVISC", f"names PVISC {number}, which is not defined")
-
-
-def _rows(axes: Array) -> tuple[Vector, Vector, Vector]:
-    """Return axes, (3, 3) columns, as rows of a deck."""
-    rows = [(float(a[0]), float(a[1]), float(a[2])) for a in axes.T]
-    return rows[0], rows[1], rows[2]
-
-
-def _bush(model: NastranModel, card: Card) -> None:
-    known = model.property_of(card, "PBUSH")
-    if known is None:
-        model.ledger.refuse("CBUSH", f"names PBUSH {card.text(2) or card.text(1)}, which is not defined")
-        return
-    if not card.integer(4, 0):
-        _ground(model, card, card.integer(3), ALL, f" by PBUSH {known.text(1)}")
-        return
-    k, b = [0.0] * 6, [0.0] * 6
-    keys = {"K": k, "B": b}
-    words = list(known.fields)
-    for place in range(1, len(words), 8):
-        key = words[place].upper()
-        if key == "GE" and any(known.real(place + 2 + j, 0.0) for j in range(6)):
-            model.ledger.note("PBUSH", "structural damping GE is left out: give the job a table [damping]")
-        elif key == "M" and known.real(place + 2, 0.0):
-            model.ledger.refuse("PBUSH", f"M = {known.text(place + 2)}: mass of a bushing")
-        elif key in keys:
-            keys[key][:] = [known.real(place + 2 + j, 0.0) for j in range(6)]
-        elif key not in ("", "GE", "M", "RCV", "T", "ALPHA"):
-            model.ledger.refuse("PBUSH", f"{key}: expected K, B, GE, M, RCV")
-    ends = [model.point(card, card.integer(n)) for n in (3, 4)]
-    has_length = bool(np.linalg.norm(ends[1] - ends[0]))
-    is_round = all(row[1] == row[2] and row[4] == row[5] for row in (k, b))
-    if has_length and not is_round and not card.text(8) and not card.text(5):
-        why = "with length, other values along y than along z, and neither orientation nor CID: which is y is not said"
-        model.ledger.refuse("CBUSH", why)
-        return
-    if not has_length and not card.text(8):
-        why = "of no length and without CID: its axes are those of the displacements of GA (CD)"
-        model.ledger.note("CBUSH", why)
-    triad = _bush_axes(model, card, ends)
-    if triad is None:
-        model.ledger.refuse("CBUSH", "whose orientation is along the element itself, which says no direction of y")
-        return
-    names = [model.group(card, [card.integer(n)]) for n in (3, 4)]
-    damping = tuple(b) if any(b) else None
-    point = None
-    if card.real(9, 0.5) != 0.5 and has_length:
-        at = ends[0] + card.real(9) * (ends[1] - ends[0])
-        point = (float(at[0]), float(at[1]), float(at[2]))
-    model.springs.append(DeckSpring((names[0], names[1]), tuple(k), damping, _rows(triad), point))
-
-
-def _bush_axes(model: NastranModel, card: Card, ends: list[Array]) -> Array | None:
-    """Return the axes of a bush, (3, 3), columns: of CID, else x along the element and y towards the vector.
-
-    None if the vector is along the element.
-    """
-    if card.text(8):
-        return model.system(card, card.integer(8), ends[0])
-    x = ends[1] - ends[0]
-    if not np.linalg.norm(x) or not card.text(5):
-        return model.axes(card.integer(3)) if not np.linalg.norm(x) else _any_axes(x)
-    word = card.text(5)
-    is_grid = word.isdigit() and not card.text(6)
-    v = model.point(card, int(word)) - ends[0] if is_grid else np.array([card.real(k, 0.0) for k in (5, 6, 7)])
-    v = v if is_grid else model.axes(card.integer(3)) @ v
-    x = x / np.linalg.norm(x)
-    z = np.cross(x, v)
-    if np.linalg.norm(z) <= ALONG * np.linalg.norm(v):
-        return None
-    z = z / np.linalg.norm(z)
-    return np.stack([x, np.cross(z, x), z], axis=1)
-
-
-def _any_axes(x: Array) -> Array:
-    x = x / np.linalg.norm(x)
-    y = np.cross(x, np.eye(3)[int(np.argmin(np.abs(x)))])
-    y = y / np.linalg.norm(y)
-    return np.stack([x, y, np.cross(x, y)], axis=1)
-
-
-def _scalar_spring(model: NastranModel, card: Card) -> None:
-    """A spring or damper between the same component of two grid points.
-
-    Two forces along an axis balance only on one line: the points must lie at one place, or apart along this axis. Two
-    moments always balance.
-    """
-    if card.name in ("CELAS2", "CDAMP2"):
-        value: float | None = card.real(2)
-    else:
-        value = model.property_value(
-            card, "PELAS" if card.name == "CELAS1" else "PDAMP", 4 if card.name == "CELAS1" else 2
-        )
-    if value is None:
-        kind = card.name.replace("C", "P", 1).rstrip("1")
-        model.ledger.refuse(card.name, f"names {kind} {card.text(2)}, which is not defined")
-        return
-    ends = _scalar_ends(model, card)
-    if ends is None:
-        model.ledger.refuse(card.name, "to a scalar point")
-        return
-    grids = [end for end in ends if end is not None]
-    if len(grids) < 2:
-        if grids:
-            _ground(model, card, grids[0][0], (grids[0][1],), f" with {value:g}")
-        return
-    (a, c), (b, c_b) = grids
-    if c != c_b:
-        model.ledger.refuse(card.name, "between different components, whose forces do not balance")
-        return
-    axes = [model.axes(node) for node in (a, b)]
-    apart = model.point(card, b) - model.point(card, a)
-    across = apart - (apart @ axes[0][:, c % 3]) * axes[0][:, c % 3]
-    if np.abs(axes[0] - axes[1]).max() > ALONG or (c < 3 and np.abs(across).max() > ALONG * np.abs(apart).max()):
-        model.ledger.refuse(
-            card.name, "between grid points of different axes, or apart across its direction: its forces do not balance"
-        )
-        return
-    names = [model.group(card, [node]) for node in (a, b)]
-    six, none = tuple(value if k == c else 0.0 for k in range(6)), (0.0,) * 6
-    stiffness, damping = (six, None) if card.name.startswith("CELAS") else (none, six)
-    model.springs.append(DeckSpring((names[0], names[1]), stiffness, damping, _rows(axes[0])))
-
-
-def _in_basic(model: NastranModel, nodes: list[int], components: tuple[int, ...]) -> bool:
-    """Whether components along the axes of these points are those along basic axes."""
-    whole = all(set(part) <= set(components) or not set(part) & set(components) for part in (ALL[:3], ALL[3:]))
-    return whole or all(node not in model.points.axes for node in nodes)
 
 
 def _rigid(model: NastranModel, card: Card) -> None:
@@ -262,12 +120,49 @@ def _rigid(model: NastranModel, card: Card) -> None:
             model.ledger.refuse("RBAR", "only with all six components of one grid point independent")
             return
         components = components_of(card, card.text(7 - first) or "123456")
-    if not _in_basic(model, followers, components):
-        model.ledger.refuse(card.name, "single components of grid points with axes of their own (CD)")
-        return
     name = f"{card.name.lower()}_{card.text(1)}"
+    turned = [node for node in followers if not in_basic(model, [node], components)]
+    for node in turned:
+        model.rows += _rigid_rows(model, card, leader, node, components)
+    followers = [node for node in followers if node not in turned]
+    if not followers:
+        return
     group = model.group(card, followers, f"{name}_nodes")
     model.rigid.append(RigidGroup(name, model.group(card, [leader]), group, components))
+
+
+def _rigid_rows(
+    model: NastranModel, card: Card, leader: int, node: int, components: tuple[int, ...]
+) -> list[tuple[tuple[int, int], Row]]:
+    """Return an equation for each component of a point, along its own axes, that follows another one rigidly.
+
+    e · u = e · (u_L + theta_L × r) = e · u_L + theta_L · (r × e), and e · theta = e · theta_L.
+    """
+    made = []
+    r = model.point(card, node) - model.point(card, leader)
+    for c in components:
+        e, first = model.axes(node)[:, c % 3], c - c % 3
+        row = {(node, first + j): float(e[j]) for j in range(3)}
+        row |= {(leader, first + j): -float(e[j]) for j in range(3)}
+        if first == 0:
+            row |= {(leader, 3 + j): -float(value) for j, value in enumerate(np.cross(r, e))}
+        made.append(((node, first), row))
+    return made
+
+
+def _rod_of_constant_length(model: NastranModel, card: Card) -> None:
+    """RROD: the distance of two grid points stays; one component of one of them, CMA or CMB, gives way."""
+    ends = [card.integer(2), card.integer(3)]
+    x = model.point(card, ends[1]) - model.point(card, ends[0])
+    words = [card.text(k) or "0" for k in (4, 5)]
+    given = [components_of(card, word) for word in words]
+    both = (*given[0], *given[1])
+    if not np.linalg.norm(x) > 0 or len(both) != 1 or both[0] > 2:
+        model.ledger.refuse("RROD", "expected two points apart, and one translation in CMA or CMB that gives way")
+        return
+    x = x / np.linalg.norm(x)
+    row = {(node, j): sign * float(x[j]) for node, sign in zip(ends, (-1, 1), strict=True) for j in range(3)}
+    model.rows.append(((ends[0] if given[0] else ends[1], 0), row))
 
 
 def _written_out(words: list[str]) -> list[str]:
@@ -297,7 +192,7 @@ def _mean(model: NastranModel, card: Card) -> None:
         for number, six in weights.items()
         if number in model.points.axes and not np.all(six == np.repeat(six[[0, 3]], 3))
     ]
-    if any(words[k].upper() == "UM" for k in ends) or turned or not _in_basic(model, [node], components):
+    if any(words[k].upper() == "UM" for k in ends) or turned or not in_basic(model, [node], components):
         why = "with UM, or with weights of single components along axes of their own (CD)"
         model.ledger.refuse("RBE3", why)
         return
@@ -341,7 +236,7 @@ def _weights(card: Card, words: list[str]) -> dict[int, Array]:
 
 def _equations(model: NastranModel) -> None:
     """MPC of the sets that the case control selects; of all sets where there is no case control."""
-    chosen = _selected(model, "MPC")
+    chosen = selected_sets(model, "MPC")
     for card in model.of("MPC"):
         if chosen is not None and card.integer(1) not in chosen:
             model.ledger.note("MPC", "of a set that the case control does not select")
@@ -349,102 +244,37 @@ def _equations(model: NastranModel) -> None:
             _equation(model, card)
 
 
-def _selected(model: NastranModel, kind: str) -> set[int] | None:
-    """Return the sets of SPC or MPC that the case control selects, those of SPCADD and MPCADD written out.
-
-    None: the deck has no case control, and all sets count. A body has one set of equations: subcases that select
-    different ones, or some none, are refused.
-    """
-    if model.chosen is None:
-        return None
-    by_subcase = model.chosen[kind]
-    if len(by_subcase) > 1:
-        words = ", ".join(str(number or "none") for number in sorted(by_subcase))
-        if kind == "MPC":
-            model.ledger.refuse(kind, f"subcases select different sets ({words}): keep one in the case control")
-        else:
-            model.ledger.note(kind, f"subcases select different sets ({words}): all of them make interfaces")
-    chosen = {number for number in by_subcase if number}
-    for card in model.of(f"{kind}ADD"):
-        if card.integer(1) in chosen:
-            chosen |= set(numbers_of(card, 2))
-    return chosen
-
-
 def _equation(model: NastranModel, card: Card) -> None:
-    terms, nodes = [], []
+    """Add an equation; the components of grid points with axes of their own are turned to basic axes."""
+    terms = []
     for first in range(2, len(card.fields), 8):
         for k in (first, first + 3):
             if card.text(k):
-                nodes.append(card.integer(k))
                 terms.append((card.integer(k), card.integer(k + 1, 0) - 1, card.real(k + 2)))
-    is_basic = all(n in model.points.positions and n not in model.points.axes for n in nodes)
-    if not is_basic or any(not 0 <= c < 6 for _, c, _ in terms):
-        model.ledger.refuse("MPC", "of scalar points, or of grid points with axes of their own (CD)")
+    if any(node not in model.points.positions or not 0 <= c < 6 for node, c, _ in terms):
+        model.ledger.refuse("MPC", "of scalar points")
         return
-    model.equations.append(Equation(tuple((model.group(card, [n]), c, a) for n, c, a in terms)))
+    row: Row = {}
+    for node, c, a in terms:
+        for j, part in enumerate(model.axes(node)[:, c % 3].tolist()):
+            if part:
+                place = (node, c - c % 3 + j)
+                row[place] = row.get(place, 0.0) + a * part
+    node, c, _ = terms[0]
+    if node in model.points.axes:
+        model.rows.append(((node, c - c % 3), row))
+    else:
+        model.plain_rows.append(row)
 
 
-def _supports(model: NastranModel) -> None:
-    """SPC, SPC1 and permanent constraints of grid points; BSET and ASET as interfaces."""
-    held: dict[int, set[int]] = {}
-    chosen = _selected(model, "SPC")
-    if chosen == set() and any(name in model.cards for name in ("SPC", "SPC1")):
-        model.ledger.note("SPC", "the case control selects none: those of all sets make interfaces")
-        chosen = None
-    last: Card | None = None
-    for card in model.of("SPC1", "SPC"):
-        if chosen is not None and card.integer(1) not in chosen:
-            model.ledger.note(card.name, "of a set that the case control does not select")
-            continue
-        last = card
-        if card.name == "SPC1":
-            for node in numbers_of(card, 3):
-                held.setdefault(node, set()).update(components_of(card, card.text(2)))
-        else:
-            for k in (2, 5):
-                if card.text(k):
-                    held.setdefault(card.integer(k), set()).update(components_of(card, card.text(k + 1)))
-    default = next((card.text(7) for card in model.of("GRDSET")), "")
-    for card in model.of("GRID"):
-        word = card.text(7) or default
-        if word and word != "0":
-            held.setdefault(card.integer(1), set()).update(components_of(card, word))
-            last = card
-    if last is not None:
-        _groups_of(model, last, held, "support")
-    boundary: dict[int, set[int]] = {}
-    for card in model.of("BSET1", "BNDFIX1", "ASET1"):
-        for node in numbers_of(card, 2):
-            boundary.setdefault(node, set()).update(components_of(card, card.text(1)))
-        last = card
-    for card in model.of("BSET", "BNDFIX", "ASET"):
-        for k in range(1, len(card.fields), 2):
-            if card.text(k):
-                boundary.setdefault(card.integer(k), set()).update(components_of(card, card.text(k + 1)))
-        last = card
-    if boundary and last is not None:
-        _groups_of(model, last, {n: c for n, c in boundary.items() if n not in held}, "boundary")
-    grounded = {n: c for n, c in model.grounded.items() if n not in held and n not in boundary}
-    if grounded:
-        _groups_of(model, model.cards["GRID"][0], grounded, "grounded")
-
-
-def _groups_of(model: NastranModel, card: Card, held: dict[int, set[int]], what: str) -> None:
-    """Make one support for each set of components, each grid point in one."""
-    followers = {node for link in model.rigid for node in model.groups[link.followers]}
-    by: dict[tuple[int, ...], list[int]] = {}
-    for node, components in held.items():
-        if node not in model.points.positions or node in followers:
-            model.ledger.note("SPC", "of scalar points, or of grid points that follow others")
-        elif not _in_basic(model, [node], tuple(sorted(components))):
-            model.ledger.note("SPC", "along axes of their own (CD): left out of the interfaces")
-        else:
-            by.setdefault(tuple(sorted(components)), []).append(node)
-    for same, nodes in by.items():
-        name = f"{what}_{''.join(str(c + 1) for c in same)}"
-        group = model.group(card, nodes, name)
-        model.supports.append(Support(name, group, same, what != "support"))
+def _close_equations(model: NastranModel) -> None:
+    """Make the equations of the deck from their rows in basic axes."""
+    made, refused = solved_equations(model.rows)
+    for node, count in refused:
+        why = f"equations that say more of a grid point (first: {node}) than its components, or the same twice"
+        model.ledger.refuse("MPC, RBE2, RBAR", why, count=count)
+    for row in (*made, *model.plain_rows):
+        model.add_equation(row)
 
 
 def _loads(model: NastranModel) -> None:

@@ -11,7 +11,7 @@ from fe_models.importers.decks.deck import Equation, LineSection, RigidGroup
 from fe_models.importers.decks.nastran.bar_shapes import bar_shape
 from fe_models.importers.decks.nastran.model import NastranModel, components_of
 
-__all__ = ["BARS", "read_bars", "with_defaults"]
+__all__ = ["BARS", "OFFSETS", "line_of_ends", "orientation_of", "read_bars", "with_defaults"]
 
 BARS = ("CBAR", "CBEAM")
 ORIENTATION, OFFT = (5, 6, 7), 8
@@ -102,6 +102,17 @@ def read_bars(model: NastranModel, known: Card, cards: list[Card]) -> None:
         model.ledger.note(
             cards[0].name, "mass is consistent here, the deck lumps it (no PARAM,COUPMASS)", count=len(cards)
         )
+
+
+def line_of_ends(model: NastranModel, card: Card) -> Array:
+    """Return both ends of a bar with their offsets, (2, 3), basic axes."""
+    ends = np.array([model.point(card, card.integer(k)) for k in (3, 4)])
+    return ends + _offsets(model, card, ends)
+
+
+def orientation_of(model: NastranModel, card: Card) -> Array:
+    """Return the vector of a bar that spans plane 1 with its axis, (3,), basic axes."""
+    return _orientation(model, card, model.point(card, card.integer(3)), line_of_ends(model, card)[0])
 
 
 def _digits(length: float) -> int:

@@ -50,9 +50,14 @@ CARDS: dict[str, str] = {
     "CBAR": _BEAM, "CBEAM": f"{_BEAM} SA=0 SB=0",
     "BAROR": "- PID - - X1 X2 X3 OFFT", "BEAMOR": "- PID - - X1 X2 X3 OFFT",
     "CROD": "EID PID G1 G2", "CTUBE": "EID PID G1 G2", "CONROD": "EID G1 G2 MID A J C~ NSM",
+    "CONM1": (
+        "EID G CID M11 M21 M22 M31 M32 M33 M41 M42 M43 M44 M51 M52 M53 M54 M55 M61 M62 M63 M64 M65 M66"
+    ),
     "CONM2": "EID G CID M X1 X2 X3 - I11 I21 I22 I31 I32 I33",
     "CBUSH": "EID PID GA GB GO/X1 X2 X3 CID S OCID=-1 S1! S2! S3!",
     "PBUSH": "PID ...",
+    "CBUSH1D": "EID PID GA GB CID", "PBUSH1D": "PID K C M - SA~ SE~ ...",
+    "CGAP": "EID PID GA GB GO/X1~ X2~ X3~ CID", "PGAP": "PID U0 F0~ KA KB KT MU1 MU2~ TMAX~ MAR~ TRMIN~",
     "CELAS1": "EID PID G1 C1 G2 C2", "CELAS2": "EID K G1 C1 G2 C2 GE^ S~",
     "PELAS": "PID1 K1 GE1^ S1~ PID2 K2 GE2^ S2~",
     "CDAMP1": "EID PID G1 C1 G2 C2", "CDAMP2": "EID B G1 C1 G2 C2",
@@ -61,6 +66,7 @@ CARDS: dict[str, str] = {
     "PMASS": "PID1 M1 PID2 M2 PID3 M3 PID4 M4",
     "CVISC": "EID PID G1 G2", "PVISC": "PID1 CE1 CR1 - PID2 CE2 CR2",
     "RBE2": "EID GN CM ...", "RBE3": "EID - REFGRID REFC ...", "RBAR": "EID GA GB CNA CNB CMA CMB ALPHA~ TREF~",
+    "RROD": "EID GA GB CMA CMB ALPHA~ TREF~",
     "MPC": "...", "MPCADD": "...", "SPC": "SID G1 C1 D1~ G2 C2 D2~", "SPC1": "...", "SPCADD": "...",
     "BSET": "...", "BSET1": "...", "BNDFIX": "...", "BNDFIX1": "...", "ASET": "...", "ASET1": "...",
     "FORCE": "SID G CID F N1 N2 N3", "MOMENT": "SID G CID M N1 N2 N3", "GRAV": "SID CID A N1 N2 N3 MB~",
@@ -101,7 +107,7 @@ HARMLESS = frozenset(
 #: properties and materials that no element read here can name: elements that do are refused by their own name
 UNNAMED = frozenset(
     "MAT2 MAT3 MAT9 MAT10 MAT11 MATF MATG MATHE MATHP MATORT MATEP PACABS PACBAR PAABSF PAXISYM PBCOMP PBEAM3 "
-    "PBEND PBUSH1D PBUSH2D PCOHE PCONEAX PFAST PGAP PLPLANE PLSOLID PSEAM PSHEAR PRAC2D PRAC3D PWELD PSHLN1 PSHLN2 "
+    "PBEND PBUSH2D PCOHE PCONEAX PFAST PLPLANE PLSOLID PSEAM PSHEAR PRAC2D PRAC3D PWELD PSHLN1 PSHLN2 "
     "PSLDN1".split()
 )
 #: cards that change another card in nonlinear analyses, or over frequency: that card is taken as it stands

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array
 from fe_models.importers.bulk_data.cards import Card
 from fe_models.importers.decks.deck import DeckLayer, DeckMaterial, ShellSection
@@ -113,6 +114,8 @@ def _direction(model: NastranModel, card: Card) -> Array:
         return np.asarray(model.system(card, int(word), np.mean(corners, axis=0))[:, 0])
     side = corners[1] - corners[0]
     normal = np.cross(corners[2] - corners[0], corners[-1] - corners[1])
+    if not np.linalg.norm(normal) > 0:
+        raise MeshError(f"{card.where} {card.text(1)}: its corners span no area")
     normal = normal / np.linalg.norm(normal)
     side = side - normal * (normal @ side)
     angle = np.deg2rad(card.real(ANGLE_FIELD[card.name], 0.0))

@@ -22,9 +22,14 @@ from fe_models.importers.decks.deck import (
     SolidSection,
     Support,
 )
+from fe_models.importers.decks.equations import Row
 from fe_models.importers.decks.ledger import Ledger
+from fe_models.importers.nastran import ELEMENT_TYPES
 
-__all__ = ["NastranModel"]
+__all__ = ["ALL", "ALONG", "NastranModel"]
+
+ALL = (0, 1, 2, 3, 4, 5)
+ALONG = 1e-9  #: part of a vector across a line, below which it is along it
 
 
 @dataclass
@@ -49,11 +54,16 @@ class NastranModel:
     rigid: list[RigidGroup] = field(default_factory=list)
     couplings: list[Coupling] = field(default_factory=list)
     equations: list[Equation] = field(default_factory=list)
+    #: equations in basic axes, of a first point with axes of its own: (point, 0 or 3 for its rotations), coefficients
+    rows: list[tuple[tuple[int, int], Row]] = field(default_factory=list)
+    plain_rows: list[Row] = field(default_factory=list)  #: others: the first one gives way
     supports: list[Support] = field(default_factory=list)
     loads: list[Load] = field(default_factory=list)
     groups: dict[str, tuple[int, ...]] = field(default_factory=dict)  #: of nodes, by their numbers
     faces: dict[str, list[tuple[int, ...]]] = field(default_factory=dict)  #: group -> corner grids of faces
     elements: dict[int, tuple[str, str]] = field(default_factory=dict)  #: number -> card, group of cells
+    held: dict[int, set[int]] = field(default_factory=dict)  #: grid point -> components that are held
+    plane: int | None = None  #: axis of the basic system across the plane of a planar deck
     grounded: dict[int, set[int]] = field(default_factory=dict)  #: grid point -> components that elements hold
     last_point: int = 0  #: number of the last grid point that was made here
     properties: dict[str, dict[int, Card]] = field(default_factory=dict)  #: by kind and number, made when asked for
@@ -75,6 +85,28 @@ class NastranModel:
         self.last_point += 1
         self.points.positions[self.last_point] = np.asarray(position)
         return self.last_point
+
+    def add_equation(self, row: Row) -> None:
+        """Add an equation in basic axes; terms that vanish are left out, but for the first, which gives way."""
+        terms = [(f"node_{node}", c, a) for k, ((node, c), a) in enumerate(row.items()) if a != 0 or k == 0]
+        for node in dict.fromkeys(node for node, _ in row):
+            self.groups[f"node_{node}"] = (node,)
+        self.equations.append(Equation(tuple(terms)))
+
+    def used_points(self) -> set[int]:
+        """Return the grid points with a motion of their own: of sectioned elements, masses, springs, leaders."""
+        found: set[int] = set()
+        for cards in self.cards.values():
+            for card in cards:
+                name = card.name
+                if name in ELEMENT_TYPES and self.elements.get(card.integer(1, -1), ("", ""))[0] == name:
+                    first, last = 3, 3 + max(ELEMENT_TYPES[name])
+                    words = [card.text(k) for k in range(first, last)]
+                    found |= {int(word) for word in words if word.isdigit()}
+        found |= {number for number in self.ends.values()}
+        groups = [mass.nodes for mass in self.masses] + [name for each in self.springs for name in each.nodes]
+        groups += [link.node for link in self.rigid] + [coupling.node for coupling in self.couplings]
+        return found.union(*(self.groups[name] for name in groups)) & set(self.points.positions)
 
     def property_of(self, card: Card, *names: str) -> Card | None:
         """Return the property card that an element names in its field 2, its own number where that is blank."""

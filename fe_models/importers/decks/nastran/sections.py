@@ -9,12 +9,24 @@ from fe_models.importers.decks.deck import DeckMass, DeckMaterial, DeckSpring, S
 from fe_models.importers.decks.nastran.bars import BARS, read_bars, with_defaults
 from fe_models.importers.decks.nastran.layups import layered_shells, orthotropic_shells, sheet_material
 from fe_models.importers.decks.nastran.model import NastranModel
+from fe_models.importers.decks.nastran.tapers import cut_tapers
 
 __all__ = ["SHELLS", "SOLIDS", "read_sections"]
 
 SOLIDS = ("CTETRA", "CHEXA", "CPENTA", "CPYRAM", "CPYRA")
 SHELLS = ("CTRIA3", "CTRIAR", "CTRIA6", "CQUAD4", "CQUADR", "CQUAD8")
 _OFFSET_FIELD = {"CTRIA3": 7, "CTRIAR": 7, "CTRIA6": 10, "CQUAD4": 8, "CQUADR": 8, "CQUAD8": 16}
+#: card -> corner grids, and of each middle grid, in the order of the card, the corners of its edge
+_MIDDLES: dict[str, tuple[int, tuple[tuple[int, int], ...]]] = {
+    "CTETRA": (4, ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))),
+    "CPYRAM": (5, ((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4))),
+    "CPENTA": (6, ((0, 1), (1, 2), (2, 0), (0, 3), (1, 4), (2, 5), (3, 4), (4, 5), (5, 3))),
+    "CHEXA": (
+        8, ((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 5), (2, 6), (3, 7), (4, 5), (5, 6), (6, 7), (7, 4)),
+    ),
+}  # fmt: skip
+_MIDDLES["CPYRA"] = _MIDDLES["CPYRAM"]
+_MIDDLES |= {"CTRIA6": (3, ((0, 1), (1, 2), (2, 0))), "CQUAD8": (4, ((0, 1), (1, 2), (2, 3), (3, 0)))}
 _CORNERS = {"CTRIA3": (11, 12, 13), "CTRIAR": (11, 12, 13), "CTRIA6": (11, 12, 13)}
 _THICKNESS_FIELDS = {name: _CORNERS.get(name, (11, 12, 13, 14)) for name in SHELLS}  #: T1 to T4
 
@@ -26,6 +38,8 @@ def read_sections(model: NastranModel) -> None:
     for card in model.of("MAT8"):
         sheet_material(model, card)
     with_defaults(model)
+    cut_tapers(model)
+    _with_middles(model)
     by_property: dict[int, list[Card]] = {}
     for card in model.of(*SOLIDS, *SHELLS, *BARS):
         by_property.setdefault(card.integer(2, card.integer(1)), []).append(card)
@@ -57,6 +71,33 @@ def _material(model: NastranModel, card: Card) -> None:
 def _cells(model: NastranModel, cards: list[Card], group: str) -> None:
     for card in cards:
         model.elements[card.integer(1)] = (card.name, group)
+
+
+def _with_middles(model: NastranModel) -> None:
+    """Give cells of which some middle grids are blank points there, which follow the mean of their edge's corners.
+
+    The edge is then straight and its displacement linear, as Nastran makes it. Cells without any are of first order.
+    """
+    made: dict[tuple[int, int], int] = {}
+    for name, (n, edges) in _MIDDLES.items():
+        cards = model.cards.get(name, [])
+        for k, card in enumerate(cards):
+            middles = [card.text(2 + n + j) for j in range(1, len(edges) + 1)]
+            if not any(middles) or all(middles):
+                continue
+            corners = [card.integer(3 + j) for j in range(n)]
+            for j, (a, b) in enumerate(edges):
+                if middles[j]:
+                    continue
+                edge = (min(corners[a], corners[b]), max(corners[a], corners[b]))
+                if edge not in made:
+                    made[edge] = model.new_point((model.point(card, edge[0]) + model.point(card, edge[1])) / 2)
+                    for c in range(6 if name in SHELLS else 3):
+                        row = {(made[edge], c): 1.0, (edge[0], c): -0.5, (edge[1], c): -0.5}
+                        model.plain_rows.append(row)
+                middles[j] = str(made[edge])
+            fields = (*card.fields[: 2 + n], *middles, *card.fields[2 + n + len(edges) :])
+            cards[k] = Card(card.name, fields, card.where)
 
 
 def _solids(model: NastranModel, known: Card, cards: list[Card]) -> None:
@@ -122,9 +163,9 @@ def _ratios(model: NastranModel, known: Card) -> tuple[float, float] | str:
     """
     if not known.text(2) or not known.text(3):
         return "without MID1 or T: a plate that only bends"
-    if not known.text(4):
-        return "without MID2: a membrane, without stiffness in bending"
-    materials = [model.materials.get(known.text(k)) for k in (2, 4)]
+    if not known.text(4) and model.plane is None:
+        return "without MID2: a membrane, without stiffness in bending; only where the deck is planar"
+    materials = [model.materials.get(known.text(k) or known.text(2)) for k in (2, 4)]
     third = model.materials.get(known.text(6) or known.text(2))
     first, second = materials
     if first is None or second is None or third is None:

@@ -17,6 +17,7 @@ from fe_models.importers.decks.nastran.card_fields import check_cards
 from fe_models.importers.decks.nastran.case_control import case_control, read_parameters
 from fe_models.importers.decks.nastran.model import NastranModel
 from fe_models.importers.decks.nastran.sections import SHELLS, SOLIDS, read_sections
+from fe_models.importers.decks.nastran.supports import hold_points
 from fe_models.importers.nastran import ELEMENT_TYPES, nodes_of
 from fe_models.importers.raw_mesh import RawBlock, RawMesh
 
@@ -45,6 +46,7 @@ def read_nastran_deck(path: Path, data: bytes) -> Deck:
     model.has_temperature = None if head is None else head.has_temperature
     parameters = [*([] if head is None else head.parameters), *cards.get("PARAM", ())]
     read_parameters(model, parameters)
+    hold_points(model)
     read_sections(model)
     read_attached(model)
     check_cards(model)
@@ -54,7 +56,7 @@ def read_nastran_deck(path: Path, data: bytes) -> Deck:
     return Deck(
         path, "nastran", mesh, model.ledger, model.materials, tuple(model.solids), tuple(model.shells),
         tuple(model.lines), tuple(model.masses), tuple(model.springs), tuple(model.rigid), tuple(model.couplings),
-        tuple(model.equations), tuple(model.supports), tuple(model.loads),
+        tuple(model.equations), tuple(model.supports), tuple(model.loads), plane=model.plane,
     )  # fmt: skip
 
 

@@ -1,0 +1,44 @@
+"""Equations between components of nodes in basic axes: those of nodes with axes of their own are solved together."""
+
+from collections.abc import Iterable
+
+import numpy as np
+from scipy.linalg import qr
+
+__all__ = ["Row", "solved_equations"]
+
+NEGLIGIBLE = 1e-14  #: part of the largest coefficient below which a term is none
+Row = dict[tuple[int, int], float]  #: (node, component in basic axes) -> coefficient; the sum of all is zero
+
+
+def solved_equations(rows: Iterable[tuple[tuple[int, int], Row]]) -> tuple[list[Row], list[tuple[int, int]]]:
+    """Return equations that each give away their first component, and (node, count) of those that cannot.
+
+    Equations whose first terms were components of one node along its own axes are solved together for as many of its
+    components in basic axes, those that are determined best, so that these give way.
+
+    Parameters
+    ----------
+    rows
+        (node, 0 for its translations or 3 for its rotations) that gives way, and the equation.
+    """
+    together: dict[tuple[int, int], list[Row]] = {}
+    for lead, row in rows:
+        together.setdefault(lead, []).append(row)
+    made: list[Row] = []
+    refused = []
+    for (node, first), mine in together.items():
+        own = [(node, first + j) for j in range(3)]
+        names = own + [name for name in dict.fromkeys(name for row in mine for name in row) if name not in own]
+        A = np.array([[row.get(name, 0.0) for name in names] for row in mine])
+        if len(mine) > 3 or np.linalg.matrix_rank(A[:, :3]) < len(mine):
+            refused.append((node, len(mine)))
+            continue
+        order = qr(A[:, :3], pivoting=True, mode="r")[1][: len(mine)]
+        A = np.linalg.solve(A[:, order], A)
+        A[np.abs(A) < NEGLIGIBLE * np.abs(A).max()] = 0.0
+        rest = [k for k in range(len(names)) if k not in order]
+        made += [
+            {names[j]: float(A[k, j]) for j in (slave, *rest) if A[k, j] or j == slave} for k, slave in enumerate(order)
+        ]
+    return made, refused
