@@ -165,7 +165,7 @@ class BodySection(Table):
     nodes: Path | None = Field(None, description="the path of a table of nodes, for beams")
     lines: Path | None = Field(None, description="the path of a table of lines, for beams")
     plane: choice("plane", lambda: tuple(PLANES)) | None = Field(  # type: ignore[valid-type]
-        None, description=f"the plane beams, or the body of a deck, deform in, one of {', '.join(PLANES)}; default: space"
+        None, description=f"the plane beams or decks deform in, one of {', '.join(PLANES)}; default: space"
     )
     part: PartSection | None = Field(None, description="a table {number, of or at, axis}: one part of the mesh alone")
     units: choice("unit system", lambda: tuple(UNIT_SYSTEMS)) = Field(  # type: ignore[valid-type]

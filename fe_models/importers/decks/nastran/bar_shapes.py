@@ -217,7 +217,7 @@ def _dbox(
 def _hat1(b: float, h: float, top: float, t: float, t_plate: float) -> tuple[list[Rectangle], Any]:
     """A hat closed by a plate below it."""
     brim, high = (b - top) / 2, h - t_plate - t
-    parts = [(b, t_plate, 0, t_plate / 2), (top, t, 0, h - t / 2)]
+    parts: list[Rectangle] = [(b, t_plate, 0, t_plate / 2), (top, t, 0, h - t / 2)]
     parts += [(t, high, side * (top - t) / 2, t_plate + high / 2) for side in (-1, 1)]
     parts += [(brim, t, side * (top + brim) / 2, t_plate + t / 2) for side in (-1, 1) if brim > 0]
     w, d = top - t, h - t / 2 - t_plate / 2
