@@ -1,4 +1,4 @@
-"""The command line `cms`: reduce, look at and picture flexible bodies."""
+"""The command line `cms`: reduce, inspect and draw flexible bodies."""
 
 __all__ = ["main"]
 

@@ -1,4 +1,4 @@
-"""`python -m cms.cli` is the command `cms`, where its script is not on the path."""
+"""`python -m cms.cli` runs the command `cms` if its script is not on the path."""
 
 from cms.cli import main
 

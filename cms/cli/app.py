@@ -1,4 +1,4 @@
-"""The commands of `cms`; each imports what it needs when it runs, so that `cms --help` answers at once."""
+"""The commands of `cms`; each imports what it needs when it runs, so that `cms --help` responds at once."""
 
 from pathlib import Path
 from typing import Annotated
@@ -25,11 +25,9 @@ app.command("view")(view_command)
 def job_command(
     deck: Annotated[Path, typer.Argument(help="Deck: Abaqus, CalculiX (.inp), Nastran (.bdf), ANSYS (.cdb).")],
     units: Annotated[
-        str | None, typer.Option(help="Unit system of its numbers, such as mm-t-s; decks do not say it.")
+        str | None, typer.Option(help="Unit system of its numbers, such as mm-t-s; decks do not state it.")
     ] = None,
-    program: Annotated[
-        str | None, typer.Option(help="Whose elements a deck (.inp) has: calculix (default) or abaqus.")
-    ] = None,
+    program: Annotated[str | None, typer.Option(help="Program of a deck (.inp): calculix (default) or abaqus.")] = None,
     density: Annotated[
         list[str] | None, typer.Option(help="Density of materials without one: NAME=NUMBER, or a number; repeatable.")
     ] = None,
@@ -41,8 +39,8 @@ def job_command(
 ) -> None:
     """Write the complete job of a deck: materials, sections, masses, springs, couplings, supports, loads.
 
-    Prints every card that is not taken over, with its consequence; a mass or coupling is never dropped unasked.
-    Without -o the job stands beside the deck: rod.inp gives rod.toml.
+    The command prints every card that is not converted, with its consequence; a mass or a coupling is never dropped
+    unless it is named. Without -o the job is written beside the deck: rod.inp gives rod.toml.
 
     Example: cms job rod.inp --units mm-t-s -o rod.toml
 
@@ -66,13 +64,13 @@ def frame_command(
     ] = None,
     units: Annotated[str | None, typer.Option(help="Write numbers in another unit system, such as m-kg-s.")] = None,
     geometric: Annotated[
-        bool, typer.Option("--geometric-stiffness/--no-geometric-stiffness", help="Carry it over, or leave it out.")
+        bool, typer.Option("--geometric-stiffness/--no-geometric-stiffness", help="Convert it, or leave it out.")
     ] = True,
     output: Output = None,
 ) -> None:
-    """Convert a modal file to another body frame, from the file alone; its modes are diagonalised afresh.
+    """Convert a modal file to another body frame, from the file alone; its modes are diagonalised anew.
 
-    Without -o the file stands beside the old one: rod.h5 gives rod_tisserand.h5.
+    Without -o the new file is written beside the old one: rod.h5 gives rod_tisserand.h5.
 
     Example: cms frame rod.h5 --to tisserand -o rod_t.h5
 
@@ -98,7 +96,7 @@ def faces_command(
 ) -> None:
     """List the faces of a CAD file: kind, area, centre, normal, radius, name, colour; needs the extra mesh.
 
-    What it is can be written in a job: faces = ["cylinder r=12"].
+    A job can select faces by these properties: faces = ["cylinder r=12"].
 
     Example: cms faces part.step -o faces.png
 
@@ -113,11 +111,11 @@ def faces_command(
 @guarded
 def converge_command(
     job: Annotated[Path, typer.Argument(help="Job file (TOML) of a CAD file with [mesh_size].")],
-    ratio: Annotated[float, typer.Option(help="Size of the coarser mesh over that of the job.")] = 1.5,
-    modes: Annotated[int, typer.Option(help="Elastic free modes that are compared.")] = 10,
+    ratio: Annotated[float, typer.Option(help="Ratio of the coarser mesh size to that of the job.")] = 1.5,
+    modes: Annotated[int, typer.Option(help="Number of elastic free modes to compare.")] = 10,
     json: Annotated[bool, typer.Option("--json", help="Write the numbers as JSON, for other programs.")] = False,
 ) -> None:
-    """Mesh a CAD job at its own size and a coarser one: free frequencies, and the estimated error of the mesh.
+    """Mesh a CAD job with its own size and a coarser one; show free frequencies and the estimated mesh error.
 
     Example: cms converge part.toml
     """
@@ -132,7 +130,7 @@ def modes_command(
     job: Annotated[Path, typer.Argument(help="Job file (TOML), see docs/job_file.md.")],
     json: Annotated[bool, typer.Option("--json", help="Write the list as JSON, for other programs.")] = False,
 ) -> None:
-    """List the modes of a job in words: which columns and shapes, in which order, in which frame; writes no file.
+    """Describe the modes of a job: its columns and shapes, their order, and the frame; writes no file.
 
     Example: cms modes rod.toml
     """
@@ -147,7 +145,7 @@ def formats_command(
     json: Annotated[bool, typer.Option("--json", help="Write the table as JSON, for other programs.")] = False,
     markdown: Annotated[bool, typer.Option("--markdown", help="Write the table of docs/formats.md.")] = False,
 ) -> None:
-    """List the formats of other programs that are read and written, the versions tried, and what is lost.
+    """List the formats of other programs that are read and written, the versions tested, and what is lost.
 
     Example: cms formats
     """
@@ -161,18 +159,16 @@ def formats_command(
 def export_command(
     file: ModalFile,
     to: Annotated[str, typer.Option("--to", help="Format, one of those cms formats lists by name: mbsim, exudyn, ...")],
-    units: Annotated[
-        str | None, typer.Option(help="Unit system of the numbers, such as m-kg-s; it has to be said.")
-    ] = None,
+    units: Annotated[str | None, typer.Option(help="Unit system of the numbers, such as m-kg-s; required.")] = None,
     nodes: Annotated[
         str, typer.Option(help="Nodes, where the format leaves the choice: interfaces or all.")
     ] = "default",
     load: Annotated[
-        list[str] | None, typer.Option(help="Load case that acts all the time (ext_ptfm): NAME=AMPLITUDE; repeatable.")
+        list[str] | None, typer.Option(help="Load case that acts permanently (ext_ptfm): NAME=AMPLITUDE; repeatable.")
     ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write.")] = None,
 ) -> None:
-    """Write a modal file in the format of another program, and say what that format cannot hold.
+    """Write a modal file in the format of another program, and report what that format cannot hold.
 
     Example: cms export rod.h5 --to exudyn --units m-kg-s -o rod_exudyn.npz
 
@@ -187,7 +183,7 @@ def export_command(
 @guarded
 def recovery_command(
     file: ModalFile,
-    table: Annotated[str | None, typer.Option(help="Name of the table; needed where there are several.")] = None,
+    table: Annotated[str | None, typer.Option(help="Name of the table; required if there are several.")] = None,
     rows: Annotated[
         Path | None, typer.Option(help="TOML file with tables of rows that the body knows without its model.")
     ] = None,
@@ -199,7 +195,7 @@ def recovery_command(
         Path | None, typer.Option("--output", "-o", help="File: .npz, .mat, .op4, .csv, or .h5 with the tables added.")
     ] = None,
 ) -> None:
-    """List the recovery rows of a modal file, or write them: accelerations, stresses, element and interface forces.
+    """List the recovery rows of a modal file, or write them: accelerations, stress, element and interface forces.
 
     Example: cms recovery tower.h5
 
@@ -216,14 +212,13 @@ def recovery_command(
 @guarded
 def import_command(
     files: Annotated[list[str], typer.Argument(help="Files of one body, or of its matrices as K=FILE M=FILE.")],
-    units: Annotated[
-        str | None, typer.Option(help="Unit system of the files, such as mm-t-s; it has to be said.")
-    ] = None,
-    name: Annotated[str | None, typer.Option(help="Name of the body; default: of the first file.")] = None,
+    units: Annotated[str | None, typer.Option(help="Unit system of the files, such as mm-t-s; required.")] = None,
+    name: Annotated[str | None, typer.Option(help="Name of the body; default: that of the first file.")] = None,
     form: Annotated[
-        str | None, typer.Option("--format", help="Format, by the name in cms formats; default: told by the content.")
+        str | None,
+        typer.Option("--format", help="Format, by its name in cms formats; default: found from the content."),
     ] = None,
-    nodes: Annotated[Path | None, typer.Option(help="Deck or mesh with the places that the files lack.")] = None,
+    nodes: Annotated[Path | None, typer.Option(help="Deck or mesh with the positions that the files lack.")] = None,
     boundary: Annotated[
         str | None, typer.Option(help="Of bare matrices: boundary nodes in the order of the rows, 3,11,19.")
     ] = None,
@@ -235,15 +230,17 @@ def import_command(
     ] = None,
     nodal_masses: Annotated[Path | None, typer.Option(help="Table of node and mass, instead of the full mass.")] = None,
     mesh: Annotated[Path | None, typer.Option(help="Mesh behind the body, with --density, instead.")] = None,
-    density: Annotated[float | None, typer.Option(help="Of the mesh, in the units of the files.")] = None,
+    density: Annotated[float | None, typer.Option(help="Density of the mesh, in the units of the files.")] = None,
     to: Annotated[str, typer.Option("--frame", help="Body frame: tisserand, buckens or nodal.")] = "tisserand",
     at: Annotated[str | None, typer.Option("--at", help="Interface that carries a nodal frame.")] = None,
-    damping: Annotated[float | None, typer.Option(help="Ratio of every mode, beside the damping of the files.")] = None,
+    damping: Annotated[
+        float | None, typer.Option(help="Ratio of every mode, added to the damping of the files.")
+    ] = None,
     mend_mass: Annotated[bool, typer.Option("--mend-mass", help="Set slightly negative masses to zero.")] = False,
     accept: Annotated[list[str] | None, typer.Option(help="Findings to accept: units.")] = None,
     output: Output = None,
 ) -> None:
-    """Make a modal file of a body that another program has reduced, and say what that program did not say.
+    """Make a modal file of a body that another program has reduced, and report what that program did not provide.
 
     Example: cms import outboard.op4 --units mm-kg-s -o outboard.h5
 
@@ -284,13 +281,13 @@ def check_command(
     file: ModalFile,
     job: Annotated[Path | None, typer.Option("--job", "-j", help="Job file of the full model to compare with.")] = None,
     band: Annotated[
-        float | None, typer.Option(help="Highest frequency of interest [Hz]; default: highest kept mode over 1.5.")
+        float | None, typer.Option(help="Highest frequency of interest [Hz]; default: highest kept mode / 1.5.")
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the records as JSON, for other programs.")] = False,
 ) -> None:
-    """Judge a modal file: one verdict per check, the reason, and what to do; exit code 1 if one fails.
+    """Check a modal file: one verdict per check, the reason, and what to do; the exit code is 1 if a check fails.
 
-    Without a job the file is asked whether it says one thing; with its job it is compared with the full model.
+    Without a job, the file is checked for consistency. With its job, it is compared with the full model.
 
     Example: cms check rod.h5
 
@@ -309,14 +306,12 @@ def accept_command(
     deck: Annotated[
         Path | None, typer.Option(help="Or its deck: Abaqus, CalculiX (.inp), Nastran (.bdf), ANSYS (.cdb).")
     ] = None,
-    program: Annotated[
-        str | None, typer.Option(help="Whose elements a deck (.inp) has: calculix (default) or abaqus.")
-    ] = None,
+    program: Annotated[str | None, typer.Option(help="Program of a deck (.inp): calculix (default) or abaqus.")] = None,
     density: Annotated[
         list[str] | None, typer.Option(help="Density of materials of the deck without one: NAME=NUMBER; repeatable.")
     ] = None,
     band: Annotated[
-        float | None, typer.Option(help="Highest frequency of interest [Hz]; default: highest kept mode over 1.5.")
+        float | None, typer.Option(help="Highest frequency of interest [Hz]; default: highest kept mode / 1.5.")
     ] = None,
     most_dofs: Annotated[
         int, typer.Option(min=0, help="Largest refined model for the estimate of the mesh error; 0: no estimate.")
@@ -326,10 +321,11 @@ def accept_command(
         list[Path] | None, typer.Option("--output", "-o", help="Document: .pdf, .html or .json; repeatable.")
     ] = None,
 ) -> None:
-    """Make the document a body is accepted with: origin, every check, effective masses, what it is good for.
+    """Make the acceptance document of a body: origin, every check, effective masses, range of validity.
 
-    For own and received bodies; with a full model also what that says, and the cards of its deck that were left out.
-    Exit code 0: accepted, 1: not. Without -o: rod.h5 gives rod_acceptance.pdf; a PDF needs the extra pdf.
+    It works for own and received bodies. With a full model it also contains the comparison, and the cards of its deck
+    that were left out. Exit code 0: accepted, 1: not accepted. Without -o: rod.h5 gives rod_acceptance.pdf; a PDF needs
+    the extra pdf.
 
     Example: cms accept rod.h5 --full rod.toml -o acceptance.pdf -o acceptance.json
 
@@ -348,7 +344,7 @@ def accept_command(
 @guarded
 def frf_command(
     file: ModalFile,
-    excited: Annotated[str, typer.Option("--from", help="Interface the force acts on.")],
+    excited: Annotated[str, typer.Option("--from", help="Interface at which the force acts.")],
     answering: Annotated[str, typer.Option("--to", help="Interface whose motion is shown.")],
     band: Annotated[str, typer.Option(help="Frequencies [Hz], lowest:highest[:number], and more around resonances.")],
     component: Annotated[
@@ -364,7 +360,7 @@ def frf_command(
         list[Path] | None, typer.Option("--output", "-o", help="Picture (.png .svg .pdf) or table (.csv); repeatable.")
     ] = None,
 ) -> None:
-    """Frequency response of the free body from a force at one interface to the motion of another, in mesh axes.
+    """Compute the frequency response of the free body from a force at one interface to the motion of another.
 
     Example: cms frf rod.h5 --from big_end --to small_end --band 10:5000 -c uz -o frf.png
 
@@ -390,13 +386,13 @@ def compare_command(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Folder of the report; default: beside the job.")
     ] = None,
-    band: Annotated[float | None, typer.Option(help="Highest frequency that counts [Hz].")] = None,
-    reference_modes: Annotated[int, typer.Option(help="Without --band: elastic free modes that count.")] = 10,
+    band: Annotated[float | None, typer.Option(help="Highest frequency of the comparison [Hz].")] = None,
+    reference_modes: Annotated[int, typer.Option(help="Without --band: number of elastic free modes to compare.")] = 10,
     load: Annotated[
         list[str] | None,
         typer.Option(help="Neighbour at an interface, for loaded sets: NAME:mass=1.2,stiffness=1e4; repeatable."),
     ] = None,
-    pulse_at: Annotated[str | None, typer.Option(help="Interface the force pulse of the motion acts on.")] = None,
+    pulse_at: Annotated[str | None, typer.Option(help="Interface at which the force pulse of the motion acts.")] = None,
     motion: Annotated[
         Path | None, typer.Option(help="Reference motion instead of the pulse: .npz with u (n_dof, n_t) and t in s.")
     ] = None,
@@ -411,10 +407,10 @@ def compare_command(
         ),
     ] = None,
 ) -> None:
-    """Compare mode sets with the full model: which one is good enough, with how few modes, and why.
+    """Compare mode sets with the full model: which set is accurate enough, with how few modes, and why.
 
-    The full model is solved once and kept in the folder of the report, so that a repeat is quick. In the motion of a
-    mechanism, frames, stiffening and parts among them: floatframe study (docs/laboratory.md).
+    The full model is solved once and stored in the folder of the report, so that a repetition is fast. To compare sets
+    in the motion of a mechanism, with frames, stiffening and parts: floatframe study (docs/laboratory.md).
 
     Example: cms compare rod.toml --sets craig-bampton,craig-bampton-ir,rubin --modes 0:30 -o compare
 
@@ -434,7 +430,7 @@ def compare_command(
 @app.command("study", hidden=True, context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
 @guarded
 def study_command(context: typer.Context) -> None:
-    """Name the command that studies a body in the motion of a mechanism: it belongs to the engine."""
+    """Name the command that studies a body in the motion of a mechanism; it belongs to floatframe."""
     from cms.errors import JobError
 
     raise JobError(
@@ -453,9 +449,9 @@ def correlate_command(
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the numbers as JSON, for other programs.")] = False,
 ) -> None:
-    """Compare measured modes with a model: points, pairs, MAC, COMAC, orthogonality; update the job to them.
+    """Compare measured modes with a model (points, pairs, MAC, COMAC, orthogonality), and update the job.
 
-    Updates where the file has a table [update]. Without -o the page stands beside the file: rod_test.html.
+    The job is updated if the file has a table [update]. Without -o the page is written beside the file: rod_test.html.
 
     Example: cms correlate rod_test.toml
 
@@ -471,18 +467,18 @@ def correlate_command(
 def split_command(
     job: Annotated[Path, typer.Argument(help="Job file (TOML) of the whole body.")],
     n: Annotated[int | None, typer.Option("--parts", "-n", help="Number of parts of equal length.")] = None,
-    at: Annotated[str | None, typer.Option(help="Instead of -n: places of the cuts along the axis, as 40,80.")] = None,
+    at: Annotated[str | None, typer.Option(help="Instead of -n: cut positions along the axis, such as 40,80.")] = None,
     axis: Annotated[
-        str | None, typer.Option(help="Direction across which is cut: x, y, z or x,y,z; default: the longest.")
+        str | None, typer.Option(help="Normal direction of the cuts: x, y, z or x,y,z; default: the longest axis.")
     ] = None,
     cut: Annotated[str, typer.Option(help="Interfaces at the cuts: rigid or distributing.")] = "rigid",
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder to write to.")] = None,
-    reduce: Annotated[bool, typer.Option("--reduce", help="Reduce the parts at once.")] = False,
+    reduce: Annotated[bool, typer.Option("--reduce", help="Also reduce the parts.")] = False,
     workers: Workers = None,
 ) -> None:
-    """Split a body into parts with an interface at each cut, so that large deflections are carried by several frames.
+    """Split a body into parts with an interface at each cut, so that several frames can describe large deflections.
 
-    Writes a job for every part, and a system file that joins them. Without -o: rod.toml gives the folder rod_parts.
+    It writes a job for every part, and a system file that joins them. Without -o: rod.toml gives the folder rod_parts.
 
     Example: cms split blade.toml -n 4 --reduce
 
@@ -504,7 +500,7 @@ def split_command(
 def demo_command(
     folder: Annotated[Path, typer.Argument(help="Folder for the files of the demo.")] = Path("demo"),
 ) -> None:
-    """Run the whole line on a shipped connecting rod: reduce, info, view, run, plot, animate; about a minute.
+    """Run all steps with the included connecting rod: reduce, info, view, run, plot, animate; takes about a minute.
 
     Example: cms demo
     """

@@ -1,6 +1,6 @@
-"""What the command lines share: one way to fail, progress, tables that read well on every terminal and in a pipe.
+"""Shared parts of the command lines: error handling, progress, and tables for terminals and pipes.
 
-Exit codes: 0 done, 1 a fault of the program, 2 something the user can put right, 130 interrupted.
+Exit codes: 0 done, 1 a fault of the program, 2 an error that the user can correct, 130 interrupted.
 """
 
 import errno
@@ -43,14 +43,14 @@ R = TypeVar("R")
 FAULT, USER_ERROR, INTERRUPTED = 1, 2, 130
 NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 show_tracebacks = ContextVar("show_tracebacks", default=False)  #: the option --debug
-PIPE_WIDTH = 160  #: columns of tables that are not written to a terminal
+PIPE_WIDTH = 160  #: width in columns of tables that are not written to a terminal
 
 
-# Failing -------------------------------------------------------------------------------------------------------------
+# Error handling ------------------------------------------------------------------------------------------------------
 
 
 def run(app: typer.Typer, name: str) -> None:
-    """Run an application; text that the terminal's encoding cannot show is replaced, never a reason to fail."""
+    """Run an application; text that the terminal's encoding cannot show is replaced and never causes an error."""
     logging.getLogger().addHandler(Notes(logging.WARNING))
     for stream in (sys.stdout, sys.stderr):
         reconfigure = getattr(stream, "reconfigure", None)
@@ -60,7 +60,7 @@ def run(app: typer.Typer, name: str) -> None:
         try:
             app(prog_name=name)
         finally:
-            sys.stdout.flush()  # what cannot be written is told here, not by the interpreter at its end
+            sys.stdout.flush()  # errors in writing are reported here, not by the interpreter at its end
     except KeyboardInterrupt:
         print_error("interrupted")
         sys.exit(INTERRUPTED)
@@ -68,14 +68,14 @@ def run(app: typer.Typer, name: str) -> None:
         if not isinstance(error, BrokenPipeError) and error.errno not in NO_SPACE:
             raise
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        if isinstance(error, BrokenPipeError):  # the reader of our output (head, less) has seen enough
+        if isinstance(error, BrokenPipeError):  # the reader of our output (head, less) has closed the pipe
             sys.exit(0)
         print_error(f"standard output cannot be written: {error.strerror}; free space on the disk, or lift its limit")
         sys.exit(USER_ERROR)
 
 
 class Notes(logging.Handler):
-    """Tells the warnings of the packages, one line each, on standard error."""
+    """Prints the warnings of the packages on standard error, one line each."""
 
     def emit(self, record: logging.LogRecord) -> None:
         """Print one warning."""
@@ -83,7 +83,7 @@ class Notes(logging.Handler):
 
 
 class PlainHelp(TyperCommand):
-    """A command whose help is printed as it is written: words in brackets are tables and units, not markup."""
+    """A command whose help is printed literally: words in brackets are tables and units, not markup."""
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
@@ -120,7 +120,7 @@ def commands(name: str, help: str) -> typer.Typer:
 
 
 def version_option(name: str) -> Any:
-    """Return the option --version, which prints and ends."""
+    """Return the option --version, which prints the version and exits."""
 
     def show(value: bool) -> None:
         if value:
@@ -137,12 +137,13 @@ def version_option(name: str) -> Any:
 
 
 def guarded(command: Callable[P, R]) -> Callable[P, R]:
-    """Decorate a command: errors become one message on standard error and an exit code."""
+    """Decorate a command: errors become one message on standard error, and an exit code."""
 
     @functools.wraps(command)
     def safe(*args: P.args, **kwargs: P.kwargs) -> R:
         try:
-            with warnings.catch_warnings(record=True) as caught:  # of overflows and the like; none beside a refusal
+            # collects warnings of overflows and the like; they are not shown if the command fails
+            with warnings.catch_warnings(record=True) as caught:
                 result = command(*args, **kwargs)
             for each in caught:
                 warnings.warn_explicit(each.message, each.category, each.filename, each.lineno)
@@ -152,7 +153,7 @@ def guarded(command: Callable[P, R]) -> Callable[P, R]:
             raise typer.Exit(INTERRUPTED) from None
         except (typer.Exit, typer.Abort):
             raise
-        except BrokenPipeError:  # the reader of our output (head, less) has seen enough
+        except BrokenPipeError:  # the reader of our output (head, less) has closed the pipe
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             raise typer.Exit(0) from None
         except Exception as error:
@@ -162,7 +163,7 @@ def guarded(command: Callable[P, R]) -> Callable[P, R]:
             if isinstance(error, OSError) and error.filename is not None:
                 print_error(f"{error.filename}: {error.strerror}")
                 raise typer.Exit(USER_ERROR) from None
-            if isinstance(error, OSError) and error.errno in NO_SPACE:  # such as the cache of compiled code
+            if isinstance(error, OSError) and error.errno in NO_SPACE:  # for example the cache of compiled code
                 print_error(f"a file cannot be written: {error.strerror}; free space on the disk, or lift its limit")
                 raise typer.Exit(USER_ERROR) from None
             print_error(bug(error))
@@ -174,7 +175,7 @@ def guarded(command: Callable[P, R]) -> Callable[P, R]:
 
 
 def bug(error: BaseException) -> str:
-    """Return a short text about an error that nobody expected."""
+    """Return a short text about an unexpected error."""
     if isinstance(error, MemoryError):
         return "not enough memory; close other programs, take a coarser mesh or fewer modes"
     text = f"{type(error).__name__}: {error}".strip().removesuffix(":")
@@ -183,7 +184,7 @@ def bug(error: BaseException) -> str:
 
 
 def print_error(text: str) -> None:
-    """Print a message on standard error as it is: no wrapping, no markup."""
+    """Print a message on standard error literally, without wrapping or markup."""
     typer.secho("error: ", fg=typer.colors.RED, bold=True, nl=False, err=True)
     typer.echo(text, err=True)
 
@@ -191,9 +192,9 @@ def print_error(text: str) -> None:
 def output_path(
     given: Any, default: Any, error: type[Exception], *, overwrite_of: Iterable[Any] = (), needs_file: bool = False
 ) -> Any:
-    """Return where to write, after checking before any work that this is possible.
+    """Return the output path, after a check before any work that it can be written.
 
-    A device or a pipe is written to as it stands; with `needs_file`, of what is written in parts, it is refused.
+    A device or a pipe is written to directly; with `needs_file`, for output in several parts, it is rejected.
 
     Raises
     ------
@@ -225,7 +226,7 @@ def output_path(
 
 
 def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-    """Print a table on standard output; a heading that ends in '>' aligns to the right, none at all: no header."""
+    """Print a table on standard output; a heading that ends in '>' is right-aligned; no headings: no header line."""
     from rich import box
     from rich.table import Table
 
@@ -243,19 +244,19 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[Any]
 
 
 def say(text: str) -> None:
-    """Print a line on standard output, as it is."""
+    """Print a line on standard output, literally."""
     out().print(text, markup=False, soft_wrap=True)
 
 
 def escape(cell: Any) -> str:
-    """Return a cell as text that rich prints as it is."""
+    """Return a cell as text that rich prints literally."""
     from rich.markup import escape as escaped
 
     return escaped(cell if isinstance(cell, str) else f"{cell:.6g}" if isinstance(cell, float) else str(cell))
 
 
 def out() -> Any:
-    """Return the console of standard output: as wide as the terminal, or wide enough for a pipe."""
+    """Return the console of standard output, as wide as the terminal, or wide enough for a pipe."""
     from rich.console import Console
 
     width = None if sys.stdout.isatty() or "COLUMNS" in os.environ else PIPE_WIDTH
@@ -288,6 +289,6 @@ def stages(*, remaining: bool = False) -> Iterator[Stages]:
 
 
 def vector_words(values: Any, scale: float | None = None) -> str:
-    """Return numbers in one line; what is rounding beside the scale (default: the greatest of them) reads 0."""
+    """Return numbers in one line; numbers that are rounding relative to the scale (default: the largest) become 0."""
     scale = max((abs(value) for value in values), default=0.0) if scale is None else scale
     return "(" + ", ".join(f"{value if abs(value) > 1e-12 * scale else 0:.6g}" for value in values) + ")"

@@ -1,4 +1,4 @@
-"""`cms demo`: the whole line on a shipped rod that bends in a fast crank, step by step as a user would type it."""
+"""`cms demo`: all steps with an included rod that bends in a fast crank, one by one as a user would type them."""
 
 import os
 import subprocess
@@ -20,18 +20,18 @@ from cms.errors import JobError
 
 __all__ = ["run_demo"]
 
-JOBS = ("rod.toml", "crank.toml")  #: shipped beside this file
+JOBS = ("rod.toml", "crank.toml")  #: these files are included beside this module
 MODE = 3
-FPS = 15  #: of the film of the motion, 8 s long: its drawing is most of the work of the demo
+FPS = 15  #: frames per second of the film of the motion, 8 s long; drawing it is most of the work of the demo
 
 
 def run_demo(folder: Path) -> None:
-    """Copy the shipped part and its jobs into a folder and run every command on them.
+    """Copy the included part and its jobs into a folder, and run every command on them.
 
     Raises
     ------
     JobError
-        If the folder cannot be made, or holds a job that was changed: it is not overwritten.
+        If the folder cannot be made, or contains a changed job, which is not overwritten.
     """
     began = time.perf_counter()
     put_inputs(folder)
@@ -42,7 +42,7 @@ def run_demo(folder: Path) -> None:
 
 
 def run_steps(folder: Path, wait_for_kernels: Callable[[], None]) -> None:
-    """Run every command, each announced; those that do not need each other at the same time."""
+    """Run every command, each announced; independent commands run at the same time."""
     from cms.cli.info import info_command, info_record
     from cms.cli.reduce import reduce_command
     from fe_models.foundation.paths import replace_file
@@ -73,7 +73,7 @@ def run_steps(folder: Path, wait_for_kernels: Callable[[], None]) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Begun:
-    """A command that runs in a process of its own, and the file that takes what it prints."""
+    """A command that runs in its own process, and the file that receives its output."""
 
     words: str
     worker: subprocess.Popen[bytes]
@@ -81,9 +81,9 @@ class Begun:
 
 
 def begun(running: ExitStack, folder: Path, words: str) -> Begun:
-    """Begin a command, `cms ...` or `floatframe ...`, in the folder, as a user does; the stack ends it.
+    """Start a command, `cms ...` or `floatframe ...`, in the folder, as a user does; the stack ends it.
 
-    This package does not know `floatframe` otherwise.
+    Apart from this, the package does not know `floatframe`.
     """
     program, *arguments = words.split()
     said = running.enter_context(TemporaryFile())
@@ -96,12 +96,12 @@ def begun(running: ExitStack, folder: Path, words: str) -> Begun:
 
 
 def finish(folder: Path, command: Begun) -> None:
-    """Announce a command that was begun, wait for its end and print what it said.
+    """Announce a command that was started, wait for its end, and print its output.
 
     Raises
     ------
     typer.Exit
-        With the exit code of the command, which has said what is wrong.
+        With the exit code of the command, which has printed its error.
     """
     announce(folder, command.words)
     sys.stdout.flush()
@@ -119,13 +119,13 @@ def ended(worker: subprocess.Popen[bytes]) -> None:
 
 
 def environment() -> dict[str, str]:
-    """Return the environment of processes beside: they find the packages where this one did."""
+    """Return the environment of child processes, in which they find the packages of this process."""
     search = os.pathsep.join([str(Path(cms.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
     return os.environ | {"PYTHONPATH": search}
 
 
 def list_files(folder: Path) -> None:
-    """Print what was made."""
+    """Print the list of files that were made."""
     made = {
         "rod.msh": "the shipped mesh, tet10",
         "rod.toml": "what to reduce and how",
@@ -145,9 +145,9 @@ def list_files(folder: Path) -> None:
 
 @contextmanager
 def kernels_compiled_beside() -> Iterator[Callable[[], None]]:
-    """Compile the kernels of the motion in a process beside, where they are not yet; give the function that waits.
+    """Compile the kernels of the motion in another process, if necessary; yield the function that waits for it.
 
-    A minute on a fresh machine, which the other steps use as well. Where it fails, the run compiles them itself.
+    It takes a minute on a new machine, in parallel with the other steps. If it fails, the run compiles them itself.
     """
     worker = subprocess.Popen(
         [sys.executable, "-P", "-m", "floatframe.cli.compile_kernels"], env=environment(),
@@ -166,7 +166,7 @@ def kernels_compiled_beside() -> Iterator[Callable[[], None]]:
 
 
 def put_inputs(folder: Path) -> None:
-    """Put the mesh and the job files into the folder; a job that was changed there is left alone and told."""
+    """Copy the mesh and the job files into the folder; raise `JobError` for a changed job, which is left as it is."""
     from fe_models.foundation.paths import replace_file
     from fe_models.parts import shipped_mesh
 
@@ -187,6 +187,6 @@ def put_inputs(folder: Path) -> None:
 
 
 def announce(folder: Path, command: str) -> None:
-    """Announce a step by the command that does the same."""
+    """Announce a step by the equivalent command."""
     typer.echo()
     typer.secho(f"{folder}$ {command}", bold=True)

@@ -1,4 +1,4 @@
-"""The command `cms formats`: what is read from other programs and what is written for them."""
+"""The command `cms formats`: formats of other programs that are read and written."""
 
 import json
 from dataclasses import asdict
@@ -13,14 +13,14 @@ from fe_models.importers.formats import FORMATS as MODELS
 
 __all__ = ["FORMATS", "list_formats", "markdown_tables"]
 
-HELD = ("mesh", "geometry", "deck", "matrices", "reduced body")  #: what files hold, from the part to the body
+HELD = ("mesh", "geometry", "deck", "matrices", "reduced body")  #: contents of files, from the part to the body
 FORMATS = tuple(sorted((*MODELS, *REDUCED, *EXPORTED), key=lambda known: HELD.index(known.holds)))
 IN = ("program", "format", "holds", "what is lost", "tried")
 OUT = ("program", "format", "--to", "what is lost", "tried")
 
 
 def list_formats(*, as_json: bool, as_markdown: bool) -> None:
-    """Print the formats that come in and those that go out, for readers, other programs or docs/formats.md."""
+    """Print the formats that are read and those that are written, as tables, as JSON, or for docs/formats.md."""
     if as_json:
         typer.echo(json.dumps([asdict(known) for known in FORMATS], indent=2))
     elif as_markdown:
@@ -37,7 +37,7 @@ def markdown_tables() -> str:
 
 
 def markdown(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
-    """Return a table in Markdown; stars of keywords are letters."""
+    """Return a table in Markdown, with the stars of keywords escaped."""
     cells = [head, ("---",) * len(head), *(tuple(cell.replace("*", "\\*") for cell in row) for row in rows)]
     return "\n".join(f"| {' | '.join(row)} |" for row in cells)
 
@@ -53,6 +53,6 @@ def rows_out() -> list[tuple[str, ...]]:
 
 
 def format_words(known: FileFormat) -> str:
-    """Return the name of a format with its files, and the extra that it needs."""
+    """Return the name of a format with its file suffixes, and the extra that it needs."""
     extra = f"; extra {known.extra}" if known.extra else ""
     return f"{known.name} ({' '.join(known.suffixes)}{extra})"

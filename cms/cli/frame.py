@@ -20,7 +20,7 @@ __all__ = ["FrameRequest", "frame_of", "numbers", "run_frame"]
 
 @dataclass(frozen=True)
 class FrameRequest:
-    """What `cms frame` was asked for."""
+    """The arguments of `cms frame`."""
 
     file: Path
     to: str  #: key of `FRAMES`
@@ -39,7 +39,7 @@ def run_frame(request: FrameRequest) -> "ReducedBody":
     Raises
     ------
     CmsError
-        If the frame is unknown, the file lacks what it rests on, or the output cannot be written.
+        If the frame is unknown, the file lacks data that it needs, or the output cannot be written.
     """
     from cms.frame_conversion import convert_frame
     from cms.modal_file.file import convert_units, read, write
@@ -63,7 +63,7 @@ def run_frame(request: FrameRequest) -> "ReducedBody":
 
 
 def frame_of(request: FrameRequest) -> "Frame":
-    """Return the frame that was asked for.
+    """Return the requested frame.
 
     Raises
     ------
@@ -89,14 +89,14 @@ def frame_of(request: FrameRequest) -> "Frame":
 
 
 def damping_of(request: FrameRequest) -> "Damping | None":
-    """Return the damping that replaces that of the file, if one was asked for."""
+    """Return the damping that replaces that of the file; None if none is requested."""
     from cms.reduced_basis.damping import ModalDamping
 
     return None if request.ratio is None else ModalDamping(request.ratio)
 
 
 def numbers(option: str, text: str) -> tuple[float, float, float]:
-    """Return three numbers with commas between."""
+    """Return three numbers separated by commas."""
     try:
         values = [float(word) for word in text.split(",")]
     except ValueError:

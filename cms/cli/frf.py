@@ -1,4 +1,4 @@
-"""The command `cms frf`: frequency response between two interfaces of a modal file, with the full model over it."""
+"""The command `cms frf`: frequency response between two interfaces of a modal file, optionally with its full model."""
 
 import csv
 import io
@@ -27,12 +27,13 @@ from fe_models.foundation.words import nearest, quoted
 __all__ = ["FrfRequest", "parse_band", "parse_component", "run_frf"]
 
 PICTURES, TABLES = (".png", ".svg", ".pdf"), (".csv",)
-OVERLAY_DAMPING = 0.01  #: ratio in both responses where none is given: a full model brings no damping that compares
+#: damping ratio in both responses if none is given, because a full model has no comparable damping
+OVERLAY_DAMPING = 0.01
 
 
 @dataclass(frozen=True)
 class FrfRequest:
-    """What the command was asked for."""
+    """The arguments of the command."""
 
     file: Path
     excited: str
@@ -46,7 +47,7 @@ class FrfRequest:
 
 
 def run_frf(request: FrfRequest) -> None:
-    """Compute the response, with points around all resonances, print its peaks, and write what was asked for."""
+    """Compute the response with points around all resonances, print its peaks, and write the requested files."""
     from cms.modal_file.file import read
 
     frequencies = parse_band(request.band)
@@ -54,7 +55,7 @@ def run_frf(request: FrfRequest) -> None:
     paths = [checked_output(path, request) for path in request.outputs]
     reduced = read(request.file)
     for name in (request.excited, request.answering):
-        reduced.interface(name)  # refuse an unknown one before any work
+        reduced.interface(name)  # raises an error for an unknown interface before any work
     damping = OVERLAY_DAMPING if request.damping is None and request.job is not None else request.damping
     frequencies = resonance_grid(frequencies, *file_resonances(reduced, damping=damping))
     full = None
@@ -74,7 +75,7 @@ def run_frf(request: FrfRequest) -> None:
 
 
 def parse_band(text: str) -> Array:
-    """Return the frequencies of lowest:highest or lowest:highest:number, evenly spaced by their logarithm [Hz].
+    """Return the frequencies of lowest:highest or lowest:highest:number, logarithmically spaced [Hz].
 
     >>> parse_band("10:1000:3").round(6).tolist()
     [10.0, 100.0, 1000.0]
@@ -82,7 +83,7 @@ def parse_band(text: str) -> Array:
     Raises
     ------
     QualityError
-        If the text is no band.
+        If the text is not a frequency band.
     """
     parts = text.split(":")
     try:
@@ -98,7 +99,7 @@ def parse_band(text: str) -> Array:
 
 
 def parse_component(text: str) -> tuple[int, int]:
-    """Return the motion and the force of "uz" (force along the same) or "uz/ry", indices into `MOTION_COMPONENTS`."""
+    """Return motion and force of "uz" (force in the same direction) or "uz/ry", as indices of `MOTION_COMPONENTS`."""
     motion, _, force = text.partition("/")
     force = force or motion
     for word in (motion, force):
@@ -110,7 +111,7 @@ def parse_component(text: str) -> tuple[int, int]:
 
 
 def checked_output(path: Path, request: FrfRequest) -> Path:
-    """Return where to write after checking that this is possible and of a known kind."""
+    """Return the output path, after a check that it can be written and has a known suffix."""
     if path.suffix.lower() not in (*PICTURES, *TABLES):
         raise QualityError(f"--output {path}: expected a name that ends in {', '.join((*PICTURES, *TABLES))}")
     inputs = [request.file] + ([request.job] if request.job else [])
@@ -118,7 +119,7 @@ def checked_output(path: Path, request: FrfRequest) -> Path:
 
 
 def full_model(request: FrfRequest, reduced: ReducedBody, highest: float) -> tuple[PortModel, float]:
-    """Return the full model of a job at the two interfaces, known up to a frequency [Hz], and its time unit [s]."""
+    """Return the full model of a job at the two interfaces, valid up to a frequency [Hz], and its time unit [s]."""
     from cms.cli.console import stages
     from cms.families.families import Families
     from cms.jobs.body_of_job import coupled_body, uncoupled_body
@@ -148,7 +149,7 @@ def print_peaks(
     full: FrequencyResponse | None,
     pairs: tuple[tuple[int, int], ...],
 ) -> None:
-    """Print the largest peaks of each component, and the error against the full model."""
+    """Print the largest peaks of each component, and the error relative to the full model."""
     from cms.quality.of_reduction.frf import peaks
 
     unit = response_unit

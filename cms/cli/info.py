@@ -1,4 +1,4 @@
-"""`cms info`: what is in a modal file, as tables or as JSON."""
+"""`cms info`: the content of a modal file, as tables or as JSON."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
 
 __all__ = ["info_command", "info_record", "print_body"]
 
-MOST_SETS = 20  #: that are listed
+MOST_SETS = 20  #: largest number of sets that are listed
 
 
 def info_record(file: Path, units: str | None = None, mass_at: str | None = None) -> str:
-    """Return what is in a modal file as JSON text, with the effective masses at an interface if one is named."""
+    """Return the content of a modal file as JSON, with the effective masses at an interface if one is named."""
     import json
 
     from cms.modal_file.file import digest, read
@@ -29,7 +29,7 @@ def info_record(file: Path, units: str | None = None, mass_at: str | None = None
 
 
 def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
-    """Print mass properties, modes and interfaces of a body; provenance too if everything is wanted."""
+    """Print mass properties, modes and interfaces of a body, and its provenance if `everything`."""
     from cms.quality.body_record import body_record, body_size
 
     record = body_record(body)
@@ -117,7 +117,7 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
 
 
 def stiffening_words(record: Any) -> str:
-    """Say what stiffens the body, or why nothing does."""
+    """Describe which loads stiffen the body, or why none do."""
     is_told = "geometric stiffness" in record["provenance"]
     if record["geometric_stiffness"]:
         return f"spin, accelerations, {'loads at some interfaces, see below' if is_told else 'interface loads'}"
@@ -125,7 +125,7 @@ def stiffening_words(record: Any) -> str:
 
 
 def numbering_rows(record: Any) -> list[tuple[str, str]]:
-    """Return what the user's numbers cover, and which points turn."""
+    """Return the range of the user's numbers, and the points with rotations."""
     rows = []
     for what in ("nodes", "elements"):
         found = record[what]
@@ -142,33 +142,33 @@ def numbering_rows(record: Any) -> list[tuple[str, str]]:
 
 
 def turned_axes(axes: Any) -> list[tuple[str, Any]]:
-    """Return the axes of B by name, columns of their matrix; none where they are those of the mesh."""
+    """Return the axes of B by name; an empty list if they are the mesh axes."""
     columns = [[row[k] for row in axes] for k in range(3)]
     unit = [[float(i == k) for i in range(3)] for k in range(3)]
     return [] if columns == unit else list(zip("xyz", columns, strict=True))
 
 
 def load_scale(case: Any, mass: float) -> float:
-    """Return the size of the forces of a load case, also of one in balance: by its resultant and its modal forces."""
+    """Return the size of the forces of a load case, also if it is balanced, from its resultant and modal forces."""
     return max(map(abs, [*case["force"], *(h * mass**0.5 for h in case["modal_forces"])]), default=0.0)
 
 
 def moments_words(record: Any) -> str:
-    """Return how well the mass moments are known."""
+    """Describe how accurately the mass moments are known."""
     if not record["moments_are_exact"]:
         return "approximate (from bare matrices)"
     return "exact, as far as they are known" if record["missing_inertia_terms"] else "exact"
 
 
 def stress_words(stress: Any) -> str:
-    """Return where the stress of the modes is known."""
+    """Describe where the stress of the modes is known."""
     places = ["at the kept nodes"] if stress["nodal"] else []
     places += [f"at {stress['points']} points"] if stress["points"] else []
     return " and ".join(places) or "not kept"
 
 
 def hertz(value: float | None) -> str:
-    """Return a frequency with six digits; a shape without mass has none."""
+    """Return a frequency with six digits; "" for a shape without mass."""
     return "static" if value is None else f"{value:.6g}"
 
 
@@ -187,7 +187,7 @@ def info_command(
         typer.Option("--effective-mass", help="Effective mass of every mode while this interface is held and driven."),
     ] = None,
 ) -> None:
-    """Show what is in a modal file: mass, inertia, units, frame, modes, interfaces, load cases, provenance.
+    """Show the content of a modal file: mass, inertia, units, frame, modes, interfaces, load cases, provenance.
 
     Example: cms info rod.h5 --json
 
@@ -209,7 +209,7 @@ def info_command(
 
 
 def print_effective_mass(body: "ReducedBody", at: str) -> None:
-    """Print the share of every mode in mass and inertia, and their sums up to it, while an interface is driven."""
+    """Print the share of every mode in mass and inertia, and cumulative sums, while an interface is driven."""
     from cms.quality.of_body.effective_mass import DIRECTIONS, effective_mass_at
 
     found = effective_mass_at(body, at)

@@ -1,4 +1,4 @@
-"""`cms job`: a whole deck of a finite element program becomes a job file."""
+"""`cms job`: a job file from a whole deck of a finite element program."""
 
 import os
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ class DeckRequest:
 
 
 def write_job(request: DeckRequest) -> None:
-    """Read the deck, print what is not taken over, write the job."""
+    """Read the deck, print what is not converted, and write the job."""
     from fe_models.importers.decks.read_deck import read_deck
 
     if request.units is None or request.units not in UNIT_SYSTEMS:
@@ -45,7 +45,7 @@ def write_job(request: DeckRequest) -> None:
 
 
 def densities_of(words: tuple[str, ...]) -> dict[str, float]:
-    """Return material -> density of words NAME=NUMBER; a number alone holds for all materials without one."""
+    """Return the density of each material from NAME=NUMBER; a single number applies to all materials without one."""
     found = {}
     for word in words:
         name, _, number = word.rpartition("=")

@@ -1,4 +1,4 @@
-"""The command `cms modes`: the modes of a job in words: which columns, which shapes, which order, which frame."""
+"""The command `cms modes`: a description of the modes of a job: columns, shapes, order and frame."""
 
 import json
 from pathlib import Path
@@ -22,7 +22,7 @@ FRAME_WORDS = {
 
 
 def list_modes(path: Path, *, as_json: bool) -> None:
-    """Make the mode set and the reduced body of a job, and print what they consist of; writes no file."""
+    """Make the mode set and the reduced body of a job, and print their contents; writes no file."""
     from cms.jobs.body_of_job import job_body
     from cms.jobs.job import read_job
     from cms.jobs.mode_set_of_job import job_mode_set, reduction_of

@@ -1,4 +1,4 @@
-"""A command that several ranks run together (mpirun): rank 0 does the work and writes, the others do what it asks."""
+"""Commands that several ranks run together (mpirun): rank 0 works and writes; the others serve its requests."""
 
 import signal
 from collections.abc import Callable, Sequence
@@ -16,11 +16,11 @@ from fe_models.foundation.ranks.ranks import RankError, require_agreement, start
 __all__ = ["on_ranks", "one_job_of_ranks"]
 
 
-OF_RANKS = ("petsc", "petsc-disk", "slepc")  #: solvers that many ranks share
+OF_RANKS = ("petsc", "petsc-disk", "slepc")  #: solvers that several ranks can share
 
 
 def one_job_of_ranks(jobs: Sequence[Path], workers: str | None, solver: str | None) -> None:
-    """Refuse what several ranks cannot do; nothing is refused of one process."""
+    """Raise `JobError` for what several ranks cannot do; a single process has no restrictions."""
     n = started_ranks()
     if n == 1:
         return
@@ -32,19 +32,19 @@ def one_job_of_ranks(jobs: Sequence[Path], workers: str | None, solver: str | No
 
 
 def on_ranks(question: Callable[[], Sequence[Path | str]], work: Callable[[], None]) -> None:
-    """Do the work on rank 0, once all ranks have the same program and the same question; alone: do it.
+    """Do the work on rank 0, after a check that all ranks have the same program and input; a single rank just does it.
 
     Parameters
     ----------
     question
-        Words, and files of which the content counts; called on every rank. Its error is that of rank 0, if all have it.
+        Returns texts, and files whose content counts; called on every rank. An error on all ranks is that of rank 0.
     work
         Called on rank 0.
 
     Raises
     ------
     RankError
-        On rank 0, if a rank differs from it; the others end without a word.
+        On rank 0, if a rank differs from it; the others end silently.
     """
     if started_ranks() == 1:
         work()
@@ -66,7 +66,7 @@ def on_ranks(question: Callable[[], Sequence[Path | str]], work: Callable[[], No
     if ranks.rank:
         ranks.serve()
         return
-    signal.signal(signal.SIGTERM, stopped)  # so that mpirun, when a rank is lost, finds nothing half written
+    signal.signal(signal.SIGTERM, stopped)  # so that mpirun leaves no half-written file if it stops the ranks
     try:
         work()
     finally:
@@ -74,5 +74,5 @@ def on_ranks(question: Callable[[], Sequence[Path | str]], work: Callable[[], No
 
 
 def stopped(*_: object) -> None:
-    """End this process as Ctrl-C does: what was begun is taken back."""
+    """End this process as Ctrl-C does, so that unfinished output is removed."""
     raise KeyboardInterrupt

@@ -1,4 +1,4 @@
-"""`cms reduce`: a job becomes a modal file, many jobs many."""
+"""`cms reduce`: one job becomes one modal file, or many jobs many."""
 
 import os
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ __all__ = ["Fleet", "reduce_and_write", "reduce_and_write_fleet", "reduce_comman
 
 
 def reduce_and_write(job: "Job", path: Path, solver: str | None = None, memory: str | None = None) -> "ReducedBody":
-    """Run a job, write its modal file, and print what was done."""
+    """Run a job, write its modal file, and print a summary."""
     from cms.jobs.reduce_job import reduce_job
     from cms.modal_file.file import write
 
@@ -31,7 +31,7 @@ def reduce_and_write(job: "Job", path: Path, solver: str | None = None, memory: 
             reduced = reduce_job(job, clock, solver=solver, memory=memory, on_report=reports.append)
             with clock("write"):
                 write(reduced, path)
-    finally:  # a mesh that is refused is better understood with its numbers
+    finally:  # the mesh numbers help to understand why a mesh is rejected
         for report in reports:
             print_table(report.title, ("", ""), report.rows())
     print_body(reduced)
@@ -56,28 +56,28 @@ def print_times(clock: "Stages") -> None:
 
 @dataclass(frozen=True)
 class Fleet:
-    """Several jobs, and where and how they are run."""
+    """Several jobs, and how they are run."""
 
     jobs: Sequence[Path]
-    output: Path | None  #: folder of the modal files, or the file of one job; None: beside the jobs
+    output: Path | None  #: folder of the modal files, or the file of a single job; None: beside the jobs
     workers: str | None
     journal: Path | None  #: None: beside the modal files
     solver: str | None = None
 
     def journal_path(self, outputs: Sequence[Path]) -> Path:
-        """Return where the journal is by default: in the folder that holds all modal files."""
+        """Return the default path of the journal: in the folder that contains all modal files."""
         if self.journal is not None:
             return self.journal
         return Path(os.path.commonpath([os.path.abspath(path.parent) for path in outputs])) / "reduce.journal"
 
 
 def reduce_and_write_fleet(fleet: Fleet) -> None:
-    """Run several jobs by workers, write their modal files, and print what became of each.
+    """Run several jobs by workers, write their modal files, and print the outcome of each.
 
     Raises
     ------
     JobError, WorkerError
-        Before any work: if a job, an output or the workers do not do.
+        Before any work, if a job, an output or the workers are invalid.
     typer.Exit
         If a job failed.
     """
@@ -130,9 +130,9 @@ def reduce_command(
 ) -> None:
     """Reduce finite element bodies to modal files.
 
-    Without -o the modal file stands beside the job file: rod.toml gives rod.h5. Several jobs, or --workers: each is a
-    task, what is done is kept in a journal (reduce.journal), and the same command goes on from there. One job with the
-    mode set multilevel: its substructures are the tasks.
+    Without -o the modal file is written beside the job file: rod.toml gives rod.h5. With several jobs or --workers,
+    each job is a task; finished jobs are recorded in a journal (reduce.journal), and the same command continues from
+    there. For one job with the mode set multilevel, its substructures are the tasks.
 
     Example: cms reduce rod.toml -o rod.h5
 

@@ -1,4 +1,4 @@
-"""`cms split`: the job of one body becomes jobs of its parts, and the system that joins them again."""
+"""`cms split`: the job of one body becomes jobs of its parts, and a system that joins them."""
 
 import json
 import os
@@ -21,23 +21,23 @@ if TYPE_CHECKING:
 __all__ = ["SplitRequest", "direction_of", "places_of", "split_job"]
 
 CUT_KINDS = ("rigid", "distributing")
-COORDINATE = 1e-9  #: of the size of the mesh, by which coordinates of the same node may differ
+COORDINATE = 1e-9  #: largest difference between coordinates of the same node, relative to the mesh size
 
 
 @dataclass(frozen=True)
 class SplitRequest:
-    """What `cms split` was asked for."""
+    """The arguments of `cms split`."""
 
     job: Path
     n: int | None = None
-    at: tuple[float, ...] | None = None  #: places of the cuts along the axis
+    at: tuple[float, ...] | None = None  #: positions of the cuts along the axis
     axis: tuple[float, float, float] | None = None
-    kind: str = "rigid"  #: of the interfaces at the cuts
+    kind: str = "rigid"  #: kind of the interfaces at the cuts
     folder: Path | None = None  #: default: NAME_parts beside the job
 
 
 def direction_of(text: str | None) -> tuple[float, float, float] | None:
-    """Return the direction that is meant by x, y, z or three numbers."""
+    """Return the direction for x, y, z or three numbers."""
     from cms.cli.frame import numbers
 
     if text is None:
@@ -49,7 +49,7 @@ def direction_of(text: str | None) -> tuple[float, float, float] | None:
 
 
 def places_of(text: str | None) -> tuple[float, ...] | None:
-    """Return the places of the cuts that are meant by numbers with commas between them."""
+    """Return the positions of the cuts from numbers separated by commas."""
     if text is None:
         return None
     try:
@@ -64,9 +64,9 @@ def split_job(request: SplitRequest) -> list[Path]:
     Raises
     ------
     JobError
-        If the body cannot be cut so: an interface, a load or an attachment lies on two parts.
+        If the body cannot be cut there, because an interface, a load or an attachment lies on two parts.
     MeshError
-        If the mesh cannot be cut into so many parts.
+        If the mesh cannot be cut into this number of parts.
     """
     import tomlkit
 
@@ -102,7 +102,7 @@ def split_job(request: SplitRequest) -> list[Path]:
 
 
 def mesh_of(job: Job) -> Any:
-    """Read the mesh of a job that can be cut: of solid cells, of a shell, or of lines."""
+    """Read the mesh of a job that can be cut: solid cells, shells or lines."""
     from cms.jobs.attachments_of_job import frame_mesh
     from cms.jobs.mesh_of_job import solid_mesh_of
     from cms.jobs.shell_body import shell_mesh
@@ -120,7 +120,7 @@ def mesh_of(job: Job) -> Any:
 
 
 def homes_of(job: Job, mesh: Any, parts: tuple[Any, ...], cuts: list[str]) -> dict[str, int]:
-    """Return interface -> number of the part it is on, from 0; `JobError` if it is on two, or on a cut."""
+    """Return the index of the part of each interface; raise `JobError` if it is on two parts or on a cut."""
     from cms.jobs.attachments_of_job import frame_interface
     from cms.jobs.parts_of_job import interface_of
     from cms.jobs.shell_body import shell_interface_of
@@ -157,7 +157,7 @@ def homes_of(job: Job, mesh: Any, parts: tuple[Any, ...], cuts: list[str]) -> di
 
 
 def shares(A: np.ndarray, B: np.ndarray, tolerance: float) -> bool:
-    """Return whether two sets of points have one in common."""
+    """Return whether two sets of points have a point in common."""
     from scipy.spatial import cKDTree
 
     return bool(np.isfinite(cKDTree(A).query(B, distance_upper_bound=tolerance)[0]).any())
@@ -175,7 +175,7 @@ def edit_job(
     cuts: "list[Cut]",
     inside: list[str],
 ) -> None:
-    """Turn the job of the whole body into that of a part; comments and order of the file stay."""
+    """Edit the job of the whole body to that of a part; comments and order of the file are kept."""
     import tomlkit
 
     body = document["body"]
@@ -208,9 +208,9 @@ def edit_job(
 
 
 def edit_reduction(reduction: Any, job: Job, interfaces: list[str]) -> None:
-    """Leave out what the table says of interfaces of other parts; mean axes instead of a nodal frame.
+    """Remove entries about interfaces of other parts; replace a nodal frame by mean axes.
 
-    Neighbours hold parts at both ends: with geometric stiffness a frame clamped at one of them carries little.
+    Neighbours hold the parts at both ends. With geometric stiffness, a frame clamped at one end would be inaccurate.
     """
     for key in ("free", "loads"):
         if key in reduction:
@@ -230,7 +230,7 @@ def edit_reduction(reduction: Any, job: Job, interfaces: list[str]) -> None:
 
 
 def keep(document: Any, key: str, names: list[str]) -> None:
-    """Keep the named tables of a table of tables; drop it where none is left."""
+    """Keep the named tables of a table of tables; drop the table if none is left."""
     if key not in document:
         return
     for name in [name for name in document[key] if name not in names]:
@@ -240,7 +240,7 @@ def keep(document: Any, key: str, names: list[str]) -> None:
 
 
 def keep_groups(document: Any, key: str, groups_key: str, groups: Mapping[str, Any]) -> None:
-    """Keep the tables of a table of tables that name groups of this part, with those groups alone."""
+    """Keep the tables of a table of tables that name groups of this part, with only those groups."""
     for name in list(document.get(key, {})):
         given = document[key][name].get(groups_key, "all")
         names = [given] if isinstance(given, str) else list(given)
@@ -252,7 +252,7 @@ def keep_groups(document: Any, key: str, groups_key: str, groups: Mapping[str, A
 
 
 def attached(tables: Mapping[str, Any], key: str, part: Any, cuts: "list[Cut]") -> list[str]:
-    """Return the attachments that are on this part; `JobError` if one is on a cut, where two parts would have it."""
+    """Return the attachments on this part; raise `JobError` if one is on a cut, where two parts would have it."""
     on_cut = [set(part.node_sets[cut.name].tolist()) for cut in cuts]
     names = []
     for name, table in tables.items():
@@ -289,12 +289,12 @@ def loads_on(job: Job, part: Any, inside: list[str], request: SplitRequest) -> l
 
 
 def key(name: str) -> str:
-    """Return a name as a key of TOML, in quotes where it needs them."""
+    """Return a name as a TOML key, in quotes if necessary."""
     return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json.dumps(name)
 
 
 def system_text(job: Job, n: int) -> str:
-    """Return a system file of the parts, joined at their cuts where they were drawn."""
+    """Return a system file with the parts in their original positions, joined at the cuts."""
     name = str(job.body.name)
     lines = [
         f"# {name!r} in {n} parts, each with a frame of its own. Reduce them first: cms reduce part_1.toml, ...",

@@ -1,4 +1,4 @@
-"""Test and model: measured modes beside those of a model, and the model updated to them."""
+"""Test and model: measured modes compared with those of a model, and the updated model."""
 
 import lazy_loader
 

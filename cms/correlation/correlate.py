@@ -1,4 +1,4 @@
-"""Measured modes beside computed ones."""
+"""Comparison of measured and computed modes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,31 +29,32 @@ __all__ = ["Correlation", "Pairing", "correlate"]
 
 @dataclass(frozen=True)
 class Pairing:
-    """How modes are paired."""
+    """Rules for pairing modes."""
 
-    by_hand: tuple[tuple[int, int], ...] = ()  #: (measured, computed), from 1; 0: no partner
+    by_hand: tuple[tuple[int, int], ...] = ()  #: pairs (measured, computed), counted from 1; 0: no partner
     least_mac: float = LEAST_MAC
     window: float = WINDOW
 
 
 @dataclass(frozen=True, eq=False)
 class Correlation:
-    """A test and a model, side by side."""
+    """Comparison of a test and a model."""
 
     measured: MeasuredModes
     model: ModelModes
     points: PointPairs
     mac: Array  #: (n_t, n_m)
-    auto_mac: Array  #: of the test with itself, (n_t, n_t): what its points do not tell apart
+    auto_mac: Array  #: MAC of the test with itself, (n_t, n_t); shows modes that its points do not distinguish
     pairs: tuple[ModePair, ...]
-    comac: Array  #: of each measured row over the pairs, (n_rows,); empty without pairs
-    orthogonality: Array | None  #: of the paired measured shapes by the mass of the model, (n, n); None: not known
-    cross_orthogonality: Array | None  #: of them with their partners, (n, n)
-    why_not: str = ""  #: why there is no orthogonality
+    comac: Array  #: COMAC of each measured row over the pairs, (n_rows,); empty without pairs
+    #: orthogonality of the paired measured shapes in the mass of the model, (n, n); None: unknown
+    orthogonality: Array | None
+    cross_orthogonality: Array | None  #: orthogonality of the paired measured shapes to their partners, (n, n)
+    why_not: str = ""  #: reason why there is no orthogonality
 
     @property
     def errors(self) -> Array:
-        """Computed over measured frequency less 1, of each pair, (n,)."""
+        """Relative frequency errors of the pairs, computed / measured - 1, (n,)."""
         return np.array([self.model.frequencies[p.computed] / self.measured.frequencies[p.measured] - 1
                          for p in self.pairs])  # fmt: skip
 
@@ -63,7 +64,7 @@ class Correlation:
         return at_rows(self.model, self.points.rows, self.points.directions)
 
     def point_comac(self) -> list[tuple[int, str, float]]:
-        """Return point, node and the least COMAC of its directions, worst first."""
+        """Return point, node, and the smallest COMAC of its directions, worst first."""
         if not self.comac.size:
             return []
         least = [float(self.comac[self.measured.points == point].min()) for point in self.points.points]
@@ -71,7 +72,7 @@ class Correlation:
         return sorted(rows, key=lambda row: row[2])
 
     def as_dict(self) -> dict[str, Any]:
-        """Return everything in plain types; modes count from 1."""
+        """Return all results in plain types; modes are counted from 1."""
         paired = {pair.measured for pair in self.pairs}
         t, m = self.measured, self.model
         return {
@@ -106,12 +107,12 @@ def correlate(
     placement: Placement | None = None,
     pairing: Pairing | None = None,
 ) -> Correlation:
-    """Pair points and modes of a test and a model, and say how like they are.
+    """Pair the points and modes of a test and a model, and measure their agreement.
 
     Raises
     ------
     CorrelationError
-        If a point has no node, or a pair by hand names a mode that is not there.
+        If a point has no node, or a manual pair names a mode that does not exist.
     """
     pairing = pairing or Pairing()
     points = pair_points(measured, model, placement)
@@ -145,7 +146,7 @@ def correlate(
 
 
 def paired_shapes(measured: MeasuredModes, shapes: Array, pairs: Sequence[ModePair]) -> tuple[Array, Array]:
-    """Return measured and computed shapes of the pairs, the measured ones scaled to the computed, (n_rows, n) twice."""
+    """Return measured and computed shapes of the pairs, the measured ones scaled to the computed, (n_rows, n) each."""
     a = measured.shapes[:, [pair.measured for pair in pairs]]
     b = shapes[:, [pair.computed for pair in pairs]]
     return a * scale_factors(a, b), b

@@ -1,4 +1,4 @@
-"""The file of a correlation (TOML): which test, which model, how points and modes are paired, what is updated."""
+"""The correlation file (TOML): test, model, pairing of points and modes, and the update."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -30,13 +30,13 @@ from fe_models.meshes.mesh import Mesh
 __all__ = ["CorrelationFile", "CorrelationResult", "read_correlation", "run_correlation"]
 
 METRES = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254}
-OF_MESH = ("body", "mesh_size")  #: tables of a job whose numbers change its mesh
+OF_MESH = ("body", "mesh_size")  #: tables of a job whose numbers affect its mesh
 UNIVERSAL, TABLES = (".unv", ".uff", ".unv55", ".ufb"), (".csv", ".txt")
 Axis = Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
 
 
 def beside(value: Any, info: ValidationInfo) -> Any:
-    """Return a path beside the file."""
+    """Return a path relative to the file."""
     return Path(info.context or ".") / value if isinstance(value, str) else value
 
 
@@ -64,7 +64,7 @@ class ModelTable(Table):
 class TestTable(Table):
     """[test]: the measured modes and where their points are."""
 
-    __test__ = False  # no class of tests
+    __test__ = False  # not a class of tests for pytest
     file: Path = Field(description="the path of a universal file (.unv, .uff) or a table (.csv)")
     length: str | None = Field(None, description=f"the unit of length of the file, one of {', '.join(METRES)}")
     modes: tuple[int, ...] | None = Field(
@@ -101,7 +101,7 @@ class TestTable(Table):
 
 
 class PairsTable(Table):
-    """[pairs]: how modes are paired."""
+    """[pairs]: rules for pairing modes."""
 
     by_hand: tuple[tuple[int, int], ...] = Field(
         (), strict=False, description="pairs [measured, computed], from 1; 0 for no partner"
@@ -120,7 +120,7 @@ class ParameterTable(Table):
 
 
 class UpdateTable(Table):
-    """[update]: what is updated, and how well frequencies were measured."""
+    """[update]: the parameters, and the accuracy of the measured frequencies."""
 
     frequency_spread: float = Field(0.005, gt=0, description="the standard deviation of a frequency, a share above 0")
     iterations: int = Field(20, ge=1, le=200, description="a whole number from 1 to 200")
@@ -128,7 +128,7 @@ class UpdateTable(Table):
 
 
 class CorrelationFile(Table):
-    """A whole file."""
+    """A complete correlation file."""
 
     model: ModelTable = Field(description="a table [model]")
     test: TestTable = Field(description="a table [test]")
@@ -141,22 +141,22 @@ class CorrelationFile(Table):
 
 @dataclass(frozen=True, eq=False)
 class CorrelationResult:
-    """What the file asked for."""
+    """Results of a correlation file."""
 
-    correlation: Correlation  #: of the model as it is
+    correlation: Correlation  #: correlation with the original model
     update: Update | None
-    damping: tuple[DampingFit, ...]  #: fits to the measured ratios; none: the test has no damping
+    damping: tuple[DampingFit, ...]  #: fits to the measured damping ratios; empty: the test has no damping
     document: dict[str, Any] | None  #: the job with the updated values
 
 
 def read_correlation(path: str | Path) -> CorrelationFile:
-    """Read and check a file; `CorrelationError` with every problem."""
+    """Read and check a file; raise `CorrelationError` that lists every problem."""
     path = Path(path)
     return validated(CorrelationFile, read_toml(path, CorrelationError), path, CorrelationError, context=path.parent)
 
 
 def run_correlation(asked: CorrelationFile, stages: Stages | None = None) -> CorrelationResult:
-    """Read test and model, compare them, and update the job where that is asked for.
+    """Read test and model, compare them, and update the job if requested.
 
     Raises
     ------
@@ -199,9 +199,9 @@ def run_correlation(asked: CorrelationFile, stages: Stages | None = None) -> Cor
 
 
 def body_maker(content: dict[str, Any], path: Path, parameters: tuple[Parameter, ...]) -> Callable[[Array], FEBody]:
-    """Return the function from values of the parameters to the coupled body of the job; the last bodies are kept.
+    """Return the function from parameter values to the coupled body of the job; the last bodies are cached.
 
-    A solid mesh is read and judged once, unless a parameter belongs to the mesh.
+    A solid mesh is read and checked once, unless a parameter affects the mesh.
     """
     made: dict[bytes, FEBody] = {}
     meshes: list[Mesh] = []
@@ -229,13 +229,13 @@ def named(job: Job, path: Path) -> Job:
 
 
 def placement_of(test: TestTable) -> Placement:
-    """Return how the points of a test lie in the mesh."""
+    """Return the position of the test axes in the mesh."""
     by_hand = {int(point): node for point, node in test.nodes.items()}
     return Placement(test.origin, test.axes, by_hand, test.match, test.tolerance)
 
 
 def measured_modes(test: TestTable, length: float) -> MeasuredModes:
-    """Read the measured modes, places in the length unit of the model."""
+    """Read the measured modes, with positions in the length unit of the model."""
     suffix, given = test.file.suffix.lower(), None if test.length is None else METRES[test.length]
     if not test.file.is_file():
         raise CorrelationError(f"test.file: {test.file}: no such file")
@@ -252,7 +252,7 @@ def measured_modes(test: TestTable, length: float) -> MeasuredModes:
 
 
 def parameter_of(name: str, table: ParameterTable, content: dict[str, Any], path: Path) -> Parameter:
-    """Return a parameter with the value that the job has now."""
+    """Return a parameter with its current value in the job."""
     where = f"update.parameters.{name}"
     probe = object()
     document = changed(content, {table.path: probe}, str(path), CorrelationError)
@@ -268,7 +268,7 @@ def parameter_of(name: str, table: ParameterTable, content: dict[str, Any], path
 
 
 def replaced(document: Any, content: Any, probe: object) -> Any:
-    """Return what stands in the content where the document has the probe; None where there is nothing."""
+    """Return the value in the content at the position of the probe in the document; None if there is none."""
     if document is probe:
         return content
     keys = document if isinstance(document, dict) else range(len(document)) if isinstance(document, list) else ()
@@ -283,7 +283,7 @@ def replaced(document: Any, content: Any, probe: object) -> Any:
 
 
 def damping_of(measured: MeasuredModes, units: Units) -> tuple[DampingFit, ...]:
-    """Return fits to the measured damping, where two or more ratios are known, for a job in these units."""
+    """Return fits to the measured damping if at least two ratios are known, for a job in these units."""
     is_known = measured.damping > 0 if measured.damping.size else np.zeros(0, bool)
     if is_known.sum() < 2:
         return ()

@@ -1,4 +1,4 @@
-"""Numbers that say how like measured and computed shapes are: MAC, COMAC, orthogonality, scale.
+"""Measures of agreement between measured and computed shapes: MAC, COMAC, orthogonality, scale.
 
 Sources: Allemang (2003) for MAC and COMAC, O'Callahan, Avitabile and Riemer (1989) for the mass at the measured rows.
 """
@@ -15,7 +15,7 @@ from fe_models.foundation.arrays import Array
 __all__ = ["ModePair", "comac", "mac", "mass_at_rows", "orthogonality", "pair_modes", "scale_factors"]
 
 LEAST_MAC = 0.5
-WINDOW = 0.5  #: of the measured frequency, within which a computed one may be its partner
+WINDOW = 0.5  #: relative distance from the measured frequency within which a computed mode may be its partner
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ def pair_modes(
     least_mac: float = LEAST_MAC,
     window: float = WINDOW,
 ) -> tuple[ModePair, ...]:
-    """Pair modes so that the sum of their MAC is greatest, those given by hand first.
+    """Pair modes such that the sum of their MAC is largest, after the manual pairs.
 
     Parameters
     ----------
@@ -46,12 +46,12 @@ def pair_modes(
     likeness
         MAC, (n_t, n_m).
     by_hand
-        Pairs of indices from 0; such a measured mode may be paired with -1, nothing.
+        Pairs of indices from 0; -1 as second index: the measured mode has no partner.
 
     Raises
     ------
     CorrelationError
-        If a pair by hand names a mode that is not there, or one twice.
+        If a manual pair names a mode that does not exist, or names a mode twice.
     """
     taken_t, taken_m = set[int](), set[int]()
     pairs = []
@@ -76,9 +76,9 @@ def pair_modes(
 
 
 def comac(A: Array, B: Array) -> Array:
-    """Coordinate MAC of paired shapes at each row, (n_rows, n) twice -> (n_rows,): (sum |a b|)² / (sum a² sum b²).
+    """Return the coordinate MAC of paired shapes (n_rows, n) at each row, (n_rows,): (sum |a b|)² / (sum a² sum b²).
 
-    Shapes are scaled to unit length first, so that every pair counts alike. Rows that move in none are 1.
+    Shapes are first scaled to unit length, so that every pair has equal weight. Rows without motion have the value 1.
     """
     a, b = A / np.linalg.norm(A, axis=0), B / np.linalg.norm(B, axis=0)
     size = (a * a).sum(axis=1) * (b * b).sum(axis=1)
@@ -87,19 +87,19 @@ def comac(A: Array, B: Array) -> Array:
 
 
 def scale_factors(measured: Array, computed: Array) -> Array:
-    """Factor that brings each measured shape to its computed one in the least squares, (n_rows, n) twice -> (n,)."""
+    """Return the least-squares factor from each measured shape to its computed one, (n_rows, n) each -> (n,)."""
     return np.asarray(np.einsum("rk,rk->k", measured, computed) / np.einsum("rk,rk->k", measured, measured))
 
 
 def mass_at_rows(shapes: Array) -> Array:
-    """Mass of the model at the measured rows, (n_rows, n_rows): (Phi_a⁺)ᵀ Phi_a⁺ of M-orthonormal modes (SEREP).
+    """Return the model mass at the measured rows, (n_rows, n_rows): (Phi_a⁺)ᵀ Phi_a⁺ of M-orthonormal modes (SEREP).
 
-    Its rank is the number of modes: it weighs shapes by how they are made of them, and knows no others.
+    Its rank is the number of modes. It only measures the components of a shape along these modes.
 
     Raises
     ------
     CorrelationError
-        If the rows do not tell the modes apart: there are fewer rows than modes, or modes look alike there.
+        If the rows do not distinguish the modes: there are fewer rows than modes, or modes look alike there.
     """
     if shapes.shape[0] < shapes.shape[1] or np.linalg.cond(shapes) > 1e6:
         raise CorrelationError(
@@ -110,7 +110,7 @@ def mass_at_rows(shapes: Array) -> Array:
 
 
 def orthogonality(measured: Array, M_a: Array, computed: Array | None = None) -> Array:
-    """Shapes by the mass at their rows, each scaled to unit modal mass: measured with measured, or with computed."""
+    """Return products of measured shapes, with each other or with computed ones, in the mass at their rows."""
 
     def scaled(X: Array) -> Array:
         mass = np.einsum("rk,rs,sk->k", X, M_a, X)

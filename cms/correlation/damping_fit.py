@@ -1,4 +1,4 @@
-"""Damping of a model from measured ratios: one ratio for all modes, or Rayleigh's, by least squares."""
+"""Damping of a model from measured ratios by least squares: one ratio for all modes, or Rayleigh damping."""
 
 from dataclasses import dataclass
 
@@ -12,16 +12,16 @@ __all__ = ["DampingFit", "fit_damping"]
 
 @dataclass(frozen=True, eq=False)
 class DampingFit:
-    """A damping with its uncertainty."""
+    """A fitted damping with its uncertainty."""
 
     kind: str  #: "ratio" or "rayleigh"
     values: Array  #: ratio; or alpha [1/s] and beta [s]
-    spread: Array  #: standard deviation of each
-    misfit: float  #: root mean square of measured less fitted ratio
-    time: float = 1.0  #: unit of time of the job that takes the table [s]
+    spread: Array  #: standard deviation of each value
+    misfit: float  #: root mean square of measured minus fitted ratio
+    time: float = 1.0  #: time unit of the job that receives the table [s]
 
     def table(self) -> str:
-        """Return the table [damping] of a job, in its units: alpha per unit of time, beta in units of time."""
+        """Return the table [damping] of a job in its units: alpha per time unit, beta in time units."""
         factors = {"ratio": 1.0} if self.kind == "ratio" else {"alpha": self.time, "beta": 1 / self.time}
         rows = (f"{name} = {v * factor:.6g}" for (name, factor), v in zip(factors.items(), self.values, strict=True))
         return "\n".join(["[damping]", *rows])
@@ -30,15 +30,15 @@ class DampingFit:
 def fit_damping(frequencies: Array, ratios: Array, *, time: float = 1.0) -> tuple[DampingFit, ...]:
     """Fit zeta = const, and zeta = alpha / (4 pi f) + beta pi f, to measured ratios at frequencies [Hz].
 
-    time: unit of time of the job for which the fits write their table [s].
+    time: time unit of the job for which the fits write their table [s].
 
-    The spread is that of the misfit: residuals over (n - number of constants). Rayleigh's constants are those of D =
-    alpha M + beta K; one that comes out negative is set to zero, since a job takes none.
+    The standard deviation follows from the residuals, divided by (n - number of constants). The Rayleigh constants are
+    those of D = alpha M + beta K; a negative one is set to zero, because a job does not accept it.
 
     Raises
     ------
     CorrelationError
-        If there are fewer than two ratios, or one is negative.
+        If there are fewer than two ratios, or a ratio is negative.
     """
     f, zeta = np.asarray(frequencies, float), np.asarray(ratios, float)
     if len(zeta) < 2 or (zeta < 0).any():

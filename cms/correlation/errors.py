@@ -1,4 +1,4 @@
-"""What goes wrong between test and model."""
+"""Errors of test and model correlation."""
 
 from cms.errors import CmsError
 
@@ -6,4 +6,4 @@ __all__ = ["CorrelationError"]
 
 
 class CorrelationError(CmsError):
-    """Measured modes are damaged, have no place on the model, or do not determine what was asked."""
+    """Measured modes are damaged, cannot be located on the model, or do not determine the requested result."""

@@ -1,4 +1,4 @@
-"""Measured modes: points, directions, frequencies, damping and shapes, whatever they were read from."""
+"""Measured modes: points, directions, frequencies, damping and shapes, independent of the file format."""
 
 from dataclasses import dataclass, field, replace
 
@@ -17,17 +17,18 @@ class MeasuredModes:
     Raises
     ------
     CorrelationError
-        If sizes do not fit, a number is not finite, frequencies are not above 0, or a direction has no length.
+        If sizes do not fit, a number is not finite, frequencies are not positive, or a direction has zero length.
     """
 
     frequencies: Array  #: (n,) [Hz]
-    shapes: Array  #: real, (n_rows, n), any scale
+    shapes: Array  #: real shapes, (n_rows, n), with any scale
     points: IntArray  #: number of the point of each row, (n_rows,)
     directions: Array  #: unit vector of each row, in the axes of the test, (n_rows, 3)
-    #: place of the point of each row, in the length unit of the model, (n_rows, 3); NaN where the test does not say it
+    #: position of the point of each row, in the length unit of the model, (n_rows, 3); NaN if the test does not give it
     places: Array
-    damping: Array = field(default_factory=lambda: np.zeros(0))  #: ratio of critical of each mode, (n,); empty: unknown
-    collinearity: Array = field(default_factory=lambda: np.zeros(0))  #: of complex shapes, 0 to 1, (n,); empty: real
+    damping: Array = field(default_factory=lambda: np.zeros(0))  #: damping ratio of each mode, (n,); empty: unknown
+    #: phase collinearity of complex shapes, 0 to 1, (n,); empty: real shapes
+    collinearity: Array = field(default_factory=lambda: np.zeros(0))
     source: str = ""
     notes: tuple[str, ...] = ()
 
@@ -76,10 +77,11 @@ class MeasuredModes:
 
 
 def phase_collinearity(shapes: np.ndarray) -> Array:
-    """Modal phase collinearity of complex shapes, (n_rows, n) -> (n,): 1 where all points move in one phase or against.
+    """Return the modal phase collinearity of complex shapes, (n_rows, n) -> (n,); 1 if all points are in phase.
 
-    With S_ab = Re/Im products, MPC = ((S_xx - S_yy)² + 4 S_xy²) / (S_xx + S_yy)²: the share of the larger eigenvalue of
-    the 2 x 2 covariance of real and imaginary parts, scaled to 0 ... 1 (Pappa, Elliott and Schenk 1993).
+    With S_ab as products of real and imaginary parts, MPC = ((S_xx - S_yy)² + 4 S_xy²) / (S_xx + S_yy)². This is the
+    share of the larger eigenvalue of the 2 x 2 covariance of real and imaginary parts, scaled to 0 ... 1 (Pappa,
+    Elliott and Schenk 1993).
     """
     x, y = shapes.real, shapes.imag
     xx, yy, xy = (x * x).sum(axis=0), (y * y).sum(axis=0), (x * y).sum(axis=0)
@@ -87,6 +89,6 @@ def phase_collinearity(shapes: np.ndarray) -> Array:
 
 
 def real_shapes(shapes: np.ndarray) -> Array:
-    """Turn each complex shape by the phase that leaves most of it real, and take that part, (n_rows, n)."""
+    """Rotate each complex shape to the phase that maximises its real part, and return the real part, (n_rows, n)."""
     phase = 0.5 * np.angle((shapes**2).sum(axis=0))
     return np.asarray((shapes * np.exp(-1j * phase)).real)

@@ -1,9 +1,9 @@
-"""Measured modes from a table (.csv): one row a measured direction, one column a mode, its frequency in the heading.
+"""Measured modes from a table (.csv): a row per measured direction, a column per mode, headed by its frequency.
 
     point, direction, x, y, z, 103.2 Hz 1.1 %, 251.9 Hz 0.8 %
     5012,  +z,        0, 0, 5, 0.31,           -0.02
 
-x, y, z may be left out where points are numbers of nodes; a direction is x, -y, ... or three numbers with blanks.
+x, y, z may be omitted if points are node numbers; a direction is x, -y, ... or three numbers separated by blanks.
 """
 
 import csv
@@ -28,14 +28,14 @@ def read_mode_table(path: Path, length: float, *, given: float | None = None) ->
     Parameters
     ----------
     length
-        Metre of one length unit of the model.
+        Length unit of the model [m].
     given
-        Metre of one length unit of x, y, z; None: that of the model.
+        Length unit of x, y, z [m]; None: that of the model.
 
     Raises
     ------
     CorrelationError
-        With the line, if a heading, a direction or a number is none.
+        With the line number, if a heading, a direction or a number is invalid.
     """
     try:
         text = path.read_text(encoding="utf-8-sig")
@@ -87,14 +87,14 @@ def number(where: str, cell: str) -> float:
 
 
 def whole_number(where: str, cell: str) -> int:
-    """Return the number of a point."""
+    """Return the number of a point, an integer."""
     if not re.fullmatch(r"\s*\d+\s*", cell):
         raise CorrelationError(f"{where}: expected the number of a point, got {cell.strip()!r}")
     return int(cell)
 
 
 def direction_of(where: str, cell: str) -> Array:
-    """Return the vector of a direction: x, +x, -y, or three numbers with blanks between."""
+    """Return the vector of a direction: x, +x, -y, or three numbers separated by blanks."""
     word = cell.strip().lower()
     if (axis := word.lstrip("+-")) in AXES and len(word) - len(axis) <= 1:
         return (-1.0 if word.startswith("-") else 1.0) * np.array(AXES[axis])

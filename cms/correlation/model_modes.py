@@ -1,4 +1,4 @@
-"""Modes of the model that a test is compared with: of a full model as it stands free or held, or of a modal file."""
+"""Modes of the model for comparison with a test: of a full model, free or held, or of a modal file."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,14 +27,14 @@ class ModelModes:
     name: str
     frequencies: Array  #: ascending (n,) [Hz]
     shapes: Array  #: translations at the nodes, (n_nodes, 3, n)
-    nodes: Array  #: places in the mesh, (n_nodes, 3)
+    nodes: Array  #: positions in the mesh, (n_nodes, 3)
     numbering: Numbering
-    columns: Array | None = None  #: of a full model: the modes over its dofs, M-orthonormal, (n_dof, n)
+    columns: Array | None = None  #: modes of a full model over its dofs, M-orthonormal, (n_dof, n)
     is_free: bool = True
 
     @property
     def size(self) -> float:
-        """Diagonal of the box about the nodes."""
+        """Diagonal of the bounding box of the nodes."""
         return float(np.linalg.norm(np.ptp(self.nodes, axis=0)))
 
 
@@ -44,7 +44,7 @@ def modes_of_body(body: FEBody, cutoff: float, *, held: Sequence[str] = ()) -> M
     Parameters
     ----------
     held
-        Interfaces that are held in the test; none: the body is free.
+        Interfaces that are held in the test; empty: the body is free.
 
     Raises
     ------

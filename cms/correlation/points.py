@@ -1,4 +1,4 @@
-"""Which node of the model a measured point is: by its number, by its place, or by hand."""
+"""Nodes of the model that belong to the measured points: by number, by position, or manually."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,17 +13,18 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["Placement", "PointPairs", "pair_points"]
 
-TOLERANCE = 0.02  #: of the size of the model, how far a node may be from its point
+TOLERANCE = 0.02  #: largest distance between a node and its point, relative to the size of the model
 
 
 @dataclass(frozen=True)
 class Placement:
-    """How the axes of the test lie in the mesh, and which points are which nodes."""
+    """Position of the test axes in the mesh, and the assignment of points to nodes."""
 
-    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  #: of the test in the mesh [length of the model]
-    axes: tuple[tuple[float, float, float], ...] = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))  #: of the test, in the mesh
-    nodes: Mapping[int, int | str] = field(default_factory=dict)  #: point -> number of its node, by hand
-    match: str = "place"  #: "place": the nearest node; "number": the node of the same number
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  #: origin of the test in the mesh [length of the model]
+    #: axes of the test in the mesh
+    axes: tuple[tuple[float, float, float], ...] = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
+    nodes: Mapping[int, int | str] = field(default_factory=dict)  #: node number of each manually assigned point
+    match: str = "place"  #: "place": the nearest node; "number": the node with the number of the point
     tolerance: float = TOLERANCE
 
     def __post_init__(self) -> None:
@@ -40,12 +41,12 @@ class Placement:
 class PointPairs:
     """The node of each measured row, and its direction in mesh axes."""
 
-    rows: IntArray  #: of the nodes, (n_rows,)
+    rows: IntArray  #: node index of each row, (n_rows,)
     directions: Array  #: (n_rows, 3)
     points: IntArray  #: distinct measured points, (n_points,)
-    nodes: tuple[str, ...]  #: their nodes by name
-    distances: Array  #: of both, NaN where the test has no places, (n_points,)
-    size: float  #: of the model
+    nodes: tuple[str, ...]  #: names of their nodes
+    distances: Array  #: distance between point and node, NaN if the test has no positions, (n_points,)
+    size: float  #: size of the model
 
 
 def pair_points(measured: MeasuredModes, model: ModelModes, placement: Placement | None = None) -> PointPairs:
@@ -54,7 +55,7 @@ def pair_points(measured: MeasuredModes, model: ModelModes, placement: Placement
     Raises
     ------
     CorrelationError
-        If a node is missing, a point is too far from every node, or two points have one node.
+        If a node is missing, a point is too far from every node, or two points have the same node.
     """
     placement = placement or Placement()
     A = np.array(placement.axes, dtype=float).T
@@ -98,7 +99,7 @@ def pair_points(measured: MeasuredModes, model: ModelModes, placement: Placement
 
 
 def node_of(model: ModelModes, node: int | str, where: str) -> int:
-    """Return the row of a node by its number; where the model has no numbers, by its index."""
+    """Return the index of a node with a given number; if the model has no numbers, the number is the index."""
     if not model.numbering.nodes.size:
         if not isinstance(node, int) or not 0 <= node < len(model.nodes):
             raise CorrelationError(f"{where}: the model knows no numbers of nodes; expected an index, got {node!r}")
@@ -107,6 +108,6 @@ def node_of(model: ModelModes, node: int | str, where: str) -> int:
 
 
 def listed(numbers: IntArray) -> str:
-    """Return some numbers in words."""
+    """Return some numbers as text."""
     shown = ", ".join(str(number) for number in numbers[:5])
     return f"{shown}, ..." if len(numbers) > 5 else shown

@@ -14,9 +14,9 @@ from cms.report.words import hertz, signed_percent
 
 __all__ = ["correlation_page"]
 
-GOOD_MAC, POOR_MAC = 0.9, 0.7  #: by custom
+GOOD_MAC, POOR_MAC = 0.9, 0.7  #: customary limits of the MAC
 GOOD_ERROR, POOR_ERROR = 0.02, 0.05
-GOOD_CROSS = 0.1  #: largest off-diagonal entry of an orthogonality, by custom
+GOOD_CROSS = 0.1  #: customary limit of the largest off-diagonal entry of an orthogonality matrix
 MOST_POINTS = 20
 
 
@@ -37,7 +37,7 @@ def correlation_page(result: CorrelationResult) -> str:
 
 
 def facts(c: Correlation) -> str:
-    """Return what was compared."""
+    """Return a description of what was compared."""
     away = c.points.distances[np.isfinite(c.points.distances)]
     placed = f", at most {away.max():.3g} from their nodes" if len(away) else ", placed by number"
     return (
@@ -47,7 +47,7 @@ def facts(c: Correlation) -> str:
 
 
 def answer(result: CorrelationResult) -> str:
-    """Return the answer in a sentence, with its numbers."""
+    """Return the main result in a sentence, with its numbers."""
     first = result.correlation
     last = first if result.update is None else result.update.after
     if not last.pairs:
@@ -69,14 +69,14 @@ def answer(result: CorrelationResult) -> str:
 
 
 def graded(value: float, good: float, poor: float, words: str) -> Cell:
-    """Return a number in the colour of its grade; small values are good where good < poor."""
+    """Return a number in the colour of its grade; if good < poor, small values are good."""
     sign = 1.0 if good < poor else -1.0
     kind = "pass" if sign * value <= sign * good else "warn" if sign * value <= sign * poor else "fail"
     return Cell(words, f"n {kind}")
 
 
 def pairs_section(result: CorrelationResult) -> Section:
-    """Pairs of modes."""
+    """Return the section about pairs of modes."""
     c = result.correlation if result.update is None else result.update.after
     first = result.correlation
     before = {pair.measured: error for pair, error in zip(first.pairs, first.errors, strict=True)}
@@ -125,7 +125,7 @@ def heat(values: Any, across: str, down: str) -> Chart:
 
 
 def mac_section(result: CorrelationResult) -> Section:
-    """MAC before and after, and of the test with itself."""
+    """Return the section about the MAC before and after the update, and of the test with itself."""
     shown = {"mac": ("test and model", result.correlation.mac, "computed mode")}
     if result.update is not None:
         shown["mac-after"] = ("test and updated model", result.update.after.mac, "computed mode")
@@ -140,7 +140,7 @@ def mac_section(result: CorrelationResult) -> Section:
 
 
 def orthogonality_section(c: Correlation) -> Section:
-    """Orthogonality of the measured shapes by the mass of the model."""
+    """Return the section about orthogonality of the measured shapes in the mass of the model."""
     if c.orthogonality is None or c.cross_orthogonality is None:
         words = f'<p class="notice">Not known: {text(c.why_not)}.</p>'
         return Section("orthogonality", "Orthogonality", "Orthogonality", words)
@@ -160,7 +160,7 @@ def orthogonality_section(c: Correlation) -> Section:
 
 
 def points_section(c: Correlation) -> Section:
-    """Points that fit worst."""
+    """Return the section about the points with the poorest agreement."""
     rows = [[Cell(str(point), "n"), Cell(node, "n"), graded(value, GOOD_MAC, POOR_MAC, f"{value:.3f}")]
             for point, node, value in c.point_comac()[:MOST_POINTS]]  # fmt: skip
     if not rows:
@@ -173,7 +173,7 @@ def points_section(c: Correlation) -> Section:
 
 
 def update_section(update: Update) -> Section:
-    """Parameters with their uncertainty."""
+    """Return the section about the parameters and their uncertainty."""
     rows = []
     for p, value, spread, told in zip(update.parameters, update.values, update.spread, update.determined, strict=True):
         low, high = p.start * (1 + p.least), p.start * (1 + p.most)
@@ -198,7 +198,7 @@ def update_section(update: Update) -> Section:
 
 
 def damping_section(result: CorrelationResult) -> Section:
-    """Fits of the measured damping."""
+    """Return the section about fits of the measured damping."""
     rows = []
     for fit in result.damping:
         names = ("ratio",) if fit.kind == "ratio" else ("alpha [1/s]", "beta [s]")

@@ -11,10 +11,10 @@ from fe_models.foundation.extras import extra_module
 
 __all__ = ["read_universal"]
 
-#: code of dataset 164 -> metre of one length unit (SI, British, metric, ..., mm, cm, inch, mm)
+#: length unit in metres for each code of dataset 164 (SI, British, metric, ..., mm, cm, inch, mm)
 LENGTHS = {1: 1.0, 2: 0.3048, 3: 1.0, 4: 0.3048, 5: 1e-3, 6: 1e-2, 7: 0.0254, 8: 1e-3, 10: 1e-3}
 NORMAL, COMPLEX = 2, (3, 7)  #: analysis types of dataset 55
-GLOBAL = (0, 1)  #: numbers of displacement systems that are the axes of the test
+GLOBAL = (0, 1)  #: displacement systems that are the axes of the test
 NODES, SHAPES, UNITS = (15, 2411), 55, 164
 
 
@@ -24,14 +24,14 @@ def read_universal(path: Path, length: float, *, given: float | None = None) -> 
     Parameters
     ----------
     length
-        Metre of one length unit of the model.
+        Length unit of the model [m].
     given
-        Metre of one length unit of the file, where it does not say it in a dataset 164.
+        Length unit of the file [m], if the file has no dataset 164.
 
     Raises
     ------
     CorrelationError
-        If the file is damaged or has no modes, points have no place, or nothing tells the unit of length.
+        If the file is damaged or has no modes, points have no position, or the length unit is unknown.
     MissingExtraError
         If pyuff (extra `modal-test`) is not installed.
     """
@@ -41,7 +41,7 @@ def read_universal(path: Path, length: float, *, given: float | None = None) -> 
         file = pyuff.UFF(str(path))
         kinds = [int(kind) for kind in file.get_set_types()]
         sets = [(kind, file.read_sets(k)) for k, kind in enumerate(kinds) if kind in (*NODES, SHAPES, UNITS)]
-    except Exception as error:  # whatever a damaged file does to the reader, the user gets one message
+    except Exception as error:  # whatever error the reader raises for a damaged file, the user gets one message
         words = f"{type(error).__name__}: {error}"[:200]
         raise CorrelationError(f"{path}: could not be read as a universal file: {words}") from error
     metre = unit_of_length(path, [block for kind, block in sets if kind == UNITS], given)
@@ -75,9 +75,9 @@ def read_universal(path: Path, length: float, *, given: float | None = None) -> 
 
 
 def require_whole(path: Path) -> None:
-    """Raise `CorrelationError` if the last dataset of a file of text has no end: the reader would leave it out."""
+    """Raise `CorrelationError` if the last dataset of a text file has no end; the reader would ignore it."""
     content = path.read_bytes()
-    if b"    58b" in content:  # bytes of measured time series may look like anything
+    if b"    58b" in content:  # bytes of measured time series may have any value
         return
     marks = sum(line.rstrip() == b"    -1" for line in content.splitlines())
     if marks % 2:
@@ -85,7 +85,7 @@ def require_whole(path: Path) -> None:
 
 
 def unit_of_length(path: Path, blocks: list[dict[str, Any]], given: float | None) -> float:
-    """Return the metre of one length unit of the file; what it says and what was said must agree."""
+    """Return the length unit of the file [m]; file and argument must agree."""
     told = None
     for block in blocks:
         code = int(block.get("units_code", 0))
@@ -99,7 +99,7 @@ def unit_of_length(path: Path, blocks: list[dict[str, Any]], given: float | None
 
 
 def places_of(path: Path, blocks: list[dict[str, Any]], factor: float) -> dict[int, np.ndarray]:
-    """Return number -> place of the points, in the unit of the model."""
+    """Return the position of each point by number, in the unit of the model."""
     found: dict[int, np.ndarray] = {}
     for block in blocks:
         systems = {int(each) for each in np.atleast_1d(block.get("disp_cs", 0))}
@@ -116,7 +116,7 @@ def places_of(path: Path, blocks: list[dict[str, Any]], factor: float) -> dict[i
 
 
 def mode_of(path: Path, block: dict[str, Any]) -> dict[str, Any] | None:
-    """Return frequency, damping, points and shape (n, 3) of a dataset 55; None if it is no mode."""
+    """Return frequency, damping, points and shape, (n, 3), of a dataset 55; None if it is not a mode."""
     kind = int(block.get("analysis_type", 0))
     if kind not in (NORMAL, *COMPLEX):
         return None

@@ -1,14 +1,15 @@
-"""Update a job to measured frequencies: least squares with sensitivities, prior spreads and their uncertainty.
+"""Update of a job to measured frequencies: least squares with sensitivities and prior standard deviations.
 
-With theta = p / p_0 - 1, e_k = (f_k / f_k,measured - 1) / sigma_k over the pairs, and prior spreads s:
+With theta = p / p_0 - 1, e_k = (f_k / f_k,measured - 1) / sigma_k over the pairs, and prior standard deviations s:
 
-(1) modes of the model at theta, paired with the test by MAC
+(1) compute the modes of the model at theta, and pair them with the test by MAC
 (2) d f_k / f_k = phiᵀ (dK - omega² dM) phi / (2 omega²) for modes with phiᵀ M phi = 1 (Fox and Kapoor 1968); dK and dM
-    by central differences of the assembled matrices, exact where they are linear or quadratic in p
-(3) (Jᵀ J + S⁻²) d theta = -(Jᵀ e + S⁻² theta), halved until |e|² + |theta / s|² falls; bounds hold
-(4) covariance (Jᵀ J + S⁻²)⁻¹ at the end (Friswell and Mottershead 1995, ch. 8)
+    are central differences of the assembled matrices, exact if these are linear or quadratic in p
+(3) solve (Jᵀ J + S⁻²) d theta = -(Jᵀ e + S⁻² theta), and halve the step until |e|² + |theta / s|² decreases, within
+    bounds
+(4) the covariance is (Jᵀ J + S⁻²)⁻¹ at the end (Friswell and Mottershead 1995, ch. 8)
 
-Damping does not enter: `fit_damping` takes the measured ratios alone.
+Damping is not used here: `fit_damping` uses the measured ratios alone.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,35 +30,35 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["Parameter", "Update", "update_model"]
 
-STEP = 1e-3  #: of theta, for the differences of the matrices
-SMALLEST_STEP = 1e-5  #: of theta, below which the update has converged
+STEP = 1e-3  #: step of theta for the differences of the matrices
+SMALLEST_STEP = 1e-5  #: step of theta below which the update has converged
 MOST_ITERATIONS = 20
 HALVINGS = 8
-MODES_BEYOND = 1.3  #: computed modes go up to this multiple of the highest measured frequency
+MODES_BEYOND = 1.3  #: modes are computed up to this multiple of the highest measured frequency
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number of the job that is updated."""
+    """A number of the job to update."""
 
     name: str
     path: str  #: key path in the job, such as "materials.steel.young"
-    start: float  #: not 0
-    spread: float = 0.1  #: standard deviation that is expected, as a share of the start
-    least: float = -0.9  #: of theta = p / start - 1
+    start: float  #: initial value, not 0
+    spread: float = 0.1  #: expected standard deviation, relative to the initial value
+    least: float = -0.9  #: lower bound of theta = p / start - 1
     most: float = 9.0
 
 
 @dataclass(frozen=True, eq=False)
 class Update:
-    """What the update found."""
+    """Result of the update."""
 
     parameters: tuple[Parameter, ...]
-    values: Array  #: (n,), in the unit of each
-    spread: Array  #: standard deviation of each, as a share of its start, (n,)
-    correlation: Array  #: of the parameters, (n, n)
-    jacobian: Array  #: relative frequency over relative parameter at the end, (n_pairs, n)
-    frequency_spread: float  #: of the measured frequencies, as a share
+    values: Array  #: updated values, (n,), each in its unit
+    spread: Array  #: standard deviation of each, relative to its initial value, (n,)
+    correlation: Array  #: correlation matrix of the parameters, (n, n)
+    jacobian: Array  #: relative change of frequency per relative change of parameter at the end, (n_pairs, n)
+    frequency_spread: float  #: relative standard deviation of the measured frequencies
     history: tuple[tuple[float, ...], ...]  #: objective, then values, of each step
     before: Correlation
     after: Correlation
@@ -65,12 +66,12 @@ class Update:
 
     @property
     def determined(self) -> Array:
-        """How much of each parameter the test told, (n,): 1 - (spread / prior spread)², 0 for nothing."""
+        """Information gained about each parameter, (n,): 1 - (spread / prior spread)²; 0: none."""
         prior = np.array([parameter.spread for parameter in self.parameters])
         return np.asarray(1 - (self.spread / prior) ** 2)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it in plain types."""
+        """Return the result in plain types."""
         return {
             "converged": self.is_converged,
             "frequency_spread": self.frequency_spread,
@@ -97,19 +98,19 @@ def update_model(
     frequency_spread: float = 0.005,
     most_iterations: int = MOST_ITERATIONS,
 ) -> Update:
-    """Find the values with which the model has the measured frequencies.
+    """Find the parameter values for which the model has the measured frequencies.
 
     Parameters
     ----------
     body_at
-        Values of the parameters, (n,) -> the coupled body; its dofs are the same for all values.
+        Function from parameter values, (n,), to the coupled body; its dofs must not depend on the values.
     frequency_spread
-        Standard deviation of the measured frequencies, as a share.
+        Relative standard deviation of the measured frequencies.
 
     Raises
     ------
     CorrelationError
-        If no modes are paired, a parameter changes nothing or is 0, or the spreads are not above 0.
+        If no modes are paired, a parameter has no effect or is 0, or a standard deviation is not positive.
     """
     if not parameters or any(not p.start for p in parameters):
         raise CorrelationError("update: expected one or more parameters whose start is not 0")
@@ -131,7 +132,7 @@ def update_model(
         return body, found
 
     def objective(found: Correlation, theta: Array) -> float:
-        """Of the measured modes that were paired at the start; one that lost its partner counts as at the window."""
+        """Return the objective over the modes paired at the start; a lost partner counts as an error of `window`."""
         error = dict(zip([pair.measured for pair in found.pairs], found.errors, strict=True))
         window = (pairing or Pairing()).window
         left = np.array([error.get(k, window) for k in wanted]) / frequency_spread
@@ -176,7 +177,7 @@ def update_model(
 def relative_jacobian(
     body: FEBody, body_at: Callable[[Array], FEBody], start: Array, theta: Array, found: Correlation
 ) -> Array:
-    """Return relative change of each paired frequency by theta, (n_pairs, n), by step (2)."""
+    """Return the relative change of each paired frequency per theta, (n_pairs, n): step (2)."""
     columns = found.model.columns
     if columns is None:
         raise CorrelationError("update: expected the modes of a full model")

@@ -1,4 +1,4 @@
-"""Pictures and films of surfaces, off-screen: describe a `Scene`, then `render_picture` or `render_animation`."""
+"""Off-screen pictures and films of surfaces: describe a `Scene`, then call `render_picture` or `render_animation`."""
 
 from cms.rendering.errors import RenderError, SceneError
 from cms.rendering.render import Drawing, render_animation, render_picture

@@ -1,4 +1,4 @@
-"""A scene to a file with one way of drawing views: frames are made one after the other, then written."""
+"""Drawing of a scene into a file with a given view function: frames are drawn one after the other, then written."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,7 +11,7 @@ from cms.rendering.scene import Scene
 __all__ = ["OnFrame", "ViewMaker", "draw_animation", "draw_picture"]
 
 ViewMaker = Callable[[Scene, Camera], Callable[[int], Image]]
-OnFrame = Callable[[int, int], None]  #: called with the number of frames done and of all
+OnFrame = Callable[[int, int], None]  #: receives the number of finished frames and of all frames
 
 
 def draw_picture(scene: Scene, path: Path, view_maker: ViewMaker) -> None:

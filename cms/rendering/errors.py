@@ -1,4 +1,4 @@
-"""Errors of the rendering."""
+"""Errors of rendering."""
 
 from cms.errors import CmsError
 
@@ -6,7 +6,7 @@ __all__ = ["RenderError", "SceneError"]
 
 
 class SceneError(CmsError, ValueError):
-    """A scene is not drawable: shapes that do not fit, nothing to see, an unknown file ending."""
+    """A scene cannot be drawn: shapes do not fit, it is empty, or the file suffix is unknown."""
 
 
 class RenderError(CmsError, RuntimeError):

@@ -25,9 +25,10 @@ Image = NDArray[np.uint8]  #: (height, width, 3)
 
 PICTURE_SUFFIXES = (".png",)
 FILM_SUFFIXES = (".gif", ".mp4")
-DITHER = np.array([[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]]) - 7.5  #: added before rounding to a
-# colour: it turns bands into a fine pattern, which stands still from frame to frame
-PALETTE_FRAMES = 60  #: of a GIF, held in memory: some of them choose the colours of all
+#: ordered dither, added before rounding to a
+DITHER = np.array([[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]]) - 7.5
+# colour; it replaces bands by a fine pattern that does not change from frame to frame
+PALETTE_FRAMES = 60  #: frames of a GIF held in memory, from which the common palette is chosen
 
 
 def require_suffix(path: Path, suffixes: tuple[str, ...]) -> None:
@@ -37,7 +38,7 @@ def require_suffix(path: Path, suffixes: tuple[str, ...]) -> None:
 
 
 def average_of_blocks(image: Image, n: int) -> Image:
-    """Return an image, (n height, n width, >= 3) uint8, made n times smaller by averaging: smooth edges."""
+    """Return an image, (n height, n width, >= 3) uint8, reduced n times by averaging, which smooths edges."""
     height, width = (size // n for size in image.shape[:2])
     blocks = image[..., :3].astype(np.uint16).reshape(height, n, width, n, 3)
     return np.asarray(blocks.sum(axis=(1, 3)) // n**2, dtype=np.uint8)
@@ -51,9 +52,9 @@ def write_picture(image: Image, path: Path) -> None:
 
 
 def write_film(frames: Iterable[Image], path: Path, *, fps: float) -> None:
-    """Write frames, each (height, width, 3) uint8, as the film that the suffix names.
+    """Write frames, each (height, width, 3) uint8, as a film in the format of the suffix.
 
-    A GIF counts hundredths of a second: its rate is the nearest one that it knows, and it repeats for ever.
+    A GIF counts in hundredths of a second: its frame rate is the nearest possible one, and it repeats for ever.
     """
     if path.suffix.lower() == ".gif":
         write_gif(frames, path, fps)
@@ -62,7 +63,7 @@ def write_film(frames: Iterable[Image], path: Path, *, fps: float) -> None:
 
 
 def write_gif(frames: Iterable[Image], path: Path, fps: float) -> None:
-    """Write a GIF with one palette for all frames, so that still parts do not flicker."""
+    """Write a GIF with one palette for all frames, so that static parts do not flicker."""
     from PIL import Image as PilImage
 
     source = iter(frames)
@@ -80,15 +81,15 @@ def write_gif(frames: Iterable[Image], path: Path, fps: float) -> None:
         return image
 
     images = (indexed(frame) for frame in chain(start, source))
-    duration = max(round(100 / fps), 2) * 10  # [ms]; viewers slow down what is faster than 20 ms
+    duration = max(round(100 / fps), 2) * 10  # [ms]; viewers slow down frames shorter than 20 ms
     first = next(images)
     first.save(path, "GIF", save_all=True, append_images=images, duration=duration, loop=0, optimize=False)
 
 
 def palette_of(frames: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return colours, (<= 256, 3), for frames, (n, height, width, 3): the background as it is, and 255 for all else.
+    """Return colours, (<= 256, 3), for frames, (n, height, width, 3): the exact background colour, and 255 others.
 
-    The background, most of all pixels, would take most of the colours and none of them would be its own.
+    The background covers most pixels. It would otherwise take most of the colours, none of them exact.
     """
     from PIL import Image as PilImage
 
@@ -101,7 +102,7 @@ def palette_of(frames: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def nearest_colors(colors: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return the number of the nearest colour for each cell of 4 levels a side, (64, 64, 64)."""
+    """Return the index of the nearest colour for each cell of 4 levels per side, (64, 64, 64)."""
     from scipy.spatial import KDTree
 
     levels = np.arange(64) * 4 + 1.5

@@ -1,4 +1,4 @@
-"""The words around a view: title, captions, colour bar, labels, axes; the same whatever drew the view."""
+"""Text and scales around a view (title, captions, colour bar, labels, axes), independent of the drawing library."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -20,15 +20,15 @@ INK, FAINT, AXIS_COLORS = "#1f2a33", "#5b6770", ("#c8403a", "#3a9a4b", "#2f6fc4"
 
 @dataclass(frozen=True)
 class Layout:
-    """Where things stand, in pixels."""
+    """Positions of the elements, in pixels."""
 
-    size: tuple[int, int]  #: of the picture
+    size: tuple[int, int]  #: size of the picture
     view: tuple[int, int, int, int]  #: left, top, width, height of the view
-    unit: int  #: size of the small text; everything scales with it
+    unit: int  #: size of the small text; all other sizes scale with it
 
 
 def layout_of(scene: Scene) -> Layout:
-    """Return the layout of a scene: words above, colour bar on the right, the view in what is left."""
+    """Return the layout of a scene: text at the top, colour bar on the right, and the view in the remaining area."""
     width, height = scene.size
     unit = max(round(min(width / 1280, height / 800) * 19), 9)
     top = unit
@@ -41,7 +41,7 @@ def layout_of(scene: Scene) -> Layout:
 
 
 def compose(scene: Scene, layout: Layout, camera: Camera, view: Image, frame: int) -> Image:
-    """Return the finished picture, (height, width, 3) uint8, around a view of the layout's size, uint8."""
+    """Return the finished picture, (height, width, 3) uint8, around a view of the given layout."""
     from PIL import Image as PilImage
     from PIL import ImageDraw
 
@@ -69,7 +69,7 @@ def compose(scene: Scene, layout: Layout, camera: Camera, view: Image, frame: in
 
 
 def draw_color_bar(draw: Any, scene: Scene, layout: Layout) -> None:
-    """Draw the colour bar with round numbers beside it."""
+    """Draw the colour bar with rounded numbers beside it."""
     u, (width, height) = layout.unit, layout.size
     _, top, _, view_height = layout.view
     low, high = scene.color_limits
@@ -120,7 +120,7 @@ def draw_triads(draw: Any, scene: Scene, layout: Layout, camera: Camera, frame: 
 def draw_axes(draw: Any, origin: Any, arms: Array, depth: Array, u: int, names: str) -> None:
     """Draw three axes whose arms in the picture are the columns of arms, (2, 3) [px]; the farthest first.
 
-    Called with pixel arms whose y may point down (triads) or up (the corner: names are given, y is turned).
+    y of the arms may point down (triads) or up (the corner axes, with names and inverted y).
     """
     sign = -1.0 if names else 1.0
     for k in np.argsort(-np.asarray(depth)):
@@ -138,7 +138,7 @@ def draw_axes(draw: Any, origin: Any, arms: Array, depth: Array, u: int, names: 
 
 @lru_cache(maxsize=16)
 def font(size: int, *, is_bold: bool = False) -> Any:
-    """Return matplotlib's own DejaVu Sans, so that pictures look alike on every machine."""
+    """Return matplotlib's own DejaVu Sans, so that pictures look the same on every machine."""
     import matplotlib
     from PIL import ImageFont
 

@@ -1,7 +1,7 @@
-"""The light of pictures, the same in both ways of drawing them; directions right, up and towards the eye.
+"""The lights of pictures, common to both drawing libraries; directions are right, up and towards the eye.
 
-Colours that mean numbers must be read alike on all sides: there more of the light comes from everywhere, and what
-faces downwards is lit from below.
+Colours that represent numbers must look the same on all sides. In that case more of the light is ambient, and downward
+faces are lit from below.
 """
 
 import numpy as np
@@ -10,27 +10,27 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["GLOSS", "LIGHTS", "ambient", "brightness", "diffuse"]
 
-#: from where, and how strong: key light, light from the side, fill light from below
+#: direction and strength: key light, side light, fill light from below
 LIGHTS = (
     (np.array([-0.4, 0.65, 1.0]), 0.72),
     (np.array([0.9, 0.1, 0.9]), 0.34),
     (np.array([-0.1, -1.0, 0.35]), 0.34),
 )
-GLOSS = {True: 0.08, False: 0.18}  #: strength of highlights, by whether colours mean numbers
+GLOSS = {True: 0.08, False: 0.18}  #: strength of highlights, by whether colours represent numbers
 
 
 def ambient(*, shows_numbers: bool) -> float:
-    """Return the share of light that comes from everywhere."""
+    """Return the share of ambient light."""
     return 0.55 if shows_numbers else 0.28
 
 
 def diffuse(*, shows_numbers: bool) -> float:
-    """Return the share of light that depends on the side."""
+    """Return the share of directional light."""
     return 0.48 if shows_numbers else 0.8
 
 
 def brightness(normals: Array, *, shows_numbers: bool) -> Array:
-    """Return the light on faces of these unit normals (right, up, towards the eye), (n, 3) -> (n,)."""
+    """Return the brightness of faces with these unit normals (right, up, towards the eye), (n, 3) -> (n,)."""
     total = np.zeros(len(normals))
     for towards, strength in LIGHTS:
         total += strength * np.clip(normals @ (towards / np.linalg.norm(towards)), 0, 1)

@@ -1,4 +1,4 @@
-"""Views drawn by matplotlib, where there is no OpenGL: faces sorted from far to near, each with one shade."""
+"""Views drawn by matplotlib, if there is no OpenGL: faces sorted from far to near, each with one shade."""
 
 from collections.abc import Callable
 from typing import Any
@@ -14,7 +14,7 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["matplotlib_view"]
 
-OVERSAMPLING = 2  #: drawn so much larger without smoothing, then averaged: smoothed neighbours would show seams
+OVERSAMPLING = 2  #: scale of drawing without smoothing, before averaging; smoothing of neighbours would show seams
 
 
 def matplotlib_view(scene: Scene, camera: Camera) -> Callable[[int], Image]:
@@ -58,7 +58,7 @@ def matplotlib_view(scene: Scene, camera: Camera) -> Callable[[int], Image]:
 
 
 class DrawnSurface:
-    """A surface with what does not change from frame to frame: which edges are sharp, which faces are smoothed."""
+    """A surface with data that are the same in all frames: sharp edges, and smoothing of faces."""
 
     def __init__(self, surface: Surface, scene: Scene) -> None:
         from matplotlib.colors import to_rgb
@@ -67,14 +67,15 @@ class DrawnSurface:
         rest = frame_of(surface.nodes, 0, 2)
         self.smoothing = smooth_neighbours(rest, surface.triangles)
         self.edges, self.beside, self.is_sharp = surface_edges(rest, surface.triangles)
-        self.is_closed = bool((self.beside[:, 0] != self.beside[:, 1]).all())  # then the inside is never seen
+        # the inside of a closed surface is never visible
+        self.is_closed = bool((self.beside[:, 0] != self.beside[:, 1]).all())
         self.limits = scene.color_limits if surface.scalars is not None else (0.0, 1.0)
         self.color = np.array(to_rgb(surface.color))
 
     def polygons(self, camera: Camera, frame: int) -> tuple[Array, Array, Array, Array, Array]:
         """Return depth (n,), corners (n, 3, 2), face and edge colours (n, 4), edge widths (n,) of faces and edges.
 
-        A translucent surface is an outline here: seams between translucent faces would show.
+        A translucent surface is drawn as an outline here, because seams between translucent faces would show.
         """
         surface, triangles = self.surface, self.surface.triangles
         nodes = frame_of(surface.nodes, frame, 2)
@@ -90,7 +91,7 @@ class DrawnSurface:
         shown = np.flatnonzero(is_solid & (faces_eye | (not self.is_closed)))
         ends = self.edges[edge_shown]
         rgba = self.shaded(normals, faces_eye, camera, frame)[shown]
-        edge_depth = seen[ends, 2].mean(axis=1) - 0.004 * camera.distance  # before the faces they bound
+        edge_depth = seen[ends, 2].mean(axis=1) - 0.004 * camera.distance  # in front of the faces that they bound
         edge_color = np.tile([0.13, 0.18, 0.22, 0.75 if is_solid else 0.32], (len(ends), 1))
         return (
             np.concatenate([seen[triangles[shown], 2].mean(axis=1), edge_depth]),
@@ -101,18 +102,18 @@ class DrawnSurface:
         )
 
     def shaded(self, normals: Array, faces_eye: Array, camera: Camera, frame: int) -> Array:
-        """Return the colours of all triangles in the light, (n_triangles, 4)."""
+        """Return the colours of all triangles with lighting, (n_triangles, 4)."""
         shading = self.smoothing @ normals
         shading /= np.maximum(np.linalg.norm(shading, axis=1, keepdims=True), 1e-300)
         shading = np.where(faces_eye[:, None], shading, -shading) @ camera.axes.T
         shows_numbers = self.surface.scalars is not None
-        light = brightness(shading * np.array([1.0, 1.0, -1.0]), shows_numbers=shows_numbers)  # axes look forward
+        light = brightness(shading * np.array([1.0, 1.0, -1.0]), shows_numbers=shows_numbers)  # axes point forward
         gloss = GLOSS[shows_numbers] * np.clip(shading @ unit(np.array([-0.3, 0.5, -0.85])), 0, 1) ** 24
         rgb = np.clip(self.face_colors(frame) * light[:, None] + gloss[:, None], 0, 1)
         return np.concatenate([rgb, np.ones((len(rgb), 1))], axis=1)
 
     def face_colors(self, frame: int) -> Array:
-        """Return the colour of each triangle before light, (n_triangles, 3)."""
+        """Return the colour of each triangle without lighting, (n_triangles, 3)."""
         if self.surface.scalars is None:
             return np.tile(self.color, (len(self.surface.triangles), 1))
         low, high = self.limits
@@ -121,7 +122,7 @@ class DrawnSurface:
 
 
 def line_collection(kind: Any, lines: Lines, camera: Camera, frame: int) -> Any:
-    """Return the segments of a frame as a collection; those that start behind the eye are left out."""
+    """Return the segments of a frame as a collection, without those that start behind the eye."""
     seen = camera.project(frame_of(lines.points, frame, 2))[lines.segments]
     seen = seen[(seen[..., 2] > 0).all(axis=1)]
     return kind(seen[..., :2], colors=lines.color, linewidths=OVERSAMPLING * lines.width * 0.72, alpha=lines.opacity)

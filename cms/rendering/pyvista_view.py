@@ -1,4 +1,4 @@
-"""Views drawn by pyvista (VTK, OpenGL), off-screen. Only for the worker: without OpenGL VTK can end the process."""
+"""Views drawn by pyvista (VTK, OpenGL), off-screen; for the worker only, because VTK without OpenGL can crash."""
 
 from collections.abc import Callable
 from typing import Any

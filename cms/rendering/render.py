@@ -1,4 +1,4 @@
-"""Scenes to files: by pyvista in a process of its own, or, where that fails, by matplotlib; and the user is told."""
+"""Scenes to files: with pyvista in a separate process or, if that fails, with matplotlib; the user is informed."""
 
 import logging
 import os
@@ -24,18 +24,18 @@ __all__ = ["Drawing", "render_animation", "render_picture"]
 
 log = logging.getLogger(__name__)
 
-# -P: a file of the user's folder must not shadow a module
+# -P: files in the user's folder must not shadow modules
 WORKER = (sys.executable, "-P", "-m", "cms.rendering.worker")
-SILENCE = 120.0  #: [s] without a new frame after which the worker is taken for dead
+SILENCE = 120.0  #: time without a new frame after which the worker counts as dead [s]
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """A file that was drawn, and by what."""
+    """A drawn file, and the library that drew it."""
 
     path: Path
     backend: str  #: "pyvista" or "matplotlib"
-    note: str = ""  #: why it was not pyvista, for the user; "": it was
+    note: str = ""  #: reason why pyvista was not used; "": it was used
 
 
 def render_picture(scene: Scene, path: str | Path) -> Drawing:
@@ -67,14 +67,14 @@ def render_animation(scene: Scene, path: str | Path, *, fps: float = 25.0, on_fr
     path
         Ends in .gif or .mp4.
     fps
-        Frames a second; a GIF takes the nearest rate that it knows (whole hundredths of a second a frame).
+        Frames per second; a GIF uses the nearest possible rate (whole hundredths of a second per frame).
     on_frame
-        Called with the number of frames drawn and of all, for a progress bar.
+        Receives the number of drawn frames and of all frames, for a progress bar.
 
     Raises
     ------
     SceneError
-        If the path has another ending, or fps is not between 1 and 120.
+        If the path has another suffix, or fps is not between 1 and 120.
     RenderError
         If the file cannot be written.
     """
@@ -94,7 +94,7 @@ def render_animation(scene: Scene, path: str | Path, *, fps: float = 25.0, on_fr
 def drawn(
     scene: Scene, target: Path, options: tuple[str, ...], fallback: Callable[[Path], None], tell: OnFrame
 ) -> Drawing:
-    """Draw under a temporary name beside the target and move into place, so that no half-written file is seen."""
+    """Draw to a temporary file beside the target, and rename it, so that no half-written file is visible."""
     if is_stream(target):
         raise RenderError(f"{target}: this is a device or a pipe; expected the name of a file")
     try:
@@ -114,7 +114,7 @@ def drawn(
 
 
 def run_worker(scene: Scene, scene_path: Path, out: Path, options: tuple[str, ...], tell: OnFrame) -> str:
-    """Draw in a process of its own; return "" or, in words, why there is no drawing."""
+    """Draw in a separate process; return "", or the reason why there is no drawing."""
     write_scene(scene, scene_path)
     search = os.pathsep.join([str(Path(cms.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
     with (scene_path.parent / "errors.txt").open("w+b") as errors:
@@ -128,7 +128,7 @@ def run_worker(scene: Scene, scene_path: Path, out: Path, options: tuple[str, ..
         try:
             is_silent = follow(worker, tell)
         finally:
-            worker.kill()  # nothing where it has ended; an interrupted caller leaves no process behind
+            worker.kill()  # does nothing if it has ended; an interrupted caller leaves no process
             code = worker.wait()
             if worker.stdout is not None:
                 worker.stdout.close()
@@ -143,7 +143,7 @@ def run_worker(scene: Scene, scene_path: Path, out: Path, options: tuple[str, ..
 
 
 def follow(worker: subprocess.Popen[str], tell: OnFrame) -> bool:
-    """Pass on the worker's progress until it ends; True if it fell silent."""
+    """Report the worker's progress until it ends; return True if it stopped responding."""
     lines: queue.Queue[str] = queue.Queue()
 
     def listen() -> None:
@@ -171,7 +171,7 @@ def follow(worker: subprocess.Popen[str], tell: OnFrame) -> bool:
 
 
 def ending(code: int, said: str) -> str:
-    """Return in words how a process ended: the signal, or the last line that it said."""
+    """Describe how a process ended: the signal, or its last line of output."""
     if code < 0:
         name = signal.Signals(-code).name if -code in signal.Signals._value2member_map_ else str(-code)
         return f"its process died of {name}, most likely there is no OpenGL here"
@@ -180,4 +180,4 @@ def ending(code: int, said: str) -> str:
 
 
 def nothing(done: int, all_: int) -> None:
-    """Take no notice of progress."""
+    """Ignore progress."""

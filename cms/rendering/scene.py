@@ -1,4 +1,4 @@
-"""What a picture or an animation shows: surfaces, lines and triads over frames, and the words around them."""
+"""Content of a picture or an animation: surfaces, lines and triads over frames, and text."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -14,12 +14,13 @@ __all__ = ["Lines", "Scene", "Surface", "Triad", "frame_of"]
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A surface of triangles; still, or one set of positions a frame."""
+    """A surface of triangles, static or with one set of positions per frame."""
 
     triangles: IntArray  #: (n_triangles, 3) indices of nodes
     nodes: Array  #: positions, (n_nodes, 3) or (n_frames, n_nodes, 3) [m]
-    scalars: Array | None = None  #: value that colours a node, (n_nodes,) or (n_frames, n_nodes); None: one colour
-    color: str = "#b8c4d0"  #: where there are no scalars
+    #: value that colours each node, (n_nodes,) or (n_frames, n_nodes); None: a single colour
+    scalars: Array | None = None
+    color: str = "#b8c4d0"  #: colour if there are no scalars
     opacity: float = 1.0  #: 0 < opacity <= 1
     has_edges: bool = True  #: whether sharp edges are drawn
     name: str = ""
@@ -48,7 +49,7 @@ class Surface:
 
     @property
     def n_frames(self) -> int:
-        """Number of frames; 1 when still."""
+        """Number of frames; 1 if static."""
         return 1 if self.nodes.ndim == 2 else len(self.nodes)
 
 
@@ -61,7 +62,7 @@ class Lines:
     color: str = "#5b6770"
     width: float = 1.5  #: [px]
     opacity: float = 1.0
-    is_backdrop: bool = False  #: whether it lies behind all else, as a ground does
+    is_backdrop: bool = False  #: whether it is drawn behind everything else, such as a ground
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "segments", frozen_int(self.segments))
@@ -74,13 +75,13 @@ class Lines:
 
     @property
     def n_frames(self) -> int:
-        """Number of frames; 1 when still."""
+        """Number of frames; 1 if static."""
         return 1 if self.points.ndim == 2 else len(self.points)
 
 
 @dataclass(frozen=True, eq=False)
 class Triad:
-    """Three short axes at a point, with a label: an interface, a marker. Seen through whatever lies before it."""
+    """Three short axes at a point, with a label, for an interface or a marker; drawn in front of everything else."""
 
     position: Array  #: (3,) or (n_frames, 3) [m]
     axes: Array  #: axes as columns, (3, 3) or (n_frames, 3, 3)
@@ -100,25 +101,27 @@ class Triad:
 
     @property
     def n_frames(self) -> int:
-        """Number of frames; 1 when still."""
+        """Number of frames; 1 if static."""
         return 1 if self.position.ndim == 1 else len(self.position)
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """All that is drawn. Parts with one frame stand still while the others move."""
+    """Everything to draw. Parts with a single frame are static while the others move."""
 
     surfaces: tuple[Surface, ...] = ()
     lines: tuple[Lines, ...] = ()
     triads: tuple[Triad, ...] = ()
     title: str = ""
     captions: tuple[str, ...] = ()  #: lines under the title
-    frame_notes: tuple[str, ...] = ()  #: one per frame, such as the time; or none
-    scalar_title: str = ""  #: what the colours mean
-    scalar_unit: str = ""  #: its unit; "": none
-    scalar_range: tuple[float, float] | None = None  #: ends of the colour bar; None: those of all frames
-    direction: Array = field(default_factory=lambda: np.array([-1.0, 2.0, -1.0]))  #: from the eye into the scene, (3,)
-    up: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: what points up in the picture, (3,)
+    frame_notes: tuple[str, ...] = ()  #: note for each frame, such as the time; or empty
+    scalar_title: str = ""  #: quantity that the colours represent
+    scalar_unit: str = ""  #: unit of that quantity; "": none
+    scalar_range: tuple[float, float] | None = None  #: ends of the colour bar; None: extremes over all frames
+    #: direction from the eye into the scene, (3,)
+    direction: Array = field(default_factory=lambda: np.array([-1.0, 2.0, -1.0]))
+    #: direction that points up in the picture, (3,)
+    up: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     background: str = "#fbfcfd"
     size: tuple[int, int] = (1280, 800)  #: width and height [px]
 
@@ -142,7 +145,7 @@ class Scene:
 
     @property
     def n_frames(self) -> int:
-        """Number of frames; 1 when all stands still."""
+        """Number of frames; 1 if everything is static."""
         return max(self.frame_counts)
 
     @property
@@ -158,7 +161,7 @@ class Scene:
 
     @property
     def color_limits(self) -> tuple[float, float]:
-        """Ends of the colour bar: as given, or the least and greatest scalar of all frames."""
+        """Ends of the colour bar: as given, or the smallest and largest scalar of all frames."""
         if self.scalar_range is not None:
             return self.scalar_range
         values = [surface.scalars for surface in self.surfaces if surface.scalars is not None and surface.scalars.size]
@@ -167,7 +170,7 @@ class Scene:
 
 
 def frame_of(values: Array, frame: int, still_ndim: int) -> Array:
-    """Return the values of one frame; what has only `still_ndim` axes, or one frame, is the same in all."""
+    """Return the values of one frame; values with only `still_ndim` axes, or one frame, are the same in all frames."""
     if values.ndim == still_ndim:
         return values
     return np.asarray(values[0 if len(values) == 1 else frame])
@@ -182,7 +185,7 @@ def positions(where: str, values: Any) -> Array:
 
 
 def finite(where: str, values: Sequence[float] | Array) -> Array:
-    """Return a read-only array after checking that it holds no NaN and no infinity."""
+    """Return a read-only array after a check that it contains no NaN and no infinity."""
     array = frozen(values)
     if not np.isfinite(array).all():
         raise SceneError(f"{where}: expected finite numbers, got NaN or infinity")

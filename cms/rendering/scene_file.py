@@ -1,4 +1,4 @@
-"""A scene as a file, for the process that draws it: arrays in an .npz, all else as JSON text inside; no pickles."""
+"""A scene as a file for the drawing process: arrays in an .npz, everything else as JSON in it; no pickles."""
 
 import json
 from dataclasses import fields
@@ -15,7 +15,7 @@ PARTS = {"surfaces": Surface, "lines": Lines, "triads": Triad}
 
 
 def write_scene(scene: Scene, path: Path) -> None:
-    """Write a scene; moving positions in single precision, which is finer than any pixel."""
+    """Write a scene; moving positions are in single precision, which is finer than any pixel."""
     arrays: dict[str, np.ndarray] = {}
     plain: dict[str, Any] = {}
 
@@ -38,7 +38,7 @@ def write_scene(scene: Scene, path: Path) -> None:
 
 
 def read_scene(path: Path) -> Scene:
-    """Return the scene of a file of `write_scene`."""
+    """Return the scene from a file of `write_scene`."""
     with np.load(path, allow_pickle=False) as archive:
         values: dict[str, Any] = json.loads(archive["__plain__"].tobytes())
         values |= {name: archive[name] for name in archive.files if name != "__plain__"}

@@ -1,4 +1,4 @@
-"""What the shape of a surface says about its picture: sharp edges, and normals smoothed up to them."""
+"""Geometry of a surface for drawing: sharp edges, and normals smoothed between them."""
 
 from functools import lru_cache
 
@@ -10,7 +10,7 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["colormap", "smooth_neighbours", "surface_edges", "triangle_normals"]
 
-FEATURE_ANGLE = np.deg2rad(35.0)  #: between normals; above it an edge is sharp
+FEATURE_ANGLE = np.deg2rad(35.0)  #: angle between normals above which an edge is sharp
 COLOR_STOPS = ("#3b6fb6", "#4fa3c7", "#8fcfb0", "#e6e28a", "#f2a65a", "#d6513f", "#9b1d3c")
 
 
@@ -23,13 +23,13 @@ def triangle_normals(nodes: Array, triangles: IntArray) -> Array:
 
 
 def surface_edges(nodes: Array, triangles: IntArray) -> tuple[IntArray, IntArray, NDArray[np.bool_]]:
-    """Return all edges of a surface, and which are sharp, free or shared by more than two triangles.
+    """Return all edges of a surface, and which are sharp, free, or shared by more than two triangles.
 
     Returns
     -------
     tuple
-        nodes of the edges, (n_edges, 2); two triangles beside each (a free edge has one twice), (n_edges, 2); whether
-        it is sharp, (n_edges,).
+        Nodes of the edges, (n_edges, 2); the two triangles at each edge (a free edge has the same one twice), (n_edges,
+        2); and whether it is sharp, (n_edges,).
     """
     ends = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
     if len(ends) == 0:
@@ -46,9 +46,9 @@ def surface_edges(nodes: Array, triangles: IntArray) -> tuple[IntArray, IntArray
 
 
 def smooth_neighbours(nodes: Array, triangles: IntArray) -> sp.csr_array:
-    """Return the matrix that sums, for each triangle, the area normals of those that touch it at less than the angle.
+    """Return the matrix that sums, for each triangle, the area normals of neighbours at less than the feature angle.
 
-    (n_triangles, n_triangles), with entries 0 and 1; the triangle itself is included.
+    It is (n_triangles, n_triangles), with entries 0 and 1, and includes the triangle itself.
     """
     n = len(triangles)
     corner = sp.csr_array((np.ones(3 * n), (np.repeat(np.arange(n), 3), triangles.ravel())), shape=(n, len(nodes)))
@@ -62,7 +62,7 @@ def smooth_neighbours(nodes: Array, triangles: IntArray) -> sp.csr_array:
 
 @lru_cache(maxsize=1)
 def colormap() -> Array:
-    """Return the colour map, (256, 3) in 0..1: cool to warm, evenly spaced in perceived difference (CIE76)."""
+    """Return the colour map, (256, 3) in 0..1: cool to warm, with equal perceived differences (CIE76)."""
     from matplotlib.colors import LinearSegmentedColormap
 
     fine = LinearSegmentedColormap.from_list("", COLOR_STOPS)(np.linspace(0, 1, 2048))[:, :3]

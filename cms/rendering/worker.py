@@ -1,7 +1,7 @@
-"""The process that draws with pyvista: `python -m cms.rendering.worker scene.npz out.png [fps]`.
+"""The drawing process with pyvista: `python -m cms.rendering.worker scene.npz out.png [fps]`.
 
-It is a process of its own because VTK ends the one it is in where there is no OpenGL. It prints one line a frame, by
-which `cms.rendering.render` knows that it is alive.
+It is a separate process, because VTK ends its process if there is no OpenGL. It prints one line per frame, which tells
+`cms.rendering.render` that it is alive.
 """
 
 import sys
@@ -15,7 +15,7 @@ __all__ = ["main"]
 
 
 def main(scene_path: str, out: str, fps: str = "") -> None:
-    """Draw the scene of a file into another: a film if fps is given, else a picture."""
+    """Draw the scene of one file into another: a film if fps is given, otherwise a picture."""
     leave_no_core_file()
     scene = read_scene(Path(scene_path))
     if fps:
@@ -25,7 +25,7 @@ def main(scene_path: str, out: str, fps: str = "") -> None:
 
 
 def leave_no_core_file() -> None:
-    """Forbid core files, where there is such a thing: VTK may well crash, and its memory is of no use to the user."""
+    """Disable core files if the system has them: VTK may crash, and its memory is useless to the user."""
     try:
         import resource
     except ImportError:
@@ -34,7 +34,7 @@ def leave_no_core_file() -> None:
 
 
 def report(done: int, all_: int) -> None:
-    """Tell the parent process how far it is."""
+    """Report progress to the parent process."""
     sys.stdout.write(f"{done} {all_}\n")
     sys.stdout.flush()
 

@@ -1,6 +1,6 @@
-"""Reports: they write down what records say, and compute nothing."""
+"""Reports: they present records, and compute nothing."""
 
 import lazy_loader
 
-# the public names stand in __init__.pyi; each module is imported when its name is first used
+# The public names are listed in __init__.pyi. A module is imported when one of its names is first used.
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,4 +1,4 @@
-"""Sections of a comparison about the body and the sets themselves: mode shapes, columns, what the numbers mean."""
+"""Sections of a comparison about the body and the sets: mode shapes, columns, meaning of the numbers."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,7 @@ __all__ = ["columns_section", "method_section", "shape_section"]
 
 
 def shape_section(comparison: Comparison, stills: int) -> Section:
-    """Mode shapes of the full model, to turn and on paper."""
+    """Return the section with mode shapes of the full model, interactive and as pictures."""
     drawing, full = comparison.drawing, comparison.full
     if not len(drawing.nodes):
         return Section("shapes-section", "Mode shapes", "Mode shapes", '<p class="notice">The body has no surface.</p>')
@@ -56,7 +56,7 @@ def shape_section(comparison: Comparison, stills: int) -> Section:
 
 
 def columns_section(comparison: Comparison) -> Section:
-    """What the sets are made of."""
+    """Return the section about the columns of the sets."""
     rows: list[tuple[str, Sequence[Cell]]] = []
     for k, result in enumerate(comparison.sets):
         point = result.detail
@@ -89,7 +89,7 @@ def columns_section(comparison: Comparison) -> Section:
 
 
 def method_section(comparison: Comparison) -> Section:
-    """What the numbers mean, and where they come from."""
+    """Return the section about the meaning and the source of the numbers."""
     terms = [(COLUMNS[name], name) for name in DECIDING] + [(DOUBTS[name], name) for name in DOUBTS]
     meanings = "".join(
         f"<dt>{text(sentence_case(title)[:-1])}</dt><dd>{text(sentence_case(LIMITS[name].title))} "

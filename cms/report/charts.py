@@ -23,18 +23,18 @@ __all__ = [
     "response_error_chart",
 ]
 
-FLOOR = 1e-10  #: least error that is drawn over time or frequency; what is below is rounding
-DECADES = 4  #: below its limit that the chart of a record reaches; smaller values stand at its lower end
+FLOOR = 1e-10  #: smallest error drawn over time or frequency; smaller values are rounding
+DECADES = 4  #: decades below its limit that the chart of a record shows; smaller values are drawn at its lower end
 DIRECTIONS = ("x", "y", "z", "about x", "about y", "about z")
 INK, GRID = "#3d4650", "#e3e7eb"
 
-MAC_HEIGHT, CONVERGENCE_HEIGHT = 270, 290  #: of a chart and of its place [px]
+MAC_HEIGHT, CONVERGENCE_HEIGHT = 270, 290  #: height of a chart and of its frame [px]
 
 Chart = dict[str, Any]
 
 
 def convergence_chart(comparison: Comparison, name: str) -> Chart:
-    """Value of one record against the number of modes (or of coordinates), one line a set, and its limit."""
+    """Return the value of one record against the number of modes (or coordinates), one line per set, with its limit."""
     tolerance = LIMITS[name].tolerance
     floor = 10.0 ** math.floor(math.log10(tolerance or 1.0) - DECADES)
     traces: list[Chart] = []
@@ -64,7 +64,7 @@ def convergence_chart(comparison: Comparison, name: str) -> Chart:
 
 
 def response_chart(comparison: Comparison) -> Chart:
-    """Magnitude of the drawn entry of the response: the full model, and every set at its shown point."""
+    """Return the magnitude of the drawn response entry: full model, and every set at its shown point."""
     full, units = comparison.full, comparison.units
     traces = [
         line(full.response_hz, full.response, "full model", FULL_MODEL, width=4, opacity=0.35, hover="%{y:.3g}"),
@@ -82,7 +82,7 @@ def response_chart(comparison: Comparison) -> Chart:
 
 
 def response_error_chart(comparison: Comparison) -> Chart:
-    """Relative error of the whole response matrix of the interfaces at every frequency."""
+    """Return the relative error of the complete response matrix of the interfaces at every frequency."""
     traces = [
         line(comparison.full.response_hz, np.maximum(point.record("frequency-response").data["error"], FLOOR),
              legend(result, point), style_of(k).color, dash=style_of(k).dash, hover="%{y:.2g}")
@@ -95,7 +95,7 @@ def response_error_chart(comparison: Comparison) -> Chart:
 
 
 def deformation_chart(comparison: Comparison, norm: str = "K") -> Chart:
-    """Deformation error over time of every set at its shown point, and the force that makes the motion."""
+    """Return the deformation error over time of every set at its shown point, and the exciting force."""
     full = comparison.full
     force: Chart = {
         "type": "scatter", "mode": "lines", "name": "force / peak", "x": plain(full.t * 1e3), "y": plain(full.force),
@@ -124,7 +124,7 @@ def deformation_chart(comparison: Comparison, norm: str = "K") -> Chart:
 
 
 def effective_mass_chart(comparison: Comparison) -> Chart:
-    """Share of the effective mass that every set carries while its interfaces are held, by direction."""
+    """Return the share of effective mass in every set with its interfaces held, by direction."""
     traces = []
     for k, result, point in shown(comparison):
         remainder = np.asarray(point.record("effective-mass").data["remainder"], dtype=float)
@@ -147,7 +147,7 @@ PATTERNS = ("", "/", "\\", "x", ".", "-", "|", "+")
 
 
 def mac_chart(result: SetResult, point: Point, frequencies_hz: Array) -> Chart:
-    """MAC of the free modes of the full model (down) and those of a set (across)."""
+    """Return the MAC of the free modes of the full model (down) and those of a set (across)."""
     mac = np.asarray(point.record("mac").data["mac"])
     n, k = mac.shape
     k = min(k, n + 2)
@@ -169,7 +169,7 @@ def mac_chart(result: SetResult, point: Point, frequencies_hz: Array) -> Chart:
 
 
 def dtick(n: int) -> int:
-    """Return the step of the numbers at an axis of n modes."""
+    """Return the step of the tick labels on an axis of n modes."""
     return 1 if n <= 10 else 2 if n <= 20 else 5
 
 
@@ -177,7 +177,7 @@ def dtick(n: int) -> int:
 
 
 def shown(comparison: Comparison) -> list[tuple[int, SetResult, Point]]:
-    """Return the sets that have a shown point, with their number (which gives the style)."""
+    """Return the sets with a shown point, with their index (which gives the style)."""
     return [(k, result, result.detail) for k, result in enumerate(comparison.sets) if result.detail is not None]
 
 
@@ -198,7 +198,7 @@ def line(
 
 
 def base_layout(x: str, y: str) -> Chart:
-    """Return what all charts share."""
+    """Return the layout that all charts share."""
     axis = {
         "gridcolor": GRID, "linecolor": "#9aa5b1", "ticks": "outside", "tickcolor": "#9aa5b1", "zeroline": False,
         "automargin": True, "showline": True, "tickfont": {"size": 11.5},
@@ -217,7 +217,7 @@ def base_layout(x: str, y: str) -> Chart:
 
 
 def log_axis(values: list[float]) -> Chart:
-    """Return a logarithmic axis of errors over whole decades that hold the values."""
+    """Return a logarithmic axis of errors over whole decades that contain the values."""
     positive = [value for value in values if value and value > 0]
     low = math.floor(math.log10(min(positive, default=1e-3)) + 1e-9)
     high = math.ceil(math.log10(max(positive, default=1.0)) - 1e-9)
@@ -229,7 +229,7 @@ def log_axis(values: list[float]) -> Chart:
 
 
 def limit_line(tolerance: float) -> Chart:
-    """Return the line of a limit and its word."""
+    """Return the line of a limit and its label."""
     return {
         "shapes": [
             {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": tolerance, "y1": tolerance,

@@ -10,9 +10,9 @@ __all__ = ["comparison_csv"]
 
 
 def comparison_csv(comparison: Comparison) -> str:
-    """Return the values of all records as CSV text, comma-separated, one heading row; what is not finite is empty.
+    """Return the values of all records as CSV, comma-separated, with one heading row; non-finite values are empty.
 
-    A set that could not be made has one row, with its reason as the verdict.
+    A set that could not be made has one row, with the reason as its verdict.
     """
     names = list(
         dict.fromkeys(record.name for result in comparison.sets for p in result.points for record in p.records)

@@ -1,4 +1,4 @@
-"""A comparison as one HTML page that works offline: verdicts first, then what they rest on."""
+"""A comparison as one HTML page that works offline: verdicts first, then the evidence."""
 
 from collections.abc import Sequence
 
@@ -27,7 +27,7 @@ def comparison_html(comparison: Comparison, *, stills: int = 4) -> str:
     Parameters
     ----------
     stills
-        Number of still pictures of mode shapes, for paper; each takes some seconds.
+        Number of still pictures of mode shapes, for printing; each takes some seconds.
     """
     sections = [
         verdict_section(comparison),
@@ -83,7 +83,7 @@ def header(comparison: Comparison) -> str:
 
 
 def verdict_section(comparison: Comparison) -> Section:
-    """Verdict of every set with the numbers it rests on."""
+    """Return the verdict of every set, with the numbers that it depends on."""
     headings = ["set", "verdict", "modes>", "coordinates>", *(f"{COLUMNS[name]}>" for name in DECIDING)]
     limits = [Cell("limit", "name"), Cell(""), Cell(""), Cell("")]
     limits += [Cell(limit_words(name), "n") for name in DECIDING]

@@ -14,14 +14,14 @@ VERSION = 1
 
 
 def comparison_json(comparison: Comparison) -> str:
-    """Return a comparison as JSON text; numbers that are not finite are null."""
+    """Return a comparison as JSON text; non-finite numbers become null."""
     return json.dumps(comparison_record(comparison), ensure_ascii=False, allow_nan=False)
 
 
 def comparison_record(comparison: Comparison) -> dict[str, Any]:
     """Return a comparison in plain types; frequencies are in Hz, times in s, the rest in units of the body.
 
-    The drawing is left out: it is for the eye alone.
+    The drawing is left out, because it only serves to be looked at.
     """
     return {
         "format": FORMAT,

@@ -1,4 +1,4 @@
-"""Sections of a comparison that show what its verdicts rest on: convergence, frequencies, shapes, response, motion."""
+"""Sections of a comparison with the evidence for its verdicts: convergence, frequencies, shapes, response, motion."""
 
 import math
 
@@ -29,7 +29,7 @@ __all__ = [
     "response_section",
 ]
 
-#: what the chart of a record shows
+#: what the chart of each record shows
 SEEN = {
     "frequency-error": "Largest error of the elastic free-free frequencies in the band. Reduced frequencies are bounds "
     "from above, so the lines can only fall; where a set has fewer modes than the band it has no point yet.",
@@ -49,7 +49,7 @@ SEEN = {
 
 
 def convergence_section(comparison: Comparison) -> Section:
-    """Error against number of modes, one chart a record."""
+    """Return the section with error against number of modes, one chart per record."""
     charts: dict[str, Chart] = {}
     figures = []
     for name in (*DECIDING, "residual-bound", "effective-mass"):
@@ -77,7 +77,7 @@ def convergence_section(comparison: Comparison) -> Section:
 
 
 def frequency_section(comparison: Comparison) -> Section:
-    """Elastic free frequencies of the full model and of every set at its shown point."""
+    """Return the section with elastic free frequencies of the full model and of every set at its shown point."""
     full = comparison.full
     shown = [(result, result.detail) for result in comparison.sets if result.detail is not None]
     headings = ["mode>", "full model [Hz]>"]
@@ -99,7 +99,7 @@ def frequency_section(comparison: Comparison) -> Section:
 
 
 def error_kind(error: float) -> str:
-    """Return the verdict of one frequency by the limit of the record."""
+    """Return the verdict of one frequency, according to the limit of the record."""
     limit = LIMITS["frequency-error"]
     if math.isnan(error) or (limit.failing is not None and abs(error) > limit.failing):
         return "fail"
@@ -107,7 +107,7 @@ def error_kind(error: float) -> str:
 
 
 def mac_section(comparison: Comparison) -> Section:
-    """MAC matrices of every set at its shown point."""
+    """Return the section with MAC matrices of every set at its shown point."""
     charts: dict[str, Chart] = {}
     figures = []
     for k, result in enumerate(comparison.sets):
@@ -127,7 +127,7 @@ def mac_section(comparison: Comparison) -> Section:
 
 
 def response_section(comparison: Comparison) -> Section:
-    """Frequency response: overlay and error."""
+    """Return the section with the frequency response: overlay and error."""
     full = comparison.full
     if not any(result.detail for result in comparison.sets):
         return Section("response", "Frequency response", "Response", nothing_to_show())
@@ -159,7 +159,7 @@ def response_section(comparison: Comparison) -> Section:
 
 
 def motion_section(comparison: Comparison) -> Section:
-    """Deformation error over time."""
+    """Return the section with the deformation error over time."""
     if not any(result.detail for result in comparison.sets):
         return Section("motion", "Deformation error", "Motion", nothing_to_show())
     rows = []
@@ -187,7 +187,7 @@ def motion_section(comparison: Comparison) -> Section:
 
 
 def mass_section(comparison: Comparison) -> Section:
-    """Effective mass by direction."""
+    """Return the section with the effective mass by direction."""
     if not any(result.detail for result in comparison.sets):
         return Section("mass", "Effective mass", "Effective mass", nothing_to_show())
     full = comparison.full

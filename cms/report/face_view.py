@@ -1,4 +1,4 @@
-"""A picture of the faces of a CAD file, each with its number where it can be seen, from two opposite sides."""
+"""A picture of the faces of a CAD file from two opposite sides, with the number of each visible face."""
 
 import os
 import tempfile
@@ -19,9 +19,9 @@ __all__ = ["draw_faces", "visible_points"]
 
 COLOURS = ("#a9c4de", "#e8c39e", "#b5d6a7", "#d9b3d1", "#e5dc9a", "#a8d5d1", "#e0aaa5", "#c2bbe0", "#cdbfa8", "#b6c9c0")
 CHOSEN, OTHERS = "#e07b39", "#d5dbe0"
-EDGEWISE = 0.05  #: cosine between normal and line of sight below which a triangle is not seen
-TRIED = 60  #: triangles of a face that are looked at for a place for its number
-SIZE = (1000, 800)  #: of each of the two views [px]
+EDGEWISE = 0.05  #: cosine between normal and line of sight below which a triangle is invisible
+TRIED = 60  #: triangles of a face that are tried as a place for its number
+SIZE = (1000, 800)  #: size of each of the two views [px]
 
 
 def draw_faces(surface: CadSurface, path: str | Path, *, chosen: Iterable[int] = ()) -> Drawing:
@@ -34,7 +34,7 @@ def draw_faces(surface: CadSurface, path: str | Path, *, chosen: Iterable[int] =
     path
         Ends in .png.
     chosen
-        Numbers of faces: these stand out, and only they are numbered; none: all are.
+        Numbers of faces to highlight; only these are numbered. Empty: all faces are numbered.
     """
     from PIL import Image
 
@@ -92,16 +92,16 @@ def _colour(number: int, chosen: set[int]) -> str:
 
 
 def visible_points(nodes: Array, triangles: dict[int, IntArray], eye: Array) -> dict[int, Array]:
-    """Return for each face that is seen the middle of a triangle of it that nothing hides, near its own middle.
+    """Return for each visible face the centre of one of its unobstructed triangles, near the centre of the face.
 
     Parameters
     ----------
     nodes
         (n_nodes, 3).
     triangles
-        Number of a face -> its triangles, (n, 3).
+        Triangles of each face by its number, (n, 3).
     eye
-        Where the faces are seen from, (3,).
+        Position of the eye, (3,).
     """
     corners = nodes[np.concatenate(list(triangles.values()))]
     size = float(np.linalg.norm(np.ptp(nodes, axis=0)))

@@ -1,4 +1,4 @@
-"""Pieces of an HTML page: escaped text, tables, figures, and the page around them, with everything inside."""
+"""Pieces of a self-contained HTML page: escaped text, tables, figures, and the page itself."""
 
 import html
 import json
@@ -15,31 +15,31 @@ class Cell:
     """A cell of a table."""
 
     words: str
-    kind: str = ""  #: "n" for numbers, "name", "pass", "warn", "fail", "blank"; several with blanks between
-    note: str = ""  #: smaller, under the words
-    markup: str = ""  #: HTML in front of the words
+    kind: str = ""  #: "n" for numbers, "name", "pass", "warn", "fail", "blank"; several separated by blanks
+    note: str = ""  #: smaller text below
+    markup: str = ""  #: HTML before the text
     span: int = 1
 
 
 @dataclass(frozen=True)
 class Section:
-    """A section of a page with its entry in the contents."""
+    """A section of a page, with its entry in the table of contents."""
 
     key: str
     title: str
-    short: str  #: in the contents
+    short: str  #: title in the table of contents
     body: str  #: HTML
     lead: str = ""  #: first sentence
-    charts: dict[str, Any] = field(default_factory=dict)  #: id -> plotly figure
+    charts: dict[str, Any] = field(default_factory=dict)  #: plotly figure by id
 
 
 def text(words: object) -> str:
-    """Return text as HTML; a number stays with its percent sign."""
+    """Return text as HTML; numbers are not separated from their percent signs."""
     return html.escape(str(words)).replace(" %", "\u00a0%")
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[Cell] | tuple[str, Sequence[Cell]]]) -> str:
-    """Return a table; a heading that ends in '>' stands right; a row may come with its CSS class."""
+    """Return a table; a heading that ends in '>' is right-aligned; a row may have a CSS class."""
     head = "".join(f"<th{' class=n' if h.endswith('>') else ''}>{text(h.removesuffix('>'))}</th>" for h in headings)
     lines = []
     for row in rows:
@@ -55,7 +55,7 @@ def _cell(cell: Cell) -> str:
 
 
 def figure(key: str, caption: str, *, title: str = "", height: int = 330, kind: str = "") -> str:
-    """Return the place of a chart with its title and caption."""
+    """Return the placeholder of a chart with its title and caption."""
     heading = f"<h3>{text(title)}</h3>" if title else ""
     return (
         f'<figure>{heading}<div class="chart {kind}" id="{key}" style="height:{height}px" role="img" '
@@ -64,12 +64,12 @@ def figure(key: str, caption: str, *, title: str = "", height: int = 330, kind: 
 
 
 def page(title: str, brand: str, header: str, sections: Sequence[Section], scripts: dict[str, str], footer: str) -> str:
-    """Return a whole page that needs nothing but itself.
+    """Return a complete, self-contained page.
 
     Parameters
     ----------
     scripts
-        id -> JSON that the page's programs read.
+        JSON that the scripts of the page read, by id.
     """
     charts = {key: chart for section in sections for key, chart in section.charts.items()}
     contents = "".join(f'<a href="#{s.key}">{text(s.short)}</a>' for s in sections)
@@ -97,10 +97,10 @@ def page(title: str, brand: str, header: str, sections: Sequence[Section], scrip
 
 
 def _json_script(key: str, words: str) -> str:
-    """Return JSON inside a page; '<' is written so that no text of a name can end the script."""
+    """Return JSON inside a page; '<' is escaped, so that no text of a name can end the script."""
     return f'<script type="application/json" id="{key}">{words.replace("<", chr(92) + "u003c")}</script>\n'
 
 
 def asset(name: str) -> str:
-    """Return a file that is shipped with the reports."""
+    """Return a file that is included with the reports."""
     return (files("cms.report") / "data" / name).read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Words and marks that the sections of a comparison share."""
+"""Texts and symbols that the sections of a comparison share."""
 
 from cms.compare.comparison import Comparison
 from cms.quality.limits import LIMITS
@@ -36,7 +36,7 @@ COLUMNS = {
 
 
 def limit_words(name: str) -> str:
-    """Return the limit of a record."""
+    """Return the text of the limit of a record."""
     tolerance = LIMITS[name].tolerance
     return "" if tolerance is None else f"\u2264 {share(tolerance)}"
 
@@ -48,14 +48,14 @@ def verdict_cell(record: QualityRecord) -> Cell:
 
 
 def swatch(k: int) -> str:
-    """Return the line of a set as it stands in the charts."""
+    """Return the line style of a set as in the charts."""
     style = style_of(k)
     dash = {"solid": "solid", "dot": "dotted"}.get(style.dash, "dashed")
     return f'<span class="swatch" style="border-color:{style.color};border-top-style:{dash}"></span>'
 
 
 def sentence_case(words: str) -> str:
-    """Return a sentence with a capital and a full stop."""
+    """Return a sentence with a capital letter and a full stop."""
     return f"{words[:1].upper()}{words[1:]}{'' if words.endswith('.') else '.'}"
 
 
@@ -76,7 +76,7 @@ def legend(comparison: Comparison) -> str:
     return f'<ul class="legend">{"".join(items)}</ul>'
 
 
-#: the markers of the charts about the origin
+#: markers of the charts, drawn about the origin
 GLYPHS = {
     "circle": '<circle r="4"/>',
     "square": '<rect x="-3.6" y="-3.6" width="7.2" height="7.2"/>',
@@ -90,6 +90,6 @@ GLYPHS = {
 
 
 def nothing_to_show() -> str:
-    """Return what stands where no set could be made."""
+    """Return the text shown if no set could be made."""
     words = "No set could be made, so there is nothing to show here; the reasons stand with the verdicts."
     return f'<p class="notice">{words}</p>'

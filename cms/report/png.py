@@ -1,4 +1,4 @@
-"""A picture for a page: drawn into a file that is gone again, or left out with a warning."""
+"""A picture for a page, drawn into a temporary file, or left out with a warning."""
 
 import logging
 import tempfile
@@ -13,12 +13,12 @@ log = logging.getLogger(__name__)
 
 
 def png_of(draw: Callable[[Path], object], what: str) -> bytes | None:
-    """Return the PNG that a function draws into a path; None, and a warning, where it cannot be drawn.
+    """Return the PNG that a function draws into a path; None, with a warning, if it cannot be drawn.
 
     Parameters
     ----------
     what
-        What goes without its picture, for the warning.
+        Name of the report part without picture, for the warning.
     """
     with tempfile.TemporaryDirectory(prefix="picture-") as folder:
         path = Path(folder) / "picture.png"

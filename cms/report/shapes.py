@@ -1,4 +1,4 @@
-"""Mode shapes for the report: data for the viewer that can be turned, and still pictures for paper."""
+"""Mode shapes for the report: data for the interactive viewer, and still pictures for printing."""
 
 import base64
 import json
@@ -18,12 +18,12 @@ __all__ = ["shapes_json", "still_pictures"]
 
 log = logging.getLogger(__name__)
 
-SCALE = 0.09  #: largest displacement of a still picture, as a share of the diagonal
-SIZE = (900, 560)  #: of a still picture [px]
+SCALE = 0.09  #: largest displacement of a still picture, relative to the diagonal of the body
+SIZE = (900, 560)  #: size of a still picture [px]
 
 
 def shapes_json(drawing: Drawing) -> str:
-    """Return what the viewer draws: positions as 32-bit floats, shapes as 16-bit parts of their largest, in base64."""
+    """Return the data of the viewer: 32-bit positions, and shapes as 16-bit fractions of their largest, in base64."""
     direction, up = view_axes(drawing.nodes)
     return json.dumps(
         {
@@ -45,7 +45,7 @@ def encoded(values: np.ndarray) -> str:
 
 
 def still_pictures(comparison: Comparison, modes: int) -> list[tuple[str, str]]:
-    """Return the first modes as pictures: (title, PNG in base64); fewer where none can be drawn."""
+    """Return the first modes as pictures, (title, PNG in base64); fewer if some cannot be drawn."""
     pictures: list[tuple[str, str]] = []
     with tempfile.TemporaryDirectory(prefix="report-") as folder:
         for k in range(min(modes, len(comparison.drawing.shapes))):
@@ -61,7 +61,7 @@ def still_pictures(comparison: Comparison, modes: int) -> list[tuple[str, str]]:
 
 
 def mode_scene(drawing: Drawing, k: int, title: str) -> Scene:
-    """Return the scene of a free mode: deformed body coloured by displacement, undeformed one behind."""
+    """Return the scene of a free mode: deformed body coloured by displacement, with the undeformed body behind."""
     shape = drawing.shapes[k]
     diagonal = float(np.linalg.norm(np.ptp(drawing.nodes, axis=0)))
     moved = drawing.nodes + SCALE * diagonal * shape

@@ -13,8 +13,8 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["animate_mode", "mode_scene", "view_mode"]
 
-DEFAULT_SCALE = 0.09  #: largest displacement drawn, as a share of the diagonal of the body
-FRAMES, FPS = 36, 24.0  #: of one period in a film: 1.5 s
+DEFAULT_SCALE = 0.09  #: largest displacement drawn, relative to the diagonal of the body
+FRAMES, FPS = 36, 24.0  #: number of frames and frames per second of one period in a film, which lasts 1.5 s
 
 
 def view_mode(body: ReducedBody, mode: int, path: str | Path, *, scale: float | None = None) -> Drawing:
@@ -25,7 +25,7 @@ def view_mode(body: ReducedBody, mode: int, path: str | Path, *, scale: float | 
     mode
         Number of the mode, 1 to n_q, as `cms info` lists them.
     scale
-        Largest displacement drawn, as a share of the diagonal of the body; None: 0.09.
+        Largest displacement drawn, relative to the diagonal of the body; None: 0.09.
 
     Raises
     ------
@@ -38,9 +38,9 @@ def view_mode(body: ReducedBody, mode: int, path: str | Path, *, scale: float | 
 def animate_mode(
     body: ReducedBody, mode: int, path: str | Path, *, scale: float | None = None, on_frame: OnFrame | None = None
 ) -> Drawing:
-    """Draw one period of a mode into a film (.gif or .mp4) that runs on without a jump; else as `view_mode`.
+    """Draw one period of a mode into a film (.gif or .mp4) that repeats without a jump; otherwise as `view_mode`.
 
-    on_frame is called with the number of frames drawn and of all.
+    on_frame receives the number of drawn frames and of all frames.
     """
     phase = 2 * np.pi * np.arange(FRAMES) / FRAMES
     scene = mode_scene(body, mode, np.sin(phase), scale=scale, size=(960, 640))
@@ -50,7 +50,7 @@ def animate_mode(
 def mode_scene(
     body: ReducedBody, mode: int, amplitudes: Array, *, scale: float | None = None, size: tuple[int, int] = (1280, 800)
 ) -> Scene:
-    """Return the scene of a mode at amplitudes between -1 and 1, one a frame, (n_frames,)."""
+    """Return the scene of a mode at amplitudes between -1 and 1, one per frame, (n_frames,)."""
     where = f"mode {mode} of body {body.name!r}"
     scale = DEFAULT_SCALE if scale is None else scale
     if not 1 <= mode <= body.n_q:
@@ -90,14 +90,14 @@ def mode_scene(
 
 
 def moved_triad(interface: ReducedInterface, mode: int, amplitudes: Array, length: float) -> Triad:
-    """Return the axes of an interface, moved and turned with the mode, at each amplitude [units of q]."""
+    """Return the axes of an interface, moved and rotated with the mode, at each amplitude [units of q]."""
     motion = amplitudes[:, None] * interface.Psi[:, mode - 1]
     turned = Rotation.from_rotvec(motion[:, 3:]).as_matrix() @ interface.triad
     return Triad(interface.position + motion[:, :3], turned, length, interface.name)
 
 
 def view_axes(nodes: Array) -> tuple[Array, Array]:
-    """Return the direction of view and what is up, (3,) each: the two longer sides of the bounding box in sight."""
+    """Return the direction of view and the up direction, (3,) each, such that the two longest box sides are visible."""
     shortest, middle, longest = np.argsort(np.ptp(nodes, axis=0), kind="stable")
     axes = np.eye(3)
     towards = axes[shortest] * (1.0 if (longest, middle) in ((0, 1), (1, 2), (2, 0)) else -1.0)
@@ -105,5 +105,5 @@ def view_axes(nodes: Array) -> tuple[Array, Array]:
 
 
 def frequency_words(frequency: float) -> str:
-    """Return a frequency [Hz] with its unit; a shape without mass has none."""
+    """Return a frequency [Hz] with its unit; a massless shape has none."""
     return f"{frequency:.5g} Hz" if np.isfinite(frequency) else "static"

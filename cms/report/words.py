@@ -1,4 +1,4 @@
-"""Numbers and dates as a report writes them."""
+"""Formatting of numbers and dates in reports."""
 
 import math
 
@@ -15,7 +15,7 @@ def hertz(value: float) -> str:
 
 
 def signed_percent(value: float) -> str:
-    """Return an error with its sign; '–' for what is missing, '0' for what is rounding."""
+    """Return an error with its sign; '–' if it is missing, '0' if it is rounding."""
     if not math.isfinite(value):
         return "\u2013"
     if abs(value) < 5e-7:
@@ -27,10 +27,10 @@ def signed_percent(value: float) -> str:
 
 
 def count(value: int) -> str:
-    """Return a whole number in groups of three digits."""
+    """Return an integer in groups of three digits."""
     return f"{value:,}".replace(",", "\u202f")
 
 
 def seconds(value: float) -> str:
-    """Return a time."""
+    """Return a duration as text."""
     return f"{value:.2g} s" if value < 9.95 else f"{value:.0f} s"

@@ -1,7 +1,7 @@
 """Block Lanczos iteration for the largest eigenvalues of a shift-inverted pencil.
 
-S = (K - sigma M)⁻¹ M is self-adjoint in the inner product (x, y) = xᵀ M y, also where M is only semidefinite. Its
-largest eigenvalues theta = 1 / (omega² - sigma) are the modes nearest above the shift.
+S = (K - sigma M)⁻¹ M is self-adjoint in the inner product (x, y) = xᵀ M y, even if M is only semidefinite. Its largest
+eigenvalues theta = 1 / (omega² - sigma) belong to the modes nearest above the shift.
 """
 
 from collections.abc import Callable
@@ -16,10 +16,10 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["BlockLanczos", "RitzPairs"]
 
-DEPENDENT = 1e-10  #: length of a new direction against the block it came from, below which it is rounding
-TAME = 1e-3  #: shortest to longest new direction, above which one pass leaves them orthogonal to 1e-13
-SETTLED = 1e-12  #: part of the shortest new direction that a pass may take off without a new product by M
-ROUNDOFF = 1e-14  #: defect of M-orthonormal columns that is left as it is
+DEPENDENT = 1e-10  #: length of a new direction relative to its block, below which it is rounding
+TAME = 1e-3  #: ratio of shortest to longest new direction, above which one pass makes them orthogonal to 1e-13
+SETTLED = 1e-12  #: share of the shortest new direction that a pass may remove without a new product with M
+ROUNDOFF = 1e-14  #: defect of M-orthonormal columns that is not corrected
 MAX_PASSES = 5
 
 
@@ -29,38 +29,38 @@ class RitzPairs:
 
     theta: Array  #: (m,) [s²]
     S: Array  #: vectors over the basis, (m, m)
-    coupling: Array  #: of S x - theta x over the next block, (b, m) [s²]
-    residuals: Array  #: |S x - theta x|_M / |theta| of unit x, by the recurrence, (m,)
+    coupling: Array  #: of S x - theta x to the next block, (b, m) [s²]
+    residuals: Array  #: |S x - theta x|_M / |theta| for unit x, from the recurrence, (m,)
 
 
 class BlockLanczos:
-    """A growing M-orthonormal basis V with its projection T = Vᵀ M S V, and the block that comes next.
+    """A growing M-orthonormal basis V with its projection T = Vᵀ M S V, and the next block.
 
     (1) W = S V_j                                                 one block solve
     (2) A = V_jᵀ M W; W <- W - V Rᵀ - V_j A                       the recurrence: R couples V_j to the basis before it
-    (3) C = Vᵀ M W; W <- W - V C                                  full reorthogonalisation of what is left
-    (4) W = V_{j+1} R by the eigenvectors of Wᵀ M W, dependent directions dropped; (3) and (4) again where W was nearly
-        dependent
-    (5) T gains the block column [Rᵀ; A] + C; R of (4) couples to the next block
+    (3) C = Vᵀ M W; W <- W - V C                                  full reorthogonalisation of the remainder
+    (4) W = V_{j+1} R from the eigenvectors of Wᵀ M W, without dependent directions; (3) and (4) are repeated if W was
+        nearly dependent
+    (5) T gets the block column [Rᵀ; A] + C; R of (4) couples to the next block
     (6) thick restart when the basis is full: V <- V X of the leading Ritz pairs, whose residuals all lie in V_{j+1}
 
-    Full reorthogonalisation leaves no spurious copies to sort out; one pass is enough because (2) has taken off all
-    that is not rounding. Blocks lie as the solver gives them, the basis column by column.
+    Full reorthogonalisation avoids spurious copies. One pass suffices, because (2) has removed everything except
+    rounding. Blocks have the memory order of the solver; the basis is stored column by column.
     """
 
     def __init__(
         self, solve: Callable[[Any], Any], M: TallProduct, space: TallSpace, *, block: int, capacity: int
     ) -> None:
-        """Begin with a random block; solve and M map columns of the space to such."""
+        """Start with a random block; solve and M map columns of the space to columns of the space."""
         self.solve, self.M, self.space, self.n, self.block = solve, M, space, space.n, block
         self.n_solves = 0
-        self.m = 0  # columns of V that T knows
+        self.m = 0  # number of columns of V that are in T
         self._basis = space.basis(min(capacity, self.n) + block)
         self._T = np.zeros((self._basis.capacity, self._basis.capacity))
         self._random = np.random.default_rng(0)
-        self._M_next = self._start()  # M V_{j+1}; V_{j+1} itself follows V in the rows
+        self._M_next = self._start()  # M V_{j+1}; V_{j+1} itself is stored after V
         self._R = np.zeros((self._M_next.shape[1], 0))  # coupling of the next block to all of V
-        self._coupled = 0  # first column of V it is coupled to
+        self._coupled = 0  # first column of V to which the next block is coupled
 
     @property
     def V(self) -> Any:
@@ -69,21 +69,21 @@ class BlockLanczos:
 
     @property
     def V_and_next(self) -> Any:
-        """The basis and the block that comes next, (n, m + b)."""
+        """The basis and the next block, (n, m + b)."""
         return self._basis.columns(0, self.m + self._M_next.shape[1])
 
     @property
     def is_exhausted(self) -> bool:
-        """Whether V spans everything the operator can reach."""
+        """Whether V spans the complete range of the operator."""
         return self._M_next.shape[1] == 0
 
     @property
     def capacity(self) -> int:
-        """Columns V can hold before a restart."""
+        """Number of columns that V can hold before a restart."""
         return self._basis.capacity - self.block
 
     def grow(self, capacity: int) -> None:
-        """Make room for more columns."""
+        """Allocate memory for more columns."""
         size = min(capacity, self.n) + self.block
         if size > self._basis.capacity:
             T = np.zeros((size, size))
@@ -109,14 +109,15 @@ class BlockLanczos:
         self._R = np.zeros((len(R), last))
         self._R[:, block] = R
         self._coupled = first
-        if len(R) == 0 and last < self.n:  # an invariant subspace: look for what the start did not contain
+        # an invariant subspace: search directions that the start block did not contain
+        if len(R) == 0 and last < self.n:
             M_next = self._start()
             self._R = np.zeros((M_next.shape[1], last))
             self._coupled = last
         self._M_next = M_next
 
     def ritz(self) -> RitzPairs:
-        """Eigenpairs of T with their residuals |R s|."""
+        """Return the eigenpairs of T with their residuals |R s|."""
         theta, S = la.eigh(self._T[: self.m, : self.m])
         theta, S = theta[::-1], S[:, ::-1]
         scale = np.maximum(np.abs(theta), np.finfo(float).tiny)
@@ -124,7 +125,7 @@ class BlockLanczos:
         return RitzPairs(theta, S, coupling, np.linalg.norm(coupling, axis=0) / scale)
 
     def restart(self, ritz: RitzPairs, keep: int) -> None:
-        """Keep the span of the leading Ritz vectors only; the next block stays."""
+        """Keep only the span of the leading Ritz vectors; the next block stays."""
         S = ritz.S[:, :keep]
         self._basis.turn(self.m, S)
         self._basis.put(keep, self._basis.columns(self.m, self.m + len(self._R)))
@@ -145,9 +146,9 @@ class BlockLanczos:
         return M_W
 
     def _append(self, W: Any, length: float) -> tuple[Array, Array, Any]:
-        """Split W = V C + V_next R, V_next in the rows after V; return C, R, M V_next (steps 3 and 4). W is lost.
+        """Split W = V C + V_next R, with V_next stored after V; return C, R, M V_next (steps 3, 4). W is overwritten.
 
-        `length` is that of what was taken off W before: a remainder is rounding by its measure.
+        `length` is the length of the part removed from W earlier; a remainder is rounding relative to it.
         """
         V, inner, combined = self.V, self.space.inner, self.space.combined
         C_sum = np.zeros((self.m, W.shape[1]))
@@ -159,7 +160,7 @@ class BlockLanczos:
             longest = np.sqrt(max(np.diag(gram).max(initial=0.0), 0.0))
             self.space.subtract(W, V, C)
             C_sum += C @ R_sum
-            gram -= C.T @ C  # of W - V C, as long as little cancels
+            gram -= C.T @ C  # Gram matrix of W - V C, accurate as long as cancellation is small
             taken = np.abs(C).max(initial=0.0)
             if not taken**2 <= SETTLED**2 * la.eigvalsh(gram)[0]:
                 M_W = self.M @ W

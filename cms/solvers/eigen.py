@@ -1,4 +1,4 @@
-"""Vibration modes: the lowest eigenpairs of K x = omega² M x, by count or up to a frequency."""
+"""Vibration modes: the lowest eigenpairs of K x = omega² M x, by number or up to a frequency."""
 
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -29,17 +29,17 @@ from fe_models.foundation.threads import one_blas_thread
 
 __all__ = ["EigenResult", "eigenmodes"]
 
-SMALL = 300  #: dofs up to which dense matrices are faster
-LARGEST_DENSE = 3000  #: dofs up to which dense matrices are affordable, where many of the modes are wanted
-SHIFT = 1e-6  #: of a free body, as a part of the median of K_kk / M_kk: near its first elastic omega²
-SHIFT_SMALL = 1e-4  #: the same for the few dofs of a dense pencil
-ZERO = 1e-13  #: the same part, below which omega² is rounding of K: a rigid-body mode
-TIGHTEST, LOOSEST = 1e-13, 0.1  #: tolerances that rounding allows, and that say anything
+SMALL = 300  #: number of dofs up to which dense matrices are faster
+LARGEST_DENSE = 3000  #: number of dofs up to which dense matrices are affordable, if many of the modes are wanted
+SHIFT = 1e-6  #: shift for a free body, relative to the median of K_kk / M_kk; near its first elastic omega²
+SHIFT_SMALL = 1e-4  #: the same for a dense pencil with few dofs
+ZERO = 1e-13  #: omega² relative to that median below which it is rounding of K: a rigid-body mode
+TIGHTEST, LOOSEST = 1e-13, 0.1  #: tightest tolerance that rounding allows, and loosest tolerance that is meaningful
 MISMATCH = 1e-3  #: defect of K x = omega² M x that only a factorisation of another matrix explains
 MOST_PROOFS = 3
-#: solver -> its own search for modes, where that is not block Lanczos on rank 0
+#: mode search of a solver, if it is not block Lanczos on rank 0
 SEARCHES: dict[str, type[SlepcSearch]] = {"slepc": SlepcSearch}
-GAP = 1e-4  #: relative gap between two omega² in which modes can be counted
+GAP = 1e-4  #: relative gap between two values of omega² in which modes can be counted
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,10 +48,10 @@ class EigenResult:
 
     omega2: Array  #: (n_modes,) [1/s²]; exactly 0 for rigid-body modes
     frequencies: Array  #: (n_modes,) [Hz]
-    Phi: Array  #: (n, n_modes); `SpreadColumns` of a body on many ranks
+    Phi: Array  #: (n, n_modes); `SpreadColumns` if the body is distributed
     residuals: Array  #: |x - (omega² - sigma) (K - sigma M)⁻¹ M x|_M of x before its last inverse iteration, (n_modes,)
-    n_solves: int  #: columns solved for
-    method: str  #: solver and its settings, in words
+    n_solves: int  #: number of columns solved
+    method: str  #: solver and its settings
     is_proven: bool  #: whether the inertia of a second factorisation proved that no mode was missed
 
     def __post_init__(self) -> None:
@@ -72,45 +72,46 @@ def eigenmodes(
     numbering: IntArray | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> EigenResult:
-    """Lowest vibration modes of a sparse symmetric pencil.
+    """Compute the lowest vibration modes of a sparse symmetric pencil.
 
     (1) block Lanczos on S = (K - sigma M)⁻¹ M until the leading residuals are below the tolerance
-    (2) Y = S X / theta: one inverse iteration of the Ritz vectors X gives their true residuals |Y - X|_M, and takes out
-        what the M-norm does not see (multipliers, massless dofs)
-    (3) Rayleigh-Ritz in the span of Y; Yᵀ (K - sigma M) Y = Yᵀ M X / theta needs no product by K
+    (2) Y = S X / theta: one inverse iteration of the Ritz vectors X gives their true residuals |Y - X|_M, and corrects
+        components without mass (multipliers, massless dofs), which the M-norm does not measure
+    (3) Rayleigh-Ritz in the span of Y; Yᵀ (K - sigma M) Y = Yᵀ M X / theta needs no product with K
     (4) signs, and directions within multiple frequencies, by `orientation`
 
     Parameters
     ----------
     K
-        Stiffness, (n, n); semidefinite (a free body), and indefinite only by Lagrange multipliers.
+        Stiffness, (n, n); semidefinite for a free body, indefinite only because of Lagrange multipliers.
     M
-        Mass, (n, n), semidefinite: massless dofs and multipliers have none. Of K and M given as `PrincipalBlock` the
-        entries are not held during the search; those by rows on many ranks (`SpreadMatrix`) stay there, and so do the
-        modes of blocks of them that were factorised there (`SpreadColumns`).
+        Mass, (n, n), semidefinite, with zeros for massless dofs and multipliers. If K and M are `PrincipalBlock`, their
+        entries are not held during the search. Distributed matrices (`SpreadMatrix`) stay distributed, and so do the
+        modes if the blocks were factorised on the ranks (`SpreadColumns`).
     n_modes
-        Number of modes, or a `ModeCount`: all modes up to a frequency [Hz]; proof that none was missed.
+        Number of modes, or a `ModeCount` for all modes up to a frequency [Hz], with or without proof.
     factorization
-        Of K - shift M if it exists already; made and freed here by default.
+        Existing factorisation of K - shift M; None: made and freed here.
     solver
-        What factorises (`cms.solvers.registry`), where no factorisation is given; by default the fastest installed.
+        Solver, or its name (`cms.solvers.registry`), if no factorisation is given; default: the fastest installed
+        solver.
     shift
-        sigma [1/s²], below all omega²; 0 with a factorisation, otherwise a small negative one that also serves a free
-        body.
+        sigma [1/s²], below all omega². Default: 0 if a factorisation is given, otherwise a small negative value that
+        also suits a free body.
     tolerance
-        Largest residual |x - (omega² - sigma) S x|_M of a unit x: a bound of the relative error of omega² - sigma,
-        whose actual error goes with its square.
+        Largest residual |x - (omega² - sigma) S x|_M of a unit x. It bounds the relative error of omega² - sigma; the
+        actual error is of the order of its square.
     numbering
-        Of the rows, by which the search deals its random start to them: the rows of one body in two orders then start
-        alike, and the modes agree closer than the tolerance. By default as the rows lie.
+        Numbers of the rows by which the random start vector is assigned. The rows of one body in two orders then start
+        equally, and the modes agree better than the tolerance. Default: the order of the rows.
     progress
-        Called with the numbers of modes found and wanted (0 as long as that is not known).
+        Receives the number of modes found and the number wanted (0 while that is unknown).
 
     Raises
     ------
     EigenError
-        If more modes are asked for than exist, an eigenvalue lies below the shift, the residuals stay above the
-        tolerance, or the inertia counts other modes than were found.
+        If more modes are requested than exist, an eigenvalue is below the shift, the residuals stay above the
+        tolerance, or the inertia counts a different number of modes.
     FactorizationError
         If K - shift M is singular.
     """
@@ -154,15 +155,16 @@ def eigenmodes(
         k = wanted.count if wanted.omega2 is None else int((modes.omega2[: modes.n_wanted] <= wanted.omega2).sum())
         residuals, method = modes.residuals, search.description
         n_solves, solver = operator.n_solves, factorization.description
-        # where K itself is factorised there is no rigid-body mode, however far the mesh's omega² lie above the modes'
+        # if K itself is factorised, there is no rigid-body mode, however far the mesh's omega² exceed those of the
+        # modes
         omega2 = _zero_rigid(modes.omega2, zero=max(ZERO * scale, 1e-9 * abs(shift)) if shift else 0.0)
         columns, whole = modes.expand(), modes.space.whole
-        del search, modes, operator  # the basis, before the modes are copied
+        del search, modes, operator  # frees the basis before the modes are copied
         if space is not None:
             space.close()
         stays = space is not None and isinstance(K, PrincipalBlock) and space.has_rows_of(K)
         Phi = space.columns(columns) if space is not None and stays else whole(columns)
-        del columns  # before the space is closed: ranks forget what has no name then
+        del columns  # before the space is closed, when ranks drop data without references
         Phi = combine(Phi, orientation(Phi, omega2)[:, :k], order="C")
     omega2 = omega2[:k]
     _require_match(K, M, Phi, omega2, shift, tolerance)
@@ -173,7 +175,7 @@ def eigenmodes(
 
 
 def frequency_scale(K: Matrix, M: Matrix) -> float:
-    """Median of K_kk / M_kk [1/s²], which is near the highest omega² of the mesh."""
+    """Return the median of K_kk / M_kk [1/s²], which is near the highest omega² of the mesh."""
     stiffness, mass = K.diagonal(), M.diagonal()
     has_both = (stiffness > 0) & (mass > 0)
     if not has_both.any():
@@ -184,7 +186,7 @@ def frequency_scale(K: Matrix, M: Matrix) -> float:
 def _proven_modes(
     K: Matrix, M: Matrix, search: KrylovSearch | DenseSearch | SlepcSearch, modes: Modes, wanted: Wanted
 ) -> Modes:
-    """Return the modes once their number agrees with the inertia; look for more as long as it is larger."""
+    """Return the modes when their number agrees with the inertia; search for more modes while it is larger."""
     operator = search.operator
     for _ in range(MOST_PROOFS):
         last, sigma = counting_shift(modes.omega2, modes.n_wanted, wanted, operator.shift)
@@ -203,8 +205,8 @@ def _proven_modes(
 
 
 def counting_shift(omega2: Array, k: int, wanted: Wanted, shift: float) -> tuple[int, float]:
-    """Return where modes can be counted: their number below, and a shift in a gap at or after the last wanted one."""
-    levels = np.concatenate([[shift], omega2])  # levels[j]: mode j, counted from 1
+    """Return the number of modes below a shift, and the shift, in a gap at or after the last wanted mode."""
+    levels = np.concatenate([[shift], omega2])  # levels[j] is mode j, counted from 1
     for j in range(k, len(omega2)):
         low, high = levels[j], levels[j + 1]
         if high - low > GAP * (high - shift):
@@ -222,7 +224,7 @@ def _factorize_shifted(K: Matrix, M: Matrix, sigma: float, solver: str | Solver 
 
 
 def _count_below(K: Matrix, M: Matrix, sigma: float, at_shift: Inverse) -> int:
-    """Modes between the shift and sigma, by Sylvester's law: K - sigma M has one more negative eigenvalue for each."""
+    """Count modes between the shift and sigma by Sylvester's law: each adds one negative eigenvalue of K - sigma M."""
     with _factorize_shifted(K, M, sigma, at_shift.solver) as factorization:
         inertia = factorization.inertia
     if inertia.n_zero or at_shift.inertia.n_zero:
@@ -242,7 +244,7 @@ def _zero_rigid(omega2: Array, *, zero: float) -> Array:
 
 
 def _require_match(K: Matrix, M: Matrix, Phi: Array, omega2: Array, shift: float, tolerance: float) -> None:
-    """Check K x = omega² M x on one random combination: the iteration itself sees K only through its factorisation."""
+    """Check K x = omega² M x for one random combination; the iteration itself uses K only through its factorisation."""
     if not len(omega2):
         return
     signs = np.random.default_rng(0).choice([-1.0, 1.0], size=len(omega2)) / np.sqrt(omega2 - shift)

@@ -26,19 +26,19 @@ __all__ = [
     "shifted_matrix",
 ]
 
-SINGULAR = 1e-3  #: relative residual after two solves; a regular matrix of condition 1e12 leaves 1e-4
+SINGULAR = 1e-3  #: relative residual after two solves; a regular matrix with condition number 1e12 leaves 1e-4
 
-#: a sparse matrix, or a part of one, which is cut out where its entries are needed and not held in between
+#: a sparse matrix, or a block of one that is only formed while its entries are needed
 Matrix: TypeAlias = sp.csc_array | PrincipalBlock
 
 
 def matrix_of(A: Matrix) -> sp.csc_array:
-    """Return a matrix that was given, or cut it out."""
+    """Return the matrix; a block is formed."""
     return A.cut() if isinstance(A, PrincipalBlock) else sp.csc_array(whole_matrix(A))
 
 
 def shifted_matrix(K: Matrix, M: Matrix, sigma: float) -> Matrix:
-    """Return K - sigma M, (n, n); of blocks by rows on many ranks there, else as a sparse matrix."""
+    """Return K - sigma M, (n, n), distributed if the blocks are; otherwise a sparse matrix."""
     if isinstance(K, PrincipalBlock) and isinstance(M, PrincipalBlock) and K.index is M.index:
         if isinstance(K.A, SpreadMatrix) and isinstance(M.A, SpreadMatrix):
             return PrincipalBlock(spread_sum(K.A, M.A, -sigma), K.index)
@@ -47,15 +47,16 @@ def shifted_matrix(K: Matrix, M: Matrix, sigma: float) -> Matrix:
 
 @dataclass(frozen=True)
 class Inertia:
-    """Numbers of negative and positive eigenvalues; certain only if no pivot was within rounding of zero."""
+    """Numbers of negative and positive eigenvalues; certain only if no pivot was zero to rounding."""
 
     n_negative: int
-    n_zero: int  #: pivots within rounding of zero, counted with a guessed sign in the others
+    #: number of pivots that are zero to rounding; they are counted in the other numbers with a guessed sign
+    n_zero: int
     n_positive: int
 
 
 class EmptyFactor:
-    """The factor of a matrix without rows: of the interior of a body all of whose dofs are on interfaces."""
+    """The factor of a matrix without rows, the interior of a body with all dofs on interfaces."""
 
     n = n_factor_entries = n_negative = n_perturbed = n_positive = 0
     description = "nothing to factorise"
@@ -68,20 +69,20 @@ class EmptyFactor:
         return np.zeros((0, b.shape[1]), order="F")
 
     def close(self) -> None:
-        """Free nothing."""
+        """Do nothing: there is nothing to free."""
         self.is_open = False
 
 
 class Factorization:
-    """A factorised symmetric matrix; a context manager that frees the factor at its end."""
+    """A factorised symmetric matrix; the context manager frees the factor."""
 
     def __init__(self, factor: Factor, solver: Solver) -> None:
         self._factor = factor
-        self.solver = solver  #: which made it, for further matrices of the same body
+        self.solver = solver  #: the solver that made the factor, for further matrices of the same body
 
     @property
     def factor(self) -> Factor:
-        """What the solver made."""
+        """The factor made by the solver."""
         return self._factor
 
     @property
@@ -91,22 +92,22 @@ class Factorization:
 
     @property
     def description(self) -> str:
-        """Solver, its version and settings, in words for the provenance."""
+        """Solver, its version and settings, for the provenance."""
         return self._factor.description
 
     @property
     def n_factor_entries(self) -> int:
-        """Stored entries of the factor; 8 bytes each."""
+        """Number of stored entries of the factor, 8 bytes each."""
         return self._factor.n_factor_entries
 
     @property
     def inertia(self) -> Inertia:
-        """Signs of the eigenvalues, by Sylvester's law from the pivots.
+        """Return the signs of the eigenvalues from the pivots, by Sylvester's law.
 
         Raises
         ------
         FactorizationError
-            If the solver had to leave the diagonal for a pivot, as SuperLU may, so that their signs say nothing.
+            If the solver used off-diagonal pivots, as SuperLU may, so that their signs are meaningless.
         """
         factor = self._factor
         if factor.n_negative < 0:
@@ -117,7 +118,7 @@ class Factorization:
         return Inertia(factor.n_negative, factor.n_perturbed, factor.n_positive)
 
     def solve(self, b: Array) -> Array:
-        """Return A⁻¹ b for one column (n,) or many (n, k); these come in the order of the factor."""
+        """Return A⁻¹ b for one column, (n,), or many, (n, k), in the memory order of the factor."""
         if not self._factor.is_open:
             raise FactorizationError("solve: the factorisation was closed; factorise again")
         b = np.asarray(b, dtype=np.float64)
@@ -139,27 +140,27 @@ class Factorization:
 def factorize(A: Matrix, *, definite: bool = True, solver: str | Solver | None = None) -> Factorization:
     """Factorise a symmetric sparse matrix.
 
-    (1) lower triangle, every diagonal entry stored
-    (2) factor by the solver asked for; else by PARDISO, and by our Cholesky factorisation where there is none, or
-        for large definite matrices
-    (3) proof by two solves from a fixed random column: an (almost) singular matrix is refused
+    (1) extract the lower triangle, with every diagonal entry stored
+    (2) factorise with the requested solver; default: PARDISO, or our Cholesky factorisation if there is no PARDISO or
+        the matrix is large and definite
+    (3) check by two solves from a fixed random column; an (almost) singular matrix is rejected
 
     Parameters
     ----------
     A
-        Symmetric, (n, n); only its lower triangle is read. A `PrincipalBlock` is not held while the solver works.
+        Symmetric, (n, n); only its lower triangle is read. A `PrincipalBlock` is not held during the factorisation.
     definite
-        Whether A must be positive definite (Cholesky); False: any symmetric regular matrix.
+        Whether A must be positive definite (Cholesky); False: any regular symmetric matrix.
     solver
-        One of `SOLVERS` by name, or a `Solver`; by default the fastest that is installed.
+        A `Solver`, or the name of one in `SOLVERS`; default: the fastest installed solver.
 
     Raises
     ------
     FactorizationError
-        If A is not square or not finite, singular, not definite although `definite`, or if the solver is unknown or not
-        installed.
+        If A is not square, not finite or singular, if it is not definite although `definite`, or if the solver is
+        unknown or not installed.
     FactorRoomError
-        If memory or disk have no room for the factor.
+        If memory or disk space do not suffice for the factor.
     """
     chosen = solver_of(solver)
     make = _ready(A, definite, chosen)
@@ -168,13 +169,13 @@ def factorize(A: Matrix, *, definite: bool = True, solver: str | Solver | None =
     except FactorizationError as error:
         hint = "; it is singular or not positive definite" if definite else "; it is singular"
         raise FactorizationError(f"factorize: {error}{hint}") from error
-    del make  # and with it the lower triangle
+    del make  # also frees the lower triangle
     require_regular(A, factorization)
     return factorization
 
 
 def _ready(A: Matrix, definite: bool, solver: Solver) -> Callable[[], Factor]:
-    """Step (1): return what makes the factor; rows on many ranks stay there, where the solver takes them so."""
+    """Step (1): return a function that makes the factor; distributed rows stay distributed if the solver allows."""
     block = A.spread() if isinstance(A, PrincipalBlock) and solver.spread is not None else None
     if block is not None and solver.spread is not None:
         if definite:
@@ -196,7 +197,7 @@ def checked_lower(A: sp.csc_array) -> sp.csc_array:
 
 
 def lower_triangle(A: sp.csc_array) -> sp.csc_array:
-    """Return the lower triangle with every diagonal entry stored (as zero if need be) and sorted row indices."""
+    """Return the lower triangle with every diagonal entry stored (as zero if necessary) and sorted row indices."""
     n = A.shape[0]
     if not A.has_canonical_format:
         A = A.copy()
@@ -206,7 +207,7 @@ def lower_triangle(A: sp.csc_array) -> sp.csc_array:
     indptr = starts[A.indptr]
     indices, data = A.indices[is_lower], A.data[is_lower]
     del is_lower, starts
-    # sorted rows: the first entry of a column is its diagonal, if that is stored
+    # with sorted rows, the first entry of a column is its diagonal entry, if that is stored
     lacks = np.diff(indptr) == 0
     full = np.flatnonzero(~lacks)
     lacks[full] = indices[indptr[full]] != full
@@ -228,10 +229,10 @@ def _require_positive(diagonal: Array) -> None:
 
 
 def require_regular(A: Matrix, factorization: Factorization) -> None:
-    """Solve twice from a random column: the result leans to the softest direction, whose residual shows singularity.
+    """Solve twice from a random column: the result is dominated by the softest direction and reveals singularity.
 
-    An exactly singular matrix often passes the pivots, because rounding leaves them near 1e-16 instead of zero. Its
-    solutions then are 1e16 times too long along the null space and no longer satisfy A x = b.
+    An exactly singular matrix often passes the pivot check, because rounding leaves pivots near 1e-16 instead of zero.
+    Its solutions are then 1e16 times too large along the null space, and no longer satisfy A x = b.
     """
     b = np.random.default_rng(0).standard_normal(A.shape[0])
     b = _unit(factorization.solve(b))

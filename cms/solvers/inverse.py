@@ -1,4 +1,4 @@
-"""What the eigensolver asks of whatever solves (K - sigma M) x = f for it."""
+"""Protocol of a solver for (K - sigma M) x = f, as the eigensolver uses it."""
 
 from typing import Protocol
 
@@ -14,15 +14,15 @@ class Inverse(Protocol):
 
     @property
     def n(self) -> int:
-        """Order."""
+        """Order of the matrix."""
 
     @property
     def description(self) -> str:
-        """Solver in words for the provenance."""
+        """Name and settings of the solver, for the provenance."""
 
     @property
     def solver(self) -> Solver:
-        """What factorised, for further matrices of the same pencil."""
+        """The solver that factorised, for further matrices of the same pencil."""
 
     @property
     def inertia(self) -> Inertia:

@@ -1,4 +1,4 @@
-"""How many vibration modes: a number, or all up to a frequency; proven to be all of them, or not."""
+"""Number of vibration modes: given as a number or a cutoff frequency, with or without proof of completeness."""
 
 import math
 import operator
@@ -11,9 +11,10 @@ __all__ = ["ModeCount", "mode_count"]
 
 @dataclass(frozen=True)
 class ModeCount:
-    """How many vibration modes are wanted: the lowest n, or all up to a cutoff.
+    """The wanted vibration modes: the lowest n, or all up to a cutoff.
 
-    Wherever a function takes `n_modes`, a number means that many of the lowest modes; this type says the rest:
+    Wherever a function takes `n_modes`, an integer means that many of the lowest modes; this type covers the other
+    cases:
 
     >>> ModeCount(cutoff=5000.0, verify=True)
     ModeCount(n=None, cutoff=5000.0, verify=True)
@@ -21,12 +22,12 @@ class ModeCount:
     Raises
     ------
     ModeSetError
-        If not exactly one of `n` and `cutoff` is given, or it is no such number.
+        If not exactly one of `n` and `cutoff` is given, or the number is invalid.
     """
 
     n: int | None = None  #: number of modes, 0 or more
-    cutoff: float | None = None  #: instead of a number: all modes up to this frequency [Hz, or 1/time unit of the body]
-    verify: bool = False  #: prove by the inertia of a factorisation that no mode was missed
+    cutoff: float | None = None  #: all modes up to this frequency, instead of n [Hz, or 1/time unit of the body]
+    verify: bool = False  #: whether to prove by the inertia of a factorisation that no mode was missed
 
     def __post_init__(self) -> None:
         if (self.n is None) == (self.cutoff is None):
@@ -47,10 +48,10 @@ class ModeCount:
 
     @property
     def words(self) -> str:
-        """The count in words, for messages and records."""
+        """Description for messages and records."""
         return f"n_modes = {self.n}" if self.cutoff is None else f"cutoff = {self.cutoff:g}"
 
 
 def mode_count(n_modes: "int | ModeCount") -> ModeCount:
-    """Return what is wanted as a `ModeCount`."""
+    """Return the number or `ModeCount` as a `ModeCount`."""
     return n_modes if isinstance(n_modes, ModeCount) else ModeCount(n_modes)

@@ -10,21 +10,22 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["DenseSearch", "KrylovSearch"]
 
-BLOCK = 8  #: columns of a Lanczos block; narrow ones need fewer columns
-WIDE, MANY = 16, 32  #: columns of a block from so many modes on; wide ones are solved faster, column for column
+BLOCK = 8  #: columns of a Lanczos block; narrow blocks need fewer columns in total
+#: columns of a wide block, and number of modes from which it is used; wide blocks are solved faster per column
+WIDE, MANY = 16, 32
 GUARDS = 8  #: Ritz vectors beyond the wanted ones that take part in the last step
-FIRST_GUESS = 30  #: modes to make room for, as long as only a frequency is given
-MOST_COLUMNS = 40  #: to solve for, per wanted mode and guard
+FIRST_GUESS = 30  #: expected number of modes, while only a frequency is given
+MOST_COLUMNS = 40  #: largest number of columns to solve, per wanted mode and guard
 MOST_REFINEMENTS = 4
-VISIBLE = 1e-6  #: part of the modes that a solve takes off without its being seen in the M-norm: it has no mass
-FLOOR = 1e-13  #: residual by the recurrence below which only rounding is left
-NEGLIGIBLE = 1e-12  #: theta against the largest one, below which a mode has no mass
-NEGATIVE = 1e-8  #: the same for a negative theta that is more than rounding
-MASSLESS = 1e-13  #: eigenvalue of M against its largest, below which a direction has no mass
+VISIBLE = 1e-6  #: share of a mode that a solve may change without an effect on the M-norm, because it has no mass
+FLOOR = 1e-13  #: residual from the recurrence below which only rounding is left
+NEGLIGIBLE = 1e-12  #: theta relative to the largest, below which a mode has no mass
+NEGATIVE = 1e-8  #: magnitude of a negative theta, relative to the largest, that is more than rounding
+MASSLESS = 1e-13  #: eigenvalue of M relative to the largest, below which a direction has no mass
 
 
 class KrylovSearch:
-    """Block Lanczos, grown until the wanted modes have converged; can be asked for more of them afterwards."""
+    """Block Lanczos, extended until the wanted modes have converged; more modes can be requested afterwards."""
 
     def __init__(self, operator: ShiftInverted, wanted: Wanted) -> None:
         self.operator = operator
@@ -34,10 +35,10 @@ class KrylovSearch:
         self._lanczos = BlockLanczos(
             operator.solve, operator.M_product, operator.space, block=block, capacity=basis_size(guess, block)
         )
-        self._is_clean = operator.has_mass_everywhere  # else rounding in massless dofs is taken out by S
+        self._is_clean = operator.has_mass_everywhere  # otherwise S removes rounding in massless dofs
 
     def modes(self, wanted: Wanted, at_least: int = 0) -> Modes:
-        """Return the wanted modes, or `at_least` so many, improved; their true residuals are below the tolerance."""
+        """Return the wanted modes, or at least `at_least`, improved; their true residuals are below the tolerance."""
         operator, tolerance = self.operator, self.operator.tolerance
         for _ in range(MOST_REFINEMENTS):
             ritz, k = self._converge(wanted, at_least, tolerance)
@@ -52,14 +53,14 @@ class KrylovSearch:
                 residual = modes.residuals.max(initial=0.0)
             if residual <= operator.tolerance:
                 return modes
-            tolerance = max(0.1 * tolerance, FLOOR)  # the recurrence was more hopeful than the truth
+            tolerance = max(0.1 * tolerance, FLOOR)  # the residual from the recurrence was smaller than the true one
         raise EigenError(
             f"eigenmodes: residuals stay at {residual:.1e}, expected {operator.tolerance:.1e}; "
             "K is too ill-conditioned for this tolerance: allow a larger one, or mend units and stiffness contrasts"
         )
 
     def _converge(self, wanted: Wanted, at_least: int, tolerance: float) -> tuple[RitzPairs, int]:
-        """Advance until the wanted pairs have converged by the recurrence; return all pairs and the wanted number."""
+        """Iterate until the wanted pairs have converged according to the recurrence; return all pairs and how many."""
         lanczos = self._lanczos
         next_look = 0
         k, most = 1, np.inf
@@ -72,7 +73,8 @@ class KrylovSearch:
                     return ritz, k
                 if lanczos.is_exhausted:
                     raise EigenError(f"eigenmodes: expected {k} modes, found all there are: {len(ritz.theta)}")
-                next_look = max(lanczos.m + lanczos.m // 64, k)  # eigenpairs of T cost more as it grows
+                # computing the eigenpairs of T becomes more expensive as T grows
+                next_look = max(lanczos.m + lanczos.m // 64, k)
                 lanczos.grow(basis_size(k, lanczos.block))
                 most = MOST_COLUMNS * (k + 10 * lanczos.block)
             if lanczos.m + lanczos.block > lanczos.capacity:
@@ -83,7 +85,7 @@ class KrylovSearch:
         raise EigenError(f"eigenmodes: no convergence after {lanczos.n_solves} columns; allow a larger tolerance")
 
     def _judge(self, ritz: RitzPairs, wanted: Wanted, at_least: int, tolerance: float) -> tuple[int, bool]:
-        """Return how many pairs are wanted by what is known now, and whether all of them have converged."""
+        """Return how many pairs are wanted according to present knowledge, and whether all of them have converged."""
         is_exhausted = self._lanczos.is_exhausted
         theta, residuals = ritz.theta, ritz.residuals
         if wanted.omega2 is None:
@@ -97,7 +99,7 @@ class KrylovSearch:
         else:
             theta_cutoff = 1 / (wanted.omega2 - self.operator.shift)
             k = max(int((theta > theta_cutoff).sum()), at_least)
-            # the next mode is beyond the frequency for certain, or converged there
+            # the next mode is certainly beyond the frequency, or has converged there
             is_bounded = is_exhausted or (
                 k < len(theta)
                 and (theta[k] * (1 + residuals[k]) < theta_cutoff or residuals[k] <= tolerance)
@@ -109,7 +111,7 @@ class KrylovSearch:
 
 
 def improved_modes(lanczos: BlockLanczos, ritz: RitzPairs, k: int, shift: float) -> Modes:
-    """Modes from the span of Y = S X of the leading Ritz vectors X = V s, without a solve.
+    """Return modes in the span of Y = S X of the leading Ritz vectors X = V s, without a solve.
 
     (1) S X = X theta + V_next (R s), so Y = S X / theta = X + V_next g with g = R s / theta: an inverse iteration
     (2) (K - sigma M) Y = M X / theta, so Yᵀ (K - sigma M) Y = 1 / theta = H;  Yᵀ M Y = 1 + gᵀ g = G
@@ -130,10 +132,10 @@ def improved_modes(lanczos: BlockLanczos, ritz: RitzPairs, k: int, shift: float)
 
 
 class DenseSearch:
-    """All modes of a small pencil at once.
+    """Computes all modes of a small pencil at once.
 
-    (1) M = B Bᵀ by the eigenvectors of S M S, S_kk = M_kk^(-1/2), massless directions left out; so what has no mass
-        depends neither on the units of rotations and translations nor on a heavy point beside a light beam
+    (1) M = B Bᵀ from the eigenvectors of S M S, S_kk = M_kk^(-1/2), without massless directions; the rank then depends
+        neither on the units of rotations and translations nor on a heavy point beside a light beam
     (2) Bᵀ (K - sigma M)⁻¹ B q = theta q;  x = (K - sigma M)⁻¹ B q / theta has xᵀ M x = 1
     """
 
@@ -155,7 +157,7 @@ class DenseSearch:
         refuse_negative(self._theta)
 
     def modes(self, wanted: Wanted, at_least: int = 0) -> Modes:
-        """Return the wanted modes, or `at_least` so many, refined."""
+        """Return the wanted modes, or at least `at_least`, refined."""
         operator, theta = self.operator, self._theta
         n_finite = leading_count(theta, 1, len(theta))
         if wanted.omega2 is None:
@@ -182,7 +184,7 @@ class DenseSearch:
 
 
 def basis_size(k: int, block: int) -> int:
-    """Columns of a Krylov basis in which k modes usually converge without a restart."""
+    """Return the number of columns of a Krylov basis in which k modes usually converge without a restart."""
     return 3 * k + 15 * block + 80
 
 
@@ -193,7 +195,7 @@ def leading_count(theta: Array, least: int, most: int) -> int:
 
 
 def refuse_negative(theta: Array) -> None:
-    """Refuse a pencil with eigenvalues below the shift."""
+    """Raise `EigenError` if the pencil has eigenvalues below the shift."""
     if len(theta) and theta[-1] < -NEGATIVE * theta[0]:
         raise EigenError(
             "eigenmodes: an eigenvalue omega² lies below the shift; expected a stiffness and a mass without negative "

@@ -1,4 +1,4 @@
-"""One fixed basis among many equal ones: signs of modes, and directions within multiple frequencies."""
+"""Unique choice among equivalent bases: signs of modes, and directions within multiple frequencies."""
 
 from typing import Any
 
@@ -10,22 +10,22 @@ from fe_models.foundation.tall.on_disk import in_memory
 
 __all__ = ["orientation", "turn"]
 
-SLICE = 8192  #: rows that are turned at a time
+SLICE = 8192  #: number of rows transformed at a time
 MULTIPLE = 1e-10  #: relative gap of omega² below which modes count as one multiple mode
 
 
 def orientation(Phi: Any, omega2: Array) -> Array:
-    """Orthogonal matrix Z, (k, k), that turns modes into their standard basis Phi @ Z.
+    """Return the orthogonal matrix Z, (k, k), that transforms modes to their standard basis Phi @ Z.
 
-    Within a group of modes of one frequency any rotation is as good as another, and rounding chooses. The length of a
-    row of the group is blind to rotations, so (1) the row of greatest length is turned into (+, 0, 0, …), (2) the
-    greatest remaining row into (*, +, 0, …), and so on. A group of one: its greatest entry becomes positive.
-    Rows within 1 % of the greatest are equal for this purpose; the first of them is taken.
+    Within a group of modes with equal frequency, any rotation is equally valid, and rounding decides. The length of a
+    row of the group does not depend on the rotation. Therefore (1) the longest row is rotated to (+, 0, 0, …), (2) the
+    longest remaining row to (*, +, 0, …), and so on. In a group of one mode, the largest entry becomes positive. Rows
+    within 1 % of the longest count as equally long; the first of them is used.
 
     Parameters
     ----------
     Phi
-        Modes by ascending frequency, (n, k); of those on all ranks one frequency at a time is collected.
+        Modes by ascending frequency, (n, k); distributed modes are collected one frequency at a time.
     omega2
         Their squared frequencies, (k,) [1/s²].
     """
@@ -54,13 +54,14 @@ def _standard_rotation(group: Array) -> Array:
         if length[row] > 0:
             direction = rest[row] / length[row]
             rest = rest - np.outer(rest @ direction, direction)
-    # rows of the leading entries = L Qᵀ with L lower triangular, so Q turns them into L; its diagonal made positive
+    # rows of the leading entries = L Qᵀ with lower triangular L, so Q transforms them to L; its diagonal is made
+    # positive
     Q, R = np.linalg.qr(group[leading].T)
     return Q * np.where(np.diag(R) < 0, -1.0, 1.0)
 
 
 def turn(Phi: Array, Z: Array) -> None:
-    """Put Phi Z into Phi, (n, k); the Z of `orientation` is a diagonal but for small blocks."""
+    """Overwrite Phi, (n, k), with Phi Z; the Z of `orientation` is diagonal except for small blocks."""
     signs = np.diag(Z)
     groups = np.split(np.arange(len(Z)), np.flatnonzero(_new_block(Z)))
     for first in range(0, len(Phi), SLICE):
@@ -72,7 +73,7 @@ def turn(Phi: Array, Z: Array) -> None:
 
 
 def _new_block(Z: Array) -> NDArray[np.bool_]:
-    """Return whether a block begins at each column of a matrix of blocks along the diagonal, (k,); not at the first."""
+    """Return whether a diagonal block begins at each column of a block-diagonal matrix, (k,); False for the first."""
     row, column = np.nonzero(Z)
     last = np.arange(len(Z))
     np.maximum.at(last, row, column)

@@ -1,7 +1,7 @@
 """PARDISO of the Intel Math Kernel Library, called directly for symmetric matrices.
 
-`pypardiso` finds and loads the library; its own solver class copies and hashes the matrix and keeps the default of two
-steps of iterative refinement, which makes a block solve 4-7 times slower than the plain substitution used here.
+`pypardiso` finds and loads the library. Its own solver class copies and hashes the matrix and keeps the default of two
+steps of iterative refinement. This makes a block solve 4-7 times slower than the plain substitution used here.
 
 References
 ----------
@@ -25,8 +25,9 @@ __all__ = ["PardisoFactor", "missing_pardiso", "mkl_runtime"]
 
 POSITIVE_DEFINITE, INDEFINITE = 2, -2  # mtype: real symmetric
 ANALYSE_AND_FACTORIZE, SOLVE, RELEASE = 12, 33, -1  # phase
-CHUNK = 64  #: right-hand sides per call; wider ones gain nothing measurable, and PARDISO's workspace grows with them
-PIVOT_PERTURBATION = 13  #: pivots below 1e-13 of the matrix norm are raised to it and counted; PARDISO then refines
+CHUNK = 64  #: right-hand sides per call; more are not faster, and PARDISO's workspace grows with them
+#: pivots below 1e-13 of the matrix norm are set to this bound and counted; PARDISO then refines
+PIVOT_PERTURBATION = 13
 
 NOT_FACTORIZED = {
     -2: "not enough memory for the factor",
@@ -41,11 +42,11 @@ NO_ROOM = (-2, -10)
 
 @cache
 def mkl_runtime() -> ctypes.CDLL | None:
-    """Return the loaded library, or None where there is none (other processors, macOS, not installed)."""
-    # its threads give the processor back at once: between two solves it belongs to NumPy and to our own threads
+    """Return the loaded library; None if it is not available (other processors, macOS, not installed)."""
+    # its threads release the processor immediately, because NumPy and our own threads need it between two solves
     os.environ.setdefault("KMP_BLOCKTIME", "0")
     path = installed_mkl()
-    if path is not None:  # found by its package: pypardiso would search all of sys.prefix, a second and more
+    if path is not None:  # found in its package; pypardiso would search all of sys.prefix, which takes a second or more
         os.environ.setdefault("PYPARDISO_MKL_RT", path)
     try:
         from pypardiso import PyPardisoSolver
@@ -56,7 +57,7 @@ def mkl_runtime() -> ctypes.CDLL | None:
 
 
 def missing_pardiso() -> str:
-    """Return in words what PARDISO lacks here, "" where it can be used."""
+    """Describe what PARDISO lacks here; "" if it can be used."""
     return "" if mkl_runtime() is not None else "needs MKL, which is not installed; pip install pypardiso (x86-64 only)"
 
 
@@ -71,10 +72,10 @@ def installed_mkl() -> str | None:
 
 
 class PardisoFactor:
-    """Cholesky or L D Lᵀ factor of a symmetric matrix in PARDISO's own memory, until `close`.
+    """Cholesky or L D Lᵀ factor of a symmetric matrix in PARDISO's own memory, until `close` is called.
 
-    Bitwise repeatable where MKL_CBWR was set in the environment before the program started; otherwise two runs on one
-    machine with equal threads differ by rounding.
+    Results are bitwise reproducible if MKL_CBWR was set in the environment before the program started. Otherwise two
+    runs on one machine with equal threads differ by rounding.
     """
 
     def __init__(self, lower: sp.csc_array, *, definite: bool) -> None:
@@ -82,10 +83,11 @@ class PardisoFactor:
         library = mkl_runtime()
         if library is None:
             raise FactorizationError(f"PARDISO {missing_pardiso()}")
-        self._pardiso = library["pardiso"]  # a handle of our own: pypardiso's carries its argument types
+        self._pardiso = library["pardiso"]  # our own handle, because pypardiso's handle has its argument types attached
         self._pardiso.restype = None
         self.n = lower.shape[0]
-        # the compressed columns of the lower triangle are the compressed rows of the upper one PARDISO asks for
+        # the compressed columns of the lower triangle are the compressed rows of the upper triangle that PARDISO
+        # expects
         self._a = np.ascontiguousarray(lower.data, dtype=np.float64)
         self._ia = np.ascontiguousarray(lower.indptr, dtype=np.int32)
         self._ja = np.ascontiguousarray(lower.indices, dtype=np.int32)
@@ -110,11 +112,11 @@ class PardisoFactor:
 
     @property
     def n_factor_entries(self) -> int:
-        """Stored entries of the factor."""
+        """Number of stored entries of the factor."""
         return int(np.uint32(self._iparm[17])) if self._iparm[17] < 0 else int(self._iparm[17])
 
     def solve(self, b: Array) -> Array:
-        """Return A⁻¹ b for b (n, k), any order; the result is in Fortran order."""
+        """Return A⁻¹ b for b, (n, k), in any memory order; the result is in Fortran order."""
         x = np.empty(b.shape, order="F")
         for first in range(0, b.shape[1], CHUNK):
             columns = slice(first, min(first + CHUNK, b.shape[1]))
@@ -124,13 +126,13 @@ class PardisoFactor:
         return x
 
     def close(self) -> None:
-        """Free the factor; further solves are refused by the caller."""
+        """Free the factor; the caller rejects further solves."""
         if self.is_open:
             self.is_open = False
             self._call(RELEASE)
 
     def __del__(self) -> None:
-        if getattr(self, "is_open", False) and not sys.is_finalizing():  # the end of the process frees it as well
+        if getattr(self, "is_open", False) and not sys.is_finalizing():  # the end of the process frees it too
             self.close()
 
     def _call(self, phase: int, b: Array | None = None, x: Array | None = None) -> int:
@@ -157,15 +159,15 @@ class PardisoFactor:
 
 
 def settings(*, definite: bool) -> np.ndarray:
-    """Return iparm, (64,) int32: parallel nested dissection, no refinement, 0-based indices; the rest per [1]_."""
+    """Return iparm, (64,) int32: parallel nested dissection, no refinement, 0-based indices; other entries see [1]_."""
     iparm = np.zeros(64, np.int32)
-    iparm[0] = 1  # nothing is defaulted
+    iparm[0] = 1  # use the values given here instead of defaults
     iparm[1] = 2 if is_bitwise() else 3  # nested dissection, serial or parallel
     iparm[9] = PIVOT_PERTURBATION
-    iparm[17] = -1  # report the entries of the factor
+    iparm[17] = -1  # report the number of entries of the factor
     iparm[34] = 1  # 0-based
     if not definite:
-        iparm[10] = iparm[12] = 1  # scaling and matching: for multipliers, which have a zero diagonal
+        iparm[10] = iparm[12] = 1  # scaling and matching, for multipliers with a zero diagonal
         iparm[20] = 1  # Bunch-Kaufman pivots
     if is_bitwise():
         iparm[33] = n_threads()
@@ -173,12 +175,12 @@ def settings(*, definite: bool) -> np.ndarray:
 
 
 def is_bitwise() -> bool:
-    """Whether the user asked the library for bitwise repeatable results, by MKL_CBWR in the environment."""
+    """Whether the user requested bitwise reproducible results through MKL_CBWR in the environment."""
     return bool(os.environ.get("MKL_CBWR"))
 
 
 def n_threads() -> int:
-    """Threads the library uses."""
+    """Return the number of threads that the library uses."""
     library = mkl_runtime()
     return int(library.mkl_get_max_threads()) if library else 1
 

@@ -1,6 +1,6 @@
-"""The compiled product of sparse rows with a block of columns; imported where it is used.
+"""The compiled product of sparse rows with a block of columns; imported only where used.
 
-SciPy's own writes into new memory at every call, and passes the row that it sums once for every entry.
+SciPy's own product allocates new memory in every call, and passes over the output row once for every entry.
 """
 
 import numpy as np
@@ -11,10 +11,10 @@ __all__ = ["multiply_rows"]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def multiply_rows(indptr, indices, data, first, last, n_components, wide, y):
-    """Write y = (S ⊗ 1_c) x, rows c first to c last of y, (n, k), of any strides, by the compressed rows of S.
+    """Write rows c first to c last of y = (S ⊗ 1_c) x, (n, k), with any strides, from the compressed rows of S.
 
-    wide: x, (n, k), as rows of c k numbers. Four entries at a time pass the sum, which stays in the nearest cache; the
-    order of the sums is SciPy's.
+    wide: x, (n, k), as rows of c k numbers. Four entries are added at a time, so the output row stays in the nearest
+    cache. The order of summation is that of SciPy.
     """
     width = wide.shape[1]
     k = width // n_components

@@ -1,7 +1,8 @@
-"""The tall columns of an iteration as rows on all ranks: rank 0 holds names of them, and small matrices.
+"""The tall columns of an iteration, distributed by rows: rank 0 holds keys of them, and small matrices.
 
-Rank 0 runs the iteration and decides; what it asks of columns, all ranks do with their rows at once. Rows are those of
-the factor, so that solves take them where they are, and nothing as long as the body passes through rank 0.
+Rank 0 runs the iteration and decides. All ranks perform operations on columns with their own rows at once. The rows are
+distributed like those of the factor, so solves need no redistribution, and no array as long as the body passes through
+rank 0.
 """
 
 import weakref
@@ -32,17 +33,17 @@ numbers = count()
 
 
 class RankColumns:
-    """Columns whose rows lie on all ranks, (n, k); with the last name of them they go."""
+    """Distributed columns, (n, k); freed when the last reference is dropped."""
 
     def __init__(self, space: "RankSpace", part: Part, source: object = None) -> None:
-        """Name columns; source: what owns them, where they are part of another's."""
+        """Refer to columns; source: their owner, if they are a part of others."""
         self.part, self.shape, self.source = part, (space.n, part.last - part.first), source
         if source is None:
             weakref.finalize(self, space.dropped.append, part.key).atexit = False
 
 
 class RankBasis:
-    """Columns that grow in number, rows of them on all ranks."""
+    """A growing number of distributed columns."""
 
     def __init__(self, space: "RankSpace", capacity: int) -> None:
         self.space, self.capacity, self.key = space, capacity, new_key()
@@ -50,25 +51,25 @@ class RankBasis:
         weakref.finalize(self, space.dropped.append, self.key).atexit = False
 
     def columns(self, first: int, last: int) -> RankColumns:
-        """Return some of them, (n, last - first)."""
+        """Return some columns, (n, last - first)."""
         return RankColumns(self.space, Part(self.key, first, last), self)
 
     def put(self, first: int, X: RankColumns) -> None:
-        """Write columns, from this one on."""
+        """Write columns, starting at index `first`."""
         self.space.ask(None, put_here, self.key, first, X.part)
 
     def turn(self, m: int, C: Array) -> None:
-        """Replace the first k columns by V C of the first m."""
+        """Replace the first k columns by V C, where V are the first m columns."""
         self.space.ask(None, turn_here, self.key, m, C)
 
     def grow(self, capacity: int, m: int) -> None:
-        """Make room for more; the first m columns stay."""
+        """Allocate memory for more columns; the first m columns stay."""
         self.space.ask(None, grow_here, self.key, capacity, m)
         self.capacity = capacity
 
 
 class RankProduct:
-    """The product with a matrix whose rows lie on all ranks."""
+    """The product with a distributed matrix."""
 
     def __init__(self, space: "RankSpace", A: Matrix) -> None:
         self.space, self.key = space, new_key()
@@ -86,31 +87,31 @@ class RankProduct:
 
 
 class RankSpace:
-    """Columns are names of rows on all ranks, of which rank 0 has no more than its own, until `close`."""
+    """Columns are keys of rows on all ranks, until `close`; rank 0 holds only its own rows."""
 
     def __init__(self, factor: PetscFactor, numbering: IntArray | None = None) -> None:
-        """Lay out columns as the factor has its rows; numbering: as that of `ArraySpace`."""
+        """Distribute columns like the rows of the factor; numbering: as for `ArraySpace`."""
         self.numbering = numbering
         self.factor, self.ranks, self.rows, self.n = factor, factor.ranks, factor.rows, factor.n
-        self.dropped: list[str] = []  #: keys that nobody names any more; told with the next question
+        self.dropped: list[str] = []  #: keys without references; ranks drop their data with the next request
 
     def ask(self, key: str | None, function: Callable[..., Any], *arguments: Any) -> list[Any]:
-        """Call function(ranks, *arguments) on all ranks; each keeps what it returns under the key, or tells it."""
+        """Call function(ranks, *arguments) on all ranks; each keeps its result under the key (None: returns it)."""
         dropped = [self.dropped.pop() for _ in range(len(self.dropped))]
         return self.ranks.everywhere(kept_here, dropped, key, function, *arguments)
 
     def made(self, k: int, function: Callable[..., Any], *arguments: Any) -> RankColumns:
-        """Return new columns, (n, k), the rows of which a function returns on each rank."""
+        """Return new columns, (n, k), whose rows the function returns on each rank."""
         key = new_key()
         self.ask(key, function, *arguments)
         return RankColumns(self, Part(key, 0, k))
 
     def close(self) -> None:
-        """Free what is not named any more, on all ranks."""
+        """Free data without references, on all ranks."""
         self.ask(None, give_back_here)
 
     def random(self, generator: np.random.Generator, k: int) -> RankColumns:
-        """Return columns of normally distributed numbers, those of one process, (n, k)."""
+        """Return columns of normally distributed numbers, (n, k), equal to those of a single process."""
         self.ranks.store["columns"] = dealt(generator.standard_normal((k, self.n)).T, self.numbering)
         return self.made(k, given_here, self.rows)
 
@@ -123,11 +124,11 @@ class RankSpace:
         return self.made(C.shape[1], combine_here, X.part, C)
 
     def combined(self, X: RankColumns, C: Array) -> RankColumns:
-        """Return X C, (n, l), in memory of its own; what X was is freed with its name."""
+        """Return X C, (n, l), in new memory; X is freed with its last reference."""
         return self.combine(X, C)
 
     def subtract(self, Y: RankColumns, X: RankColumns, C: Array) -> None:
-        """Take X C from Y in place."""
+        """Subtract X C from Y in place."""
         self.ask(None, subtract_here, Y.part, X.part, C)
 
     def scale(self, X: RankColumns, factors: Array) -> None:
@@ -135,7 +136,7 @@ class RankSpace:
         self.ask(None, scale_here, X.part, factors)
 
     def basis(self, capacity: int) -> RankBasis:
-        """Return room for so many columns."""
+        """Allocate memory for `capacity` columns."""
         return RankBasis(self, capacity)
 
     def whole(self, X: RankColumns) -> Array:
@@ -143,20 +144,20 @@ class RankSpace:
         return self.ask(None, collected_here, self.rows, X.part)[0]
 
     def has_rows_of(self, A: PrincipalBlock) -> bool:
-        """Return whether the rows of a block lie on the ranks as those of the columns do."""
+        """Return whether the rows of a block are distributed like those of the columns."""
         block = A.spread()
         return block is not None and block.rows == self.rows
 
     def columns(self, X: RankColumns) -> SpreadColumns:
-        """Return columns by another name; they go with the space, and what is made of them stays."""
+        """Return the columns as `SpreadColumns`; they end with the space, but results computed from them stay."""
         return SpreadColumns(RowLayout(self.ranks, np.arange(self.n), self.rows), X.part, X)
 
     def product(self, A: Matrix) -> RankProduct:
-        """Spread the rows of a symmetric matrix, (n, n), which may lie so, and return the product with it."""
+        """Distribute the rows of a symmetric matrix, (n, n), if necessary, and return the product with it."""
         return RankProduct(self, A)
 
     def solver(self, factorization: Inverse) -> Callable[[RankColumns], RankColumns]:
-        """Return what solves for columns by the factor whose rows are those of this space."""
+        """Return the function that solves for columns with the factor of this space."""
         assert isinstance(factorization, Factorization)
         assert factorization.factor is self.factor
         return lambda b: self.made(b.shape[1], solved_here, self.factor.key, self.rows, b.part)
@@ -168,7 +169,7 @@ def new_key() -> str:
 
 
 def kept_here(ranks: Ranks, dropped: list[str], key: str | None, function: Callable[..., Any], *arguments: Any) -> Any:
-    """Forget what nobody names; call the function and keep what it returns, or return it."""
+    """Drop data without references; call the function, and keep its result or return it."""
     for each in dropped:
         ranks.store.pop(each, None)
     answer = function(ranks, *arguments)
@@ -179,12 +180,12 @@ def kept_here(ranks: Ranks, dropped: list[str], key: str | None, function: Calla
 
 
 def give_back_here(ranks: Ranks) -> None:
-    """Return memory of what was forgotten."""
+    """Return freed memory to the system."""
     give_back()
 
 
 def given_here(ranks: Ranks, rows: Rows) -> Array:
-    """Return this rank's rows of columns that rank 0 has."""
+    """Return this rank's rows of columns that rank 0 holds."""
     return own_rows(ranks, rows, ranks.store.pop("columns", None))
 
 
@@ -194,17 +195,17 @@ def collected_here(ranks: Ranks, rows: Rows, X: Part) -> Array | None:
 
 
 def inner_here(ranks: Ranks, X: Part, Y: Part) -> Array:
-    """Return the part of Xᵀ Y of these rows."""
+    """Return the contribution of this rank's rows to Xᵀ Y."""
     return inner(own_part(ranks, X), own_part(ranks, Y))
 
 
 def combine_here(ranks: Ranks, X: Part, C: Array) -> Array:
-    """Return rows of X C."""
+    """Return this rank's rows of X C."""
     return combine(own_part(ranks, X), C)
 
 
 def subtract_here(ranks: Ranks, Y: Part, X: Part, C: Array) -> None:
-    """Take rows of X C from those of Y."""
+    """Subtract this rank's rows of X C from those of Y."""
     subtract(own_part(ranks, Y), own_part(ranks, X), C)
 
 
@@ -214,39 +215,39 @@ def scale_here(ranks: Ranks, X: Part, factors: Array) -> None:
 
 
 def basis_here(ranks: Ranks, key: str, rows: Rows, capacity: int) -> None:
-    """Make room for rows of a basis."""
+    """Allocate this rank's rows of a basis."""
     ranks.store[key] = ArrayBasis(rows.count(ranks.rank), capacity)
 
 
 def put_here(ranks: Ranks, key: str, first: int, X: Part) -> None:
-    """Write rows of columns into a basis."""
+    """Write this rank's rows of columns into a basis."""
     ranks.store[key].put(first, own_part(ranks, X))
 
 
 def turn_here(ranks: Ranks, key: str, m: int, C: Array) -> None:
-    """Turn rows of a basis."""
+    """Transform this rank's rows of a basis."""
     ranks.store[key].turn(m, C)
 
 
 def grow_here(ranks: Ranks, key: str, capacity: int, m: int) -> None:
-    """Make room for more."""
+    """Allocate memory for more columns."""
     ranks.store[key].grow(capacity, m)
 
 
 def product_here(ranks: Ranks, key: str, rows: Rows) -> None:
-    """Replace the matrix that rank 0 has by this rank's rows of it; compressed columns are rows, A is symmetric."""
+    """Replace the matrix that rank 0 holds by this rank's rows; columns equal rows, because A is symmetric."""
     A = ranks.store.pop(key, None)
     ranks.store[key] = (A.indptr, A.indices, A.data) if isinstance(A, sp.csc_array) else A
     ranks.store[key] = RowsProduct(ranks, rows, *rows_here(ranks, key, rows))
 
 
 def multiplied_here(ranks: Ranks, key: str, x: Part) -> Array:
-    """Return rows of A x."""
+    """Return this rank's rows of A x."""
     return np.asarray(ranks.store[key] @ own_part(ranks, x))
 
 
 def solved_here(ranks: Ranks, key: str, rows: Rows, b: Part) -> Array:
-    """Return rows of A⁻¹ b, some columns at a time."""
+    """Return this rank's rows of A⁻¹ b, for blocks of columns."""
     x = np.empty((rows.count(ranks.rank), b.last - b.first), order="F")
     for first in range(b.first, b.last, CHUNK):
         some = Part(b.key, first, min(first + CHUNK, b.last))

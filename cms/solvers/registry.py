@@ -1,7 +1,7 @@
-"""The solvers by name, as `--solver`, `solver` in job files and `solver=` choose them.
+"""The solvers by name, for `--solver`, `solver` in job files and `solver=`.
 
-Another one is a line of `SOLVERS`: its name, what makes a factor (`MakeFactor` of
-`fe_models.foundation.solver`), and what says in words what is missing here, "" where nothing is.
+To add a solver, add a line to `SOLVERS`: its name, the function that makes a factor (`MakeFactor` of
+`fe_models.foundation.solver`), and the function that says what is missing, "" if nothing.
 """
 
 from functools import partial
@@ -33,32 +33,32 @@ SOLVERS = {
         Solver("petsc-disk", ON_DISK, missing_petsc, ON_DISK),
     )
 }
-LARGE = 150_000  #: rows from which our Cholesky factor, whose solves are faster, makes up for its compilation
+LARGE = 150_000  #: number of rows above which the faster solves of our Cholesky factor outweigh its compilation
 
 
 def pardiso_or_cholesky(lower: sp.csc_array, *, definite: bool) -> Factor:
-    """Return the factor of PARDISO; our Cholesky factor of a large matrix that is meant to be positive definite."""
+    """Return the factor of PARDISO, or our Cholesky factor if the matrix is large and must be positive definite."""
     if definite and lower.shape[0] >= LARGE:
         return CholeskyFactor(lower)
     return SOLVERS["pardiso"].factor(lower, definite=definite)
 
 
 def missing_default() -> str:
-    """Say what PARDISO lacks here."""
+    """Describe what PARDISO lacks here."""
     return SOLVERS["pardiso"].missing()
 
 
-#: where none is asked for, the first that is installed
+#: default solvers; the first installed one is used
 DEFAULTS = (Solver("pardiso", pardiso_or_cholesky, missing_default), SOLVERS["cholesky"])
 
 
 def solver_of(choice: str | Solver | None = None) -> Solver:
-    """Return the solver of a name, or one given as such; None: the fastest of those installed, by size.
+    """Return the solver of that name, or the given solver; None: the fastest installed one, depending on the size.
 
     Raises
     ------
     FactorizationError
-        If there is no solver of that name, or it is not installed: the text says what to install.
+        If there is no solver of that name, or it is not installed; the message says what to install.
     """
     if isinstance(choice, Solver):
         return choice

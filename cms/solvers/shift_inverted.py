@@ -1,4 +1,4 @@
-"""The shift-inverted operator S = (K - sigma M)⁻¹ M, and modes refined by one more application of it."""
+"""The shift-inverted operator S = (K - sigma M)⁻¹ M, and refinement of modes by one more application."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["Modes", "ShiftInverted", "Wanted", "measured_residual", "refined_modes"]
 
-SAMPLES = 4  #: columns for the measurement of all residuals together
+SAMPLES = 4  #: number of columns for a common measurement of all residuals
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """How many modes are asked for: the first `count`, or all up to `omega2`."""
+    """The wanted modes: the first `count`, or all up to `omega2`."""
 
     count: int | None
     omega2: float | None
@@ -32,12 +32,12 @@ class Wanted:
 
     @classmethod
     def of(cls, wanted: ModeCount) -> "Wanted":
-        """Return a count of modes in the quantities of the pencil."""
+        """Convert a mode count to the quantities of the pencil."""
         return cls(wanted.n, None if wanted.cutoff is None else (2 * np.pi * wanted.cutoff) ** 2)
 
 
 class ShiftInverted:
-    """The operator S with its tolerance, of columns of one space; counts those it solves for."""
+    """The operator S with its tolerance, on columns of one space; it counts the columns solved."""
 
     def __init__(
         self,
@@ -63,18 +63,18 @@ class ShiftInverted:
         return self._solve(b)
 
     def report(self, found: int, wanted: int) -> None:
-        """Tell the caller how far the search is."""
+        """Report the progress of the search to the caller."""
         if self._progress is not None:
             self._progress(found, wanted)
 
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """Modes as coefficients of a block of columns: the wanted ones, and a few guards after them."""
+    """Modes as coefficients of a block of columns: the wanted modes, followed by a few guards."""
 
     omega2: Array  #: ascending, (n_wanted + n_guards,)
     n_wanted: int
-    residuals: Array  #: of the wanted ones before the last improvement, (n_wanted,)
+    residuals: Array  #: residuals of the wanted modes before the last improvement, (n_wanted,)
     Y: Any  #: columns of the space, (n, p)
     Z: Array  #: coefficients, M-orthonormal Phi = Y Z, (p, n_wanted + n_guards)
     space: TallSpace
@@ -85,7 +85,7 @@ class Modes:
 
 
 def refined_modes(operator: ShiftInverted, X: Any, theta: Array, n_wanted: int) -> Modes:
-    """Modes from M-orthonormal Ritz vectors X, (n, p), by one inverse iteration and Rayleigh-Ritz.
+    """Refine M-orthonormal Ritz vectors X, (n, p), by one inverse iteration and Rayleigh-Ritz.
 
     (1) Y = S X / theta; residuals |Y - X|_M
     (2) Yᵀ (K - sigma M) Y = Yᵀ M X / theta = H,  Yᵀ M Y = G;  H z = (omega² - sigma) G z
@@ -107,14 +107,15 @@ def refined_modes(operator: ShiftInverted, X: Any, theta: Array, n_wanted: int) 
 def measured_residual(operator: ShiftInverted, modes: Modes) -> tuple[float, float]:
     """Measure (Σ_j |r_j|_M²)^½ of the wanted modes, r_j = x_j - (omega_j² - sigma) S x_j, with few columns.
 
-    The sum Σ ± r_j with random signs has the expected squared length Σ |r_j|² in any norm. Mean over `SAMPLES` sums.
+    A sum Σ ± r_j with random signs has the expected squared length Σ |r_j|² in any norm. The mean of `SAMPLES` sums is
+    used.
 
     Returns
     -------
     residual
-        In the M-norm: an estimate of the root of the sum, and by it a bound of each |r_j|_M.
+        In the M-norm: an estimate of the root of the sum, which bounds each |r_j|_M.
     defect
-        The same without M, as a part of the columns themselves: it also sees what has no mass.
+        The same without M, relative to the columns; this also measures massless components.
     """
     k = modes.n_wanted
     Z, above_shift = modes.Z[:, :k], modes.omega2[:k] - operator.shift

@@ -1,4 +1,4 @@
-"""Modes by SLEPc: Krylov-Schur iteration for the largest theta of S = K⁻¹ M, its basis spread over all ranks."""
+"""Modes by SLEPc: Krylov-Schur iteration for the largest theta of S = K⁻¹ M, with a distributed basis."""
 
 from itertools import count
 
@@ -16,14 +16,15 @@ from fe_models.foundation.ranks.rows import Rows, collected, spread
 
 __all__ = ["SlepcSearch"]
 
-GUARDS = 4  #: modes beyond the wanted ones that are asked for, to see where a frequency is passed
-FIRST_GUESS = 30  #: modes, as long as only a frequency is given
-SHARPER = 1e-6  #: of the tolerance of the caller: of theta here, whose error goes with the square of the residual
+GUARDS = 4  #: modes requested beyond the wanted ones, to see where a frequency is passed
+FIRST_GUESS = 30  #: expected number of modes, while only a frequency is given
+#: factor on the tolerance of the caller; here it applies to theta, whose error is the square of the residual
+SHARPER = 1e-6
 numbers = count()
 
 
 class SlepcSearch:
-    """Krylov-Schur with vectors on all ranks; rank 0 receives the modes that were found."""
+    """Krylov-Schur with distributed vectors; rank 0 receives the modes."""
 
     def __init__(self, operator: ShiftInverted, wanted: Wanted) -> None:
         assert isinstance(operator.factorization, Factorization)
@@ -38,7 +39,7 @@ class SlepcSearch:
         factor.ranks.everywhere(spread_mass, self.key, factor.rows)
 
     def modes(self, wanted: Wanted, at_least: int = 0) -> Modes:
-        """Return the wanted modes, or `at_least` so many."""
+        """Return the wanted modes, or at least `at_least`."""
         operator = self.operator
         n_asked = max(wanted.count or FIRST_GUESS, at_least) + GUARDS
         while True:
@@ -64,7 +65,7 @@ def spread_mass(ranks: Ranks, key: str, rows: Rows) -> None:
     """Keep this rank's rows of the upper triangle of M."""
     PETSc = petsc()
     n_own = rows.count(ranks.rank)
-    lower = ranks.store.pop(key, None)  # columns of the lower triangle are rows of the upper one
+    lower = ranks.store.pop(key, None)  # columns of the lower triangle are rows of the upper triangle
     csr = spread(ranks, rows, None if lower is None else (lower.indptr, lower.indices, lower.data))
     M = PETSc.Mat().createSBAIJ(((n_own, rows.n), (n_own, rows.n)), 1, csr=csr, comm=communicator(ranks))
     M.assemble()
@@ -73,14 +74,14 @@ def spread_mass(ranks: Ranks, key: str, rows: Rows) -> None:
 
 
 def n_solved() -> int:
-    """Return how many columns this process has solved for, as PETSc counts them."""
+    """Return how many columns this process has solved, as counted by PETSc."""
     return int(petsc().Log.Event("MatSolve").getPerfInfo()["count"])
 
 
 def search_here(
     ranks: Ranks, factor_key: str, mass_key: str, rows: Rows, n_asked: int, tolerance: float
 ) -> tuple[Array, Array, Array | None, int]:
-    """Return omega² above the shift, ascending, their errors, and the modes on rank 0, and the number of solves."""
+    """Return omega² above the shift, ascending, their errors, the modes on rank 0, and the number of solves."""
     SLEPc = slepc()
     _, ksp, A = ranks.store[factor_key]
     M = ranks.store[mass_key]
@@ -95,7 +96,7 @@ def search_here(
     st = eps.getST()
     st.setType(SLEPc.ST.Type.SINVERT)
     st.setShift(0.0)
-    st.setKSP(ksp)  # with the factor of A it has: the matrix of a zero shift is A itself
+    st.setKSP(ksp)  # with the factor of A; the matrix of a zero shift is A itself
     before = n_solved()
     eps.solve()
     n_solves = n_solved() - before

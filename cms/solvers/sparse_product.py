@@ -1,4 +1,4 @@
-"""Products of a large symmetric sparse matrix with blocks of columns, in threads (SciPy's own use one)."""
+"""Threaded products of a large symmetric sparse matrix with blocks of columns (SciPy's own use one thread)."""
 
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
@@ -18,21 +18,21 @@ from fe_models.foundation.threads import n_threads
 
 __all__ = ["SymmetricProduct"]
 
-SMALL = 200_000  #: stored entries below which threads cost more than they bring
-NARROW = 4  #: numbers in a row of columns below which SciPy's product takes less time
-COLUMNS = 16  #: columns per pass over the matrix; the rows of x it touches then stay in the cache
+SMALL = 200_000  #: stored entries below which threads cost more than they save
+NARROW = 4  #: numbers in a row of columns below which SciPy's product is faster
+COLUMNS = 16  #: columns per pass over the matrix; the rows of x in use then stay in the cache
 
 
 class SymmetricProduct:
-    """The map x -> A x of a symmetric matrix A; its compressed columns are read as rows, nothing is copied.
+    """The map x -> A x of a symmetric matrix A; its compressed columns are read as rows, without a copy.
 
-    Where A begins with S ⊗ 1₃ (`scalar_part`), as the mass of a solid does, columns x of three components a node are
-    rows of S three times as wide: a third of the entries is read, and the rows of x come in longer pieces. With
-    B = A[:, 3p:] for what else there is (reference nodes, multipliers)
+    If A begins with S ⊗ 1₃ (`scalar_part`), like the mass of a solid, columns x with three components per node are rows
+    of S that are three times as wide. Only a third of the entries is read, and the rows of x are read in longer pieces.
+    With B = A[:, 3p:] for the other dofs (reference nodes, multipliers)
 
         (A x)_lead = (S ⊗ 1₃) x_lead + B_lead x_rest,   (A x)_rest = Bᵀ x
 
-    A matrix by rows on all ranks (`SpreadMatrix`) is multiplied there.
+    A distributed matrix (`SpreadMatrix`) is multiplied on its ranks.
     """
 
     def __init__(self, A: sp.csc_array, *, columns: int = COLUMNS) -> None:
@@ -50,7 +50,7 @@ class SymmetricProduct:
         self._pool = ThreadPoolExecutor(n_parts) if n_parts > 1 else None
 
     def __matmul__(self, x: Any) -> Any:
-        """Return A x in the order of x, (n, k), in memory; of columns on all ranks on these."""
+        """Return A x, (n, k), in the memory order of x; the product of distributed columns is distributed."""
         if self._is_spread:
             return self.A @ (x if isinstance(x, SpreadColumns) else in_memory(x))
         x = in_memory(x)
@@ -67,7 +67,7 @@ class SymmetricProduct:
         return ordered(result, order)
 
     def _multiply(self, block: Array, target: Array, n_components: int) -> None:
-        """Write the product by the rows; rows of so many components lie in one row of the block."""
+        """Write the product row by row; `n_components` rows form one row of the block."""
         rows = self._rows
         wide = block.reshape(-1, n_components * block.shape[1])
         if rows.nnz <= SMALL or wide.shape[1] < NARROW:
@@ -84,14 +84,14 @@ class SymmetricProduct:
             list(self._pool.map(multiply, self._shares))
 
     def _add_rest(self, block: Array, target: Array) -> None:
-        """Add what the columns after those of S have."""
+        """Add the contribution of the columns after those of S."""
         rest, (rows, B_rows) = self._rest
         target[rows] += B_rows @ block[self._n_lead :]
         target[self._n_lead :] = rest @ block
 
     @cached_property
     def _rest(self) -> tuple[sp.csr_array, tuple[Array, sp.csr_array]]:
-        """Bᵀ, and the rows of B_lead that are not empty with their numbers."""
+        """Return Bᵀ, and the non-empty rows of B_lead with their indices."""
         B = sp.csc_array(self.A[:, self._n_lead :])
         rows = np.unique(B.indices)
         rows = rows[rows < self._n_lead]

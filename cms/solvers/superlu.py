@@ -1,4 +1,4 @@
-"""SuperLU through SciPy: the factorisation that runs everywhere."""
+"""SuperLU through SciPy: the factorisation that is always available."""
 
 import logging
 
@@ -13,17 +13,18 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["SuperLuFactor"]
 
-SMALL = 3000  #: rows below which minimum degree is good enough, and done before compiled loops are loaded
-MANY = 50_000  #: rows from which it is looked how long it takes
-LONG = 30.0  #: seconds from which that is said before the work
-OPERATIONS = 4e9  #: a second (4.6e9 to 4.8e9 measured, tet10 rod of 58 788 rows and grid of 32 768, one processor)
-BYTES = 48.0  #: of memory an entry of the triangular factor while L and U are made (docs/memory.md)
+SMALL = 3000  #: rows below which minimum degree is good enough, and finishes before compiled loops are loaded
+MANY = 50_000  #: rows above which the duration is estimated
+LONG = 30.0  #: duration in seconds above which a warning is given before the work
+#: operations per second (4.6e9 to 4.8e9 measured: tet10 rod with 58 788 rows, grid with 32 768; one processor)
+OPERATIONS = 4e9
+BYTES = 48.0  #: bytes of memory per entry of the triangular factor while L and U are made (docs/memory.md)
 
 log = logging.getLogger(__name__)
 
 
 class SuperLuFactor:
-    """L U factor of a symmetric matrix, pivots on the diagonal wherever it lets them."""
+    """L U factor of a symmetric matrix, with pivots on the diagonal where possible."""
 
     def __init__(self, lower: sp.csc_array, *, definite: bool) -> None:
         """Factorise the matrix with this lower triangle, (n, n), every diagonal entry stored, sorted row indices."""
@@ -44,7 +45,7 @@ class SuperLuFactor:
             )
         except MemoryError as error:
             raise FactorRoomError(f"SuperLU: not enough memory; n = {self.n}, {lower.nnz} entries") from error
-        except RuntimeError as error:  # "Factor is exactly singular"
+        except RuntimeError as error:  # the message is "Factor is exactly singular"
             raise FactorizationError(f"SuperLU: {error}; n = {self.n}, {lower.nnz} entries") from error
         self.is_open = True
         pivots = self._lu.U.diagonal()
@@ -64,11 +65,11 @@ class SuperLuFactor:
 
     @property
     def n_factor_entries(self) -> int:
-        """Stored entries of the factor."""
+        """Number of stored entries of the factor."""
         return int(self._lu.nnz)
 
     def solve(self, b: Array) -> Array:
-        """Return A⁻¹ b for b (n, k), any order; the result is in Fortran order."""
+        """Return A⁻¹ b for b, (n, k), in any memory order; the result is in Fortran order."""
         if self._order is None:
             return np.asfortranarray(self._lu.solve(np.asfortranarray(b)))
         x = np.empty(b.shape, order="F")
@@ -83,7 +84,7 @@ class SuperLuFactor:
 
 
 def announce(fronts: Fronts, *, definite: bool) -> None:
-    """Say before the work what SuperLU takes of time and memory, and what takes less; nothing where it is little."""
+    """Warn before the work how much time and memory SuperLU needs, and what needs less; silent if it needs little."""
     seconds = 2 * fronts.operations / OPERATIONS
     if seconds < LONG:
         return

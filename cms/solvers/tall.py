@@ -1,9 +1,9 @@
-"""Products of tall arrays, (n, k) with n much larger than k, by slices of rows in threads.
+"""Products of tall arrays, (n, k) with n much larger than k, in slices of rows in threads.
 
-NumPy's own BLAS threads wait for their next task on the processor, which the sparse solver working in turns with them
-then lacks; ours sleep. The slices are summed in their order, so that results repeat bit for bit. Arrays on disk
-(`fe_models.foundation.tall.on_disk`) are worked on in smaller slices. Columns whose rows lie on all ranks
-(`SpreadColumns`) are worked on there, and an array beside them is sent there; so is what is made of them.
+NumPy's own BLAS threads poll for their next task and thereby block processors for the sparse solver; our threads sleep.
+Slices are summed in order, so results are bitwise reproducible. Arrays on disk (`fe_models.foundation.tall.on_disk`)
+are processed in smaller slices. Distributed columns (`SpreadColumns`) are processed on their ranks; arrays used
+together with them are sent there, and results stay distributed.
 """
 
 from collections.abc import Callable, Iterator
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 __all__ = ["combine", "combined", "dots", "inner", "ordered", "put", "rows_times", "squares", "subtract"]
 
-SMALL = 20_000  #: rows below which threads cost more than they bring
-SLICE = 8192  #: rows at a time; what is made of them on the way stays in the cache
+SMALL = 20_000  #: rows below which threads cost more than they save
+SLICE = 8192  #: number of rows at a time; intermediate results stay in the cache
 
 
 def inner(X: Any, Y: Any) -> Array:
@@ -42,14 +42,14 @@ def inner(X: Any, Y: Any) -> Array:
 
 
 def dots(X: Any, Y: Any) -> Array:
-    """Return Σ_n X_nk Y_nk of every column, (k,)."""
+    """Return Σ_n X_nk Y_nk for every column, (k,)."""
     if isinstance(X, SpreadColumns):
         return _sum(iter(on_rows(X.layout, dots, X, Y)))
     return np.asarray(np.einsum("nk,nk->k", X, Y))
 
 
 def rows_times(S: Any, X: Any) -> Array:
-    """Return S X, (m, k), of a sparse matrix S, (m, n), that reads few rows of X."""
+    """Return S X, (m, k), for a sparse matrix S, (m, n), that reads few rows of X."""
     if not isinstance(X, SpreadColumns):
         return np.asarray(S @ X)
     S = sp.csr_array(S)
@@ -58,7 +58,7 @@ def rows_times(S: Any, X: Any) -> Array:
 
 
 def squares(d: Array, X: Any) -> Array:
-    """Return Σ_n d_n X_nk² of every column, (k,)."""
+    """Return Σ_n d_n X_nk² for every column, (k,)."""
     if isinstance(X, SpreadColumns):
         return _sum(iter(on_rows(X.layout, _weighted_squares, spread_columns(X.layout, d[:, None]), X)))
     return _sum(np.einsum("n,nk,nk->k", d[some], X[some], X[some]) for some in row_slices(len(X), X))
@@ -69,7 +69,7 @@ def _weighted_squares(d: Array, X: Array) -> Array:
 
 
 def combine(X: Any, C: Array, *, order: Literal["C", "F"] | None = None) -> Any:
-    """Return X C, (n, l), in the order of X or the one given."""
+    """Return X C, (n, l), in the memory order of X or the given one."""
     if isinstance(X, SpreadColumns):
         return spread_with(X.layout, C.shape[1], combine, X, C)
     order = order or _order(X)
@@ -88,7 +88,7 @@ def combine(X: Any, C: Array, *, order: Literal["C", "F"] | None = None) -> Any:
 
 
 def combined(X: Any, C: Array) -> Any:
-    """Return X C, (n, m), in the place of X, (n, k), which is lost; an array of its own where m is much less than k."""
+    """Return X C, (n, m), in the memory of X, (n, k), which is overwritten; a new array if m is much smaller than k."""
     k, m = C.shape
     if isinstance(X, SpreadColumns) or not m or not k // 2 <= m <= k:
         return combine(X, C)
@@ -100,14 +100,14 @@ def combined(X: Any, C: Array) -> Any:
     _by_rows(len(X), update)
     if m == k or not X.flags.c_contiguous:
         return X[:, :m]
-    whole = X.reshape(-1)  # rows close up, so that what is left lies in one piece, as sparse products want it
+    whole = X.reshape(-1)  # rows are packed, so that the result is contiguous, as sparse products need it
     for part in _slices(slice(0, len(X)), X):
         whole[part.start * m : part.stop * m] = X[part, :m].ravel()
     return whole[: len(X) * m].reshape(-1, m)
 
 
 def subtract(Y: Any, X: Any, C: Array) -> None:
-    """Take X C from Y, (n, l), in place."""
+    """Subtract X C from Y, (n, l), in place."""
     if isinstance(Y, SpreadColumns):
         on_rows(Y.layout, subtract, Y, spread_columns(Y.layout, X), C)
         return
@@ -133,7 +133,7 @@ def ordered(X: Array, order: Literal["C", "F"]) -> Array:
 
 
 def put(X: Array, target: Array) -> None:
-    """Copy X, (n, k), into an array of its shape in any order."""
+    """Copy X, (n, k), into an array of the same shape, in any memory order."""
 
     def copy(rows: slice) -> None:
         for part in _slices(rows, X):
@@ -143,12 +143,12 @@ def put(X: Array, target: Array) -> None:
 
 
 def _order(X: Array) -> Literal["C", "F"]:
-    """Return the order in which X lies, or nearly lies (a part of its rows or columns)."""
+    """Return the memory order of X, also if X is a part of the rows or columns of an array."""
     return "C" if X.strides[1] <= X.strides[0] else "F"
 
 
 def _slices(rows: slice, *arrays: Array) -> Iterator[slice]:
-    """Yield slices that the cache holds, or, of arrays on disk, those after which their memory is given back."""
+    """Yield slices that fit in the cache, or, for arrays on disk, slices after which their memory is released."""
     if any(is_on_disk(X) for X in arrays):
         yield from row_slices(rows, *arrays)
         return
@@ -157,7 +157,7 @@ def _slices(rows: slice, *arrays: Array) -> Iterator[slice]:
 
 
 def _sum(parts: Iterator[Array]) -> Array:
-    """Return the sum of parts, which are not held together."""
+    """Return the sum of parts, which are not all held in memory."""
     total = next(parts)
     for part in parts:
         total += part

@@ -1,6 +1,6 @@
-"""Where the tall columns of an iteration lie, (n, k) with n much larger than k, and what it does with them.
+"""Storage of the tall columns of an iteration, (n, k) with n much larger than k, and operations on them.
 
-`ArraySpace`: arrays of this process. Rows of them on many ranks: `cms.solvers.rank_space`.
+`ArraySpace` uses arrays of this process; `cms.solvers.rank_space` distributes the rows over ranks.
 """
 
 from collections.abc import Callable
@@ -16,36 +16,36 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["ArraySpace", "TallBasis", "TallProduct", "TallSpace"]
 
-RESTART_ROWS = 65536  #: turned at once; no second basis in memory
+RESTART_ROWS = 65536  #: number of rows transformed at a time, which avoids a second basis in memory
 
 
 class TallProduct(Protocol):
-    """The map x -> A x of a symmetric matrix A, of columns of one space."""
+    """The map x -> A x of a symmetric matrix A, for columns of one space."""
 
     def __matmul__(self, x: Any) -> Any:
         """Return A x, (n, k)."""
 
 
 class TallBasis(Protocol):
-    """Columns that grow in number, in memory of their own."""
+    """A growing number of columns in their own memory."""
 
-    capacity: int  #: columns there is room for
+    capacity: int  #: number of columns for which memory is allocated
 
     def columns(self, first: int, last: int) -> Any:
-        """Return some of them, (n, last - first); they change with the basis."""
+        """Return some columns, (n, last - first); they change together with the basis."""
 
     def put(self, first: int, X: Any) -> None:
-        """Write columns, from this one on."""
+        """Write columns, starting at index `first`."""
 
     def turn(self, m: int, C: Array) -> None:
-        """Replace the first k columns by V C of the first m, C (m, k)."""
+        """Replace the first k columns by V C, where V are the first m columns and C is (m, k)."""
 
     def grow(self, capacity: int, m: int) -> None:
-        """Make room for more; the first m columns stay."""
+        """Allocate memory for more columns; the first m columns stay."""
 
 
 class TallSpace(Protocol):
-    """What an iteration asks of the place where its columns lie; columns are arrays, or stand for rows on ranks."""
+    """Operations of an iteration on its columns, which are arrays or refer to rows on ranks."""
 
     n: int
 
@@ -59,16 +59,16 @@ class TallSpace(Protocol):
         """Return X C, (n, l)."""
 
     def combined(self, X: Any, C: Array) -> Any:
-        """Return X C, (n, l), for columns X that are not used any more, in their place if that is possible."""
+        """Return X C, (n, l), for columns X that are no longer needed, in their memory if possible."""
 
     def subtract(self, Y: Any, X: Any, C: Array) -> None:
-        """Take X C from Y in place."""
+        """Subtract X C from Y in place."""
 
     def scale(self, X: Any, factors: Array) -> None:
         """Multiply every column by its factor, (k,), in place."""
 
     def basis(self, capacity: int) -> TallBasis:
-        """Return room for so many columns."""
+        """Allocate memory for `capacity` columns."""
 
     def whole(self, X: Any) -> Array:
         """Return columns as an array of this process, (n, k)."""
@@ -77,11 +77,11 @@ class TallSpace(Protocol):
         """Return the product with a symmetric matrix, (n, n)."""
 
     def solver(self, factorization: Inverse) -> Callable[[Any], Any]:
-        """Return what solves for columns by a factorisation."""
+        """Return the function that solves for columns with a factorisation."""
 
 
 class ArrayBasis:
-    """The basis, column by column."""
+    """The basis, stored column by column."""
 
     def __init__(self, n: int, capacity: int) -> None:
         self.rows, self.capacity = np.empty((capacity, n)), capacity
@@ -91,18 +91,18 @@ class ArrayBasis:
         return self.rows[first:last].T
 
     def put(self, first: int, X: Array) -> None:
-        """Write columns, from this one on."""
+        """Write columns, starting at index `first`."""
         put(X, self.columns(first, first + X.shape[1]))
 
     def turn(self, m: int, C: Array) -> None:
-        """Replace the first k columns by V C of the first m."""
+        """Replace the first k columns by V C, where V are the first m columns."""
         C_t, n = np.ascontiguousarray(C.T), self.rows.shape[1]
         for first in range(0, n, RESTART_ROWS):
             part = slice(first, first + RESTART_ROWS)
             self.rows[: len(C_t), part] = C_t @ self.rows[:m, part]
 
     def grow(self, capacity: int, m: int) -> None:
-        """Make room for more; the first m columns stay."""
+        """Allocate memory for more columns; the first m columns stay."""
         rows = np.empty((capacity, self.rows.shape[1]))
         rows[:m] = self.rows[:m]
         self.rows, self.capacity = rows, capacity
@@ -112,7 +112,7 @@ class ArraySpace:
     """Columns are arrays of this process."""
 
     def __init__(self, n: int, numbering: IntArray | None = None) -> None:
-        """Columns of n rows; numbering: of the rows, by which random numbers are dealt to them, None: as they lie."""
+        """Columns with n rows; numbering: numbers of the rows that assign random values to them; None: row order."""
         self.n, self.numbering = n, numbering
 
     def random(self, generator: np.random.Generator, k: int) -> Array:
@@ -128,11 +128,11 @@ class ArraySpace:
         return combine(X, C)
 
     def combined(self, X: Array, C: Array) -> Array:
-        """Return X C, (n, l), in the place of X, which is lost."""
+        """Return X C, (n, l), in the memory of X, which is overwritten."""
         return combined(X, C)
 
     def subtract(self, Y: Array, X: Array, C: Array) -> None:
-        """Take X C from Y in place."""
+        """Subtract X C from Y in place."""
         subtract(Y, X, C)
 
     def scale(self, X: Array, factors: Array) -> None:
@@ -140,7 +140,7 @@ class ArraySpace:
         X *= factors
 
     def basis(self, capacity: int) -> ArrayBasis:
-        """Return room for so many columns."""
+        """Allocate memory for `capacity` columns."""
         return ArrayBasis(self.n, capacity)
 
     def whole(self, X: Array) -> Array:
@@ -152,10 +152,10 @@ class ArraySpace:
         return SymmetricProduct(A)
 
     def solver(self, factorization: Inverse) -> Callable[[Array], Array]:
-        """Return what solves for columns by a factorisation, in the order of the factor."""
+        """Return the function that solves for columns with a factorisation, in the memory order of the factor."""
         return factorization.solve
 
 
 def dealt(X: Array, numbering: IntArray | None) -> Array:
-    """Return row numbering[r] of X at each row r, (n, k), in the order in memory that X has."""
+    """Return row numbering[r] of X at each row r, (n, k), in the memory order of X."""
     return X if numbering is None else X.T[:, numbering].T

@@ -1,1 +1,1 @@
-"""Sparse Cholesky factorisation of our own, by fronts: where there is no MKL, and where the factor belongs on disk."""
+"""Our multifrontal sparse Cholesky factorisation, for machines without MKL and for factors on disk."""

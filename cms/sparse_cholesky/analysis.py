@@ -1,4 +1,4 @@
-"""Analysis of a sparse symmetric matrix before its numbers: order of elimination, fronts, and what they will cost."""
+"""Symbolic analysis of a sparse symmetric matrix: elimination order, fronts, and the cost of the factorisation."""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -16,56 +16,56 @@ if TYPE_CHECKING:
 
 __all__ = ["Fronts", "analyse", "dissection_order"]
 
-LEAF = 12  #: vertices, mostly nodes of the mesh, below which a part is not dissected further
-MANY = 5000  #: vertices above which parts of a graph are dissected beside each other
-SHARES = 8  #: of all vertices, as large as such parts are at most
-FEW = 24  #: columns up to which small fronts are joined whatever zeros that brings
-SHARE = 0.5  #: of zeros that is allowed in a front of about so many columns; less in larger ones
+LEAF = 12  #: vertices (mostly mesh nodes) below which a part is not dissected further
+MANY = 5000  #: vertices above which parts of a graph are dissected in parallel
+SHARES = 8  #: reciprocal share of all vertices that such a part may have
+FEW = 24  #: columns up to which small fronts are merged regardless of the zeros that this adds
+SHARE = 0.5  #: allowed share of zeros in a merged front with about `FEW` columns; smaller in larger fronts
 
 
 @dataclass(frozen=True, eq=False)
 class Fronts:
-    """Dense fronts of a multifrontal factorisation, each after its children; rows and columns in the new order."""
+    """Dense fronts of a multifrontal factorisation, children before parents; rows and columns in the new order."""
 
-    order: IntArray  #: the row of the matrix that comes k-th, (n,)
+    order: IntArray  #: matrix row at position k, (n,)
     first: IntArray  #: first column of each front, (n_fronts + 1,)
-    begin: IntArray  #: where the rows below a front begin in `rows`, (n_fronts + 1,)
-    rows: IntArray  #: rows below the columns of all fronts, ascending in each
+    begin: IntArray  #: start of the rows below each front in `rows`, (n_fronts + 1,)
+    rows: IntArray  #: rows below the columns of all fronts, ascending within each front
     above: IntArray  #: parent of each front, -1: none, (n_fronts,)
 
     @property
     def width(self) -> IntArray:
-        """Columns of each front, (n_fronts,)."""
+        """Number of columns of each front, (n_fronts,)."""
         return np.diff(self.first)
 
     @property
     def below(self) -> IntArray:
-        """Rows below the columns of each front, (n_fronts,)."""
+        """Number of rows below the columns of each front, (n_fronts,)."""
         return np.diff(self.begin)
 
     @property
     def n_entries(self) -> int:
-        """Entries of the factor."""
+        """Number of entries of the factor."""
         w, u = self.width, self.below
         return int((w * (w + 1) // 2 + w * u).sum())
 
     @cached_property
     def stored(self) -> IntArray:
-        """Where the numbers of each front begin among those that are stored for the factor, and their end.
+        """Start of each front among the stored numbers of the factor, and their end.
 
-        Tiles of eight rows: up to their diagonal in the columns of a front, over all its columns below.
+        Numbers are stored in tiles of eight rows: up to the diagonal within the columns of a front, all columns below.
         """
         columns, below = -(-self.width // 8), -(-self.below // 8)
         return np.concatenate([[0], np.cumsum(32 * columns * (columns + 1) + 8 * below * self.width)])
 
     @property
     def n_stored(self) -> int:
-        """Numbers that are stored for the factor."""
+        """Number of stored numbers of the factor."""
         return int(self.stored[-1])
 
     @cached_property
     def place(self) -> IntArray:
-        """The place of each row below a front in the front of its parent: its columns first, then the rows below."""
+        """Position of each row below a front in its parent front: first the parent's columns, then the rows below."""
         from cms.sparse_cholesky import kernels
 
         return kernels.places_above(self.begin, self.rows, self.first, self.above)
@@ -85,9 +85,9 @@ class Fronts:
 def analyse(lower: sp.csc_array) -> Fronts:
     """Return the fronts of the symmetric matrix with this lower triangle.
 
-    (1) rows with the same neighbours, such as the dofs of a node, are one vertex
-    (2) nested dissection of the vertices
-    (3) elimination tree, in postorder; columns of the factor with nearly the same rows are one front
+    (1) merge rows with the same neighbours, such as the dofs of a node, to one vertex
+    (2) order the vertices by nested dissection
+    (3) build the elimination tree in postorder; columns of the factor with nearly the same rows form one front
     """
     from cms.sparse_cholesky import kernels
 
@@ -108,7 +108,7 @@ def analyse(lower: sp.csc_array) -> Fronts:
     order, sizes = order[by_front], sizes[by_front]
     first = np.searchsorted(front[by_front], np.arange(len(above) + 1))
     begin, rows = kernels.front_rows(start, neighbours, first, above)
-    at = np.concatenate([[0], np.cumsum(sizes)])  # from vertices to rows of the matrix
+    at = np.concatenate([[0], np.cumsum(sizes)])  # converts vertices to rows of the matrix
     members = np.argsort(inverse(order)[group], kind="stable")
     lengths = sizes[rows]
     ends = np.concatenate([[0], np.cumsum(lengths)])
@@ -117,16 +117,16 @@ def analyse(lower: sp.csc_array) -> Fronts:
 
 
 def dissection_order(lower: sp.csc_array) -> IntArray:
-    """Return an order of elimination by nested dissection, (n,): the row that comes k-th."""
+    """Return an elimination order by nested dissection, (n,): the row at position k."""
     start, neighbours, weight, group = quotient(lower)
     order = nested_dissection(start, neighbours, weight)
     return np.argsort(inverse(order)[group], kind="stable")
 
 
 def nested_dissection(start: IntArray, neighbours: IntArray, weight: IntArray) -> IntArray:
-    """Return an order of elimination of a graph by nested dissection, (n_v,): the vertex that comes k-th.
+    """Return an elimination order of a graph by nested dissection, (n_v,): the vertex at position k.
 
-    Parts below the first cuts are dissected by themselves, in threads; on their number nothing depends.
+    Parts below the first cuts are dissected separately, in threads; the result does not depend on their number.
     """
     from cms.sparse_cholesky.dissection_kernels import dissect
     from cms.sparse_cholesky.separator_kernels import Graph, workspace
@@ -142,24 +142,24 @@ def nested_dissection(start: IntArray, neighbours: IntArray, weight: IntArray) -
 
 
 def quotient(lower: sp.csc_array) -> "tuple[IntArray, IntArray, IntArray, IntArray]":
-    """Return the graph of a matrix with rows of equal neighbours as one vertex.
+    """Return the graph of a matrix in which rows with equal neighbours are one vertex.
 
     Returns
     -------
     start, neighbours
-        Its compressed rows, the vertex itself left out.
+        Compressed rows of the graph, without the vertex itself.
     weight
-        Rows of the matrix in each vertex, (n_v,).
+        Number of matrix rows in each vertex, (n_v,).
     group
         Vertex of each row, (n,).
     """
     from cms.sparse_cholesky import kernels
 
     keys = np.random.default_rng(0).integers(1, 2**63, size=lower.shape[0], dtype=np.uint64)
-    # equal sums of random numbers over a row and its neighbours: equal rows, but for one case in 2**64
+    # equal sums of random numbers over a row and its neighbours identify equal rows, except for one case in 2**64
     total = kernels.sums_over_rows(lower.indptr, lower.indices, keys)
     _, representative, group = np.unique(total, return_index=True, return_inverse=True)
-    rank = inverse(np.argsort(representative, kind="stable"))  # vertices in the order of their first rows
+    rank = inverse(np.argsort(representative, kind="stable"))  # vertices are ordered by their first rows
     group = rank[group].astype(np.int32)
     representative = np.sort(representative)
     start, neighbours = kernels.graph_of(lower.indptr, lower.indices, representative, group)
@@ -176,7 +176,7 @@ def renumbered(start: IntArray, neighbours: IntArray, order: IntArray) -> "tuple
 
 
 def inverse(order: "Array | IntArray") -> IntArray:
-    """Return the place of each element of an order."""
+    """Return the position of each element in an order."""
     rank = np.empty(len(order), np.int64)
     rank[order] = np.arange(len(order))
     return rank

@@ -1,4 +1,4 @@
-"""Blocks of fronts, each one task: whole subtrees below, single fronts above; and threads that go through them."""
+"""Blocks of fronts as tasks (subtrees at the bottom, single fronts at the top), and threads that process them."""
 
 import heapq
 import threading
@@ -18,24 +18,24 @@ if TYPE_CHECKING:
 
 __all__ = ["Blocks", "blocks_of", "for_each"]
 
-PARTS = 32  #: a subtree with more than this part of all work is divided
-ENTRY = 100.0  #: operations that take as long as an entry of the factor does otherwise
+PARTS = 32  #: a subtree with more than 1/32 of the total work is divided
+ENTRY = 100.0  #: number of operations that take as long as the other work per entry of the factor
 
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """Runs of fronts in their order: each a subtree, several beside each other, or one front above other blocks."""
+    """Consecutive fronts as blocks: a subtree, several neighbouring subtrees, or one front above other blocks."""
 
     fronts: Fronts
     first: IntArray  #: first front of each block, (n_blocks + 1,)
-    above: IntArray  #: the block of the parent of its roots, -1: none, (n_blocks,)
+    above: IntArray  #: block that contains the parent of its roots, -1: none, (n_blocks,)
 
     def __len__(self) -> int:
         return len(self.above)
 
     @cached_property
     def below(self) -> list[list[int]]:
-        """The blocks right below each, in order."""
+        """Child blocks of each block, in order."""
         below: list[list[int]] = [[] for _ in self.above]
         for k, above in enumerate(self.above):
             if above >= 0:
@@ -44,7 +44,7 @@ class Blocks:
 
     @cached_property
     def tree(self) -> "Tree":
-        """The fronts as kernels read them."""
+        """The fronts in the form that kernels use."""
         from cms.sparse_cholesky.front_kernels import Tree
 
         fronts = self.fronts
@@ -52,13 +52,13 @@ class Blocks:
 
     @property
     def stored(self) -> IntArray:
-        """Where the numbers of each block begin among those that are stored for the factor, and their end."""
+        """Start of each block among the stored numbers of the factor, and their end."""
         return self.fronts.stored[self.first]
 
     def room(self, k: int, size: IntArray) -> tuple[int, int, int]:
-        """Return the numbers of the largest front of a block, of its stack, and of what it leaves there.
+        """Return array sizes for a block: its largest front, its stack, and the update matrices left on the stack.
 
-        size: of what each front leaves, (n_fronts,).
+        size: size of the update matrix of each front, (n_fronts,).
         """
         from cms.sparse_cholesky.front_kernels import room
 
@@ -66,12 +66,12 @@ class Blocks:
 
     @cached_property
     def work(self) -> "Array":
-        """What each block takes of time in the factorisation, in operations, (n_blocks,)."""
+        """Time of each block in the factorisation, in operations, (n_blocks,)."""
         return np.add.reduceat(front_work(self.fronts), self.first[:-1])
 
     @cached_property
     def by_distance(self) -> IntArray:
-        """The turn of each block if the work from it to its root decides, the most first, (n_blocks,)."""
+        """Priority of each block by the work on its path to the root, most first, (n_blocks,)."""
         path = self.work.copy()
         for k in reversed(range(len(self))):
             if self.above[k] >= 0:
@@ -80,7 +80,7 @@ class Blocks:
 
     @cached_property
     def by_height(self) -> IntArray:
-        """The turn of each block on the way down if the longest way below it decides, the most first, (n_blocks,)."""
+        """Priority of each block on the way down by the longest path below it, most first, (n_blocks,)."""
         height = self.work.copy()
         for k, above in enumerate(self.above):
             if above >= 0:
@@ -89,18 +89,18 @@ class Blocks:
 
     @cached_property
     def by_depth(self) -> IntArray:
-        """The turn of each block if what waits for its parent decides: subtree after subtree, (n_blocks,)."""
+        """Priority of each block that minimises waiting update matrices: subtree after subtree, (n_blocks,)."""
         return np.arange(len(self))
 
     def turns(self, *, on_disk: bool) -> IntArray:
-        """Return the turns in the factorisation: as fast as possible, or with as little memory."""
+        """Return the priorities for the factorisation: fastest, or with least memory."""
         return self.by_depth if on_disk else self.by_distance
 
     def n_working(self, n_threads: int, *, on_disk: bool = False) -> int:
-        """Most numbers that the factorisation holds at once beside the factor: fronts, and what waits for its parent.
+        """Return the peak number of values held besides the factor: active fronts, and waiting update matrices.
 
-        Blocks in the order of `for_each`, each for as long as it has operations; on disk with the panels of those at
-        work.
+        Blocks run in the order of `for_each`, each for a time proportional to its operations. On disk, the panels of
+        active blocks are included.
         """
         turns = self.turns(on_disk=on_disk) if n_threads > 1 else self.by_depth
         size = self.fronts.below.astype(np.int64) ** 2
@@ -127,12 +127,12 @@ class Blocks:
 
 
 def front_work(fronts: Fronts) -> "Array":
-    """Return what each front takes of time, in operations, (n_fronts,): its entries are written and read as well."""
+    """Return the time of each front, in operations, (n_fronts,), including reading and writing its entries."""
     return fronts.front_operations + ENTRY * fronts.width * (fronts.width + fronts.below)
 
 
 def blocks_of(fronts: Fronts) -> Blocks:
-    """Cut the tree of fronts into blocks; the same whatever the number of threads is."""
+    """Cut the tree of fronts into blocks, independently of the number of threads."""
     n_fronts, above = len(fronts.above), fronts.above
     work = front_work(fronts)
     start = np.arange(n_fronts)  # first front of each subtree
@@ -142,7 +142,7 @@ def blocks_of(fronts: Fronts) -> Blocks:
             start[above[f]] = min(start[above[f]], start[f])
     limit = work[above < 0].sum() / PARTS
     first: list[int] = []
-    parents: list[int] = []  # of blocks, from the last to the first
+    parents: list[int] = []  # parents of the blocks, from the last block to the first
     f, run = n_fronts - 1, 0.0
     while f >= 0:
         is_large = work[f] > limit
@@ -163,9 +163,9 @@ def blocks_of(fronts: Fronts) -> Blocks:
 def for_each(
     blocks: Blocks, task: Callable[[int], None], n_threads: int, turns: IntArray, *, downwards: bool = False
 ) -> None:
-    """Do a task for every block, each after those below it (downwards: after the one above it), in some threads.
+    """Execute a task for every block, after its children (downwards: after its parent), in threads.
 
-    Of blocks that may begin the one with the first turn does. One thread goes subtree by subtree.
+    Among the blocks that are ready, the one with the highest priority starts. A single thread goes subtree by subtree.
     """
     n = len(blocks)
     if n_threads == 1 or n == 1:
@@ -192,7 +192,7 @@ def for_each(
                 begun.append(k)
             try:
                 task(k)
-            except BaseException as error:  # handed to the thread that asked
+            except BaseException as error:  # passed on to the calling thread
                 with change:
                     failures.append(error)
                     change.notify_all()
@@ -213,7 +213,7 @@ def for_each(
         worker()
         for thread in started:
             thread.join()
-    except BaseException as error:  # an interrupt while this thread waits: the others end after their tasks
+    except BaseException as error:  # an interrupt while this thread waits: the other threads end after their tasks
         with change:
             failures.append(error)
             change.notify_all()
@@ -221,7 +221,7 @@ def for_each(
             thread.join()
     if failures:
         first = failures[0]
-        failures.clear()  # its traceback holds what the tasks held
+        failures.clear()  # its traceback references the arrays of the tasks
         try:
             raise first
         finally:

@@ -1,6 +1,6 @@
-"""Compiled loops of nested dissection; imported where they are used: numba takes half a second to import.
+"""Compiled loops of nested dissection; imported only where used, because numba takes half a second to import.
 
-Their graphs are those of `cms.sparse_cholesky.separator_kernels`.
+Graphs have the form described in `cms.sparse_cholesky.separator_kernels`.
 """
 
 import numpy as np
@@ -12,13 +12,13 @@ __all__ = ["dissect"]
 
 jit = njit(cache=True, nogil=True, error_model="numpy")
 
-WAYS = 6  #: orders of a part, each of which gives a cut
-NEAR = 1.5  #: cuts of up to so many times the least cost are refined, the best of them is taken
+WAYS = 6  #: orderings of a part, each of which gives a cut
+NEAR = 1.5  #: cuts with a cost of up to this factor times the smallest are refined, and the best is used
 
 
 @jit
 def breadth_first(graph, mark, part, first, queue, distance, stamp, stamps):
-    """Walk the part from a vertex, nearest first, into `queue`; returns how many vertices were met."""
+    """Traverse the part from a vertex, nearest first, into `queue`; return the number of vertices reached."""
     queue[0], stamps[first], distance[first] = first, stamp, 0
     n, k = 1, 0
     while k < n:
@@ -36,11 +36,12 @@ def breadth_first(graph, mark, part, first, queue, distance, stamp, stamps):
 
 @jit
 def best_cut(graph, mark, part, vertices, value):
-    """Return where a part is best cut by `value`: cut, the side whose touching vertices separate it, and the cost.
+    """Return the best cut of a part by `value`: the cut, the side whose boundary is the separator, and its cost.
 
-    For a cut c below the value of THERE: HERE's vertices that touch THERE are those with value < c <= the largest value
-    next to them, and the other way round; so one pass over the edges counts them for all cuts. Cost: the lighter of
-    both, by a power of the shares of both sides; infinite where no cut keeps both sides.
+    A cut c puts vertices with values below c HERE and the others THERE. The vertices HERE that touch THERE are those
+    with value < c <= the largest value among their neighbours, and vice versa, so one pass over the edges counts them
+    for all cuts. The cost is the lighter of both boundaries, multiplied by a power of the shares of both sides; it is
+    infinite if a side is empty.
     """
     start, neighbours, weight = graph.start, graph.neighbours, graph.weight
     low, high = value[vertices[0]], value[vertices[0]]
@@ -80,15 +81,15 @@ def best_cut(graph, mark, part, vertices, value):
 
 @jit
 def dissect(graph, cut, order, lo, hi, leaf, small):
-    """Order the vertices order[lo:hi] by nested dissection in place; return the parts that are left, as (lo, hi).
+    """Order the vertices order[lo:hi] by nested dissection in place; return the remaining parts as (lo, hi).
 
-    Parts of up to `leaf` vertices stay as they are; those of up to `small` are left to other calls.
+    Parts of up to `leaf` vertices are not divided; those of up to `small` vertices are left to other calls.
 
-    (1) components of a part are parts of their own
-    (2) three vertices far apart; distances to each and their differences order the part in six ways, each with its best
-        cut (`best_cut`)
-    (3) separator: the vertices of one half that touch the other, refined; of the cuts that are not much worse than the
-        best one before that the best one after it; last in the order, both halves before it
+    (1) connected components are separate parts
+    (2) find three vertices far apart; distances to them, and differences of distances, order the part in six ways, each
+        with its best cut (`best_cut`)
+    (3) the separator consists of the vertices of one half that touch the other, refined; among cuts close to the best
+        before refinement, the best after refinement is used; it is ordered last, after both halves
     """
     n = graph.start.size - 1
     mark, side = cut.mark, cut.side
@@ -127,7 +128,7 @@ def dissect(graph, cut, order, lo, hi, leaf, small):
             stamp += 1
             breadth_first(graph, mark, part, far, place, distance[k], stamp, stamps)
             far = place[m - 1]
-            if k == 1:  # the third: far from both
+            if k == 1:  # the third vertex is far from both
                 for v in vertices:
                     if min(distance[0, v], distance[1, v]) > min(distance[0, far], distance[1, far]):
                         far = v
@@ -171,7 +172,7 @@ def dissect(graph, cut, order, lo, hi, leaf, small):
 
 @jit
 def way_value(distance, way, v):
-    """Return the value of a vertex in one of six orders of a part: three distances, and their differences."""
+    """Return the value of a vertex in one of six orderings of a part: three distances, and their differences."""
     if way < 3:
         return distance[way, v]
     return distance[way - 3, v] - distance[(way - 2) % 3, v]

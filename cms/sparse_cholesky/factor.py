@@ -1,4 +1,4 @@
-"""Cholesky factorisation by fronts (multifrontal), in memory or with the factor on disk."""
+"""Multifrontal Cholesky factorisation, in memory or with the factor on disk."""
 
 import threading
 from pathlib import Path
@@ -16,17 +16,18 @@ from fe_models.foundation.threads import n_threads, one_blas_thread
 
 __all__ = ["CholeskyFactor"]
 
-WIDTHS = (8, 16)  #: columns that pass the factor together: so many numbers read 8 and 16 times as many products
+#: number of right-hand sides that pass through the factor together; each factor entry read serves all of them
+WIDTHS = (8, 16)
 
 
 class CholeskyFactor:
-    """Cholesky factor P A Pᵀ = L Lᵀ of a positive definite matrix, until `close`.
+    """Cholesky factor P A Pᵀ = L Lᵀ of a positive definite matrix, until `close` is called.
 
-    For each front, children first, with w columns of its own and u rows below them:
+    For each front, children first, with w own columns and u rows below them:
 
-    (1) F = [[F11, .], [F21, F22]]: entries of A in its columns, plus what the children left
-    (2) F11 = L11 L11ᵀ;  L21 = F21 L11⁻ᵀ;  what it leaves: F22 - L21 L21ᵀ
-    (3) [L11; L21] goes to the panels, which all solves pass once forwards and once backwards
+    (1) F = [[F11, .], [F21, F22]]: entries of A in its columns, plus the update matrices of its children
+    (2) F11 = L11 L11ᵀ;  L21 = F21 L11⁻ᵀ;  update matrix: F22 - L21 L21ᵀ
+    (3) [L11; L21] is stored in the panels, through which every solve passes once forward and once backward
     """
 
     def __init__(
@@ -38,9 +39,10 @@ class CholeskyFactor:
         Parameters
         ----------
         on_disk
-            Whether the factor stands in a file of `folder` (by default that of temporary files) instead of memory.
+            Whether to store the factor in a file in `folder` (default: the folder for temporary files) instead of
+            memory.
         fronts
-            Of an analysis before; made here by default.
+            Result of an earlier analysis; None: the analysis is made here.
         """
         self.is_open = False
         if not definite:
@@ -76,7 +78,7 @@ class CholeskyFactor:
         entries = front_kernels.Entries(*kernels.permuted(lower.indptr, lower.indices, lower.data, rank))
         tree, blocks = self._blocks.tree, self._blocks
         left_size = self._fronts.below.astype(np.int64) ** 2
-        left: dict[int, Array] = {}  # by blocks that wait for the one above
+        left: dict[int, Array] = {}  # update matrices by block, waiting for the parent block
         local = threading.local()
 
         def factorise(k: int) -> None:
@@ -109,7 +111,7 @@ class CholeskyFactor:
         give_back()
 
     def solve(self, b: Array) -> Array:
-        """Return A⁻¹ b for b (n, k), any order; up to 16 columns come by rows, more in Fortran order."""
+        """Return A⁻¹ b for b, (n, k), in any memory order; up to 16 columns come in C order, others in F order."""
         if b.shape[1] <= WIDTHS[-1]:
             return self._substituted(b)
         x = np.empty(b.shape, order="F")
@@ -119,7 +121,7 @@ class CholeskyFactor:
         return x
 
     def _substituted(self, b: Array) -> Array:
-        """Return the solutions for b, (n, k) with k <= 16, by rows."""
+        """Return the solutions for b, (n, k) with k <= 16, in C order."""
         from cms.sparse_cholesky import solve_kernels
         from cms.sparse_cholesky.tiles import LANES, ROWS
 
@@ -156,7 +158,7 @@ class CholeskyFactor:
         return x
 
     def close(self) -> None:
-        """Free the factor; a second time does nothing."""
+        """Free the factor; further calls do nothing."""
         if self.is_open:
             self.is_open = False
             self._panels.close()

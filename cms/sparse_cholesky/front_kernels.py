@@ -1,8 +1,8 @@
-"""Compiled loops over fronts that make the factor; imported where they are used.
+"""Compiled loops over fronts that compute the factor; imported only where used.
 
-A front of w columns and u rows below them is F, (w + u, w), and what it leaves, U, (u, u), one column after the other
-in flat arrays; of symmetric parts the lower triangle. What fronts of a subtree leave lies on a stack until their parent
-takes it.
+A front with w columns and u rows below them is stored as F, (w + u, w), and its update matrix as U, (u, u), column by
+column in flat arrays. Of symmetric parts only the lower triangle is used. Update matrices in a subtree lie on a stack
+until the parent takes them.
 """
 
 from typing import Any, NamedTuple
@@ -27,14 +27,14 @@ __all__ = [
     "words",
 ]
 
-TOGETHER = 8  #: tiles that are written at once
-STRIPE = 64  #: columns of which BLAS eliminates the rows below at once; products do the rest, at twice the speed
+TOGETHER = 8  #: number of tiles written at the same time
+STRIPE = 64  #: columns whose rows below BLAS eliminates at once; products do the rest, at twice the speed
 
 jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
 def external(name: str) -> Any:
-    """Return a routine of BLAS or LAPACK for kernels; they find it by its name, so that they can be kept on disk."""
+    """Return a BLAS or LAPACK routine for kernels; it is found by name, so that compiled kernels can be cached."""
     address, n_arguments = routine_address(name)
     binding.add_symbol(f"sparse_cholesky_{name}", address)
     return types.ExternalFunction(f"sparse_cholesky_{name}", types.void(*[types.intp] * n_arguments))
@@ -44,7 +44,7 @@ dgemm, dpotrf, dsyrk, dtrsm = external("dgemm"), external("dpotrf"), external("d
 
 
 class Tree(NamedTuple):
-    """Fronts as kernels read them (`Fronts`)."""
+    """Fronts in the form that kernels use (`Fronts`)."""
 
     first: IntArray
     begin: IntArray
@@ -55,7 +55,7 @@ class Tree(NamedTuple):
 
 
 class Entries(NamedTuple):
-    """The lower triangle of the matrix in the order of the fronts, by columns."""
+    """Lower triangle of the matrix in the order of the fronts, by columns."""
 
     start: IntArray
     rows: IntArray
@@ -63,7 +63,7 @@ class Entries(NamedTuple):
 
 
 class Words(NamedTuple):
-    """Arguments of BLAS and LAPACK, which take addresses alone; of one thread."""
+    """Arguments of BLAS and LAPACK, which are passed by address; one set for each thread."""
 
     sizes: IntArray
     factors: Array
@@ -71,18 +71,18 @@ class Words(NamedTuple):
 
 
 def words() -> Words:
-    """Return them: sizes, which kernels fill in; 1 and -1; the letters L, N, R and T."""
+    """Return the arguments: sizes, which kernels set; 1 and -1; the letters L, N, R and T."""
     return Words(np.zeros(6, np.intc), np.array([1.0, -1.0]), np.frombuffer(b"LNRT", np.uint8).copy())
 
 
 @jit
 def room(tree, lo, hi, size):
-    """Return what a run of subtrees needs: numbers of the largest F, of the stack, and of what roots leave on it.
+    """Return array sizes for consecutive subtrees: largest F, stack, and update matrices that roots leave on it.
 
-    size: of what each front leaves, (n_fronts,).
+    size: size of the update matrix of each front, (n_fronts,).
     """
     front = stack = top = 0
-    waiting = np.zeros(hi - lo, np.int64)  # left by the children of each front
+    waiting = np.zeros(hi - lo, np.int64)  # update matrices of the children of each front
     for f in range(lo, hi):
         w, u = tree.first[f + 1] - tree.first[f], tree.begin[f + 1] - tree.begin[f]
         front = max(front, w * (w + u))
@@ -95,7 +95,7 @@ def room(tree, lo, hi, size):
 
 @jit
 def begin_front(tree, entries, f, F, U, local):
-    """Put the entries of the matrix into an empty front; `local`: a workspace over all rows."""
+    """Write the entries of the matrix into an empty front; `local` is a workspace over all rows."""
     lo, hi = tree.first[f], tree.first[f + 1]
     w, u = hi - lo, tree.begin[f + 1] - tree.begin[f]
     F[: w * (w + u)] = 0.0
@@ -112,7 +112,7 @@ def begin_front(tree, entries, f, F, U, local):
 
 @jit
 def add_update(place, left, w, u, F, U):
-    """Add what a child leaves, (m, m), to a front, by the places of its rows."""
+    """Add the update matrix of a child, (m, m), to a front at the positions of its rows."""
     m = place.size
     for j in range(m):
         if place[j] < w:
@@ -127,7 +127,7 @@ def add_update(place, left, w, u, F, U):
 
 @jit
 def take_updates(tree, lo, hi, stack, f, F, U):
-    """Add what the roots among fronts lo to hi leave on their stack to front f, their parent."""
+    """Add the update matrices that roots among fronts lo to hi left on their stack to their parent, front f."""
     w, u = tree.first[f + 1] - tree.first[f], tree.begin[f + 1] - tree.begin[f]
     at = 0
     for c in range(lo, hi):
@@ -174,9 +174,9 @@ def finish_front(tree, f, F, U, panel, words):
 
 @jit
 def write_rows(F, source, length, n_rows, n_columns, panel, at, step):
-    """Copy rows of a front, whose columns have a length, to tiles that begin `step` numbers apart.
+    """Copy rows of a front, whose columns have a given length, to tiles that begin `step` numbers apart.
 
-    Column by column through some tiles at once: a column stands far from the next one in memory.
+    Several tiles are written together, column by column, because columns are far apart in memory.
     """
     for j in range(n_columns):
         for k in range(n_rows // ROWS):
@@ -194,7 +194,7 @@ def write_rows(F, source, length, n_rows, n_columns, panel, at, step):
 
 @jit
 def write_tiles(F, w, u, panel):
-    """Write the columns of a front as tiles of eight rows: their diagonal as reciprocals, rows that miss as zeros."""
+    """Write the columns of a front as tiles of eight rows; diagonals are reciprocals, missing rows are zero."""
     at, length = 0, w + u
     for top in range(0, w, ROWS):
         write_rows(F, top, length, min(ROWS, w - top), top, panel, at, 0)
@@ -214,10 +214,10 @@ def write_tiles(F, w, u, panel):
 
 @jit
 def factorise_fronts(tree, entries, lo, hi, F, stack, local, panels, words):
-    """Factorise a run of subtrees; return 0, or a failed row in the new order, counted from 1.
+    """Factorise consecutive subtrees; return 0, or a failed row in the new order, counted from 1.
 
-    (1) the front: entries of the matrix, and what its children left, which are last on the stack
-    (2) its columns are eliminated and written; what it leaves takes the place of what its children left
+    (1) make the front: entries of the matrix, and the update matrices of its children, which are last on the stack
+    (2) eliminate and write its columns; its update matrix replaces those of its children
     """
     left_by, n_left, top = np.empty(hi - lo, np.int64), 0, 0
     for f in range(lo, hi):

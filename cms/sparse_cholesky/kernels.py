@@ -1,6 +1,6 @@
-"""Compiled loops of elimination tree and fronts; imported where they are used: numba takes half a second to import.
+"""Compiled loops of elimination tree and fronts; imported only where used, because numba takes half a second to import.
 
-Graphs are compressed rows `start`, `neighbours` without the vertex itself.
+Graphs are given by compressed rows `start`, `neighbours`, without the vertex itself.
 """
 
 import numpy as np
@@ -23,7 +23,7 @@ jit = njit(cache=True, nogil=True, error_model="numpy")
 
 @jit
 def sums_over_rows(indptr, indices, keys):
-    """Return the sum of the keys of each row and its neighbours, (n,), of a lower triangle."""
+    """Return the sum of the keys of each row and its neighbours, (n,), given a lower triangle."""
     total = keys.copy()
     for j in range(keys.size):
         for e in range(indptr[j], indptr[j + 1]):
@@ -36,7 +36,7 @@ def sums_over_rows(indptr, indices, keys):
 
 @jit
 def graph_of(indptr, indices, representative, group):
-    """Return the graph of the vertices that one row each stands for, both directions of the lower triangle."""
+    """Return the graph of the vertices, each represented by one row, with both directions of the lower triangle."""
     n = representative.size
     start, stands = np.zeros(n + 2, np.int64), np.zeros(group.size, np.bool_)
     stands[representative] = True
@@ -63,7 +63,7 @@ def graph_of(indptr, indices, representative, group):
 
 @jit
 def elimination_tree(start, neighbours):
-    """Return the parent of each column of the factor, (n,), -1 of a root; vertices in the order of elimination."""
+    """Return the parent of each column of the factor, (n,), -1 for roots; vertices are in elimination order."""
     n = start.size - 1
     parent, ancestor = np.full(n, -1, np.int64), np.full(n, -1, np.int64)
     for i in range(n):
@@ -80,7 +80,7 @@ def elimination_tree(start, neighbours):
 
 @jit
 def postorder(parent):
-    """Return the columns so that each subtree is a range and ends with its root, (n,)."""
+    """Return the columns in an order in which each subtree is contiguous and ends with its root, (n,)."""
     n = parent.size
     first, beside = np.full(n, -1, np.int64), np.full(n, -1, np.int64)
     for j in range(n - 1, -1, -1):
@@ -125,11 +125,11 @@ def weighted_counts(start, neighbours, parent, weight):
 
 @jit
 def amalgamate(parent, count, weight, few, share):
-    """Return the front of each column, (n,), and the parent of each front; fronts in postorder.
+    """Return the front of each column, (n,), and the parent of each front; fronts are in postorder.
 
-    (1) columns with the same rows below are one front
-    (2) a front joins its parent's where that adds few zeros: up to `few` columns always, above up to a share of zeros
-        that falls from `share` with the number of columns
+    (1) columns with the same rows below form one front
+    (2) a front is merged with its parent if that adds few zeros: always up to `few` columns, above that up to a share
+        of zeros that decreases from `share` with the number of columns
     """
     n = parent.size
     front = np.empty(n, np.int64)
@@ -177,7 +177,7 @@ def amalgamate(parent, count, weight, few, share):
 
 @jit
 def append_rows(rows, at, found, lo, hi, last, seen, f):
-    """Append what front f has not seen of found[lo:hi] from row `last` on; return rows (maybe longer) and their end."""
+    """Append entries of found[lo:hi] from row `last` on that front f lacks; return rows (maybe enlarged) and end."""
     for k in range(lo, hi):
         i = found[k]
         if i >= last and seen[i] != f:
@@ -191,7 +191,7 @@ def append_rows(rows, at, found, lo, hi, last, seen, f):
 
 @jit
 def front_rows(start, neighbours, first, above):
-    """Return where the rows below each front begin, and the rows, ascending; columns of front f: first[f] and on."""
+    """Return the start of the rows below each front, and the rows, ascending; front f starts at column first[f]."""
     n_fronts, n = first.size - 1, start.size - 1
     seen = np.full(n, -1, np.int64)
     begin = np.zeros(n_fronts + 1, np.int64)
@@ -216,7 +216,7 @@ def front_rows(start, neighbours, first, above):
 
 @jit
 def places_above(begin, rows, first, above):
-    """Return the place of each row below a front in the front of its parent: columns first, then the rows below."""
+    """Return the position of each row below a front in its parent front: parent's columns first, then rows below."""
     place = np.empty(rows.size, np.int32)
     for f in range(above.size):
         p = above[f]
@@ -235,7 +235,7 @@ def places_above(begin, rows, first, above):
 
 @jit
 def permuted(indptr, indices, data, rank):
-    """Return the lower triangle of a matrix in another order by columns: row i becomes rank[i]; rows as they come."""
+    """Return the lower triangle of a reordered matrix by columns: row i becomes rank[i]; rows are not sorted."""
     n = rank.size
     start = np.zeros(n + 1, np.int64)
     for j in range(n):

@@ -1,4 +1,4 @@
-"""Addresses of the routines of SciPy's BLAS and LAPACK, for callers without the interpreter."""
+"""Addresses of the routines of SciPy's BLAS and LAPACK, for calls without the interpreter."""
 
 import ctypes
 
@@ -6,7 +6,7 @@ __all__ = ["routine_address"]
 
 
 def routine_address(name: str) -> tuple[int, int]:
-    """Return the address of a routine such as "dgemm", and the number of its arguments, all of which are pointers."""
+    """Return the address of a routine such as "dgemm", and the number of its arguments, which are all pointers."""
     from scipy.linalg import cython_blas, cython_lapack
 
     capsules = cython_blas.__pyx_capi__ if name in cython_blas.__pyx_capi__ else cython_lapack.__pyx_capi__

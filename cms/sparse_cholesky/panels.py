@@ -1,4 +1,4 @@
-"""Where the columns of a factor wait for the solves: in memory, or in a file that vanishes with its process."""
+"""Storage of the columns of a factor for the solves: in memory, or in a file that vanishes with the process."""
 
 import os
 import tempfile
@@ -15,16 +15,16 @@ __all__ = ["Panels", "PanelsInFile", "PanelsInMemory"]
 
 
 class Panels(Protocol):
-    """The numbers of the factor, block by block (`cms.sparse_cholesky.blocks`); each is written once."""
+    """The numbers of the factor by block (`cms.sparse_cholesky.blocks`); each block is written once."""
 
     def put(self, k: int, numbers: Array) -> None:
-        """Keep those of block k."""
+        """Store the numbers of block k."""
 
     def of(self, k: int) -> Array:
-        """Return those of block k."""
+        """Return the numbers of block k."""
 
     def close(self) -> None:
-        """Give up what they take."""
+        """Free the storage."""
 
 
 class PanelsInMemory:
@@ -34,7 +34,7 @@ class PanelsInMemory:
         self._numbers: dict[int, Array] = {}
 
     def put(self, k: int, numbers: Array) -> None:
-        """Keep the numbers of block k."""
+        """Store the numbers of block k."""
         self._numbers[k] = numbers
 
     def of(self, k: int) -> Array:
@@ -42,27 +42,27 @@ class PanelsInMemory:
         return self._numbers[k]
 
     def close(self) -> None:
-        """Free them."""
+        """Free the arrays."""
         self._numbers = {}
 
 
 class PanelsInFile:
-    """Panels in a file without a name, which the system removes with the process, however that ends."""
+    """Panels in an unnamed file, which the system removes when the process ends, however it ends."""
 
     def __init__(self, ends: IntArray, folder: Path | None = None) -> None:
-        """Open the file, in the folder for temporary files by default.
+        """Open the file, by default in the folder for temporary files.
 
         Parameters
         ----------
         ends
-            Where the numbers of each block begin, and their end, (n_blocks + 1,).
+            Start of the numbers of each block, and their end, (n_blocks + 1,).
         folder
-            Of the file.
+            Folder of the file.
 
         Raises
         ------
         FactorRoomError
-            If the folder does not exist, cannot be written, or has too little room.
+            If the folder does not exist, cannot be written, or has too little space.
         """
         self._ends = 8 * np.asarray(ends, dtype=np.int64)
         self._lock = threading.Lock()

@@ -1,4 +1,4 @@
-"""Compiled refinement of a separator, which cuts a part of a graph into two sides without an edge in between."""
+"""Compiled refinement of a separator, which cuts a part of a graph into two sides without an edge between them."""
 
 from typing import NamedTuple
 
@@ -12,10 +12,10 @@ __all__ = ["BETWEEN", "HERE", "THERE", "Cut", "Graph", "cost_of", "refine", "sta
 jit = njit(cache=True, nogil=True, error_model="numpy")
 
 HERE, THERE, BETWEEN = 0, 1, 2  # the side of a vertex
-PENALTY = 1.5  #: power of the shares of both sides, by which a separator is judged: uneven halves cost
-PASSES = 6  #: over a separator, each of which may only make it better
-LARGEST = 0.7  #: share of a part that a side may grow to
-LEAST = 30  #: moves without success that end a pass, and a quarter of the vertices of the separator more
+PENALTY = 1.5  #: exponent of the shares of both sides in the cost of a separator; uneven halves cost more
+PASSES = 6  #: passes over a separator; none may increase its cost
+LARGEST = 0.7  #: largest share of a part that a side may have
+LEAST = 30  #: moves without success that end a pass, plus a quarter of the vertices of the separator
 BETTER = 1.0 - 1e-9
 
 
@@ -28,17 +28,17 @@ class Graph(NamedTuple):
 
 
 class Cut(NamedTuple):
-    """Workspace over all vertices, of which those of one part count."""
+    """Workspace over all vertices, of which one part is in use."""
 
-    mark: IntArray  #: the part of each vertex
-    side: np.ndarray  #: HERE, THERE or BETWEEN, small integers
-    separator: IntArray  #: its vertices, the first length[0] of the array
+    mark: IntArray  #: part of each vertex
+    side: np.ndarray  #: HERE, THERE or BETWEEN, as small integers
+    separator: IntArray  #: vertices of the separator, the first length[0] of the array
     length: IntArray
-    size: IntArray  #: weight of HERE, THERE and BETWEEN, (3,)
-    place: IntArray  #: of a vertex in the separator
-    pull: IntArray  #: weight that a vertex of the separator draws out of the other side if it goes to a side, (2, n)
+    size: IntArray  #: weights of HERE, THERE and BETWEEN, (3,)
+    place: IntArray  #: position of a vertex in the separator
+    pull: IntArray  #: weight that a vertex of the separator pulls from the other side if it moves to a side, (2, n)
     locked: IntArray  #: whether a vertex has moved in this pass
-    changes: IntArray  #: of a pass: 3 vertex + side it was on
+    changes: IntArray  #: changes of a pass, as 3 vertex + previous side
 
 
 def workspace(n: int) -> Cut:
@@ -52,7 +52,7 @@ def workspace(n: int) -> Cut:
 
 @jit
 def cost_of(size):
-    """Return the weight of a separator by a power of the shares of both sides; infinite where one has none."""
+    """Return the weight of a separator times a power of the shares of both sides; infinite if a side is empty."""
     if size[HERE] <= 0 or size[THERE] <= 0:
         return np.inf
     share = size[HERE] / (size[HERE] + size[THERE])
@@ -96,7 +96,7 @@ def leave(graph, cut, v, to):
 
 @jit
 def start_cut(graph, cut, vertices, chosen):
-    """Make the vertices of one side that touch the other the separator, from sides alone."""
+    """Make the separator from the vertices of one side that touch the other, given the sides."""
     cut.length[0] = 0
     cut.size[:] = 0
     for v in vertices:
@@ -113,7 +113,7 @@ def start_cut(graph, cut, vertices, chosen):
 
 @jit
 def best_move(graph, cut, largest):
-    """Return the vertex of the separator, and its side, that makes it lightest; -1: none may move."""
+    """Return the vertex of the separator, and the side, whose move makes it lightest; -1 if none may move."""
     vertex, to, most = -1, 0, np.iinfo(np.int64).min
     for k in range(cut.length[0]):
         v = cut.separator[k]
@@ -129,11 +129,11 @@ def best_move(graph, cut, largest):
 
 @jit
 def refine(graph, cut):
-    """Make a separator better, by moves of its vertices that draw others after them; return its cost.
+    """Improve a separator by moving its vertices, which pull neighbours into it; return its cost.
 
-    (1) of all vertices that have not moved in this pass the one with the largest gain moves, even at a loss; its
-        neighbours on the other side follow into the separator
-    (2) what was best in between is kept; passes end when one brings nothing
+    (1) among the vertices that have not moved in this pass, the one with the largest gain moves, even at a loss; its
+        neighbours on the other side enter the separator
+    (2) the best intermediate separator is kept; passes end when one brings no gain
     """
     best = cost_of(cut.size)
     largest = LARGEST * cut.size.sum()

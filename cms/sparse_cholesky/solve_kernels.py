@@ -1,8 +1,8 @@
-"""Compiled substitution over the tiles of fronts; imported where they are used.
+"""Compiled substitution with the tiles of fronts; imported only where used.
 
 Columns pass together in rows of `width` = 8 len(parts) numbers (`cms.sparse_cholesky.tiles`). A front has its own rows
-of them and, on the way up, rows of what it and those below subtract from the rows below its columns, which its parent
-takes: as many rows as tiles have, so that the last ones may stand for nothing.
+of them. On the way up it also has rows with the contributions of itself and its descendants to the rows below its
+columns, which its parent takes. There are as many rows as the tiles have, so the last ones may be unused.
 """
 
 import numpy as np
@@ -24,7 +24,7 @@ jit = njit(cache=True, nogil=True, error_model="numpy")
 
 @jit
 def begin_rows(tree, f, parts, order, b, own, below):
-    """Take right-hand sides of the columns of a front from b, (n, k) by rows; nothing below yet."""
+    """Copy right-hand sides of the columns of a front from b, (n, k) in C order; contributions below start at zero."""
     width = LANES * len(parts)
     lo, w, u = tree.first[f], tree.first[f + 1] - tree.first[f], tree.begin[f + 1] - tree.begin[f]
     own[: -(-w // ROWS) * ROWS * width] = 0.0
@@ -37,7 +37,7 @@ def begin_rows(tree, f, parts, order, b, own, below):
 
 @jit
 def take_rows(place, left, w, width, own, below):
-    """Add what a child leaves, a row for each of its rows below, to the rows of its parent."""
+    """Add the contributions of a child, one row for each of its rows below, to the rows of its parent."""
     for k in range(place.size):
         if place[k] < w:
             at = place[k] * width
@@ -51,7 +51,7 @@ def take_rows(place, left, w, width, own, below):
 
 @jit
 def finish_rows(tree, f, parts, panel, own, below, Y):
-    """Solve L11 y = b, y kept in Y, (n, width);  below <- below - L21 y."""
+    """Solve L11 y = b, store y in Y, (n, width), and update below <- below - L21 y."""
     width = LANES * len(parts)
     lo, w, u = tree.first[f], tree.first[f + 1] - tree.first[f], tree.begin[f + 1] - tree.begin[f]
     tile, size = panel.ctypes.data, 8 * ROWS
@@ -70,7 +70,7 @@ def finish_rows(tree, f, parts, panel, own, below, Y):
 
 @jit
 def take_rows_of(tree, lo, hi, left, f, parts, own, below):
-    """Add what the roots among fronts lo to hi leave to front f, their parent."""
+    """Add the contributions of the roots among fronts lo to hi to their parent, front f."""
     width = LANES * len(parts)
     w, at = tree.first[f + 1] - tree.first[f], 0
     for c in range(lo, hi):
@@ -82,7 +82,7 @@ def take_rows_of(tree, lo, hi, left, f, parts, own, below):
 
 @jit
 def eliminate_fronts(tree, lo, hi, parts, order, b, panels, own, stack, Y):
-    """Solve L y = b for a run of subtrees, y into Y, (n, width); what their roots leave is then on the stack."""
+    """Solve L y = b for consecutive subtrees, y into Y, (n, width); contributions of their roots stay on the stack."""
     width = LANES * len(parts)
     left_by, n_left, top = np.empty(hi - lo, np.int64), 0, 0
     for f in range(lo, hi):
@@ -108,10 +108,10 @@ def eliminate_fronts(tree, lo, hi, parts, order, b, panels, own, stack, Y):
 
 @jit
 def substitute_back(tree, lo, hi, parts, order, panels, own, eight, Y, x):
-    """Solve Lᵀ x = y for fronts lo to hi, the last one first; y in Y, (n, width), which x overwrites.
+    """Solve Lᵀ x = y for fronts lo to hi, last first; y is in Y, (n, width), and x overwrites it.
 
-    x: (n, k) by rows, in the order of the matrix;
-    own, eight: workspaces, rows of the largest front and eight rows.
+    x: (n, k) in C order, in the order of the matrix;
+    own, eight: workspaces, with the rows of the largest front and eight rows.
     """
     width = LANES * len(parts)
     for f in range(hi - 1, lo - 1, -1):

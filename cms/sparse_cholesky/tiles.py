@@ -1,10 +1,10 @@
-"""Products of a panel with a few columns in vector registers, as LLVM instructions: where the solves spend their time.
+"""Products of a panel with a few columns in vector registers, as LLVM code; solves spend most of their time here.
 
-A tile is eight rows of a panel, column after column: entry (i, j) of it is tile[8 j + i]. Right-hand sides lie in rows
-of `width` numbers, in one vector of 512 bits or two, which LLVM splits where the processor has shorter ones. All
-numbers of a tile come one after the other from memory and serve `width` products each, so that memory is the limit.
+A tile is eight rows of a panel, column after column: entry (i, j) is tile[8 j + i]. Right-hand sides lie in rows of
+`width` numbers, in one or two vectors of 512 bits, which LLVM splits if the processor has shorter vectors. The numbers
+of a tile are read consecutively from memory and serve `width` products each, so memory bandwidth is the limit.
 
-In kernels they are called with addresses and a count, n; `parts` is a tuple of as many numbers as a row has vectors:
+Kernels call them with addresses and a count n; `parts` is a tuple with as many numbers as a row has vectors:
 
     subtract_tile(parts, Z, T, Y, n)               Z[:8] -= T Y by n columns of the tile T
     subtract_transposed_tile(parts, Y, T, Z, n)    Y[:n] -= Tᵀ Z[:8]
@@ -24,7 +24,7 @@ __all__ = ["LANES", "ROWS", "solve_tile", "solve_transposed_tile", "subtract_til
 
 ROWS = 8  #: of a tile
 LANES = 8  #: numbers in a vector
-AHEAD = 32  #: columns of a tile
+AHEAD = 32  #: columns of a tile that are prefetched in advance
 double, integer = ir.DoubleType(), ir.IntType(64)
 vector = ir.VectorType(double, LANES)
 
@@ -37,7 +37,7 @@ class Columns:
         self.parts = range(width // LANES)
 
     def place(self, address: Any, row: Any, part: int) -> Any:
-        """Return where vector `part` of a row is."""
+        """Return the address of vector `part` of a row."""
         b = self.builder
         at = b.add(b.mul(number(row), number(self.width)), number(part * LANES))
         base = b.inttoptr(address, double.as_pointer())
@@ -62,14 +62,14 @@ class Columns:
         return b.shuffle_vector(one, ir.Constant(vector, ir.Undefined), zeros)
 
     def fetch(self, tile: Any, j: Any) -> None:
-        """Ask the memory for what is read a little later; processors do so by themselves too late."""
+        """Prefetch what is read slightly later; processors do so by themselves, but too late."""
         b = self.builder
         at = b.add(b.mul(number(j), number(ROWS)), number(AHEAD * ROWS))
         byte, word = ir.IntType(8).as_pointer(), ir.IntType(32)
         place = b.bitcast(b.gep(b.inttoptr(tile, double.as_pointer()), [at]), byte)
         kind = ir.FunctionType(ir.VoidType(), [byte, word, word, word])
         ask = cgutils.get_or_insert_function(b.module, kind, "llvm.prefetch.p0i8")
-        b.call(ask, [place, *(ir.Constant(word, value) for value in (0, 3, 1))])  # to read, into all caches, data
+        b.call(ask, [place, *(ir.Constant(word, value) for value in (0, 3, 1))])  # for reading, into all caches, data
 
     def less(self, c: list[Any], a: Any, y: list[Any]) -> list[Any]:
         """Return c - a y, rounded once."""
@@ -81,12 +81,12 @@ class Columns:
 
 
 def number(value: Any) -> Any:
-    """Return a whole number as a constant; what an instruction gives stays."""
+    """Return an integer as a constant; the result of an instruction is returned unchanged."""
     return ir.Constant(integer, value) if isinstance(value, int) else value
 
 
 def subtract(columns: Columns, Z: Any, tile: Any, Y: Any, n: Any) -> None:
-    """Z[:8] -= T Y: eight rows stay in registers while n columns of the tile pass."""
+    """Z[:8] -= T Y: eight rows stay in registers while n columns of the tile are read."""
     b = columns.builder
     held = [[cgutils.alloca_once(b, vector) for _ in columns.parts] for _ in range(ROWS)]
     for i in range(ROWS):
@@ -104,7 +104,7 @@ def subtract(columns: Columns, Z: Any, tile: Any, Y: Any, n: Any) -> None:
 
 
 def subtract_transposed(columns: Columns, Y: Any, tile: Any, Z: Any, n: Any) -> None:
-    """Y[:n] -= Tᵀ Z: the same eight rows in registers, row after row of Y passes."""
+    """Y[:n] -= Tᵀ Z: the same eight rows stay in registers while the rows of Y are read."""
     z = [columns.load(Z, i) for i in range(ROWS)]
     with cgutils.for_range(columns.builder, n) as loop:
         columns.fetch(tile, loop.index)
@@ -115,7 +115,7 @@ def subtract_transposed(columns: Columns, Y: Any, tile: Any, Z: Any, n: Any) -> 
 
 
 def solve(columns: Columns, Z: Any, tile: Any) -> None:
-    """Z[:8] = L⁻¹ Z, row after row from the first."""
+    """Z[:8] = L⁻¹ Z, row by row from the first."""
     z = [columns.load(Z, i) for i in range(ROWS)]
     for j in range(ROWS):
         reciprocal = columns.entry(tile, j, j)
@@ -126,7 +126,7 @@ def solve(columns: Columns, Z: Any, tile: Any) -> None:
 
 
 def solve_transposed(columns: Columns, Z: Any, tile: Any) -> None:
-    """Z[:8] = L⁻ᵀ Z, row after row from the last."""
+    """Z[:8] = L⁻ᵀ Z, row by row from the last."""
     z = [columns.load(Z, i) for i in range(ROWS)]
     for j in reversed(range(ROWS)):
         reciprocal = columns.entry(tile, j, j)
@@ -137,7 +137,7 @@ def solve_transposed(columns: Columns, Z: Any, tile: Any) -> None:
 
 
 def on_tile_and_rows(emit: Callable[..., None]) -> Any:
-    """Return what kernels call for one of these functions, with `parts` before its own arguments."""
+    """Return the intrinsic that kernels call for one of these functions, with `parts` as its first argument."""
 
     def function(typing_context, parts, Z, tile, Y, n):
         def code(context, builder, signature, values):
@@ -150,7 +150,7 @@ def on_tile_and_rows(emit: Callable[..., None]) -> Any:
 
 
 def on_tile(emit: Callable[..., None]) -> Any:
-    """Return what kernels call for one of the functions that have no rows beside those of the tile."""
+    """Return the intrinsic that kernels call for a function without rows other than those of the tile."""
 
     def function(typing_context, parts, Z, tile):
         def code(context, builder, signature, values):

@@ -1,1 +1,1 @@
-"""Substructures of one large body: nested dissection, each part reduced by itself (docs/theory.md §2)."""
+"""Substructures of one large body: nested dissection, with each part reduced separately (docs/theory.md §2)."""

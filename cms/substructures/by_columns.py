@@ -1,4 +1,4 @@
-"""Work on columns beside each other, in threads."""
+"""Parallel work on slices of columns, in threads."""
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -7,11 +7,11 @@ from fe_models.foundation.threads import bounded_threads, n_threads
 
 __all__ = ["by_columns"]
 
-COLUMNS = 64  #: at once in one thread, at most
+COLUMNS = 64  #: largest number of columns at a time in one thread
 
 
 def by_columns(k: int, work: Callable[[slice], None]) -> None:
-    """Call with slices of k columns, in threads with one thread of BLAS in each."""
+    """Call `work` with slices of k columns, in threads with one BLAS thread each."""
     n = n_threads()
     width = max(1, min(COLUMNS, -(-k // n)))
     slices = [slice(a, min(a + width, k)) for a in range(0, k, width)]

@@ -1,7 +1,7 @@
-"""Dense linear algebra in place, by the routines of SciPy's BLAS and LAPACK behind their C addresses.
+"""Dense linear algebra in place, with the routines of SciPy's BLAS and LAPACK called by their C addresses.
 
-SciPy's own Python functions hold the interpreter while most of these run, so that threads would wait for each other;
-called through `ctypes` the same routines do not. All matrices lie in Fortran order, of symmetric ones the lower
+SciPy's own Python functions mostly hold the interpreter lock while they run, so threads would wait for each other.
+Called through `ctypes`, the same routines do not. All matrices are in Fortran order; of symmetric matrices, the lower
 triangle is read and written.
 """
 
@@ -27,13 +27,13 @@ __all__ = [
 
 @cache
 def routine(name: str) -> Any:
-    """Return a routine of BLAS or LAPACK; all its arguments are pointers."""
+    """Return a BLAS or LAPACK routine; all its arguments are pointers."""
     address, n_arguments = routine_address(name)
     return ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * n_arguments)(address)
 
 
 def call(name: str, *arguments: Any) -> None:
-    """Call a routine with letters, whole numbers, real numbers and arrays."""
+    """Call a routine with letters, integers, real numbers and arrays."""
     kept: list[Any] = []
     pointers = []
     for argument in arguments:
@@ -54,19 +54,19 @@ def call(name: str, *arguments: Any) -> None:
 
 
 def leading(A: Array) -> int:
-    """Return the distance of two columns of a matrix in Fortran order, which may be a part of a larger one."""
+    """Return the distance between two columns of a matrix in Fortran order, which may be a part of a larger matrix."""
     return max(A.strides[1] // 8 if A.shape[1] > 1 else A.shape[0], A.shape[0], 1)
 
 
 def cholesky(A: Array) -> int:
-    """Put L with L Lᵀ = A, (s, s), into the lower triangle of A; return 0, or the number of the row that failed."""
+    """Overwrite the lower triangle of A, (s, s), with L, L Lᵀ = A; return 0, or the number of the row that failed."""
     info = ctypes.c_int(0)
     call("dpotrf", "L", len(A), A, leading(A), info)
     return int(info.value)
 
 
 def solve_triangular(L: Array, B: Array, *, transposed: bool = False, right: bool = False) -> None:
-    """Put L⁻¹ B (or L⁻ᵀ B; on the right: B L⁻¹, B L⁻ᵀ) into B, (s, k) or (k, s)."""
+    """Overwrite B, (s, k) or (k, s), with L⁻¹ B (or L⁻ᵀ B; right: B L⁻¹, B L⁻ᵀ)."""
     if B.size:
         call(
             "dtrsm", "R" if right else "L", "L", "T" if transposed else "N", "N",
@@ -75,7 +75,7 @@ def solve_triangular(L: Array, B: Array, *, transposed: bool = False, right: boo
 
 
 def add_product(C: Array, W: Array, factor: float) -> None:
-    """Add factor Wᵀ W to the lower triangle of C, (b, b); W is (s, b)."""
+    """Add factor times Wᵀ W to the lower triangle of C, (b, b); W is (s, b)."""
     if C.size and W.size:
         call("dsyrk", "L", "T", C.shape[0], W.shape[0], factor, W, leading(W), 1.0, C, leading(C))
 
@@ -89,7 +89,7 @@ def add_rank_2k(C: Array, X: Array, Y: Array) -> None:
 
 
 def multiply_symmetric(A: Array, B: Array) -> Array:
-    """Return A B, (s, k), of a symmetric A, (s, s), by its lower triangle."""
+    """Return A B, (s, k), for a symmetric A, (s, s), from its lower triangle."""
     C = np.empty(B.shape, order="F")
     if C.size:
         call("dsymm", "L", "L", B.shape[0], B.shape[1], 1.0, A, leading(A), B, leading(B), 0.0, C, leading(C))
@@ -97,19 +97,19 @@ def multiply_symmetric(A: Array, B: Array) -> Array:
 
 
 def congruent(M: Array, L: Array) -> Array:
-    """Return L⁻¹ M L⁻ᵀ, (s, s), of a symmetric M, lower triangles."""
+    """Return L⁻¹ M L⁻ᵀ, (s, s), for a symmetric M; lower triangles are used."""
     A, info = M.copy(order="F"), ctypes.c_int(0)
     call("dsygst", 1, "L", len(A), A, leading(A), L, leading(L), info)
     return A
 
 
 def largest_eigenpairs(A: Array, above: float) -> tuple[Array, Array]:
-    """Return the eigenpairs of a symmetric A, (s, s), above a bound, the largest first; A is lost.
+    """Return the eigenpairs of a symmetric A, (s, s), above a bound, largest first; A is overwritten.
 
     Raises
     ------
     np.linalg.LinAlgError
-        If LAPACK finds none of them.
+        If LAPACK does not converge.
     """
     n = len(A)
     bound = float(max(np.abs(A).sum(axis=0).max(initial=0.0), 2 * abs(above)) * 2 + 1)
@@ -119,7 +119,7 @@ def largest_eigenpairs(A: Array, above: float) -> tuple[Array, Array]:
     size, whole = np.empty(1), np.empty(1, dtype=np.intc)
     work, integers = size, whole
     lengths = (-1, -1)
-    for _ in range(2):  # first how much room it wants
+    for _ in range(2):  # the first call queries the workspace size
         call(
             "dsyevr", "V", "V", "L", n, A, leading(A), float(above), bound, 0, 0, 0.0, found, values, vectors, n,
             support, work, lengths[0], integers, lengths[1], info,

@@ -1,4 +1,4 @@
-"""Nested dissection of the interior of a body: parts, the separators between them, separators of separators."""
+"""Nested dissection of the interior of a body: parts, separators between them, and separators of separators."""
 
 from dataclasses import dataclass
 
@@ -15,13 +15,13 @@ DIRECTIONS = 3  #: principal axes of a part that are tried as the normal of its 
 
 @dataclass(frozen=True, eq=False)
 class Dissection:
-    """A tree of substructures in the order of their elimination: children before parents, the root last.
+    """A tree of substructures in elimination order: children before parents, the root last.
 
-    Substructure t owns the dofs `order[starts[t] : starts[t + 1]]`. A leaf is a part; all others are separators, whose
-    removal leaves the subtrees of their children without a common entry of K or M.
+    Substructure t owns the dofs `order[starts[t] : starts[t + 1]]`. A leaf is a part. All other substructures are
+    separators; without a separator, the subtrees of its children have no common entry of K or M.
     """
 
-    order: IntArray  #: dofs in the order of elimination, (n,)
+    order: IntArray  #: dofs in elimination order, (n,)
     starts: IntArray  #: (n_substructures + 1,)
     parents: IntArray  #: (n_substructures,), -1 for the root
 
@@ -31,14 +31,14 @@ class Dissection:
         return len(self.parents)
 
     def first_of_subtrees(self) -> IntArray:
-        """Return the first substructure of the subtree of each: a subtree is a run that ends with its root."""
+        """Return the first substructure of each subtree; a subtree is contiguous and ends with its root."""
         first = np.arange(self.n)
         for t, parent in enumerate(self.parents[:-1].tolist()):
             first[parent] = min(first[parent], first[t])
         return first
 
     def in_order(self, A: sp.csc_array) -> sp.csc_array:
-        """Return a matrix in the order of elimination, (n, n)."""
+        """Return a matrix in elimination order, (n, n)."""
         rank = np.empty(len(self.order), dtype=A.indices.dtype)
         rank[self.order] = np.arange(len(rank))
         entries = (A.data, (rank[A.indices], np.repeat(rank, np.diff(A.indptr))))
@@ -46,14 +46,14 @@ class Dissection:
 
 
 def node_graph(K: sp.csc_array, M: sp.csc_array, nodes: IntArray) -> tuple[sp.csr_array, IntArray]:
-    """Return which nodes share an entry of K or M, and the node of every dof, numbered from 0.
+    """Return which nodes share an entry of K or M, and the node of every dof, renumbered from 0.
 
     Parameters
     ----------
     K, M
         Symmetric, (n, n).
     nodes
-        Node of every dof, any numbers, (n,).
+        Node of every dof, with any numbers, (n,).
     """
     _, node = np.unique(nodes, return_inverse=True)
     n_nodes = int(node.max()) + 1
@@ -70,35 +70,36 @@ def node_graph(K: sp.csc_array, M: sp.csc_array, nodes: IntArray) -> tuple[sp.cs
 
 
 def dissect(graph: sp.csr_array, points: Array, weights: IntArray, *, leaf: int, last: IntArray) -> Dissection:
-    """Divide nodes again and again until no part is larger than a leaf.
+    """Divide nodes repeatedly until no part is larger than a leaf.
 
-    All parts of one level are divided at once.
+    All parts of one level are divided together.
 
-    (1) the cut of a part: a plane across one of its principal axes, through its weighted middle; the axis whose plane
-        cuts the fewest edges
-    (2) the separator: the fewest nodes that touch every edge that is cut (Koenig: a maximum matching gives them)
+    (1) the cut of a part is the plane normal to one of its principal axes through its weighted centre, for the axis
+        that cuts the fewest edges
+    (2) the separator is the smallest set of nodes that touches every cut edge (from a maximum matching, by Koenig's
+        theorem)
 
     Parameters
     ----------
     graph
-        Which nodes share an entry, (n_nodes, n_nodes), symmetric, without a diagonal.
+        Adjacency of nodes that share an entry, (n_nodes, n_nodes), symmetric, without a diagonal.
     points
-        (n_nodes, 3) [m].
+        Positions, (n_nodes, 3) [m].
     weights
-        Dofs of each node, (n_nodes,).
+        Number of dofs of each node, (n_nodes,).
     leaf
-        Most dofs of a part.
+        Largest number of dofs of a part.
     last
-        Nodes that belong to the root whatever the cuts are.
+        Nodes that belong to the root regardless of the cuts.
 
     Returns
     -------
     Dissection
-        Of the nodes: `order` and `starts` count them.
+        Tree of the nodes: `order` and `starts` refer to nodes.
     """
     n = len(points)
-    of_node = np.full(n, -1)  # the substructure that owns a node; -1: it is in a part still
-    part = np.zeros(n, dtype=np.int64)  # of the nodes without an owner: the substructure that will own it or its cut
+    of_node = np.full(n, -1)  # substructure that owns a node; -1: the node is still in a part
+    part = np.zeros(n, dtype=np.int64)  # for nodes without owner: the substructure that will own the node or its cut
     of_node[last] = 0
     parents = [-1]
     edges = sp.coo_array(sp.triu(graph, 1))
@@ -131,7 +132,7 @@ def dissect(graph: sp.csr_array, points: Array, weights: IntArray, *, leaf: int,
 
 
 def _best_sides(points: Array, weights: IntArray, part: IntArray, row: IntArray, column: IntArray) -> IntArray:
-    """(1) Return on which side of its part's cut each node lies, 0 or 1."""
+    """Step (1): return the side of each node relative to the cut of its part, 0 or 1."""
     n_parts = int(part.max()) + 1
     mass = np.bincount(part, weights, minlength=n_parts)
     centre = np.stack([np.bincount(part, weights * x, minlength=n_parts) for x in points.T], axis=1) / mass[:, None]
@@ -140,7 +141,7 @@ def _best_sides(points: Array, weights: IntArray, part: IntArray, row: IntArray,
     for a in range(3):
         for b in range(3):
             spread[:, a, b] = np.bincount(part, weights * arm[:, a] * arm[:, b], minlength=n_parts)
-    axes = np.linalg.eigh(spread)[1][:, :, ::-1]  # the longest first
+    axes = np.linalg.eigh(spread)[1][:, :, ::-1]  # longest axis first
     best, fewest = np.zeros(len(points), dtype=np.int64), np.full(n_parts, np.iinfo(np.int64).max)
     for k in range(DIRECTIONS):
         height = np.einsum("na,na->n", arm, axes[part, :, k])
@@ -157,7 +158,7 @@ def _best_sides(points: Array, weights: IntArray, part: IntArray, row: IntArray,
 
 
 def _cover(row: IntArray, column: IntArray, side: IntArray) -> IntArray:
-    """(2) Return the fewest nodes that touch every edge between the sides, by Koenig's theorem."""
+    """Step (2): return the smallest set of nodes that touches every edge between the sides, by Koenig's theorem."""
     if not len(row):
         return np.zeros(0, dtype=np.int64)
     swap = side[row] == 1
@@ -166,12 +167,12 @@ def _cover(row: IntArray, column: IntArray, side: IntArray) -> IntArray:
     rights, b = np.unique(right, return_inverse=True)
     ones = np.ones(len(a), dtype=np.int8)
     between = sp.csr_array((ones, (a, b)), shape=(len(lefts), len(rights)))
-    of_left = maximum_bipartite_matching(between, perm_type="column")  # the partner of each left node, or -1
+    of_left = maximum_bipartite_matching(between, perm_type="column")  # the matched partner of each left node, or -1
     of_right = np.full(len(rights), -1)
     of_right[of_left[of_left >= 0]] = np.flatnonzero(of_left >= 0)
     reached_left = of_left < 0
     reached_right = np.zeros(len(rights), dtype=bool)
-    while True:  # alternating paths from the unmatched: any edge to the right, a matched one back
+    while True:  # alternating paths from unmatched nodes: any edge to the right, a matched edge back
         hit = np.zeros(len(rights), dtype=bool)
         hit[b[reached_left[a]]] = True
         new = hit & ~reached_right
@@ -184,7 +185,7 @@ def _cover(row: IntArray, column: IntArray, side: IntArray) -> IntArray:
 
 
 def _ordered(of_node: IntArray, parents: IntArray) -> Dissection:
-    """Return the tree in postorder; substructures that own nothing are left out, their children go up."""
+    """Return the tree in postorder; empty substructures are removed, and their children move up."""
     counts = np.bincount(of_node, minlength=len(parents))
     up = parents.copy()
     for t in range(1, len(parents)):  # parents come first here
@@ -196,7 +197,7 @@ def _ordered(of_node: IntArray, parents: IntArray) -> Dissection:
             children[up[t]].append(t)
     postorder: list[int] = []
     stack = [0]
-    while stack:  # root first, then reversed
+    while stack:  # root first, reversed at the end
         t = stack.pop()
         postorder.append(t)
         stack += children[t]

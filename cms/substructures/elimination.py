@@ -1,4 +1,4 @@
-"""One substructure after the other: its own modes, and what it leaves to the separators that enclose it."""
+"""Elimination of one substructure after the other: its own modes, and its contribution to enclosing separators."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,36 +22,36 @@ from fe_models.foundation.arrays import Array, IntArray
 __all__ = ["Part", "Reduced", "Remainder", "Substructure", "eliminate_part"]
 
 
-DEPENDENT = 1e-10  #: of a tie against the strongest one, below which it repeats others
+DEPENDENT = 1e-10  #: smallest constraint relative to the strongest one, below which it is redundant
 
 
 @dataclass(frozen=True, eq=False)
 class Substructure:
-    """An eliminated substructure with s dofs, inside b dofs of the separators that enclose it."""
+    """An eliminated substructure with s dofs, and b dofs of the enclosing separators."""
 
-    start: int  #: first dof in the order of elimination
-    boundary: IntArray  #: dofs of enclosing separators that it moves with, ascending, (b,)
-    L: Array  #: lower triangle: Cholesky factor of its condensed stiffness, (s, s)
+    start: int  #: first dof in elimination order
+    boundary: IntArray  #: dofs of enclosing separators that move it, ascending, (b,)
+    L: Array  #: Cholesky factor of its condensed stiffness, lower triangle, (s, s)
     Psi: Array  #: its own constraint modes, -K_ss⁻¹ K_sb, (s, b)
-    Phi: Array  #: its own modes with all separators around it held, orthonormal in its condensed mass, (s, m)
+    Phi: Array  #: its own modes with all enclosing separators held, orthonormal in its condensed mass, (s, m)
     omega2: Array  #: of these modes, ascending, (m,) [1/s²]
-    coupling: Array  #: their mass with the modes of all substructures below, in order, (m_below, m)
+    coupling: Array  #: mass between the modes of all substructures below, in order, and these modes, (m_below, m)
     children: tuple[int, ...]
-    pivots: Array | None = None  #: of a root with multipliers: L holds the factors of SciPy's `lu_factor` instead
-    spread: Array | None = None  #: and this S with S Sᵀ f = u of [K Cᵀ; C 0] [u; .] = [f; 0], (s, s - ties)
+    pivots: Array | None = None  #: only for a root with multipliers: L then holds the factors of SciPy's `lu_factor`
+    spread: Array | None = None  #: in that case S with S Sᵀ f = u for [K Cᵀ; C 0] [u; .] = [f; 0], (s, s - n_ties)
 
     @property
     def stop(self) -> int:
-        """The dof after its last one."""
+        """Index after its last dof."""
         return self.start + len(self.L)
 
     @property
     def n_numbers(self) -> int:
-        """Stored numbers."""
+        """Number of stored values."""
         return self.L.size + self.Psi.size + self.Phi.size + self.coupling.size
 
     def solve_own(self, f: Array) -> None:
-        """Put K_ss⁻¹ f into f, (s, k) in C order."""
+        """Overwrite f, (s, k) in C order, with K_ss⁻¹ f."""
         if self.pivots is not None:
             f[:] = la.lu_solve((self.L, self.pivots), f, check_finite=False)
             return
@@ -59,7 +59,7 @@ class Substructure:
         solve_triangular(self.L, f.T, right=True)
 
     def spread_own(self, xi: Array) -> None:
-        """Put S xi with S Sᵀ = K_ss⁻¹ into xi, (s, k) in C order."""
+        """Overwrite xi, (s, k) in C order, with S xi, where S Sᵀ = K_ss⁻¹."""
         if self.spread is not None:
             xi[:] = self.spread @ xi[: self.spread.shape[1]]
             return
@@ -68,34 +68,35 @@ class Substructure:
 
 @dataclass(frozen=True, eq=False)
 class Remainder:
-    """What eliminated substructures leave on the separators around them."""
+    """Contributions of eliminated substructures to the enclosing separators."""
 
     boundary: IntArray  #: dofs, ascending, (b,)
     K: Array  #: condensed stiffness, lower triangle, (b, b)
     M: Array  #: condensed mass, lower triangle, (b, b)
-    rows: Array  #: mass of all modes below with the boundary, (m_below, b)
+    rows: Array  #: mass between all modes below and the boundary, (m_below, b)
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A run of substructures to be eliminated, a task of its own: the subtree of the last one, or the top of the tree.
+    """Consecutive substructures that are eliminated as one task: a complete subtree, or a separator at the top.
 
-    K and M hold the columns of its dofs of the lower triangles in the order of elimination; rows and dofs are numbered
-    over the whole body.
+    K and M hold the columns of its dofs of the lower triangles in elimination order. Rows and dofs are numbered over
+    the whole body.
     """
 
-    starts: IntArray  #: of its substructures and their end, (n + 1,)
-    children: tuple[tuple[int, ...], ...]  #: of each, in the numbers of this part; below 0: `remainders` from the end
+    starts: IntArray  #: first dof of each substructure, and the end, (n + 1,)
+    #: children of each substructure, by index in this part; negative: index into `remainders` from the end
+    children: tuple[tuple[int, ...], ...]
     K: sp.csc_array
     M: sp.csc_array
-    omega2: float  #: modes of substructures are kept up to this [1/s²]
-    multipliers: IntArray  #: dofs that are Lagrange multipliers; all in the root
+    omega2: float  #: modes of substructures are kept up to this omega² [1/s²]
+    multipliers: IntArray  #: dofs that are Lagrange multipliers; all belong to the root
     remainders: tuple[Remainder, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class Reduced:
-    """A part that was eliminated."""
+    """An eliminated part."""
 
     substructures: tuple[Substructure, ...]
     remainder: Remainder
@@ -121,13 +122,15 @@ def eliminate_part(part: Part) -> Reduced:
 def eliminate(
     part: Part, t: int, below: Sequence[Remainder], children: tuple[int, ...]
 ) -> tuple[Substructure, Remainder]:
-    """Eliminate substructure t of a part; s are its own dofs, b those of separators around it.
+    """Eliminate substructure t of a part; s are its own dofs, b those of enclosing separators.
 
-    (1) K and M of s and b: entries of the body in the columns of s, and what is left of the substructures below
+    (1) assemble K and M of s and b: entries of the body in the columns of s, plus contributions of the substructures
+        below
     (2) K_ss = L Lᵀ,  W = L⁻¹ K_sb,  Psi = -L⁻ᵀ W;  K_bb <- K_bb - Wᵀ W
     (3) modes with b held: K_ss phi = omega² M_ss phi up to the bound; none if K_ss - bound M_ss is positive definite
-    (4) M_bb <- Psi_ᵀ M Psi_ of Psi_ = [Psi; 1]: M_bb + Psiᵀ X + Xᵀ Psi,  X = M_sb + M_ss Psi / 2
-    (5) mass of own modes with b: phiᵀ (M_sb + M_ss Psi);  of modes below: D_b + D_s Psi with b, D_s phi with own modes
+    (4) M_bb <- Psi_ᵀ M Psi_ with Psi_ = [Psi; 1]: M_bb + Psiᵀ X + Xᵀ Psi,  X = M_sb + M_ss Psi / 2
+    (5) mass between own modes and b: phiᵀ (M_sb + M_ss Psi);  between modes below and b: D_b + D_s Psi, and own modes:
+        D_s phi
     """
     from cms.substructures.extend_add import extend_add, put_rows
 
@@ -179,9 +182,9 @@ def eliminate(
 def _root_with_multipliers(
     part: Part, start: int, K_ss: Array, M_ss: Array, D: Array, children: tuple[int, ...]
 ) -> tuple[Substructure, Remainder]:
-    """Eliminate the root where it holds multipliers and all dofs that they tie: K_ss = [K Cᵀ; C 0].
+    """Eliminate a root that contains multipliers and all dofs that they tie: K_ss = [K Cᵀ; C 0].
 
-    Its modes are those of K and M in the null space of C, whose columns Z are orthonormal.
+    Its modes are those of K and M in the null space of C, with orthonormal basis Z.
     """
     K_ss, M_ss = (np.tril(A) + np.tril(A, -1).T for A in (K_ss, M_ss))
     is_tie = np.zeros(len(K_ss), dtype=bool)
@@ -210,9 +213,9 @@ def _root_with_multipliers(
 
 
 def own_modes(K: Array, M: Array, L: Array, bound: float) -> tuple[Array, Array]:
-    """(3) Return omega² up to a bound, ascending, and modes, M-orthonormal, by lower triangles; K and M may be lost.
+    """Step (3): return omega² up to a bound, ascending, and M-orthonormal modes; K and M (lower) may be overwritten.
 
-    M may be semidefinite: A = L⁻¹ M L⁻ᵀ has theta = 1 / omega², and 0 for what has no mass.
+    M may be semidefinite: A = L⁻¹ M L⁻ᵀ has eigenvalues theta = 1 / omega², and 0 for massless directions.
     """
     s = len(K)
     K -= bound * M
@@ -225,7 +228,7 @@ def own_modes(K: Array, M: Array, L: Array, bound: float) -> tuple[Array, Array]
 
 
 def _assembled(A: sp.csc_array, first: int, start: int, stop: int, boundary: IntArray) -> tuple[Array, Array, Array]:
-    """(1) Return the entries of the body: A_ss (lower triangle), A_sb, and an empty A_bb."""
+    """Step (1): return the entries of the body: A_ss (lower triangle), A_sb, and an empty A_bb."""
     s, b = stop - start, len(boundary)
     A_ss, A_sb, A_bb = (np.zeros(shape, order="F") for shape in ((s, s), (s, b), (b, b)))
     entries = slice(A.indptr[first], A.indptr[first + s])

@@ -1,10 +1,10 @@
-"""Compiled loops that add what a substructure left to the one around it; imported where they are used."""
+"""Compiled loops that add the contribution of a substructure to the enclosing one; imported only where used."""
 
 from numba import njit
 
 __all__ = ["extend_add", "put_rows"]
 
-TILE = 32  #: rows and columns that are transposed at once
+TILE = 32  #: rows and columns that are transposed at a time
 
 jit = njit(cache=True, nogil=True, error_model="numpy")
 
@@ -13,7 +13,7 @@ jit = njit(cache=True, nogil=True, error_model="numpy")
 def extend_add(A_ss, A_sb, A_bb, A, place, p):
     """Add the lower triangle of A, (n, n), to lower triangles A_ss, (s, s), and A_bb, (b, b), and to A_sb, (s, b).
 
-    The first p rows of A go to the dofs `place` of s, the others to those of b; both ascend. All in Fortran order.
+    The first p rows of A belong to positions `place` of s, the others to those of b; both ascend. Fortran order.
     """
     n = len(A)
     for j in range(p):
@@ -31,7 +31,7 @@ def extend_add(A_ss, A_sb, A_bb, A, place, p):
 
 @jit
 def put_rows(D, rows, first, place):
-    """Put rows, (m, n), into the rows of D from the first on, columns `place`; both in C order."""
+    """Copy rows, (m, n), to the rows of D from `first` on, columns `place`; both are in C order."""
     for i in range(len(rows)):
         for j in range(len(place)):
             D[first + i, place[j]] = rows[i, j]

@@ -1,4 +1,4 @@
-"""About how high the highest of so many modes is, before any of them is known."""
+"""Estimate of the n-th natural frequency, before any mode is computed."""
 
 import numpy as np
 import scipy.sparse as sp
@@ -10,18 +10,18 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["guessed_omega2"]
 
-SAMPLES = 8  #: subtrees whose modes are computed
-EACH = 6  #: modes of a subtree that are wanted at least, where the body has enough of them
+SAMPLES = 8  #: number of subtrees whose modes are computed
+EACH = 6  #: smallest number of wanted modes of a subtree, if the body has enough of them
 
 
 def guessed_omega2(dissection: Dissection, K: sp.csc_array, M: sp.csc_array, count: int) -> float:
-    """Return about omega² of the highest of `count` modes, rather too high [1/s²].
+    """Estimate omega² of the highest of `count` modes, tending to be too high [1/s²].
 
-    (1) subtrees that share no dof, each with some of the wanted modes
-    (2) their own modes with all else held, of a few of them
-    (3) the count-th of all these, each counted for the dofs it stands for
+    (1) choose subtrees that share no dof, each with some of the wanted modes
+    (2) compute the modes of a few of them, with all other dofs held
+    (3) take the count-th of all these modes, each weighted with the number of dofs that it represents
 
-    Holding dofs raises frequencies: with all subtrees (3) would be an upper bound; a sample makes it an estimate.
+    Holding dofs raises frequencies. With all subtrees, (3) would be an upper bound; a sample gives an estimate.
     """
     starts, parents = dissection.starts, dissection.parents
     first = dissection.first_of_subtrees()

@@ -1,4 +1,4 @@
-"""Modes better and better: inverse iteration by the tree with Rayleigh-Ritz, and what error is left."""
+"""Improvement of modes by inverse iteration with the tree and Rayleigh-Ritz, and an estimate of the remaining error."""
 
 import numpy as np
 import scipy.linalg as la
@@ -12,35 +12,34 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["COLUMNS", "PROBES", "SLICE", "ApproximateModes"]
 
-COLUMNS = 128  #: of a block
-SLICE = 16384  #: rows that are put elsewhere at a time
+COLUMNS = 128  #: columns of a block
+SLICE = 16384  #: rows that are moved at a time
 PROBES = 64  #: random columns that measure the residuals of any number of modes
-RARE = 1e-3  #: part of the modes whose residual the probes find too small
-SUMS = 16  #: of neighbouring modes, whose residuals are measured together
-FEW = 0.25  #: part of the modes up to which those that the probes doubt are measured by themselves
+RARE = 1e-3  #: share of the modes whose residual the probes underestimate
+SUMS = 16  #: number of neighbouring modes whose residuals are measured together
+FEW = 0.25  #: share of the modes up to which doubtful ones are measured individually
 
 
 class ApproximateModes:
-    """Approximate modes X of K x = omega² M x, M-orthonormal; they change in place.
+    """Approximate modes X of K x = omega² M x, M-orthonormal; they are changed in place.
 
-    X may hold the leading modes alone, whose frequencies are followed by those of others. All rows are in the order of
-    elimination.
+    X may contain only the leading modes of a longer list of frequencies. All rows are in elimination order.
     """
 
     def __init__(self, tree: SubstructureTree, K: sp.csc_array, M: sp.csc_array, omega2: Array, X: Array) -> None:
         self.tree = tree
         self.K, self.M = (SymmetricProduct(A, columns=COLUMNS) for A in (K, M))
         self.omega2 = omega2  #: Rayleigh quotients, (p,)
-        self.X = X  #: (n, p), C order; as many columns as it was given
+        self.X = X  #: (n, p), C order, with the given number of columns
         self.residuals = np.full(len(omega2), np.nan)  #: |r|_K / omega of the modes before the last step, (p,)
         self.n_solves = 0
 
     def improve(self) -> None:
-        """Take one step of subspace iteration; r = x - omega² K⁻¹ M x is the residual of what was there before.
+        """Take one step of subspace iteration; r = x - omega² K⁻¹ M x is the residual of the previous modes.
 
-        (1) Y = K⁻¹ M X, block by block in the place of X
+        (1) Y = K⁻¹ M X, block by block in the memory of X
         (2) H = Yᵀ K Y = Yᵀ M X;  G = Yᵀ M Y
-        (3) |r|²_K = omega² (omega² H_jj - 1), for xᵀ K x = omega²
+        (3) |r|²_K = omega² (omega² H_jj - 1), because xᵀ K x = omega²
         (4) H z = omega² G z;  X <- Y Z
         """
         p = len(self.omega2)
@@ -62,13 +61,14 @@ class ApproximateModes:
         self.X = combined(self.X, Z / scale[:, None])
 
     def errors(self, count: int, tolerance: float = np.inf) -> Array:
-        """Return an estimate of how much too high each of the first frequencies is, relative, (count,).
+        """Return an estimate of the relative error of each of the first frequencies (they are too high), (count,).
 
-        (1) r = x - omega² K⁻¹ M x,  a = |r|²_K / omega²,  b = |r|²_M  of each mode, one solve for each
-        (2) of many modes: a by random probes, from above; b / a by sums of neighbours, r_j / omega_j with random signs
-        (3) (a + b / (1 - omega² / omega_next²)) / 2, omega_next that of the first mode that does not take part
+        (1) r = x - omega² K⁻¹ M x,  a = |r|²_K / omega²,  b = |r|²_M  for each mode, with one solve for each
+        (2) for many modes: a from above by random probes; b / a from sums of neighbours, r_j / omega_j with random
+            signs
+        (3) (a + b / (1 - omega² / omega_next²)) / 2, where omega_next is the first mode that does not take part
             (docs/theory.md §2)
-        (4) those that (2) finds above the tolerance again by (1), the worst `PROBES` of them at most
+        (4) repeat (1) for those that (2) finds above the tolerance, at most for the worst `PROBES`
         """
         if count <= PROBES:
             return self._errors_of(*self._residuals_of_sums(np.eye(count)), np.arange(count))
@@ -86,19 +86,19 @@ class ApproximateModes:
         return errors
 
     def _errors_of(self, a: Array, b: Array, which: IntArray) -> Array:
-        """(3) Return the error of some modes by a, and b / omega², of each."""
+        """Step (3): return the error of some modes from a, and b / omega², of each."""
         omega2 = self.omega2[which]
         apart = 1 - omega2 / self.omega2[-1]
         return (a + omega2 * b / np.maximum(apart, np.finfo(float).eps)) / 2
 
     def _residuals_of_sums(self, pick: Array) -> tuple[Array, Array]:
-        """(1) Return a, and b / omega², of the sums of r_j / omega_j by the columns of pick, (count, m)."""
+        """Step (1): return a, and b / omega², for sums of r_j / omega_j with coefficients in pick, (count, m)."""
         r = self._residuals(pick)
         a, b = (np.maximum(np.einsum("nk,nk->k", r, A @ r), 0.0) for A in (self.K, self.M))
         return a, b
 
     def _residuals(self, pick: Array) -> Array:
-        """Return sums of r_j / omega_j, r = x - omega² K⁻¹ M x, by the columns of pick, (n, m); pick is (count, m)."""
+        """Return sums of r_j / omega_j, r = x - omega² K⁻¹ M x, (n, m), with the coefficients pick, (count, m)."""
         count, m = pick.shape
         omega = np.sqrt(self.omega2[:count])
         X = self.X[:, :count]
@@ -110,10 +110,11 @@ class ApproximateModes:
         return r
 
     def _probed(self, count: int) -> Array:
-        """(2) Return a of each mode from above, but for one in a thousand of them, (count,).
+        """Step (2): return an upper bound of a for each mode, valid except for one mode in a thousand, (count,).
 
-        With y = omega² M x - K x it is yᵀ K⁻¹ y / omega². Of probes w with covariance K⁻¹ each (wᵀ y)² has that as its
-        mean, the sum of so many of them the distribution chi²: divided by the quantile that it hardly ever is below.
+        With y = omega² M x - K x, a is yᵀ K⁻¹ y / omega². For probes w with covariance K⁻¹, (wᵀ y)² has this as its
+        mean, and a sum over the probes has a chi² distribution. It is divided by the quantile below which it hardly
+        ever lies.
         """
         W = np.random.default_rng(0).standard_normal((self.tree.n, PROBES))
         self.tree.spread_ordered(W)
@@ -123,6 +124,6 @@ class ApproximateModes:
         return (y**2).sum(axis=1) / (2 * gammaincinv(PROBES / 2, RARE)) / omega2[:, 0]
 
     def into(self, Phi: Array, rows: IntArray) -> None:
-        """Put the leading modes into these rows of Phi, (n_dof, k)."""
+        """Write the leading modes into these rows of Phi, (n_dof, k)."""
         for a in range(0, self.tree.n, SLICE):
             Phi[rows[a : a + SLICE]] = self.X[a : a + SLICE, : Phi.shape[1]]

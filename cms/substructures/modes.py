@@ -1,4 +1,4 @@
-"""Fixed-interface modes of a large body by multilevel substructures (docs/theory.md §2)."""
+"""Fixed-interface modes of a large body by multilevel substructuring (docs/theory.md §2)."""
 
 import logging
 from collections.abc import Callable
@@ -31,26 +31,29 @@ __all__ = ["Interior", "MultilevelResult", "multilevel_modes"]
 
 log = logging.getLogger(__name__)
 
-LEAF = 200  #: dofs of a part: larger ones cost more arithmetic, smaller ones more calls
-GUARDS, GUARD_SHARE = 12, 0.08  #: modes beyond the wanted ones that take part: a number, and a share of these
-MOST_STEPS = 8  #: of inverse iteration
-SHARE = 8  #: interior dofs for each wanted mode, at least
-THIN, SOLID = 20.0, 4.0  #: cutoff factors: modes of a surface grow with the frequency, of a solid with its third power
-DENSER, MANY = 14.0, 400  #: that of shells where at most so many dofs are there for each wanted mode
-TOO_HIGH = 1.5  #: that the estimated highest frequency is too high at least, as a rule
-MARGIN = 1.1  #: of a cutoff: reduced frequencies lie above the true ones
-RAISE, MOST_RAISES = 2.0, 3  #: of the bound, as a frequency, where it leaves too few modes of substructures
+LEAF = 200  #: dofs of a part: larger parts cost more arithmetic, smaller parts more calls
+#: guard modes beyond the wanted ones that take part: a number, and a share of the wanted modes
+GUARDS, GUARD_SHARE = 12, 0.08
+MOST_STEPS = 8  #: largest number of inverse iteration steps
+SHARE = 8  #: smallest number of interior dofs per wanted mode
+#: cutoff factors: the number of modes grows with frequency for a surface, and with its third power for a solid
+THIN, SOLID = 20.0, 4.0
+DENSER, MANY = 14.0, 400  #: cutoff factor of shells, and number of dofs per wanted mode up to which it applies
+TOO_HIGH = 1.5  #: factor by which the estimated highest frequency is usually at least too high
+MARGIN = 1.1  #: margin on a cutoff, because reduced frequencies are above the true ones
+#: increase of the bound (as a frequency) if too few substructure modes are found, and number of increases
+RAISE, MOST_RAISES = 2.0, 3
 
 
 @dataclass(frozen=True, eq=False)
 class Interior:
-    """The interior of a body with its boundary held."""
+    """The interior of a body whose boundary is held."""
 
     K: sp.csc_array  #: (n, n) [N/m]
     M: sp.csc_array  #: (n, n) [kg]
     nodes: IntArray  #: node of every dof, (n,)
-    points: Array  #: of all nodes of the body, (n_nodes, 3) [m]
-    is_multiplier: Array  #: which dofs are Lagrange multipliers, (n,)
+    points: Array  #: positions of all nodes of the body, (n_nodes, 3) [m]
+    is_multiplier: Array  #: whether each dof is a Lagrange multiplier, (n,)
 
     def dissection(self, leaf: int) -> Dissection:
         """Return the tree of the dofs; multipliers and the nodes that they tie are in its root."""
@@ -68,13 +71,13 @@ class Interior:
 
 @dataclass(frozen=True, eq=False)
 class MultilevelResult:
-    """Modes, the errors that are left in them, and the tree, which solves for other columns too."""
+    """Modes, their remaining errors, and the tree, which can solve for other columns too."""
 
     modes: EigenResult
-    errors: Array  #: estimated relative error of each frequency, from above, (k,)
-    n_steps: int  #: of inverse iteration
-    n_reduced: int  #: modes of all substructures
-    cutoff_factor: float  #: modes of substructures up to so many times the highest wanted frequency
+    errors: Array  #: estimated relative error of each frequency, an upper estimate, (k,)
+    n_steps: int  #: number of inverse iteration steps
+    n_reduced: int  #: number of modes of all substructures
+    cutoff_factor: float  #: substructure modes are kept up to this factor times the highest wanted frequency
     tree: SubstructureTree
 
     def __post_init__(self) -> None:
@@ -91,45 +94,45 @@ def multilevel_modes(
     rows: tuple[int, IntArray] | None = None,
     solver: Solver | None = None,
 ) -> MultilevelResult:
-    """Lowest vibration modes by automated multilevel substructuring.
+    """Compute the lowest vibration modes by automated multilevel substructuring.
 
-    (1) nested dissection: parts of some hundred dofs, and separators
-    (2) bound: `cutoff_factor` times the cutoff; of a number of modes, times an estimate of its highest frequency, which
-        is `TOO_HIGH` times too high as a rule
-    (3) every substructure is reduced to its own modes up to the bound, and eliminated from those above it; once more
-        with a higher bound where they are fewer than a number of modes and its guards
-    (4) of a number of modes: its highest frequency again, by the reduced pencil up to the estimate; a lower bound, but
-        none that leaves fewer modes than these
-    (5) the reduced pencil: its lowest modes, expanded down the tree
-    (6) where the error that is left is above the tolerance: steps of inverse iteration by the tree
+    (1) nested dissection into parts of some hundred dofs, and separators
+    (2) bound: `cutoff_factor` times the cutoff, or times an estimate of the highest wanted frequency, which is usually
+        too high by the factor `TOO_HIGH`
+    (3) every substructure is reduced to its own modes up to the bound, and eliminated from the enclosing ones; this is
+        repeated with a higher bound if there are fewer modes than wanted plus guards
+    (4) for a number of modes: a better estimate of the highest frequency, from the reduced pencil up to the first
+        estimate, gives a lower bound that keeps enough modes
+    (5) the lowest modes of the reduced pencil, expanded down the tree
+    (6) steps of inverse iteration with the tree, while the remaining error is above the tolerance
 
-    Frequencies are those of a Rayleigh-Ritz basis: never below the true ones.
+    The frequencies are those of a Rayleigh-Ritz basis, so they are never below the true ones.
 
     Parameters
     ----------
     interior
-        With a definite stiffness but for multipliers.
+        The interior; its stiffness is definite except for multipliers.
     wanted
-        A number of modes, or all up to a cutoff; proven to be all by the inertia of a factorisation, or not. Without
-        the proof a mode that lies nearer below a cutoff than the tolerance may be left out: its frequency is too high.
+        A number of modes, or all up to a cutoff, with or without proof by the inertia of a factorisation. Without the
+        proof, a mode closer below the cutoff than the tolerance may be missed, because its frequency is too high.
     tolerance
-        Largest relative error of a frequency. What stays above it after some steps is told, not raised.
+        Largest relative error of a frequency. A warning reports larger errors that remain after some steps.
     cutoff_factor
-        Larger: more modes of substructures, fewer steps (6). None: 20 for shells and beams, 14 where there
-        are at most 400 interior dofs for each wanted mode, 4 for solids.
+        A larger factor keeps more substructure modes and needs fewer steps (6). None: 20 for shells and beams, 14 if
+        there are at most 400 interior dofs per wanted mode, 4 for solids.
     tasks
         Where subtrees are eliminated; None: in threads of this process.
     rows
-        Over how many dofs the modes are told, and which of these are the interior; None: over the interior.
+        Number of dofs of the returned modes, and which of them are the interior; None: the modes are over the interior.
     solver
-        What factorises for the proof; None: the fastest one that is installed.
+        Solver for the proof; None: the fastest installed solver.
 
     Raises
     ------
     EigenError
-        If the substructures have fewer modes than are wanted, or the inertia counts others.
+        If the substructures have fewer modes than wanted, or the inertia counts a different number.
     ModeSetError
-        If a large part of all modes is wanted.
+        If a large share of all modes is wanted.
     FactorizationError
         If the stiffness is singular.
     """
@@ -152,7 +155,7 @@ def multilevel_modes(
     make = partial(substructure_tree, dissection, K, M, multipliers=multipliers, tasks=tasks)
     tree, bound = _tree_of(make, bound, least)  # (3)
     give_back()
-    require_regular(interior.K, Factorization(tree, solver_of(solver)))  # pivots of rounding are positive too
+    require_regular(interior.K, Factorization(tree, solver_of(solver)))  # pivots from rounding errors are positive too
     with one_blas_thread():
         own, mass = tree.omega2, tree.mass()
         if wanted.n is not None:
@@ -207,7 +210,7 @@ def multilevel_modes(
 
 
 def _factor(interior: Interior, wanted: ModeCount) -> float:
-    """Return the cutoff factor of shells and beams, whose nodes have rotations, or of solids."""
+    """Return the cutoff factor: for shells and beams, whose nodes have rotations, or for solids."""
     n = len(interior.nodes)
     if n <= 4.5 * len(np.unique(interior.nodes)):
         return SOLID
@@ -215,7 +218,7 @@ def _factor(interior: Interior, wanted: ModeCount) -> float:
 
 
 def _tree_of(make: Callable[[float], SubstructureTree], bound: float, least: int) -> tuple[SubstructureTree, float]:
-    """(3) Return a tree with at least so many modes up to a bound on omega², if some raises of it bring them."""
+    """Step (3): return a tree with at least `least` modes up to a bound on omega², raising the bound if necessary."""
     tree = make(bound)
     for _ in range(MOST_RAISES):
         if tree.mode_starts[-1] >= least:
@@ -227,19 +230,19 @@ def _tree_of(make: Callable[[float], SubstructureTree], bound: float, least: int
 
 
 def _smallest(values: Array, k: int) -> float:
-    """Return the k-th smallest of some values, k from 1; of k = 0 zero."""
+    """Return the k-th smallest of some values, k from 1; zero for k = 0."""
     return float(np.partition(values, k - 1)[k - 1]) if k else 0.0
 
 
 def _highest(own: Array, mass: ReducedMass, guess: float, count: int) -> float:
-    """(4) Return omega² of the highest of `count` modes, somewhat too high, by modes of substructures below a guess."""
+    """Step (4): estimate omega² of the highest of `count` modes, slightly too high, from modes below a guess."""
     most = max(guess, _smallest(own, count))
     kept = own <= most
     return float(reduced_omega2(own[kept], mass.of(kept), count)) if count else guess
 
 
 def _reduced(own: Array, mass: ReducedMass, wanted: ModeCount, highest: float) -> tuple[Array, Array]:
-    """(5) Return omega² of the wanted modes of the reduced pencil and of guards beyond them, and the modes."""
+    """Step (5): return omega² and modes of the reduced pencil: the wanted modes, and guards beyond them."""
     n = len(own)
     if wanted.n is not None:
         return reduced_modes(own, mass, min(wanted.n + _guards(wanted.n), n))
@@ -259,11 +262,11 @@ def _guards(count: int) -> int:
 def _improved(
     modes: ApproximateModes, Z: Array, count: int, tolerance: float, highest: float
 ) -> tuple[Array, int]:
-    """(6) Improve modes until the error that is left in the wanted ones is below the tolerance.
+    """Step (6): improve modes until the remaining error of the wanted ones is below the tolerance.
 
-    The wanted ones: at least `count`, and all that came to lie below omega² = `highest`. All are improved together with
-    the guards, whose amplitudes are the last columns of Z: a mode by itself would keep what it has of a poor guard next
-    to it, which the estimate does not see.
+    The wanted modes are at least `count`, and all below omega² = `highest`. All modes are improved together with the
+    guards, whose amplitudes are the last columns of Z. A mode improved alone would keep its component along an
+    inaccurate neighbouring guard, which the estimate does not measure.
     """
     count = max(count, int((modes.omega2 <= highest).sum()))
     errors, n_steps = modes.errors(count, tolerance) if count else np.zeros(0), 0

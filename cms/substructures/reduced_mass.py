@@ -1,4 +1,4 @@
-"""The mass of the reduced pencil: 1 on its diagonal, and a dense block of each substructure with all below it."""
+"""The mass of the reduced pencil: unit diagonal, and a dense block between each substructure and all below it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,10 +15,10 @@ __all__ = ["ReducedMass"]
 
 @dataclass(frozen=True, eq=False)
 class ReducedMass:
-    """1 + C + Cᵀ of the modes of all substructures in their order; C has one block a substructure.
+    """1 + C + Cᵀ over the modes of all substructures in order; C has one block per substructure.
 
-    Block t stands in the columns of its own modes, starts[t] to starts[t + 1], and in the rows of all modes of the
-    substructures below it, which are a run: firsts[t] to starts[t].
+    Block t has the columns of its own modes, starts[t] to starts[t + 1], and the rows of all modes of the substructures
+    below it, which are contiguous: firsts[t] to starts[t].
     """
 
     starts: IntArray  #: (n_substructures + 1,)
@@ -44,7 +44,7 @@ class ReducedMass:
         return product
 
     def between(self, to: NDArray[np.bool_], of: NDArray[np.bool_], Z: Array) -> Array:
-        """Return M_to,of Z, (n_to, k), of two parts of the modes without a common one, (n,) each; Z is (n_of, k)."""
+        """Return M_to,of Z, (n_to, k), for two disjoint parts of the modes, given as masks (n,); Z is (n_of, k)."""
         at_to, at_of = (np.concatenate([[0], np.cumsum(part)]) for part in (to, of))
         product = np.zeros((int(at_to[-1]), Z.shape[1]))
         work = []
@@ -64,7 +64,7 @@ class ReducedMass:
         return product
 
     def of(self, is_kept: NDArray[np.bool_]) -> "ReducedMass":
-        """Return the mass of a part of the modes, (n,) whether each is kept."""
+        """Return the mass of a part of the modes, given as a mask (n,)."""
         number = np.concatenate([[0], np.cumsum(is_kept)])
         blocks = [
             C if is_kept[below].all() and is_kept[own].all() else C[is_kept[below]][:, is_kept[own]]

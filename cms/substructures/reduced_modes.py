@@ -1,4 +1,4 @@
-"""The lowest modes of the reduced pencil: a diagonal stiffness, a mass with blocks along the tree."""
+"""The lowest modes of the reduced pencil, which has a diagonal stiffness and a mass with blocks along the tree."""
 
 import numpy as np
 import scipy.linalg as la
@@ -14,17 +14,17 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["reduced_modes", "reduced_omega2"]
 
-START = 5  #: modes of substructures for each wanted one in the pencil that the search begins with
-DENSE = 3000  #: modes of substructures up to which dense matrices are fast and small
-TOLERANCE = 1e-4  #: residual of the iteration, far below what the substructures leave out
-WIDER = 4  #: times as many modes of substructures in the next pencil
+START = 5  #: substructure modes per wanted mode in the first pencil of the search
+DENSE = 3000  #: number of substructure modes up to which dense matrices are fast and small
+TOLERANCE = 1e-4  #: residual of the iteration, far below the error of the substructures
+WIDER = 4  #: ratio of substructure modes in successive pencils
 SETTLED = 5e-5  #: relative error of omega² that the iteration may leave
-LAG = 4.0  #: times so much is left after a step as modes far above alone would leave
+LAG = 4.0  #: factor on the error after a step, compared with the contribution of much higher modes alone
 MOST_STEPS = 20
 
 
 class Diagonal:
-    """The inverse of a diagonal matrix, as the eigensolver wants it."""
+    """The inverse of a diagonal matrix, in the form that the eigensolver needs."""
 
     description = "a diagonal"
 
@@ -41,9 +41,9 @@ class Diagonal:
 def reduced_modes(omega2: Array, M: ReducedMass, count: int) -> tuple[Array, Array]:
     """Return the lowest `count` eigenvalues, ascending, and M-orthonormal vectors, (n, count).
 
-    (1) the pencil of the lowest modes of substructures, some for each wanted mode
-    (2) four times as many, and so on, at last all: what the new ones add to first order; where that is not enough,
-        subspace iteration that begins with the vectors found
+    (1) solve the pencil of the lowest substructure modes, some for each wanted mode
+    (2) use four times as many, and so on up to all, adding new ones to first order; if that is not accurate enough, use
+        subspace iteration that starts with these vectors
     """
     n = len(omega2)
     few = min(n, max(START * count, DENSE // 2))
@@ -63,9 +63,9 @@ def reduced_modes(omega2: Array, M: ReducedMass, count: int) -> tuple[Array, Arr
 
 
 def _widened(omega2: Array, M: ReducedMass, lam: Array, Z: Array, is_new: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """(2) Return the eigenpairs, with new modes of substructures beside those of Z, (n_old, k), whose eigenpairs Z are.
+    """Step (2): return the eigenpairs with new substructure modes in addition to those of Z, (n_old, k).
 
-    (1) what a step of subspace iteration adds along the new ones: d = D⁻¹ M_no Z Lambda;  it only scales Z
+    (1) contribution of a step of subspace iteration along the new modes, d = D⁻¹ M_no Z Lambda; it only scales Z
     (2) H = Lambda + B,  B = dᵀ D d;  G = 1 + A + Aᵀ + dᵀ M_nn d,  A = dᵀ M_no Z = B Lambda⁻¹
     (3) H c = lam G c,  Z <- [Z; d] C
     """
@@ -85,9 +85,9 @@ def _symmetric(A: Array) -> Array:
 
 
 def _is_settled(before: Array, lam: Array, cut: float) -> bool:
-    """Return whether that part of what a step took off is small, which it leaves.
+    """Return whether the share of the last change that a step leaves is small.
 
-    What the modes lack lies along those from the cut on: a step leaves about (lam / cut)² of their error.
+    The missing part of the modes lies along modes above the cut; a step leaves about (lam / cut)² of their error.
     """
     left = (before / lam - 1) * np.minimum(LAG * (lam / cut) ** 2, 0.5)
     return bool((left <= SETTLED).all())
@@ -98,9 +98,9 @@ def _lowest(omega2: Array, few: int) -> NDArray[np.bool_]:
 
 
 def _iterated(omega2: Array, M: ReducedMass, lam: Array, Z: Array, cut: float) -> tuple[Array, Array]:
-    """(2) Subspace iteration: Y = D⁻¹ M Z of D = diag(omega²), H = Yᵀ D Y, G = Yᵀ M Y, H c = lam G c, Z <- Y C.
+    """Step (2): subspace iteration Y = D⁻¹ M Z, D = diag(omega²), H = Yᵀ D Y, G = Yᵀ M Y, H c = lam G c, Z <- Y C.
 
-    It ends when what a step leaves is small.
+    It ends when the error that a step leaves is small.
     """
     M_Z = M @ Z
     for _ in range(MOST_STEPS):
@@ -117,7 +117,7 @@ def _iterated(omega2: Array, M: ReducedMass, lam: Array, Z: Array, cut: float) -
 
 
 def _at_once(omega2: Array, M: ReducedMass, count: int) -> tuple[Array, Array]:
-    """Dense: with D = diag(omega²), the largest theta of D^-½ M D^-½ are 1 / omega² of the modes."""
+    """Solve densely: with D = diag(omega²), the largest theta of D^-½ M D^-½ are 1 / omega² of the modes."""
     n = len(omega2)
     if n > DENSE and 3 * count < n:
         found = eigenmodes(
@@ -131,7 +131,7 @@ def _at_once(omega2: Array, M: ReducedMass, count: int) -> tuple[Array, Array]:
 
 
 def reduced_omega2(omega2: Array, M: ReducedMass, k: int) -> float:
-    """Return the k-th lowest eigenvalue, k from 1; dense."""
+    """Return the k-th lowest eigenvalue, k from 1, by a dense solution."""
     n = len(omega2)
     A, _ = _scaled(omega2, M)
     theta = la.eigh(A, subset_by_index=(n - k, n - k), overwrite_a=True, eigvals_only=True)

@@ -1,4 +1,4 @@
-"""The tree of eliminated substructures: solves by all of it, and the motions that its modes span."""
+"""The tree of eliminated substructures: solutions with the whole tree, and the motions spanned by its modes."""
 
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import replace
@@ -16,20 +16,21 @@ from fe_models.foundation.threads import bounded_threads, n_threads
 
 __all__ = ["SubstructureTree", "substructure_tree"]
 
-BLOCK = 256  #: columns that are put into the order of elimination at once
-PARTS = 16  #: tasks are no larger than the body over so many for each processor
+BLOCK = 256  #: columns that are brought into elimination order at a time
+PARTS = 16  #: size limit of a task: the size of the body divided by this number for each processor
 
 
 class SubstructureTree:
     """A body as a tree of substructures, each with its factor, constraint modes and own modes.
 
-    It is a `Factor` of K as well: `solve` takes and gives rows in the order of the body.
+    It is also a `Factor` of K: `solve` takes and returns rows in the order of the body.
     """
 
     def __init__(self, dissection: Dissection, substructures: list[Substructure], n_multipliers: int) -> None:
         self.dissection, self.substructures = dissection, substructures
         counts = [len(each.omega2) for each in substructures]
-        self.mode_starts = np.concatenate([[0], np.cumsum(counts)])  #: of the modes of each, (n_substructures + 1,)
+        #: start of the modes of each substructure, (n_substructures + 1,)
+        self.mode_starts = np.concatenate([[0], np.cumsum(counts)])
         self.n = len(dissection.order)
         self.n_negative, self.n_perturbed, self.n_positive = n_multipliers, 0, self.n - n_multipliers
         self.n_factor_entries = sum(each.n_numbers for each in substructures)
@@ -38,7 +39,7 @@ class SubstructureTree:
 
     @property
     def words(self) -> str:
-        """How the body was divided."""
+        """Description of the division of the body."""
         levels = np.zeros(self.dissection.n, dtype=int)
         for t in range(self.dissection.n - 2, -1, -1):
             levels[t] = levels[self.dissection.parents[t]] + 1
@@ -55,7 +56,7 @@ class SubstructureTree:
 
     @property
     def omega2(self) -> Array:
-        """Of the modes of all substructures in their order, (n_modes,) [1/s²]: the reduced stiffness, a diagonal."""
+        """omega² of the modes of all substructures in order, (n_modes,) [1/s²]: the diagonal reduced stiffness."""
         return np.concatenate([each.omega2 for each in self.substructures])
 
     def mass(self) -> ReducedMass:
@@ -64,9 +65,9 @@ class SubstructureTree:
         return ReducedMass(self.mode_starts, firsts, [each.coupling for each in self.substructures])
 
     def expand(self, Z: Array) -> Array:
-        """Return the motion of all dofs in the order of elimination, (n, k), for amplitudes of the modes, (n_modes, k).
+        """Return the motion of all dofs in elimination order, (n, k), for amplitudes of the modes, (n_modes, k).
 
-        From the root down: u_s = Phi z_s + Psi u_b.
+        It is computed from the root down: u_s = Phi z_s + Psi u_b.
         """
         X = np.empty((self.n, Z.shape[1]))
 
@@ -94,9 +95,9 @@ class SubstructureTree:
         return x
 
     def solve_ordered(self, b: Array) -> None:
-        """Put K⁻¹ b into b, (n, k) in C order, rows in the order of elimination.
+        """Overwrite b, (n, k) in C order, rows in elimination order, with K⁻¹ b.
 
-        (1) up: f_b <- f_b + Psiᵀ f_s of all substructures below;  u_s = K_ss⁻¹ f_s
+        (1) up: f_b <- f_b + Psiᵀ f_s from all substructures below;  u_s = K_ss⁻¹ f_s
         (2) down: u_s <- u_s + Psi u_b
         """
 
@@ -125,9 +126,9 @@ class SubstructureTree:
         by_columns(b.shape[1], part)
 
     def spread_ordered(self, Xi: Array) -> None:
-        """Put W Xi into Xi, (n, k) in C order, rows in the order of elimination, of some W with W Wᵀ = K⁻¹.
+        """Overwrite Xi, (n, k) in C order, rows in elimination order, with W Xi, where W Wᵀ = K⁻¹.
 
-        From the root down: u_s = L_s⁻ᵀ xi_s + Psi u_b. With multipliers W Wᵀ f = K⁻¹ f in the motions, f without any.
+        From the root down: u_s = L_s⁻ᵀ xi_s + Psi u_b. With multipliers, W Wᵀ f = K⁻¹ f on the motions, for f on them.
         """
 
         def part(columns: slice) -> None:
@@ -152,27 +153,27 @@ def substructure_tree(
     tasks: TaskMap | None = None,
     progress: Progress | None = None,
 ) -> SubstructureTree:
-    """Eliminate all substructures: subtrees as tasks beside each other, and each separator above when it can be.
+    """Eliminate all substructures: subtrees as parallel tasks, and each separator above as soon as possible.
 
     Parameters
     ----------
     dissection
-        Of the dofs.
+        Tree of the dofs.
     K, M
-        Symmetric, in the order of elimination (`in_order`), (n, n).
+        Symmetric, in elimination order (`in_order`), (n, n).
     omega2
-        Modes of substructures are kept up to this [1/s²].
+        Modes of substructures are kept up to this omega² [1/s²].
     multipliers
-        Dofs in the order of elimination that are Lagrange multipliers, which the root owns with all that they tie.
+        Multipliers, as dofs in elimination order; the root owns them and the dofs that they tie.
     tasks
         Where subtrees are eliminated; None: in threads of this process.
     progress
-        Called with the numbers of tasks done and of all.
+        Receives the number of finished tasks and of all tasks.
 
     Raises
     ------
     FactorizationError
-        If K is not positive definite (but for multipliers).
+        If K is not positive definite, apart from multipliers.
     """
     lower_K, lower_M = (sp.csc_array(sp.tril(A, format="csc")) for A in (K, M))
     body = _Body(dissection, lower_K, lower_M, omega2, multipliers)
@@ -197,7 +198,7 @@ def substructure_tree(
         for run, each in zip(runs, tasks.map(eliminate_part, parts, progress=progress), strict=True):
             keep(run, each)
         del parts
-    # one thread of BLAS in each: those of OpenBLAS wait for each other longer than they work on fronts of this size
+    # one BLAS thread each: OpenBLAS threads wait for each other longer than they work on fronts of this size
     with bounded_threads(1), ThreadPoolExecutor(body.n_threads) as pool:
         if tasks is None:
             work.update({pool.submit(eliminate_part, body.part(run)): run for run in runs})
@@ -218,7 +219,7 @@ def substructure_tree(
 
 
 class _Body:
-    """The matrices in the order of elimination, cut into parts."""
+    """The matrices in elimination order, cut into parts."""
 
     def __init__(
         self, dissection: Dissection, K: sp.csc_array, M: sp.csc_array, omega2: float, multipliers: IntArray
@@ -239,7 +240,7 @@ class _Body:
         return [range(first[t], t + 1) for t in np.flatnonzero(~is_top & is_top[parents]).tolist()], is_top
 
     def part(self, run: range, below: tuple[Remainder, ...] = ()) -> Part:
-        """Return a run of substructures with their columns; or one of them, above what is left of its children."""
+        """Return consecutive substructures with their columns, or one with the contributions of its children."""
         starts = self.dissection.starts[run.start : run.stop + 1]
         numbers = tuple(tuple(c - run.start for c in self.children[t]) for t in run)
         if len(run) == 1:

@@ -1,1 +1,1 @@
-"""Commands that bring models in from other programs, and bodies out to them."""
+"""Commands that import models from other programs, and export bodies to them."""

@@ -13,7 +13,7 @@ __all__ = ["ExportRequest", "run_export"]
 
 @dataclass(frozen=True)
 class ExportRequest:
-    """What `cms export` was asked for."""
+    """The arguments of `cms export`."""
 
     file: Path
     to: str
@@ -24,7 +24,7 @@ class ExportRequest:
 
 
 def run_export(request: ExportRequest) -> None:
-    """Write the files, and say what the format does not hold.
+    """Write the files, and report what the format does not hold.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def run_export(request: ExportRequest) -> None:
 
 
 def loads_of(request: ExportRequest) -> dict[str, float]:
-    """Return the amplitudes that were asked for by the names of their load cases."""
+    """Return the requested amplitudes by the names of their load cases."""
     loads = {}
     for text in request.loads:
         name, _, amplitude = text.rpartition("=")

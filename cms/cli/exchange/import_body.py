@@ -22,7 +22,7 @@ __all__ = ["ImportRequest", "run_import"]
 
 @dataclass(frozen=True)
 class ImportRequest:
-    """What `cms import` was asked for."""
+    """The arguments of `cms import`."""
 
     files: tuple[str, ...]  #: paths, or ROLE=path
     units: str | None
@@ -49,7 +49,7 @@ def run_import(request: ImportRequest) -> "ReducedBody":
     Raises
     ------
     CmsError
-        If the units are not said, a file cannot be read, or the body is none.
+        If no units are given, a file cannot be read, or the files do not make a body.
     """
     from cms.importers.import_body import import_body
     from cms.modal_file.file import write
@@ -87,7 +87,7 @@ def run_import(request: ImportRequest) -> "ReducedBody":
 
 
 def named_files(words: tuple[str, ...]) -> "list[Path] | dict[str, Path]":
-    """Return paths, or role -> path where files are given as ROLE=path."""
+    """Return paths, or paths by role if files are given as ROLE=path."""
     roles = [word.partition("=") for word in words]
     with_role = [role in ("K", "M", "D", "dofs") and bool(mark) for role, mark, _ in roles]
     if not any(with_role):
@@ -100,7 +100,7 @@ def named_files(words: tuple[str, ...]) -> "list[Path] | dict[str, Path]":
 
 
 def numbers_of(option: str, text: str) -> list[int]:
-    """Return whole numbers with commas between."""
+    """Return integers separated by commas."""
     try:
         return [int(word) for word in text.split(",")]
     except ValueError:
@@ -108,7 +108,7 @@ def numbers_of(option: str, text: str) -> list[int]:
 
 
 def interfaces_of(words: tuple[str, ...]) -> dict[str, list[int]] | None:
-    """Return name -> nodes of NAME=3,11; None where none were given."""
+    """Return the nodes of each interface from NAME=3,11; None if none are given."""
     found: dict[str, list[int]] = {}
     for word in words:
         name, mark, numbers = word.partition("=")
@@ -119,7 +119,7 @@ def interfaces_of(words: tuple[str, ...]) -> dict[str, list[int]] | None:
 
 
 def inertia_of(request: ImportRequest) -> "Inertia | None":
-    """Return what is given beside for the inertia, one of full mass, nodal masses, mesh and density."""
+    """Return the additional inertia data: one of full mass, nodal masses, or mesh and density."""
     from cms.importers.inertia import MeshMass, NodalMasses, full_mass_of
     from fe_models.importers.matrices.read_matrices import read_matrices
     from fe_models.importers.read_mesh import read_mesh
@@ -140,7 +140,7 @@ def inertia_of(request: ImportRequest) -> "Inertia | None":
 
 
 def table_of_masses(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Return numbers of nodes and their masses, of lines "node, mass" with an optional header."""
+    """Return node numbers and their masses from lines "node, mass" with an optional header."""
     if not path.is_file():
         raise ForeignBodyError(f"--nodal-masses {path}: there is no such file")
     numbers, masses = [], []
@@ -152,7 +152,7 @@ def table_of_masses(path: Path) -> tuple[np.ndarray, np.ndarray]:
                 number, mass = int(row[0]), float(row[1])
             except (ValueError, IndexError):
                 if k == 1:
-                    continue  # a header
+                    continue  # a header line
                 raise ForeignBodyError(f"{path}, line {k}: expected node, mass, got {','.join(row)[:60]!r}") from None
             numbers.append(number)
             masses.append(mass)
@@ -160,7 +160,7 @@ def table_of_masses(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 def frame_of(request: ImportRequest) -> "Frame | None":
-    """Return the frame that was asked for; None: the default."""
+    """Return the requested frame; None: the default."""
     from cms.cli.frame import FrameRequest
     from cms.cli.frame import frame_of as frame_of_request
 
@@ -170,7 +170,7 @@ def frame_of(request: ImportRequest) -> "Frame | None":
 
 
 def damping_of(request: ImportRequest) -> "Damping | None":
-    """Return the damping that was asked for beside that of the files."""
+    """Return the damping requested in addition to that of the files."""
     from cms.reduced_basis.damping import ModalDamping
 
     return None if request.damping is None else ModalDamping(request.damping)

@@ -15,7 +15,7 @@ __all__ = ["RecoveryCommand", "run_recovery"]
 
 @dataclass(frozen=True)
 class RecoveryCommand:
-    """What `cms recovery` was asked for."""
+    """The arguments of `cms recovery`."""
 
     file: Path
     table: str | None
@@ -26,7 +26,7 @@ class RecoveryCommand:
 
 
 def run_recovery(request: RecoveryCommand) -> None:
-    """List the rows of a body, or write one table; with `rows` those of a file are made first.
+    """List the rows of a body, or write one table; if `rows` is given, the tables of that file are made first.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def run_recovery(request: RecoveryCommand) -> None:
 
 
 def with_rows(body: "ReducedBody", path: Path) -> "ReducedBody":
-    """Return the body with the tables that a file asks for, as far as it knows them without its model."""
+    """Return the body with the tables requested in a file, as far as it knows them without its model."""
     from cms.jobs.tables.recovery_section import RecoveryFile, requests_of
     from cms.recovery.matrices import recovery_matrices
     from fe_models.foundation.toml_file import read_toml, validated

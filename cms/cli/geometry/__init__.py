@@ -1,1 +1,1 @@
-"""Commands that look at CAD files and their meshes."""
+"""Commands that inspect CAD files and their meshes."""

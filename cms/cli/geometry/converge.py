@@ -1,4 +1,4 @@
-"""`cms converge`: the free frequencies of a CAD job at two mesh sizes, and what is left to the geometry."""
+"""`cms converge`: free frequencies of a CAD job at two mesh sizes, and the estimated mesh error."""
 
 import json
 from pathlib import Path
@@ -12,12 +12,12 @@ __all__ = ["run_converge"]
 
 
 def run_converge(path: Path, *, ratio: float, n_modes: int, as_json: bool) -> None:
-    """Print frequencies at both sizes with the estimated error of the job's own.
+    """Print frequencies at both sizes, with the estimated error at the job's own size.
 
     Raises
     ------
     CmsError, FeModelsError
-        If the job does not do, or is none of a CAD file.
+        If the job is invalid, or its body is not from a CAD file.
     """
     from cms.jobs.job import read_job
     from cms.quality.mesh_convergence import ORDER, mesh_convergence

@@ -1,4 +1,4 @@
-"""`cms faces`: the faces of a CAD file, listed and drawn, so that interfaces can name them."""
+"""`cms faces`: the faces of a CAD file as a list and a picture, so that interfaces can name them."""
 
 import json
 from collections.abc import Iterable
@@ -21,7 +21,7 @@ __all__ = ["FacesRequest", "run_faces"]
 
 @dataclass(frozen=True)
 class FacesRequest:
-    """What `cms faces` was asked for."""
+    """The arguments of `cms faces`."""
 
     file: Path
     units: str
@@ -31,7 +31,7 @@ class FacesRequest:
 
 
 def run_faces(request: FacesRequest) -> None:
-    """List the faces, or those that a selector chooses, and draw them.
+    """List and draw all faces, or those that a selector chooses.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def show(part: "CadPart", faces: "Iterable[CadFace]") -> None:
 
 
 def record(part: "CadPart", faces: "Iterable[CadFace]") -> dict[str, Any]:
-    """Return what --json prints."""
+    """Return the record that --json prints."""
     from fe_models.importers.cad.face_selectors import face_words
 
     return {
@@ -124,5 +124,5 @@ def record(part: "CadPart", faces: "Iterable[CadFace]") -> dict[str, Any]:
 
 
 def listed(values: "Array | None") -> list[float] | None:
-    """Return an array as a list, None as it is."""
+    """Return an array as a list; None stays None."""
     return None if values is None else [float(value) for value in values]

@@ -1,1 +1,1 @@
-"""Commands that judge: check, compare, accept."""
+"""Commands that give verdicts: check, compare, accept."""

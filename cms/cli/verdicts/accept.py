@@ -1,4 +1,4 @@
-"""The command `cms accept`: the document that a reduced body is accepted with."""
+"""The command `cms accept`: the acceptance document of a reduced body."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,7 +24,7 @@ class AcceptRequest:
 
 
 def run_accept(request: AcceptRequest) -> int:
-    """Judge, write the document, print the verdict; return the exit code: 1 where the body is not accepted."""
+    """Check the body, write the document, print the verdict; return exit code 1 if the body is not accepted."""
     from cms.acceptance.accept import FullModel, accept_body
     from cms.acceptance.write import require_suffix, write_acceptance
     from cms.cli.job import densities_of

@@ -1,4 +1,4 @@
-"""The command `cms check`: verdicts about a modal file, alone or against its full model."""
+"""The command `cms check`: verdicts about a modal file, alone or compared with its full model."""
 
 import json
 import math
@@ -61,7 +61,7 @@ def check_against(reduced: ReducedBody, path: Path, band: float | None) -> tuple
 
 
 def quality_report(reduced: ReducedBody, records: Sequence[QualityRecord]) -> dict[str, Any]:
-    """Return records in plain types: what `cms check --json` writes."""
+    """Return the records in plain types, as `cms check --json` writes them."""
     return {
         "body": reduced.name,
         "mode_set": reduced.provenance.get("mode set", ""),
@@ -71,7 +71,7 @@ def quality_report(reduced: ReducedBody, records: Sequence[QualityRecord]) -> di
 
 
 def print_records(reduced: ReducedBody, records: Sequence[QualityRecord]) -> None:
-    """Print one row per record, worst last, then what to do about those that do not pass."""
+    """Print one row per record, worst last, then advice for records that do not pass."""
     rows = [
         (record.verdict, record.name, number(record.value), number(record.tolerance), record.reason)
         for record in records
@@ -95,5 +95,5 @@ def print_records(reduced: ReducedBody, records: Sequence[QualityRecord]) -> Non
 
 
 def number(value: float | None) -> str:
-    """Return a value with three digits; none where there is none."""
+    """Return a value with three digits; "" for None."""
     return "" if value is None or not math.isfinite(value) else f"{value:.3g}"

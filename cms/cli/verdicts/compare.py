@@ -1,4 +1,4 @@
-"""The command `cms compare`: mode sets of one job against its full model; table, HTML, JSON and CSV."""
+"""The command `cms compare`: mode sets of a job compared with its full model; table, HTML, JSON and CSV."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ SHORT = {
 
 @dataclass(frozen=True)
 class CompareRequest:
-    """What the command was asked for."""
+    """The arguments of the command."""
 
     job: Path
     sets: str
@@ -55,7 +55,7 @@ def run_compare(request: CompareRequest) -> None:
     Raises
     ------
     CompareError
-        If what was asked for cannot be compared.
+        If the requested comparison is impossible.
     """
     from cms.compare.compare import compare
     from cms.compare.mode_counts import mode_counts
@@ -95,7 +95,7 @@ def run_compare(request: CompareRequest) -> None:
 
 
 def require_job(path: Path) -> None:
-    """Refuse a modal file, or bare matrices, with the words of what is needed."""
+    """Raise `CompareError` for a modal file or bare matrices, and say what is needed."""
     if path.suffix.lower() in (".h5", ".hdf5"):
         raise CompareError(
             f"{path}: a modal file holds no full model to compare with; give the job (.toml) it was made from, or "
@@ -108,12 +108,12 @@ def require_job(path: Path) -> None:
 
 
 def parse_sets(text: str) -> tuple[str, ...]:
-    """Return the names of mode sets with commas between, each once.
+    """Return the names of mode sets separated by commas, each once.
 
     Raises
     ------
     CompareError
-        If a name is unknown or stands twice.
+        If a name is unknown or repeated.
     """
     from cms.mode_sets import MODE_SETS
 
@@ -131,12 +131,12 @@ def parse_sets(text: str) -> tuple[str, ...]:
 
 
 def parse_load(text: str) -> Any:
-    """Return the load of INTERFACE:mass=1.2,stiffness=1e4 as `cms.point_load` makes it.
+    """Return the load of INTERFACE:mass=1.2,stiffness=1e4, made by `cms.point_load`.
 
     Raises
     ------
     CompareError
-        If the text is not of this form.
+        If the text does not have this form.
     """
     from cms.families.interface_loads import point_load
 
@@ -156,12 +156,12 @@ def parse_load(text: str) -> Any:
 
 
 def output_folder(path: Path) -> Path:
-    """Return the folder of the report, made if its parent is there.
+    """Return the folder of the report, which is created if its parent exists.
 
     Raises
     ------
     CompareError
-        If it is a file, or cannot be made.
+        If the path is a file, or the folder cannot be created.
     """
     if path.exists() and not path.is_dir():
         raise CompareError(f"--output {path}: this is a file; expected a folder for the report")
@@ -180,7 +180,7 @@ def body_of(job: "Job", clock: Any, reports: list[Any]) -> "FEBody":
 
 
 def body_of_file(path: Path) -> "FEBody":
-    """Return the coupled body of a job file; runs in a worker."""
+    """Return the coupled body of a job file; called in a worker."""
     from cms.jobs.body_of_job import job_body
     from cms.jobs.job import read_job
 
@@ -188,7 +188,7 @@ def body_of_file(path: Path) -> "FEBody":
 
 
 def options_of(job: "Job", body: "FEBody", names: tuple[str, ...], loads: list[Any]) -> Mapping[str, dict[str, Any]]:
-    """Return the options of every set: those of the job for its own set, loads for the sets that take them."""
+    """Return the options of every set: those of the job for its own set, and loads for sets that need them."""
     from cms.jobs.mode_set_of_job import set_options
     from cms.jobs.reduction_table import mode_set_options
 
@@ -205,12 +205,12 @@ def options_of(job: "Job", body: "FEBody", names: tuple[str, ...], loads: list[A
 
 
 def read_motion(path: Path, body: "FEBody") -> "Snapshots":
-    """Read a reference motion: an .npz file with u, (n_dof, n_t), over the dofs of the coupled body, and t, (n_t,) [s].
+    """Read a reference motion from an .npz file: u, (n_dof, n_t), over the coupled dofs, and t, (n_t,) [s].
 
     Raises
     ------
     CompareError
-        If the file is not of this form.
+        If the file does not have this form.
     """
     import zipfile
     from io import BytesIO

@@ -1,4 +1,4 @@
-"""The command `cms correlate`: measured modes beside those of a model, and the job updated to them."""
+"""The command `cms correlate`: measured modes compared with those of a model, and the updated job."""
 
 import json
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ class CorrelateRequest:
 
 
 def run_correlate(request: CorrelateRequest) -> None:
-    """Compare, update where the file says so, print pairs and parameters, write page and updated job."""
+    """Compare, update if the file has [update], print pairs and parameters, and write page and updated job."""
     from cms.correlation.correlation_file import read_correlation, run_correlation
     from cms.correlation.errors import CorrelationError
     from cms.correlation.report import correlation_page
@@ -84,7 +84,7 @@ def run_correlate(request: CorrelateRequest) -> None:
 
 
 def print_pairs(c: "Correlation", what: str) -> None:
-    """Print one row a measured mode."""
+    """Print one row for each measured mode."""
     partner = {pair.measured: (pair, off) for pair, off in zip(c.pairs, c.errors, strict=True)}
     rows = []
     for k, f in enumerate(c.measured.frequencies):
@@ -99,7 +99,7 @@ def print_pairs(c: "Correlation", what: str) -> None:
 
 
 def print_parameters(update: "Update") -> None:
-    """Print the updated parameters with their spread."""
+    """Print the updated parameters with their standard deviations."""
     u = update
     rows = [
         (p.path, f"{p.start:.6g}", f"{v:.6g}", f"{100 * s:.2g}", f"{100 * told:.0f}")
@@ -111,7 +111,7 @@ def print_parameters(update: "Update") -> None:
 
 
 def updated_text(path: Path, parameters: "tuple[Parameter, ...]", values: "Array") -> str:
-    """Return the text of a job with the updated values, its comments and order as they are."""
+    """Return the text of a job with the updated values; comments and order are kept."""
     import tomlkit
 
     from cms.correlation.errors import CorrelationError

@@ -1,1 +1,1 @@
-"""Factorisation and modes by PETSc, SLEPc and MUMPS, alone or on many ranks."""
+"""Factorisation and modes with PETSc, SLEPc and MUMPS, on one rank or several."""

@@ -1,8 +1,8 @@
-"""MUMPS through PETSc: the matrix, its factor and the columns in solution spread over all ranks.
+"""MUMPS through PETSc: the matrix, its factor and the solution columns are distributed over all ranks.
 
-(1) rank 0 sends every rank its rows of the upper triangle, as many entries each
-(2) all ranks factorise together; the sequence is chosen by METIS on rank 0
-(3) columns: rows of them to all ranks, a solve of many right-hand sides at once, rows back
+(1) rank 0 sends every rank its rows of the upper triangle, with equally many entries
+(2) all ranks factorise together; METIS on rank 0 chooses the order
+(3) rows of the columns go to all ranks, many right-hand sides are solved at once, and rows go back
 """
 
 from itertools import count
@@ -23,9 +23,10 @@ from fe_models.foundation.ranks.trim import give_back
 __all__ = ["PetscFactor"]
 
 CHUNK = 64  #: columns per solve; the workspace of MUMPS grows with them
-ROOM = (20, 60, 200)  #: percent of work space beyond the estimate (ICNTL(14)), tried in turn
+ROOM = (20, 60, 200)  #: workspace beyond the estimate in percent (ICNTL(14)); the values are tried in turn
 METIS = 5  #: ICNTL(7)
-TOO_SMALL = (-8, -9, -11, -14, -15, -17, -20)  #: INFOG(1): work space that the next entry of ROOM gives
+#: values of INFOG(1) for a lack of workspace, which the next value of ROOM may cure
+TOO_SMALL = (-8, -9, -11, -14, -15, -17, -20)
 NOT_FACTORIZED = {
     -5: "not enough memory for the analysis",
     -7: "not enough memory for the analysis",
@@ -40,7 +41,7 @@ numbers = count()
 
 
 class PetscFactor:
-    """Cholesky or L D Lᵀ factor of a symmetric matrix on all ranks, until `close`."""
+    """Cholesky or L D Lᵀ factor of a symmetric matrix, distributed over all ranks, until `close` is called."""
 
     def __init__(
         self,
@@ -52,11 +53,11 @@ class PetscFactor:
     ) -> None:
         """Factorise the matrix with this lower triangle, (n, n), every diagonal entry stored, sorted row indices.
 
-        Its entries go to the ranks: `lower` is empty afterwards, so that rank 0 does not hold them twice. Of a matrix
-        by rows on the ranks each takes its own.
+        The entries are sent to the ranks, and `lower` is empty afterwards, so that rank 0 does not hold them twice. For
+        a distributed matrix each rank uses its own rows.
 
-        on_disk: the factor is kept in files of each rank, in the folder that MUMPS_OOC_TMPDIR names (/tmp).
-        keeps_matrix: the matrix stays beside its factor, for a search by SLEPc.
+        on_disk: the factor is stored in files of each rank, in the folder named by MUMPS_OOC_TMPDIR (/tmp).
+        keeps_matrix: the matrix is kept together with its factor, for a search by SLEPc.
         """
         self.is_open = True
         self.ranks = all_ranks()
@@ -81,7 +82,7 @@ class PetscFactor:
             raise kind(f"MUMPS: {words}; n = {self.n}, {n_entries} entries")
         self.n_negative, self.n_perturbed = n_negative, self.record["null"]
         self.n_positive = self.n - n_negative - self.n_perturbed
-        #: MB of MUMPS on every rank, and entries of the factor there
+        #: memory of MUMPS on every rank in MB, and entries of the factor there
         self.memory = [each["MB"] for each in found]
         self.entries = [each["entries"] for each in found]
         self.n_factor_entries = sum(self.entries)
@@ -92,7 +93,7 @@ class PetscFactor:
         self.description = f"MUMPS (PETSc {version}; {form}; no refinement; {of})"
 
     def solve(self, b: Array) -> Array:
-        """Return A⁻¹ b for b (n, k), any order; the result is in Fortran order."""
+        """Return A⁻¹ b for b, (n, k), in any memory order; the result is in Fortran order."""
         x = np.empty(b.shape, order="F")
         for first in range(0, b.shape[1], CHUNK):
             columns = slice(first, min(first + CHUNK, b.shape[1]))
@@ -108,12 +109,12 @@ class PetscFactor:
 
 
 def emptied(n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return indptr, indices, data of a matrix of n columns without entries."""
+    """Return indptr, indices, data of an empty matrix with n columns."""
     return np.zeros(n + 1, np.int32), np.zeros(0, np.int32), np.zeros(0)
 
 
 def communicator(ranks: Ranks) -> Any:
-    """Return PETSc's communicator of these ranks."""
+    """Return PETSc's communicator for these ranks."""
     PETSc = petsc()
     return PETSc.COMM_SELF if ranks.size == 1 else PETSc.COMM_WORLD
 
@@ -121,7 +122,7 @@ def communicator(ranks: Ranks) -> Any:
 def factorize_here(
     ranks: Ranks, key: str, rows: Rows, definite: bool, on_disk: bool, keeps_matrix: bool
 ) -> dict[str, Any]:
-    """Steps (1) and (2), on every rank; return what MUMPS tells."""
+    """Steps (1) and (2), on every rank: return what MUMPS reports."""
     PETSc = petsc()
     comm = communicator(ranks)
     indptr, indices, data = rows_here(ranks, key, rows)
@@ -146,18 +147,18 @@ def factorize_here(
         F.setMumpsIcntl(14, room)
         F.setMumpsIcntl(22, int(on_disk))
         if not definite:
-            F.setMumpsIcntl(13, 1)  # the signs of all pivots are counted, those of the last front too
-            F.setMumpsIcntl(24, 1)  # and those within rounding of zero
+            F.setMumpsIcntl(13, 1)  # count the signs of all pivots, including those of the last front
+            F.setMumpsIcntl(24, 1)  # also count pivots that are zero to rounding
         try:
             ksp.setUp()
-        except PETSc.Error:  # all ranks have it; INFOG says what it was
+        except PETSc.Error:  # raised on all ranks; INFOG has the reason
             pass
         error = F.getMumpsInfog(1)
         if error not in TOO_SMALL:
             break
         ksp.destroy()
-    if not keeps_matrix and error >= 0:  # the factor does not need it any more
-        for each in (pc, ksp, A):  # pc too: left to Python it would wait in PETSc's garbage
+    if not keeps_matrix and error >= 0:  # the factor no longer needs the matrix
+        for each in (pc, ksp, A):  # pc too, because Python would leave it in PETSc's garbage
             each.destroy()
     ranks.store[key] = (F, ksp, A) if keeps_matrix else (F,)
     give_back()
@@ -172,18 +173,18 @@ def factorize_here(
 
 
 def rows_here(ranks: Ranks, key: str, rows: Rows) -> tuple[np.ndarray, np.ndarray, Array]:
-    """Return the rows that this rank has, or gets from rank 0."""
+    """Return the rows that this rank holds or receives from rank 0."""
     given = ranks.store.pop(key, None)
     return (given.indptr, given.indices, given.data) if isinstance(given, OwnRows) else spread(ranks, rows, given)
 
 
 def entries(value: int) -> int:
-    """Return a number of MUMPS, negative ones of which are in millions."""
+    """Return a count of MUMPS; negative values are in millions."""
     return -value * 10**6 if value < 0 else value
 
 
 def solve_here(ranks: Ranks, key: str, rows: Rows) -> Array | None:
-    """Step (3), on every rank; the solutions on rank 0."""
+    """Step (3), on every rank: return the solutions on rank 0."""
     own = own_rows(ranks, rows, ranks.store.pop("columns", None))
     x = collected(ranks, rows, solved_rows(ranks, key, rows, own))
     give_back()
@@ -191,7 +192,7 @@ def solve_here(ranks: Ranks, key: str, rows: Rows) -> Array | None:
 
 
 def solved_rows(ranks: Ranks, key: str, rows: Rows, own: Array) -> Array:
-    """Return this rank's rows of the solutions, by its rows of the right-hand sides, (n_own, k)."""
+    """Return this rank's rows of the solutions, given its rows of the right-hand sides, (n_own, k)."""
     PETSc = petsc()
     comm = communicator(ranks)
     F = ranks.store[key][0]

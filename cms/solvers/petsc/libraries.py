@@ -1,4 +1,4 @@
-"""PETSc, SLEPc and MPI for Python: not of any wheel, but built once beside MPI (docs/cluster_mpi.md)."""
+"""PETSc, SLEPc and MPI for Python; they have no wheels and must be built beside MPI (docs/cluster_mpi.md)."""
 
 from functools import cache
 from importlib import import_module
@@ -11,18 +11,18 @@ HOW = "benchmarks/install_petsc.sh builds them beside Debian's PETSc (docs/clust
 
 
 def missing_petsc() -> str:
-    """Return in words what is missing, "" where PETSc can be used."""
+    """Describe what is missing; "" if PETSc can be used."""
     lacks = [name for name in ("petsc4py", "slepc4py", "mpi4py") if find_spec(name) is None]
     return f"needs {', '.join(lacks)}, which {'is' if len(lacks) == 1 else 'are'} not installed; {HOW}" if lacks else ""
 
 
 @cache
 def petsc() -> ModuleType:
-    """Return petsc4py.PETSc, begun without options of the command line."""
-    import_module("mpi4py.MPI")  # begins MPI, and ends it with the process
+    """Return petsc4py.PETSc, initialised without command line options."""
+    import_module("mpi4py.MPI")  # initialises MPI, and finalises it when the process ends
     import_module("petsc4py").init([])
     PETSc = import_module("petsc4py.PETSc")
-    PETSc.Log.begin()  # counts solves
+    PETSc.Log.begin()  # counts the solves
     return PETSc
 
 
