@@ -8,5 +8,5 @@ trajectory = integrate(system, GeneralizedAlpha(rho_inf=0.8), t_end=1.0, h=1e-3)
 
 import lazy_loader
 
-# the public names stand in __init__.pyi; each module is imported when its name is first used
+# The public names are listed in __init__.pyi. A module is imported when one of its names is first used.
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

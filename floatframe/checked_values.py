@@ -1,4 +1,4 @@
-"""Checked, read-only arrays for the description of a system: `ModelError` in the words of the one who wrote it."""
+"""Checks that return read-only arrays for the description of a system; errors use the user's terms (`ModelError`)."""
 
 from typing import Any
 
@@ -11,11 +11,11 @@ from floatframe.errors import ModelError
 
 __all__ = ["Array", "array_of_shape", "number", "rotation_of", "unit_vector"]
 
-ORTHONORMAL_DEFECT = 1e-6  #: largest |R.T R - 1| that is taken for rounding of the numbers as typed
+ORTHONORMAL_DEFECT = 1e-6  #: largest |R.T R - 1| that counts as rounding of typed numbers
 
 
 def array_of_shape(where: str, values: Any, shape: tuple[int, ...]) -> Array:
-    """Return a read-only float64 copy; `ModelError` naming `where` if shape or finiteness is wrong."""
+    """Return a read-only float64 copy; raise `ModelError` that names `where` if shape or values are invalid."""
     try:
         array = np.array(values, dtype=np.float64, order="C")
     except (TypeError, ValueError, OverflowError):
@@ -29,7 +29,7 @@ def array_of_shape(where: str, values: Any, shape: tuple[int, ...]) -> Array:
 
 
 def number(where: str, value: Any, *, at_least: float | None = None, above: float | None = None) -> float:
-    """Return a finite float, a default as it is; `ModelError` naming `where` if it is none or out of bounds."""
+    """Return a finite float, or an unset default unchanged; raise `ModelError` if it is no number or out of bounds."""
     try:
         result = value if isinstance(value, Quantity) else float(value)
     except (TypeError, ValueError, OverflowError):
@@ -44,7 +44,7 @@ def number(where: str, value: Any, *, at_least: float | None = None, above: floa
 
 
 def unit_vector(where: str, values: Any) -> Array:
-    """Return the read-only vector of length one along three given numbers, (3,)."""
+    """Return the read-only unit vector along three given numbers, (3,)."""
     vector = array_of_shape(where, values, (3,))
     length = np.linalg.norm(vector)
     if length == 0:
@@ -53,7 +53,7 @@ def unit_vector(where: str, values: Any) -> Array:
 
 
 def rotation_of(where: str, values: Any) -> Array:
-    """Return a read-only rotation matrix, (3, 3), made orthonormal to roundoff; `ModelError` if it is far from one."""
+    """Return a read-only rotation matrix, (3, 3), orthonormal to roundoff; raise `ModelError` if it is far from one."""
     matrix = array_of_shape(where, values, (3, 3))
     defect = np.abs(matrix.T @ matrix - np.eye(3)).max()
     if defect > ORTHONORMAL_DEFECT or np.linalg.det(matrix) < 0:

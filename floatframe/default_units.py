@@ -1,4 +1,4 @@
-"""The defaults of joints, forces and elements in the units of a system; what a user gives stays as it is."""
+"""Conversion of the default values of joints, forces and elements to the units of a system; user values stay."""
 
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
@@ -11,7 +11,7 @@ __all__ = ["in_units_of"]
 
 
 def in_units_of(units: Units, part: Any) -> Any:
-    """Return a part of a system, a dataclass, with its defaults, and those of what it holds, in units of the system."""
+    """Return a part of a system (a dataclass) with its defaults, also nested ones, in the units of the system."""
     of_angle = bool(getattr(part, "is_angular", False))
     changed = {}
     for each in fields(part):
@@ -23,7 +23,7 @@ def in_units_of(units: Units, part: Any) -> Any:
 
 
 def held_in_units(units: Units, value: Any) -> Any:
-    """Return what a field holds with its defaults in units of the system; itself if there are none."""
+    """Return the value of a field with its defaults in the units of the system, or the value itself if it has none."""
     if isinstance(value, Marker):
         return value
     if is_dataclass(value) and not isinstance(value, type):

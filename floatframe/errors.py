@@ -1,4 +1,4 @@
-"""Errors of this package: one root, leaves that are also the built-in kind a caller would expect."""
+"""Errors of this package: one root class, and leaves that also derive from `ValueError` or `RuntimeError`."""
 
 from typing import Any
 
@@ -18,44 +18,44 @@ __all__ = [
 
 
 class FloatframeError(ReportedError):
-    """Root of every error that `floatframe` raises on purpose."""
+    """Root of every intentional error of `floatframe`."""
 
 
 class ModelError(FloatframeError, ValueError):
-    """A body, marker, joint, force or system is not what it claims to be."""
+    """A body, marker, joint, force or system is invalid."""
 
 
 class SystemFileError(FloatframeError, ValueError):
-    """A system file is not valid; the text names the key, the value and the choices."""
+    """The system file is invalid; the message names the key, the value and the choices."""
 
 
 class ResultsError(FloatframeError, ValueError):
-    """A file is not a readable results file, or cannot be written."""
+    """The file is not a readable results file, or cannot be written."""
 
 
 class SignalError(FloatframeError, ValueError):
-    """A file of signals, or what was asked of a signal, is not valid; the text names file, line and channel."""
+    """A file of signals, or a request about a signal, is invalid; the message names file, line and channel."""
 
 
 class FatigueError(FloatframeError, ValueError):
-    """An S-N curve, a load block or a fatigue file is not valid, or stresses lie beyond what they are known for."""
+    """An S-N curve, a load block or a fatigue file is invalid, or stresses are outside their range of validity."""
 
 
 class UrdfError(FloatframeError, ValueError):
-    """A description of a robot is not valid, or cannot be written; the text names file, line, link or joint."""
+    """The description of a robot is invalid, or cannot be written; the message names file, line, link or joint."""
 
 
 class ConvergenceError(FloatframeError, RuntimeError):
-    """Newton's method failed; what was computed before is kept.
+    """Newton's method failed; the results computed before are kept.
 
     Attributes
     ----------
     t, h
-        Time at the beginning of the failed step and its size [s].
+        Time at the start of the failed step, and its size [s].
     residual
-        Size of the last correction relative to what would have been accepted.
+        Size of the last correction relative to the accepted size.
     trajectory
-        The motion up to the last good step, or None if there was none.
+        The motion up to the last successful step, or None if there was none.
     """
 
     def __init__(self, message: str, *, t: float, h: float, residual: float, trajectory: Any = None) -> None:
@@ -67,14 +67,14 @@ class ConvergenceError(FloatframeError, RuntimeError):
 
 
 class CosimulationError(FloatframeError, RuntimeError):
-    """A unit of another program failed, or the units did not agree; what was computed before is kept.
+    """A unit of another program failed, or the units did not agree; the results computed before are kept.
 
     Attributes
     ----------
     t
-        Time at the beginning of the failed macro-step [s], None before the first.
+        Time at the start of the failed macro-step [s]; None before the first step.
     trajectory
-        The motion up to there, or None if there was none.
+        The motion up to that time, or None if there was none.
     """
 
     def __init__(self, message: str, *, t: float | None = None, trajectory: Any = None) -> None:

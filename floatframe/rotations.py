@@ -1,16 +1,16 @@
 """Rotations: Euler parameters, rotation vectors, matrices, and the Jacobians of the exponential map.
 
-One convention: R_GB maps components, v_G = R_GB @ v_B; p = (w, x, y, z) are its unit Euler parameters (Hamilton
-product); a rotation vector theta turns B by t = |theta| about theta; omega_B is the angular velocity in body axes, so
-that R_dot = R tilde(omega_B). With S = tilde(theta)
+One convention is used throughout. R_GB maps components, v_G = R_GB @ v_B; p = (w, x, y, z) are its unit Euler
+parameters (Hamilton product). A rotation vector theta rotates B by t = |theta| about theta. omega_B is the angular
+velocity in body axes, so that R_dot = R tilde(omega_B). With S = tilde(theta)
 
     exp(theta) = 1 + s S + a S²,   left Jacobian L = 1 + a S + b S²,   right Jacobian T = Lᵀ = 1 - a S + b S²
 
     s = sin t / t,   a = (1 - cos t)/t²,   b = (t - sin t)/t³,   da = (da/dt)/t,   db = (db/dt)/t
 
-below t = 1/2 by their series (the next term is under 1e-17). Vectors lie along the last axis of stacks of any shape;
-what has no branch but that of the series takes complex numbers too. The kernels have the same formulas for one vector,
-compiled, in kernels/rotation.py; a test holds both to each other.
+Below t = 1/2 these quotients are computed by their series (the next term is below 1e-17). Vectors lie along the last
+axis of stacks of any shape. Functions without a branch other than that of the series also accept complex numbers. The
+kernels in kernels/rotation.py contain the same formulas for one vector, compiled; a test compares both.
 """
 
 import numpy as np
@@ -36,8 +36,8 @@ __all__ = [
     "turned",
 ]
 
-SERIES_BELOW = 0.25  #: of the squared angle
-NEAR_FULL_TURN = 1e-6  #: |theta| below which its direction is noise beside that of full turns
+SERIES_BELOW = 0.25  #: limit of the squared angle
+NEAR_FULL_TURN = 1e-6  #: |theta| minus full turns, below which the direction of theta is lost to rounding
 TERMS = 10
 
 
@@ -62,7 +62,7 @@ def turned(R: Array, a: Array) -> Array:
 
 
 def rotation_matrix(p: Array) -> Array:
-    """R_GB, (..., 3, 3), of the Euler parameters p = (w, x, y, z), (..., 4): v_G = R_GB @ v_B."""
+    """Return R_GB, (..., 3, 3), for Euler parameters p = (w, x, y, z), (..., 4): v_G = R_GB @ v_B."""
     w, x, y, z = np.moveaxis(np.asarray(p, dtype=float), -1, 0)
     rows = [
         [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -73,9 +73,10 @@ def rotation_matrix(p: Array) -> Array:
 
 
 def euler_parameters(R: Array) -> Array:
-    """Return p, (4,), of a rotation matrix, (3, 3); w >= 0.
+    """Return p, (4,), with w >= 0, for a rotation matrix, (3, 3).
 
-    The largest of the four squares (from trace and diagonal) is taken first, so that no small number divides.
+    The largest of the four squares (from trace and diagonal) is computed first, so that no division by a small number
+    occurs.
     """
     R = np.asarray(R, dtype=float)
     trace = np.trace(R)
@@ -95,9 +96,9 @@ def euler_parameters(R: Array) -> Array:
 
 
 def euler_parameters_of_rotation_vector(theta: Array) -> Array:
-    """Return p = (cos(|theta|/2), sin(|theta|/2) theta/|theta|), (..., 4), of a rotation vector, (..., 3) [rad].
+    """Return p = (cos(|theta|/2), sin(|theta|/2) theta/|theta|), (..., 4), for a rotation vector, (..., 3) [rad].
 
-    For complex numbers too.
+    Complex numbers are accepted too.
     """
     theta = np.asarray(theta)
     x = 0.25 * dot(theta, theta)
@@ -113,7 +114,7 @@ def euler_parameter_product(p: Array, other: Array) -> Array:
 
 
 def euler_parameter_rates(p: Array, omega_B: Array) -> Array:
-    """p_dot = 1/2 p * (0, omega_B), (4,) [1/s]; omega_B, (3,) [rad/s], in body axes."""
+    """Return p_dot = 1/2 p * (0, omega_B), (4,) [1/s]; omega_B, (3,) [rad/s], is in body axes."""
     w, v = p[0], np.asarray(p[1:])
     return 0.5 * np.array([-(v @ omega_B), *(w * np.asarray(omega_B) + np.cross(v, omega_B))])
 
@@ -130,7 +131,7 @@ def series(x: Array, first: int) -> Array:
 
 
 def series_of_rate(x: Array, first: int) -> Array:
-    """Return twice the derivative of `series` by x: (d/dt)/t of it, Σ -2 (k + 1) (-x)^k / (2 k + 2 + first)!."""
+    """Return twice the derivative of `series` with respect to x, Σ -2 (k + 1) (-x)^k / (2 k + 2 + first)!."""
     total, term = np.zeros_like(x), -2 * np.ones_like(x)
     for k in range(1, first + 3):
         term = term / k
@@ -141,7 +142,7 @@ def series_of_rate(x: Array, first: int) -> Array:
 
 
 def quotients(x: Array) -> tuple[Array, Array, Array]:
-    """Return s, a, b of the square x of an angle."""
+    """Return s, a, b for the square x of an angle."""
     x = np.asarray(x) * 1.0
     is_small = np.abs(x) < SERIES_BELOW
     if np.all(is_small):
@@ -155,7 +156,7 @@ def quotients(x: Array) -> tuple[Array, Array, Array]:
 
 
 def rates_of_quotients(x: Array) -> tuple[Array, Array]:
-    """Return da, db of the square x of an angle."""
+    """Return da, db for the square x of an angle."""
     x = np.asarray(x) * 1.0
     is_small = np.abs(x) < SERIES_BELOW
     t = np.sqrt(np.where(is_small, 1.0, x))
@@ -173,14 +174,14 @@ def polynomial(theta: Array, first: Array, second: Array) -> Array:
 
 
 def rotation_exp(theta: Array) -> Array:
-    """Return the rotation matrix of a rotation vector, (..., 3, 3) for (..., 3); complex numbers too."""
+    """Return the rotation matrix of a rotation vector, (..., 3, 3) for (..., 3); complex numbers are accepted too."""
     theta = np.asarray(theta)
     s, a, _ = quotients(dot(theta, theta))
     return polynomial(theta, s, a)
 
 
 def left_jacobian(theta: Array) -> Array:
-    """Return L(theta), (..., 3, 3): d exp(theta) exp(theta)ᵀ = tilde(L dtheta); complex numbers too."""
+    """Return L(theta), (..., 3, 3): d exp(theta) exp(theta)ᵀ = tilde(L dtheta); complex numbers are accepted too."""
     theta = np.asarray(theta)
     _, a, b = quotients(dot(theta, theta))
     return polynomial(theta, a, b)
@@ -192,9 +193,9 @@ def right_jacobian(theta: Array) -> Array:
 
 
 def spin_rate(theta: Array, rate: Array, second: Array) -> Array:
-    """Return the rate of the angular velocity L(theta) rate of exp(theta), (..., 3), seen from where it begins.
+    """Return the rate of the angular velocity L(theta) rate of exp(theta), (..., 3), in the axes at the start.
 
-    L second + (theta · rate) (da theta × rate + db theta × (theta × rate)) + b rate × (theta × rate).
+    It is L second + (theta · rate) (da theta × rate + db theta × (theta × rate)) + b rate × (theta × rate).
     """
     theta = np.asarray(theta)
     x = dot(theta, theta)
@@ -206,7 +207,7 @@ def spin_rate(theta: Array, rate: Array, second: Array) -> Array:
 
 
 def rotation_log(R: Array) -> Array:
-    """Return the rotation vector, (3,) [rad], of a rotation matrix; its length lies in 0..pi."""
+    """Return the rotation vector, (3,) [rad], of a rotation matrix; its length is between 0 and pi."""
     p = euler_parameters(R)
     sine = np.linalg.norm(p[1:])
     if sine == 0.0:
@@ -215,9 +216,9 @@ def rotation_log(R: Array) -> Array:
 
 
 def continued_rotation(theta: Array, expected: Array) -> Array:
-    """Return theta + 2 pi n theta/|theta|, |theta| <= pi, nearest to the expected rotation vector, (..., 3).
+    """Return the rotation vector theta + 2 pi n theta/|theta| nearest to an expected one, (..., 3); |theta| <= pi.
 
-    Complex numbers too, theta real but for a small change.
+    Complex numbers are accepted if the imaginary part of theta is small.
     """
     real = np.real(theta)
     t, size = np.linalg.norm(real, axis=-1), np.linalg.norm(expected, axis=-1)

@@ -1,4 +1,4 @@
-"""The state of a system: where its bodies are and how they move."""
+"""The state of a system: positions and velocities of its bodies."""
 
 from dataclasses import dataclass
 
@@ -15,15 +15,15 @@ __all__ = ["State"]
 class State:
     """Positions and velocities of all bodies, in the order of the system.
 
-    Velocities of body i in u: v_GO in ground axes (3), omega_B in body axes (3), q_dot (n_q of the body).
+    For each body i, u contains v_GO in ground axes (3), omega_B in body axes (3), and q_dot (n_q of the body).
     """
 
     r: Array  #: position of the frame origins, ground axes, (n_b, 3) [m]
     p: Array  #: Euler parameters (w, x, y, z) of R_GB, (n_b, 4)
     q: Array  #: modal coordinates of all bodies, (n_q,)
     u: Array  #: velocities, (6 n_b + n_q,)
-    #: unknowns of the connections, such as those of an equilibrium, (n_w,): where states of elements and user forces
-    #: begin; None: at their start
+    #: unknowns of the connections, (n_w,), such as those of an equilibrium; they include the states of elements and
+    #: user forces; None: initial values
     w: Array | None = None
 
     def __post_init__(self) -> None:

@@ -25,11 +25,11 @@ REDUNDANT = ("refuse", "minimum-norm")
 
 
 class Named(Protocol):
-    """What a system carries for those who measure, linearise or run it: sensors, channels, events."""
+    """A sensor, channel or event, which a system carries for measurement, linearisation or a run."""
 
     @property
     def name(self) -> str:
-        """Its name, used once."""
+        """Unique name."""
 
 
 @frozen_copies
@@ -40,27 +40,29 @@ class System:
     Raises
     ------
     ModelError
-        If there is no body, a name is missing or used twice, a flexible body was made in other units, or (when the
+        If there is no body; if a name is missing or used twice; if a flexible body is in other units; or if (when the
         system is first compiled) a joint or force names a body, interface or place that does not exist.
     """
 
     bodies: Sequence[Body]
-    joints: Sequence[Joint] = ()  #: couplers given among them are moved to `couplers`
+    joints: Sequence[Joint] = ()  #: couplers among them are moved to `couplers`
     forces: Sequence[Force] = ()
     units: Units = field(default_factory=lambda: unit_system("m-kg-s"))
     name: str = "system"
-    #: constraints that repeat others: "refuse" them by name, or share their reactions ("minimum-norm")
+    #: redundant constraints: "refuse" rejects them with their names, "minimum-norm" distributes their reactions
     redundant: str = "refuse"
-    couplers: Sequence[CoordinateCoupler] = ()  #: between coordinates of joints
+    couplers: Sequence[CoordinateCoupler] = ()  #: couplers between coordinates of joints
     elements: Sequence[Element] = field(default=(), kw_only=True)  #: public elements, see `floatframe.elements`
-    sensors: Sequence[Named] = field(default=(), kw_only=True)  #: what is measured on its motions
-    inputs: Sequence[Named] = field(default=(), kw_only=True)  #: forces that act on it when it is linearised
-    outputs: Sequence[Named] = field(default=(), kw_only=True)  #: what is then observed
-    events: Sequence[Named] = field(default=(), kw_only=True)  #: what a run does when a value passes a level
+    sensors: Sequence[Named] = field(default=(), kw_only=True)  #: quantities measured on its motions
+    #: forces that act as inputs when the system is linearised
+    inputs: Sequence[Named] = field(default=(), kw_only=True)
+    outputs: Sequence[Named] = field(default=(), kw_only=True)  #: observed quantities of the linearised system
+    events: Sequence[Named] = field(default=(), kw_only=True)  #: actions of a run when a value passes a level
     fmus: Sequence[Named] = field(default=(), kw_only=True)  #: units of other programs, see `co_simulate`
-    scene: Sequence[Shape | Geometry] = field(default=(), kw_only=True)  #: what stands around: ground, road, track
-    source: str = field(default="", kw_only=True)  #: path of the system file, for the record; "": made in Python
-    data_files: Sequence[str] = field(default=(), kw_only=True)  #: paths of signals, tyres, roads it was made with
+    scene: Sequence[Shape | Geometry] = field(default=(), kw_only=True)  #: surroundings: ground, road, track
+    #: path of the system file, for the record; "": the system was made in Python
+    source: str = field(default="", kw_only=True)
+    data_files: Sequence[str] = field(default=(), kw_only=True)  #: paths of the signals, tyres and roads that were used
 
     def __post_init__(self) -> None:
         for part in (
@@ -102,12 +104,12 @@ class System:
 
     @property
     def files(self) -> tuple[str, ...]:
-        """The files it was read from: the system file, modal files of bodies, signals, files of elements."""
+        """Files of the system: the system file, modal files of bodies, signals, files of elements."""
         sources = [body.source for body in self.bodies if isinstance(body, FlexibleBody)]
         return tuple(source for source in (self.source, *sources, *self.data_files) if source)
 
     def body(self, name: str) -> Body:
-        """Return the body of that name; `ModelError` with the choices if there is none."""
+        """Return the body of that name; raise `ModelError` with the known names if there is none."""
         for body in self.bodies:
             if body.name == name:
                 return body
@@ -116,7 +118,7 @@ class System:
 
 
 def require_names(where: str, names: Iterable[str], *, taken: Iterable[str] = ()) -> None:
-    """Raise `ModelError` unless every name is a word, used once, and can name a group in a results file."""
+    """Raise `ModelError` unless every name is unique and valid as a group name in a results file."""
     seen = set(taken)
     for name in names:
         if not isinstance(name, str) or not name.strip() or "/" in name or name in (".", ".."):

@@ -1,4 +1,4 @@
-"""Forces: one file each; `FORCES` is the registry for the system file."""
+"""Forces: one file for each; `FORCES` is the registry for the system file."""
 
 from floatframe.forces.body_load import BodyLoad
 from floatframe.forces.bushing import Bushing

@@ -14,16 +14,16 @@ __all__ = ["BodyLoad"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class BodyLoad:
-    """A load case of a flexible body times an amplitude; it turns with the body.
+    """A load case of a flexible body times an amplitude; it rotates with the body.
 
-    Its resultant acts at the undeformed body, its modal forces at the modes: the change of its torque with the
-    deformation, of first order, is left out.
+    Its resultant acts on the undeformed body, and its modal forces act on the modes. The first-order change of its
+    torque due to the deformation is neglected.
     """
 
     name: str
     body: str | Named  #: a flexible body
-    load_case: str  #: name in the modal file
-    amplitude: TimeFunction | float = field(default=1.0)  #: factor, or a function of time
+    load_case: str  #: name of the load case in the modal file
+    amplitude: TimeFunction | float = field(default=1.0)  #: factor: a number or a function of time
 
     def __post_init__(self) -> None:
         if isinstance(self.amplitude, int | float):

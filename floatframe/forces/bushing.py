@@ -1,4 +1,4 @@
-"""The bushing: six stiffnesses and dampers, coupled as wanted, between two markers."""
+"""The bushing: a stiffness and a damping matrix for six deformations between two markers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,26 +14,28 @@ from floatframe.functions.time_functions import NOT_OF_TIME, TimeFunction
 
 __all__ = ["AXES", "DEFORMATIONS", "Bushing"]
 
-DEFORMATIONS = ("x", "y", "z", "rx", "ry", "rz")  #: in the order of the rows of the matrices
-AXES = {"a": 0.0, "b": 1.0, "half way": 0.5}  #: by name, the share of the rotation of B against A that they make
+DEFORMATIONS = ("x", "y", "z", "rx", "ry", "rz")  #: deformations in the order of the matrix rows
+#: share of the rotation of B relative to A that each choice of axes includes
+AXES = {"a": 0.0, "b": 1.0, "half way": 0.5}
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Bushing:
-    """Force and torque K xi + D xi_dot + preload + tables(xi) between two markers; derived from a potential.
+    """Force and torque K xi + D xi_dot + preload + tables(xi) between two markers, derived from a potential.
 
-    The deformation xi: distance of the points (3) and rotation vector (3) of marker B against A, in the axes of one of
-    them. Those of the part that does not spin are right for a bearing: a damper in axes that turn with a rotor drives
-    it. Without damping the energy is kept, also far from small rotations. The deformation is zero where the markers
-    coincide. A rotation about one axis is counted beyond half a turn and goes on through full turns; where B also
-    tilts, the rotation vector means little near a full turn.
+    The deformation xi consists of the distance between the points (3) and the rotation vector (3) of marker B relative
+    to A, in the axes of one of them. For a bearing, use the axes of the part that does not spin: a damper in axes that
+    rotate with a rotor drives it. Without damping, energy is conserved, also for large rotations. The deformation is
+    zero where the markers coincide. A rotation about one axis is counted beyond half a turn and through full turns. If
+    B also tilts, the rotation vector has little meaning near a full turn.
 
-    Half way between the axes of A and B both play the same part, as in a beam or a sleeve of rubber between two bodies
-    that turn alike. There the rotation must stay below half a turn, and between the ground and a body that spins the
-    axes turn at half of its speed.
+    With axes half way between A and B, both markers play the same part, as in a beam or a rubber sleeve between two
+    bodies with similar rotation. The rotation must then stay below half a turn. Between the ground and a spinning body,
+    these axes rotate at half the speed.
 
-    A body given in place of a marker is held where, and as, the other marker is placed: zero deformation as placed.
+    A body given instead of a marker is attached at the position of the other marker, with zero deformation as
+    assembled.
     """
 
     name: str
@@ -44,7 +46,7 @@ class Bushing:
     preload: Array = field(default_factory=lambda: np.zeros(6))  #: force and torque on A at zero deformation, (6,)
     #: functions of one deformation ("x", ..., "rz"), such as tables, whose values are added [N, N m]
     characteristics: Mapping[str, TimeFunction] = field(default_factory=dict, metadata=NOT_OF_TIME)
-    axes: str = "a"  #: in which it acts: those of marker "a", of marker "b", or "half way" between them
+    axes: str = "a"  #: axes in which it acts: those of marker "a" or marker "b", or "half way" between them
 
     def __post_init__(self) -> None:
         where = f"force {self.name!r}"
@@ -77,14 +79,14 @@ class Bushing:
 
     @property
     def counts_turns(self) -> bool:
-        """Whether rotations beyond half a turn make a difference to it, and are counted."""
+        """Whether rotations beyond half a turn affect it, and are counted."""
         of_rotations = [self.stiffness[3:], self.damping[3:], self.damping[:, 3:], self.preload[3:]]
         is_turned = any(part.any() for part in of_rotations) or any(key.startswith("r") for key in self.characteristics)
         return is_turned and self.axes != "half way"
 
 
 def six_by_six(where: str, values: Array) -> Array:
-    """Return a matrix, (6, 6), given whole or by its diagonal."""
+    """Return a (6, 6) matrix from the complete matrix or its diagonal."""
     if np.shape(values) == (6,):
         values = np.diag(array_of_shape(where, values, (6,)))
     return array_of_shape(where, values, (6, 6))

@@ -12,7 +12,7 @@ __all__ = ["Gravity"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Gravity:
-    """A uniform acceleration of free fall; it acts on every particle of the deformed bodies."""
+    """A uniform gravitational acceleration, which acts on every particle of the deformed bodies."""
 
     acceleration: Array  #: ground axes, (3,) [m/s²], such as (0, 0, -9.81)
 

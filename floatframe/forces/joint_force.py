@@ -20,13 +20,13 @@ class JointForce:
 
     Q = -k (x - x_0) - c x_dot + preload + motor(t) + characteristic(x - x_0) - (T + mu N) tanh(x_dot/v_0)
 
-    N is the size of the force in the joint normal to its axis. An angle enters between -pi and pi from its free value.
-    Regularised Coulomb friction creeps: it holds a load with x_dot below v_0.
+    N is the magnitude of the joint force normal to its axis. An angle is taken between -pi and pi from its free value.
+    Regularised Coulomb friction creeps: it holds a load only while x_dot stays below v_0.
     """
 
     name: str
     joint: str  #: name of the joint
-    coordinate: str  #: of it, such as "angle"
+    coordinate: str  #: name of the coordinate of the joint, such as "angle"
     stiffness: float = 0.0  #: k [N/m, N m/rad]
     free: float = 0.0  #: x_0 [m, rad]
     damping: float = 0.0  #: c [N s/m, N m s/rad]
@@ -34,13 +34,14 @@ class JointForce:
     motor: TimeFunction | None = None  #: a function of time [N, N m]
     #: a function of x - x_0, such as a table [N, N m]
     characteristic: TimeFunction | None = field(default=None, metadata=NOT_OF_TIME)
-    friction: float = 0.0  #: T, of Coulomb [N, N m]
-    friction_coefficient: float = 0.0  #: mu; for an angle mu times the radius of the bearing [1, m]
-    friction_speed: float = FRICTION_SPEED  #: v_0, where friction is at tanh(1) of its value [m/s, rad/s]
+    friction: float = 0.0  #: Coulomb friction T [N, N m]
+    friction_coefficient: float = 0.0  #: coefficient mu; for an angle, mu times the bearing radius [1, m]
+    #: v_0, the speed at which friction reaches tanh(1) of its value [m/s, rad/s]
+    friction_speed: float = FRICTION_SPEED
 
     @property
     def is_angular(self) -> bool:
-        """Whether its coordinate is an angle: joints name them so."""
+        """Whether the coordinate is an angle, which joints indicate in its name."""
         return self.coordinate.startswith("angle")
 
     def __post_init__(self) -> None:

@@ -17,14 +17,14 @@ __all__ = ["PointForce"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class PointForce:
-    """A force and a torque that act on a marker."""
+    """A force and a torque on a marker."""
 
     name: str
     marker: Marker
     force: Array = field(default_factory=lambda: np.zeros(3))  #: (3,) [N]
     torque: Array = field(default_factory=lambda: np.zeros(3))  #: (3,) [N m]
-    is_follower: bool = False  #: True: components in the axes of the (deformed) marker; False: in ground axes
-    amplitude: TimeFunction | None = None  #: a function of time by which both are multiplied; None: one
+    is_follower: bool = False  #: True: components in the axes of the (deformed) marker; False: ground axes
+    amplitude: TimeFunction | None = None  #: function of time that multiplies both; None: one
 
     def __post_init__(self) -> None:
         if not isinstance(self.amplitude, TimeFunction | None):

@@ -1,4 +1,4 @@
-"""Contact of a sphere with a plane or another sphere: Hertz's force, restitution, friction."""
+"""Contact of a sphere with a plane or another sphere: Hertz force, restitution, friction."""
 
 from dataclasses import dataclass, field
 
@@ -17,12 +17,12 @@ SLOW = Quantity(1e-3, SPEED)
 
 
 def exact_dissipation(e: float) -> float:
-    """Return the h with which two bodies leave each other with e times their speed of approach.
+    """Return the h for which two bodies separate with e times their approach speed.
 
-    With f = k xⁿ (1 + h x_dot/v_0) the energy integral over the contact, v dv/(1 + h v/v_0) = -(k/m) xⁿ dx, taken from
-    v_0 to -e v_0, gives h (1 + e) = log((1 + h)/(1 - h e)), whatever k, n, m.
+    With f = k xⁿ (1 + h x_dot/v_0), the energy integral over the contact, v dv/(1 + h v/v_0) = -(k/m) xⁿ dx, from v_0
+    to -e v_0 gives h (1 + e) = log((1 + h)/(1 - h e)), for any k, n, m.
     """
-    from scipy.optimize import brentq  # slow to import, seldom wanted
+    from scipy.optimize import brentq  # slow to import, and seldom needed
 
     if e >= 1.0:
         return 0.0
@@ -37,7 +37,7 @@ def exact_dissipation(e: float) -> float:
     return float(brentq(defect, low, high, xtol=1e-14, rtol=1e-14)) if defect(low) < 0 else low
 
 
-#: name: h as a function of the coefficient of restitution e
+#: h as a function of the coefficient of restitution e, by name
 DISSIPATIONS = {
     "exact": exact_dissipation,
     "hunt-crossley": lambda e: 1.5 * (1 - e),
@@ -47,16 +47,16 @@ DISSIPATIONS = {
 
 
 def hertz_stiffness(modulus: float, radius: float, other_radius: float | None = None) -> float:
-    """Return k of f = k x^(3/2): 4/3 E* sqrt(R*), for a sphere on a plane or on another sphere.
+    """Return k in f = k x^(3/2): 4/3 E* sqrt(R*), for a sphere on a plane or on another sphere.
 
     Parameters
     ----------
     modulus
         E*, 1/E* = (1 - nu_1²)/E_1 + (1 - nu_2²)/E_2 [Pa].
     radius
-        Of the sphere [m].
+        Radius of the sphere [m].
     other_radius
-        Of the other sphere [m]; None: a plane.
+        Radius of the other sphere [m]; None: a plane.
     """
     E = number("hertz_stiffness: modulus", modulus, above=0.0)
     R = number("hertz_stiffness: radius", radius, above=0.0)
@@ -68,26 +68,27 @@ def hertz_stiffness(modulus: float, radius: float, other_radius: float | None = 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class SphereContact:
-    """A sphere about the point of marker B meets a plane through the point of marker A, or a sphere about it.
+    """Contact of a sphere about the point of marker B with a plane through, or a sphere about, the point of marker A.
 
-    f = k xⁿ (1 + h x_dot/v_0) for a depth x > 0 and never below zero, v_0 the speed of approach at the beginning of
-    each contact; friction mu f V/sqrt(|V|² + v_s²) against the slip V. Without radius_a there is a plane.
+    f = k xⁿ (1 + h x_dot/v_0) for a depth x > 0, and never negative; v_0 is the approach speed at the start of each
+    contact. Friction is mu f V/sqrt(|V|² + v_s²) against the slip velocity V. Without radius_a the contact is with a
+    plane.
     """
 
     name: str
     marker_a: Marker
     marker_b: Marker
-    radius_b: float  #: of the sphere on B [m]
-    radius_a: float | None = None  #: of the sphere on A [m]; None: a plane
+    radius_b: float  #: radius of the sphere on B [m]
+    radius_a: float | None = None  #: radius of the sphere on A [m]; None: a plane
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: normal of the plane, axes of A, towards B
-    modulus: float | None = None  #: E* of Hertz [Pa]; gives stiffness and exponent 3/2
-    stiffness: float | None = None  #: k, instead of it [N/mⁿ]
+    modulus: float | None = None  #: Hertz modulus E* [Pa]; determines stiffness and exponent 3/2
+    stiffness: float | None = None  #: k, instead of the modulus [N/mⁿ]
     exponent: float = 1.5  #: n
-    restitution: float = 1.0  #: coefficient e of restitution, above 0
+    restitution: float = 1.0  #: coefficient of restitution e, above 0
     dissipation: str = "exact"  #: law of h(e): exact, hunt-crossley, lankarani-nikravesh or flores
     friction: float = 0.0  #: mu
-    friction_speed: float = SLOW  #: v_s, slip at which friction is 0.71 of its value [m/s]
-    slow: float = SLOW  #: least v_0 [m/s]
+    friction_speed: float = SLOW  #: v_s, the slip at which friction is 0.71 of its value [m/s]
+    slow: float = SLOW  #: smallest v_0 [m/s]
 
     def __post_init__(self) -> None:
         where = f"force {self.name!r}"
@@ -115,7 +116,7 @@ class SphereContact:
 
     @property
     def coefficients(self) -> dict[str, float]:
-        """Numbers for the kernels, by the names of `kernels.model.Contacts`."""
+        """Numbers for the kernels, by the field names of `kernels.model.Contacts`."""
         k = self.stiffness
         if k is None:
             assert self.modulus is not None  # checked above

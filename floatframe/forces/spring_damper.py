@@ -16,8 +16,8 @@ __all__ = ["SpringDamper"]
 class SpringDamper:
     """Tension k (l - l_0) + c l_dot + preload + characteristic(l - l_0) along the line from marker A to marker B.
 
-    l is the length of that line.
-    A spring whose markers coincide has no direction: give free_length = 0 and no preload there, or keep them apart.
+    l is the length of that line. A spring has no direction where its markers coincide. If that can happen, set
+    free_length = 0 and no preload, or keep the markers apart.
     """
 
     name: str
@@ -25,7 +25,7 @@ class SpringDamper:
     marker_b: Marker
     stiffness: float = 0.0  #: k [N/m]
     damping: float = 0.0  #: c [N s/m]
-    free_length: float | None = None  #: l_0 [m]; None: the distance as placed
+    free_length: float | None = None  #: l_0 [m]; None: the assembled distance
     preload: float = 0.0  #: constant part of the tension [N]
     #: a function of l - l_0, such as a table [N]
     characteristic: TimeFunction | None = field(default=None, metadata=NOT_OF_TIME)

@@ -1,4 +1,4 @@
-"""User forces: expressions or functions of coordinates, time and states of their own (control)."""
+"""User forces: expressions or functions of coordinates, time and their own states (control)."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -21,34 +21,34 @@ __all__ = ["UserForce"]
 class UserForce:
     """Forces Q along coordinates x, and states z with z_dot = g, as functions of t, x, x_dot and z.
 
-    With expressions (see `functions.expressions`), in which `phi` is the value of the coordinate of that name,
-    `phi_dot` its rate, `t` the time, and states, parameters and tables go by their names:
+    In expressions (see `functions.expressions`), `phi` is the value of the coordinate of that name, `phi_dot` is its
+    rate, and `t` is the time. States, parameters and tables have their own names:
 
         UserForce("pid", {"phi": JointCoordinate("hub", "angle")},
                   forces={"phi": "-kp*(phi - aim(t)) - kd*phi_dot - ki*e"},
                   rates={"e": "phi - aim(t)"}, states={"e": 0.0},
                   parameters={"kp": 40.0, "kd": 4.0, "ki": 10.0}, functions={"aim": smooth_step(0, 1, 0, 0.5)})
 
-    With a function: `forces` then names the coordinates that get one. It is called as function(t, x, v, z, Q, z_dot)
-    with arrays in the order in which coordinates and states are given, and writes Q, (n_forces,), and z_dot,
-    (n_states,). One made by `numba.njit` runs at full speed, a plain Python function slowly. Its derivatives are taken
-    by differences, and it must depend on its arguments alone: it is called more often than once a step.
+    With a function, `forces` names the coordinates along which forces act. It is called as function(t, x, v, z, Q,
+    z_dot) with arrays in the order of coordinates and states, and writes Q, (n_forces,), and z_dot, (n_states,). A
+    function compiled by `numba.njit` runs at full speed, a Python function slowly. Its derivatives are computed by
+    finite differences. It must depend only on its arguments, because it is called more than once per step.
     """
 
     name: str
-    coordinates: Mapping[str, Coordinate]  #: what is seen and acted on, by name
+    coordinates: Mapping[str, Coordinate]  #: observed coordinates, along which forces may act, by name
     forces: Mapping[str, str] | Sequence[str] = field(default_factory=dict)  #: expressions by coordinate, or names
     rates: Mapping[str, str] = field(default_factory=dict)  #: expressions of the rates of the states
-    states: Mapping[str, float] = field(default_factory=dict)  #: values of the states at the start
-    parameters: Mapping[str, float] = field(default_factory=dict)  #: numbers of expressions
-    #: functions of one number of expressions
+    states: Mapping[str, float] = field(default_factory=dict)  #: initial values of the states
+    parameters: Mapping[str, float] = field(default_factory=dict)  #: constants in expressions
+    #: functions of one variable in expressions
     functions: Mapping[str, TimeFunction] = field(default_factory=dict, metadata=NOT_OF_TIME)
     function: Callable[..., None] | None = None  #: instead of expressions
-    knots: Sequence[float] = ()  #: times at which the function jumps, where steps of a run end [s]
-    #: expressions at whose zeros forces and rates jump with the motion. There their names stand for the sign, 1 (at
-    #: zero too) or -1, which stands still in a step; steps of a run end at the zeros
+    knots: Sequence[float] = ()  #: times at which the function jumps; steps of a run end there [s]
+    #: expressions at whose zeros forces and rates jump. In other expressions, the name of a switch stands for its sign,
+    #: 1 (also at zero) or -1. The sign is constant within a step, and steps of a run end at the zeros
     switches: Mapping[str, str] = field(default_factory=dict)
-    length: float | None = None  #: over which the function changes [m]; None: the size of the smaller body
+    length: float | None = None  #: length scale on which the function changes [m]; None: the size of the smaller body
 
     def __post_init__(self) -> None:
         where = f"force {self.name!r}"
@@ -99,12 +99,12 @@ class UserForce:
 
     @property
     def inputs(self) -> list[str]:
-        """Names of the inputs of expressions in their order: t, coordinates, their rates, states."""
+        """Names of the inputs of expressions, in order: t, coordinates, their rates, states."""
         names = list(self.coordinates)
         return ["t", *names, *(f"{name}_dot" for name in names), *self.states]
 
     def parts_of_time(self) -> TimeParts:
-        """Return what of the expressions depends on time alone."""
+        """Return the parts of the expressions that depend only on time."""
         parts = TimeParts()
         if self.function is not None or not isinstance(self.forces, Mapping):
             return parts
@@ -119,7 +119,7 @@ class UserForce:
 
 
 def require_words(where: str, names: Sequence[str]) -> None:
-    """Raise `ModelError` unless all names can stand in an expression and differ."""
+    """Raise `ModelError` unless all names are valid in an expression and unique."""
     for k, name in enumerate(names):
         if not isinstance(name, str) or not name.isidentifier():
             raise ModelError(f"{where}: expected a name of letters, digits and _, got {name!r}")

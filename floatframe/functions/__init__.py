@@ -1,1 +1,1 @@
-"""Functions of time and of coordinates, as tables, pieces and expressions."""
+"""Functions of time and of coordinates: tables, piecewise functions and expressions."""

@@ -1,8 +1,8 @@
-"""A small language for forces and control: `-k*phi - c*phi_dot + table(t)`, compiled to a tape of operations.
+"""A small language for forces and control, `-k*phi - c*phi_dot + table(t)`, compiled to a tape of operations.
 
-Numbers, names, + - * / ** (or ^), comparisons < <= > >=, `a if x < b else c`, and the functions of `FUNCTIONS`. The
-text is parsed by Python's own parser and never run: only what is listed here exists. The kernels walk the tape and
-its exact gradient (kernels/connections/tape.py), so that nothing is compiled for a new expression.
+It has numbers, names, + - * / ** (or ^), comparisons < <= > >=, `a if x < b else c`, and the functions of `FUNCTIONS`.
+The text is parsed by Python's own parser and never executed; nothing beyond this list is allowed. The kernels evaluate
+the tape and its exact gradient (kernels/connections/tape.py), so a new expression needs no compilation.
 """
 
 import ast
@@ -16,12 +16,12 @@ from floatframe.errors import ModelError
 
 __all__ = ["CONSTANTS", "FUNCTIONS", "Tape", "compile_expression"]
 
-#: operations without operands on the tape, of one operand, of two: codes in the kernels
+#: codes of the operations on the tape in the kernels: without operands, with one operand, with two
 CONSTANT, INPUT, CALL, SELECT = range(4)
 NEGATIVE, SIN, COS, TAN, ASIN, ACOS, ATAN, SINH, COSH, TANH, EXP, LOG, SQRT, ABS, SIGN = range(4, 19)
 ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, ATAN2, LESS, MIN, MAX = range(19, 28)
 
-FUNCTIONS = {  # name: (code, number of arguments)
+FUNCTIONS = {  # code and number of arguments, by name
     "sin": (SIN, 1), "cos": (COS, 1), "tan": (TAN, 1), "asin": (ASIN, 1), "acos": (ACOS, 1), "atan": (ATAN, 1),
     "sinh": (SINH, 1), "cosh": (COSH, 1), "tanh": (TANH, 1), "exp": (EXP, 1), "log": (LOG, 1), "sqrt": (SQRT, 1),
     "abs": (ABS, 1), "sign": (SIGN, 1), "atan2": (ATAN2, 2), "min": (MIN, 2), "max": (MAX, 2),
@@ -36,7 +36,7 @@ LONGEST_TEXT = 10_000  #: characters
 
 @dataclass
 class Tape:
-    """Operations in their order: code, operands (numbers of earlier ones, or of an input), constant."""
+    """Operations in order, with code, operands (indices of earlier operations, or of an input) and constant."""
 
     op: list[int] = field(default_factory=list)
     a: list[int] = field(default_factory=list)
@@ -44,7 +44,7 @@ class Tape:
     c: list[float] = field(default_factory=list)
 
     def add(self, op: int, a: int = 0, b: int = 0, c: float = 0.0) -> int:
-        """Add an operation; return its number."""
+        """Append an operation; return its index."""
         self.op.append(op)
         self.a.append(a)
         self.b.append(b)
@@ -66,22 +66,22 @@ def compile_expression(
     Parameters
     ----------
     where
-        What it is, for messages.
+        Name of the expression, for messages.
     text
         The expression.
     inputs
-        Names of the numbers it is a function of, in their order.
+        Names of its input variables, in order.
     parameters
-        Names with a value.
+        Names with constant values.
     functions
-        Names of functions of one number (tables), and their numbers in the kernels.
+        Names of functions of one variable (tables), with their indices in the kernels.
     switches
-        Names of expressions, of which the sign is meant: 1 at zero and above, else -1.
+        Names of expressions whose sign is used: 1 at zero and above, else -1.
 
     Raises
     ------
     ModelError
-        With the token and its column, if it is not an expression or uses what does not exist.
+        With the token and its column, if the text is not an expression or uses unknown names.
     """
     if isinstance(text, str) and len(text) > LONGEST_TEXT:
         raise ModelError(f"{where}: expected up to {LONGEST_TEXT} characters, got {len(text)}: {quoted(text)}")
@@ -105,7 +105,7 @@ def compile_expression(
 
 def parsed(text: str) -> ast.expr:
     """Return the syntax tree of an expression."""
-    with warnings.catch_warnings():  # of the parser, about what reads oddly: 1if x<1else 2
+    with warnings.catch_warnings():  # the parser warns about odd text such as 1if x<1else 2
         warnings.simplefilter("ignore", SyntaxWarning)
         warnings.simplefilter("ignore", DeprecationWarning)
         return ast.parse(text.strip().replace("^", "**"), mode="eval").body
@@ -129,7 +129,7 @@ class Writer:
         return ModelError(f"{self.where}: {words} at column {column} of {quoted(self.text)}{hint}")
 
     def write(self, node: ast.AST) -> int:
-        """Write a node; return the number of its operation."""
+        """Write a node; return the index of its operation."""
         if isinstance(node, ast.Constant):
             return self.number(node)
         if isinstance(node, ast.Name):

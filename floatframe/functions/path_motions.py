@@ -1,9 +1,9 @@
-"""Motions of several coordinates through many values, by splines, as fast as limits of speed and acceleration allow.
+"""Motions of several coordinates through many values by splines, as fast as limits on speed and acceleration allow.
 
-A spline through the same values in s times the time has 1/s of the speed and 1/s² of the acceleration everywhere: where
-only the values are given, the least s at which no coordinate exceeds a limit is known at once, and one coordinate is
-at one of its limits somewhere. How the time is shared between the values is a choice; here each part takes what the
-slowest coordinate needs at its largest speed, or by its acceleration from rest to rest, whichever is longer.
+A spline through the same values in s times the time has 1/s of the speed and 1/s² of the acceleration everywhere. If
+only the values are given, the smallest s for which no coordinate exceeds a limit follows directly, and some coordinate
+reaches a limit somewhere. The distribution of time between the values is a choice. Here each part takes the time that
+the slowest coordinate needs at its largest speed, or from rest to rest by its acceleration, whichever is longer.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,27 +19,27 @@ from floatframe.functions.time_functions import TimeFunction
 
 __all__ = ["PathMotion", "largest_size", "limit_of", "path_motion", "rest_to_rest_spline"]
 
-#: by degree: what is zero at both ends, in the form of scipy.interpolate.make_interp_spline
+#: conditions of zero derivatives at both ends for each degree, as in scipy.interpolate.make_interp_spline
 ENDS = {3: [(1, 0.0)], 5: [(1, 0.0), (2, 0.0)]}
 
 
 def rest_to_rest_spline(t: Array, values: Array, degree: int = 3) -> TimeFunction:
-    """Return the spline through a table that begins and ends at rest, and holds its ends before and after.
+    """Return the spline through a table that starts and ends at rest, and is constant before and after.
 
     Parameters
     ----------
     t
-        Times, rising, (n_t,) [s], two or more.
+        Increasing times, (n_t,) [s], two or more.
     values
-        Of the coordinate, (n_t,) [m or rad].
+        Values of the coordinate, (n_t,) [m or rad].
     degree
-        3: continuous acceleration, which jumps to zero at both ends; 5: it is zero there, and two more rates are
-        continuous.
+        3: continuous acceleration inside, with jumps to zero at both ends. 5: the acceleration is zero there, and two
+        more derivatives are continuous.
 
     Raises
     ------
     ModelError
-        If times do not rise, numbers are not finite, or the degree is another.
+        If times do not increase, numbers are not finite, or the degree is not 3 or 5.
     """
     from scipy.interpolate import PPoly, make_interp_spline
 
@@ -55,9 +55,9 @@ def rest_to_rest_spline(t: Array, values: Array, degree: int = 3) -> TimeFunctio
 
 
 def largest_size(function: TimeFunction, order: int) -> float:
-    """Return the largest size of a derivative of a function without sines, between its first and last beginning.
+    """Return the largest magnitude of a derivative of a function without sines, between its first and last knot.
 
-    Found at ends of pieces and where the next derivative is zero within one.
+    It is found at the ends of pieces, and where the next derivative is zero within a piece.
     """
     if function.pieces[:, 6].any():
         raise ModelError("largest_size: expected a function of polynomials, got one with a sine")
@@ -71,10 +71,10 @@ def largest_size(function: TimeFunction, order: int) -> float:
 
 
 class PathMotion(NamedTuple):
-    """Drives of several coordinates along one path."""
+    """Prescribed motions of several coordinates along one path."""
 
-    motions: dict[str, TimeFunction]  #: by name of the coordinate
-    t: Array  #: when each of the values is passed, (n,) [s]
+    motions: dict[str, TimeFunction]  #: motion of each coordinate, by name
+    t: Array  #: time at which each of the values is reached, (n,) [s]
 
 
 def path_motion(
@@ -85,28 +85,28 @@ def path_motion(
     degree: int = 5,
     t_start: float = 0.0,
 ) -> PathMotion:
-    """Return the splines from rest to rest through values of several coordinates, as fast as the limits allow.
+    """Return splines from rest to rest through values of several coordinates, as fast as the limits allow.
 
-    (1) the time of each part: that of the slowest coordinate, max(|h|/v, √(4 |h|/a)) for a way h
-    (2) splines through the values at these times
-    (3) times multiplied by s, the largest of |rate|/v and √(|second rate|/a) of all coordinates
+    (1) the time of each part is that of the slowest coordinate, max(|h|/v, √(4 |h|/a)) for a distance h
+    (2) splines are put through the values at these times
+    (3) times are multiplied by s, the largest of |rate|/v and √(|second rate|/a) over all coordinates
 
     Parameters
     ----------
     values
-        By name of a coordinate: its values in order, two or more, as many for each [m or rad].
+        Values of each coordinate in order, by name; two or more, equally many for all [m or rad].
     speed, acceleration
-        Limits, above zero: one number for all, or by name.
+        Limits above zero: one number for all coordinates, or by name.
     degree
-        Of the splines, 3 or 5, see `rest_to_rest_spline`.
+        Degree of the splines, 3 or 5, see `rest_to_rest_spline`.
     t_start
-        When the motion begins [s].
+        Time at which the motion starts [s].
 
     Raises
     ------
     ModelError
-        If there is nothing to move, numbers of values differ, all coordinates stay between two values, or a limit is
-        missing or not above zero.
+        If there is no coordinate, numbers of values differ, all coordinates have the same value twice in sequence, or a
+        limit is missing or not positive.
     """
     where = "path_motion"
     points = {name: np.array(each, dtype=float) for name, each in values.items()}
@@ -137,7 +137,7 @@ def path_motion(
 
 
 def limit_of(where: str, what: str, name: str, given: float | Mapping[str, float]) -> float:
-    """Return the limit of one coordinate, above zero; `ModelError` if it has none."""
+    """Return the positive limit of one coordinate; raise `ModelError` if it has none."""
     if isinstance(given, Mapping):
         if name not in given:
             raise ModelError(f"{where}: {what}: there is none of {name!r}; got {', '.join(map(repr, given)) or 'none'}")

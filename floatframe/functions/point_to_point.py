@@ -1,6 +1,6 @@
-"""Motions from one value to another as drives: a polynomial of degree five, and a trapezoid of the speed.
+"""Prescribed motions from one value to another: a polynomial of degree five, and a trapezoidal speed profile.
 
-floatframe.functions.path_motions leads several coordinates through many values.
+For several coordinates through many values, see floatframe.functions.path_motions.
 """
 
 import math
@@ -15,7 +15,7 @@ from floatframe.functions.time_functions import N_COEFFICIENTS, TimeFunction
 
 __all__ = ["quintic", "trapezoid", "trapezoids_together"]
 
-LEAST_EXCESS = 1e-9  #: relative, by which a duration may fall below the shortest one: rounding
+LEAST_EXCESS = 1e-9  #: relative amount by which a duration may be shorter than the minimum, because of rounding
 
 
 def quintic(
@@ -31,17 +31,17 @@ def quintic(
 ) -> TimeFunction:
     """Return the polynomial of degree five with given values, velocities and accelerations at both ends.
 
-    With x the time from the beginning, T the duration and h, v0, v1, a0, a1 what is left of the ends:
+    With x the time from the start, T the duration, and h, v0, v1, a0, a1 the remaining end conditions:
 
         c = [first, v0, a0/2, (20 h - (8 v1 + 12 v0) T - (3 a0 - a1) T²)/(2 T³),
              (-30 h + (14 v1 + 16 v0) T + (3 a0 - 2 a1) T²)/(2 T⁴), (12 h - 6 (v1 + v0) T + (a1 - a0) T²)/(2 T⁵)]
 
-    Before and after it goes on along its tangents, so that it rests there where the velocities are zero.
+    Before and after, it continues along its tangents, so it rests there if the velocities are zero.
 
     Raises
     ------
     ModelError
-        If the end does not follow the beginning, or a number is not finite.
+        If the end is not after the start, or a number is not finite.
     """
     where = "quintic"
     t0, t1 = number(f"{where}: t_start", t_start), number(f"{where}: t_end", t_end)
@@ -54,7 +54,7 @@ def quintic(
     a1 = number(f"{where}: last_acceleration", last_acceleration)
     T, h = t1 - t0, x1 - x0
     pieces = np.zeros((3, N_COEFFICIENTS))
-    pieces[0, :2] = x0 - v0, v0  # begins one unit of time earlier
+    pieces[0, :2] = x0 - v0, v0  # starts one unit of time earlier
     pieces[1, :6] = [
         x0,
         v0,
@@ -77,28 +77,28 @@ def trapezoid(
     t_start: float = 0.0,
     duration: float | None = None,
 ) -> TimeFunction:
-    """Return the motion at constant acceleration, constant speed and constant deceleration, from rest to rest.
+    """Return the motion with constant acceleration, constant speed and constant deceleration, from rest to rest.
 
-    A short way has no part at constant speed: the speed is a triangle. With a duration that is longer than the
-    shortest one the speed is the lower of the two that take this time.
+    A short distance has no part with constant speed: the speed profile is a triangle. If the duration is longer than
+    the minimum, the speed is the lower of the two that take this time.
 
     Parameters
     ----------
     first, last
-        Values of the coordinate before and after [m or rad].
+        Values of the coordinate at the start and at the end [m or rad].
     speed
         Largest speed, above zero [m/s or rad/s].
     acceleration, deceleration
-        Largest sizes, above zero [m/s² or rad/s²]; deceleration: as the acceleration.
+        Largest magnitudes, above zero [m/s² or rad/s²]; deceleration defaults to the acceleration.
     t_start
-        When it begins [s].
+        Time at which the motion starts [s].
     duration
-        How long it takes [s]; default: as short as the limits allow.
+        Duration [s]; None: as short as the limits allow.
 
     Raises
     ------
     ModelError
-        If a limit is not above zero, or the duration is too short for them; the shortest one is told.
+        If a limit is not positive, or the duration is too short for the limits; the message gives the minimum.
     """
     where = "trapezoid"
     x0, x1 = number(f"{where}: first", first), number(f"{where}: last", last)
@@ -133,7 +133,7 @@ def trapezoid(
         [x1],
     ]
     begins = [t0 - 1.0, t0, t0 + rise, t0 + rise + even, t0 + rise + even + fall]
-    if even <= LEAST_EXCESS * T:  # a triangle
+    if even <= LEAST_EXCESS * T:  # the profile is a triangle
         del rows[2], begins[2]
         begins[2] = t0 + rise
     pieces = np.zeros((len(rows), N_COEFFICIENTS))
@@ -143,7 +143,7 @@ def trapezoid(
 
 
 def shortest_time(h: float, v: float, a: float, d: float) -> float:
-    """Return the shortest time for a way h with largest speed v, acceleration a and deceleration d, all above zero."""
+    """Return the shortest time for a distance h with the limits speed v, acceleration a, deceleration d, all > 0."""
     inverse = 1 / a + 1 / d
     return h / v + v * inverse / 2 if v * v * inverse < 2 * h else math.sqrt(2 * h * inverse)
 
@@ -155,16 +155,16 @@ def trapezoids_together(
     acceleration: float | Mapping[str, float],
     t_start: float = 0.0,
 ) -> dict[str, TimeFunction]:
-    """Return trapezoids of several coordinates that begin and end together, as fast as the slowest of them can.
+    """Return trapezoids of several coordinates that start and end together, as fast as the slowest coordinate allows.
 
     Parameters
     ----------
     ways
-        By name of a coordinate: its values before and after.
+        Values of each coordinate at the start and at the end, by name.
     speed, acceleration
-        Limits, above zero: one number for all, or by name.
+        Limits above zero: one number for all coordinates, or by name.
     t_start
-        When they begin [s].
+        Time at which the motions start [s].
 
     Raises
     ------

@@ -1,8 +1,8 @@
-"""Functions of time through tables: of positions, or of accelerations that are integrated exactly twice.
+"""Functions of time from tables of positions, or of accelerations, which are integrated twice exactly.
 
-A cubic spline through samples of a position swings about the acceleration they came from: it overshoots by a part of
-every jump of its slope. What is known as an acceleration should stay one: `acceleration_table` takes it as straight
-lines between its samples, whose second integral is a cubic on every piece, without any error but rounding.
+A cubic spline through samples of a position oscillates about the original acceleration: it overshoots at every jump of
+its slope. A quantity known as an acceleration should therefore remain one. `acceleration_table` interpolates it
+linearly between its samples; the second integral is a cubic on every piece, exact to rounding.
 """
 
 from collections.abc import Callable
@@ -26,7 +26,7 @@ __all__ = [
 
 
 def checked_table(where: str, t: Array, values: Array, least: int) -> tuple[Array, Array]:
-    """Return times and values as arrays; `ModelError` unless there are enough, finite, at rising times."""
+    """Return times and values as arrays; raise `ModelError` unless they are enough, finite, and at increasing times."""
     t, values = np.array(t, dtype=float), np.array(values, dtype=float)
     if t.ndim != 1 or t.shape != values.shape or len(t) < least:
         raise ModelError(
@@ -43,30 +43,31 @@ def checked_table(where: str, t: Array, values: Array, least: int) -> tuple[Arra
 
 
 def between(t: Array, coefficients: Array, first: tuple[float, ...], last: tuple[float, ...]) -> TimeFunction:
-    """Return the function of pieces between times t, with polynomials before and after them.
+    """Return the piecewise function between times t, with polynomials before and after the table.
 
-    coefficients: (n_t - 1, degree + 1), of 1, x, x², … from the beginning of each piece; `first` and `last`: of the
-    polynomials about t[0], which holds before it, and about t[-1].
+    coefficients: (n_t - 1, degree + 1), of 1, x, x², … from the start of each piece. `first` and `last` are polynomials
+    about t[0], valid before it, and about t[-1], valid after it.
     """
     pieces = np.zeros((len(t) + 1, N_COEFFICIENTS))
     pieces[1:-1, : coefficients.shape[1]] = coefficients
     pieces[-1, : len(last)] = last
-    about = np.polynomial.Polynomial(first)(np.polynomial.Polynomial([-1.0, 1.0])).coef  # t[0] - 1, where it begins
+    # start of the first piece at t[0] - 1
+    about = np.polynomial.Polynomial(first)(np.polynomial.Polynomial([-1.0, 1.0])).coef
     pieces[0, : len(about)] = about
     return TimeFunction(np.concatenate([[t[0] - 1.0], t]), pieces)
 
 
 def linear_table(t: Array, values: Array) -> TimeFunction:
-    """Return straight lines through a table, held beyond its ends: for forces; a motion may not have such corners."""
+    """Return straight lines through a table, constant beyond its ends. For forces only: a motion may have no kinks."""
     t, values = checked_table("linear table", t, values, 2)
     slopes = np.diff(values) / np.diff(t)
     return between(t, np.column_stack([values[:-1], slopes]), (values[0],), (values[-1],))
 
 
 def monotone_table(t: Array, values: Array) -> TimeFunction:
-    """Return the monotone cubic through a table (PCHIP): no overshoot, smooth rate; its acceleration jumps at samples.
+    """Return the monotone cubic through a table (PCHIP): no overshoot, smooth rate, acceleration jumps at the samples.
 
-    Beyond its ends it goes on along its tangents.
+    Beyond its ends it continues along its tangents.
     """
     from scipy.interpolate import PchipInterpolator
 
@@ -77,9 +78,9 @@ def monotone_table(t: Array, values: Array) -> TimeFunction:
 
 
 def quintic_table(t: Array, values: Array) -> TimeFunction:
-    """Return the quintic spline through a table: position, rate, acceleration and their two next rates are continuous.
+    """Return the quintic spline through a table, with four continuous derivatives.
 
-    Beyond its ends it goes on along its tangents, so that its acceleration jumps there unless it ends at zero.
+    Beyond its ends it continues along its tangents, so its acceleration jumps there unless it ends at zero.
     """
     from scipy.interpolate import PPoly, make_interp_spline
 
@@ -93,25 +94,25 @@ def quintic_table(t: Array, values: Array) -> TimeFunction:
 
 
 def acceleration_table(t: Array, values: Array, position: float = 0.0, velocity: float = 0.0) -> TimeFunction:
-    """Return the position whose acceleration is given by straight lines through a table, integrated exactly twice.
+    """Return the position whose acceleration is the linear interpolation of a table, integrated twice exactly.
 
-    With slope s of a piece and x the time from its beginning (0): a = a0 + s x, v = v0 + a0 x + s x²/2,
-    u = u0 + v0 x + a0 x²/2 + s x³/6; v and u of each beginning are those of the end before. Before the table and after
-    it the acceleration is zero; it jumps at an end where the table does not end at zero.
+    With slope s of a piece and time x from its start: a = a0 + s x, v = v0 + a0 x + s x²/2, u = u0 + v0 x + a0 x²/2 + s
+    x³/6. v and u at each start are those at the end of the previous piece. The acceleration is zero before and after
+    the table; it jumps at an end where the table is not zero.
 
     Parameters
     ----------
     t
-        Times, rising, (n_t,) [s].
+        Increasing times, (n_t,) [s].
     values
         Acceleration of the coordinate, (n_t,) [m/s² or rad/s²].
     position, velocity
-        Of the coordinate at t[0] [m, m/s or rad, rad/s].
+        Values of the coordinate at t[0] [m, m/s or rad, rad/s].
 
     Raises
     ------
     ModelError
-        If times do not rise, or numbers are not finite.
+        If times do not increase, or numbers are not finite.
     """
     t, a = checked_table("acceleration table", t, values, 2)
     u0, v0 = number("acceleration table: position", position), number("acceleration table: velocity", velocity)
@@ -132,7 +133,7 @@ INTERPOLATIONS: dict[str, Callable[[Array, Array], TimeFunction]] = {
 
 
 def interpolated(t: Array, values: Array, interpolation: str = "cubic") -> TimeFunction:
-    """Return the function through a table by the name of its interpolation; `ModelError` for an unknown name."""
+    """Return the function through a table with a named interpolation; raise `ModelError` for an unknown name."""
     if interpolation not in INTERPOLATIONS:
         raise ModelError(
             f"table: unknown interpolation {quoted(interpolation)}{nearest(interpolation, INTERPOLATIONS)}"

@@ -1,6 +1,6 @@
-"""Functions of time for prescribed motions, made of pieces: each a polynomial of degree five and one sine.
+"""Functions of time for prescribed motions: piecewise, each piece a polynomial of degree five plus one sine.
 
-The kernels know this one form; whatever the user gives (a table, a formula, a callable) is brought into it here.
+The kernels only know this form. All user input (a table, a formula, a callable) is converted to it here.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,19 +27,20 @@ __all__ = [
     "table",
 ]
 
-N_COEFFICIENTS = 9  #: of a piece: six of the polynomial in t - t_k, then amplitude, angular frequency, phase
+#: coefficients of a piece: six of the polynomial in t - t_k, then amplitude, angular frequency, phase
+N_COEFFICIENTS = 9
 MOST_PIECES = 20000
 
-#: metadata of fields of forces and elements whose functions have another argument than the time
+#: metadata of fields of forces and elements whose functions do not depend on time
 NOT_OF_TIME = {"of_time": False}
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class TimeFunction:
-    """A piecewise function: the first piece holds before its beginning too, the last without end."""
+    """A piecewise function; the first piece also holds before its start, and the last one has no end."""
 
-    begins: Array  #: times where the pieces begin, rising, (n,) [s]
+    begins: Array  #: start times of the pieces, increasing, (n,) [s]
     pieces: Array  #: coefficients, (n, 9): Σ_k c_k (t - t_k)^k + amplitude sin(omega (t - t_k) + phase)
 
     def __post_init__(self) -> None:
@@ -55,9 +56,9 @@ class TimeFunction:
         object.__setattr__(self, "pieces", frozen(pieces))
 
     def jumps(self, order: int) -> tuple[Array, Array]:
-        """Return the times where the value (order 0), rate or second rate jumps, and by how much: each (n,).
+        """Return the times at which the value (order 0), rate or second rate jumps, and the jumps, (n,) each.
 
-        A jump is above 1e-9 of the sizes of the numbers it lies between, unless these are next to nothing (denormal).
+        A jump must exceed 1e-9 of the magnitudes of the numbers on both sides, unless these are negligible (denormal).
         """
         length = np.diff(self.begins)
         before, after = at_pieces(self.pieces[:-1], length, order), at_pieces(self.pieces[1:], 0.0, order)
@@ -77,7 +78,7 @@ class TimeFunction:
 
 
 def at_pieces(c: Array, x: Array | float, order: int = 0) -> Array:
-    """Return the values of pieces c, (n, 9), or their derivatives, at times x, (n,), from their beginnings."""
+    """Return the values of pieces c, (n, 9), or their derivatives, at times x, (n,), from their starts."""
     smooth = np.zeros(len(c))
     for k in range(5, order - 1, -1):  # Horner's scheme
         smooth = smooth * x + perm(k, order) * c[:, k]
@@ -86,7 +87,7 @@ def at_pieces(c: Array, x: Array | float, order: int = 0) -> Array:
 
 
 def piece_sizes(c: Array, x: Array | float, order: int) -> Array:
-    """Return the sums of the sizes of the terms of `at_pieces`, (n,), the scale of their rounding errors."""
+    """Return the sums of the magnitudes of the terms of `at_pieces`, (n,), which scale their rounding errors."""
     c, x = np.abs(c), np.abs(x)
     terms = np.zeros(len(c))
     for k in range(5, order - 1, -1):
@@ -95,7 +96,7 @@ def piece_sizes(c: Array, x: Array | float, order: int) -> Array:
 
 
 def one_piece(coefficients: list[float], sine: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> TimeFunction:
-    """Return a function of one piece that begins at t = 0."""
+    """Return a function with one piece that starts at t = 0."""
     row = np.zeros((1, N_COEFFICIENTS))
     row[0, : len(coefficients)] = coefficients
     row[0, 6:] = sine
@@ -124,7 +125,7 @@ def harmonic(amplitude: float, omega: float, phase: float = 0.0, offset: float =
 
 
 def smooth_step(t_start: float, t_end: float, first: float, last: float) -> TimeFunction:
-    """Return the polynomial of degree five from first to last, with rate and second rate zero at both ends."""
+    """Return the polynomial of degree five from first to last, with zero rate and second rate at both ends."""
     t_start, t_end = number("smooth_step: t_start", t_start), number("smooth_step: t_end", t_end)
     first, last = number("smooth_step: first", first), number("smooth_step: last", last)
     if t_end <= t_start:
@@ -151,10 +152,10 @@ def cycloidal_spin_up(omega: float, duration: float) -> TimeFunction:
 
 
 def piecewise(t: Sequence[float], pieces: Sequence[TimeFunction]) -> TimeFunction:
-    """Return a function made of others: piece k from t[k] on, as a function of the time since then.
+    """Return a function composed of others: piece k from t[k] on, as a function of the time since t[k].
 
-    The first piece holds before t[0] too, the last without end. Values may jump where pieces meet (forces); a
-    prescribed motion must not, and is refused where value or rate does.
+    The first piece also holds before t[0], and the last one has no end. Values may jump between pieces (for forces). A
+    prescribed motion must not jump in value or rate, and is then rejected.
     """
     begins = [number("piecewise: t", each) for each in t]
     if not begins or len(begins) != len(pieces) or (np.diff(begins) <= 0).any():
@@ -169,7 +170,7 @@ def piecewise(t: Sequence[float], pieces: Sequence[TimeFunction]) -> TimeFunctio
             inside = function.begins < length
             times += list(begin + function.begins[inside])
             rows += list(function.pieces[inside])
-            if not inside.any():  # only its first piece, which holds before it begins
+            if not inside.any():  # only its first piece, which also holds before its start
                 times.append(begin)
                 rows.append(moved_piece(function.pieces[0], -function.begins[0]))
             continue
@@ -184,7 +185,7 @@ def piecewise(t: Sequence[float], pieces: Sequence[TimeFunction]) -> TimeFunctio
 
 
 def moved_piece(c: Array, x: float) -> Array:
-    """Return the coefficients of a piece about a time x after its beginning."""
+    """Return the coefficients of a piece with its origin moved to a time x after its start."""
     row = np.array(c)
     smooth = np.concatenate([c[:6], np.zeros(3)])[None, :]
     row[:6] = [at_pieces(smooth, x, k)[0] / factorial(k) for k in range(6)]
@@ -193,7 +194,7 @@ def moved_piece(c: Array, x: float) -> Array:
 
 
 def table(t: Array, values: Array) -> TimeFunction:
-    """Return the cubic spline through a table, not-a-knot; beyond its ends it goes on along its tangents."""
+    """Return the cubic spline through a table (not-a-knot); beyond its ends it continues along its tangents."""
     from scipy.interpolate import CubicSpline
 
     t, values = np.array(t, dtype=float), np.array(values, dtype=float)
@@ -210,12 +211,12 @@ def table(t: Array, values: Array) -> TimeFunction:
 
 
 def sampled(function: Callable[[float], float], t_start: float, t_end: float, tolerance: float) -> TimeFunction:
-    """Return the spline of a Python function, its knots doubled until it is met between them within the tolerance.
+    """Return a spline of a Python function; knots are doubled until the error between them is below the tolerance.
 
     Raises
     ------
     ModelError
-        If the tolerance is not reached with 20000 pieces: the function jumps or has a kink.
+        If the tolerance is not reached with 20000 pieces, because the function jumps or has a kink.
     """
     n = 16
     error = np.inf

@@ -1,8 +1,8 @@
-"""Times at which an expression jumps with time: comparisons of what depends on time alone, and tables with jumps.
+"""Times at which an expression jumps as a function of time: comparisons of time-dependent terms, and tables with jumps.
 
 `10 if t < 0.3 else 0` jumps at 0.3, `f(2*t - 1)` where 2 t - 1 passes a jump of f, `sign(sin(50*t))` at every zero of
-the sine. Each is a switch, a function of times that is true or false; its changes are bracketed between given times and
-bisected. What a comparison of coordinates switches depends on the motion and is not found here.
+the sine. Each is a switch: a function of time that is true or false. Its changes are bracketed between given times and
+found by bisection. A comparison of coordinates depends on the motion, and is not handled here.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -61,26 +61,26 @@ MOST_HALVINGS = 120
 
 
 class TimeParts(NamedTuple):
-    """What of expressions depends on time alone."""
+    """Parts of expressions that depend only on time."""
 
     switches: tuple[Switch, ...] = ()
     phases: tuple[OfTime, ...] = ()  #: arguments of sines and cosines [rad]
-    value: OfTime | None = None  #: of the last expression; None if it depends on more
+    value: OfTime | None = None  #: value of the last expression; None if it does not depend only on time
 
     def __add__(self, other: "TimeParts") -> "TimeParts":  # type: ignore[override]
-        """Return the parts of both, with the value of the other."""
+        """Return the parts of both, with the value of the second."""
         return TimeParts(self.switches + other.switches, self.phases + other.phases, other.value)
 
 
 def time_parts(tape: Tape, inputs: Mapping[int, OfTime], functions: Sequence[TimeFunction]) -> TimeParts:
-    """Return what of an expression depends on time alone.
+    """Return the parts of an expression that depend only on time.
 
     Parameters
     ----------
     tape
-        The expression; its calls count `functions`.
+        The expression; its calls refer to indices of `functions`.
     inputs
-        By number of the input: those that depend on time alone.
+        Inputs that depend only on time, by index of the input.
     functions
         The tables that it calls.
     """
@@ -128,7 +128,7 @@ def called(function: OfTime, x: OfTime, t: Array) -> Array:
 
 
 def chosen(test: OfTime, yes: OfTime, no: OfTime, t: Array) -> Array:
-    """Return one of two functions of time by a third."""
+    """Return one of two functions of time, selected by a third."""
     return np.where(test(t) != 0.0, yes(t), no(t))
 
 
@@ -139,7 +139,7 @@ def applied(operation: Callable[..., Array], operands: Sequence[OfTime], t: Arra
 
 
 def is_true(value: OfTime, t: Array) -> NDArray[np.bool_]:
-    """Return where a comparison holds."""
+    """Return where a comparison is true."""
     return value(t) != 0.0
 
 
@@ -154,7 +154,7 @@ def is_below(value: OfTime, t: Array) -> NDArray[np.bool_]:
 
 
 def switch_times(switches: Sequence[Switch], t: Array) -> list[float]:
-    """Return the times at which switches change between times t, (n_t,), rising: the first time after each change."""
+    """Return, in rising order, the first time after each change of a switch within the times t, (n_t,)."""
     found: set[float] = set()
     for switch in switches:
         is_on = switch(t)

@@ -1,4 +1,4 @@
-"""Joints: one file each; `JOINTS` is the registry for the system file."""
+"""Joints: one file for each; `JOINTS` is the registry for the system file."""
 
 from floatframe.joints.constant_orientation import ConstantOrientation
 from floatframe.joints.constant_velocity import ConstantVelocityJoint

@@ -1,4 +1,4 @@
-"""Axes of joints: one direction fixed in both markers, and what is normal to it."""
+"""Axes of joints: a common direction of both markers, and its normals."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -14,7 +14,7 @@ __all__ = ["axis_in_b", "checked_axes", "checked_motions", "normals_of", "turnin
 
 
 def normals_of(axis: Array) -> tuple[Array, Array]:
-    """Return two unit vectors normal to the axis and to each other, each (3,); they and the axis are right-handed."""
+    """Return two unit vectors, each (3,), normal to the axis and to each other; with the axis they are right-handed."""
     helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
     first = np.cross(axis, helper)
     first /= np.linalg.norm(first)
@@ -22,14 +22,14 @@ def normals_of(axis: Array) -> tuple[Array, Array]:
 
 
 def axis_in_b(axis: Array, axis_b: Array | None, A_a: Array, A_b: Array) -> Array:
-    """Return the axis in the axes of marker B: as given, or the same direction as placed, (3,)."""
+    """Return the axis in the axes of marker B, (3,): as given, or the same direction in the assembled position."""
     return A_b.T @ A_a @ axis if axis_b is None else axis_b
 
 
 def turning_frame(axis: Array, axis_b: Array, A_a: Array, A_b: Array) -> tuple[Array, Array, Array]:
-    """Return directions x, z of A with x × z = axis, and y of B that lies along z at angle zero: as placed.
+    """Return directions x, z of A with x × z = axis, and y of B, which lies along z at angle zero (as assembled).
 
-    If the axis of B is given and placed elsewhere, y is the direction normal to it nearest to z.
+    If a given axis of B has another direction as assembled, y is the direction normal to it that is nearest to z.
     """
     x, z = normals_of(axis)
     y = A_b.T @ A_a @ z
@@ -40,14 +40,14 @@ def turning_frame(axis: Array, axis_b: Array, A_a: Array, A_b: Array) -> tuple[A
 
 
 def checked_axes(joint: Any) -> None:
-    """Make `axis` and `axis_b` of a joint unit vectors; `ModelError` if one has no direction."""
+    """Make `axis` and `axis_b` of a joint unit vectors; raise `ModelError` for a zero vector."""
     for name in ("axis", "axis_b"):
-        if getattr(joint, name, None) is not None:  # not every joint has an axis of B
+        if getattr(joint, name, None) is not None:  # not every joint has an axis on B
             object.__setattr__(joint, name, unit_vector(f"joint {joint.name!r}: {name}", getattr(joint, name)))
 
 
 def checked_motions(joint: Any) -> None:
-    """Bring `motions` of a joint into the form name: `TimeFunction`; `ModelError` for unknown coordinates."""
+    """Convert `motions` of a joint to `TimeFunction`s by coordinate; raise `ModelError` for unknown coordinates."""
     where = f"joint {joint.name!r}: motions"
     if not isinstance(joint.motions, Mapping):
         raise ModelError(f"{where}: expected a dict from coordinates to functions of time, got {joint.motions!r}")

@@ -1,4 +1,4 @@
-"""Constant orientation: two bodies move without turning against each other."""
+"""The constant-orientation joint: two bodies move without relative rotation."""
 
 from dataclasses import dataclass
 
@@ -16,18 +16,18 @@ __all__ = ["ConstantOrientation"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ConstantOrientation:
-    """Holds the orientation of marker B in marker A; three constraints.
+    """Fixes the orientation of marker B relative to marker A; three constraints.
 
-    The held orientation is the one in which the bodies were placed, unless `rotation` gives it.
+    The fixed orientation is that of the assembled bodies, unless `rotation` is given.
     """
 
     name: str
     marker_a: Place
     marker_b: Place
-    rotation: Array | None = None  #: R_AB from marker axes B to A that is held, (3, 3); None: as placed
+    rotation: Array | None = None  #: fixed rotation R_AB from marker axes B to A, (3, 3); None: as assembled
 
     size = 6  #: components of the unknown wrench
-    moment_b = MOMENT  #: where the moment on B begins in it
+    moment_b = MOMENT  #: index at which the moment on B starts in the wrench
     coordinates = ()
 
     def __post_init__(self) -> None:
@@ -35,6 +35,6 @@ class ConstantOrientation:
             object.__setattr__(self, "rotation", rotation_of(f"joint {self.name!r}: rotation", self.rotation))
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
-        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), in ground axes, as placed."""
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
         R_AB = A_a.T @ A_b if self.rotation is None else self.rotation
         return (*(Row(GAUGE, axis, part=FORCE) for axis in np.eye(3)), *orientation_rows(R_AB))

@@ -1,4 +1,4 @@
-"""The constant-velocity joint (Rzeppa, tripod): two shafts at any angle that turn equally."""
+"""The constant-velocity joint (Rzeppa, tripod): two shafts at any angle that rotate at equal speed."""
 
 from dataclasses import dataclass, field
 
@@ -16,28 +16,29 @@ __all__ = ["ConstantVelocityJoint"]
 
 @dataclass(frozen=True, eq=False)
 class ConstantVelocityJoint:
-    """Holds two points together and lets the shafts through them turn equally, whatever their angle; four constraints.
+    """Joins two points, and makes the shafts through them rotate equally at any angle between them; four constraints.
 
-    B turns against A about axes normal to the bisector of both shafts only, so that the angular velocities of the
-    shafts about their own axes agree at every instant. Free: the two deflections of the shafts. The shafts are to be
-    placed at less than 135 degrees from one line.
+    B only rotates relative to A about axes normal to the bisector of both shafts. The angular velocities of the shafts
+    about their own axes are therefore equal at every instant. The two deflections of the shafts are free. In the
+    assembled position the shafts must be at less than 135 degrees from a straight line.
     """
 
     name: str
     marker_a: Place
     marker_b: Place
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: shaft of A, in the axes of marker A, (3,)
-    axis_b: Array | None = None  #: shaft of B, away from A, in the axes of marker B, (3,); None: in line as placed
+    #: shaft of B, pointing away from A, in the axes of marker B, (3,); None: collinear as assembled
+    axis_b: Array | None = None
 
     size = 6  #: components of the unknown wrench: force and moment
-    moment_b = MOMENT  #: where the moment on B begins in it
+    moment_b = MOMENT  #: index at which the moment on B starts in the wrench
     coordinates = ()
 
     def __post_init__(self) -> None:
         checked_axes(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
-        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), in ground axes, as placed."""
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
         axis_b = axis_in_b(self.axis, self.axis_b, A_a, A_b)
         along, across = A_a @ self.axis, A_b @ axis_b
         cosine = float(along @ across)
@@ -46,8 +47,8 @@ class ConstantVelocityJoint:
                 f"joint {self.name!r}: expected shafts less than 135 degrees from one line as placed, got "
                 f"{np.degrees(np.arccos(max(cosine, -1.0))):.6g}; axis_b leads away from A"
             )
-        x, z = normals_of(self.axis)  # x × z along the axis of A
-        turn = np.cross(along, across)  # as placed B is A turned about this axis, straight from shaft to shaft
+        x, z = normals_of(self.axis)  # x × z is along the axis of A
+        turn = np.cross(along, across)  # as assembled, B is A rotated about this axis from shaft to shaft
         in_b = [A_b.T @ (v * cosine + np.cross(turn, v) + turn * (turn @ v) / (1 + cosine)) for v in (A_a @ x, A_a @ z)]
         held = Row(EQUAL_TURN, x, in_b[0], z=z, u=in_b[1])
         return (*point_rows(), held, *(Row(BISECTOR, e, axis_b, z=self.axis, part=MOMENT) for e in (x, z)))

@@ -14,16 +14,16 @@ __all__ = ["CoordinateCoupler", "Limits"]
 
 @dataclass(frozen=True)
 class Limits:
-    """Stops of a coupler: lower <= Σ a_k x_k <= upper, struck with Newton's coefficient of restitution.
+    """Stops of a coupler: lower <= Σ a_k x_k <= upper, with Newton's coefficient of restitution.
 
-    At a stop the velocities change by the impulse that turns the rate v of the sum into -restitution v with all joints
-    closed (M du = Gᵀ i, flexible bodies with their modes). A bounce whose flight would be shorter than a step ends on
-    the stop, which then holds the sum until it would have to pull.
+    At a stop an impulse changes the rate v of the sum to -restitution v, with all joints satisfied (M du = Gᵀ i,
+    including the modes of flexible bodies). A bounce with a flight shorter than a step ends at the stop, which then
+    holds the sum until it would have to pull.
     """
 
-    lower: float | None = None  #: in the unit of the sum; None: no stop there
+    lower: float | None = None  #: lower bound in the unit of the sum; None: no lower stop
     upper: float | None = None
-    restitution: float = 0.0  #: 0 (does not bounce) to 1 (keeps its energy)
+    restitution: float = 0.0  #: 0 (no bounce) to 1 (no loss of energy)
 
     def __post_init__(self) -> None:
         if self.lower is None and self.upper is None:
@@ -42,23 +42,24 @@ class Limits:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class CoordinateCoupler:
-    """Holds a linear relation between coordinates: Σ a_k x_k = c; one constraint.
+    """Enforces a linear relation between coordinates: Σ a_k x_k = c; one constraint.
 
-    A pair of gears with z_1 and z_2 teeth in mesh from outside: z_1 phi_1 + z_2 phi_2 = c, on a fixed frame; on a
-    carrier the angles are those of their joints with it. A rack on a pinion of radius r: x - r phi = c. Its reaction is
-    one number lam; the force along coordinate k is a_k lam, as two wheels share one tooth force. Angles go on beyond a
-    full turn.
+    A pair of gears with z_1 and z_2 teeth and external mesh on a fixed frame: z_1 phi_1 + z_2 phi_2 = c. On a carrier,
+    the angles are those of the joints with the carrier. A rack on a pinion of radius r: x - r phi = c. The reaction is
+    one number lam; the force along coordinate k is a_k lam, as two gears share one tooth force. Angles are counted
+    beyond full turns.
 
-    Not engaged it has no force until an event switches it on: a latch (one term), a clutch or a brake (two). What it
-    holds then is the sum as caught, unless `constant` says otherwise; the rate of the sum that is left is taken out by
-    one impulse, and the energy that is lost counts as taken. With `limits` it acts only while the sum is at one.
+    If it is not engaged, it has no force until an event engages it: a latch (one term), a clutch or a brake (two
+    terms). It then holds the current value of the sum, unless `constant` is given. An impulse removes the remaining
+    rate of the sum, and the energy balance records the loss. With `limits` it only acts while the sum is at a limit.
     """
 
     name: str
     terms: Sequence[tuple[Coordinate, float]]  #: coordinates and their coefficients a_k
-    constant: float | TimeFunction | None = None  #: c, a number or a function of time; None: as placed, or as caught
-    engaged: bool = True  #: False: no force until an event switches it on
-    limits: Limits | None = None  #: it is not engaged, but stops the sum there
+    #: c as a number or a function of time; None: as assembled, or the value when engaged
+    constant: float | TimeFunction | None = None
+    engaged: bool = True  #: False: no force until an event engages it
+    limits: Limits | None = None  #: stops of the sum; the coupler is then not engaged
 
     def __post_init__(self) -> None:
         where = f"coupler {self.name!r}"
@@ -90,5 +91,5 @@ class CoordinateCoupler:
 
     @property
     def acts(self) -> bool:
-        """Whether it holds its sum at the start, rather than waiting for an event or a stop."""
+        """Whether it enforces its relation from the start, rather than after an event or at a stop."""
         return self.engaged and self.limits is None

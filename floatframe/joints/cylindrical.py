@@ -18,21 +18,22 @@ __all__ = ["CylindricalJoint"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class CylindricalJoint:
-    """Leaves marker B to slide along an axis and to turn about it; four constraints.
+    """Lets marker B slide along an axis and rotate about it; four constraints.
 
-    The point of B stays on the line through the point of A. Coordinates: `distance` of the points along the axis,
-    `angle` of B about it, zero as placed.
+    The point of B stays on the line through the point of A. Coordinates: `distance` between the points along the axis;
+    `angle` of B about it, zero as assembled.
     """
 
     name: str
     marker_a: Place
     marker_b: Place
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
-    axis_b: Array | None = None  #: in the axes of marker B, (3,); None: as placed
-    motions: Mapping[str, TimeFunction] = field(default_factory=dict)  #: prescribed, by coordinate; a number: held
+    axis_b: Array | None = None  #: in the axes of marker B, (3,); None: as assembled
+    #: prescribed motions by coordinate; a number fixes the coordinate
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     size = 9  #: components of the unknown wrench
-    moment_b = MOMENT_B  #: where the moment on B begins in it
+    moment_b = MOMENT_B  #: index at which the moment on B starts in the wrench
     coordinates = ("distance", "angle")
 
     def __post_init__(self) -> None:
@@ -40,7 +41,7 @@ class CylindricalJoint:
         checked_motions(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
-        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), in ground axes, as placed."""
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
         axis_b = axis_in_b(self.axis, self.axis_b, A_a, A_b)
         frame = turning_frame(self.axis, axis_b, A_a, A_b)
         return (

@@ -1,4 +1,4 @@
-"""The rod: two points at a distance."""
+"""The distance joint: two points at a constant distance."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -20,7 +20,7 @@ __all__ = ["DistanceJoint"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class DistanceJoint:
-    """Holds the points of two markers at a distance, as a massless rod does; one constraint.
+    """Keeps the points of two markers at a distance, like a massless rod; one constraint.
 
     Coordinate `distance`.
     """
@@ -28,11 +28,12 @@ class DistanceJoint:
     name: str
     marker_a: Place
     marker_b: Place
-    distance: float | None = None  #: [m]; None: as placed
-    motions: Mapping[str, TimeFunction] = field(default_factory=dict)  #: prescribed, by coordinate; a number: held
+    distance: float | None = None  #: [m]; None: as assembled
+    #: prescribed motions by coordinate; a number fixes the coordinate
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     size = 4  #: components of the unknown wrench
-    moment_b = NO_MOMENT  #: where the moment on B begins in it
+    moment_b = NO_MOMENT  #: index at which the moment on B starts in the wrench
     coordinates = ("distance",)
 
     def __post_init__(self) -> None:
@@ -42,7 +43,7 @@ class DistanceJoint:
         checked_motions(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
-        """Return the rows for markers placed with r_B - r_A = d, (3,) in ground axes."""
+        """Return the rows for markers assembled with r_B - r_A = d, (3,), in ground axes."""
         distance = float(np.linalg.norm(d)) if self.distance is None else self.distance
         if np.linalg.norm(d) == 0:
             raise ModelError(

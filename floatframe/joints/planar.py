@@ -18,21 +18,22 @@ __all__ = ["PlanarJoint"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class PlanarJoint:
-    """Keeps the point of marker B in a plane of marker A and the normals parallel; three constraints.
+    """Keeps the point of marker B in a plane of marker A, with parallel normals; three constraints.
 
-    Coordinates: `first` and `second`, of the point of B in the plane, along the two directions of
-    `normals_of(axis)`; `angle` of B about the normal, zero as placed.
+    Coordinates: `first` and `second`, the position of the point of B in the plane along the two directions of
+    `normals_of(axis)`; `angle` of B about the normal, zero as assembled.
     """
 
     name: str
     marker_a: Place
     marker_b: Place
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: normal, in the axes of marker A
-    axis_b: Array | None = None  #: in the axes of marker B, (3,); None: as placed
-    motions: Mapping[str, TimeFunction] = field(default_factory=dict)  #: prescribed, by coordinate; a number: held
+    axis_b: Array | None = None  #: in the axes of marker B, (3,); None: as assembled
+    #: prescribed motions by coordinate; a number fixes the coordinate
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     size = 9  #: components of the unknown wrench
-    moment_b = MOMENT_B  #: where the moment on B begins in it
+    moment_b = MOMENT_B  #: index at which the moment on B starts in the wrench
     coordinates = ("first", "second", "angle")
 
     def __post_init__(self) -> None:
@@ -40,7 +41,7 @@ class PlanarJoint:
         checked_motions(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
-        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), in ground axes, as placed."""
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
         axis_b = axis_in_b(self.axis, self.axis_b, A_a, A_b)
         first, second = normals_of(self.axis)
         return (

@@ -20,17 +20,18 @@ __all__ = ["PointOnLine"]
 class PointOnLine:
     """Keeps the point of marker B on a line through the point of marker A; two constraints.
 
-    Coordinate `distance`: of the point of B from that of A, along the line.
+    Coordinate `distance`: from the point of A to the point of B, along the line.
     """
 
     name: str
     marker_a: Place
     marker_b: Place
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
-    motions: Mapping[str, TimeFunction] = field(default_factory=dict)  #: prescribed, by coordinate; a number: held
+    #: prescribed motions by coordinate; a number fixes the coordinate
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     size = 6  #: components of the unknown wrench
-    moment_b = NO_MOMENT  #: where the moment on B begins in it
+    moment_b = NO_MOMENT  #: index at which the moment on B starts in the wrench
     coordinates = ("distance",)
 
     def __post_init__(self) -> None:
@@ -38,6 +39,6 @@ class PointOnLine:
         checked_motions(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
-        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), in ground axes, as placed."""
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
         held = (Row(SLIDE, n) for n in normals_of(self.axis))
         return (*arm_rows(), *held, slide_row(self.axis, self.motions, "distance"))

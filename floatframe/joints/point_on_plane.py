@@ -20,7 +20,7 @@ __all__ = ["PointOnPlane"]
 class PointOnPlane:
     """Keeps the point of marker B on a plane through the point of marker A; one constraint.
 
-    Coordinates: `first` and `second`, of the point of B in the plane, along the two directions of
+    Coordinates: `first` and `second`, the position of the point of B in the plane along the two directions of
     `normals_of(axis)`.
     """
 
@@ -28,10 +28,11 @@ class PointOnPlane:
     marker_a: Place
     marker_b: Place
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: normal, in the axes of marker A
-    motions: Mapping[str, TimeFunction] = field(default_factory=dict)  #: prescribed, by coordinate; a number: held
+    #: prescribed motions by coordinate; a number fixes the coordinate
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     size = 6  #: components of the unknown wrench
-    moment_b = NO_MOMENT  #: where the moment on B begins in it
+    moment_b = NO_MOMENT  #: index at which the moment on B starts in the wrench
     coordinates = ("first", "second")
 
     def __post_init__(self) -> None:
@@ -39,7 +40,7 @@ class PointOnPlane:
         checked_motions(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
-        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), in ground axes, as placed."""
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
         first, second = normals_of(self.axis)
         free = (slide_row(first, self.motions, "first"), slide_row(second, self.motions, "second"))
         return (*arm_rows(), Row(SLIDE, self.axis), *free)

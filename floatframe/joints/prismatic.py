@@ -18,20 +18,21 @@ __all__ = ["PrismaticJoint"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class PrismaticJoint:
-    """Leaves marker B to slide along an axis of marker A without turning; five constraints.
+    """Lets marker B slide along an axis of marker A without rotation; five constraints.
 
-    The point of B stays on the line through the point of A. The held orientation is the one in which the bodies were
-    placed. Coordinate `distance`: of the point of B from that of A, along the axis.
+    The point of B stays on the line through the point of A. The fixed orientation is that of the assembled bodies.
+    Coordinate `distance`: from the point of A to the point of B, along the axis.
     """
 
     name: str
     marker_a: Place
     marker_b: Place
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
-    motions: Mapping[str, TimeFunction] = field(default_factory=dict)  #: prescribed, by coordinate; a number: held
+    #: prescribed motions by coordinate; a number fixes the coordinate
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     size = 9  #: components of the unknown wrench
-    moment_b = MOMENT_B  #: where the moment on B begins in it
+    moment_b = MOMENT_B  #: index at which the moment on B starts in the wrench
     coordinates = ("distance",)
 
     def __post_init__(self) -> None:
@@ -39,7 +40,7 @@ class PrismaticJoint:
         checked_motions(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
-        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), in ground axes, as placed."""
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
         held = (Row(SLIDE, n) for n in normals_of(self.axis))
         return (
             *arm_rows(),

@@ -1,4 +1,4 @@
-"""The screw joint: rotation about an axis and translation along it in a fixed ratio."""
+"""The screw joint: rotation about an axis, and translation along it in a fixed ratio."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -36,22 +36,23 @@ METRE = Quantity(1.0, LENGTH)
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ScrewJoint:
-    """Leaves marker B to turn about an axis and slide along it, `lead` for each turn; five constraints.
+    """Lets marker B rotate about an axis and slide along it by `lead` for each turn; five constraints.
 
-    The point of B stays on the line through the point of A. Coordinates: `angle` of B about the axis, zero as placed;
-    `distance` = lead angle/(2 pi) of the points along the axis: they are to be placed one in the other.
+    The point of B stays on the line through the point of A. Coordinates: `angle` of B about the axis, zero as
+    assembled; `distance` = lead angle/(2 pi) between the points along the axis. The points must coincide as assembled.
     """
 
     name: str
     marker_a: Place
     marker_b: Place
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
-    axis_b: Array | None = None  #: in the axes of marker B, (3,); None: as placed
-    lead: float = METRE  #: distance along the axis for one turn, above zero for a right-handed screw [m]
-    motions: Mapping[str, TimeFunction] = field(default_factory=dict)  #: prescribed, by coordinate; a number: held
+    axis_b: Array | None = None  #: in the axes of marker B, (3,); None: as assembled
+    lead: float = METRE  #: distance along the axis per turn; positive for a right-handed screw [m]
+    #: prescribed motions by coordinate; a number fixes the coordinate
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     size = 9  #: components of the unknown wrench
-    moment_b = MOMENT_B  #: where the moment on B begins in it
+    moment_b = MOMENT_B  #: index at which the moment on B starts in the wrench
     coordinates = ("angle", "distance")
 
     def __post_init__(self) -> None:
@@ -63,7 +64,7 @@ class ScrewJoint:
         checked_motions(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
-        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), in ground axes, as placed."""
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
         axis_b = axis_in_b(self.axis, self.axis_b, A_a, A_b)
         x, z, y = turning_frame(self.axis, axis_b, A_a, A_b)
         slope = self.lead / (2 * np.pi)
@@ -71,7 +72,7 @@ class ScrewJoint:
             raise ModelError(f"joint {self.name!r}: motions: expected angle or distance, which follows it, got both")
         angle = RowCoordinate("angle", TWIST, x, y, z, parts=((MOMENT_B, 1.0), (FORCE, slope)))
         distance = RowCoordinate("distance", PUSH, self.axis, parts=((FORCE, 1.0), (MOMENT_B, 1 / slope)))
-        other = angle if "distance" in self.motions else distance  # it follows the one of the last row
+        other = angle if "distance" in self.motions else distance  # it depends on the coordinate of the last row
         if "distance" in self.motions:
             drive = Row(SLIDE, self.axis, motion=self.motions["distance"], coordinate=distance)
         elif "angle" in self.motions:

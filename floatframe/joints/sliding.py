@@ -1,4 +1,4 @@
-"""A point, or a body, that slides along the deformed centre line of a flexible body."""
+"""The sliding joint: a point or a body slides along the deformed centre line of a flexible body."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -25,22 +25,23 @@ class SlidingJoint:
     """Keeps the point of marker B on the deformed line through interfaces of a flexible body; two constraints.
 
     The line leads from marker A through the interfaces `line`, in their order; undeformed it is straight. Between the
-    interfaces it is a cubic by their displacements and rotations, so that three or more of them are wanted for a beam
-    that bends within its length. Beyond its ends it goes on straight. With `is_aligned` marker B keeps its orientation,
-    as placed, to the line, which turns as it bends and twists: five constraints, a prismatic joint on the deformed
-    line.
-    There is no friction: the reaction does no work as B slides.
+    interfaces it is a cubic defined by their displacements and rotations, so a beam that bends within its length needs
+    three or more interfaces. Beyond its ends the line continues straight. With `is_aligned`, marker B keeps its
+    assembled orientation relative to the line, which rotates as it bends and twists: five constraints, a prismatic
+    joint on the deformed line. There is no friction: the reaction does no work as B slides.
 
-    Coordinate `distance`: place of B along the line from marker A, in the length of the undeformed line.
+    Coordinate `distance`: position of B along the line from marker A, measured on the undeformed line.
     """
 
     name: str
-    marker_a: Marker  #: at an interface of a flexible body, where the line begins
+    marker_a: Marker  #: at the interface of a flexible body where the line begins
     marker_b: Place
-    line: Sequence[str] = ()  #: names of the further interfaces of that body along the line
+    line: Sequence[str] = ()  #: names of the other interfaces of that body along the line
     is_aligned: bool = False  #: True: the orientation of marker B follows the line
-    normal: Array | None = None  #: direction across the line in the axes of its body, (3,); None: chosen
-    motions: Mapping[str, TimeFunction] = field(default_factory=dict)  #: prescribed, by coordinate; a number: held
+    #: direction normal to the line in the axes of its body, (3,); None: chosen automatically
+    normal: Array | None = None
+    #: prescribed motions by coordinate; a number fixes the coordinate
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     coordinates = ("distance",)
 
@@ -68,16 +69,16 @@ class SlidingJoint:
 
     @property
     def size(self) -> int:
-        """Components of the unknown wrench: force, and moment where it is aligned."""
+        """Number of components of the unknown wrench: force, and moment if aligned."""
         return 6 if self.is_aligned else 3
 
     @property
     def moment_b(self) -> int:
-        """Where the moment on B begins in it."""
+        """Index at which the moment on B starts in the wrench."""
         return MOMENT if self.is_aligned else NO_MOMENT
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
-        """Return the rows for axes of the line A_a, x along it, and marker axes A_b, (3, 3), ground axes, as placed."""
+        """Return the rows, given the assembled axes, (3, 3), of the line (A_a, x along it) and of marker B (A_b)."""
         if "distance" in self.motions:
             own = Row(LINE, part=ALONG, motion=self.motions["distance"])
         else:
@@ -87,12 +88,12 @@ class SlidingJoint:
 
 
 def line_triad(where: str, points: Array, normal: Array | None) -> tuple[Array, Array]:
-    """Return places along a straight line of points, (n,), and its axes as columns, x along it, (3, 3).
+    """Return positions along a straight line of points, (n,), and its axes as columns, x along it, (3, 3).
 
     Raises
     ------
     ModelError
-        If the points are not in a row along a straight line, or the normal lies along it.
+        If the points are not in sequence along a straight line, or the normal is parallel to it.
     """
     chord = points[-1] - points[0]
     length = float(np.linalg.norm(chord))

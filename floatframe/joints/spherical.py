@@ -1,4 +1,4 @@
-"""The spherical joint: two markers share a point."""
+"""The spherical joint: two markers have a common point."""
 
 from dataclasses import dataclass
 
@@ -20,9 +20,9 @@ class SphericalJoint:
     marker_b: Place
 
     size = 3  #: components of the unknown wrench: force
-    moment_b = NO_MOMENT  #: there is none
+    moment_b = NO_MOMENT  #: no moment acts
     coordinates = ()
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
-        """Return the rows; axes and places of the markers do not matter."""
+        """Return the rows; axes and positions of the markers do not matter."""
         return point_rows()

@@ -1,4 +1,4 @@
-"""The universal joint (Cardan, Hooke): two axes that meet at right angles."""
+"""The universal joint (Cardan, Hooke): two axes that intersect at right angles."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -19,10 +19,10 @@ __all__ = ["UniversalJoint"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class UniversalJoint:
-    """Holds two points together and an axis of marker A at a right angle to one of marker B; four constraints.
+    """Joins two points, and keeps an axis of marker A normal to an axis of marker B; four constraints.
 
-    Coordinates, zero as placed: `angle` of the cross about the axis of A, `angle_b` of B against the cross about the
-    axis of B.
+    Coordinates, zero as assembled: `angle` of the cross about the axis of A; `angle_b` of B relative to the cross about
+    the axis of B.
     """
 
     name: str
@@ -30,10 +30,11 @@ class UniversalJoint:
     marker_b: Place
     axis: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))  #: in the axes of marker A, (3,)
     axis_b: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  #: in the axes of marker B, (3,)
-    motions: Mapping[str, TimeFunction] = field(default_factory=dict)  #: prescribed, by coordinate; a number: held
+    #: prescribed motions by coordinate; a number fixes the coordinate
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
 
     size = 6  #: components of the unknown wrench
-    moment_b = MOMENT  #: where the moment on B begins in it
+    moment_b = MOMENT  #: index at which the moment on B starts in the wrench
     coordinates = ("angle", "angle_b")
 
     def __post_init__(self) -> None:
@@ -41,8 +42,8 @@ class UniversalJoint:
         checked_motions(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
-        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), in ground axes, as placed."""
-        # the axis of B as placed gives angle zero: the direction z of A that lies along it
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
+        # angle zero is the assembled position: z of A lies along the axis of B
         z = A_a.T @ A_b @ self.axis_b
         z = z - (z @ self.axis) * self.axis
         if np.linalg.norm(z) < 1e-3:

@@ -1,10 +1,10 @@
-"""What bodies, wheels, ground, rails and elements look like: plain data for films, pictures and pages.
+"""Appearance of bodies, wheels, ground, rails and elements: plain data for films, pictures and pages.
 
-A *geometry* (box, cylinder, wheel, road, ...) knows its own axes and gives `Piece`s: triangles and lines of one colour.
-A `Shape` is a geometry with a place, a colour and, on a flexible body, the interface that carries it. Bodies carry
-shapes (`RigidBody(shapes=...)`, `FlexibleBody(shapes=...)`), a system its surroundings (`System(scene=...)`), and
-`Element.drawn()` returns `Drawn`, `Stretched` and `Arrow`, which follow the markers of the element. Nothing of it acts
-on a motion.
+A *geometry* (box, cylinder, wheel, road, ...) has its own axes and returns `Piece`s: triangles and lines of one colour.
+A `Shape` is a geometry with a position, a colour and, on a flexible body, the interface that carries it. Bodies carry
+shapes (`RigidBody(shapes=...)`, `FlexibleBody(shapes=...)`), and a system has surroundings (`System(scene=...)`).
+`Element.drawn()` returns `Drawn`, `Stretched` and `Arrow`, which follow the markers of the element. Shapes do not
+affect the motion.
 """
 
 from floatframe.shapes.drawn import Arrow, Drawn, Stretched

@@ -1,6 +1,6 @@
-"""What an element shows of itself: shapes fixed to its markers, parts stretched between two of them, arrows.
+"""The drawing of an element: shapes fixed to its markers, parts stretched between two markers, arrows.
 
-`Element.drawn()` returns a tuple of these; markers are told by their numbers in `Element.markers`.
+`Element.drawn()` returns a tuple of these; markers are given by their indices in `Element.markers`.
 """
 
 from dataclasses import dataclass
@@ -19,29 +19,29 @@ __all__ = ["STRETCHED", "Arrow", "Drawn", "Stretched", "StretchedPiece"]
 
 Z = np.array([0.0, 0.0, 1.0])
 SPRING, OUTER, INNER = "#2a7f62", "#5d6f80", "#b9c3cc"
-TURNS, A_TURN, WIRE = 7, 20, 8  #: of a coil: turns, points a turn, points round the wire
+TURNS, A_TURN, WIRE = 7, 20, 8  #: coil: turns, points per turn, points around the wire
 STRETCH, FIRST, SECOND = "stretch", "first", "second"  #: how a part follows its two markers
 
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """A shape in the axes of a marker of the element, or in those of the ground."""
+    """A shape in the axes of a marker of the element, or in ground axes."""
 
     shape: Shape
-    marker: int | None = 0  #: number in `Element.markers`; None: the ground, such as for its road or track
-    is_default: bool = False  #: whether it gives way to shapes that the body of its marker has of its own
-    is_in_metres: bool = False  #: whether its numbers are metres, whatever the units of the system
+    marker: int | None = 0  #: index in `Element.markers`; None: the ground, as for a road or track
+    is_default: bool = False  #: whether it is hidden if the body of its marker has shapes of its own
+    is_in_metres: bool = False  #: whether its numbers are in metres, independent of the units of the system
 
 
 @dataclass(frozen=True, eq=False)
 class Stretched:
-    """A part between two markers: "coil", "strut" (a rod in a cylinder), "rod" (of one thickness) or "line"."""
+    """A part between two markers: "coil", "strut" (a rod in a cylinder), "rod" (of constant thickness) or "line"."""
 
     kind: str = "coil"
-    first: int = 0  #: number of the marker at its beginning
-    second: int = 1  #: of the marker at its end
-    radius: float | None = None  #: None: 0.06 of the length as assembled [m]
-    color: str | None = None  #: None: that of its kind
+    first: int = 0  #: index of the marker at its start
+    second: int = 1  #: index of the marker at its end
+    radius: float | None = None  #: None: 0.06 of the assembled length [m]
+    color: str | None = None  #: None: the colour of its kind
 
     def __post_init__(self) -> None:
         if self.kind not in STRETCHED:
@@ -52,25 +52,26 @@ class Stretched:
             object.__setattr__(self, "color", color_of(self.color))
 
     def pieces(self, length: float) -> "tuple[StretchedPiece, ...]":
-        """Return its parts for a length as assembled [m]."""
+        """Return its parts for an assembled length [m]."""
         return STRETCHED[self.kind](self.radius or 0.06 * length, length, self.color)
 
 
 @dataclass(frozen=True, eq=False)
 class Arrow:
-    """An arrow at a marker, along three outputs of the element, as long as they are large."""
+    """An arrow at a marker along three outputs of the element, with a length proportional to them."""
 
-    #: names of the components, as in `ElementLaw.outputs`; None: the force of the element on the body of the marker
+    #: names of the components in `ElementLaw.outputs`; None: the force of the element on the body of the marker
     outputs: tuple[str, str, str] | None = None
-    marker: int = 0  #: number of the marker it starts at
-    is_in_marker_axes: bool = False  #: whether the components are along the axes of the marker, else of the ground
-    at: tuple[str, str, str] | None = None  #: outputs that are the place of its start, ground axes; None: the marker
+    marker: int = 0  #: index of the marker at which it starts
+    is_in_marker_axes: bool = False  #: whether the components are in marker axes; otherwise in ground axes
+    #: outputs that give the position of its start in ground axes; None: the marker
+    at: tuple[str, str, str] | None = None
     color: str = "#c2452d"
 
 
 @dataclass(frozen=True, eq=False)
 class StretchedPiece:
-    """A part of what lies between two markers, drawn along z from the first marker.
+    """A piece of a part between two markers, drawn along z from the first marker.
 
     "stretch": z runs from 0 to 1 and is multiplied by the distance. "first", "second": z is a length from that marker
     towards the other.
@@ -81,7 +82,7 @@ class StretchedPiece:
 
 
 def coil(radius: float, length: float, color: str | None) -> tuple[StretchedPiece, ...]:
-    """Return a wound wire."""
+    """Return a coiled wire."""
     turn = np.linspace(0.0, 2 * np.pi * TURNS, TURNS * A_TURN + 1)
     along = np.linspace(0.06, 0.94, len(turn)) * length
     points = np.stack([radius * np.cos(turn), radius * np.sin(turn), along], axis=1)

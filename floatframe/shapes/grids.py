@@ -8,9 +8,9 @@ __all__ = ["grid_triangles", "polygon_triangles"]
 
 
 def grid_triangles(n: int, m: int, *, closes_n: bool = False, closes_m: bool = False) -> IntArray:
-    """Return triangles of a grid of n x m nodes, row by row; closed in one direction or both.
+    """Return triangles of a grid of n x m nodes, row by row, closed in one direction, in both, or open.
 
-    Seen from the side to which (along n) x (along m) points they turn left.
+    They are anticlockwise when seen from the side to which (along n) x (along m) points.
     """
     i, j = np.meshgrid(np.arange(n if closes_n else n - 1), np.arange(m if closes_m else m - 1), indexing="ij")
     a, b = i * m + j, (i + 1) % n * m + j
@@ -20,7 +20,7 @@ def grid_triangles(n: int, m: int, *, closes_n: bool = False, closes_m: bool = F
 
 
 def polygon_triangles(points: Array) -> IntArray:
-    """Return triangles of a simple polygon that turns left, (n, 2), by cutting ears."""
+    """Return triangles of a simple anticlockwise polygon, (n, 2), by ear clipping."""
     left = list(range(len(points)))
     found = []
     while len(left) > 3:
@@ -32,7 +32,7 @@ def polygon_triangles(points: Array) -> IntArray:
             if not any(is_within(points[p], points[a], points[b], points[c]) for p in others):
                 break
         else:
-            k = 0  # a polygon without an ear crosses itself, or lies on a line: any corner will do
+            k = 0  # a polygon without an ear intersects itself or is degenerate: any corner may be used
             a, b, c = left[-1], left[0], left[1]
         found.append((a, b, c))
         left.pop(k)
@@ -41,10 +41,10 @@ def polygon_triangles(points: Array) -> IntArray:
 
 
 def turn(a: Array, b: Array, c: Array) -> float:
-    """Return twice the area of a triangle, above 0 where it turns left."""
+    """Return twice the area of a triangle, positive if it is anticlockwise."""
     return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
 
 
 def is_within(p: Array, a: Array, b: Array, c: Array) -> bool:
-    """Whether a point lies in a triangle that turns left, its edges included."""
+    """Whether a point lies in an anticlockwise triangle, including its edges."""
     return turn(a, b, p) >= 0 and turn(b, c, p) >= 0 and turn(c, a, p) >= 0

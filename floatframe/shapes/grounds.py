@@ -1,4 +1,4 @@
-"""What machines stand and move on: a plane with a grid, uneven ground, a road along a curve, a railway track."""
+"""Surroundings of machines: a plane with a grid, uneven ground, a road along a curve, a railway track."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,7 +17,7 @@ __all__ = ["Plane", "Road", "Terrain", "Track"]
 
 ASPHALT, PAINT, SOIL, RAIL, SLEEPER, BED = "#8a9097", "#f3f4f2", "#b7b9a8", "#7d6d63", "#b0a596", "#c2bdb4"
 MOST_SLEEPERS = 1200
-#: head, web and foot of a rail by its height: the middle of the head's top is at the origin
+#: head, web and foot of a rail, in units of its height; the origin is the centre of the top of the head
 RAIL_OUTLINE = np.array(
     [(-0.21, -0.02), (-0.18, 0.0), (0.18, 0.0), (0.21, -0.02), (0.21, -0.2), (0.06, -0.26), (0.05, -0.84),
      (0.43, -0.93), (0.43, -1.0), (-0.43, -1.0), (-0.43, -0.93), (-0.05, -0.84), (-0.06, -0.26), (-0.21, -0.2)]
@@ -26,10 +26,10 @@ RAIL_OUTLINE = np.array(
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """A flat ground with a grid, without an end."""
+    """A flat, unlimited ground with a grid."""
 
     normal: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: upwards, (3,)
-    step: float | None = None  #: distance of the lines of the grid; None: a round number that suits the machine [m]
+    step: float | None = None  #: distance between grid lines; None: a round number that suits the machine [m]
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "normal", unit_vector("plane: normal", self.normal))
@@ -37,7 +37,7 @@ class Plane:
             object.__setattr__(self, "step", number("plane: step", self.step, above=0.0))
 
     def pieces(self) -> tuple[Piece, ...]:
-        """Return nothing: how far it is drawn depends on what moves on it."""
+        """Return nothing: the extent of the drawing depends on the moving bodies."""
         return ()
 
 
@@ -45,7 +45,7 @@ class Plane:
 class Terrain:
     """Uneven ground: heights over a grid."""
 
-    x: Array  #: places of the grid, rising, (n,) [m]
+    x: Array  #: increasing grid coordinates, (n,) [m]
     y: Array  #: (m,) [m]
     z: Array  #: heights, (n, m) [m]
 
@@ -67,9 +67,9 @@ class Terrain:
 
 @dataclass(frozen=True, eq=False)
 class Road:
-    """A road along a curve, its surface through the points, with painted edges and a broken line in its middle."""
+    """A road along a curve on its surface, with painted edges and a broken centre line."""
 
-    points: Array  #: of the middle of the surface, (n, 3) [m]
+    points: Array  #: points on the centre line of the surface, (n, 3) [m]
     width: float  #: [m]
     up: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: (3,)
     is_painted: bool = True  #: whether lines are painted on it
@@ -96,11 +96,11 @@ class Road:
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """Two rails on sleepers along a curve: its points lie in the middle between the tops of the rails."""
+    """Two rails on sleepers along a curve; its points lie midway between the tops of the rails."""
 
     points: Array  #: (n, 3) [m]
-    gauge: float  #: between the middles of the heads of the rails [m]
-    cant: Array | None = None  #: how much the left rail lies higher than the right one, a number or one a point [m]
+    gauge: float  #: distance between the centres of the rail heads [m]
+    cant: Array | None = None  #: height of the left rail above the right one: one number, or one per point [m]
     up: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: (3,)
     rail_height: float | None = None  #: None: 0.115 of the gauge [m]
     sleeper_distance: float | None = None  #: None: 0.4 of the gauge [m]
@@ -120,7 +120,7 @@ class Track:
 
     def pieces(self) -> tuple[Piece, ...]:
         """Return both rails, the sleepers and their bed."""
-        assert self.rail_height is not None  # set above
+        assert self.rail_height is not None  # __post_init__ has set it
         h, gauge = self.rail_height, self.gauge
         axes = self.axes
         outline = h * RAIL_OUTLINE
@@ -135,8 +135,8 @@ class Track:
 
     @property
     def axes(self) -> Array:
-        """Across the track to the left and upwards, as canted, at each point, (n, 3, 2)."""
-        assert self.cant is not None  # set above
+        """Directions to the left and up, with cant, at each point, (n, 3, 2)."""
+        assert self.cant is not None  # __post_init__ has set it
         d = along(self.points)
         left = np.cross(self.up, d)
         left /= np.linalg.norm(left, axis=1, keepdims=True)
@@ -145,8 +145,8 @@ class Track:
         return np.stack([np.cos(angle) * left + np.sin(angle) * above, np.cos(angle) * above - np.sin(angle) * left], 2)
 
     def sleepers(self, axes: Array) -> Piece:
-        """Return a box under the rails at every step of the way; of a long track fewer than there are."""
-        assert self.rail_height is not None  # set above
+        """Return a box under the rails at every sleeper distance; a long track shows fewer."""
+        assert self.rail_height is not None  # __post_init__ has set it
         assert self.sleeper_distance is not None
         way = way_of(self.points)
         count = min(int(way[-1] / self.sleeper_distance) + 1, MOST_SLEEPERS)
@@ -177,7 +177,7 @@ def way_of(points: Array) -> Array:
 
 
 def band(points: Array, up: Array, right: float, left: float, lift: float, color: str) -> Piece:
-    """Return a strip along a curve between two distances to its left."""
+    """Return a strip along a curve, between two distances to the left of it."""
     d = along(points)
     side = np.cross(up, d)
     side /= np.linalg.norm(side, axis=1, keepdims=True)
@@ -187,7 +187,7 @@ def band(points: Array, up: Array, right: float, left: float, lift: float, color
 
 
 def dashes(points: Array, length: float, step: float, most: int = 600) -> list[Array]:
-    """Return pieces of a line, each of a length, at every step."""
+    """Return pieces of a line with a given length at every step."""
     way = way_of(points)
     step = max(step, way[-1] / most)
     found = []

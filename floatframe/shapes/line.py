@@ -16,7 +16,7 @@ class Line:
     """Straight lines from point to point."""
 
     points: Array  #: (n, 3) [m]
-    is_closed: bool = False  #: whether the last point is joined to the first
+    is_closed: bool = False  #: whether the last point is connected to the first
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", points_3("line: points", self.points, 2))

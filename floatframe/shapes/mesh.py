@@ -46,19 +46,19 @@ def mesh_file(path: str | os.PathLike[str], *, scale: float = 1.0) -> Mesh:
     Parameters
     ----------
     scale
-        By which its coordinates are multiplied, such as 0.001 for a drawing in millimetres in a system in metres.
+        Factor on its coordinates, such as 0.001 for a drawing in millimetres in a system in metres.
 
     Raises
     ------
     ModelError
-        If the file cannot be read, or holds no surface.
+        If the file cannot be read, or contains no surface.
     """
     import pyvista as pv
 
     try:
         found = pv.read(os.fspath(path))
         surface = (found if isinstance(found, pv.PolyData) else found.extract_surface(algorithm=None)).triangulate()
-    except Exception as error:  # readers of many formats, each with errors of its own
+    except Exception as error:  # the readers of the formats raise different errors
         raise ModelError(f"mesh: {path}: cannot be read as a surface: {error}") from error
     triangles = surface.faces.reshape(-1, 4)[:, 1:] if surface.n_cells else np.zeros((0, 3), np.int64)
     if not len(triangles):

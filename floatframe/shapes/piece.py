@@ -11,23 +11,24 @@ __all__ = ["Piece", "joined", "shifted"]
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """Triangles or lines of one colour, in the axes of what carries them."""
+    """Triangles or lines of one colour, in the axes of their carrier."""
 
     nodes: Array  #: (n, 3) [m]
-    triangles: IntArray = field(default_factory=lambda: np.zeros((0, 3), np.int64))  #: outward ones turn left
-    segments: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))  #: ends of lines
-    color: str = ""  #: "#rrggbb"; "": that of the shape, or of whatever carries it
+    #: anticlockwise when seen from outside
+    triangles: IntArray = field(default_factory=lambda: np.zeros((0, 3), np.int64))
+    segments: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))  #: end points of lines
+    color: str = ""  #: "#rrggbb"; "": the colour of the shape, or of its carrier
     opacity: float = 1.0
-    is_ground: bool = False  #: whether it takes no part in the size of what is seen
+    is_ground: bool = False  #: whether it is ignored in the size of the picture
 
 
 def shifted(piece: Piece, position: Array, R: Array) -> Piece:
-    """Return the piece turned by R, (3, 3), then moved by position, (3,)."""
+    """Return the piece rotated by R, (3, 3), then moved by position, (3,)."""
     return replace(piece, nodes=piece.nodes @ np.asarray(R).T + np.asarray(position))
 
 
 def joined(pieces: list[Piece]) -> Piece:
-    """Return several pieces as one, with the colour of the first."""
+    """Return several pieces as one piece with the colour of the first."""
     starts = np.cumsum([0, *(len(piece.nodes) for piece in pieces)])
     return replace(
         pieces[0],

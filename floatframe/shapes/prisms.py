@@ -1,4 +1,4 @@
-"""Boxes, and outlines drawn out along an axis."""
+"""Boxes, and outlines extruded along an axis."""
 
 from dataclasses import dataclass, field
 
@@ -35,9 +35,9 @@ class Box:
 
 @dataclass(frozen=True, eq=False)
 class Extrusion:
-    """An outline drawn out along an axis, half to each side: a beam of that section, a plate of that outline.
+    """An outline extruded along an axis, half to each side: a beam with that section, or a plate with that outline.
 
-    The outline lies in the plane across the axis: for the axis z its pairs are (x, y), for x (y, z), for y (z, x).
+    The outline lies in the plane normal to the axis: for axis z its pairs are (x, y), for x (y, z), for y (z, x).
     """
 
     profile: Array  #: corners, (n, 2) [m]

@@ -1,4 +1,4 @@
-"""Shapes that are round about an axis: cylinders, cones, pipes, spheres, any turned part."""
+"""Axisymmetric shapes: cylinders, cones, pipes, spheres, solids of revolution."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,18 +13,18 @@ from floatframe.shapes.piece import Piece
 
 __all__ = ["Cylinder", "Revolution", "Sphere", "axes_about", "points_2", "revolved"]
 
-AROUND = 48  #: nodes of a circle
+AROUND = 48  #: number of nodes of a circle
 
 
 @dataclass(frozen=True, eq=False)
 class Cylinder:
-    """A cylinder about its axis, its middle at the origin; a cone with a second radius, a pipe with an inner one."""
+    """A cylinder centred at the origin; with `end_radius` it is a cone, with `inner_radius` a pipe."""
 
     radius: float  #: [m]
     length: float  #: [m]
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: (3,)
-    end_radius: float | None = None  #: at the end to which the axis points; None: the same [m]
-    inner_radius: float = 0.0  #: of a pipe [m]
+    end_radius: float | None = None  #: radius at the end to which the axis points; None: the same [m]
+    inner_radius: float = 0.0  #: inner radius of a pipe [m]
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -49,11 +49,11 @@ class Cylinder:
 
 @dataclass(frozen=True, eq=False)
 class Revolution:
-    """A turned part: a profile of radius and place along the axis, in the order in which it is drawn."""
+    """A solid of revolution, given by a profile of radius and axial position, in drawing order."""
 
-    profile: Array  #: (n, 2): radius, place along the axis [m]
+    profile: Array  #: radius and axial position, (n, 2) [m]
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: (3,)
-    is_closed: bool = False  #: whether the last point is joined to the first, as of a ring
+    is_closed: bool = False  #: whether the last point is connected to the first, as for a ring
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -84,9 +84,9 @@ class Sphere:
 
 
 def revolved(profile: Array, axis: Array, *, is_closed: bool = False, around: int = AROUND, color: str = "") -> Piece:
-    """Return a profile, (n, 2) of radius and place, turned about an axis; outward where the material lies left of it.
+    """Return a profile, (n, 2) of radius and axial position, revolved about an axis; the material is on its left.
 
-    Profiles that run along the axis with the material on their inner side face outward.
+    Profiles along the axis with the material on their inner side face outward.
     """
     x, y, z = axes_about(axis)
     angle = 2 * np.pi * np.arange(around) / around
@@ -100,7 +100,7 @@ def revolved(profile: Array, axis: Array, *, is_closed: bool = False, around: in
 
 
 def axes_about(axis: Array) -> tuple[Array, Array, Array]:
-    """Return right-handed axes whose third is along the given one, (3,) each."""
+    """Return right-handed axes whose third is along the given axis, (3,) each."""
     z = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
     helper = np.eye(3)[int(np.argmin(np.abs(z)))]
     x = np.cross(helper, z)

@@ -1,4 +1,4 @@
-"""A geometry with its place and colour: what a body, or the surroundings, look like."""
+"""A geometry with its position and colour, for a body or the surroundings."""
 
 import re
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ from floatframe.shapes.piece import Piece, shifted
 __all__ = ["Geometry", "Shape", "shape_tuple"]
 
 COLOR = re.compile(r"#[0-9a-fA-F]{6}")
-#: words that may stand for colours
+#: names that may be used for colours
 NAMED = {
     "steel": "#9aa7b3", "aluminium": "#c3cad0", "dark": "#3b4249", "black": "#24272b", "white": "#eef0f1",
     "red": "#c4473a", "orange": "#d98a3d", "yellow": "#d9b84a", "green": "#5f9a63",
@@ -26,29 +26,29 @@ NAMED = {
 
 
 class Geometry(Protocol):
-    """What has a surface or lines of its own axes."""
+    """An object with a surface or lines in its own axes."""
 
     def pieces(self) -> tuple[Piece, ...]:
-        """Return the pieces it is drawn by."""
+        """Return the pieces with which it is drawn."""
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """A geometry with place and colour.
+    """A geometry with position and colour.
 
     Raises
     ------
     ModelError
-        If a number is not finite, or the colour is none.
+        If a number is not finite, or the colour is invalid.
     """
 
     geometry: Geometry
-    #: of its origin [m] in the axes of the body (of a flexible one those of its mesh), of the interface, of the ground
+    #: position of its origin [m] in the axes of the body (flexible: of its mesh), of the interface, or of the ground
     position: Array = field(default_factory=lambda: np.zeros(3))
-    rotation_vector: Array = field(default_factory=lambda: np.zeros(3))  #: how it is turned in them, (3,) [rad]
-    color: str | None = None  #: "#rrggbb" or a name in `NAMED`; None: of its kind, else of its body
+    rotation_vector: Array = field(default_factory=lambda: np.zeros(3))  #: rotation relative to these axes, (3,) [rad]
+    color: str | None = None  #: "#rrggbb" or a name in `NAMED`; None: the colour of its kind, else of its body
     opacity: float = 1.0  #: 0 < opacity <= 1
-    interface: str | None = None  #: of a flexible body: what it is fixed to; None: the frame of the body
+    interface: str | None = None  #: interface of a flexible body to which it is fixed; None: the frame of the body
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -63,7 +63,7 @@ class Shape:
             put(self, "color", color_of(self.color))
 
     def pieces(self) -> tuple[Piece, ...]:
-        """Return its pieces in the axes of what carries it, with its colour and opacity where it has them."""
+        """Return its pieces in the axes of its carrier, with its colour and opacity if they have none."""
         R = rotation_exp(self.rotation_vector)
         return tuple(
             replace(
@@ -74,7 +74,7 @@ class Shape:
 
 
 def color_of(text: str) -> str:
-    """Return "#rrggbb" of a colour; `ModelError` if it is none."""
+    """Return "#rrggbb" for a colour; raise `ModelError` if it is invalid."""
     if text in NAMED:
         return NAMED[text]
     if not isinstance(text, str) or not COLOR.fullmatch(text):
@@ -83,17 +83,17 @@ def color_of(text: str) -> str:
 
 
 def shape_tuple(where: str, shapes: Any, interfaces: Sequence[str] = ()) -> tuple[Shape, ...]:
-    """Return shapes as a tuple; a geometry among them becomes one at the origin.
+    """Return shapes as a tuple; a geometry among them becomes a shape at the origin.
 
     Parameters
     ----------
     interfaces
-        To which they may be fixed.
+        Interfaces to which they may be fixed.
 
     Raises
     ------
     ModelError
-        If one of them is neither, or is fixed to an interface that does not exist.
+        If an item is neither a shape nor a geometry, or is fixed to an unknown interface.
     """
     if not isinstance(shapes, Sequence):
         shapes = (shapes,)

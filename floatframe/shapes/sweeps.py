@@ -1,4 +1,4 @@
-"""Outlines moved along a curve: bent tubes, rails."""
+"""Outlines swept along a curve: bent tubes, rails."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +13,7 @@ from floatframe.shapes.piece import Piece
 
 __all__ = ["Tube", "along", "points_3", "swept"]
 
-AROUND = 16  #: nodes of the circle of a tube
+AROUND = 16  #: number of nodes of the circle of a tube
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,7 +22,7 @@ class Tube:
 
     points: Array  #: (n, 3) [m]
     radius: float  #: [m]
-    is_closed: bool = False  #: whether the last point is joined to the first
+    is_closed: bool = False  #: whether the last point is connected to the first
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", points_3("tube: points", self.points, 2))
@@ -37,14 +37,14 @@ class Tube:
 
 
 def swept(outline: Array, points: Array, axes: Array, *, is_closed: bool = False, has_caps: bool = True) -> Piece:
-    """Return an outline, (m, 2), moved along a curve.
+    """Return an outline, (m, 2), swept along a curve.
 
     Parameters
     ----------
     outline
-        Turns left where the curve comes towards the eye.
+        Anticlockwise when the curve comes towards the viewer.
     points, axes
-        Of the curve: (n, 3), and (n, 3, 2): where both axes of the outline point.
+        Points of the curve, (n, 3), and directions of both outline axes, (n, 3, 2).
     """
     m, n = len(outline), len(points)
     nodes = (points[:, None] + np.einsum("nak,mk->nma", axes, outline)).reshape(-1, 3)
@@ -56,7 +56,7 @@ def swept(outline: Array, points: Array, axes: Array, *, is_closed: bool = False
 
 
 def along(points: Array, *, is_closed: bool = False) -> Array:
-    """Return the unit direction of a line of points at each, (n, 3)."""
+    """Return the unit tangent of a line of points at each point, (n, 3)."""
     if is_closed:
         d = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
     else:
@@ -67,7 +67,7 @@ def along(points: Array, *, is_closed: bool = False) -> Array:
 
 
 def carried_axes(points: Array, *, is_closed: bool = False) -> Array:
-    """Return two axes across a line of points that turn about it as little as may be, (n, 3, 2)."""
+    """Return two axes normal to a line of points with minimal rotation about it, (n, 3, 2)."""
     d = along(points, is_closed=is_closed)
     x = np.cross(d[0], np.eye(3)[int(np.argmin(np.abs(d[0])))])
     found = []
@@ -79,7 +79,7 @@ def carried_axes(points: Array, *, is_closed: bool = False) -> Array:
 
 
 def points_3(where: str, values: Any, least: int) -> Array:
-    """Return finite points, (n, 3), read-only, no two following ones equal."""
+    """Return finite points, (n, 3), read-only, without equal consecutive points."""
     try:
         points = np.array(values, dtype=float)
     except (TypeError, ValueError):

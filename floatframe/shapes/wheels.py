@@ -1,4 +1,4 @@
-"""Wheels: with a tyre on rim and spokes, or of a railway with tread and flange; both show that they turn."""
+"""Wheels with tyre, rim and spokes, and railway wheels with tread and flange; marks make their rotation visible."""
 
 from dataclasses import dataclass, field
 
@@ -19,13 +19,13 @@ STEEL, TREAD_STEEL = "#6f7a85", "#aab3bb"
 
 @dataclass(frozen=True, eq=False)
 class Wheel:
-    """A tyre with rim, hub and spokes about its axis, its middle at the origin."""
+    """A tyre with rim, hub and spokes about its axis, with its centre at the origin."""
 
-    radius: float  #: of the tread [m]
-    width: float  #: of the tyre [m]
+    radius: float  #: radius of the tread [m]
+    width: float  #: width of the tyre [m]
     rim_radius: float | None = None  #: None: 0.64 of the radius [m]
     n_spokes: int = 5
-    axis: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  #: of the turn, (3,)
+    axis: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  #: axis of rotation, (3,)
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -69,14 +69,14 @@ class Wheel:
 
 @dataclass(frozen=True, eq=False)
 class RailWheel:
-    """A railway wheel: conical tread with a flange, web, hub, and marks that show its turning."""
+    """A railway wheel: conical tread with flange, web, hub, and marks that show its rotation."""
 
-    radius: float  #: of the tread at the origin [m]
-    flange_side: int = 1  #: 1: at the end of the wheel to which the axis points, -1: at the other, 0: none
+    radius: float  #: radius of the tread at the origin [m]
+    flange_side: int = 1  #: 1: flange at the end to which the axis points, -1: at the other end, 0: no flange
     width: float | None = None  #: None: 0.3 of the radius [m]
     flange_height: float | None = None  #: None: 0.06 of the radius [m]
-    conicity: float = 0.05  #: of the drawn tread
-    axis: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  #: of the turn, (3,)
+    conicity: float = 0.05  #: conicity of the drawn tread
+    axis: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  #: axis of rotation, (3,)
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -91,7 +91,7 @@ class RailWheel:
 
     def pieces(self) -> tuple[Piece, ...]:
         """Return tyre with flange, web with hub, and marks on both sides."""
-        assert self.width is not None  # set above
+        assert self.width is not None  # __post_init__ has set it
         assert self.flange_height is not None
         R, w, f, s = self.radius, self.width, self.flange_height, self.flange_side or 1
         out, at_flange, inside = -0.5 * w, 0.28 * w, 0.5 * w
@@ -127,7 +127,7 @@ def tread(R: float, half: float, depth: float) -> list[tuple[float, float]]:
 
 
 def around(piece: Piece, axis: Array, n: int) -> Piece:
-    """Return a piece drawn radially along x and along the axis as z, repeated about an axis."""
+    """Return a piece drawn radially along x and axially along z, repeated about an axis."""
     x, y, z = axes_about(axis)
     copies = []
     for k in range(n):
@@ -138,7 +138,7 @@ def around(piece: Piece, axis: Array, n: int) -> Piece:
 
 
 def arc_mark(axis: Array, r: float, half: float, place: float, angle: float, color: str, phase: float = 0.0) -> Piece:
-    """Return a flat piece of a ring across an axis, seen from both sides."""
+    """Return a flat piece of a ring normal to an axis, visible from both sides."""
     x, y, z = axes_about(axis)
     turns = phase + np.linspace(-angle / 2, angle / 2, 5)
     ring = np.cos(turns)[:, None] * x + np.sin(turns)[:, None] * y

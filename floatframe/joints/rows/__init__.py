@@ -1,4 +1,4 @@
-"""Rows of joints: what each kind means (`kinds`), how one is described (`row`), how its coordinate is measured."""
+"""Rows of joints: the meaning of each kind (`kinds`), their description (`row`), and measured coordinates."""
 
 from floatframe.joints.rows.coordinate import RelativePlace, RowCoordinate
 from floatframe.joints.rows.kinds import (

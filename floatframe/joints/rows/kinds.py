@@ -1,9 +1,9 @@
-"""What each kind of row of a joint means: one record, which everything that is not a formula of it asks.
+"""The meaning of each kind of joint row, as one record that all other code consults.
 
-A joint between markers A and B has as unknown a wrench in ground axes: the force F on A (and its opposite on B), the
-moment M on A, the moment N whose opposite acts on B. It has as many rows as unknowns, so that no row of a body depends
-on another body and bodies can be eliminated one by one with the exact tangent. With E = A_A x, Z = A_A z, D = A_B y,
-Y = A_B u, d = r_B - r_A and f(t) the prescribed motion of a row (constant c without):
+The unknown of a joint between markers A and B is a wrench in ground axes: the force F on A (with the opposite force on
+B), the moment M on A, and the moment N whose opposite acts on B. A joint has as many rows as unknowns. No row of a body
+therefore depends on another body, and bodies can be eliminated one by one with the exact tangent. With E = A_A x, Z =
+A_A z, D = A_B y, Y = A_B u, d = r_B - r_A, and f(t) the prescribed motion of a row (a constant c if there is none):
 
     held      POINT x      r_A - r_B = 0, along x in ground axes       closes a point
               DOT x y      E · D = c                                   closes an angle
@@ -26,17 +26,18 @@ Y = A_B u, d = r_B - r_A and f(t) the prescribed motion of a row (constant c wit
               BISECTOR x   part · (E × (Z + D)) = 0                    moment along the bisector of the shafts Z, D
               RIM x        N - rho × F = 0, along x in ground axes     the force acts at the rim of a disc on B
 
-Rows of a line that deforms, LINE, LINE_TURN (held) and LINE_FREE (wrench), are in kernels/joints/deformed_line.py.
+Rows of a deforming line, LINE, LINE_TURN (held) and LINE_FREE (wrench), are in kernels/joints/deformed_line.py.
 
-rho leads from the centre of a disc (axis y in B, radius c) to the point of its rim nearest to the plane, see
-kernels/joints/rolling.py. Force elements have rows of their own, PART; the held row of a coordinate coupler is
-COUPLE, and RELEASED while the coupler is not engaged; SPAN is the distance of two points as a coordinate; LAW_LENGTH,
-LAW_ANGLE and LAW_RATE are what public elements hold.
+rho is the vector from the centre of a disc (axis y in B, radius c) to the point of its rim nearest to the plane, see
+kernels/joints/rolling.py. Force elements have their own rows, PART. The held row of a coordinate coupler is COUPLE, or
+RELEASED while the coupler is not engaged. SPAN is the distance between two points as a coordinate. LAW_LENGTH,
+LAW_ANGLE and LAW_RATE are constraints of public elements.
 
-Joints whose points coincide need one moment (N = M), the others take the force at the point of B and have ARM rows.
+Joints whose points coincide need one moment (N = M); in the others the force acts at the point of B, and they have ARM
+rows.
 
-A kind is its entry in `ROW_KINDS`, and its formulas in the kernels (kernels/joints/row_formulas.py). Who wants to
-know whether a row holds something, what its unit is or how its coordinate is measured, looks here.
+A kind is defined by its entry in `ROW_KINDS` and its formulas in kernels/joints/row_formulas.py. All other code reads
+from here whether a row is a constraint, which unit it has and how its coordinate is measured.
 """
 
 from dataclasses import dataclass
@@ -98,23 +99,24 @@ __all__ = [
 POINT, DOT, GAUGE, SPRING, TURN, SLIDE, DISTANCE, SCREW, GAUGE_B, THREAD, ARM, ROD, PUSH, TWIST = range(14)
 RIM_HEIGHT, ROLL, RIM, COUPLE, PART, SPAN, TURN_B, TWIST_B, LINE, LINE_TURN, LINE_FREE = range(14, 25)
 EQUAL_TURN, BISECTOR, LAW_LENGTH, LAW_ANGLE, LAW_RATE, RELEASED = range(25, 31)
-NOTHING, POSITION, VELOCITY = range(3)  #: what a row holds
-FORCE, MOMENT, MOMENT_B = 0, 3, 6  #: where the parts F, M, N begin in the unknown wrench
-NO_MOMENT = -1  #: in place of a part: nothing acts there
+NOTHING, POSITION, VELOCITY = range(3)  #: quantity that a row holds
+FORCE, MOMENT, MOMENT_B = 0, 3, 6  #: indices at which the parts F, M, N start in the unknown wrench
+NO_MOMENT = -1  #: replaces the index of a part if no moment acts
 
 
 @dataclass(frozen=True)
 class RowKind:
-    """What a kind of row means."""
+    """Meaning of a kind of row."""
 
-    code: int  #: in the kernels
-    name: str  #: what it does, in words
-    holds: int = NOTHING  #: NOTHING (it says what the wrench is), POSITION or VELOCITY
-    is_length: bool = False  #: what it holds is in the unit of length (VELOCITY: of length over time), else an angle
-    is_angle: bool = False  #: what it measures as a coordinate is an angle
-    can_yield: bool = False  #: redundant ones share their load where the system asks for it
-    is_loaded: bool = False  #: it carries forces along a coordinate
-    is_free: bool = False  #: it leaves a coordinate free, along which a force may act
+    code: int  #: code in the kernels
+    name: str  #: description of what it does
+    holds: int = NOTHING  #: NOTHING (the row defines the wrench), POSITION or VELOCITY
+    #: whether the held quantity is a length (VELOCITY: length over time); otherwise it is an angle
+    is_length: bool = False
+    is_angle: bool = False  #: whether its measured coordinate is an angle
+    can_yield: bool = False  #: whether redundant rows share their load if the system requests it
+    is_loaded: bool = False  #: whether forces act along its coordinate
+    is_free: bool = False  #: whether it leaves a coordinate free, along which a force may act
 
 
 ROW_KINDS = (
@@ -161,20 +163,20 @@ def kind_of(code: int) -> RowKind:
 
 
 def is_held(codes: IntArray) -> NDArray[np.bool_]:
-    """Return which rows hold something, positions or velocities, by their codes, (n,)."""
+    """Return which rows hold a position or a velocity, given their codes, (n,)."""
     return HOLDS[codes] != NOTHING
 
 
 def is_held_position(codes: IntArray) -> NDArray[np.bool_]:
-    """Return which rows hold a position, by their codes, (n,)."""
+    """Return which rows hold a position, given their codes, (n,)."""
     return HOLDS[codes] == POSITION
 
 
 def is_held_velocity(codes: IntArray) -> NDArray[np.bool_]:
-    """Return which rows hold a velocity and no position, by their codes, (n,)."""
+    """Return which rows hold a velocity but no position, given their codes, (n,)."""
     return HOLDS[codes] == VELOCITY
 
 
 def is_held_length(codes: IntArray) -> NDArray[np.bool_]:
-    """Return which rows hold a position in the unit of length, by their codes, (n,)."""
+    """Return which rows hold a position in the unit of length, given their codes, (n,)."""
     return (HOLDS[codes] == POSITION) & IS_LENGTH[codes]

@@ -1,4 +1,4 @@
-"""Rows of joints as they are described, and the lists of them of which most joints are made."""
+"""Description of the rows of joints, and the lists of rows of which most joints consist."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -35,41 +35,41 @@ class Row:
     kind: int  #: code, see `ROW_KINDS`
     x: Array = field(default_factory=lambda: ZERO)  #: direction in the axes of marker A, (3,); POINT, ARM, ROD: ground
     y: Array = field(default_factory=lambda: ZERO)  #: direction in the axes of marker B, (3,)
-    c: float = 0.0  #: value that is held, or slope of a screw
+    c: float = 0.0  #: held value, or slope of a screw
     z: Array = field(default_factory=lambda: ZERO)  #: second direction in the axes of marker A, (3,)
     u: Array = field(default_factory=lambda: ZERO)  #: second direction in the axes of marker B, (3,)
-    part: int = FORCE  #: of the wrench: FORCE, MOMENT or MOMENT_B; of DOT: where its reaction is
-    motion: TimeFunction | None = None  #: prescribed motion of the held quantity; None: c
-    coordinate: RowCoordinate | None = None  #: of the joint to which the row belongs
+    part: int = FORCE  #: part of the wrench: FORCE, MOMENT or MOMENT_B; for DOT: the part that contains its reaction
+    motion: TimeFunction | None = None  #: prescribed motion of the held quantity; None: constant c
+    coordinate: RowCoordinate | None = None  #: coordinate of the joint to which the row belongs
 
     @property
     def coordinate_name(self) -> str:
-        """Name of the coordinate, "" for none."""
+        """Name of the coordinate; "" if there is none."""
         return "" if self.coordinate is None else self.coordinate.name
 
 
 def point_rows() -> tuple[Row, ...]:
-    """Return the three rows that hold the points of two markers together."""
+    """Return the three rows that make the points of two markers coincide."""
     return tuple(Row(POINT, axis) for axis in np.eye(3))
 
 
 def arm_rows() -> tuple[Row, ...]:
-    """Return the three rows that balance the wrenches on two markers that are apart."""
+    """Return the three rows that balance the wrenches on two markers at different points."""
     return tuple(Row(ARM, axis) for axis in np.eye(3))
 
 
 def orientation_rows(R_AB: Array, part: int = MOMENT) -> tuple[Row, ...]:
-    """Return the three rows that hold the rotation from marker axes B to A.
+    """Return the three rows that fix the rotation from marker axes B to A.
 
-    x_A·y' = y_A·z' = z_A·x' = 0 with the axes x', y', z' fixed in B that coincide with x_A, y_A, z_A.
+    They are x_A·y' = y_A·z' = z_A·x' = 0, where the axes x', y', z' fixed in B coincide with x_A, y_A, z_A.
     """
-    in_b = R_AB.T  # columns: the axes of A as they lie in B
+    in_b = R_AB.T  # columns are the axes of A in B
     x, y, z = np.eye(3)
     return tuple(Row(DOT, a, b, part=part) for a, b in ((x, in_b[:, 1]), (y, in_b[:, 2]), (z, in_b[:, 0])))
 
 
 def slide_row(axis: Array, motions: Mapping[str, TimeFunction], name: str) -> Row:
-    """Return the row of a free distance along an axis of A: prescribed, or without force."""
+    """Return the row of a free distance along an axis of A: prescribed, or force-free."""
     own = RowCoordinate(name, PUSH, axis)
     if name in motions:
         return Row(SLIDE, axis, motion=motions[name], coordinate=own)
@@ -77,10 +77,10 @@ def slide_row(axis: Array, motions: Mapping[str, TimeFunction], name: str) -> Ro
 
 
 def turn_row(axis: Array, frame: tuple[Array, Array, Array], part: int, motions: Mapping, name: str) -> Row:
-    """Return the row of a free angle about an axis of A: prescribed, or without moment.
+    """Return the row of a free angle about an axis of A: prescribed, or moment-free.
 
-    frame: two directions of A, normal to the axis with x × z along it, and the direction of B that is along z at
-    angle zero.
+    frame: two directions of A, normal to the axis, with x × z along it, and the direction of B that is along z at angle
+    zero.
     """
     x, z, y = frame
     own = RowCoordinate(name, TWIST, x, y, z, parts=((part, 1.0),))
@@ -90,7 +90,7 @@ def turn_row(axis: Array, frame: tuple[Array, Array, Array], part: int, motions:
 
 
 def turn_row_b(axis: Array, axis_b: Array, z: Array, motions: Mapping, name: str) -> Row:
-    """Return the row of a free angle about an axis of B: prescribed, or without moment.
+    """Return the row of a free angle about an axis of B: prescribed, or moment-free.
 
     z: direction of B, normal to its axis, that is along the axis of A at angle zero.
     """
@@ -101,7 +101,7 @@ def turn_row_b(axis: Array, axis_b: Array, z: Array, motions: Mapping, name: str
 
 
 def loaded_row(row: Row) -> Row:
-    """Return the row of a free coordinate with forces along it, in place of the one without."""
+    """Return the row of a free coordinate along which forces act, in place of the force-free row."""
     own = row.coordinate
     assert own is not None
     assert kind_of(row.kind).is_free
