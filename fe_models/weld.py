@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_models.body.elimination import eliminate_dofs
-from fe_models.body.fe_body import ElementModel, FEBody, Interface, Recovery, StressPointModel
+from fe_models.body.fe_body import MULTIPLIER, ElementModel, FEBody, Interface, Recovery, StressPointModel
 from fe_models.body.load_cases import LoadCase
 from fe_models.body.mass_loads import MassLoads
 from fe_models.body.numbering import numbering_side_by_side
@@ -127,7 +127,9 @@ def weld(bodies: Sequence[FEBody], joints: Iterable[tuple[Place, Place]], *, nam
 
     (1) place matrices, nodes, dofs, surfaces and load cases side by side
     (2) at each joint, let the six dofs of the second interface follow the first rigidly: u_2 = u_1 + theta_1 × r
-    (3) remove the joined interfaces from the boundary; the other interfaces stay as they are
+    (3) where only distributing interfaces meet, nothing but multipliers holds their reference nodes: replace the leader
+        by the mean motion of its members, u_1 = A u_members, and remove its multipliers
+    (4) remove the joined interfaces from the boundary; the other interfaces stay as they are
 
     To join a beam to a solid, give the solid an interface on its faces, rigid (RBE2) or distributing (RBE3), and the
     beam an interface at its end node. The two interfaces need not lie at one point: the distance between them is a
@@ -302,21 +304,40 @@ def _followers(where: str, body: FEBody, pairs: list[tuple[IntArray, IntArray]])
         if roots[0] == roots[1]:
             raise BodyError(f"{where}: a joint connects interfaces that are joined already; remove one of the joints")
         leader[roots[1]] = roots[0]
-    slaves: list[int] = []
-    rows: list[int] = []
-    columns: list[int] = []
-    values: list[float] = []
-    for node in leader:
-        root = _root(leader, node)
-        motion = np.eye(6)
-        motion[:3] = rigid_motion_of_points(body.nodes[node][None], body.nodes[root])[0]
-        at = np.nonzero(motion)
-        rows += (len(slaves) + at[0]).tolist()
-        columns += dofs_of[root][at[1]].tolist()
-        values += motion[at].tolist()
-        slaves += dofs_of[node].tolist()
-    T_s = sp.csr_array((values, (rows, columns)), shape=(len(slaves), body.n_dof))
-    return np.array(slaves, dtype=np.int64), T_s
+    slaves: list[IntArray] = []
+    blocks: list[sp.csr_array] = []
+    for root in dict.fromkeys(_root(leader, node) for node in leader):
+        followers = [node for node in leader if _root(leader, node) == root]
+        motion = sp.csr_array((np.ones(6), (np.arange(6), dofs_of[root])), shape=(6, body.n_dof))
+        if all(_has_only_multipliers(body, dofs_of[node]) for node in (root, *followers)):
+            multipliers, motion = _mean_motion(body, dofs_of[root])
+            slaves += [dofs_of[root], multipliers]
+            blocks += [motion, sp.csr_array((len(multipliers), body.n_dof))]
+        for node in followers:
+            arm = np.eye(6)
+            arm[:3] = rigid_motion_of_points(body.nodes[node][None], body.nodes[root])[0]
+            slaves.append(dofs_of[node])
+            blocks.append(sp.csr_array(arm @ motion))
+    if not slaves:
+        return np.zeros(0, np.int64), sp.csr_array((0, body.n_dof))
+    return np.concatenate(slaves), sp.csr_array(sp.vstack(blocks, "csr"))
+
+
+def _has_only_multipliers(body: FEBody, dofs: IntArray) -> bool:
+    """Whether multipliers alone hold the node of these dofs, as they do that of a distributing interface."""
+    rows, _ = body.K[:, dofs].nonzero()
+    return bool((body.dofs[rows, 1] == MULTIPLIER).all())
+
+
+def _mean_motion(body: FEBody, dofs: IntArray) -> tuple[IntArray, sp.csr_array]:
+    """Return the multipliers of a reference node, and A of u_reference = A u_members over all dofs, (6, n_dof)."""
+    rows, _ = body.K[:, dofs].nonzero()
+    multipliers = np.unique(rows)
+    C = sp.csr_array(body.K[multipliers])
+    at_reference = C[:, dofs].toarray()
+    is_member = np.ones(body.n_dof)
+    is_member[dofs] = 0.0
+    return multipliers, sp.csr_array(-np.linalg.inv(at_reference) @ (C @ sp.diags_array(is_member)))
 
 
 def _root(leader: dict[int, int], node: int) -> int:

@@ -6,18 +6,16 @@ import numpy as np
 import scipy.sparse as sp
 
 from cms.errors import BodyError, EigenError, FactorizationError, ModeSetError
+from cms.families.mechanism import WITHIN_ROUNDING, moving_nodes
 from cms.solvers.factorization import EmptyFactor, Factorization, factorize
 from cms.solvers.registry import solver_of
 from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.body.nearby import nearby_order
 from fe_models.body.submatrix import PrincipalBlock, principal_block
-from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.solver import Solver
-from fe_models.foundation.words import node_list
 
 __all__ = ["FixedInterfaceBody", "fix_interfaces"]
-
-ZERO_ENERGY = 1e-8  #: |K u| / (|K|_max |u|) below which u is a motion without energy
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,21 +96,13 @@ def _mechanism_message(body: FEBody, i: IntArray, K_ii: sp.csc_array, M_ii: sp.c
     # the mechanism matters more than the reason why its motion could not be computed
     except (EigenError, FactorizationError):
         return f"{start}; it has a mechanism, or a part that no interface holds"
-    energy = np.abs(K_ii @ modes.Phi).max(axis=0) / (np.abs(K_ii.data).max() * np.abs(modes.Phi).max(axis=0))
-    is_free = energy < ZERO_ENERGY
+    energy = np.einsum("nk,nk->k", modes.Phi, K_ii @ modes.Phi)
+    terms = np.einsum("n,nk,nk->k", np.abs(K_ii.diagonal()), modes.Phi, modes.Phi)
+    is_free = energy < WITHIN_ROUNDING * np.finfo(float).eps * terms
     if not is_free.any():
-        return f"{start}; its smallest energy is {energy.min():.1e} of the largest stiffness"
+        return f"{start}; its smallest energy is {(energy / terms).min():.1e} of the sum of its terms"
     return (
         f"{start}: {int(is_free.sum())}{'+' if is_free.all() else ''} motions without energy, largest at "
         f"{moving_nodes(body, i, modes.Phi[:, is_free])}; hold these nodes by an interface, join the parts, or "
         "mend the mesh"
     )
-
-
-def moving_nodes(body: FEBody, rows: IntArray, Phi: Array) -> str:
-    """Name the three nodes with the largest motion in these columns over the given dofs, with their positions."""
-    is_translation = (body.dofs[rows, 1] >= 0) & (body.dofs[rows, 1] < 3)
-    chosen = is_translation if is_translation.any() else np.ones(len(rows), bool)
-    size = np.bincount(body.dofs[rows[chosen], 0], (Phi[chosen] ** 2).sum(axis=1), minlength=len(body.nodes))
-    order = np.argsort(-np.round(size / size.max(), 6), kind="stable")  # nodes with equal motion keep their order
-    return node_list(order[: min(3, np.count_nonzero(size))].tolist(), body.nodes)

@@ -13,7 +13,8 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from cms.errors import BodyError, EigenError
-from cms.families.fixed_interface import FixedInterfaceBody, moving_nodes
+from cms.families.fixed_interface import FixedInterfaceBody
+from cms.families.mechanism import free_motions, mechanism_words
 from cms.solvers.factorization import Inertia, factorize, shifted_matrix
 from cms.solvers.tall import combine, inner
 from fe_models.body.coupling_on_ranks import spread_extension
@@ -24,11 +25,10 @@ from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 from fe_models.foundation.solver import Solver
 from fe_models.foundation.tall.on_disk import of_this_process
 
-__all__ = ["BoundaryConditions", "CondensedBody", "Flexibility"]
+__all__ = ["BoundaryConditions", "CondensedBody", "Flexibility", "held_factor"]
 
 RIGID_ENERGY = 1e-14  #: squared motion against the conditions, below which a rigid-body motion is free
 COUNTED = 1e-11  #: eigenvalue of the scaled boundary block relative to its largest, above which its sign is certain
-SINGULAR = 1e-13  #: smallest eigenvalue of the scaled condensed stiffness, below which there is a mechanism
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ class Flexibility:
         n_n = motions.shape[1]
         self.r = _pivots(on_z / _lengths(body, h, Z)[:, None]) if r is None else r
         self.e = np.setdiff1d(np.arange(Z.shape[1]), self.r)
-        self._factor = _cholesky(condensed, Z, S_z, self.e)
+        self._factor = held_factor(condensed, Z, S_z, self.e)
         self.T = None if Z.shape[0] == Z.shape[1] else _expansion(condensed, Z)
         self.M = self._with_load(body.M, conditions.M_load)
         self.K = self._with_load(body.K, conditions.K_load)
@@ -265,24 +265,29 @@ def _pivots(motions: Array) -> IntArray:
     return np.sort(pivots[:n]).astype(np.int64)
 
 
-def _cholesky(condensed: CondensedBody, Z: Array, S_z: Array, e: IntArray) -> tuple[Array, tuple[Array, bool]]:
-    """Factorise S_ee, scaled with its diagonal; raise `BodyError` for a mechanism."""
+def held_factor(condensed: CondensedBody, Z: Array, S_z: Array, e: IntArray) -> tuple[Array, tuple[Array, bool]]:
+    """Factorise S_ee, scaled by its diagonal: the scale, (n_e,), and the Cholesky factor.
+
+    Raises
+    ------
+    BodyError
+        If a motion of z_e costs no energy: a mechanism.
+    """
     S_ee = S_z[np.ix_(e, e)]
     if not len(e):
         return np.zeros(0), (S_ee, True)
-    diagonal = np.diag(S_ee)
-    size = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
-    scaled = S_ee * np.outer(size, size)
-    values, vectors = la.eigh((scaled + scaled.T) / 2)
-    is_free = values < SINGULAR
-    if is_free.any():
-        body = condensed.body
-        moved = of_this_process(combine(condensed.Psi_C, Z[:, e] @ (size[:, None] * vectors[:, is_free])))
+    body = condensed.body
+    free = free_motions(body, condensed.Psi_C, Z[:, e], S_ee, np.abs(body.K.diagonal()[condensed.fixed.b]))
+    if free.shape[1]:
+        raise BodyError(mechanism_words(body, free))
+    size = 1 / np.sqrt(np.where(np.diag(S_ee) > 0, np.diag(S_ee), 1.0))
+    try:
+        return size, la.cho_factor(S_ee * np.outer(size, size), lower=True)
+    except la.LinAlgError as error:
         raise BodyError(
-            f"body {body.name!r}: {int(is_free.sum())} motions besides the rigid ones cost no energy: a mechanism, "
-            f"largest at {moving_nodes(body, np.arange(body.n_dof), moved)}; join the parts or add what holds them"
-        )
-    return size, la.cho_factor(scaled, lower=True)
+            f"body {body.name!r}: its stiffness seen from the interfaces is lost in the rounding of much larger terms; "
+            "give stiff springs and stiff short members stiffnesses nearer to those of their neighbours"
+        ) from error
 
 
 def _boundary_entries(A: SpreadMatrix, fixed: FixedInterfaceBody, Z: Array) -> sp.csc_array:

@@ -19,7 +19,7 @@ from cms.reduced_basis.independent import Columns, gram
 from cms.second_order.centrifugal import CENTRIFUGAL
 from cms.solvers.factorization import factorize, shifted_matrix
 from cms.solvers.sparse_product import SymmetricProduct
-from fe_models.body.fe_body import FEBody
+from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.body.submatrix import PrincipalBlock
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
@@ -145,6 +145,7 @@ class _Span:
     def __init__(self, families: Families, *, deflation: float) -> None:
         self.body, self.families, self.deflation = families.body, families, deflation
         self._K, self._M = SymmetricProduct(self.body.K), SymmetricProduct(self.body.M)
+        self._is_motion = self.body.dofs[:, 1] != MULTIPLIER
         self.columns = self._products(np.zeros((self.body.n_dof, 0)))
         self.labels: list[str] = []
         self.groups: list[str] = []
@@ -170,9 +171,13 @@ class _Span:
         expansion.ends = (*expansion.ends, self.n)
 
     def _orthonormal(self, X: Array) -> Columns:
-        """Return W-orthonormal directions of elastic columns X outside the span: step (3)."""
+        """Return W-orthonormal directions of elastic columns X outside the span: step (3).
+
+        Multipliers are set to zero: motions that satisfy the constraints have the same energy with any multipliers, and
+        the remainder of a motion in the span would be rounding beside them.
+        """
         free = self.families.free
-        X = X - free.N @ (free.M_N.T @ X)
+        X = (X - free.N @ (free.M_N.T @ X)) * self._is_motion[:, None]
         block = self._products(X)
         stiffness = np.einsum("nk,nk->k", X, block.KX)
         mass = np.einsum("nk,nk->k", X, block.MX)

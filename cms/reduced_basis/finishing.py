@@ -7,7 +7,7 @@ import numpy as np
 import scipy.linalg as la
 
 from cms.errors import BodyError, ModeSetError
-from cms.families.fixed_interface import moving_nodes
+from cms.families.mechanism import mechanism_words, rounding_of_energy, without_energy
 from cms.mode_set import ModeSet
 from cms.reduced_basis.frames import FrameCondition
 from cms.reduced_basis.independent import (
@@ -21,7 +21,7 @@ from cms.reduced_basis.independent import (
 from cms.reduced_basis.rigid_content import elastic_directions, orthonormal_motions
 from cms.reduced_body.source_columns import SourceColumns, source_columns
 from cms.solvers.orientation import orientation
-from cms.solvers.tall import combine, combined, inner, squares, subtract
+from cms.solvers.tall import combine, combined, inner, subtract
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.ranks.spread_columns import SpreadColumns, on_rows
@@ -30,7 +30,8 @@ from fe_models.foundation.tall.on_disk import copied, in_memory, row_slices
 __all__ = ["FinishedBasis", "finish"]
 
 MASSLESS = 1e-12  #: modal mass times omega_1² of a shape of unit W-length, below which the shape is static
-ZERO_ENERGY = 1e3  #: strain energy of a shape relative to the rounding of its terms, below which it counts as zero
+#: energy of a shape from a Gram matrix relative to its rounding, below which the energy is computed from the shape
+SUSPECT_ENERGY = 1e3
 INDEPENDENT = 1e-14  #: smallest eigenvalue of the norm of a pencil, scaled to a unit diagonal
 #: rounding error in PhiᵀMPhi, below which shapes are formed directly from the columns of the set
 TRUSTED_ROUNDING = 1e-11
@@ -68,7 +69,7 @@ def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedB
     where = f"mode set {modes.name!r} of body {body.name!r}"
     V, products = modes.columns, Products.of_body(body)
     V_K, V_M = products.grams(V)
-    omega2_1 = first_elastic(where, V, V_K, V_M, condition)
+    omega2_1 = first_elastic(where, body, V, V_K, V_M, condition)
     Q, redundant = independent_basis(V, V_K, V_M, products, body, omega2_1)  # (1)
     try:
         found = elastic_pencil(where, body, Q, products, condition, omega2_1)
@@ -85,13 +86,11 @@ def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedB
         again, defect = normalised_again(Phi, is_massive, products)
         Z, Phi = Z @ again, combined(Phi, again)
         omega2 = diagonal_within(gram_in_blocks(Phi, products.K), np.eye(len(again)))
-    is_free = is_massive & (omega2 < ZERO_ENERGY * rounding_of_energy(body, Phi))
-    if is_free.any():
-        moving = moving_nodes(body, np.arange(body.n_dof), in_memory(Phi[:, is_free]))
-        raise BodyError(
-            f"body {body.name!r}: {int(is_free.sum())} motions besides the rigid ones cost no energy: a "
-            f"mechanism, largest at {moving}; join the parts or add what holds them"
-        )
+    is_suspect = is_massive & (omega2 < SUSPECT_ENERGY * rounding_of_energy(body, Phi))
+    suspect = in_memory(Phi[:, is_suspect])
+    free = suspect[:, without_energy(body, suspect)]
+    if free.shape[1]:
+        raise BodyError(mechanism_words(body, free))
     if defect > ORTHONORMAL_DEFECT:
         raise ModeSetError(
             f"{where}: shapes are M-orthonormal to {defect:.1e} only, expected {ORTHONORMAL_DEFECT:.0e}; "
@@ -193,10 +192,11 @@ def turn_in_place(Phi: Any, turn: Array) -> None:
         Phi[rows, mixed] = turned
 
 
-def first_elastic(where: str, V: Array, G_K: Array, G_M: Array, condition: FrameCondition) -> float:
+def first_elastic(where: str, body: FEBody, V: Array, G_K: Array, G_M: Array, condition: FrameCondition) -> float:
     """Estimate omega_1² of the free body: the smallest Rayleigh quotient of a column without its rigid part [1/s²].
 
-    Each quotient is an upper bound. The smallest is accurate enough to scale a norm.
+    Each quotient is an upper bound. The smallest is accurate enough to scale a norm. Columns whose energy is rounding,
+    such as those of parts without a connection, are left out.
     """
     rigid = inner(condition.M_Psi_R, V)
     stiffness, mass = np.diag(G_K), np.diag(G_M)
@@ -204,7 +204,11 @@ def first_elastic(where: str, V: Array, G_K: Array, G_M: Array, condition: Frame
     is_elastic = elastic_mass > 1e-9 * mass
     if not is_elastic.any():
         raise ModeSetError(f"{where}: its columns hold only rigid-body motion; add modes or interfaces")
-    return float((stiffness[is_elastic] / elastic_mass[is_elastic]).min())
+    rounding = rounding_of_energy(body, V)
+    is_certain = is_elastic & (stiffness > SUSPECT_ENERGY * rounding)
+    if not is_certain.any():
+        is_certain, stiffness = is_elastic, np.maximum(stiffness, rounding)
+    return float((stiffness[is_certain] / elastic_mass[is_certain]).min())
 
 
 def elastic_part(body: FEBody, Q: Basis, condition: FrameCondition, omega2_1: float) -> Array:
@@ -218,11 +222,6 @@ def elastic_part(body: FEBody, Q: Basis, condition: FrameCondition, omega2_1: fl
 def diagonal_within(G: Array, Z: Array) -> Array:
     """Return the diagonal of Zᵀ G Z, (k,)."""
     return np.asarray(np.einsum("kq,kq->q", Z, G @ Z))
-
-
-def rounding_of_energy(body: FEBody, u: Array) -> Array:
-    """Return the rounding error of the strain energy of each column: eps times the sum of |K_kk| u_k², (k,)."""
-    return np.finfo(float).eps * squares(np.abs(body.K.diagonal()), u)
 
 
 def elastic_eigenvectors(G_K: Array, G_M: Array, omega2_1: float) -> tuple[Array, Array]:

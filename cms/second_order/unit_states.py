@@ -8,6 +8,7 @@ import scipy.linalg as la
 
 from cms.errors import BodyError
 from cms.families.families import Families
+from cms.families.flexibility import held_factor
 from cms.families.sharing import body_of, families_of
 from cms.reduced_basis.frames import Frame, FrameCondition, TisserandFrame, frame_condition
 from cms.second_order.spread_loads import spread_forces
@@ -140,15 +141,7 @@ def static_states(families: Families, F: Array) -> Array:
     e = np.flatnonzero(~np.isin(h, families.r))
     if len(e):
         g = F[h] - (body.K[:, h].T @ embedded(v, i, body.n_dof))
-        S_ee = families.S[np.ix_(e, e)]
-        size = 1 / np.sqrt(np.where(np.diag(S_ee) > 0, np.diag(S_ee), 1.0))
-        try:
-            factor = la.cho_factor(S_ee * np.outer(size, size))
-        except la.LinAlgError as error:
-            raise BodyError(
-                f"body {body.name!r}: motions besides the rigid ones cost no energy: a mechanism; join the parts or "
-                "add what holds them"
-            ) from error
+        size, factor = held_factor(families.condensed, np.eye(len(h)), families.S, e)
         z[e] = size[:, None] * la.cho_solve(factor, size[:, None] * g[e])
     u = of_this_process(combine(families.Psi_C, z))
     u[i] += v

@@ -290,7 +290,7 @@ def test_a_hinge_between_two_parts_is_named_as_mechanism():
     """Two bricks that share one edge turn about it without energy."""
     body = hinged_bricks()
     coupled = couple(body)
-    with pytest.raises(BodyError, match=r"1 motions besides the rigid ones cost no energy.*largest at node"):
+    with pytest.raises(BodyError, match=r"1 motion besides the rigid ones costs no energy.*largest at node"):
         reduce(coupled, guyan(coupled))
 
 

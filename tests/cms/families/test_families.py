@@ -343,7 +343,7 @@ def test_hinged_parts_with_both_sides_held_are_a_mechanism():
     """K_II is regular there, so only the condensed stiffness can tell."""
     from tests.cms.test_reduction import hinged_bricks
 
-    with Families(couple(hinged_bricks())) as f, pytest.raises(BodyError, match=r"1 motions besides.*a mechanism"):
+    with Families(couple(hinged_bricks())) as f, pytest.raises(BodyError, match=r"1 motion besides.*a mechanism"):
         _ = f.Psi_A
 
 

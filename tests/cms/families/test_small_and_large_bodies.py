@@ -1,5 +1,6 @@
-"""Bodies without interior dofs, all the modes there are, and interfaces with very many dofs."""
+"""Bodies without interior dofs, all the modes there are, loose parts, wires, and interfaces with very many dofs."""
 
+import dataclasses
 import logging
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.testing import assert_allclose
 
 import cms
 import fe_models as fm
-from cms.errors import ModeSetError
+from cms.errors import BodyError, ModeSetError
 from cms.families import families, interface_cost
 from cms.families.interface_cost import few_columns, large_interfaces, reduction_cost
 from tests.bodies import box_mesh
@@ -106,3 +107,86 @@ def test_the_file_of_a_reduction_is_as_large_as_was_said(tmp_path):
     cms.write(cms.reduce(body, modes, geometric=False), tmp_path / "b.h5")
     said = reduction_cost(body, modes.columns.shape[1]).file
     assert 0.8 < (tmp_path / "b.h5").stat().st_size / said < 1.1
+
+
+def mean_motion(points, reference):
+    """Least-squares rigid motion of points, [d, theta] (6, 3 n), by a pseudo-inverse."""
+    turned = [np.cross(np.eye(3), p - reference).T for p in points]  # columns e_k x r
+    return np.linalg.pinv(np.concatenate([np.hstack([np.eye(3), each]) for each in turned]))
+
+
+@pytest.mark.parametrize("solver", ["superlu", None])
+@pytest.mark.parametrize("n_parts", [2, 3])
+def test_bricks_welded_at_distributing_interfaces_swing_as_the_constrained_pencil(n_parts, solver):
+    """The oracle ties the mean motions of the faces in the null space of the constraint, without multipliers."""
+    rng = np.random.default_rng(5)
+    parts, faces, arms = [], [], []
+    for k in range(n_parts):
+        mesh = box_mesh(2, 1, 1, 0.5, 0.2, 0.1)
+        mesh = dataclasses.replace(mesh, nodes=mesh.nodes + np.array([3.0 + 0.5 * k, -1.0, 2.0]))
+        ends = []
+        for name, side in (("a", "left"), ("b", "right")):
+            members = mesh.node_sets[side]
+            is_outer = (k, name) in ((0, "a"), (n_parts - 1, "b"))
+            at = mesh.nodes[members].mean(axis=0) + 0.1 * rng.normal(size=3)
+            ends.append(fm.Interface(name, "nodes" if is_outer else "distributing", members, at))
+        uncoupled = fm.solid_body(mesh, STEEL, name=f"p{k}", units=SI)
+        parts.append(uncoupled)
+        faces.append([mesh.node_sets["left"], mesh.node_sets["right"]])
+        arms.append(ends)
+    coupled = [cms.couple(p.with_interfaces(*ends)) for p, ends in zip(parts, arms, strict=True)]
+    joints = [((f"p{k}", "b"), (f"p{k + 1}", "a")) for k in range(n_parts - 1)]
+    whole = fm.weld(coupled, joints, name="w")
+    K, M = (la.block_diag(*[getattr(p, name).toarray() for p in parts]) for name in "KM")
+    first = np.cumsum([0, *(p.n_dof for p in parts)])
+    C = np.zeros((6 * len(joints), len(K)))
+    for k in range(len(joints)):
+        at = arms[k][1].reference  # the motion of either face seen from one point
+        for part, side, sign in ((k, 1, 1.0), (k + 1, 0, -1.0)):
+            rows = first[part] + (3 * faces[part][side][:, None] + np.arange(3)).ravel()
+            C[6 * k : 6 * k + 6, rows] = sign * mean_motion(parts[part].nodes[faces[part][side]], at)
+    Z = la.null_space(C)
+    expected = np.sqrt(la.eigh(Z.T @ K @ Z, Z.T @ M @ Z, eigvals_only=True)[6:10]) / (2 * np.pi)
+    reduced = cms.reduce(whole, cms.rubin(cms.Families(whole, solver=solver), n_modes=4))
+    assert_allclose(reduced.free_frequencies[:4], expected, rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("spring", "n_inner"), [(None, 6), ([1e9, 1e9, 1e9, 0, 0, 0], 3), ([1e9, 1e9, 1e9, 1e5, 1e5, 0], 1)]
+)
+@pytest.mark.parametrize("name", ["craig_bampton", "rubin", "craig_chang"])
+@pytest.mark.parametrize("geometric", [None, False])
+def test_the_inner_motions_of_two_beams_are_counted(name, spring, n_inner, geometric):
+    """A joint of two beams leaves the motions that it does not hold, whatever the direction of the beams."""
+    along = np.array([1.0, 2.0, 3.0]) / np.sqrt(14)
+    triad = np.linalg.qr(np.column_stack([along, np.eye(3)[:, :2]]))[0][:, [1, 2, 0]]  # z along the beams
+    triad[:, 2] *= np.linalg.det(triad)
+    nodes = np.concatenate([np.linspace(0, 1, 6), np.linspace(1, 2, 6)])[:, None] * along + np.array([5.0, -3.0, 2.0])
+    lines = np.array([(i, i + 1) for i in range(5)] + [(6 + i, 7 + i) for i in range(5)])
+    mesh = fm.LineMesh(nodes, lines, node_sets={"a": np.array([0]), "b": np.array([11])})
+    turn = [] if spring is None else [fm.Spring((5, 6), np.array(spring), triad=triad)]
+    body = cms.couple(
+        fm.beam_body(
+            mesh, fm.BeamProperty(fm.Rectangle(0.03, 0.05), STEEL), name="b", units=SI, springs=turn,
+            interfaces=[fm.line_interface(mesh, end, fm.NodeSet(end)) for end in "ab"],
+        )
+    )  # fmt: skip
+    what = "6 motions" if n_inner == 6 else f"{n_inner} motion{'s' if n_inner > 1 else ''}"
+    with pytest.raises(BodyError, match=f"{what} besides the rigid ones costs? no energy.*largest at node"):
+        cms.reduce(body, SETS[name](body, n_modes=4), geometric=geometric)
+
+
+@pytest.mark.parametrize("along", [(1.0, 0.0, 0.0), (1.0, 2.0, 3.0)])
+@pytest.mark.parametrize("name", SETS)
+def test_a_wire_swings_like_a_free_beam(name, along):
+    """EA L²/EI = 1e13 along an axis of the mesh, and 1e10 across it, where entries of K hold bending and tension."""
+    ratio = 1e13 if along[1] == 0 else 1e10
+    width = np.sqrt(12 / ratio)
+    mesh = fm.straight_line((0, 0, 0), tuple(np.array(along) / np.linalg.norm(along)), 12)
+    ends = [fm.line_interface(mesh, end, fm.NodeSet(end)) for end in ("start", "end")]
+    section = fm.BeamProperty(fm.Rectangle(width, width), STEEL)
+    body = cms.couple(fm.beam_body(mesh, section, name="wire", units=SI, interfaces=ends))
+    reduced = cms.reduce(body, SETS[name](body, n_modes=10))
+    bending = width * np.sqrt(STEEL.E / 12 / STEEL.rho) / (2 * np.pi)  # of radius of gyration width / sqrt(12)
+    expected = bending * np.array([4.730041, 4.730041, 7.853205, 7.853205]) ** 2
+    assert_allclose(reduced.free_frequencies[:4], expected, rtol=2e-3)

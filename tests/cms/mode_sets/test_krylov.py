@@ -13,9 +13,11 @@ from cms.families.receptance import boundary_scale, largest_error, receptance_of
 from cms.mode_sets.krylov import krylov
 from cms.reduction import reduce
 from fe_models.body.couplings import couple
+from fe_models.body.fe_body import Interface
 from fe_models.body.load_cases import LoadCase
 from fe_models.foundation.units import unit_system
-from tests.bodies import bar, chain
+from fe_models.solids.body import solid_body
+from tests.bodies import STEEL, bar, box_mesh, chain
 
 ROUNDOFF = 1e-12
 
@@ -238,3 +240,18 @@ def test_labels_say_hertz_whatever_the_unit_of_time(body):
     modes = krylov(replace(body, units=unit_system("mm-kg-ms")), n_blocks=1, shifts=(0.8,))
     assert modes.options["shifts"] == "800 Hz"
     assert modes.labels[-1].startswith("krylov 800 Hz block 1")
+
+
+@pytest.mark.parametrize("kinds", [("rigid", "distributing"), ("distributing", "distributing")])
+def test_no_more_motions_are_found_than_the_body_has(kinds):
+    """Multipliers of a distributing interface are no motions: what is left of one is rounding beside them."""
+    mesh = box_mesh(2, 2, 1, 1.0, 0.4, 0.3)
+    block = solid_body(mesh, STEEL, name="block", units=unit_system("m-kg-s"))
+    sides = [mesh.node_sets[side] for side in ("left", "right")]
+    ends = [Interface(n, k, s, mesh.nodes[s].mean(0)) for n, k, s in zip("ab", kinds, sides, strict=True)]
+    body = couple(block.with_interfaces(*ends))
+    moving = body.n_dof - 12 * kinds.count("distributing") - 6
+    for shifts in ((0.0,), (0.0, 800.0)):
+        reduced = reduce(body, krylov(body, n_blocks=8, shifts=shifts), geometric=False, stress=False)
+        assert np.diag(reduced.M).all()
+        assert moving - 2 <= reduced.n_q <= moving
