@@ -144,8 +144,7 @@ def shake(job: ShakeJob) -> ShakeResult:
                 continue
             key = (request.kind, run.test, run.direction)
             if isinstance(run, SineRun):
-                wide = None if job.uncertainty.is_none else job.uncertainty
-                notched[key] = notched_sine(model, run, request.limits, wide, request.deepest)
+                notched[key] = notched_sine(model, run, request.limits, request.deepest)
             else:
                 notched[key] = notched_random(model, run, request.limits, request.deepest)
     notes += [note for run in times for note in run.notes]

@@ -278,6 +278,10 @@ class RecoverySensor:
         columns = {table.labels[row]: values[:, k] for k, row in enumerate(rows)}
         return Measurement(self.name, trajectory.t, columns, {table.labels[row]: table.units[row] for row in rows})
 
+    def places_and_rates(self, small: SmallMotions, z: Rows) -> tuple[Rows, Rows]:
+        """Return what stands for z and z' in the rows: places count from the frame, velocities from rest."""
+        return small.by_motion(np.concatenate([np.zeros((6, small.n_x)), z.x[6:]])), z.rate
+
     def linear(self, small: SmallMotions) -> LinearColumns:
         """Return the rows by small motions and wrenches about a state at rest."""
         body, table, rows = self.found(small.system)
@@ -287,8 +291,8 @@ class RecoverySensor:
             return LinearColumns({}, units, dict.fromkeys(units, why))
         z, R = small.of_file(body.name)
         frame = small.frame_place(body.name)
-        own = small.by_motion(np.concatenate([np.zeros((6, small.n_x)), z.x[6:]]))
-        y = own.turned(table.dynamic[0][rows]) + z.rate.turned(table.dynamic[1][rows])
+        places, rates = self.places_and_rates(small, z)
+        y = places.turned(table.dynamic[0][rows]) + rates.turned(table.dynamic[1][rows])
         y = y + z.rate.rate.turned(table.dynamic[2][rows])
         turning = frame.turned
         on_interfaces, now = interface_load_rows(small, body), interface_loads(small.system, small.now, body)[:, 0]

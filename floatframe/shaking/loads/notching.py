@@ -27,7 +27,6 @@ from floatframe.errors import ModelError
 from floatframe.shaking.loads.levels import Level
 from floatframe.shaking.loads.random_vibration import RandomRun
 from floatframe.shaking.loads.sine import SineRun
-from floatframe.shaking.loads.uncertainty import Uncertainty
 from floatframe.shaking.structure.model import Output, ShakenModel
 
 __all__ = ["ForceLimit", "Notch", "NotchedRun", "ResponseLimit", "notched_random", "notched_sine"]
@@ -133,22 +132,15 @@ def in_output_units(model: ShakenModel, output: Output, value: float) -> float:
     return value * model.gravity if output.kind == "acceleration" else value
 
 
-def notched_sine(
-    model: ShakenModel,
-    run: SineRun,
-    limits: Sequence[Limit],
-    uncertainty: Uncertainty | None = None,
-    deepest: float = DEEPEST,
-) -> NotchedRun:
-    """Return the notched input of a sine run.
+def notched_sine(model: ShakenModel, run: SineRun, limits: Sequence[Limit], deepest: float = DEEPEST) -> NotchedRun:
+    """Return the notched input of a sine run; amplitudes with uncertainty are kept below the limits.
 
     Raises
     ------
     ModelError
         If a limit asks for a notch deeper than allowed, or is one of a random test.
     """
-    transfer = run.sizes / run.level[:, None]
-    wide = transfer if uncertainty is None else run.uncertain / run.level[:, None]
+    transfer, wide = run.sizes / run.level[:, None], run.uncertain / run.level[:, None]
     allowed, of = np.full((len(limits), len(run.frequencies)), np.inf), {}
     for k, limit in enumerate(limits):
         column = column_of(run.outputs, limit)
@@ -175,15 +167,18 @@ def notched_sine(
 
 
 def notched_random(model: ShakenModel, run: RandomRun, limits: Sequence[Limit], deepest: float = DEEPEST) -> NotchedRun:
-    """Return the notched input of a random run of one direction; limits of density, then of rms."""
+    """Return the notched input of a random run of one direction; limits of density, then of rms.
+
+    What is kept below the limits are the densities with uncertainty; the densities and rms that are left are nominal.
+    """
     if run.level.shape[1] != 1:
         raise ModelError(f"notch: random {run.test!r} drives several inputs at once; notches are made of one direction")
     f, level = run.band.frequencies, run.level[:, 0]
-    transfer = run.density / level[:, None]
+    transfer, wide = run.density / level[:, None], run.wide / level[:, None]
     allowed, of = np.full((len(limits), len(f)), np.inf), {}
     for k, limit in enumerate(limits):
         column = column_of(run.outputs, limit)
-        own = transfer[:, column]
+        own = wide[:, column]
         if isinstance(limit, ForceLimit):
             value = force_limit(model, limit, run.direction, f, level)
         elif limit.rms is not None:
@@ -199,7 +194,7 @@ def notched_random(model: ShakenModel, run: RandomRun, limits: Sequence[Limit], 
     notched, which = lowered(level, allowed)
     decibels = 10 * np.log10(notched / level)
     found = stretches(
-        f, decibels, which, limits, of, [transfer[:, column_of(run.outputs, limit)] * level for limit in limits]
+        f, decibels, which, limits, of, [wide[:, column_of(run.outputs, limit)] * level for limit in limits]
     )
     require_possible(found, deepest, f"random {run.test!r}, {run.direction}")
     sizes = transfer * notched[:, None]

@@ -104,6 +104,7 @@ class RandomRun:
     density: Array  #: (n_f, n_out) [units of the model² per Hz]
     rms: Array  #: (n_out,)
     error: Array  #: bound of the relative error of rms by the integration, (n_out,)
+    wide: Array  #: densities with uncertainty, (n_f, n_out): what notches keep below their limits
     uncertain: Array  #: rms with uncertainty, (n_out,)
     crossings: Array  #: zero crossings upwards, (n_out,) [Hz]
     expected: Array | None  #: largest value to expect in the duration, (n_out,)
@@ -149,7 +150,8 @@ def random_run(
     crossings = np.sqrt(
         np.divide(band.integral(f[:, None] ** 2 * density), rms2, out=np.zeros_like(rms2), where=rms2 > 0)
     )
-    wide = densities(uncertainty_of(uncertainty, f, G, density_in, len(columns)), groups)
+    spread = uncertainty_of(uncertainty, f, G, density_in, len(columns))
+    wide = density if spread is G else densities(spread, groups)
     of_places = {
         model.outputs[rows.start].group: random_von_mises(
             band.integral(np.einsum("fai,fbi->fab", G[:, rows], G[:, rows].conj()).real)
@@ -168,6 +170,7 @@ def random_run(
         density=density,
         rms=rms,
         error=np.divide(band.error(density), 2 * rms2, out=np.zeros_like(rms2), where=rms2 > 0),
+        wide=wide,
         uncertain=np.sqrt(np.maximum(band.integral(wide), 0.0)),
         crossings=crossings,
         expected=None if test.duration is None else largest(rms, crossings, test.duration),

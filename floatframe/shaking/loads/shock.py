@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
 from floatframe.errors import ModelError
@@ -23,6 +24,8 @@ POINTS_A_CYCLE = 20  #: of the highest mode that vibrates
 AFTER = 10.0  #: cycles of the lowest mode that are looked at after the end of an input
 MOST_SAMPLES = 2_000_000
 ON_GRID = 1e-6  #: of a step, by which a time may miss it
+COARSE_DIGIT = 0.25  #: of a step, above which the last digit of a time does not say where it was meant to be
+LOST = 0.01  #: of the largest value of a history, from which its change by new times is told
 
 
 @dataclass(frozen=True)
@@ -163,9 +166,9 @@ def time_run(
             for k, v in zip(columns, inputs.values(), strict=True)
         ]
     )
-    t, values, is_exact = sampled(given, rows, h, after)
-    if not is_exact:
-        notes.append(f"{where}: unequal times were sampled anew every {t[1]:.4g} s, straight between the given ones")
+    t, values, words = sampled(given, rows, h, after)
+    if words:
+        notes.append(f"{where}: {words}")
     for k, row in zip(columns, rows, strict=True):
         if after > 0 and abs(row[-1]) > 1e-3 * np.abs(row).max():
             notes.append(f"{where}: {model.inputs[k]} ends at {row[-1]:.4g} and is zero from the next sample on")
@@ -213,8 +216,12 @@ def time_run(
     )
 
 
-def sampled(given: Array, values: Array, h: float, after: float) -> tuple[Array, Array, bool]:
-    """Return equal time steps of at most h, the values there, and whether all given times are among them.
+def sampled(given: Array, values: Array, h: float, after: float) -> tuple[Array, Array, str]:
+    """Return equal time steps of at most h, the values there, and what was done to the given ones, "" if nothing.
+
+    (1) times on equal steps, or off them by the rounding of their digits: these steps, divided
+    (2) others: steps of half the shortest distance; the values whose straight pieces are nearest to the given ones in
+        the square mean, so that areas and first moments stay and what is faster than the steps does not fold down
 
     Beyond the last given time the values are zero, from the next step on.
 
@@ -225,17 +232,72 @@ def sampled(given: Array, values: Array, h: float, after: float) -> tuple[Array,
     values
         (n_act, n), straight between them.
     """
-    least = float(np.diff(given).min())
-    counts = given / least
-    is_exact = bool(np.abs(counts - np.round(counts)).max() < ON_GRID)
-    step = least / math.ceil(least / h * (1 - ON_GRID)) if is_exact else h
-    n = round(given[-1] / step)
-    n_after = math.ceil(after / step)
-    t = np.arange(n + n_after + 1) * step
+    words = ""
+    distances = np.diff(given)
+    if (equal := equal_steps(given)) is not None:  # (1)
+        step, counts, miss = equal
+        if miss > ON_GRID * step:
+            words = (
+                f"times lie up to {miss:.2g} s off equal steps of {step:.6g} s, as rounded digits do: taken as equal"
+            )
+        step, places = step / math.ceil(step / h * (1 - ON_GRID)), step * counts
+        n = round(places[-1] / step)
+    else:  # (2)
+        places = given
+        room = MOST_SAMPLES * given[-1] / (given[-1] + after)
+        n = math.ceil(given[-1] / min(h, max(float(distances.min()) / 2, given[-1] / room)))
+        step = given[-1] / n
+        words = f"unequal times were sampled anew every {step:.4g} s, areas under the straight pieces kept"
+    t = np.arange(n + math.ceil(after / step) + 1) * step
     found = np.zeros((len(values), len(t)))
-    for j, row in enumerate(values):
-        found[j, : n + 1] = np.interp(t[: n + 1], given, row)
-    return t, found, is_exact
+    for row, new in zip(values, found, strict=True):
+        if equal is not None:
+            new[: n + 1] = np.interp(t[: n + 1], places, row)
+            continue
+        new[: n + 1] = nearest_straight(places, row, t[: n + 1])
+        if abs(np.abs(new).max() - np.abs(row).max()) > LOST * np.abs(row).max():
+            words += f"; the largest {np.abs(row).max():.4g} became {np.abs(new).max():.4g}"
+    return t, found, words
+
+
+def equal_steps(given: Array) -> tuple[float, Array, float] | None:
+    """Return the step on whose multiples all times lie, the multiples, and by how much they miss; None: no such step.
+
+    Times miss by `ON_GRID` of a step, or by the rounding to the last digit that they have.
+    """
+    least = float(np.diff(given).min())
+    counts = np.round(given / least)
+    if np.abs(given / least - counts).max() < ON_GRID:
+        return least, counts, 0.0
+    distances = np.diff(given)
+    counts = np.concatenate([[0], np.cumsum(np.round(distances / np.median(distances)))])
+    step = float(counts @ given / (counts @ counts)) if counts.any() else 0.0
+    miss = float(np.abs(given - counts * step).max())
+    digit = next((10.0**-d for d in range(13) if np.abs(given * 10**d - np.round(given * 10**d)).max() < 1e-3), 0.0)
+    is_rounding = (np.diff(counts) > 0).all() and miss <= digit and digit < COARSE_DIGIT * step
+    return (step, counts, miss) if is_rounding else None
+
+
+def nearest_straight(places: Array, values: Array, t: Array) -> Array:
+    """Return values at equal times t whose straight pieces are nearest to those of others in the square mean, (n_t,).
+
+    M v = b: with hats N_k on t, M_kl is the integral of N_k N_l and b_k that of N_k times the given straight pieces,
+    by Simpson's rule between all times of both, where the product is a parabola.
+    """
+    step, n = float(t[1]), len(t)
+    ends = np.union1d(places, t)
+    ends = ends[np.concatenate([[True], np.diff(ends) > ON_GRID * 1e-3 * step])]
+    a, c = ends[:-1], ends[1:]
+    left = np.minimum(np.searchsorted(t, (a + c) / 2) - 1, n - 2)
+    b = np.zeros(n)
+    for at, weight in ((a, 1.0), ((a + c) / 2, 4.0), (c, 1.0)):
+        part = (c - a) / 6 * weight * np.interp(at, places, values)
+        share = (at - t[left]) / step
+        b += np.bincount(left, part * (1 - share), n) + np.bincount(left + 1, part * share, n)
+    bands = np.zeros((2, n))
+    bands[0, 1:], bands[1] = step / 6, 2 * step / 3
+    bands[1, [0, -1]] = step / 3
+    return np.asarray(la.solveh_banded(bands, b))
 
 
 def model_factor(model: ShakenModel, k: int) -> float:

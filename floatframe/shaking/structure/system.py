@@ -24,12 +24,23 @@ from floatframe.compiling.markers import joint_markers, marker_pose, n_q_of
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
 from floatframe.forces import Gravity
-from floatframe.results.sensors import InterfaceForceSensor, PlaceSensor, ReactionSensor, SpringSensor, StressSensor
+from floatframe.results.sensors import (
+    InterfaceForceSensor,
+    PlaceSensor,
+    ReactionSensor,
+    RecoverySensor,
+    SpringSensor,
+    StressSensor,
+)
+from floatframe.results.sensors.measurement import unit_words
 from floatframe.rotations import rotation_matrix
 from floatframe.shaking.structure.body import force_outputs, unit_of
 from floatframe.shaking.structure.damping import Damping
 from floatframe.shaking.structure.model import DIRECTIONS, Base, Output, ShakenModel, rigid_rows
 from floatframe.shaking.structure.places import Observed
+from floatframe.shaking.structure.recovery_rows import recovery_outputs
+from floatframe.small_motions import rows as small_rows
+from floatframe.small_motions.small_motions import SmallMotions
 from floatframe.state import State
 from floatframe.system import System
 
@@ -98,6 +109,18 @@ def marker_a(system: System, connection: object, state: State) -> tuple[Array, f
     return marker_pose(a, state, n_q_of(system))[0], -1.0 if a.body < 0 else 1.0
 
 
+class RecoveryFromBase(RecoverySensor):
+    """Rows of a recovery table, of whose places and velocities those are taken off that the first base carries."""
+
+    def places_and_rates(self, small: SmallMotions, z: small_rows.Rows) -> tuple[small_rows.Rows, small_rows.Rows]:
+        """Return the motion of the body relative to the first base, the inputs of which come first."""
+        x = np.array(z.x)
+        for k, base in enumerate(small.bases[: len(DIRECTIONS)]):
+            x[:, small.n_u + k] -= x[:, : small.n_u] @ small.rigid(base)
+        own = small.by_motion(x)
+        return own, own.rate
+
+
 @dataclass(frozen=True, eq=False)
 class Rows:
     """Outputs by the outputs of the linearised system: y = W y_linear."""
@@ -162,8 +185,11 @@ def shaken_system(
     at = {name: k for k, name in enumerate(linear.outputs)}
     L = np.stack([linear.L, linear.L_rate, linear.L_acceleration])
     D = np.stack([linear.D, linear.D_rate, linear.D_acceleration])
-    if not damping.own:
-        B[1], L[1], D[1] = 0.0, 0.0, 0.0
+    if not damping.own:  # forces have no part of dampers; velocities stay
+        by_damper = [
+            not is_velocity(system, columns[n], u) for n, u in zip(linear.outputs, linear.output_units, strict=True)
+        ]
+        B[1], L[1, by_damper], D[1, by_damper] = 0.0, 0.0, 0.0
     E_rows, D_rows = [], []
     for row in rows:
         chosen = [at[column.name] for column in row.columns]
@@ -200,6 +226,14 @@ def is_carried(column: Column) -> bool:
     return isinstance(column.sensor, (ReactionSensor, InterfaceForceSensor)) or (
         isinstance(column.sensor, SpringSensor) and column.column == "tension"
     )
+
+
+def is_velocity(system: System, column: Column, unit: str) -> bool:
+    """Whether an output is a velocity, whose rates are none of dampers."""
+    if isinstance(column.sensor, RecoverySensor):
+        _, table, _ = column.sensor.found(system)
+        return table.quantities[table.labels.index(column.column)] == "velocity"
+    return unit in (unit_words(system.units, "speed"), unit_words(system.units, "angular speed"))
 
 
 def cleaned(product: Array, left: Array, right: Array) -> Array:
@@ -326,11 +360,18 @@ def sensor_rows(system: System, about: Equilibrium, each: Observed) -> Rows:
         raise ModelError(
             f"shake: output {each.name!r}: no sensor {quoted(str(each.sensor))}{nearest(str(each.sensor), names)}"
         )
+    named: dict[str, Output] = {}
+    if isinstance(sensor, RecoverySensor):
+        sensor = RecoveryFromBase(sensor.name, sensor.body, sensor.table, sensor.rows)
+        named = {output.name: output for output in recovery_outputs(each, sensor.found(system)[1])}
     linear = linearize(system, about, inputs=[], outputs=[sensor])  # type: ignore[list-item]
     outputs, columns = [], []
     for name, unit in zip(linear.outputs, linear.output_units, strict=True):
         column = name.removeprefix(f"{sensor.name}.")
-        outputs.append(Output(f"{each.name} {column}", kind_of(unit, system), unit, each.name, f"sensor {sensor.name}"))
+        kind, group = kind_of(unit, system), each.name
+        if column in named:
+            kind, group = named[column].kind, f"{each.name} {named[column].group}"
+        outputs.append(Output(f"{each.name} {column}", kind, unit, group, f"sensor {sensor.name}"))
         columns.append(Column(sensor, column, name=f"shaken {name}"))  # type: ignore[arg-type]
     return Rows(outputs, columns, np.eye(len(columns)))
 

@@ -46,7 +46,7 @@ def test_an_uncertain_response_makes_a_deeper_and_wider_notch():
     level = SineTest("s", Level.of([(5, 1.0), (100, 1.0)]), ("z",))
     doubtful = Uncertainty(1.25, 0.05)
     run = sine_run(MODEL, level, "z", doubtful)
-    found = notched_sine(MODEL, run, [ResponseLimit("mass acceleration z", 5.0)], doubtful)
+    found = notched_sine(MODEL, run, [ResponseLimit("mass acceleration z", 5.0)])
     plain = notched_sine(MODEL, SINE, [ResponseLimit("mass acceleration z", 5.0)])
     assert_allclose(found.notches[0].depth - plain.notches[0].depth, 20 * np.log10(1.25), rtol=1e-9)
     assert found.notches[0].last > plain.notches[0].last
@@ -99,3 +99,16 @@ def test_a_density_limit_in_g_is_one_of_the_density():
 def test_notches_that_are_impossible_are_refused(make, words):
     with pytest.raises(ModelError, match=words):
         make()
+
+
+def test_uncertainty_deepens_notches_of_random_tests():
+    """The factor alone takes 20 log10 of it from a density, and the rms with the factor is the one that is allowed."""
+    level = RandomTest("r", Level.of([(5, 0.01), (100, 0.01)], "g2/Hz"), ("z",))
+    doubtful = random_runs(MODEL, level, Uncertainty(1.5))[0]
+    plain = random_runs(MODEL, level)[0]
+    limit = [ResponseLimit("mass acceleration z", 0.02)]
+    found, nominal = (notched_random(MODEL, run, limit).notches[0] for run in (doubtful, plain))
+    assert_allclose(found.depth - nominal.depth, 20 * np.log10(1.5), rtol=1e-9)
+    wanted = 0.5 * plain.rms[ACCELERATION] / G
+    kept = notched_random(MODEL, doubtful, [ResponseLimit("mass acceleration z", rms=wanted)])
+    assert_allclose(1.5 * kept.rms[ACCELERATION] / G, wanted, rtol=1e-6)

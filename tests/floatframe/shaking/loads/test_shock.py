@@ -192,3 +192,42 @@ def test_inputs_in_si_become_units_of_the_model(units, acceleration, turning, fo
     found = dict(zip(run.inputs, np.abs(run.input_values).max(axis=1) / 40.0, strict=True))
     for name, factor in zip(names, (acceleration, turning, force, moment, 1.0), strict=True):
         assert_allclose(found[name], factor, rtol=1e-9, err_msg=name)
+
+
+def test_rounded_times_are_the_equal_steps_that_they_were():
+    """51.2 kHz written with six digits: what rings at 4 kHz and lasts one sample is not folded down, nor lost."""
+    exact = np.arange(4096) / 51200.0
+    a = 1e3 * np.sin(2 * np.pi * 4000.3 * exact) * np.exp(-exact / 0.02)
+    a[700] += 5e4
+    model = masses([35.0, 300.0], 0.02)
+    own, rounded = (
+        time_runs(model, TimeTest("s", t, a, ("z",), kind="shock"))[0] for t in (exact, np.round(exact, 6) + 3.0)
+    )
+    assert "as rounded digits do: taken as equal" in rounded.notes[0]
+    assert not own.notes
+    assert_allclose(rounded.peaks, own.peaks, rtol=1e-4)
+    assert_allclose(rounded.velocity_left, own.velocity_left, rtol=1e-4)
+    for name, spectra in own.spectra.items():
+        assert_allclose(rounded.spectra[name][10.0], spectra[10.0], rtol=1e-3)
+
+
+def test_unequal_times_keep_areas_and_what_is_fast():
+    """Displacement of an oscillator under straight pieces, by its Green's function and their integrals."""
+    rng = np.random.default_rng(2)
+    t = np.concatenate([[0.0], np.cumsum(10 ** rng.uniform(-5.0, -3.0, size=400))])
+    a = rng.normal(size=len(t))
+    a[0] = a[-1] = 0.0
+    a[200] = 300.0  # a spike that no step of 20 points a cycle would see
+    f, zeta = 25.0, 0.03
+    run = time_runs(masses([f], zeta), TimeTest("s", t, a, ("z",), after=0.02))[0]
+    omega = 2 * np.pi * f
+    damped = omega * np.sqrt(1 - zeta**2)
+    x, w = np.polynomial.legendre.leggauss(4)
+    tau = ((t[:-1] + t[1:]) / 2)[:, None] + np.diff(t)[:, None] / 2 * x
+    area = np.diff(t)[:, None] / 2 * w * np.interp(tau, t, a)
+    for k in (len(run.t) // 3, len(run.t) // 2, len(run.t) - 1):
+        lag = run.t[k] - tau
+        green = np.where(lag > 0, np.exp(-zeta * omega * lag) * np.sin(damped * lag) / damped, 0.0)
+        assert_allclose(run.values[DISPLACEMENT, k], -(area * green).sum(), rtol=2e-3)
+    assert_allclose(run.velocity_left, [np.trapezoid(a, t)], rtol=1e-9)
+    assert any("areas under the straight pieces kept" in note for note in run.notes)
