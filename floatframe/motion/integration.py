@@ -26,6 +26,7 @@ from floatframe.integrators import CLASSES, in_formulation
 from floatframe.integrators.carry import Carry, Integrator
 from floatframe.kernels.memory import Rows
 from floatframe.kernels.work import new_work
+from floatframe.motion.energy_watch import EnergyWatch
 from floatframe.motion.event_steps import EventWatch
 from floatframe.motion.events import has_events, require_times_of_events
 from floatframe.motion.jumps import jumps_of_steps, over_jumps
@@ -33,7 +34,7 @@ from floatframe.motion.knots import knot_words
 from floatframe.motion.law_watch import LawWatch
 from floatframe.motion.restart import RESTART_STEPS, carry_of_record, restart_record, system_digest
 from floatframe.motion.step_advice import frequency_words, step_advice
-from floatframe.motion.step_watch import WATCHES, EnergyWatch, StepWatch, has_steps_of_one_size
+from floatframe.motion.step_watch import WATCHES, StepWatch, has_second_order, has_steps_of_one_size
 from floatframe.motion.validity_watch import ValidityWatch
 from floatframe.results.head import BodyEntry, Head
 from floatframe.results.results_file import MemorySource, validity_text
@@ -316,7 +317,8 @@ class Run:
     def __post_init__(self) -> None:
         self.watch = ValidityWatch(self.system, self.notes)
         self.watching = str(self.head.run.get("watch", "off"))
-        self.steps = StepWatch(self.integrator, is_on=self.watching != "off" and has_steps_of_one_size(self.integrator))
+        is_on = self.watching != "off" and has_second_order(self.integrator)
+        self.steps = StepWatch(self.integrator, self.n_total, is_on)
         self.energy = EnergyWatch(self.output_every)
         self.closed = self.looked = time.monotonic()  # when the last segment was, and rows were looked at
         self.waiting: list[Rows] = []
@@ -392,9 +394,8 @@ class Run:
                     work.solver.c_k[...] = 0.0  # factors are made anew, as after a resumption
                     if n_done and time.monotonic() - self.closed > SEGMENT_SECONDS:
                         self.close_segment(self.record(carry, n_done))
-                is_window = self.steps.is_window(n_done)
-                n_batch = self.steps.room(n_done, batch_steps)
-                n_batch = min(n_batch, self.n_total - n_done, RESTART_STEPS - n_done % RESTART_STEPS)
+                n_batch = min(batch_steps, self.steps.room(n_done, batch_steps), self.n_total - n_done)
+                n_batch = min(n_batch, RESTART_STEPS - n_done % RESTART_STEPS)
                 begin, n_happened = carry, self.n_happened
                 n_smooth = min((k - n_done for k in jumps if k >= n_done), default=n_batch)
                 if n_smooth == 0:
@@ -426,13 +427,13 @@ class Run:
                     note = self.energy.observe(self.system, rows, is_switched=is_switched, is_last=is_last)
                     self.tell(note)
                     is_beyond = self.energy.is_beyond and self.watching == "stop"
-                if is_window and n_smooth and n_good and failure is None and not is_switched:
+                if n_smooth and n_good and failure is None and not is_switched:
                     note = self.steps.take(
                         self.acting, begin, carry, t0=self.t_start, h=self.h, first=n_done, n_steps=n_good
                     )
                     self.tell(note)
-                elif self.steps.opened:
-                    self.steps.opened = []
+                else:
+                    self.steps.interrupt(self.h)
                 n_done += n_good
                 if self.watching != "off" and failure is None:
                     for words in laws.observe(carry, n_done, is_last=n_done == self.n_total or has_stopped):

@@ -1,21 +1,22 @@
-"""Watches a run step by step: how far its steps err, and how much of its energy comes from the steps alone.
+"""Watches the steps of a run: how far they put the motion off, by the same motion in steps of another size beside it.
 
-Error of the steps, for methods of second order with steps of one size:
+For methods of second order, with steps of one size and with steps that an error tolerance controls:
 
-(1) windows of `WINDOW` steps follow each other closely at the start of a run and every `FARTHEST` steps later
-(2) a window is taken again from the same memory in steps of half the size: the difference is 3/4 of its error
-(3) the differences of place at its middle and end, d_1 and d_2, give that of the speed too, (d_2 - d_1)/(half of it)
-(4) the error of the motion is estimated by the sums over all steps; between two windows a step has the mean of theirs
-(5) errors of place are measured by the farthest way of a body from its start, those of speed by twice the largest
-    speed (a vibration goes two amplitudes away), and both make one number, sqrt(a² + b²), as they turn into one
-    another in a vibration; rotations likewise, or by the way over the length of the system where that is more
+(1) a run begins with a companion: the same motion in steps twice as long (a tolerance eight times as large), which
+    costs half a step for each. What it differs by is three times the error of the run, growth and decay of errors
+    along the motion included
+(2) where that is above the limit, or the long steps fail, a companion in halves of the steps takes all of them again,
+    and goes on instead: it differs by 3/4 of the error, and alone decides what is told
+(3) the companion goes along for `BESIDE` steps, or the first `SHARE` of a long run, or until the error, drawn out to
+    the end of the run, is far below the limit
+(4) afterwards windows of `WINDOW` steps, farther and farther apart, are taken again in halves from the same memory, and
+    the errors of the steps are summed; between two windows a step has the mean of theirs
+(5) errors of place are measured by the farthest way of a body from its start, rotations likewise, or by the way over
+    the length of the system where that is more. In windows those of speed count as well, by twice the largest speed
+    (a vibration goes two amplitudes away); both make one number, sqrt(a² + b²), as they turn into one another
 
-Speeds are those between the middle and the end, so that vibrations which a step does not resolve count for little. What
-errors become in a motion that forgets them (damping) or magnifies them (chaos) the sum does not know.
-
-Energy: total energy - work + dissipated, less its value at the start, is what the steps have added. The schemes may
-lose energy, never gain it. Work is summed by the trapezoidal rule, which is exact to the change of the power in a step;
-so much of a gain is not held against the steps.
+A companion begins anew where forces jump, events switch and a run can be resumed; the errors before it are added. What
+errors become that windows sum is not known: a motion may forget them (damping) or magnify them (chaos).
 """
 
 from collections.abc import Mapping
@@ -29,40 +30,93 @@ from floatframe.errors import FloatframeError, ResultsError
 from floatframe.integrators.carry import Carry, Integrator
 from floatframe.integrators.ida import Ida
 from floatframe.integrators.relative_ode import RelativeOde
-from floatframe.kernels.memory import GRAVITATION, KINETIC, SPRINGS, STRAIN, WORK_GIVEN, WORK_TAKEN, Rows
 from floatframe.kernels.work import Work, new_work
 from floatframe.motion.restart import RESTART_STEPS
 from floatframe.results.validity import ValidityNote
 from floatframe.state import State
 from floatframe.system import System
 
-__all__ = ["WATCHES", "EnergyWatch", "StepWatch", "has_steps_of_one_size"]
+__all__ = ["FIRST_VERDICT", "WATCHES", "StepWatch", "has_second_order", "has_steps_of_one_size"]
 
 #: what is done with what is found: end a run half of whose energy comes from its steps; tell alone; do not look for it
 WATCHES = ("stop", "tell", "off")
+BESIDE = 400  #: steps beside which a companion goes
+SHARE = 0.05  #: or of the steps of the run, where that is more
+CALM_STEPS = 64  #: after so many steps a companion may stop
+CALM = 0.1  #: of the limit, below which the error drawn out to the end of the run is far below it
+FIRST_CHECK = 4  #: steps before a companion is compared, and at least between two comparisons
+CHECKS = 8  #: and this part of the steps that it has gone
 WINDOW = 4  #: steps that are taken again in halves, an even number
 FARTHEST = 4092  #: most steps between two windows
 FIRST_VERDICT = 20  #: steps before which a motion has gone too short a way to measure errors by
 STEP_LIMIT = 0.03  #: estimated error of the motion above which a run tells
-ENERGY_LIMIT = 0.05  #: gain over the energy that moves about, above which a run tells
-ENERGY_STOP = 0.5  #: and above which it stops
 LEAST_WAY = 1e-7  #: of the length of the system: shorter ones are rest
 LEAST_TURN = 1e-6  #: rad, likewise
 FULL_TURN = 3.0  #: rad: a body that turns so far is measured by a whole turn
+SCREEN = 0.25  #: of the limit, above which steps in halves decide: one in doubles may be too far off to measure by
 AIM = 0.2  #: of the limit, that the step which is advised would reach
-ERROR_OF_HALVES = 4.0 / 3.0  #: error of a window over what its halves differ by: 1 - (1/2)²
+DOUBLES, HALVES = 2.0, 0.5  #: size of steps of a companion over those of the run
+SHARE_OF_ERROR = {DOUBLES: 1 / 3, HALVES: 4 / 3}  #: error of the run over what both differ by: 1/(2² - 1), 1/(1 - 1/2²)
+
+
+@dataclass
+class Companion:
+    """The same motion from one memory on in steps of another size."""
+
+    integrator: Integrator
+    begin: Carry  #: memory of the run from which it began
+    start: int  #: step after which
+    ratio: float  #: size of its steps over that of the run
+    at: int  #: step after which it is
+    carry: Carry  #: its memory there
+    apart: Array  #: error of the run there, (n_b, 2, 3)
+    before: int  #: the comparison before: step
+    apart_before: Array  #: and error
+    peak: Array  #: largest error, of place and rotation, (n_b, 2)
+
+    @classmethod
+    def begun(cls, integrator: Integrator, carry: Carry, start: int, ratio: float) -> "Companion":
+        """Begin from a memory after step `start`."""
+        none = np.zeros((len(carry.state.r), 2, 3))
+        method = integrator_of(integrator, ratio)
+        return cls(method, carry, start, ratio, start, carry, none, start, none, lengths(none))
+
+    def follow(self, system: System, work: Work, end: Carry, last: int, t0: float, h: float) -> bool:
+        """Go on to the step after which the run has memory `end`; return whether its steps succeed."""
+        size, done = self.ratio * h, round((self.at - self.start) / self.ratio)
+        n = round((last - self.at) / self.ratio)
+        try:
+            carry, _, _, failure = self.integrator.advance(
+                system, self.carry, work, t0=t0 + self.start * h, h=size, first=done, n_steps=n, every=done + n + 1
+            )
+        except FloatframeError:
+            return False
+        if failure is not None:
+            return False
+        self.carry, self.before, self.apart_before, self.at = carry, self.at, self.apart, last
+        self.apart = SHARE_OF_ERROR[self.ratio] * difference(end.state, carry.state)
+        self.peak = np.maximum(self.peak, lengths(self.apart))
+        return True
+
+    def speeds(self, h: float) -> Array:
+        """Return the errors of the speeds between the last two comparisons, (n_b, 2)."""
+        return lengths(self.apart - self.apart_before) / (h * max(1, self.at - self.before))
 
 
 @dataclass
 class StepWatch:
-    """The error of the steps of a run, estimated from windows of steps that are taken again in halves."""
+    """The error of the steps of a run, by companions at first and by windows of steps later."""
 
     integrator: Integrator
+    n_total: int  #: steps of the run
     is_on: bool = True
+    spent: int = 0  #: steps beside which a companion has gone
+    is_calm: bool = False  #: no companion goes along any more
+    companion: Companion | None = None
     next: int = 0  #: step at which the next window begins
     gap: int = 0  #: steps between the last window and the next one
     watched: int = 0  #: steps of which the error is summed
-    #: error of a step in the last window: of place and rotation, and of their speeds, (n_b, 2, 2)
+    #: error of a step, lately: of place and rotation, and of their speeds, (n_b, 2, 2)
     rate: Array | None = None
     total: Array = field(default_factory=lambda: np.zeros((0, 2, 2)))  #: error of the motion, (n_b, 2, 2)
     begun: State | None = None  #: state at the start
@@ -71,21 +125,34 @@ class StepWatch:
     turn: Array = field(default_factory=lambda: np.zeros(0))  #: largest turn of each body in a step, (n_b,) [rad]
     note: ValidityNote | None = None
     opened: list[tuple[int, Carry]] = field(default_factory=list)  #: begin and middle of a window: step, memory
-    again: tuple[System, Work] | None = None  #: working arrays of the steps that are taken again
+    again: tuple[System, Work] | None = None  #: working arrays of companions and windows
 
     def begin(self, state: State) -> None:
         """Begin from the state at the start of a run."""
         n = len(state.r)
         self.begun, self.total, self.turn = state, np.zeros((n, 2, 2)), np.zeros(n)
 
+    @property
+    def most_beside(self) -> int:
+        """Steps beside which companions go."""
+        return max(BESIDE, int(SHARE * self.n_total))
+
+    @property
+    def has_companion(self) -> bool:
+        """Whether a companion goes along."""
+        return self.is_on and not self.is_calm
+
     def is_window(self, n_done: int) -> bool:
         """Whether the steps after n_done belong to a window; none has a restart inside."""
-        if not self.is_on or n_done < self.next:
+        if self.has_companion or not self.is_on or n_done < self.next:
             return False
         return bool(self.opened) or n_done % RESTART_STEPS <= RESTART_STEPS - WINDOW
 
     def room(self, n_done: int, most: int) -> int:
-        """Return how many steps may be taken at once after n_done: half a window, or up to the next one."""
+        """Return how many steps may be taken at once after n_done: to a comparison, half a window, or the next one."""
+        if self.has_companion:
+            gone = 0 if self.companion is None else n_done - self.companion.start
+            return 1 if gone % 2 else max(FIRST_CHECK, gone // CHECKS // 2 * 2)
         if self.is_window(n_done):
             return WINDOW // 2
         return min(most, self.next - n_done) if self.is_on and n_done < self.next else most
@@ -93,11 +160,78 @@ class StepWatch:
     def take(
         self, system: System, begin: Carry, end: Carry, *, t0: float, h: float, first: int, n_steps: int
     ) -> ValidityNote | None:
-        """Take steps of a window from one memory to another; return a note that is new with them."""
-        if not self.opened:
-            self.opened = [(first, begin), (first + n_steps, end)]
+        """Take steps that led from one memory to another; return a note that is new with them."""
+        last = first + n_steps
+        if self.has_companion:
+            return self.accompany(system, begin, end, t0, h, first, last)
+        if not self.is_window(first):
             return None
-        return self.closed(system, end, first + n_steps, t0, h)
+        if not self.opened:
+            self.opened = [(first, begin), (last, end)]
+            return None
+        return self.closed(system, end, last, t0, h)
+
+    def interrupt(self, h: float) -> None:
+        """Leave the steps out that come next: forces jump in them, or events switch."""
+        self.opened = []
+        self.leave(h)
+
+    def accompany(
+        self, system: System, begin: Carry, end: Carry, t0: float, h: float, first: int, last: int
+    ) -> ValidityNote | None:
+        """Compare the memory after step `last` with that of the companion; return a note that is new with it."""
+        work = self.working(system)
+        if self.companion is None:
+            self.catch_up(first, self.rate)
+            work.solver.c_k[...] = 0.0
+            self.companion = Companion.begun(self.integrator, begin, first, DOUBLES)
+        other = self.companion
+        if (last - other.start) % 2 == 0:
+            self.measure(begin.state, end.state, h * (last - first))
+            self.turn = np.maximum(self.turn, turns_in_a_step(system, end.state, h))
+            is_good = other.follow(system, work, end, last, t0, h)
+            if other.ratio == DOUBLES and not (is_good and self.share(system, other).max() < SCREEN * STEP_LIMIT):
+                other = Companion.begun(self.integrator, other.begin, other.start, HALVES)
+                work.solver.c_k[...] = 0.0
+                is_good = other.follow(system, work, end, last, t0, h)
+                self.companion = other
+            if not is_good:
+                self.companion, self.is_calm, self.next = None, True, last
+                return None
+        t = t0 + last * h
+        is_judged = last >= max(FIRST_VERDICT, min(self.n_total, self.most_beside) // 2)
+        note = self.judged(system, t, h) if is_judged else None
+        largest = float(self.share(system, other).max())
+        is_over = self.spent + last - other.start >= self.most_beside or self.note is not None
+        is_calm = last >= CALM_STEPS and largest * self.n_total / last < CALM * STEP_LIMIT
+        if is_over or is_calm or last % RESTART_STEPS == 0:
+            self.leave(h)
+        if is_over or is_calm:
+            self.is_calm, self.gap = True, max(last, WINDOW)
+            self.next = last + self.gap
+        return note
+
+    def leave(self, h: float) -> None:
+        """Sum the error that the companion has found, and go on without it."""
+        other, self.companion = self.companion, None
+        if other is None or other.at == other.start:
+            return
+        found = np.stack([other.peak, other.speeds(h)], axis=2)
+        self.total, self.rate = self.total + found, found / (other.at - other.start)
+        self.spent += other.at - other.start
+        self.watched = other.at
+
+    def catch_up(self, step: int, rate: Array | None) -> None:
+        """Sum the error of the steps before one that have not been watched, of a rate."""
+        if rate is not None:
+            self.total = self.total + max(0, step - self.watched) * rate
+        self.watched = max(step, self.watched)
+
+    def working(self, system: System) -> Work:
+        """Return working arrays of companions and windows."""
+        if self.again is None or self.again[0] is not system:
+            self.again = system, new_work(compiled_system(system).model)
+        return self.again[1]
 
     def closed(self, system: System, end: Carry, last: int, t0: float, h: float) -> ValidityNote | None:
         """Take the steps of the window that is open again, up to a memory; return a note that is new with them."""
@@ -105,33 +239,20 @@ class StepWatch:
         self.opened = []
         self.gap = min(2 * self.gap + WINDOW, FARTHEST)
         self.next = last + self.gap
-        if self.again is None or self.again[0] is not system:
-            self.again = system, new_work(compiled_system(system).model)
-        work = self.again[1]
+        work = self.working(system)
         work.solver.c_k[...] = 0.0  # factors of another window, which would not be the same after a resumption
-        apart, finer, at = [np.zeros((len(self.total), 2, 3))], before, start
+        other = Companion.begun(self.integrator, before, start, HALVES)
         for number, coarse in ((middle, half), (last, end)):
-            if number == at:
-                continue
-            try:
-                finer, _, _, failure = self.integrator.advance(
-                    system, finer, work, t0=t0, h=h / 2, first=2 * at, n_steps=2 * (number - at), every=2 * (last + 1)
-                )
-            except FloatframeError:
+            if number > other.at and not other.follow(system, work, coarse, number, t0, h):
                 return None
-            if failure is not None:
-                return None
-            apart.append(difference(coarse.state, finer.state))
-            at = number
-        seconds = h * (last - middle if last > middle else last - start)
-        speed = (apart[-1] - apart[-2]) / seconds
-        size = np.sqrt((np.stack([apart[-1], speed], axis=2) ** 2).sum(axis=3))
-        rate = ERROR_OF_HALVES / (last - start) * size
-        mean = rate if self.rate is None else (self.rate + rate) / 2
-        self.total = self.total + max(0, start - self.watched) * mean + (last - start) * rate
+        size = np.stack([lengths(other.apart), other.speeds(h)], axis=2)
+        rate = size / (last - start)
+        self.catch_up(start, rate if self.rate is None else (self.rate + rate) / 2)
+        self.total = self.total + size
         self.rate, self.watched = rate, last
         self.turn = np.maximum(self.turn, turns_in_a_step(system, end.state, h))
-        self.measure(half.state if last > middle else before.state, end.state, seconds)
+        begun, then = (middle, half) if last > middle else (start, before)
+        self.measure(then.state, end.state, h * (last - begun))
         return self.judged(system, t0 + last * h, h) if last >= FIRST_VERDICT else None
 
     def measure(self, half: State, end: State, seconds: float) -> None:
@@ -145,26 +266,36 @@ class StepWatch:
 
     def conclude(self, system: System, end: Carry, n_done: int, t0: float, h: float) -> ValidityNote | None:
         """Sum the error up to the end of a run; return a note that is new with it."""
-        t = t0 + n_done * h
         if self.opened and self.opened[1][0] == n_done:
             note = self.closed(system, end, n_done, t0, h)
             if note is not None:
                 return note
+        self.leave(h)
         if self.rate is None:
             return None
-        self.total = self.total + max(0, n_done - self.watched) * self.rate
-        self.watched = max(n_done, self.watched)
-        return self.judged(system, t, h)
+        self.catch_up(n_done, self.rate)
+        return self.judged(system, t0 + n_done * h, h)
 
-    def judged(self, system: System, t: float, h: float) -> ValidityNote | None:
-        """Return the note of the error so far if it is new."""
+    def share(self, system: System, companion: Companion | None = None) -> Array:
+        """Return the error of places and rotations of each body over their way, (n_b, 2); a companion: and its own."""
         compiled = compiled_system(system)
         least = np.array([LEAST_WAY * compiled.length, LEAST_TURN])
         size = self.size.copy()
         size[1] = np.maximum(size[1], size[0] / compiled.length)
         moves = size[:, 0] > least
-        parts = self.total / np.where(size > 0.0, size, np.inf)
-        share = np.where(moves, np.linalg.norm(parts, axis=2), 0.0)  # (n_b, 2)
+        total = self.total
+        if companion is not None:
+            total = total.copy()
+            total[:, :, 0] += companion.peak
+        parts = total / np.where(size > 0.0, size, np.inf)
+        return np.where(moves, np.linalg.norm(parts, axis=2), 0.0)
+
+    def judged(self, system: System, t: float, h: float) -> ValidityNote | None:
+        """Return the note of the error so far if it is new."""
+        companion = self.companion
+        if companion is not None and companion.ratio == DOUBLES:
+            return None
+        share = self.share(system, companion)
         i = int(np.argmax(share.max(axis=1)))
         largest = float(share[i].max())
         if not largest > STEP_LIMIT:
@@ -175,8 +306,13 @@ class StepWatch:
             return None
         turn = f"it turns by up to {self.turn[i]:.2g} rad in a step; " if self.turn[i] > 0.1 else ""
         finer = h * np.sqrt(AIM * STEP_LIMIT / largest)
+        advice = f"take a step of about {finer:.1g}"
+        tolerance = getattr(self.integrator, "error_tolerance", None)
+        if tolerance is not None:
+            finer = tolerance * (AIM * STEP_LIMIT / largest) ** 1.5
+            advice = f"take an error_tolerance of about {finer:.1g}"
         self.note = ValidityNote(
-            compiled.body_names[i], "steps", STEP_LIMIT, largest, t, t, advice=f"{turn}take a step of about {finer:.1g}"
+            compiled_system(system).body_names[i], "steps", STEP_LIMIT, largest, t, t, advice=turn + advice
         )
         return self.note
 
@@ -186,7 +322,7 @@ class StepWatch:
             return {}
         rate = np.full_like(self.total, np.nan) if self.rate is None else self.rate
         return {
-            "watch_counts": np.array([self.next, self.gap, self.watched]), "watch_rate": rate,
+            "watch_counts": np.array([self.next, self.gap, self.watched, self.spent, self.is_calm]), "watch_rate": rate,
             "watch_total": self.total, "watch_size": self.size, "watch_turn": self.turn,
             **{f"watch_{name}": np.asarray(getattr(self.begun, name)) for name in ("r", "p", "q", "u")},
         }  # fmt: skip
@@ -196,7 +332,8 @@ class StepWatch:
         if not self.is_on:
             return
         try:
-            self.next, self.gap, self.watched = (int(n) for n in record["watch_counts"])
+            self.next, self.gap, self.watched, self.spent, is_calm = (int(n) for n in record["watch_counts"])
+            self.is_calm = bool(is_calm)
             arrays = [
                 np.array(record[f"watch_{name}"], dtype=float)
                 for name in ("rate", "total", "size", "turn", "r", "p", "q", "u")
@@ -208,102 +345,20 @@ class StepWatch:
         self.note = next((note for note in notes if note.kind == "steps"), None)
 
 
-@dataclass
-class EnergyWatch:
-    """The energy that the steps of a run have added to its motion, from its rows of results."""
+def integrator_of(integrator: Integrator, ratio: float) -> Integrator:
+    """Return a method for steps whose size has a ratio to those of another one."""
+    tolerance = getattr(integrator, "error_tolerance", None)
+    return integrator if tolerance is None else replace(integrator, error_tolerance=tolerance * ratio**3)
 
-    every: int  #: steps between rows
-    n_seen: int = 0  #: rows after the first one
-    last: Array | None = None  #: energy, work given and taken at the last row, (3,)
-    change: Array | None = None  #: of the work in the interval before it, (2,)
-    potential: Array | None = None  #: least and largest of gravity
-    gain: float = 0.0  #: what the steps have added
-    unsure: float = 0.0  #: of it, by the sum of the work
-    scale: float = 0.0  #: largest energy that moves about
-    note: ValidityNote | None = None
-    is_beyond: bool = False  #: whether the run has to stop
 
-    def observe(self, system: System, rows: Rows, *, is_switched: bool, is_last: bool = False) -> ValidityNote | None:
-        """Take rows of results; return a note that is new with them. is_switched: something else acts in them.
-
-        The first steps, in which little moves yet, are judged at the end of a run alone (is_last).
-        """
-        if len(rows.t) == 0:
-            return None
-        d = rows.diagnostics
-        energy = d[:, KINETIC] + d[:, STRAIN] + d[:, SPRINGS] + d[:, GRAVITATION]
-        now = np.stack([energy, d[:, WORK_GIVEN], d[:, WORK_TAKEN]], axis=1)
-        self.measure(d)
-        last, self.last = self.last, now[-1]
-        number = self.n_seen + 1 + np.arange(len(rows.t))
-        self.n_seen += 0 if last is None else len(rows.t)
-        if last is None or is_switched:
-            self.change = None
-            return None
-        steps = np.diff(np.concatenate([last[None], now]), axis=0)
-        work = steps[:, 1:]
-        change = work[:1] if self.change is None else self.change[None]
-        swing = np.abs(work) if self.every > 1 else np.abs(np.diff(np.concatenate([change, work]), axis=0)) / 2
-        if self.change is None:
-            swing[0] = np.abs(work[0])
-        self.change = work[-1]
-        gains = self.gain + np.cumsum(steps[:, 0] - work[:, 0] + work[:, 1])
-        unsure = self.unsure + np.cumsum(swing.sum(axis=1))
-        self.gain, self.unsure = float(gains[-1]), float(unsure[-1])
-        share = (gains - unsure) / self.scale if self.scale > 0.0 else np.zeros(len(gains))
-        is_judged = number * self.every >= FIRST_VERDICT
-        is_judged[-1] = is_judged[-1] or is_last
-        share = np.where(is_judged, share, 0.0)
-        largest = float(share.max())
-        if not largest > ENERGY_LIMIT:
-            return None
-        k = int(np.argmax(share))
-        self.is_beyond = self.is_beyond or largest > ENERGY_STOP
-        if self.note is not None:
-            if largest > self.note.largest:
-                self.note = replace(self.note, largest=largest, t_largest=float(rows.t[k]))
-            return None
-        first = float(rows.t[int(np.argmax(share > ENERGY_LIMIT))])
-        compiled = compiled_system(system)
-        body = compiled.body_names[int(np.argmax(kinetic_energies(system, rows.u[k])))]
-        self.note = ValidityNote(
-            body, "energy", ENERGY_LIMIT, largest, first, float(rows.t[k]), advice=
-            "take a shorter step, the scheme energy-momentum or relative coordinates",
-        )  # fmt: skip
-        return self.note
-
-    def record(self) -> dict[str, Array]:
-        """Return what is needed to go on, by name."""
-        if self.last is None or self.potential is None:
-            return {}
-        change = np.full(2, np.nan) if self.change is None else self.change
-        sums = np.array([self.gain, self.unsure, self.scale])
-        return {"energy_sums": np.concatenate([sums, self.last, change, self.potential])}
-
-    def restore(self, record: Mapping[str, Array], notes: tuple[ValidityNote, ...]) -> None:
-        """Go on from a record and the notes of the part that is done."""
-        if "energy_sums" not in record:
-            return
-        numbers = np.array(record["energy_sums"], dtype=float)
-        self.gain, self.unsure, self.scale = (float(x) for x in numbers[:3])
-        self.n_seen = FIRST_VERDICT  # a restart comes later
-        self.last, change, self.potential = numbers[3:6], numbers[6:8], numbers[8:10]
-        self.change = None if np.isnan(change).any() else change
-        self.note = next((note for note in notes if note.kind == "energy"), None)
-
-    def measure(self, d: Array) -> None:
-        """Take rows into the largest energy that moves about."""
-        ends = np.array([d[:, GRAVITATION].min(), d[:, GRAVITATION].max()])
-        if self.potential is not None:
-            ends = np.array([min(ends[0], self.potential[0]), max(ends[1], self.potential[1])])
-        self.potential = ends
-        parts = np.abs(d[:, [KINETIC, STRAIN, SPRINGS, WORK_GIVEN, WORK_TAKEN]])
-        self.scale = max(self.scale, float(parts.max()), float(ends[1] - ends[0]))
+def has_second_order(integrator: Integrator) -> bool:
+    """Whether the error of a method falls with the square of its steps."""
+    return not isinstance(integrator, Ida | RelativeOde)
 
 
 def has_steps_of_one_size(integrator: Integrator) -> bool:
     """Whether a method takes steps of the size that it is given."""
-    return not isinstance(integrator, Ida | RelativeOde) and getattr(integrator, "error_tolerance", None) is None
+    return has_second_order(integrator) and getattr(integrator, "error_tolerance", None) is None
 
 
 def lengths(vectors: Array) -> Array:
@@ -338,12 +393,3 @@ def turns_in_a_step(system: System, state: State, h: float) -> Array:
     """Return how far each body turns in a step of size h, (n_b,) [rad]."""
     u0 = compiled_system(system).model.bodies.u0[:-1]
     return h * np.linalg.norm(state.u[u0[:, None] + np.arange(3, 6)], axis=1)
-
-
-def kinetic_energies(system: System, u: Array) -> Array:
-    """Return the kinetic energy of each body as if its mass were about its origin, (n_b,)."""
-    model = compiled_system(system).model
-    u0, kind = model.bodies.u0[:-1], model.bodies.kind
-    v, omega = u[u0[:, None] + np.arange(3)], u[u0[:, None] + np.arange(3, 6)]
-    J = np.einsum("naa->na", model.body_types.J0)[kind]
-    return np.asarray(0.5 * model.body_types.mass[kind] * (v**2).sum(axis=1) + 0.5 * (J * omega**2).sum(axis=1))

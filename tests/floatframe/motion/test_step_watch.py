@@ -31,7 +31,8 @@ from floatframe.cli.app import app
 from floatframe.compiling.system import compiled_system
 from floatframe.kernels.memory import KINETIC, new_rows
 from floatframe.kernels.work import new_work
-from floatframe.motion.step_watch import EnergyWatch, StepWatch, rotations_between
+from floatframe.motion.energy_watch import EnergyWatch
+from floatframe.motion.step_watch import StepWatch, rotations_between
 from floatframe.results.validity import ValidityNote, notes_from_json, notes_to_json
 from floatframe.rotations import euler_parameters_of_rotation_vector
 
@@ -68,7 +69,7 @@ def test_the_estimated_error_is_that_of_an_oscillator(method, steps_in_period):
     omega, periods = 5.0, 3
     h = 2 * np.pi / omega / steps_in_period
     system = oscillator(omega)
-    watch = StepWatch(method)
+    watch = StepWatch(method, periods * steps_in_period)
     run = running(system, method, h, periods * steps_in_period, watch)
     motion = integrate(system, method, periods * steps_in_period * h, h)
     x = motion.body("mass").r[:, 0] - 50.0
@@ -84,11 +85,10 @@ def running(system, method, h, n_steps, watch):
     watch.begin(carry.state)
     done = 0
     while done < n_steps:
-        n, begin, is_window = min(watch.room(done, 400), n_steps - done), carry, watch.is_window(done)
+        n, begin = min(watch.room(done, 400), n_steps - done), carry
         carry, _, _, failure = method.advance(system, carry, work, t0=0.0, h=h, first=done, n_steps=n, every=10**6)
         assert failure is None
-        if is_window:
-            watch.take(system, begin, carry, t0=0.0, h=h, first=done, n_steps=n)
+        watch.take(system, begin, carry, t0=0.0, h=h, first=done, n_steps=n)
         done += n
     watch.conclude(system, carry, done, 0.0, h)
     return float(np.linalg.norm(watch.total[:, 0] / watch.size[0], axis=1).max())
