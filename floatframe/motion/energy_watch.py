@@ -2,7 +2,8 @@
 
 Total energy - work + dissipated, less its value at the start, is what the steps have added. The schemes may lose
 energy, never gain it. Work is summed by the trapezoidal rule, which is exact to the change of the power in a step; so
-much of a gain is not held against the steps.
+much of a gain is not held against the steps. Nor is what rounding gives: places are known to `ROUNDING` of their
+distance from the origin, velocities that close joints to that over the step.
 """
 
 from collections.abc import Mapping
@@ -21,6 +22,7 @@ __all__ = ["EnergyWatch"]
 
 ENERGY_LIMIT = 0.05  #: gain over the energy that moves about, above which a run tells
 ENERGY_STOP = 0.5  #: and above which it stops
+ROUNDING = 8 * np.finfo(float).eps  #: of a number
 
 
 @dataclass
@@ -28,6 +30,7 @@ class EnergyWatch:
     """The energy that the steps of a run have added to its motion, from its rows of results."""
 
     every: int  #: steps between rows
+    h: float  #: step size [s]
     n_seen: int = 0  #: rows after the first one
     last: Array | None = None  #: energy, work given and taken at the last row, (3,)
     change: Array | None = None  #: of the work in the interval before it, (2,)
@@ -35,6 +38,7 @@ class EnergyWatch:
     gain: float = 0.0  #: what the steps have added
     unsure: float = 0.0  #: of it, by the sum of the work
     scale: float = 0.0  #: largest energy that moves about
+    noise: float = 0.0  #: of the energy, by rounding
     note: ValidityNote | None = None
     is_beyond: bool = False  #: whether the run has to stop
 
@@ -49,6 +53,7 @@ class EnergyWatch:
         energy = d[:, KINETIC] + d[:, STRAIN] + d[:, SPRINGS] + d[:, GRAVITATION]
         now = np.stack([energy, d[:, WORK_GIVEN], d[:, WORK_TAKEN]], axis=1)
         self.measure(d)
+        self.noise = max(self.noise, rounding_energy(system, rows, self.h))
         last, self.last = self.last, now[-1]
         number = self.n_seen + 1 + np.arange(len(rows.t))
         self.n_seen += 0 if last is None else len(rows.t)
@@ -65,7 +70,7 @@ class EnergyWatch:
         gains = self.gain + np.cumsum(steps[:, 0] - work[:, 0] + work[:, 1])
         unsure = self.unsure + np.cumsum(swing.sum(axis=1))
         self.gain, self.unsure = float(gains[-1]), float(unsure[-1])
-        share = (gains - unsure) / self.scale if self.scale > 0.0 else np.zeros(len(gains))
+        share = (gains - unsure - self.noise) / self.scale if self.scale > 0.0 else np.zeros(len(gains))
         is_judged = number * self.every >= FIRST_VERDICT
         is_judged[-1] = is_judged[-1] or is_last
         share = np.where(is_judged, share, 0.0)
@@ -92,7 +97,7 @@ class EnergyWatch:
         if self.last is None or self.potential is None:
             return {}
         change = np.full(2, np.nan) if self.change is None else self.change
-        sums = np.array([self.gain, self.unsure, self.scale])
+        sums = np.array([self.gain, self.unsure, self.scale, self.noise])
         return {"energy_sums": np.concatenate([sums, self.last, change, self.potential])}
 
     def restore(self, record: Mapping[str, Array], notes: tuple[ValidityNote, ...]) -> None:
@@ -100,9 +105,9 @@ class EnergyWatch:
         if "energy_sums" not in record:
             return
         numbers = np.array(record["energy_sums"], dtype=float)
-        self.gain, self.unsure, self.scale = (float(x) for x in numbers[:3])
+        self.gain, self.unsure, self.scale, self.noise = (float(x) for x in numbers[:4])
         self.n_seen = FIRST_VERDICT  # a restart comes later
-        self.last, change, self.potential = numbers[3:6], numbers[6:8], numbers[8:10]
+        self.last, change, self.potential = numbers[4:7], numbers[7:9], numbers[9:11]
         self.change = None if np.isnan(change).any() else change
         self.note = next((note for note in notes if note.kind == "energy"), None)
 
@@ -114,6 +119,16 @@ class EnergyWatch:
         self.potential = ends
         parts = np.abs(d[:, [KINETIC, STRAIN, SPRINGS, WORK_GIVEN, WORK_TAKEN]])
         self.scale = max(self.scale, float(parts.max()), float(ends[1] - ends[0]))
+
+
+def rounding_energy(system: System, rows: Rows, h: float) -> float:
+    """Return by how much rounding may change the energy of rows in steps of size h."""
+    model = compiled_system(system).model
+    mass = model.body_types.mass[model.bodies.kind]
+    v = np.abs(rows.u[:, model.bodies.u0[:-1, None] + np.arange(3)]).max(axis=(0, 2))
+    slip = ROUNDING * np.abs(rows.r).max(axis=(0, 2)) / h
+    fall = ROUNDING * np.abs(rows.diagnostics[:, GRAVITATION]).max()
+    return float((mass * slip * (v + slip)).sum() + fall)
 
 
 def kinetic_energies(system: System, u: Array) -> Array:

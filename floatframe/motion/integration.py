@@ -158,8 +158,10 @@ def integrate(
         log.warning("system %r: %s", system.name, advice.words)
     is_fixed = has_steps_of_one_size(integrator)
     frequencies = frequency_words(system, t_start, step, n_total, has_steps_of_one_size=is_fixed)
-    for words in (*knot_words(system, t_start, step, n_total), *frequencies):
-        log.warning("system %r: %s", system.name, words)
+    acting = [ValidityNote.of_law("knots", words, t_start) for words in knot_words(system, t_start, step, n_total)]
+    acting += [ValidityNote.of_law("frequency", words, t_start) for words in frequencies]
+    for note in acting:
+        log.warning("system %r: %s", system.name, note.words)
     head = head_of(system, integrator, t_start, t_end, step, output_every)
     head = replace(head, angles=compiled_system(system).angles, run=dict(head.run) | {"watch": watch})
     events = EventWatch(system, head) if has_events(system) else None
@@ -174,7 +176,9 @@ def integrate(
         if events is not None:
             events.begin(rows)
         writer = None if place is None else ResultsWriter(place, head)
-        run = Run(system, integrator, head, t_start, t_end, step, n_total, output_every, writer, events=events)
+        run = Run(
+            system, integrator, head, t_start, t_end, step, n_total, output_every, writer, tuple(acting), events=events
+        )  # fmt: skip
         run.words_of_start = lambda: words_of_begun_drives(begun, t_start, state, step)
         run.steps.begin(carry.state)
         run.energy.observe(system, rows, is_switched=False)
@@ -282,7 +286,7 @@ class Run:
     n_total: int
     output_every: int
     writer: ResultsWriter | None
-    notes: tuple[ValidityNote, ...] = ()  #: of the part that is done
+    notes: tuple[ValidityNote, ...] = ()  #: known before, or of the part that is done
     kept: list[Rows] = field(default_factory=list)
     seconds_before: float = 0.0  #: that the run has taken before it was interrupted
     began: float = field(default_factory=time.perf_counter)
@@ -319,7 +323,7 @@ class Run:
         self.watching = str(self.head.run.get("watch", "off"))
         is_on = self.watching != "off" and has_second_order(self.integrator)
         self.steps = StepWatch(self.integrator, self.n_total, is_on)
-        self.energy = EnergyWatch(self.output_every)
+        self.energy = EnergyWatch(self.output_every, self.h)
         self.closed = self.looked = time.monotonic()  # when the last segment was, and rows were looked at
         self.waiting: list[Rows] = []
 
@@ -340,6 +344,8 @@ class Run:
     def look(self) -> None:
         """Hand on the rows that wait; tell when a body leaves the range of its linear frame."""
         self.looked = time.monotonic()
+        if self.writer is not None:
+            self.writer.validity = notes_to_json(self.watch.notes)
         if not self.waiting:
             return
         rows = Rows(*(np.concatenate(arrays) for arrays in zip(*self.waiting, strict=True)))
@@ -357,7 +363,7 @@ class Run:
         """Keep what the watches of steps and energy have found; log a note that is new."""
         for found in (self.steps.note, self.energy.note):
             if found is not None:
-                self.watch.found[found.body, found.kind] = found
+                self.watch.found[found.key] = found
         if note is not None:
             log.warning("system %r: %s", self.system.name, note.words)
 
@@ -437,6 +443,8 @@ class Run:
                 n_done += n_good
                 if self.watching != "off" and failure is None:
                     for words in laws.observe(carry, n_done, is_last=n_done == self.n_total or has_stopped):
+                        found = ValidityNote.of_law("law", words, self.t_start + n_done * self.h)
+                        self.watch.found[found.key] = found
                         log.warning("system %r: %s", self.system.name, words)
                 safe = self.record_where_due(carry, n_done)
                 if n_done == self.n_total or failure is not None or has_stopped or is_beyond:

@@ -7,8 +7,8 @@ For methods of second order, with steps of one size and with steps that an error
     along the motion included
 (2) where that is above the limit, or the long steps fail, a companion in halves of the steps takes all of them again,
     and goes on instead: it differs by 3/4 of the error, and alone decides what is told
-(3) the companion goes along for `BESIDE` steps, or the first `SHARE` of a long run, or until the error, drawn out to
-    the end of the run, is far below the limit
+(3) the companion goes along for `BESIDE` steps, or the first `SHARE` of a long run; in a run of more than `BESIDE` less
+    far where the error, drawn out to the end of the run, is far below the limit
 (4) afterwards windows of `WINDOW` steps, farther and farther apart, are taken again in halves from the same memory, and
     the errors of the steps are summed; between two windows a step has the mean of theirs
 (5) errors of place are measured by the farthest way of a body from its start, rotations likewise, or by the way over
@@ -42,7 +42,7 @@ __all__ = ["FIRST_VERDICT", "WATCHES", "StepWatch", "has_second_order", "has_ste
 WATCHES = ("stop", "tell", "off")
 BESIDE = 400  #: steps beside which a companion goes
 SHARE = 0.05  #: or of the steps of the run, where that is more
-CALM_STEPS = 64  #: after so many steps a companion may stop
+CALM_STEPS = 200  #: after so many steps a companion may stop, in runs of more than `BESIDE`
 CALM = 0.1  #: of the limit, below which the error drawn out to the end of the run is far below it
 FIRST_CHECK = 4  #: steps before a companion is compared, and at least between two comparisons
 CHECKS = 8  #: and this part of the steps that it has gone
@@ -203,7 +203,7 @@ class StepWatch:
         note = self.judged(system, t, h) if is_judged else None
         largest = float(self.share(system, other).max())
         is_over = self.spent + last - other.start >= self.most_beside or self.note is not None
-        is_calm = last >= CALM_STEPS and largest * self.n_total / last < CALM * STEP_LIMIT
+        is_calm = last >= CALM_STEPS and self.n_total > BESIDE and largest * self.n_total / last < CALM * STEP_LIMIT
         if is_over or is_calm or last % RESTART_STEPS == 0:
             self.leave(h)
         if is_over or is_calm:

@@ -63,7 +63,7 @@ class ValidityWatch:
     def __init__(self, system: System, notes: tuple[ValidityNote, ...] = ()) -> None:
         """Begin with a system, and the notes of the part of the motion that is already done."""
         self.system = system
-        self.found = {(note.body, note.kind): note for note in notes}
+        self.found = {note.key: note for note in notes}
         elastic = [
             (i, body) for i, body in enumerate(system.bodies) if isinstance(body, FlexibleBody) and is_elastic(body)
         ]

@@ -8,7 +8,8 @@ from typing import Any
 __all__ = ["ValidityNote", "notes_from_json", "notes_to_json"]
 
 OF_FRAMES = ("rotation", "load", "speed", "inertia")  #: kinds of notes about the linear frame of a body
-KINDS = (*OF_FRAMES, "steps", "energy")
+OF_LAWS = ("frequency", "knots", "law")  #: about what acts over time: faster than the steps, or jumping inside them
+KINDS = (*OF_FRAMES, "steps", "energy", *OF_LAWS)
 
 
 @dataclass(frozen=True)
@@ -18,11 +19,12 @@ class ValidityNote:
     One per body and kind where a body has left the range of its linear frame ("rotation", "load", "speed" or
     "inertia", the field of `cms.reduced_body.linear_range.Limits`); one for the steps of the run ("steps": their
     estimated error over the way of the motion) and one for its energy ("energy": what the steps have added, over what
-    moves about), with the body that is most concerned.
+    moves about), with the body that is most concerned. One for each supply, load, drive or law of a user that the steps
+    do not follow ("frequency", "knots" of a table, "law"), with where it stands in the system in place of a body.
     """
 
     body: str
-    kind: str  #: "rotation", "load", "speed", "inertia", "steps" or "energy"
+    kind: str  #: "rotation", "load", "speed", "inertia", "steps", "energy", "frequency", "knots" or "law"
     limit: float
     largest: float  #: so far; rotation in rad, else a ratio
     t_first: float  #: when the limit was passed [s]
@@ -30,7 +32,18 @@ class ValidityNote:
     is_stiffened: bool = False
     has_matrices: bool = False  #: whether the reduced body holds geometric stiffness
     in_mean_axes: float = -1.0  #: the same rotation against mean axes, where the body has another frame; -1: not known
-    advice: str = ""  #: what to do about steps or energy
+    advice: str = ""  #: what to do about steps or energy; of what acts over time: what is the matter, and what to do
+
+    @classmethod
+    def of_law(cls, kind: str, words: str, t: float) -> "ValidityNote":
+        """Return the note of a sentence "where: what; what to do" about something that acts over time."""
+        where, _, rest = words.partition(": ")
+        return cls(where, kind, 0.0, 0.0, t, t, advice=rest)
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """What a run has one note of."""
+        return (self.body, self.kind, self.advice) if self.kind in OF_LAWS else (self.body, self.kind)
 
     @property
     def is_of_a_frame(self) -> bool:
@@ -94,6 +107,8 @@ class ValidityNote:
     @property
     def words(self) -> str:
         """Say it in one sentence, in the units of the system."""
+        if self.kind in OF_LAWS:
+            return f"{self.body}: {self.advice}"
         if not self.is_of_a_frame:
             return f"body {self.body!r}, t = {self.t_first:.6g}: {self.what}; {self.action}"
         return (

@@ -22,7 +22,8 @@ __all__ = ["motion_case", "motion_verdict"]
 WRONG_BY = 0.05  #: of the motion
 CALM = 0.01  #: of the motion: below, a note is needless
 AGREED = 0.004  #: of the motion, between references
-FINEST = 512  #: steps of the reference in one of the case
+COARSEST, FINEST = 8, 256  #: steps of the reference in one of the case
+MOST_STEPS = 40_000  #: of a reference
 CHAOS = 30.0  #: growth of a difference in a run
 SAMPLES = 60  #: times that are compared
 
@@ -89,15 +90,15 @@ def run(case: MotionCase, finer_by: int) -> tuple[Samples, tuple[ff.ValidityNote
         )  # fmt: skip
         state = part.state(-1)
         parts.append(part)
-        notes = (*notes, *(note for note in part.validity if not note.is_of_a_frame))
+        notes = (*notes, *(note for note in part.validity if note.kind in ("steps", "energy")))
     return Samples(parts, every), notes
 
 
 def reference_of(case: MotionCase) -> Samples | None:
     """Return the motion in fine steps on which both formulations agree; None if they do not at the finest."""
-    finer_by, last = 16, None
-    while finer_by <= FINEST:
-        formulation = "absolute" if finer_by in (16, 64, 256) else "relative"
+    finer_by, last, formulation = COARSEST, None, "relative"
+    while finer_by <= FINEST and finer_by * case.n_steps <= MOST_STEPS:
+        formulation = "relative" if formulation == "absolute" else "absolute"
         try:
             made, _ = run(finer(case, formulation), finer_by)
         except ff.ConvergenceError:

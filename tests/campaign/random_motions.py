@@ -26,6 +26,7 @@ KINDS = (
 WEIGHTS = np.array([6, 3, 2, 1, 2, 1, 3, 1, 1, 1, 1, 1, 1], dtype=float)
 COORDINATES = {"revolute": ("angle",), "prismatic": ("distance",), "cylindrical": ("distance", "angle"),
                "universal": ("angle", "angle_b"), "planar": ("first",)}  # fmt: skip
+MOST_PERIODS = 3.0  #: of the fast part in a step, which steps by their error would resolve
 CHUNKS = (1, 3, 10)  #: steps between restarts
 
 
@@ -108,7 +109,7 @@ def random_motion(seed: int) -> MotionCase:
     system = ff.System(
         build.bodies, build.joints, [*gravity, *build.forces], units, elements=build.elements, events=events,
     )  # fmt: skip
-    method, formulation, name = random_method(rng, has_events=bool(events))
+    method, formulation, name = random_method(rng, has_events=bool(events), periods=build.periods)
     chunk = int(rng.choice(CHUNKS)) if rng.random() < 0.25 and not events and n_in_second < 100 else 0
     n_steps = max(5, round(float(rng.uniform(0.5, 2.0)) * n_in_second))
     words = (
@@ -337,8 +338,8 @@ def add_events(build: Builder) -> list[ff.Event]:
     ]
 
 
-def random_method(rng: np.random.Generator, *, has_events: bool) -> tuple[Integrator, str, str]:
-    """Return a method, the formulation, and both in words."""
+def random_method(rng: np.random.Generator, *, has_events: bool, periods: float) -> tuple[Integrator, str, str]:
+    """Return a method, the formulation, and both in words; steps by their error only where they need not be many."""
     formulation = "relative" if rng.random() < 0.4 else "absolute"
     rho = float(rng.choice([0.0, 0.5, 0.8, 0.8, 0.9, 1.0]))
     kind = rng.random()
@@ -346,7 +347,7 @@ def random_method(rng: np.random.Generator, *, has_events: bool) -> tuple[Integr
         return ff.GeneralizedAlpha(rho), formulation, f"generalized-alpha {rho:g}"
     if kind < 0.7:
         return ff.hht(-0.1), formulation, "hht"
-    if kind < 0.75:
+    if kind < 0.75 and periods < MOST_PERIODS:
         return ff.GeneralizedAlpha(rho, error_tolerance=1e-5), formulation, f"generalized-alpha {rho:g} with error 1e-5"
     if kind < 0.9 or has_events:
         return ff.EnergyMomentum(), "absolute", "energy-momentum"

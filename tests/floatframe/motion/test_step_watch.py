@@ -34,7 +34,7 @@ from floatframe.kernels.work import new_work
 from floatframe.motion.energy_watch import EnergyWatch
 from floatframe.motion.step_watch import StepWatch, rotations_between
 from floatframe.results.validity import ValidityNote, notes_from_json, notes_to_json
-from floatframe.rotations import euler_parameters_of_rotation_vector
+from floatframe.rotations import euler_parameters, euler_parameters_of_rotation_vector, rotation_exp
 
 GROUND = Marker("ground", position=np.zeros(3))
 
@@ -109,6 +109,57 @@ def test_coarse_steps_of_a_pendulum_are_told_with_time_body_and_remedy(caplog, t
     assert not fine.validity
 
 
+def two_bars(first):
+    """Return two bars on hinges, let go with the first at an angle: a motion that magnifies errors."""
+    R = rotation_exp(np.array([0.0, 0.0, first]))
+    way, end = R[:, 0], np.array([0.5, 0.0, 0.0])
+    bars = [
+        RigidBody(name, 1.0, 0.1 * np.eye(3), position=PLACE + at * way, orientation=euler_parameters(R))
+        for name, at in (("upper", 0.5), ("lower", 1.5))
+    ]
+    top = RevoluteJoint("top", Marker("ground", position=PLACE), Marker("upper", position=-end), axis=(0, 0, 1))
+    knee = RevoluteJoint("knee", Marker("upper", position=end), Marker("lower", position=-end), axis=(0, 0, 1))
+    return System(bars, [top, knee], [Gravity((0, -9.81, 0))])
+
+
+PLACE = np.array([30.0, -20.0, 10.0])
+
+
+@pytest.mark.parametrize(
+    ("first", "h", "formulation"), [(0.3, 0.02, "absolute"), (0.3, 0.02, "relative"), (1.0, 0.01, "absolute")]
+)
+def test_errors_that_the_motion_magnifies_are_told(first, h, formulation, end=4.0):
+    """Sums of the errors of single steps, which know no growth, stay below the limit in some of these."""
+    system, method = two_bars(first), GeneralizedAlpha(0.8)
+    motion = integrate(system, method, end, h, formulation=formulation)
+    fine = integrate(system, method, end, h / 16, output_every=16, formulation="relative", watch="off").body("lower").r
+    way = np.linalg.norm(fine - fine[0], axis=1).max()
+    assert np.linalg.norm(motion.body("lower").r - fine, axis=1).max() > 0.05 * way
+    assert kinds(motion) == {"steps"}
+
+
+def test_a_swing_that_many_steps_follow_is_not_told():
+    motion = integrate(two_bars(0.3), GeneralizedAlpha(0.8), 4.0, 0.002)
+    fine = integrate(two_bars(0.3), GeneralizedAlpha(0.8), 4.0, 0.001, output_every=2, watch="off")
+    assert np.abs(motion.body("lower").r - fine.body("lower").r).max() < 0.01
+    assert not motion.validity
+
+
+@pytest.mark.parametrize(("tolerance", "is_wrong"), [(1e-4, True), (1e-9, False)])
+def test_an_error_tolerance_that_is_too_large_for_a_small_motion_is_told(tolerance, is_wrong):
+    """1 kg on a spring moves 0.1 mm, and is a metre large. Exact: the cosine."""
+    omega, amplitude = 20.0, 1e-4
+    body = RigidBody("mass", 1.0, np.eye(3), position=PLACE + np.array([amplitude, 0, 0]))
+    rail = PrismaticJoint("rail", Marker("ground", position=PLACE), Marker("mass", position=(0, 0, 0)), axis=(1, 0, 0))
+    system = System([body], [rail], [JointForce("spring", "rail", "distance", stiffness=omega**2)])
+    motion = integrate(system, GeneralizedAlpha(0.8, error_tolerance=tolerance), 2.0, 0.05)
+    x = motion.body("mass").r[:, 0] - PLACE[0]
+    error = np.abs(x - amplitude * np.cos(omega * motion.t)).max() / (2 * amplitude)
+    assert (error > 0.05) == is_wrong
+    assert kinds(motion) == ({"steps"} if is_wrong else set())
+    assert all("take an error_tolerance of about" in note.words for note in motion.validity)
+
+
 def test_a_motion_that_gains_energy_stops_with_what_was_reached():
     with pytest.raises(ConvergenceError, match="of the energy in the motion comes from the steps") as caught:
         integrate(growing(), FRESH, 4.0, 0.05)
@@ -143,12 +194,24 @@ def test_energy_of_forces_and_dampers_is_no_gain_of_the_steps():
 @pytest.mark.parametrize("scale", [1e-6, 1e6])
 @pytest.mark.parametrize(("kinetic", "gain"), [((1.0, 1.0, 1.0), 0.0), ((1.0, 1.2, 1.5), 0.5 / 1.5), ((1.0, 0.4), 0.0)])
 def test_a_gain_of_energy_is_measured_by_the_energy_that_moves(scale, kinetic, gain):
-    watch, model = EnergyWatch(1), compiled_system(oscillator()).model
+    watch, model = EnergyWatch(1, 1e-2), compiled_system(oscillator()).model
     for number, energy in enumerate(kinetic):
         rows = new_rows(model, 1)
         rows.diagnostics[:, KINETIC] = scale * energy
         watch.observe(oscillator(), rows, is_switched=False, is_last=number == len(kinetic) - 1)
     assert_allclose(0.0 if watch.note is None else watch.note.largest, gain, rtol=1e-12)
+
+
+@pytest.mark.parametrize("far", [0.0, 1e7])
+def test_what_rounding_gives_far_from_the_origin_is_no_gain(far):
+    """Velocities that close joints jump by the rounding of places over the step, 2 nm / 10 µs there."""
+    watch, model = EnergyWatch(1, 1e-5), compiled_system(oscillator()).model
+    for speed in (1e-4, 2e-4, 3e-4):
+        rows = new_rows(model, 1)
+        rows.r[...], rows.u[:, 0] = far, speed
+        rows.diagnostics[:, KINETIC] = 0.5 * speed**2
+        watch.observe(oscillator(), rows, is_switched=False, is_last=speed > 2e-4)
+    assert (watch.note is None) == (far > 0.0)
 
 
 def test_rotations_between_orientations_are_those_that_made_them():
