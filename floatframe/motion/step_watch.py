@@ -270,6 +270,12 @@ class StepWatch:
             note = self.closed(system, end, n_done, t0, h)
             if note is not None:
                 return note
+        other = self.companion
+        if other is not None and other.at == other.start and n_done > other.start:  # a run of one step, or of three
+            other = Companion.begun(self.integrator, other.begin, other.start, HALVES)
+            if other.follow(system, self.working(system), end, n_done, t0, h):
+                self.measure(other.begin.state, end.state, h * (n_done - other.start))
+                self.companion = other
         self.leave(h)
         if self.rate is None:
             return None
@@ -348,7 +354,9 @@ class StepWatch:
 def integrator_of(integrator: Integrator, ratio: float) -> Integrator:
     """Return a method for steps whose size has a ratio to those of another one."""
     tolerance = getattr(integrator, "error_tolerance", None)
-    return integrator if tolerance is None else replace(integrator, error_tolerance=tolerance * ratio**3)
+    if tolerance is None:
+        return integrator
+    return replace(integrator, error_tolerance=tolerance * ratio**3)  # type: ignore[type-var]
 
 
 def has_second_order(integrator: Integrator) -> bool:

@@ -76,7 +76,7 @@ def joined(parts: list[np.ndarray]) -> np.ndarray:
     return np.concatenate([parts[0], *(part[1:] for part in parts[1:])])
 
 
-def run(case: MotionCase, finer_by: int) -> tuple[Samples, tuple[ff.ValidityNote, ...]]:
+def run(case: MotionCase, finer_by: int, watch: str = "stop") -> tuple[Samples, tuple[ff.ValidityNote, ...]]:
     """Return the motion of a case with steps divided by a number, at the times that are compared, and its notes."""
     every = max(1, case.n_steps // SAMPLES)
     h, n = case.h / finer_by, case.n_steps * finer_by
@@ -86,7 +86,7 @@ def run(case: MotionCase, finer_by: int) -> tuple[Samples, tuple[ff.ValidityNote
         last = min(first + chunk, n)
         part = ff.integrate(
             case.system, case.method, last * h, h, t_start=first * h, state=state, output_every=finer_by,
-            formulation=case.formulation if isinstance(case.method, ff.GeneralizedAlpha) else None,
+            formulation=case.formulation if isinstance(case.method, ff.GeneralizedAlpha) else None, watch=watch,
         )  # fmt: skip
         state = part.state(-1)
         parts.append(part)
@@ -100,7 +100,7 @@ def reference_of(case: MotionCase) -> Samples | None:
     while finer_by <= FINEST and finer_by * case.n_steps <= MOST_STEPS:
         formulation = "relative" if formulation == "absolute" else "absolute"
         try:
-            made, _ = run(finer(case, formulation), finer_by)
+            made, _ = run(finer(case, formulation), finer_by, "off")
         except ff.ConvergenceError:
             made = None
         if made is not None and last is not None and difference(last, made) <= AGREED:

@@ -128,14 +128,25 @@ PLACE = np.array([30.0, -20.0, 10.0])
 @pytest.mark.parametrize(
     ("first", "h", "formulation"), [(0.3, 0.02, "absolute"), (0.3, 0.02, "relative"), (1.0, 0.01, "absolute")]
 )
-def test_errors_that_the_motion_magnifies_are_told(first, h, formulation, end=4.0):
+def test_errors_that_the_motion_magnifies_are_told(first, h, formulation):
     """Sums of the errors of single steps, which know no growth, stay below the limit in some of these."""
-    system, method = two_bars(first), GeneralizedAlpha(0.8)
+    system, method, end = two_bars(first), GeneralizedAlpha(0.8), 4.0
     motion = integrate(system, method, end, h, formulation=formulation)
     fine = integrate(system, method, end, h / 16, output_every=16, formulation="relative", watch="off").body("lower").r
     way = np.linalg.norm(fine - fine[0], axis=1).max()
     assert np.linalg.norm(motion.body("lower").r - fine, axis=1).max() > 0.05 * way
     assert kinds(motion) == {"steps"}
+
+
+@pytest.mark.parametrize(("n", "h"), [(1, 0.3), (3, 0.2)])
+def test_a_run_of_few_steps_is_judged_at_its_end(n, h):
+    """A pendulum falls in half a second."""
+    motion = integrate(pendulum(), GeneralizedAlpha(0.5), n * h, h)
+    fine = integrate(pendulum(), GeneralizedAlpha(0.5), n * h, h / 100, output_every=100)
+    way = np.linalg.norm(fine.body("rod").r[-1] - fine.body("rod").r[0])
+    assert np.linalg.norm(motion.body("rod").r[-1] - fine.body("rod").r[-1]) > 0.03 * way
+    assert kinds(motion) == {"steps"}
+    assert not fine.validity
 
 
 def test_a_swing_that_many_steps_follow_is_not_told():
