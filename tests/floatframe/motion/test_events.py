@@ -338,7 +338,7 @@ def test_an_event_goes_on_after_a_resumption(tmp_path, monkeypatch):
 
     path = tmp_path / "out.h5"
     with pytest.raises(KilledError):
-        integrate(system, trapezoidal(), 0.5, 1e-3, output=path, progress=kill)
+        integrate(system, trapezoidal(), 0.5, 1e-3, output=path, progress=kill, batch_steps=50)
     assert test_restart.steps_on_record(path) == 200
     again = resume(system, path)
     assert_array_equal(again.t, whole.t)
