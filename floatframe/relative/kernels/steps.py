@@ -211,6 +211,8 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
     Return (status, last correction by the allowed one, error; -1 if not estimated). Factors of an earlier step serve as
     long as corrections shrink fast with them; where they do not, the step is begun anew with its own, and the more
     steps have theirs at once the more often that happens (long chains: their mass matrix changes much with the shape).
+    A step that does not converge so is begun once more, with exact factors in every iteration: what approximate ones
+    have led far away does not come back.
     """
     alpha_m, alpha_f, beta, gamma = order.alpha_m, order.alpha_f, order.beta, order.gamma
     c_k = beta * h * h
@@ -230,6 +232,7 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
     if tangent.exactly > 0:
         tangent.exactly -= 1
     is_old, made, begun = work.solver.is_due == 0, -1, 0  # iterations at which factors were made, the step begun anew
+    is_last_try = False
     predict(model, work, tree, joints, tangent, memory, order, h)
     factorisations = work.counted.factorisations
     is_open = tangent.V.shape[0] == 0  # wrenches that are kept are not in the norm
@@ -276,14 +279,14 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
             iteration += 1
             begun = iteration
             continue
-        if not math.isfinite(norm):
+        if not math.isfinite(norm) and is_last_try:
             work.solver.is_due = 1
             return DIVERGED, math.inf, -1.0
         excess = norm / allowed if allowed > 0.0 else math.inf
         of_states = 0.0
         if has_states:
             of_states = correction_of_states(model, work, c_k) / order.tolerance
-            if not math.isfinite(of_states):
+            if not math.isfinite(of_states) and is_last_try:
                 work.solver.is_due = 1
                 return DIVERGED, math.inf, -1.0
         is_small = is_enough(norm, last, wanted, allowed) if is_open else norm <= allowed
@@ -311,6 +314,12 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
         last, last_of_states = norm, of_states
         excess = max(excess, of_states)
         iteration += 1
+        if not is_last_try and (iteration == order.max_iterations or not math.isfinite(norm + of_states)):
+            is_last_try, is_old, tangent.exactly, tangent.n_known = True, False, EXACT_STEPS, 0
+            predict(model, work, tree, joints, tangent, memory, order, h)
+            last, last_of_states, iteration, begun, made = math.inf, math.inf, 0, 0, -1
+        if is_last_try:
+            work.solver.is_due = 1
     work.solver.is_due = 1
     return DIVERGED, excess, -1.0
 
