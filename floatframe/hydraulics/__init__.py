@@ -1,7 +1,8 @@
-"""Hydraulic circuits and shock absorbers with states of their own, as public elements.
+"""Hydraulic circuits and shock absorbers with their own states, as public elements.
 
-`fluid` and `gas` say what volumes and energies are at a pressure; `components` describes circuits, `nodes` checks them,
-`circuit_data` writes their numbers, and `circuit_law` is the compiled law; `oleo_strut` is a shock absorber.
+`fluid` and `gas` give volumes and energies as functions of the pressure. `components` describes circuits, `nodes`
+validates them, `circuit_data` writes their data, and `circuit_law` is the compiled law. `oleo_strut` is a shock
+absorber.
 """
 
 from floatframe.hydraulics.circuit import Circuit

@@ -1,4 +1,4 @@
-"""A hydraulic circuit as one element: components between nodes, pressures as states, attached to markers."""
+"""A hydraulic circuit as one element, with components between nodes, and pressures as states."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -28,22 +28,23 @@ __all__ = ["Circuit"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Circuit(Element):
-    """Components between named nodes; cylinders and pumps attach it to markers.
+    """A hydraulic circuit: components between named nodes; cylinders and pumps connect it to markers.
 
-    Nodes are made by naming them. A node that no supply or tank holds has its absolute pressure as a state, and needs
-    volume: that of chambers and pipes at it, or its own, `nodes={"gallery": Node(volume=2e-5)}`.
+    A node exists if a component names it. The absolute pressure of a node is a state, unless a supply or tank
+    prescribes it; such a node needs a volume, either that of its chambers and pipes, or its own, `nodes={"gallery":
+    Node(volume=2e-5)}`.
 
     Raises
     ------
     ModelError
-        For an unknown node, one with nothing or one component at it, one without volume, pressures that two components
-        prescribe, a circuit in which nothing sets the pressure, and cylinders placed outside their stroke.
+        If a node is unknown, has fewer than two components, or has no volume; if two components prescribe one pressure;
+        if nothing sets the pressure in the circuit; or if a cylinder is assembled outside its stroke.
     """
 
     name: str
     fluid: Fluid
     components: Sequence[Component]
-    nodes: Mapping[str, Node] = field(default_factory=dict)  #: what nodes have beside components, by name
+    nodes: Mapping[str, Node] = field(default_factory=dict)  #: further properties of nodes, by name
 
     def __post_init__(self) -> None:
         where = f"element {self.name!r}"
@@ -69,12 +70,12 @@ class Circuit(Element):
 
     @classmethod
     def from_table(cls, name: str, table: Mapping[str, Any], read: Any) -> "Circuit":
-        """Return the circuit of a table [elements.NAME]; `read` is the reader of such tables.
+        """Return the circuit of a table [elements.NAME]; `read` is a `TableReader`.
 
         Raises
         ------
         ModelError
-            With the key path, if a component has an unknown type or wrong keys.
+            If a component has an unknown type or wrong keys; the message names the key path.
         """
         made = dict(table)
         rows = made.get("components", [])
@@ -96,7 +97,7 @@ class Circuit(Element):
 
     @property
     def markers(self) -> tuple[Marker, ...]:
-        """The markers of its cylinders and pumps, two of each."""
+        """Markers of its cylinders and pumps, two for each."""
         return tuple(
             marker
             for each in self.components
@@ -105,7 +106,7 @@ class Circuit(Element):
         )
 
     def drawn(self) -> tuple[Stretched, ...]:
-        """Return cylinder and rod of each cylinder, as wide as its head and half as wide."""
+        """Return a drawn cylinder and rod for each cylinder, with the diameter of its head and half of that."""
         attached = [each for each in self.components if isinstance(each, Cylinder | Pump)]
         found = []
         for k, each in enumerate(attached):
@@ -115,5 +116,5 @@ class Circuit(Element):
         return tuple(found)
 
     def law(self, placed: Placed) -> ElementLaw:
-        """Return the law of the circuit, its cylinders as placed and its pressures at their start."""
+        """Return the law of the circuit for the assembled cylinders and the initial pressures."""
         return circuit_law_of(self.fluid, self.components, self.nodes, placed)

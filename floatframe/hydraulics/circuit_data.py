@@ -1,4 +1,4 @@
-"""A circuit as the numbers that its law reads: nodes, components, what is attached to which node, functions."""
+"""The data of a circuit, which its law reads: nodes, components, their connections, functions."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -60,7 +60,8 @@ from floatframe.hydraulics.nodes import nodes_of, prescribed
 
 __all__ = ["circuit_law_of"]
 
-TRANSITION = 1e-3  #: of the ambient pressure: where the flow of orifices becomes laminar, by default
+#: pressure difference below which the flow of orifices is laminar, relative to the ambient pressure; default
+TRANSITION = 1e-3
 
 OUTPUTS = {
     ORIFICE: (("flow", "m^3/s"),),
@@ -72,24 +73,24 @@ OUTPUTS = {
     ACCUMULATOR: (("oil", "m^3"),),
     PUMP: (("flow", "m^3/s"), ("torque", "N m"), ("speed", "rad/s")),
     SPOOL: (("spool", "1"),),
-}  #: what is seen of a component, by its kind
+}  #: outputs of a component that sensors can read, by its kind
 
 
 @dataclass
 class PlacedNode:
-    """A node while the data are made."""
+    """A node while the data are assembled."""
 
     name: str
     volume: float = 0.0
     compliance: float = 0.0
     start: float = 0.0
     pressure: TimeFunction | None = None
-    attached: list[tuple[int, int, int]] = field(default_factory=list)  #: how, component, its output
+    attached: list[tuple[int, int, int]] = field(default_factory=list)  #: kind of connection, component, and its output
 
 
 @dataclass
 class Record:
-    """A component while the data are made."""
+    """A component while the data are assembled."""
 
     name: str
     kind: int
@@ -97,14 +98,14 @@ class Record:
     b: int
     numbers: list[float]
     markers: tuple[int, int] = (-1, -1)
-    start: float | None = None  #: of its state
-    functions: dict[int, TimeFunction] = field(default_factory=dict)  #: by the place among its numbers
-    is_servo: bool = False  #: whether its opening follows what it is asked for
-    spool: tuple[int, int] | None = None  #: place among its numbers, and component whose first output is read
+    start: float | None = None  #: initial value of its state
+    functions: dict[int, TimeFunction] = field(default_factory=dict)  #: functions, by index among its parameters
+    is_servo: bool = False  #: whether the spool follows its command
+    spool: tuple[int, int] | None = None  #: index among its parameters, and component whose first output is read
 
 
 class Builder:
-    """Collects nodes and records of a circuit."""
+    """Collects the nodes and records of a circuit."""
 
     def __init__(self, fluid: Fluid, components: Sequence[Component], nodes: Mapping[str, Node]) -> None:
         self.fluid = fluid
@@ -123,7 +124,7 @@ class Builder:
         self.records: list[Record] = []
 
     def number(self, name: str | None) -> int:
-        """Return the number of a node among free ones, or -1 - k of given node k; far below for none."""
+        """Return the number of a free node, -1 - k for prescribed node k, or `NONE` if there is no node."""
         if name is None:
             return NONE
         k = self.numbers[name]
@@ -131,22 +132,22 @@ class Builder:
         return k if k < n else -1 - (k - n)
 
     def node(self, number: int) -> PlacedNode:
-        """Return the node of a number."""
+        """Return the node with a number."""
         return self.nodes[number] if number >= 0 else self.given[-1 - number]
 
     def add(self, record: Record, attached: dict[int, list[tuple[int, int]]]) -> int:
-        """Add a record; `attached`: for a node, how and by which output."""
+        """Add a record; `attached` gives, for each node, the kind of connection and the output."""
         self.records.append(record)
         for number, ways in attached.items():
             self.node(number).attached += [(how, len(self.records) - 1, output) for how, output in ways]
         return len(self.records) - 1
 
     def between(self, record: Record) -> int:
-        """Add a component whose first output flows from its node a to its node b."""
+        """Add a component whose first output is the flow from its node a to its node b."""
         return self.add(record, {record.a: [(OUT_OF, 0)], record.b: [(INTO, 0)]})
 
     def conductance(self, area: float, discharge: float) -> float:
-        """Return the flow of an orifice over the root of its pressure difference."""
+        """Return the flow through an orifice divided by the square root of its pressure difference."""
         return discharge * area * sqrt(2 / self.fluid.density)
 
 
@@ -156,12 +157,12 @@ NONE = -(10**6)
 def circuit_law_of(
     fluid: Fluid, components: Sequence[Component], nodes: Mapping[str, Node], placed: Placed
 ) -> ElementLaw:
-    """Return the law of a circuit whose cylinders are as placed."""
+    """Return the law of a circuit, given its assembled cylinders."""
     made = Builder(fluid, components, nodes)
     marker = 0
     cylinders: dict[str, int] = {}
     acts: list[str] = []
-    for each in components:  # first: others may follow their strokes
+    for each in components:  # cylinders come first, because valves may follow their strokes
         if isinstance(each, Cylinder):
             cylinders[each.name] = add_cylinder(made, each, marker, placed)
         elif isinstance(each, Pump):
@@ -189,11 +190,11 @@ def circuit_law_of(
             made.between(Record(each.name, RESISTANCE, made.number(each.a), made.number(each.b), [each.conductance]))
         elif isinstance(each, FlowSource):
             record = Record(each.name, FLOW, made.number(each.a), made.number(each.b), [0])
-            assert isinstance(each.flow, TimeFunction)  # by the component
+            assert isinstance(each.flow, TimeFunction)  # ensured by the component
             record.functions[0] = each.flow
             made.between(record)
         elif isinstance(each, Accumulator):
-            assert each.oil_limit is not None  # by the component
+            assert each.oil_limit is not None  # ensured by the component
             numbers = list(gas_numbers(each.gas_volume, each.charge, each.exponent, each.oil_limit))
             node = made.number(each.node)
             made.add(Record(each.name, ACCUMULATOR, node, node, numbers), {node: [(GAS, 0)]})
@@ -201,16 +202,14 @@ def circuit_law_of(
 
 
 def add_cylinder(made: Builder, each: Cylinder, marker: int, placed: Placed) -> int:
-    """Add a cylinder; `ModelError` if it is placed outside its stroke."""
+    """Add a cylinder; `ModelError` if it is assembled outside its stroke."""
     length = float(np.linalg.norm(placed.r[marker + 1] - placed.r[marker]))
     stroke = length - each.retracted_length
     if length == 0.0:
-        raise ModelError(
-            f"component {each.name!r}: its markers are at one place as placed, so that it has no direction"
-        )
+        raise ModelError(f"component {each.name!r}: its markers are at one place as assembled, so it has no direction")
     if not -1e-9 * each.stroke <= stroke <= (1 + 1e-9) * each.stroke and each.stop_stiffness == 0:
         raise ModelError(
-            f"component {each.name!r}: its markers are {length:.6g} apart as placed, stroke {stroke:.6g}; expected "
+            f"component {each.name!r}: its markers are {length:.6g} apart as assembled, stroke {stroke:.6g}; expected "
             f"0 to {each.stroke:g}: check retracted_length = {each.retracted_length:g}, or give stop_stiffness"
         )
     numbers = [
@@ -234,7 +233,7 @@ def add_pump(made: Builder, each: Pump, marker: int) -> None:
 
 
 def add_pipe(made: Builder, each: Pipe) -> None:
-    """Add a pipe: its flows and the nodes between them."""
+    """Add a pipe, as flows and the nodes between them."""
     fluid, n, A = made.fluid, each.segments, each.area
     part = each.length / n
     viscous = 0.0 if fluid.viscosity is None else 8 * pi * fluid.viscosity * part / A**2
@@ -258,9 +257,9 @@ def add_pipe(made: Builder, each: Pipe) -> None:
 
 
 def add_directional_valve(made: Builder, each: DirectionalValve, cylinders: dict[str, int]) -> None:
-    """Add a directional valve: its spool, and four paths."""
+    """Add a directional valve, as a spool and four flow paths."""
     record = Record(each.name, SPOOL, NONE, NONE, [each.time_constant, 0, each.gain or 0.0, 0])
-    assert isinstance(each.opening, TimeFunction)  # by the component
+    assert isinstance(each.opening, TimeFunction)  # ensured by the component
     record.functions[1] = each.opening
     if each.follow is not None:
         record.spool = 3, cylinders[each.follow]
@@ -285,7 +284,7 @@ def add_directional_valve(made: Builder, each: DirectionalValve, cylinders: dict
 
 
 def written(made: Builder, placed: Placed, acts: list[str]) -> ElementLaw:
-    """Return the law: names, starts and the data, in the layout of `floatframe.hydraulics.circuit_law`."""
+    """Return the law, with names, initial values and data in the layout of `floatframe.hydraulics.circuit_law`."""
     nodes = [*made.nodes, *made.given]
     n_free, n_nodes = len(made.nodes), len(nodes)
 
@@ -366,13 +365,13 @@ def written(made: Builder, placed: Placed, acts: list[str]) -> ElementLaw:
 
 
 def laminar_flow(made: Builder, node: PlacedNode) -> float:
-    """Return the flow at which the orifices and valves of a node become laminar, 0 if it has none."""
+    """Return the flow below which the orifices and valves of a node are laminar; 0 if it has none."""
     at_node = [made.records[component] for how, component, _ in node.attached if how in (INTO, OUT_OF)]
     return sum(each.numbers[0] * sqrt(each.numbers[1]) for each in at_node if each.kind in (ORIFICE, VALVE))
 
 
 def evaluated(data: np.ndarray, start: np.ndarray, placed: Placed, n_outputs: int) -> np.ndarray:
-    """Return the outputs at the start, the markers at rest as placed."""
+    """Return the outputs at the start, with the assembled markers at rest."""
     n = len(placed.r)
     x = np.zeros((n, 18))
     x[:, :3], x[:, 3:12] = placed.r, np.asarray(placed.A).reshape(n, 9)
@@ -382,7 +381,7 @@ def evaluated(data: np.ndarray, start: np.ndarray, placed: Placed, n_outputs: in
 
 
 def islands_of(made: Builder, ends: list[tuple[int, int]], values: np.ndarray) -> list[list[int]]:
-    """Return the free nodes of each part of the circuit that nothing flows into as it starts."""
+    """Return the free nodes of each part of the circuit into which nothing flows at the start."""
     n_free = len(made.nodes)
     island = list(range(n_free))
     is_open = [False] * n_free
@@ -408,7 +407,7 @@ def islands_of(made: Builder, ends: list[tuple[int, int]], values: np.ndarray) -
 
 
 def passes(record: Record, i: int, j: int, values: np.ndarray) -> bool:
-    """Return whether fluid can pass a component as it starts."""
+    """Return whether fluid can pass through a component at the start."""
     n = record.numbers
     if record.kind == ORIFICE:
         part = 1.0

@@ -1,19 +1,20 @@
-"""The law of a circuit: flows between nodes, pressures as states, forces of its cylinders and torques of its pumps.
+"""The law of a circuit: flows between nodes, pressures as states, cylinder forces and pump torques.
 
-With v(p) and h(p) of the fluid (`floatframe.hydraulics.fluid`), flows q counted as volume at ambient pressure, and at
-node i the volume V of what is attached to it (dead volumes, chambers), its elastic growth C (p - p_a) and the oil
-U(p) in accumulators:
+v(p) and h(p) are those of the fluid (`floatframe.hydraulics.fluid`). Flows q are volumes at ambient pressure per time.
+At node i, V is the volume of the connected chambers and dead volumes, C (p - p_a) their elastic growth, and U(p) the
+oil in accumulators.
 
-(1) each component has its flow q from its node a to its node b; it loses the power q (h_a - h_b);
-(2) a cylinder pushes its ends apart by (p_head - p_a) A_head - (p_rod - p_a) A_rod, less friction, and stops at its
-ends;
-(3) a pump or motor of displacement D passes q = D omega with the torque D (h_a - h_b);
+(1) each component has the flow q from its node a to its node b; it dissipates the power q (h_a - h_b);
+(2) a cylinder pushes its ends apart with the force (p_head - p_a) A_head - (p_rod - p_a) A_rod minus friction, and has
+    stops at both ends;
+(3) a pump or motor of displacement D has the flow q = D omega and the torque D (h_a - h_b);
 (4) a pipe's flow has inertia, I dq/dt = h_a - h_b - R q - c q |q|;
-(5) each node keeps its content (V + C (p - p_a) + U)/v:  dp/dt (v (C + dU/dp) - (V + C (p - p_a) + U) dv/dp) = v (v Q
+(5) the content (V + C (p - p_a) + U)/v of each node is conserved:  dp/dt (v (C + dU/dp) - (V + C (p - p_a) + U) dv/dp)
+    = v (v Q
 - dV/dt),
-    Q the sum of the flows into it.
+    with Q the sum of the flows into it.
 
-The energy of the nodes and pipes grows by exactly what supplies bring, less what is lost and what bodies receive.
+The energy of nodes and pipes grows by exactly the energy that supplies add, minus losses and the work on bodies.
 """
 
 import numpy as np
@@ -28,7 +29,7 @@ from floatframe.hydraulics.stops import stop_force
 
 __all__ = ["circuit_law", "circuit_rest"]
 
-# where things stand in the data
+# indices of the header of the data
 N_NODES, N_FREE, N_COMPONENTS, NODES, COMPONENTS, ATTACHED, N_ISLANDS, ISLANDS, FLUID = range(9)
 HEAD = FLUID + 6
 AMBIENT = FLUID + 3
@@ -37,21 +38,21 @@ VOLUME, COMPLIANCE, FUNCTION, FIRST, COUNT, LAMINAR = range(NODE_WIDTH)
 COMPONENT_WIDTH = 22
 KIND, A, B, SEEN, STATE, MARKER_A, MARKER_B, FIRST_NUMBER = range(8)
 ORIFICE, VALVE, RESISTANCE, INERTIA, CYLINDER, ACCUMULATOR, FLOW, PUMP, SPOOL = range(1, 10)  # kinds of components
-INTO, OUT_OF, HEAD_CHAMBER, ROD_CHAMBER, GAS = range(5)  # how a component is attached to a node
+INTO, OUT_OF, HEAD_CHAMBER, ROD_CHAMBER, GAS = range(5)  # kinds of connection between a component and a node
 TOTALS = ("power in", "power lost", "energy", "power out", "content")
 ALWAYS, BY_FUNCTION, BY_SPOOL, BY_SPOOL_BACK = range(4)  # openings of orifices
-LEAST_VOLUME = 0.01  # of the dead volume: what is left of a chamber that a stop has not kept open
+LEAST_VOLUME = 0.01  # least volume of a chamber beyond its stop, relative to the dead volume
 
 
 @register_jitable
 def turbulent(dp, transition):
-    """Return the root of a pressure difference with its sign, linear below the transition: dp/(dp² + d²)^(1/4)."""
+    """Return the signed root of a pressure difference, linear below the transition d: dp/(dp² + d²)^(1/4)."""
     return dp / np.sqrt(np.sqrt(dp * dp + transition * transition))
 
 
 @register_jitable
 def ramp(x):
-    """Return the cubic that rises from 0 at x = 0 to 1 at x = 1, without slope at both."""
+    """Return the cubic from 0 at x = 0 to 1 at x = 1, with zero slope at both ends."""
     if x.real <= 0.0:
         return 0.0 * x
     if x.real >= 1.0:
@@ -61,13 +62,13 @@ def ramp(x):
 
 @register_jitable
 def size(x):
-    """Return |x| by the sign of its real part."""
+    """Return |x|, with the sign taken from the real part."""
     return -x if x.real < 0.0 else x
 
 
 @register_jitable
 def chamber(data, c, seen, is_rod):
-    """Return volume and rate of a chamber of the cylinder whose record begins at c."""
+    """Return volume and rate of a chamber of the cylinder whose record begins at index c."""
     n, s = c + FIRST_NUMBER, int(data[c + SEEN])
     stroke, rate = seen[s], seen[s + 1]
     if is_rod:
@@ -83,7 +84,7 @@ def chamber(data, c, seen, is_rod):
 
 @register_jitable
 def node_volume(data, i, p, seen):
-    """Return volume, its rate at fixed pressure, its slope over pressure, energy of walls and gas, and the inflow."""
+    """Return volume, its rate at constant pressure, its pressure derivative, energy of walls and gas, and inflow."""
     node = int(data[NODES]) + NODE_WIDTH * i
     P = p - data[AMBIENT]
     C = data[node + COMPLIANCE]
@@ -107,7 +108,7 @@ def node_volume(data, i, p, seen):
 
 @njit
 def circuit_law(t, x, z, lam, data, wrench, z_dot, g, seen):
-    """Write forces, rates of pressures and flows, and outputs of a circuit, (1) to (5) of the module."""
+    """Write forces, rates of pressures and flows, and outputs of a circuit, equations (1) to (5) of the module."""
     n_nodes, n_free = int(data[N_NODES]), int(data[N_FREE])
     for m in range(wrench.shape[0]):
         for j in range(6):
@@ -135,7 +136,7 @@ def circuit_law(t, x, z, lam, data, wrench, z_dot, g, seen):
             elif how != ALWAYS:
                 u = seen[at] if how == BY_SPOOL else -seen[at]
                 part = (u - data[n + 4]) / (1.0 - data[n + 4])
-            if part.real < 0.0 or (part.real == 0.0 and how == BY_SPOOL_BACK):  # a spool in the middle has one slope
+            if part.real < 0.0 or (part.real == 0.0 and how == BY_SPOOL_BACK):  # one slope for a spool in the middle
                 part = 0.0 * part
             q = part * data[n] * turbulent(dp, data[n + 1]) + data[n + 5] * dp
             seen[s] = q
@@ -215,13 +216,14 @@ def circuit_law(t, x, z, lam, data, wrench, z_dot, g, seen):
 
 @njit
 def circuit_rest(t, x, z, lam, data, wrench, z_dot, g, seen):
-    """Write what `circuit_law` does, but rates of pressures that have the same zeros and are easier to solve.
+    """Write the same as `circuit_law`, except rates of pressures with the same zeros that are easier to solve.
 
-    The flow Q into a node goes with roots of pressure differences, from which Newton's method steps across the zero and
-    back. Q sqrt(Q² + Q_0²)/Q_0, with the flow Q_0 at which its orifices become laminar, goes with the differences.
+    The flow Q into a node depends on roots of pressure differences, with which Newton's method steps back and forth
+    across the zero. Q sqrt(Q² + Q_0²)/Q_0, with the flow Q_0 at which its orifices become laminar, is proportional to
+    the differences.
 
-    The rate of one node of each closed part is what its content is off: nothing flows into or out of such a part, and
-    its pressures at rest follow from what it has been filled with.
+    For one node of each isolated part, the rate is the error of the content of the part: nothing flows into or out of
+    such a part, so its content at the start determines its pressures at rest.
     """
     circuit_law(t, x, z, lam, data, wrench, z_dot, g, seen)
     for i in range(int(data[N_FREE])):

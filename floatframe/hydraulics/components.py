@@ -1,4 +1,4 @@
-"""Components of a circuit: plain descriptions between nodes that go by their names. Pressures are absolute."""
+"""Components of a circuit: descriptions without behaviour, between nodes given by name. Pressures are absolute."""
 
 from dataclasses import dataclass, field, fields
 from typing import Any
@@ -35,7 +35,7 @@ FRICTION_SPEED = Quantity(1e-3, SPEED)
 def checked(
     component: Any, *, above: tuple[str, ...] = (), at_least: tuple[str, ...] = (), functions: tuple[str, ...] = ()
 ) -> None:
-    """Check numbers of a frozen component, those that may be None included, and make time functions of numbers."""
+    """Check the numbers of a frozen component, including those that may be None; convert numbers to time functions."""
     where = f"component {component.name!r}"
     for key in (*above, *at_least):
         value = getattr(component, key)
@@ -53,7 +53,7 @@ def checked(
 
 @dataclass(frozen=True)
 class Node:
-    """What a node has beside its components."""
+    """Properties of a node besides its components."""
 
     volume: float = 0.0  #: dead volume [m³]
     pressure: float | None = None  #: at the start, absolute [Pa]; None: ambient
@@ -67,29 +67,30 @@ class Node:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Cylinder:
-    """A cylinder between two markers: pressure at its head drives them apart, pressure at the rod side together.
+    """A cylinder between two markers; head pressure pushes them apart, rod pressure pulls them together.
 
-    A side without a node is open to the ambient pressure (single acting). The stroke is the distance of the markers
-    less `retracted_length`. Stops press with k x (1 + d dx/dt) where the stroke leaves 0 .. `stroke` by x.
+    A side without a node is open to the ambient pressure (single acting). The stroke is the distance between the
+    markers minus `retracted_length`. If the stroke leaves the range 0 .. `stroke` by x, a stop acts with k x (1 + d
+    dx/dt).
     """
 
     name: str
-    marker_a: Marker  #: of the housing
-    marker_b: Marker  #: of the rod
-    head_area: float  #: of the piston on the side of marker a [m²]
-    rod_area: float = 0.0  #: of the ring on the side of the rod [m²]
-    head: str | None = None  #: node of the chamber at the head
-    rod: str | None = None  #: node of the chamber around the rod
-    stroke: float = field(kw_only=True)  #: [m]
-    retracted_length: float = field(kw_only=True)  #: distance of the markers at stroke 0 [m]
-    head_dead_volume: float = 0.0  #: of the chamber at stroke 0 [m³]
-    rod_dead_volume: float = 0.0  #: of the chamber at full stroke [m³]
-    leakage: float = 0.0  #: of the piston, flow over pressure difference [m³/(s Pa)]
-    friction: float = 0.0  #: of the seals [N]
+    marker_a: Marker  #: on the housing
+    marker_b: Marker  #: on the rod
+    head_area: float  #: piston area on the side of marker a [m²]
+    rod_area: float = 0.0  #: ring area of the piston on the side of the rod [m²]
+    head: str | None = None  #: node of the head chamber
+    rod: str | None = None  #: node of the rod chamber
+    stroke: float = field(kw_only=True)  #: largest stroke [m]
+    retracted_length: float = field(kw_only=True)  #: distance between the markers at stroke 0 [m]
+    head_dead_volume: float = 0.0  #: dead volume of the head chamber, at stroke 0 [m³]
+    rod_dead_volume: float = 0.0  #: dead volume of the rod chamber, at full stroke [m³]
+    leakage: float = 0.0  #: leakage past the piston, flow divided by pressure difference [m³/(s Pa)]
+    friction: float = 0.0  #: friction of the seals [N]
     friction_speed: float = FRICTION_SPEED  #: v_s in friction v/√(v² + v_s²) [m/s]
-    damping: float = 0.0  #: [N s/m]
-    stop_stiffness: float = 0.0  #: k of both stops; 0: none [N/m]
-    stop_damping: float = 0.0  #: d of both stops [s/m]
+    damping: float = 0.0  #: viscous damping [N s/m]
+    stop_stiffness: float = 0.0  #: k, stiffness of both stops; 0: no stops [N/m]
+    stop_damping: float = 0.0  #: d, damping of both stops [s/m]
 
     def __post_init__(self) -> None:
         checked(
@@ -116,18 +117,20 @@ class Cylinder:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Orifice:
-    """Flow opening discharge area √(2 Δp/ρ) from node a to node b, linear below the pressure difference `transition`.
+    """An orifice with the flow opening discharge area √(2 Δp/ρ) from node a to b, linear for Δp below `transition`.
 
-    As dp/(dp² + transition²)^(1/4), which is the root to 3 % at three times the transition and to 2.5e-7 at 1000 times.
+    The root is replaced by dp/(dp² + transition²)^(1/4). Their relative difference is 3 % at three times the transition
+    and 2.5e-7 at 1000 times.
     """
 
     name: str
     a: str
     b: str
-    area: float  #: [m²]
+    area: float  #: cross section [m²]
     discharge: float = 0.7
-    transition: float | None = None  #: pressure difference of laminar flow [Pa]; None: 1e-3 of the ambient pressure
-    opening: TimeFunction | float | None = None  #: part of the area over time; None: 1
+    #: pressure difference below which the flow is laminar [Pa]; None: 1e-3 of the ambient pressure
+    transition: float | None = None
+    opening: TimeFunction | float | None = None  #: open fraction of the area as a function of time; None: 1
 
     def __post_init__(self) -> None:
         checked(self, above=("area", "discharge", "transition"), functions=("opening",))
@@ -135,7 +138,7 @@ class Orifice:
 
 @dataclass(frozen=True, eq=False)
 class Resistance:
-    """Laminar flow conductance Δp from node a to node b, such as a gap or a porous plug."""
+    """A laminar flow conductance Δp from node a to node b, such as through a gap or a porous plug."""
 
     name: str
     a: str
@@ -148,17 +151,17 @@ class Resistance:
 
 @dataclass(frozen=True, eq=False)
 class CheckValve:
-    """An orifice that opens for flow from node a to node b, from Δp = `cracking` on, wholly at `full`."""
+    """An orifice for flow from node a to node b that begins to open at Δp = `cracking` and is open at `full`."""
 
     name: str
     a: str
     b: str
-    area: float  #: when open [m²]
-    full: float  #: pressure difference at which it is open [Pa]
+    area: float  #: when fully open [m²]
+    full: float  #: pressure difference at which it is fully open [Pa]
     cracking: float = 0.0  #: pressure difference at which it begins to open [Pa]
     discharge: float = 0.7
-    transition: float | None = None  #: as of an orifice [Pa]
-    leakage: float = 0.0  #: when shut, flow over pressure difference [m³/(s Pa)]
+    transition: float | None = None  #: as for an orifice [Pa]
+    leakage: float = 0.0  #: leakage when closed, flow divided by pressure difference [m³/(s Pa)]
 
     def __post_init__(self) -> None:
         checked(self, above=("area", "full", "discharge", "transition"), at_least=("cracking", "leakage"))
@@ -171,14 +174,15 @@ class CheckValve:
 
 @dataclass(frozen=True, eq=False)
 class ReliefValve(CheckValve):
-    """A check valve whose `cracking` pressure is the set pressure over node b, as to the tank."""
+    """A check valve to the tank, node b, whose `cracking` pressure is the set pressure above that of node b."""
 
 
 @dataclass(frozen=True, eq=False)
 class Accumulator:
-    """A gas volume behind a bladder at a node: V_0 at the charge, polytropic, without oil below it.
+    """A gas volume behind a bladder at a node, polytropic, with volume V_0 at the charge pressure and no oil below it.
 
-    The oil takes V_0 (1 - (charge/p)^(1/n)) up to `oil_limit`; both corners are rounded over 1 % of their pressures.
+    It takes the oil volume V_0 (1 - (charge/p)^(1/n)), up to `oil_limit`. Both corners are rounded over 1 % of their
+    pressures.
     """
 
     name: str
@@ -186,7 +190,7 @@ class Accumulator:
     gas_volume: float  #: V_0 [m³]
     charge: float  #: absolute pressure of the gas without oil [Pa]
     exponent: float = 1.4  #: n; 1: isothermal
-    oil_limit: float | None = None  #: most oil [m³]; None: 0.999 of the gas volume
+    oil_limit: float | None = None  #: largest volume of oil [m³]; None: 0.999 of the gas volume
 
     def __post_init__(self) -> None:
         checked(self, above=("gas_volume", "charge", "exponent", "oil_limit"))
@@ -201,10 +205,10 @@ class Accumulator:
 
 @dataclass(frozen=True, eq=False)
 class Pipe:
-    """A line in equal segments from node a to node b, each with inertia and friction; half a segment's oil at each end.
+    """A pipe from node a to node b in equal segments with inertia and friction; each end has half a segment of oil.
 
-    Pressure drop of the laminar flow 8 pi mu l q/A² (Hagen-Poiseuille, from the viscosity of the fluid; none without
-    it) plus friction_factor l/d ρ q |q|/(2 A²), d the diameter of the circle of that area.
+    The pressure drop is 8 pi mu l q/A² for laminar flow (Hagen-Poiseuille, if the fluid has a viscosity) plus
+    friction_factor l/d ρ q |q|/(2 A²), where d is the diameter of a circle with the area A.
     """
 
     name: str
@@ -213,11 +217,11 @@ class Pipe:
     length: float  #: [m]
     area: float  #: [m²]
     segments: int = 1
-    friction_factor: float = 0.0  #: of turbulent flow (Darcy)
+    friction_factor: float = 0.0  #: Darcy friction factor of turbulent flow
     wall_modulus: float | None = (
-        None  #: pressure over the relative growth of the area, E t/d of a thin wall [Pa]; None: rigid
+        None  #: pressure divided by the relative growth of the area, E t/d for a thin wall [Pa]; None: rigid
     )
-    flow: float = 0.0  #: at the start [m³/s]
+    flow: float = 0.0  #: initial flow [m³/s]
 
     def __post_init__(self) -> None:
         checked(self, above=("length", "area", "wall_modulus"), at_least=("friction_factor",))
@@ -229,7 +233,7 @@ class Pipe:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Supply:
-    """A node whose pressure is given, over time or as a number."""
+    """A node with a prescribed pressure, a function of time or a number."""
 
     name: str
     node: str
@@ -254,7 +258,7 @@ class Tank:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class FlowSource:
-    """A flow from node a to node b that is given, over time or as a number: a pump that nothing holds."""
+    """A prescribed flow from node a to node b, a function of time or a number, like that of an ideal pump."""
 
     name: str
     a: str
@@ -268,20 +272,20 @@ class FlowSource:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Pump:
-    """A pump or motor of displacement D: flow D omega from node a to node b, torque D (p_a - p_b) on marker b.
+    """A pump or motor of displacement D, with flow D omega from node a to b and torque D (p_a - p_b) on marker b.
 
-    omega is the angular velocity of marker b against marker a (the housing) about the axis.
+    omega is the angular velocity of marker b relative to marker a (the housing) about the axis.
     """
 
     name: str
     a: str
     b: str
-    marker_a: Marker  #: of the housing
-    marker_b: Marker  #: of the shaft
+    marker_a: Marker  #: on the housing
+    marker_b: Marker  #: on the shaft
     displacement: float  #: volume per radian [m³]
-    axis: Array = (0.0, 0.0, 1.0)  # type: ignore[assignment]  #: in marker a, (3,)
-    leakage: float = 0.0  #: from a to b, flow over pressure difference [m³/(s Pa)]
-    drag: float = 0.0  #: torque over speed [N m s]
+    axis: Array = (0.0, 0.0, 1.0)  # in axes of marker a, (3,)
+    leakage: float = 0.0  #: leakage from a to b, flow divided by pressure difference [m³/(s Pa)]
+    drag: float = 0.0  #: drag torque divided by speed [N m s]
 
     def __post_init__(self) -> None:
         checked(self, above=("displacement",), at_least=("leakage", "drag"))
@@ -291,10 +295,10 @@ class Pump:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class DirectionalValve:
-    """A 4/3 valve with spool position u in -1 .. 1: pressure to a and b to tank where u > 0, pressure to b where u < 0.
+    """A 4/3 valve with spool position u in -1 .. 1: u > 0 connects pressure to a and b to tank; u < 0 pressure to b.
 
-    Each path is an orifice of the area times (|u| - overlap)/(1 - overlap). The spool follows `opening`, or, with
-    `follow`, u = gain (opening - stroke of that cylinder), at once or with a time constant.
+    Each path is an orifice whose area is multiplied by (|u| - overlap)/(1 - overlap). The spool follows `opening` or,
+    with `follow`, u = gain (opening - stroke of that cylinder), at once or with a time constant.
     """
 
     name: str
@@ -302,15 +306,15 @@ class DirectionalValve:
     tank: str
     a: str
     b: str
-    area: float  #: of a path at u = 1 [m²]
-    opening: TimeFunction | float = 0.0  #: u over time, or the stroke that is wanted [m]
-    time_constant: float = 0.0  #: of the spool; 0: at once [s]
-    follow: str | None = None  #: name of a cylinder
-    gain: float | None = None  #: u over the error of the stroke [1/m]
-    overlap: float = 0.0  #: part of the spool's way without flow
+    area: float  #: area of a path at u = 1 [m²]
+    opening: TimeFunction | float = 0.0  #: u as a function of time, or the desired stroke [m]
+    time_constant: float = 0.0  #: time constant of the spool; 0: it follows at once [s]
+    follow: str | None = None  #: name of a cylinder whose stroke is controlled
+    gain: float | None = None  #: u divided by the error of the stroke [1/m]
+    overlap: float = 0.0  #: part of the spool travel without flow
     discharge: float = 0.7
-    transition: float | None = None  #: as of an orifice [Pa]
-    leakage: float = 0.0  #: of each path [m³/(s Pa)]
+    transition: float | None = None  #: as for an orifice [Pa]
+    leakage: float = 0.0  #: leakage of each path [m³/(s Pa)]
 
     def __post_init__(self) -> None:
         checked(

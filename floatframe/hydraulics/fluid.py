@@ -1,17 +1,17 @@
-"""The fluid of a circuit: compressible, with entrained air where wanted, and cavities where its pressure would fall.
+"""The fluid of a circuit: compressible, optionally with entrained air, and with cavitation at low pressure.
 
-Pressures are absolute. v(p) is the volume that a unit of volume at ambient pressure p_a takes at the pressure p,
+Pressures are absolute. A unit of volume at ambient pressure p_a has, at the pressure p, the volume
 
     v(p) = (1 - a) exp(-(p - p_a)/K) + a (p_a/p)^(1/n) + exp((p_v - p)/d),        v(p_a) = 1,
 
-with the bulk modulus K of the liquid, the volume a of entrained air at ambient pressure, its polytropic exponent n,
-and vapour below the vapour pressure p_v: its cavities are as large as the liquid at p_v itself, grow e-fold for each
-width d = (p_a - p_v)/50 below it, and are 2e-22 of the volume at ambient pressure. So the pressure stays near p_v
-however much a chamber is pulled, and every tangent is finite.
+with the bulk modulus K of the liquid, the volume fraction a of entrained air at ambient pressure, its polytropic
+exponent n, and vapour below the vapour pressure p_v. The cavities are as large as the liquid at p_v, grow by a factor e
+for each width d = (p_a - p_v)/50 below it, and are 2e-22 of the volume at ambient pressure. The pressure therefore
+stays near p_v however much a chamber expands, and every tangent is finite.
 
-h(p), the integral of v from p_a to p, is the work that a unit of volume at ambient pressure brings with it where it
-flows in at the pressure p, and its internal energy is h - (p - p_a) v: a chamber of volume V holds the content V/v
-and the energy V (h/v - (p - p_a)), whose rate is h times the inflow less (p - p_a) times the growth of V, exactly.
+h(p), the integral of v from p_a to p, is the work that a unit of volume at ambient pressure carries when it flows in at
+the pressure p; its internal energy is h - (p - p_a) v. A chamber of volume V has the content V/v and the energy V (h/v
+- (p - p_a)). The rate of this energy is exactly h times the inflow minus (p - p_a) times the rate of V.
 """
 
 from dataclasses import dataclass
@@ -25,23 +25,23 @@ from floatframe.errors import ModelError
 
 __all__ = ["Fluid", "compression"]
 
-CAVITY_WIDTHS = 50  #: widths d between vapour and ambient pressure
-LEAST_PRESSURE = 1e-3  #: of the ambient pressure: below it the air goes on along its tangent
-MOST_EXPONENT = 30.0  #: above it, at cavities of 1e13 volumes, the exponential goes on along its tangent
+CAVITY_WIDTHS = 50  #: number of widths d between vapour and ambient pressure
+LEAST_PRESSURE = 1e-3  #: relative to the ambient pressure; below it, the curve of the air is continued by its tangent
+MOST_EXPONENT = 30.0  #: above it, at cavities of 1e13 volumes, the exponential is continued by its tangent
 
 
 @dataclass(frozen=True)
 class Fluid:
-    """A hydraulic fluid, by numbers in the units of the system; pressures are absolute.
+    """A hydraulic fluid, with values in units of the system and absolute pressures.
 
-    Mineral oil in SI units: density 870 kg/m³, bulk modulus 1.4e9 Pa, viscosity 0.03 Pa s, ambient 101325 Pa.
+    Example, mineral oil in SI units: density 870 kg/m³, bulk modulus 1.4e9 Pa, viscosity 0.03 Pa s, ambient 101325 Pa.
     """
 
     density: float  #: at ambient pressure [kg/m³]
-    bulk_modulus: float  #: K of the liquid without air [Pa]
-    ambient: float  #: absolute pressure outside, p_a [Pa]
-    viscosity: float | None = None  #: dynamic, for pipes [Pa s]
-    air: float = 0.0  #: volume of entrained air over the whole, at ambient pressure
+    bulk_modulus: float  #: K, of the liquid without air [Pa]
+    ambient: float  #: p_a, absolute ambient pressure [Pa]
+    viscosity: float | None = None  #: dynamic viscosity, used for pipes [Pa s]
+    air: float = 0.0  #: volume fraction of entrained air at ambient pressure
     air_exponent: float = 1.4  #: polytropic exponent n of the entrained air
     vapour_pressure: float = 0.0  #: p_v, absolute [Pa]
 
@@ -62,7 +62,7 @@ class Fluid:
 
     @property
     def numbers(self) -> list[float]:
-        """K, a, 1/n, p_a, p_v, d: what `compression` reads, in this order."""
+        """K, a, 1/n, p_a, p_v, d, in the order in which `compression` reads them."""
         width = (self.ambient - self.vapour_pressure) / CAVITY_WIDTHS
         return [self.bulk_modulus, self.air, 1 / self.air_exponent, self.ambient, self.vapour_pressure, width]
 
@@ -74,7 +74,7 @@ class Fluid:
 
 @register_jitable
 def compression(p, data: Array, at: int):
-    """Return v, dv/dp and h at the pressure p of the fluid whose numbers stand in `data` from `at` on."""
+    """Return v, dv/dp and h at the pressure p, of the fluid whose parameters begin at data[at]."""
     K, air, m = data[at], data[at + 1], data[at + 2]
     p_a, p_v, width = data[at + 3], data[at + 4], data[at + 5]
     liquid = (1.0 - air) * np.exp(-(p - p_a) / K)

@@ -1,8 +1,8 @@
-"""The gas of an accumulator: polytropic, with a bladder that ends at its port and a limit of the oil it takes.
+"""The gas of an accumulator: polytropic, behind a bladder that closes the port, with a limit of the oil volume.
 
-Of the gas volume V_0 at the charge p_0 the oil takes U(p) = V_0 (1 - (p_0/p)^(1/n)) above p_0 and nothing below it,
-up to a limit U_m, reached at p_m = p_0 (1 - U_m/V_0)^-n. The two corners are rounded over the pressures (1 - w) p to
-(1 + w) p about them by cubics, so that U and its slope are continuous and the integral of U is known exactly.
+Of the gas volume V_0 at the charge pressure p_0, the oil takes U(p) = V_0 (1 - (p_0/p)^(1/n)) for p > p_0 and nothing
+below it, up to a limit U_m, which is reached at p_m = p_0 (1 - U_m/V_0)^-n. The two corners are rounded by cubics over
+the pressures (1 - w) p to (1 + w) p, so that U and its slope are continuous and the integral of U is known exactly.
 """
 
 from collections.abc import Sequence
@@ -14,12 +14,12 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["GAS_NUMBERS", "gas_numbers", "oil_in_accumulator"]
 
-ROUNDING = 0.01  #: w, of the pressure at a corner
-GAS_NUMBERS = 13  #: how many numbers `gas_numbers` returns
+ROUNDING = 0.01  #: w, half width of the rounding relative to the pressure at the corner
+GAS_NUMBERS = 13  #: number of values from `gas_numbers`
 
 
 def gas_numbers(volume: float, charge: float, exponent: float, limit: float) -> Sequence[float]:
-    """Return what `oil_in_accumulator` reads: V_0, p_0, 1/n, U_m, corners, their values, slopes and integrals."""
+    """Return the data of `oil_in_accumulator`: V_0, p_0, 1/n, U_m, corners, their values, slopes and integrals."""
     m = 1 / exponent
     top = charge * (1 - limit / volume) ** -exponent
 
@@ -46,7 +46,7 @@ def cubic(x, width, a, a_slope, b, b_slope):
 
 @register_jitable
 def power_integral(p, volume, charge, m):
-    """Return an integral of V_0 (1 - (p_0/p)^m) over p."""
+    """Return an integral of V_0 (1 - (p_0/p)^m) over the pressure."""
     if m == 1.0:
         return volume * (p - charge * np.log(p / charge))
     return volume * (p - charge / (1.0 - m) * (p / charge) ** (1.0 - m))
@@ -54,7 +54,7 @@ def power_integral(p, volume, charge, m):
 
 @register_jitable
 def oil_in_accumulator(p, data: Array, at: int):
-    """Return U, dU/dp and the integral of U up to p, of the gas whose numbers stand in `data` from `at` on."""
+    """Return U, dU/dp and the integral of U up to p, of the gas whose parameters begin at data[at]."""
     volume, charge, m, limit = data[at], data[at + 1], data[at + 2], data[at + 3]
     p1, p2, p3, p4 = data[at + 4], data[at + 5], data[at + 6], data[at + 7]
     zero = 0.0 * p

@@ -1,4 +1,4 @@
-"""Nodes of a circuit: which components are at them, who gives their pressures, and whether they can have one."""
+"""Validation of the nodes of a circuit: their components, prescribed pressures, and whether a pressure is defined."""
 
 from collections.abc import Mapping, Sequence
 
@@ -28,13 +28,13 @@ PORTS = ("a", "b", "head", "rod", "node", "pressure", "tank")  #: fields of comp
 
 
 def nodes_of(component: Component) -> list[str]:
-    """Return the names of the nodes at a component."""
+    """Return the names of the nodes of a component."""
     names = [getattr(component, port, None) for port in PORTS]
     return [name for name in names if isinstance(name, str)]
 
 
 def prescribed(fluid: Fluid, components: Sequence[Component]) -> dict[str, TimeFunction]:
-    """Return the pressures that supplies and tanks give, by node."""
+    """Return the pressures prescribed by supplies and tanks, by node."""
     found: dict[str, TimeFunction] = {}
     for each in components:
         if isinstance(each, Supply | Tank):
@@ -43,13 +43,13 @@ def prescribed(fluid: Fluid, components: Sequence[Component]) -> dict[str, TimeF
                     f"component {each.name!r}: node {each.node!r} has the pressure of another supply or tank"
                 )
             pressure = each.pressure if isinstance(each, Supply) else constant(fluid.ambient)
-            assert isinstance(pressure, TimeFunction)  # by the supply
+            assert isinstance(pressure, TimeFunction)  # ensured by the supply
             found[each.node] = pressure
     return found
 
 
 def check_nodes(fluid: Fluid, components: Sequence[Component], nodes: Mapping[str, Node]) -> None:
-    """Raise `ModelError` unless all nodes are connected and have volume or a pressure, and something sets it."""
+    """Raise `ModelError` unless all nodes are connected and have volume or a pressure, and something sets its level."""
     counts: dict[str, int] = {}
     has_volume = {name for name, node in nodes.items() if node.volume > 0}
     for each in components:
@@ -61,7 +61,7 @@ def check_nodes(fluid: Fluid, components: Sequence[Component], nodes: Mapping[st
             raise ModelError(f"component {each.name!r}: expected two nodes, got {each.a!r} twice")
     for name in nodes:
         if name not in counts:
-            raise ModelError(f"nodes: {name}: no component names it{nearest(name, tuple(counts))}")
+            raise ModelError(f"nodes: {name}: no component uses it{nearest(name, tuple(counts))}")
     given = prescribed(fluid, components)
     for each in components:
         names = nodes_of(each)
@@ -79,8 +79,8 @@ def check_nodes(fluid: Fluid, components: Sequence[Component], nodes: Mapping[st
                 )
             if isinstance(each, Accumulator) and name in given:
                 raise ModelError(
-                    f"component {each.name!r}: the pressure of node {name!r} is given; an accumulator there does "
-                    "nothing"
+                    f"component {each.name!r}: the pressure of node {name!r} is prescribed; an accumulator there has "
+                    "no effect"
                 )
         if isinstance(each, DirectionalValve) and each.follow is not None:
             cylinders = [other.name for other in components if isinstance(other, Cylinder)]

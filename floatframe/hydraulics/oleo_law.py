@@ -11,13 +11,13 @@ from floatframe.hydraulics.stops import stop_force
 
 __all__ = ["AREAS", "oleo_law"]
 
-AREAS = 26  # where the metered areas begin
-TRANSITION = 1e-3  # of the ambient pressure: laminar flow of compressible oil below it
+AREAS = 26  # index of the first metered area
+TRANSITION = 1e-3  # relative to the ambient pressure; below it, the flow of compressible oil is laminar
 
 
 @register_jitable
 def gas_spring(V, V_0, charge, n, p_a, least):
-    """Return the pressure of the gas at the volume V and its energy over that at V_0 in the ambient pressure."""
+    """Return the gas pressure at the volume V, and its energy relative to that at V_0 and ambient pressure."""
     low = least * V_0
     inside = low + 0.0 * V if V.real < low else V
     p = charge * (V_0 / inside) ** n
@@ -36,7 +36,7 @@ def gas_spring(V, V_0, charge, n, p_a, least):
 
 @njit
 def oleo_law(t, x, z, lam, data, wrench, z_dot, g, seen):
-    """Write the force of a strut, the rate of its oil pressure and its outputs."""
+    """Write the force of a strut, the rate of its oil pressure, and its outputs."""
     p_a, p_v, width, rho = data[3], data[4], data[5], data[6]
     V_0, charge, A_g, A_o, n, discharge = data[7], data[8], data[9], data[10], data[11], data[12]
     volume, at_recoil = data[20], int(data[21])

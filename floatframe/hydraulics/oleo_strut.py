@@ -1,6 +1,6 @@
-"""An oleo-pneumatic shock absorber between two markers: gas spring, metered orifice, seals and stops.
+"""An oleo-pneumatic shock absorber between two markers, with gas spring, metered orifice, seals and stops.
 
-The forces are those of Milwitzky & Cook (1953), with compressible oil if asked for.
+The forces are those of Milwitzky & Cook (1953), optionally with compressible oil.
 """
 
 from dataclasses import dataclass, field
@@ -27,7 +27,8 @@ __all__ = ["OleoStrut"]
 FRICTION_SPEED = Quantity(0.01, SPEED)
 
 Z_AXIS: Any = (0.0, 0.0, 1.0)
-LEAST_GAS = 0.02  #: of the gas volume when extended: below it its pressure goes on along its tangent
+#: relative to the extended gas volume; below it, the curve of the pressure is continued by its tangent
+LEAST_GAS = 0.02
 OUTPUTS = (
     ("stroke", "m"), ("rate", "m/s"), ("force", "N"), ("gas pressure", "Pa"), ("oil pressure", "Pa"), ("flow", "m^3/s"),
     ("gas force", "N"), ("oil force", "N"), ("friction", "N"), ("stop force", "N"), ("power lost", "W"),
@@ -38,47 +39,47 @@ OUTPUTS = (
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class OleoStrut(Element):
-    """A shock absorber whose stroke s is `extended_length` less the distance of marker b from marker a along the axis.
+    """A shock absorber with stroke s = `extended_length` minus the distance of marker b from marker a along the axis.
 
-    Pressures are absolute, p_a is the ambient one. With the gas volume V = V_0 - A_g s the strut pushes its ends
-    apart by
+    Pressures are absolute; p_a is the ambient pressure. With the gas volume V = V_0 - A_g s, the strut pushes its ends
+    apart with the force
 
         (p_g - p_a) A_g + (p_o - p_g) A_o + seals + stops,      p_g = charge (V_0/V)^n,
 
-    and oil flows through the orifice by the pressure difference p_o - p_g = ρ/2 (q/(discharge area(s)))² with the
-    sign of q = A_o ds/dt, where `area` meters the compression and `recoil_area` the recoil. p_o stays above the
-    vapour pressure (rounded over a fiftieth of what the ambient pressure is above it).
+    Oil flows through the orifice due to the pressure difference p_o - p_g = ρ/2 (q/(discharge area(s)))² with the sign
+    of q = A_o ds/dt; `area` meters the compression and `recoil_area` the recoil. p_o stays above the vapour pressure
+    (rounded over 1/50 of the difference between ambient and vapour pressure).
 
-    With `oil_volume` the oil is compressible and p_o a state: the volume (v(p_o) - v(charge)) oil_volume, v(p) of the
-    fluid with its air and its cavities, is what the chamber has not passed on to the gas side, q = A_o ds/dt - d/dt
-    of it, and a cavity of the recoil has to close before the strut damps again.
+    With `oil_volume`, the oil is compressible and p_o is a state. The volume (v(charge) - v(p_o)) oil_volume, with v(p)
+    of the fluid including air and cavities, is the part of A_o s that has not passed to the gas side: q = A_o ds/dt
+    minus the rate of this volume. A cavity formed in the recoil has to close before the strut damps again.
 
     Seals: (friction + friction_area (p_g - p_a)) v/√(v² + friction_speed²). Stops: k x (1 + d dx/dt) beyond either end.
     """
 
     name: str
-    marker_a: Marker  #: of the cylinder
-    marker_b: Marker  #: of the piston
+    marker_a: Marker  #: on the cylinder
+    marker_b: Marker  #: on the piston
     fluid: Fluid
-    gas_volume: float  #: V_0, extended [m³]
-    charge: float  #: absolute pressure of the gas, extended [Pa]
-    gas_area: float  #: A_g, of the piston rod: what displaces gas [m²]
-    oil_area: float  #: A_o, of the chamber that the orifice empties [m²]
-    #: of the orifice over the stroke, a number or a function of s [m²]
+    gas_volume: float  #: V_0, when extended [m³]
+    charge: float  #: absolute gas pressure when extended [Pa]
+    gas_area: float  #: A_g, area of the piston rod, which displaces gas [m²]
+    oil_area: float  #: A_o, area of the oil chamber [m²]
+    #: area of the orifice, a number or a function of the stroke s [m²]
     area: TimeFunction | float = field(metadata=NOT_OF_TIME)
-    stroke: float  #: at which the strut bottoms [m]
-    extended_length: float  #: distance of the markers along the axis at s = 0 [m]
-    stop_stiffness: float  #: k [N/m]
-    #: of the orifice when the strut extends [m²]; None: as `area`
+    stroke: float  #: stroke at which the strut bottoms [m]
+    extended_length: float  #: distance between the markers along the axis at s = 0 [m]
+    stop_stiffness: float  #: k, stiffness of the stops [N/m]
+    #: area of the orifice when the strut extends [m²]; None: as `area`
     recoil_area: TimeFunction | float | None = field(default=None, metadata=NOT_OF_TIME)
-    exponent: float = 1.3  #: n of the gas
+    exponent: float = 1.3  #: n, polytropic exponent of the gas
     discharge: float = 0.9
-    oil_volume: float | None = None  #: of the oil chamber [m³]; None: incompressible oil
-    friction: float = 0.0  #: of the seals [N]
-    friction_area: float = 0.0  #: friction over gas pressure [m²]
+    oil_volume: float | None = None  #: volume of the oil chamber [m³]; None: incompressible oil
+    friction: float = 0.0  #: friction of the seals [N]
+    friction_area: float = 0.0  #: additional friction of the seals divided by the gas pressure [m²]
     friction_speed: float = FRICTION_SPEED  #: [m/s]
-    stop_damping: float = 0.0  #: d [s/m]
-    axis: Array = Z_AXIS  #: from marker a towards marker b, in the axes of marker a, (3,)
+    stop_damping: float = 0.0  #: d, damping of the stops [s/m]
+    axis: Array = Z_AXIS  #: direction from marker a to marker b, in the axes of marker a, (3,)
 
     def __post_init__(self) -> None:
         where = f"element {self.name!r}"
@@ -103,7 +104,7 @@ class OleoStrut(Element):
             self._metered(where, key)
 
     def _metered(self, where: str, key: str) -> None:
-        """Check an area over the stroke, and make a function of a number."""
+        """Check an area as a function of the stroke, and convert a number to a function."""
         given = getattr(self, key)
         if given is None:
             return
@@ -121,11 +122,11 @@ class OleoStrut(Element):
             )
 
     def drawn(self) -> tuple[Stretched, ...]:
-        """Return a rod in a cylinder, as wide as the area that displaces gas."""
+        """Return a drawn rod in a cylinder with the area that displaces gas."""
         return (Stretched("strut", radius=sqrt(self.gas_area / pi)),)
 
     def law(self, placed: Placed) -> ElementLaw:
-        """Return the law of the strut; `ModelError` if it is placed outside its stroke."""
+        """Return the law of the strut; `ModelError` if it is assembled outside its stroke."""
         from floatframe.hydraulics.oleo_law import AREAS, oleo_law
 
         where = f"element {self.name!r}"
@@ -133,12 +134,12 @@ class OleoStrut(Element):
         s = self.extended_length - distance
         if distance <= 0:
             raise ModelError(
-                f"{where}: marker_b lies {distance:.6g} along the axis from marker_a as placed; expected one above 0: "
+                f"{where}: marker_b lies {distance:.6g} along the axis from marker_a as assembled; expected above 0: "
                 "does the axis point from marker_a to marker_b?"
             )
         if not -0.5 * self.stroke <= s <= 1.5 * self.stroke:
             raise ModelError(
-                f"{where}: its markers are {distance:.6g} apart along the axis as placed, stroke {s:.6g}; expected "
+                f"{where}: its markers are {distance:.6g} apart along the axis as assembled, stroke {s:.6g}; expected "
                 f"0 to {self.stroke:g}: check extended_length = {self.extended_length:g}"
             )
         area, recoil = function_numbers(self.area), []  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Stops at the ends of a stroke: linear springs that lose energy and never pull."""
+"""Stops at the ends of a stroke: dissipative linear springs that only push."""
 
 from numba.extending import register_jitable
 
@@ -7,7 +7,7 @@ __all__ = ["stop_force"]
 
 @register_jitable
 def stop_force(depth, rate, stiffness, damping):
-    """Return the force k x (1 + d dx/dt) of a stop at depth x > 0, never below 0, its energy and the power it loses."""
+    """Return the force k x (1 + d dx/dt) >= 0 of a stop at depth x > 0, its energy, and the power it dissipates."""
     if depth.real <= 0.0:
         return 0.0 * depth, 0.0 * depth, 0.0 * depth
     factor = 1.0 + damping * rate

@@ -1,4 +1,4 @@
-"""Films of a computed motion: deformed bodies coloured by displacement, rigid ones by shapes or boxes, on a ground."""
+"""Films of a computed motion: deformed bodies coloured by displacement, rigid bodies as shapes or boxes, a ground."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -27,14 +27,14 @@ from floatframe.system import Body, System
 
 __all__ = ["animate", "bodies_of", "motion_scene"]
 
-VISIBLE = 0.02  #: share of a body's diagonal below which its displacement is drawn larger
-DRAWN = 0.06  #: share of the diagonal to which it is then enlarged, at most
-LARGEST = 0.2  #: half edge of the box of a rigid body, by the size of the scene
-HIDDEN = 0.1  #: share of a flexible body's nodes in a box from which that is drawn as glass
-GLASS = 0.35  #: its opacity
-MOST_TRIADS = 11  #: axes with a name that are drawn; of more, none
+VISIBLE = 0.02  #: if displacement / diagonal of a body is smaller, the displacement is magnified
+DRAWN = 0.06  #: largest displacement / diagonal of a body after magnification
+LARGEST = 0.2  #: half edge of the box of a rigid body, divided by the size of the scene
+HIDDEN = 0.1  #: fraction of the nodes of a flexible body within a box from which the box is drawn transparent
+GLASS = 0.35  #: its opacity then
+MOST_TRIADS = 11  #: if more axes have names, none are drawn
 TRAIL_COLOR, RIGID_COLOR = "#7d5ba6", "#9fb0bf"
-TRAIL_POINTS = 1500  #: of a trail, at most
+TRAIL_POINTS = 1500  #: largest number of points of a trail
 
 
 def animate(
@@ -50,36 +50,36 @@ def animate(
     system: System | None = None,
     on_frame: OnFrame | None = None,
 ) -> Drawing:
-    """Draw a motion into a film.
+    """Make a film of a motion.
 
     Parameters
     ----------
     bodies
-        What the bodies of the trajectory look like, by name (`bodies_of` reads them from the modal files); one that
-        is missing is drawn as a small cube.
+        Appearance of the bodies of the trajectory, by name (`bodies_of` reads them from the modal files); a missing
+        body is drawn as a small cube.
     path
-        Ends in .gif or .mp4.
+        File whose name ends in .gif or .mp4.
     fps
-        Frames a second; fewer where the trajectory has not so many rows.
+        Frames per second; fewer if the trajectory has too few rows.
     speed
-        Seconds of motion in a second of film; None: 1 if the film then lasts 2 to 12 s, else a round number.
+        Seconds of motion per second of film; None: 1 if the film then lasts 2 to 12 s, otherwise a round number.
     magnification
-        How many times larger the elastic displacement is drawn; None: 1, or a round number where nobody would see it.
+        Factor of the elastic displacement as drawn; None: 1, or a round number if it would be invisible.
     up
-        What points up in the film, ground axes, (3,); None: against gravity if the trajectory knows it, else z, or y
-        for a motion in the xy plane.
+        Upward direction in ground axes, (3,); None: opposite to gravity if the trajectory contains it, else z, or y for
+        a motion in the xy plane.
     color
-        By what flexible bodies are coloured: `DISPLACEMENT` or `VON_MISES` of `floatframe.pictures.body_colors`.
+        Quantity that colours flexible bodies: `DISPLACEMENT` or `VON_MISES` of `floatframe.pictures.body_colors`.
     system
-        The system of the motion: its joints, springs, dampers, bushings and contacts are drawn (see
+        The system of the motion, whose joints, springs, dampers, bushings and contacts are then drawn (see
         `floatframe.pictures.glyphs`).
     on_frame
-        Called with the number of frames drawn and of all.
+        Called with the number of frames drawn so far and the total number.
 
     Raises
     ------
     ResultsError
-        If the trajectory has no rows, or a body does not fit it.
+        If the trajectory has no rows, or does not match a body.
     """
     times = film_times(trajectory.t * trajectory.units.time, fps=fps, speed=speed, n_nodes=count_nodes(bodies))
     scene = motion_scene(trajectory, bodies, times, magnification=magnification, up=up, color=color, system=system)
@@ -87,12 +87,12 @@ def animate(
 
 
 def bodies_of(trajectory: Trajectory) -> dict[str, ReducedBody]:
-    """Return the reduced bodies of a trajectory by name, read from the modal files it names.
+    """Return the reduced bodies of a trajectory, by name, read from its modal files.
 
     Raises
     ------
     ResultsError
-        If a modal file is not the one the motion was computed with.
+        If a modal file is not the one with which the motion was computed.
     """
     found = {}
     for entry in trajectory.head.bodies:
@@ -115,7 +115,7 @@ def motion_scene(
     color: BodyColor = DISPLACEMENT,
     system: System | None = None,
 ) -> Scene:
-    """Return the scene of a motion: surfaces, interfaces and their trails, ground; else as `animate`."""
+    """Return the scene of a motion, with surfaces, interfaces, their trails and ground; parameters as `animate`."""
     unknown = set(bodies) - set(trajectory.body_names)
     if unknown:
         raise ResultsError(
@@ -168,7 +168,7 @@ def motion_scene(
             surfaces.append(Surface(triangles, moved, color=RIGID_COLOR, opacity=opacity, name=name))
             triads.append(Triad(r, R, 0.06 * size, name))
             lines.append(trail(motions[name].r, rows))
-    if len(triads) > MOST_TRIADS:  # their names would hide the machine
+    if len(triads) > MOST_TRIADS:  # more names would hide the machine
         triads = []
     around = [] if system is None else element_pieces(system, trajectory, rows)
     for piece, at in around:
@@ -218,7 +218,7 @@ def motion_scene(
 
 
 def drawn_piece(piece: Piece, nodes: Array, name: str) -> tuple[list[Surface], list[Lines]]:
-    """Return a piece at its places, (n, 3) or (n_frames, n, 3), as surfaces and lines."""
+    """Return a piece with its nodes, (n, 3) or (n_frames, n, 3), as surfaces and lines."""
     color = piece.color or RIGID_COLOR
     surfaces, lines = [], []
     if len(piece.triangles):
@@ -232,7 +232,7 @@ def drawn_piece(piece: Piece, nodes: Array, name: str) -> tuple[list[Surface], l
 
 
 def connections(system: System | None, name: str) -> Array | None:
-    """Return where a rigid body is met by joints and forces, in its frame, (n, 3); None for an unknown system."""
+    """Return the points of a rigid body where joints and forces act, body frame, (n, 3); None for an unknown system."""
     if system is None:
         return None
     markers, index = compiled_system(system).model.markers, [body.name for body in system.bodies].index(name)
@@ -242,7 +242,7 @@ def connections(system: System | None, name: str) -> Array | None:
 def hides_flexible(
     name: str, corners: Array, frames: Mapping[str, tuple[Array, Array]], flexible: Mapping[str, ReducedBody]
 ) -> bool:
-    """Whether nodes of a flexible body lie within the box of a rigid one in the first frame."""
+    """Return whether nodes of a flexible body lie within the box of a rigid one in the first frame."""
     (r, R), low, high = frames[name], corners.min(axis=0), corners.max(axis=0)
     for other, body in flexible.items():
         r_o, R_o = frames[other]
@@ -254,22 +254,22 @@ def hides_flexible(
 
 
 def rotations(p: Array) -> Array:
-    """Return R_GB, (n, 3, 3), of Euler parameters (w, x, y, z), (n, 4)."""
+    """Return R_GB, (n, 3, 3), from Euler parameters (w, x, y, z), (n, 4)."""
     return np.asarray(Rotation.from_quat(p[:, [1, 2, 3, 0]]).as_matrix())
 
 
 def count_nodes(bodies: Mapping[str, ReducedBody | RigidBody]) -> int:
-    """Return how many nodes a frame has."""
+    """Return the number of nodes in a frame."""
     return sum(len(body.nodes) if isinstance(body, ReducedBody) else 8 for body in bodies.values())
 
 
 def diagonal(body: ReducedBody) -> float:
-    """Return the diagonal of the bounding box of a body's kept nodes [m]."""
+    """Return the diagonal of the bounding box of the kept nodes of a body [m]."""
     return float(np.linalg.norm(np.ptp(body.nodes, axis=0)))
 
 
 def scene_size(flexible: Mapping[str, ReducedBody], frames: Mapping[str, tuple[Array, Array]]) -> float:
-    """Return a length by which glyphs are measured: the largest body, or what the origins sweep [m]."""
+    """Return the length that scales glyphs: the size of the largest body, or the range of the origins [m]."""
     sizes = [diagonal(body) for body in flexible.values()]
     if not sizes:
         sizes = [float(np.linalg.norm(np.ptp(np.concatenate([r for r, _ in frames.values()]), axis=0)))]
@@ -277,7 +277,7 @@ def scene_size(flexible: Mapping[str, ReducedBody], frames: Mapping[str, tuple[A
 
 
 def chosen_magnification(flexible: Mapping[str, ReducedBody], displacements: Mapping[str, Array]) -> float:
-    """Return 1 where the displacement is seen as it is, else the round number that draws it at 2.4 to 6 % of a body."""
+    """Return 1 if the displacement is visible as it is, else the round number that makes it 2.4 to 6 % of a body."""
     share = max(
         (float(np.abs(displacements[name]).max()) / diagonal(body) for name, body in flexible.items()), default=1.0
     )
@@ -285,7 +285,7 @@ def chosen_magnification(flexible: Mapping[str, ReducedBody], displacements: Map
 
 
 def largest_place(bodies: Mapping[str, ReducedBody], scalars: Mapping[str, Array]) -> str:
-    """Return the node with the largest scalar of all frames, as the user numbers it."""
+    """Return the user's number of the node with the largest scalar of all frames."""
     name = max(scalars, key=lambda body: float(scalars[body].max(initial=0.0)))
     row = int(scalars[name].max(axis=0).argmax())
     where = f"node {bodies[name].node_name(row)}"
@@ -293,18 +293,18 @@ def largest_place(bodies: Mapping[str, ReducedBody], scalars: Mapping[str, Array
 
 
 def largest_of(scalars: Mapping[str, Array]) -> float:
-    """Return the largest size of the scalars of all bodies."""
+    """Return the largest magnitude of the scalars of all bodies."""
     return max((float(np.abs(values).max(initial=0.0)) for values in scalars.values()), default=0.0)
 
 
 def interface_path(motion: BodyMotion, interface: ReducedInterface, magnification: float) -> Array:
-    """Return the positions of an interface in all rows, ground axes, (n_t, 3)."""
+    """Return the positions of an interface in all rows, in ground axes, (n_t, 3)."""
     local = interface.position + magnification * (motion.q @ interface.Psi[:3].T)
     return np.asarray(motion.r + np.einsum("tab,tb->ta", rotations(motion.p), local))
 
 
 def trail(path: Array, rows: IntArray) -> Lines:
-    """Return the path of a point, (n_t, 3), up to each frame, a row: what is still to come lies on the point."""
+    """Return the path of a point, (n_t, 3), up to each frame, one row each; later points coincide with the last one."""
     kept = np.unique(np.r_[rows, np.arange(rows[0], rows[-1], max(len(path) // TRAIL_POINTS, 1))])
     points = path[np.minimum(kept[None, :], rows[:, None])]
     segments = np.stack([np.arange(len(kept) - 1), np.arange(1, len(kept))], axis=1)
@@ -312,7 +312,7 @@ def trail(path: Array, rows: IntArray) -> Lines:
 
 
 def up_of(trajectory: Trajectory, points: Array) -> Array:
-    """Return what is up, (3,): against gravity if known; else z, or y where the system is flat in z and moves in y."""
+    """Return the upward direction, (3,): opposite to gravity if known; else z, or y for a planar motion in xy."""
     gravity = np.asarray(trajectory.head.run.get("gravity", np.zeros(3)), dtype=float)
     if gravity.shape == (3,) and np.linalg.norm(gravity) > 0:
         return -gravity

@@ -1,4 +1,4 @@
-"""By what flexible bodies are coloured in films and pictures: elastic displacement, or von Mises stress."""
+"""Quantities that colour flexible bodies in films and pictures: elastic displacement, or von Mises stress."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,27 +16,28 @@ __all__ = ["BODY_COLORS", "DISPLACEMENT", "VON_MISES", "BodyColor", "length_unit
 
 @dataclass(frozen=True)
 class BodyColor:
-    """A scalar at the kept nodes of a body by its modal coordinates."""
+    """A scalar at the kept nodes of a body as a function of its modal coordinates."""
 
     title: str
-    values: Callable[[ReducedBody, Array], Array]  #: of a body and q, (n, n_q): scalars, (n, n_kept)
-    unit: Callable[[Units, float], tuple[str, float]]  #: symbol that reads well for the largest value, factor to it
+    values: Callable[[ReducedBody, Array], Array]  #: scalars, (n, n_kept), of a body and q, (n, n_q)
+    #: unit symbol suitable for the largest value, and the factor to that unit
+    unit: Callable[[Units, float], tuple[str, float]]
 
 
 def displacements(body: ReducedBody, q: Array) -> Array:
-    """Return the size of the elastic displacement, (n, n_kept) [m]."""
+    """Return the magnitude of the elastic displacement, (n, n_kept) [m]."""
     moved = (q @ body.Phi.reshape(3 * len(body.Phi), body.n_q).T).reshape(len(q), len(body.Phi), 3)
     return np.asarray(np.linalg.norm(moved, axis=2))
 
 
 def stresses(body: ReducedBody, q: Array) -> Array:
-    """Return von Mises' stress, all modes included, (n, n_kept) [Pa]; `ResultsError` without stress modes."""
+    """Return the von Mises stress, including all modes, (n, n_kept) [Pa]; `ResultsError` without stress modes."""
     modes = stress_modes(body.name, body)
     return np.concatenate([np.zeros((0, len(modes))), *von_mises_of(modes, q)])
 
 
 def length_unit(units: Units, largest: float) -> tuple[str, float]:
-    """Return the unit in which a length reads well, and the factor to it; metric lengths only."""
+    """Return a readable unit for a length, and the factor to it; metric units only."""
     if units.length_symbol not in ("m", "mm", "cm"):
         return units.length_symbol, 1.0
     for symbol, metres in (("m", 1.0), ("mm", 1e-3), ("\N{GREEK SMALL LETTER MU}m", 1e-6)):
@@ -46,7 +47,7 @@ def length_unit(units: Units, largest: float) -> tuple[str, float]:
 
 
 def stress_unit(units: Units, largest: float) -> tuple[str, float]:
-    """Return the unit in which a stress reads well, and the factor to it; metric units only."""
+    """Return a readable unit for a stress, and the factor to it; metric units only."""
     if units.stress_symbol not in ("Pa", "kPa", "MPa", "GPa"):
         return units.stress_symbol, 1.0
     pascal = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9}[units.stress_symbol]

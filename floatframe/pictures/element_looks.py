@@ -1,4 +1,4 @@
-"""What elements show of themselves in films: shapes at their markers, parts stretched between two of them."""
+"""How elements are drawn in films: shapes at their markers, and parts stretched between two markers."""
 
 from dataclasses import replace
 
@@ -22,12 +22,12 @@ COLOR = "#2a7f62"
 
 
 def shown_of(system: System, element: Element) -> tuple[Drawn | Stretched | Arrow, ...]:
-    """Return what an element shows of itself, without what gives way to shapes that its bodies have of their own.
+    """Return the drawn parts of an element; those that stand in for shapes are omitted if its bodies have shapes.
 
     Raises
     ------
     ModelError
-        If it shows something else, or at a marker that it does not have.
+        If a drawn part has another type, or refers to a marker that the element does not have.
     """
     where, markers, found = f"element {element.name!r}", markers_of(element), []
     shapely = {body.name for body in system.bodies if body.shapes}
@@ -41,7 +41,7 @@ def shown_of(system: System, element: Element) -> tuple[Drawn | Stretched | Arro
 
 
 def require_markers(where: str, shown: Drawn | Stretched | Arrow, n: int) -> None:
-    """Raise `ModelError` unless an element shows itself at markers it has."""
+    """Raise `ModelError` unless the drawn parts of an element refer to markers it has."""
     if not isinstance(shown, Drawn | Stretched | Arrow):
         raise ModelError(f"{where}: drawn: expected Drawn, Stretched or Arrow, got {shown!r}")
     numbers = (shown.first, shown.second) if isinstance(shown, Stretched) else (shown.marker,)
@@ -51,7 +51,7 @@ def require_markers(where: str, shown: Drawn | Stretched | Arrow, n: int) -> Non
 
 
 def dressed_bodies(system: System | None) -> set[str]:
-    """Return the names of the bodies on which elements draw shapes, such as the wheels of tyres."""
+    """Return the names of the bodies on which elements draw shapes, such as wheels of tyres."""
     found = set()
     for element in () if system is None else system.elements:
         for each in shown_of(system, element):  # type: ignore[arg-type]
@@ -61,15 +61,15 @@ def dressed_bodies(system: System | None) -> set[str]:
 
 
 def drawn_pieces(drawn: Drawn, metres: float) -> list[Piece]:
-    """Return the pieces of a shape in units of a system whose unit of length has so many metres."""
+    """Return the pieces of a shape in units of a system whose unit of length has `metres` metres."""
     scale = 1 / metres if drawn.is_in_metres else 1.0
     return [replace(p, nodes=scale * p.nodes, color=p.color or COLOR) for p in drawn.shape.pieces()]
 
 
 def element_pieces(system: System, trajectory: Trajectory, rows: IntArray) -> list[Placed]:
-    """Return the pieces of all elements with their nodes over the frames; arrows of loads are left to pages.
+    """Return the pieces of all elements with their nodes in all frames; load arrows are drawn only in pages.
 
-    What stands on the ground is there once, though several elements show it.
+    A shape on the ground is drawn once, even if several elements have it.
     """
     found: list[Placed] = []
     seen = set()
@@ -103,7 +103,7 @@ def pieces_of(system: System, trajectory: Trajectory, rows: IntArray, element: E
 
 
 def placed_nodes(system: System, trajectory: Trajectory, rows: IntArray, end: MarkerData | None, nodes: Array) -> Array:
-    """Return nodes in the axes of a marker, ground axes: (n, 3) on the ground, else (n_frames, n, 3)."""
+    """Return nodes given in the axes of a marker in ground axes: (n, 3) on the ground, else (n_frames, n, 3)."""
     if end is None:
         return nodes
     if end.body < 0:
@@ -112,13 +112,13 @@ def placed_nodes(system: System, trajectory: Trajectory, rows: IntArray, end: Ma
 
 
 def at_marker(system: System, trajectory: Trajectory, rows: IntArray, end: MarkerData, nodes: Array) -> Array:
-    """Return nodes in the axes of a marker over the frames, ground axes, (n_frames, n, 3)."""
+    """Return nodes given in the axes of a marker in all frames, in ground axes, (n_frames, n, 3)."""
     place = end_motion(system, trajectory, end)
     return np.asarray(place.position[rows][:, None] + np.einsum("tab,nb->tna", place.axes[rows], nodes))
 
 
 def stretched(part: StretchedPiece, a: Array, b: Array) -> Array:
-    """Return the nodes of a part between two points, (n_frames, 3) each, over the frames, (n_frames, n, 3)."""
+    """Return the nodes, in all frames, of a part stretched between two points, (n_frames, 3) each: (n_frames, n, 3)."""
     d = b - a
     length = np.linalg.norm(d, axis=1, keepdims=True)
     z = d / np.maximum(length, 1e-300)

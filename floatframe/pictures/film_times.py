@@ -1,4 +1,4 @@
-"""Which rows of a motion a film shows, and how fast."""
+"""The selection of the rows of a motion that a film shows, and its speed."""
 
 from dataclasses import dataclass
 
@@ -9,33 +9,33 @@ from floatframe.errors import ResultsError
 
 __all__ = ["FilmTimes", "film_times", "round_below", "speed_words", "time_words"]
 
-SHORT, LONG = 2.0, 12.0  #: [s] a film in real time may last; else the speed is chosen
-CHOSEN_LENGTH = 6.0  #: [s] of the film then, at least
-MOST_COORDINATES = 2e7  #: frames × nodes of a film, which bounds its memory; longer ones get fewer frames
+SHORT, LONG = 2.0, 12.0  #: range of the length of a film in real time; outside it, another speed is chosen [s]
+CHOSEN_LENGTH = 6.0  #: least length of the film with a chosen speed [s]
+MOST_COORDINATES = 2e7  #: largest frames × nodes of a film, which limits the memory; longer films get fewer frames
 
 
 @dataclass(frozen=True, eq=False)
 class FilmTimes:
-    """Which output rows a film shows, and how fast."""
+    """The output rows that a film shows, and its speed."""
 
-    rows: IntArray  #: rows of the trajectory, one a frame, (n_frames,)
-    fps: float  #: frames a second [1/s]
-    speed: float  #: seconds of motion in a second of film
+    rows: IntArray  #: rows of the trajectory, one for each frame, (n_frames,)
+    fps: float  #: frames per second [1/s]
+    speed: float  #: seconds of motion per second of film
 
 
 def film_times(t: Array, *, fps: float, speed: float | None, n_nodes: int = 0) -> FilmTimes:
-    """Choose the rows that a film shows: evenly spaced in time, none twice.
+    """Choose the rows that a film shows, equally spaced in time and without repetition.
 
     Parameters
     ----------
     t
         Output times, ascending, (n_t,) [s].
     fps
-        Frames a second that are wanted.
+        Desired frames per second.
     speed
-        Seconds of motion in a second of film; None: chosen.
+        Seconds of motion per second of film; None: chosen automatically.
     n_nodes
-        Nodes of all bodies, which bound the number of frames.
+        Nodes of all bodies, which limit the number of frames.
     """
     if len(t) == 0:
         raise ResultsError("film: the trajectory has no rows")
@@ -57,7 +57,7 @@ def film_times(t: Array, *, fps: float, speed: float | None, n_nodes: int = 0) -
 
 
 def round_below(value: float) -> float:
-    """Return the greatest of 1, 2, 5 times a power of ten that is not above the value."""
+    """Return the largest of 1, 2, 5 times a power of ten that does not exceed the value."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(max(m * power for m in (1, 2, 5) if m * power <= value * (1 + 1e-12)))
 
@@ -70,7 +70,7 @@ def speed_words(speed: float) -> str:
 
 
 def time_words(t: Array) -> tuple[str, ...]:
-    """Return times, (n,) [s], with as many decimals as tell them apart."""
+    """Return times, (n,) [s], as text with enough decimals to be distinct."""
     step = float(np.diff(t).min()) if len(t) > 1 else 1.0
     decimals = int(np.clip(np.ceil(-np.log10(step) + 0.3), 0, 9)) if step > 0 else 3
     return tuple(f"t = {value:.{decimals}f} s" for value in t)

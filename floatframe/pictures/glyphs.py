@@ -1,13 +1,13 @@
-"""What stands for joints, springs, dampers, bushings and contacts in a film: drawn lines that follow their markers.
+"""Symbols of joints, springs, dampers, bushings and contacts in films, as lines that follow their markers.
 
     revolute, screw, rolling             a ring about the axis, and the axis
     prismatic, cylindrical, planar       two rails along the axis
     spherical                            three rings
     universal, constant velocity         a cross in a ring
-    distance                             a line from point to point
+    distance                             a line between the points
     all others, such as fixed            a small square
     spring                               a coil
-    damper                               a piston in a cylinder; beside the coil where both are
+    damper                               a piston in a cylinder; next to the coil if there is a spring too
     bushing                              two rings round the axis z of A
     contact                              rings round the sphere
 
@@ -36,7 +36,7 @@ from floatframe.system import System
 __all__ = ["BUSHING_COLOR", "JOINT_COLOR", "SPRING_COLOR", "glyphs"]
 
 JOINT_COLOR, SPRING_COLOR, BUSHING_COLOR, GROUND_COLOR = "#33414d", "#2a7f62", "#b5651d", "#7b8790"
-SIZE = 0.022  #: of a glyph, by the size of the scene
+SIZE = 0.022  #: size of a glyph, divided by the size of the scene
 TURNS, POINTS_A_TURN = 7, 14  #: of a coil
 ROUND = np.linspace(0.0, 2 * np.pi, 25)
 RINGS = ("RevoluteJoint", "ScrewJoint", "RollingDisc")
@@ -48,7 +48,7 @@ RODS = ("DistanceJoint",)
 
 @dataclass(frozen=True, eq=False)
 class Ends:
-    """Both markers over the frames."""
+    """Positions and axes of both markers in all frames."""
 
     a: Array  #: positions, (n_frames, 3)
     b: Array  #: (n_frames, 3)
@@ -59,7 +59,7 @@ class Ends:
 def glyphs(
     system: System, trajectory: Trajectory, rows: IntArray, size: float, magnification: float, up: Array
 ) -> tuple[Lines, ...]:
-    """Return what is drawn of joints and forces in the rows of a motion; size: that of the scene."""
+    """Return the lines of joints and forces in the rows of a motion; `size` is that of the scene."""
     g = SIZE * size
     found: list[Lines] = []
     for joint in system.joints:
@@ -91,7 +91,7 @@ def glyphs(
 
 
 def is_spring(force: SpringDamper) -> bool:
-    """Whether a spring-damper has more than a damper."""
+    """Return whether a spring-damper has a spring."""
     return force.stiffness > 0 or force.characteristic is not None or force.damping == 0
 
 
@@ -103,7 +103,7 @@ def ends_of(
     given: Sequence[object],
     magnification: float,
 ) -> Ends:
-    """Return both markers over the frames; those on interfaces as far out as the film draws these."""
+    """Return both markers in all frames; markers on interfaces are displaced with the magnification of the film."""
     places = [place_of(system, trajectory, rows, end, of, magnification) for end, of in zip(ends, given, strict=True)]
     axes = end_motion(system, trajectory, ends[0]).axes[rows]
     return Ends(places[0], places[1], axes, min(end.body for end in ends) < 0)
@@ -144,7 +144,7 @@ def joint_glyph(kind: str, axis: Array, ends: Ends, g: float) -> list[Lines]:
 
 
 def spring_glyph(ends: Ends, g: float, *, has_spring: bool, has_damper: bool) -> list[Lines]:
-    """Return a coil between the markers, a cylinder with a piston, or both beside each other."""
+    """Return a coil between the markers, a cylinder with a piston, or both next to each other."""
     d = ends.b - ends.a
     length = np.linalg.norm(d, axis=1)[:, None]
     e = np.divide(d, length, out=np.zeros_like(d), where=length > 0)
@@ -157,7 +157,7 @@ def spring_glyph(ends: Ends, g: float, *, has_spring: bool, has_damper: bool) ->
     found = []
 
     def at(along: Array, across: Array, depth: Array, shift: float) -> Array:
-        """Return points at shares of the length and of the radius, (n_frames, n, 3)."""
+        """Return points at fractions of the length and of the radius, (n_frames, n, 3)."""
         return (
             ends.a[:, None]
             + along[None, :, None] * d[:, None]
@@ -186,13 +186,13 @@ def spring_glyph(ends: Ends, g: float, *, has_spring: bool, has_damper: bool) ->
 
 
 def bushing_glyph(ends: Ends, g: float) -> list[Lines]:
-    """Return two rings round the axis z of A, and the line from marker to marker."""
+    """Return two rings round the z axis of A, and the line between the markers."""
     rings = [ring(ends.a, ends.axes, np.eye(3)[2], share * g, BUSHING_COLOR, 2.0) for share in (1.15, 0.6)]
     return [*rings, polyline(np.stack([ends.a, ends.b], axis=1), BUSHING_COLOR)]
 
 
 def support(at: Array, up: Array, g: float) -> Lines:
-    """Return a triangle on a hatched line below a place on the ground."""
+    """Return a triangle on a hatched line below a point on the ground."""
     up = up / np.linalg.norm(up)
     side = normals(up)[0] if abs(up[0]) > 0.9 else np.array([1.0, 0.0, 0.0]) - up[0] * up
     side /= np.linalg.norm(side)
@@ -216,7 +216,7 @@ def normals(axis: Array) -> tuple[Array, Array]:
 
 
 def local(at: Array, axes: Array, points: Array) -> Array:
-    """Return points of the axes of a marker in ground axes, (n_frames, n, 3)."""
+    """Return points given in the axes of a marker in ground axes, (n_frames, n, 3)."""
     return np.asarray(at[:, None] + np.einsum("tab,nb->tna", axes, points))
 
 

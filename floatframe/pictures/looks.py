@@ -1,4 +1,4 @@
-"""Shapes of bodies over a motion: where their nodes are, with the deformation of what carries them."""
+"""Shapes of bodies during a motion: positions of their nodes, which follow the deformation of their carrier."""
 
 from dataclasses import dataclass
 
@@ -17,10 +17,10 @@ __all__ = ["Look", "carrier_of", "looks_of", "places_over"]
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """A piece with what carries it in its body."""
+    """A piece with its carrier in the body."""
 
     piece: Piece  #: in the axes of the carrier
-    carrier: MarkerShape  #: in the body frame, as the results file has it
+    carrier: MarkerShape  #: in the body frame, as in the results file
 
 
 def looks_of(body: Body) -> tuple[Look, ...]:
@@ -30,7 +30,7 @@ def looks_of(body: Body) -> tuple[Look, ...]:
 
 
 def carrier_of(body: Body, shape: Shape) -> MarkerShape:
-    """Return what carries a shape: an interface, the mesh axes of a flexible body, or the frame of a rigid one."""
+    """Return the carrier of a shape: an interface, the mesh axes of a flexible body, or the frame of a rigid body."""
     if not isinstance(body, FlexibleBody):
         return MarkerShape(np.zeros(3), np.eye(3))
     if shape.interface is not None:
@@ -40,14 +40,14 @@ def carrier_of(body: Body, shape: Shape) -> MarkerShape:
 
 
 def places_over(look: Look, r: Array, R: Array, q: Array, magnification: float = 1.0) -> Array:
-    """Return the nodes of a piece in ground axes over a motion, (n_t, n, 3).
+    """Return the nodes of a piece during a motion, in ground axes, (n_t, n, 3).
 
     Parameters
     ----------
     r, R, q
-        Of its body: (n_t, 3), (n_t, 3, 3), (n_t, n_q).
+        Motion of its body, (n_t, 3), (n_t, 3, 3), (n_t, n_q).
     magnification
-        How many times larger the displacement and rotation of its carrier are drawn.
+        Factor of the displacement and rotation of its carrier as drawn.
     """
     d = magnification * look.carrier.deformation(q)
     axes = rotation_exp(d[:, 3:]) @ look.carrier.triad

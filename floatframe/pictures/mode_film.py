@@ -1,4 +1,4 @@
-"""Films of system modes: all bodies swing about their equilibrium as one mode moves them."""
+"""Films of system modes: all bodies oscillate about their equilibrium in the shape of a mode."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -24,11 +24,12 @@ from floatframe.system import System
 
 __all__ = ["animate_mode", "draw_mode", "mode_scene"]
 
-N_FRAMES = 40  #: of one period
+N_FRAMES = 40  #: in one period
 FPS = 20.0
-SWING = 0.12  #: largest displacement by the size of the system
-LARGEST_TURN = 0.5  #: rad that a body turns in the film, at most
-INSIDE = 0.99  #: size of the still body by the moving one, so that it does not shine through where nothing moves
+SWING = 0.12  #: largest displacement, divided by the size of the system
+LARGEST_TURN = 0.5  #: largest rotation of a body in the film [rad]
+#: scale of the undeformed body relative to the moving one; below 1, so that it is hidden where nothing moves
+INSIDE = 0.99
 GHOST_COLOR, RIGID_COLOR = "#c3cbd2", "#9fb0bf"
 
 
@@ -42,30 +43,30 @@ def animate_mode(
     color: BodyColor = DISPLACEMENT,
     on_frame: OnFrame | None = None,
 ) -> Drawing:
-    """Draw one period of a system mode into a film that begins again where it ends.
+    """Make a film of one period of a system mode, which can be repeated without a jump.
 
     Parameters
     ----------
     system, about
-        The system and the equilibrium (or steady rotation) of which the modes are.
+        The system and the equilibrium (or steady rotation) to which the modes belong.
     modes
-        As `system_modes(linearize(system, about))` returns them.
+        Modes from `system_modes(linearize(system, about))`.
     number
-        Which one, from 1.
+        Number of the mode, from 1.
     path
-        Ends in .gif or .mp4.
+        File whose name ends in .gif or .mp4.
     color
-        `DISPLACEMENT`: how far a point moves, of rigid bodies too; `VON_MISES`: stress of flexible bodies; both by the
-        largest one, since a mode has no size of its own.
+        `DISPLACEMENT`: displacement of all points, also of rigid bodies; `VON_MISES`: stress of flexible bodies. Both
+        are divided by their largest value, because the amplitude of a mode is arbitrary.
     on_frame
-        Called with the number of frames drawn and of all.
+        Called with the number of frames drawn so far and the total number.
 
     Raises
     ------
     ModelError
         If there is no such mode.
     ResultsError
-        If a flexible body has no stress modes for its colour.
+        If `color` needs stress modes that a flexible body does not have.
     """
     phases = 2 * np.pi * np.arange(N_FRAMES) / N_FRAMES
     scene = mode_scene(system, about, modes, number, np.exp(1j * phases), color=color)
@@ -81,7 +82,7 @@ def draw_mode(
     *,
     color: BodyColor = DISPLACEMENT,
 ) -> Drawing:
-    """Draw a system mode at its largest displacement into a picture (.png); else as `animate_mode`."""
+    """Draw a system mode at its largest displacement into a picture (.png); parameters as `animate_mode`."""
     return render_picture(mode_scene(system, about, modes, number, np.ones(1, complex), color=color), path)
 
 
@@ -94,7 +95,7 @@ def mode_scene(
     *,
     color: BodyColor = DISPLACEMENT,
 ) -> Scene:
-    """Return the scene of a mode at phases exp(i phi), (n_frames,) complex; else as `animate_mode`."""
+    """Return the scene of a mode at phases exp(i phi), (n_frames,) complex; parameters as `animate_mode`."""
     n = len(modes.eigenvalues)
     if not 1 <= number <= n:
         raise ModelError(f"mode {number}: expected 1 to {n}, the modes of system {system.name!r}")
@@ -151,7 +152,7 @@ def mode_scene(
 
 
 def drawn_bodies(system: System) -> dict[str, IntArray]:
-    """Return the triangles of each body: its surface, or a box of its inertia."""
+    """Return the triangles of each body: its surface, or the box of its inertia."""
     found = {}
     for body in system.bodies:
         if isinstance(body, FlexibleBody):
@@ -162,7 +163,7 @@ def drawn_bodies(system: System) -> dict[str, IntArray]:
 
 
 def corners_of(system: System, i: int) -> Array:
-    """Return corners of the box of a body in its frame, (8, 3)."""
+    """Return the corners of the box of a body in its frame, (8, 3)."""
     body = system.bodies[i]
     if not isinstance(body, FlexibleBody):
         length = compiled_system(system).length
@@ -174,7 +175,7 @@ def corners_of(system: System, i: int) -> Array:
 
 
 def nodes_at(system: System, i: int, state: State) -> Array:
-    """Return what is drawn of a body in a state, ground axes, (n_nodes, 3)."""
+    """Return the drawn nodes of a body in a state, in ground axes, (n_nodes, 3)."""
     model, body = compiled_system(system).model, system.bodies[i]
     if isinstance(body, FlexibleBody) and len(body.reduced.surface):
         q = state.q[model.bodies.q0[i] : model.bodies.q0[i + 1]]
@@ -185,7 +186,7 @@ def nodes_at(system: System, i: int, state: State) -> Array:
 
 
 def amplitude(system: System, i: int, shape: Array, rest: State) -> Array:
-    """Return the complex displacement of the drawn nodes of a body in a mode, body axes, (n_nodes, 3)."""
+    """Return the complex displacement of the drawn nodes of a body in a mode, in body axes, (n_nodes, 3)."""
     model, body = compiled_system(system).model, system.bodies[i]
     u0 = int(model.bodies.u0[i])
     move, turn, q = shape[u0 : u0 + 3], shape[u0 + 3 : u0 + 6], shape[u0 + 6 : int(model.bodies.u0[i + 1])]
@@ -198,7 +199,7 @@ def amplitude(system: System, i: int, shape: Array, rest: State) -> Array:
 def colors_of(
     system: System, amplitudes: Mapping[str, Array], shape: Array, turns: Array, color: BodyColor
 ) -> dict[str, Array]:
-    """Return the scalars of each body over the frames, (n_frames, n_nodes)."""
+    """Return the scalars of each body in all frames, (n_frames, n_nodes)."""
     if color is DISPLACEMENT:
         return {
             name: np.array([np.linalg.norm(np.real(a * turned), axis=1) for turned in turns])
@@ -214,13 +215,13 @@ def colors_of(
 
 
 def upright(points: Array) -> Array:
-    """Return what is up where there is no gravity, (3,): z, or y where the system is flat in z."""
+    """Return the upward direction without gravity, (3,): z, or y if the system is flat in z."""
     extent = np.ptp(points, axis=0)
     return np.array([0.0, 1.0, 0.0]) if extent[2] < 0.3 * min(extent[:2]) else np.array([0.0, 0.0, 1.0])
 
 
 def frequency_words(modes: SystemModes, number: int, time_unit: float) -> str:
-    """Return frequency and damping of a mode in words."""
+    """Return frequency and damping of a mode as text."""
     f, ratio = float(modes.frequencies[number - 1]) / time_unit, float(modes.damping_ratios[number - 1])
     if f == 0:
         return "a motion that costs nothing" if ratio == 0 else ("decays" if ratio > 0 else "grows")
@@ -229,6 +230,6 @@ def frequency_words(modes: SystemModes, number: int, time_unit: float) -> str:
 
 
 def moving_words(modes: SystemModes, number: int) -> str:
-    """Say which bodies carry the kinetic energy of a mode."""
+    """Return the bodies that carry the kinetic energy of a mode, as text."""
     shares = sorted(zip(modes.bodies, modes.energy_shares[number - 1], strict=True), key=lambda item: -item[1])
     return "moves: " + ", ".join(f"{name} {100 * share:.0f} %" for name, share in shares[:4] if share >= 0.005)

@@ -1,4 +1,4 @@
-"""One figure that shows a computed motion: where the parts go, energies, elastic displacement, loads, errors."""
+"""One figure of a computed motion: positions, energies, elastic displacements, loads, errors."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["plot_deformation", "plot_loads", "plot_overview", "plot_places"]
 
-MOST_CURVES = 8  #: in one plot; of more, those with the largest values are drawn
+MOST_CURVES = 8  #: largest number of curves in a plot; if there are more, those with the largest values are drawn
 
 
 def plot_overview(
@@ -36,9 +36,9 @@ def plot_overview(
     trajectory
         The motion.
     bodies
-        Reduced bodies by name: their interfaces are shown, instead of frame origins and modal coordinates.
+        Reduced bodies, by name; their interfaces are shown instead of frame origins and modal coordinates.
     measurements
-        What sensors measured: a panel for each, and for each unit of its columns.
+        Measurements of sensors, with a panel for each sensor and each unit of its columns.
 
     Raises
     ------
@@ -76,12 +76,12 @@ def plot_overview(
 
 
 def sensor_panel(trajectory: Trajectory, measurement: Measurement, unit: str, ax: "Axes") -> "Axes":
-    """Plot the columns of one unit of a sensor."""
+    """Plot the columns of a sensor that have one unit."""
     return plot_measurement(measurement, ax, unit=unit, time_symbol=trajectory.units.time_symbol)
 
 
 def plot_places(trajectory: Trajectory, bodies: Mapping[str, ReducedBody], ax: "Axes | None" = None) -> "Axes":
-    """Positions in ground axes: interfaces of the given bodies, frame origins of the others; what stays is left out."""
+    """Plot positions in ground axes: interfaces of the given bodies, origins of the others, without those at rest."""
     ax = axes_for(trajectory, ax)
     paths = {}
     for name in trajectory.body_names:
@@ -105,7 +105,7 @@ def plot_places(trajectory: Trajectory, bodies: Mapping[str, ReducedBody], ax: "
 
 
 def plot_deformation(trajectory: Trajectory, bodies: Mapping[str, ReducedBody], ax: "Axes | None" = None) -> "Axes":
-    """Elastic displacement of the interfaces in the body frame, its size; modal coordinates without any body."""
+    """Plot the magnitude of the interface displacements in the body frame; modal coordinates if no body is given."""
     ax, units = axes_for(trajectory, ax), trajectory.units
     if not bodies:
         coordinates = {
@@ -127,7 +127,7 @@ def plot_deformation(trajectory: Trajectory, bodies: Mapping[str, ReducedBody], 
 
 
 def plot_loads(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
-    """Size of the force that each joint and spring-damper carries."""
+    """Plot the magnitude of the force in each joint and spring-damper."""
     ax, names = axes_for(trajectory, ax), trajectory.connection_names
     curves = {name: np.linalg.norm(trajectory.reaction(name).force, axis=1) for name in names}
     draw_largest(ax, trajectory, curves)

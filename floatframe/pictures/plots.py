@@ -1,4 +1,4 @@
-"""Plots of a computed motion: each function draws into the axes it is given, or into a figure of its own."""
+"""Plots of a computed motion; each function draws into given axes, or into a new figure."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -21,12 +21,12 @@ __all__ = [
     "plot_reaction",
 ]
 
-SHOWN = 1e-18  #: least drift on the axis: what is below is rounding of rounding
-FLOOR = 1e-300  #: below which a logarithmic axis shows nothing
+SHOWN = 1e-18  #: least drift shown on the axis; smaller values are rounding errors
+FLOOR = 1e-300  #: lowest value on a logarithmic axis
 
 
 def plot_energies(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
-    """Kinetic, strain, gravity and spring energy, work of forces and dissipation, unless zero; and the total energy."""
+    """Plot kinetic, strain, gravity and spring energy, work and dissipation, unless zero, and the total energy."""
     ax, e = axes_for(trajectory, ax), trajectory.energies
     parts = {"kinetic": e.kinetic, "strain": e.strain, "gravity": e.gravity, "springs": e.springs,
              "work of forces": e.work, "dissipated": e.dissipated}  # fmt: skip
@@ -39,7 +39,7 @@ def plot_energies(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
 
 
 def plot_energy_balance(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
-    """Error of the energy balance over the largest energy that moves about."""
+    """Plot the error of the energy balance, divided by the largest energy in motion."""
     ax = axes_for(trajectory, ax)
     defect = balance_defect(trajectory) / (energy_scale(trajectory) or 1.0)
     ax.plot(trajectory.t, defect, "k", label="total - work + dissipated")
@@ -47,7 +47,7 @@ def plot_energy_balance(trajectory: Trajectory, ax: "Axes | None" = None) -> "Ax
 
 
 def plot_momentum(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
-    """Linear momentum, and angular momentum about the ground origin (right axis), by component."""
+    """Plot components of linear momentum, and of angular momentum about the ground origin (right axis)."""
     ax = axes_for(trajectory, ax)
     units = trajectory.units
     linear = f"{units.mass_symbol} {units.length_symbol}/{units.time_symbol}"
@@ -60,7 +60,7 @@ def plot_momentum(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
 
 
 def plot_positions(trajectory: Trajectory, body: str, ax: "Axes | None" = None) -> "Axes":
-    """Position of a body's frame origin in ground axes, by component."""
+    """Plot the components of the position of a body's frame origin, in ground axes."""
     ax = axes_for(trajectory, ax)
     for axis, values in zip("xyz", trajectory.body(body).r.T, strict=True):
         ax.plot(trajectory.t, values, label=f"{body} {axis}")
@@ -70,7 +70,7 @@ def plot_positions(trajectory: Trajectory, body: str, ax: "Axes | None" = None) 
 def plot_modal_coordinates(
     trajectory: Trajectory, body: str, ax: "Axes | None" = None, *, modes: Sequence[int] | None = None
 ) -> "Axes":
-    """Modal coordinates of a body; `modes`: which, from 0 (all by default)."""
+    """Plot modal coordinates of a body; `modes` are their indices, from 0 (default: all)."""
     ax, units = axes_for(trajectory, ax), trajectory.units
     q = trajectory.body(body).q
     for k in range(q.shape[1]) if modes is None else modes:
@@ -79,7 +79,7 @@ def plot_modal_coordinates(
 
 
 def plot_reaction(trajectory: Trajectory, name: str, ax: "Axes | None" = None) -> "Axes":
-    """Force that a joint or spring-damper exerts on its marker A, by component in ground axes."""
+    """Plot the components of the force that a joint or spring-damper exerts on its marker A, in ground axes."""
     ax = axes_for(trajectory, ax)
     for axis, values in zip("xyz", trajectory.reaction(name).force.T, strict=True):
         ax.plot(trajectory.t, values, label=f"{name} {axis}")
@@ -87,7 +87,7 @@ def plot_reaction(trajectory: Trajectory, name: str, ax: "Axes | None" = None) -
 
 
 def plot_drift(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
-    """How far each joint is from being closed: distance and angle, logarithmic."""
+    """Plot the constraint error of each joint, as distance and angle, on a logarithmic axis."""
     ax, length = axes_for(trajectory, ax), trajectory.units.length_symbol
     for name in trajectory.head.joints:
         drift = trajectory.drift(name)
@@ -102,7 +102,7 @@ def plot_drift(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
 
 
 def axes_for(trajectory: Trajectory, ax: "Axes | None") -> "Axes":
-    """Return the axes, or those of a new figure, with time along x."""
+    """Return the given axes, or those of a new figure, with time along x."""
     if ax is None:
         from matplotlib.figure import Figure
 
@@ -113,7 +113,7 @@ def axes_for(trajectory: Trajectory, ax: "Axes | None") -> "Axes":
 
 
 def labelled(ax: "Axes", label: str) -> "Axes":
-    """Set the label of y, and a legend of the curves."""
+    """Set the label of the y axis, and add a legend of the curves."""
     ax.set_ylabel(label)
     if ax.get_legend_handles_labels()[0]:
         ax.legend(fontsize="small")

@@ -1,4 +1,4 @@
-"""Plots of what sensors measured: one panel a sensor and unit."""
+"""Plots of sensor measurements, with one panel for each sensor and unit."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
 __all__ = ["panels_of", "plot_measurement", "plot_sensors"]
 
-NOTHING = 1e-9  #: of the largest column of a unit, below which a curve would lie on zero
-LEFT_OUT = ("number in the mesh",)  #: units of columns that are no curves
+NOTHING = 1e-9  #: relative to the largest column of a unit; smaller curves would coincide with zero
+LEFT_OUT = ("number in the mesh",)  #: units of columns that are not plotted
 
 
 def panels_of(measurement: Measurement) -> tuple[tuple[str, tuple[str, ...]], ...]:
-    """Return the columns of each panel: a unit, and the names of the columns that have it."""
+    """Return the columns of each panel, as a unit and the names of the columns with this unit."""
     units = dict.fromkeys(measurement.units[name] for name in measurement.columns)
     return tuple(
         (unit, tuple(name for name in measurement.columns if measurement.units[name] == unit))
@@ -32,7 +32,7 @@ def panels_of(measurement: Measurement) -> tuple[tuple[str, tuple[str, ...]], ..
 def plot_measurement(
     measurement: Measurement, ax: "Axes | None" = None, *, unit: str | None = None, time_symbol: str = "s"
 ) -> "Axes":
-    """Plot the columns of one unit (default: the first one) over time."""
+    """Plot the columns of one unit (default: the first unit) over time."""
     if ax is None:
         from matplotlib.figure import Figure
 
@@ -41,7 +41,7 @@ def plot_measurement(
     unit = next(iter(panels)) if unit is None else unit
     columns = panels[unit]
     size = {name: float(np.abs(measurement.columns[name]).max(initial=0.0)) for name in columns}
-    # components that stay zero would only crowd the legend; where all do, the last one says so
+    # components that stay zero would crowd the legend; if all do, the last one is shown
     shown = [name for name in columns if size[name] > NOTHING * max(size.values())] or [columns[-1]]
     for name in columns if len(columns) == 1 else shown:
         is_sum = name.split()[-1] in ("size", "total", "von")
@@ -57,7 +57,7 @@ def plot_measurement(
 
 
 def plot_sensors(measurements: Sequence[Measurement], *, title: str = "", time_symbol: str = "s") -> "Figure":
-    """Return a figure with a panel for every sensor, and for every unit of its columns.
+    """Return a figure with a panel for every sensor and every unit of its columns.
 
     Raises
     ------

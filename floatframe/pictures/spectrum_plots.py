@@ -1,4 +1,4 @@
-"""Plots of spectra: lines, bands, maps over orders or frequencies, responses with coherence."""
+"""Plots of spectra: lines, bands, maps over orders or frequencies, transfer functions with coherence."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 
 __all__ = ["plot_spectra", "plot_spectral_map", "plot_spectrum", "plot_transfer"]
 
-RANGE = 1e-6  #: of the largest value, below which a logarithmic axis ends
-MOST_TICKS = 12  #: of bands by name
+RANGE = 1e-6  #: lower end of a logarithmic axis, relative to the largest value
+MOST_TICKS = 12  #: largest number of labelled bands
 
 
 def axes_of(ax: "Axes | None") -> "Axes":
-    """Return axes, of a new figure where none are given."""
+    """Return the given axes, or those of a new figure."""
     if ax is not None:
         return ax
     from matplotlib.figure import Figure
@@ -55,14 +55,14 @@ def plot_spectrum(spectrum: Spectrum, ax: "Axes | None" = None) -> "Axes":
 
 
 def log_from(ax: "Axes", largest: float) -> None:
-    """Make an axis of values logarithmic over six powers of ten."""
+    """Make the axis of values logarithmic over six powers of ten."""
     if largest > 0:
         ax.set_yscale("log")
         ax.set_ylim(bottom=RANGE * largest)
 
 
 def plot_spectral_map(spectra: SpectralMap, ax: "Axes | None" = None) -> "Axes":
-    """Plot amplitudes as colours over orders or frequencies, and over speed where it is known and goes one way."""
+    """Plot amplitudes as colours over orders or frequencies, and over speed if it is known and monotonic."""
     ax = axes_of(ax)
     speeds = spectra.speeds
     change = np.zeros(0) if speeds is None else np.diff(speeds)
@@ -77,7 +77,7 @@ def plot_spectral_map(spectra: SpectralMap, ax: "Axes | None" = None) -> "Axes":
 
 
 def plot_transfer(transfer: TransferEstimate, ax: "Axes | None" = None) -> "Axes":
-    """Plot the sizes of H1 and H2, and the coherence on an axis of its own."""
+    """Plot the magnitudes of H1 and H2, and the coherence on its own axis."""
     ax = axes_of(ax)
     inside = transfer.frequencies > 0
     f = transfer.frequencies[inside]
@@ -102,7 +102,7 @@ def plot_spectra(spectra: Sequence[Spectrum | SpectralMap | TransferEstimate], *
     Raises
     ------
     ResultsError
-        If there is none.
+        If there is no spectrum.
     """
     from matplotlib.figure import Figure
 

@@ -1,4 +1,4 @@
-"""What stands around a motion in a film: the ground, the direction of view, boxes for rigid bodies."""
+"""The surroundings of a motion in a film: ground, direction of view, boxes of rigid bodies."""
 
 import numpy as np
 
@@ -15,10 +15,10 @@ GRID_COLOR = "#cfd6dc"
 def box_of(
     body: RigidBody | None, half: float, most: float = np.inf, connections: Array | None = None
 ) -> tuple[Array, IntArray]:
-    """Return corners in the body frame, (8, 3), and triangles of the box of the body's inertia; of a cube without.
+    """Return corners, (8, 3) in the body frame, and triangles of the box with the body's inertia, or of a cube.
 
-    Half edges are `most` at most, so that an inertia that stands for more than a box does not fill the picture; but
-    they reach as far as its connections, points in the body frame, (n, 3).
+    Half edges are at most `most`, so that a large inertia does not fill the picture; but the box always reaches the
+    connections, points in the body frame, (n, 3).
 
     A box with half edges a, b, c has I_1 = m/3 (b² + c²) and so on, so that a² = 3/(2m) (I_2 + I_3 - I_1).
     """
@@ -38,20 +38,20 @@ def box_of(
 
 
 def view_axes(points: Array, up: Array) -> tuple[Array, Array]:
-    """Return direction and up, (3,) each: across the plane of the motion, from a little above and from the side."""
+    """Return direction of view and up, (3,) each: across the plane of motion, slightly from above and from the side."""
     up = up / np.linalg.norm(up)
     flat = points - points.mean(axis=0)
     flat = flat - np.outer(flat @ up, up)
     _, vectors = np.linalg.eigh(flat.T @ flat + 1e3 * float((flat**2).sum() + 1e-300) * np.outer(up, up))
     across = vectors[:, 0]
-    side = np.cross(up, across)  # to the right, as the eye sees it
+    side = np.cross(up, across)  # to the right in the picture
     if side[np.argmax(np.abs(side))] < 0:
         across, side = -across, -side
     return -(across + 0.33 * up + 0.3 * side), up
 
 
 def ground_grid(points: Array, up: Array) -> tuple[Lines, float]:
-    """Return a square grid below all points and the distance of its lines [m], a round number."""
+    """Return a square grid below all points, and the spacing of its lines, a round number [m]."""
     heights = points @ up
     first = np.eye(3)[np.argmin(np.abs(up))]
     first = first - (first @ up) * up

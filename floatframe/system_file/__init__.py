@@ -1,1 +1,1 @@
-"""The system file: its tables, and the system it describes."""
+"""Tables of the system file, and how they are turned into a system."""

@@ -36,12 +36,14 @@ FLEXIBLE_KEYS = (*MODE_KEYS, "q", "q_dot")
 
 
 class MassSection(Table):
-    """[[bodies.NAME.masses]]: a small part fixed to a body."""
+    """[[bodies.NAME.masses]]: a small mass fixed to a body."""
 
     mass: Positive = Field(description="a number above 0, the mass of the part")
     interface: Name | None = Field(None, description="the name of an interface of a flexible body")
     position: Vector3 | None = Field(None, description="its centre of mass in a rigid body, [x, y, z]")
-    offset: Vector3 | None = Field(None, description="its centre of mass from the interface, in its axes, [x, y, z]")
+    offset: Vector3 | None = Field(
+        None, description="its centre of mass relative to the interface, in interface axes, [x, y, z]"
+    )
     inertia: Matrix3 | None = Field(None, description="its inertia tensor about its centre of mass, three rows")
 
 
@@ -54,8 +56,10 @@ class BodySection(Table):
     center_of_mass: Vector3 | None = Field(None, description="the centre of mass in the body frame, [x, y, z]")
     inertia_axes: Matrix3 | None = Field(None, description="the axes of the inertia tensor, [x axis, y axis, z axis]")
     inertia_about: Vector3 | None = Field(None, description="the point of the inertia tensor in the body, [x, y, z]")
-    positive_products: bool | None = Field(None, description="true: products of inertia without their minus sign")
-    masses: list[MassSection] = Field([], description="tables [[bodies.NAME.masses]], parts fixed to the body")
+    positive_products: bool | None = Field(
+        None, description="true: products of inertia are given without their minus sign"
+    )
+    masses: list[MassSection] = Field([], description="tables [[bodies.NAME.masses]], masses fixed to the body")
     modes: list[Count] | None = Field(None, description="a list of whole numbers from 0, the modes to keep")
     without_modes: list[Count] | None = Field(
         None, description="a list of whole numbers from 0, the modes to leave out"
@@ -68,11 +72,13 @@ class BodySection(Table):
     omega_B: Vector3 = Field((0.0, 0.0, 0.0), description="the angular velocity in body (mesh) axes, [x, y, z]")  # noqa: N815
     q: Numbers | None = Field(None, description="a list of numbers, the modal coordinates at the start, one a mode")
     q_dot: Numbers | None = Field(None, description="a list of numbers, the rates of the modal coordinates")
-    stiffening: bool | None = Field(None, description="true or false: whether geometric stiffness of the file counts")
-    leave_out_missing: bool | None = Field(
-        None, description="true: move a body whose file lacks inertia terms without them"
+    stiffening: bool | None = Field(
+        None, description="true or false: whether to use the geometric stiffness of the file"
     )
-    shapes: list[ShapeSection] = Field([], description="tables [[bodies.NAME.shapes]], what it looks like")
+    leave_out_missing: bool | None = Field(
+        None, description="true: neglect inertia terms that the file of the body lacks"
+    )
+    shapes: list[ShapeSection] = Field([], description="tables [[bodies.NAME.shapes]], its appearance")
 
     @field_validator("file", mode="before")
     @classmethod
@@ -119,7 +125,7 @@ class BodySection(Table):
 
 
 def body_of(name: str, section: BodySection, files: dict[Any, ReducedBody], units: Units) -> Body:
-    """Return the body of a table; a modal file is read once for all its instances, and converted to the units."""
+    """Return the body of a table, in the given units; a modal file is read once for all its instances."""
     if section.euler_parameters is not None:
         orientation = np.array(section.euler_parameters)
     else:
@@ -132,7 +138,7 @@ def body_of(name: str, section: BodySection, files: dict[Any, ReducedBody], unit
         "shapes": [each.shape for each in section.shapes],
     }
     if section.file is None:
-        assert section.mass is not None  # checked by the table
+        assert section.mass is not None  # ensured by the validation of the table
         return RigidBody(name, **rigid_mass(section).arguments, **motion)
     if section.file not in files:
         try:
@@ -157,8 +163,8 @@ def body_of(name: str, section: BodySection, files: dict[Any, ReducedBody], unit
 
 
 def rigid_mass(section: BodySection) -> MassProperties:
-    """Return the mass properties of a rigid body with the parts fixed to it."""
-    assert section.mass is not None  # checked by the table
+    """Return the mass properties of a rigid body, including the masses fixed to it."""
+    assert section.mass is not None  # ensured by the validation of the table
     own = mass_properties(
         section.mass,
         section.center_of_mass or (0.0, 0.0, 0.0),
@@ -177,7 +183,7 @@ def rigid_mass(section: BodySection) -> MassProperties:
 
 
 def changed_body(section: BodySection, files: dict[Any, ReducedBody]) -> ReducedBody:
-    """Return the reduced body with the modes and parts asked for; instances with the same ones share it."""
+    """Return the reduced body with the requested modes and masses; instances with the same request share it."""
     chosen = [getattr(section, name) for name in MODE_KEYS]
     key = (section.file, repr(chosen), repr(section.masses))
     if key not in files:

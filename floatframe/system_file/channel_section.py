@@ -1,4 +1,4 @@
-"""Tables of the system file for the linearised system: [inputs.NAME], what acts; [outputs.NAME], what is observed."""
+"""Tables of the system file for inputs, [inputs.NAME], and outputs, [outputs.NAME], of the linearised system."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,13 +19,13 @@ from floatframe.system_file.place_key import MeasuredPlace, marker_at
 
 __all__ = ["InputSection", "OutputSection"]
 
-WAYS = {  # keys that go together: the first one tells which way it is
+WAYS = {  # keys that belong together, by the key that identifies the group
     "joint": ("joint", "coordinate"),
     "component": ("component", "body", "position"),
     "sensor": ("sensor", "column"),
     "body": ("body", "marker", "direction", "quantity", "relative_to", "relative_marker"),
 }
-INPUT_TYPES: dict[str, tuple[str, ...]] = {  # type -> keys; the first ones up to "|" are needed
+INPUT_TYPES: dict[str, tuple[str, ...]] = {  # type -> keys; those before "|" are required
     "base": ("|", "direction", "quantity", "about", "joints", "measure"),
     "drive": ("joint", "coordinate", "|", "measure"),
     "parameter": ("force", "parameter", "|"),
@@ -49,7 +49,7 @@ class ChannelSection(Table):
     coordinate: str | None = Field(None, description="a coordinate of the joint")
 
     def way(self) -> str:
-        """Return which of `WAYS` the keys belong to; ValueError if they do not go together."""
+        """Return the group of `WAYS` to which the keys belong; `ValueError` if they are of different groups."""
         way = next((key for key in WAYS if getattr(self, key, None) is not None), None)
         if way is None:
             raise ValueError("expected body (with marker and direction), or joint and coordinate")
@@ -72,7 +72,7 @@ class ChannelSection(Table):
 
 
 class InputSection(ChannelSection):
-    """[inputs.NAME]: a force or torque; with type a motion of a base or drive, a parameter, an amplitude."""
+    """[inputs.NAME]: a force or torque; with `type`, a motion of the base or a drive, a parameter or an amplitude."""
 
     type: choice("type of input", lambda: tuple(INPUT_TYPES)) | None = Field(  # type: ignore[valid-type]
         None, description=f"one of {', '.join(INPUT_TYPES)}; without: a force or torque"
@@ -80,7 +80,7 @@ class InputSection(ChannelSection):
     measure: choice("measure", lambda: RATES) | None = Field(  # type: ignore[valid-type]
         None, description=f"of a base or drive, one of {', '.join(RATES)}; default: {RATES[2]}"
     )
-    about: Vector3 | None = Field(None, description="a point of the axis about which a base turns, [x, y, z]")
+    about: Vector3 | None = Field(None, description="a point on the axis about which a base rotates, [x, y, z]")
     joints: list[str] | None = Field(None, description="joints and forces whose ground side moves; default: all")
     force: str | None = Field(None, description="the name of a force")
     parameter: str | None = Field(None, description="a parameter of its expressions")
@@ -118,7 +118,7 @@ class InputSection(ChannelSection):
 
 
 class OutputSection(ChannelSection):
-    """[outputs.NAME]: a sensor or a column of one, a motion of a place or joint coordinate, or a stress."""
+    """[outputs.NAME]: a sensor or one of its columns, a motion of a point or joint coordinate, or a stress."""
 
     measure: choice("measure", lambda: RATES) = Field(  # type: ignore[valid-type]
         RATES[0], description=f"one of {', '.join(RATES)}"

@@ -1,4 +1,4 @@
-"""Coordinates of joints or between markers in the system file."""
+"""Tables of the system file for coordinates of joints or between markers."""
 
 from typing import Annotated, Any
 
@@ -18,7 +18,7 @@ COORDINATES = {"axial-distance": AxialDistance, "axial-angle": AxialAngle, "poin
 
 
 def marker_of(body: str, place: str | Address | tuple[float, float, float] | None, triad: Any = None) -> Marker:
-    """Return a marker by interface, node or position; rows of the triad in the file are its axes."""
+    """Return a marker at an interface, node or position; the rows of the triad are its axes."""
     axes = None if triad is None else np.array(triad).T
     if isinstance(place, Address):
         return Marker(body, node=place.node, triad=axes)
@@ -28,7 +28,7 @@ def marker_of(body: str, place: str | Address | tuple[float, float, float] | Non
 
 
 class CoordinateSection(Table):
-    """A coordinate: of a joint, or between markers on two bodies."""
+    """A coordinate of a joint, or between markers on two bodies."""
 
     joint: Name | None = Field(None, description="the name of a joint")
     coordinate: Name | None = Field(None, description="a coordinate of the joint")
@@ -71,9 +71,9 @@ class CoordinateSection(Table):
     def found(self) -> Coordinate:
         """Return the coordinate of the table."""
         if self.joint is not None:
-            assert self.coordinate is not None  # checked by the table
+            assert self.coordinate is not None  # ensured by the validation of the table
             return JointCoordinate(self.joint, self.coordinate)
-        assert self.body_a is not None  # checked by the table
+        assert self.body_a is not None  # ensured by the validation of the table
         assert self.body_b is not None
         a = marker_of(self.body_a, self.marker_a, self.triad_a)
         b = marker_of(self.body_b, self.marker_b, self.triad_b)

@@ -12,7 +12,7 @@ __all__ = ["CosimulationSection", "FmuSection", "ForeignSection"]
 
 
 class FmuSection(Table):
-    """[fmu]: inputs, outputs and parameters of the FMU that `floatframe fmu` writes."""
+    """[fmu]: the inputs, outputs and parameters of the FMU that `floatframe fmu` writes."""
 
     inputs: list[Name] | None = Field(
         None, description="names of inputs, such as forces.NAME.amplitude, joints.NAME.angle, or a table [inputs.NAME]"
@@ -22,7 +22,7 @@ class FmuSection(Table):
 
 
 class ForeignSection(Table):
-    """[fmus.NAME]: an FMU of another program that acts beside the system."""
+    """[fmus.NAME]: an FMU of another program that is coupled to the system."""
 
     file: Name = Field(description="the path of the FMU, relative to this file")
     inputs: dict[str, Name] = Field({}, description='sensors by input of the FMU, such as {phi = "hinge.angle"}')
@@ -37,15 +37,15 @@ class ForeignSection(Table):
 
 
 class CosimulationSection(Table):
-    """[cosimulation]: how the system and its units take their steps together."""
+    """[cosimulation]: how the system and its FMUs are stepped together."""
 
     step: Positive | None = Field(None, description="a number above 0, the macro-step, a multiple of run.h")
     scheme: choice("scheme", lambda: SCHEMES) = Field(  # type: ignore[valid-type]
         SCHEMES[0], description=f"one of {', '.join(SCHEMES)}"
     )
-    tolerance: float = Field(1e-9, gt=0, lt=1, description="a number between 0 and 1, of the iteration")
+    tolerance: float = Field(1e-9, gt=0, lt=1, description="a number between 0 and 1, the tolerance of the iteration")
     max_iterations: int = Field(50, ge=2, description="a whole number, 2 or more, the most rounds of the iteration")
 
     def coupling(self) -> Coupling:
-        """Return what the table asks for."""
+        """Return the coupling that the table describes."""
         return Coupling(self.step, self.scheme, self.tolerance, self.max_iterations)

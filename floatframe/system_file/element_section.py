@@ -1,4 +1,4 @@
-"""Tables of the system file for public elements: [elements.NAME], with the fields of their class as keys."""
+"""Tables of the system file for public elements, [elements.NAME], whose keys are the fields of the element class."""
 
 import types
 from collections.abc import Mapping, Sequence
@@ -27,7 +27,7 @@ __all__ = ["TableReader", "element_of"]
 
 
 class MarkerSection(Table):
-    """A marker of an element: a table."""
+    """A table that describes a marker of an element."""
 
     body: Name = Field(description='the name of a body, or "ground"')
     marker: PlaceOnBody | None = Field(None, description="an interface, or a position [x, y, z] in the body")
@@ -36,12 +36,12 @@ class MarkerSection(Table):
 
 @dataclass(frozen=True, eq=False)
 class TableReader:
-    """Reads what stands in the table of an element; every error names the key."""
+    """Reads the values in the table of an element; every error message names the key."""
 
     where: str  #: key path of the table
-    folder: Path  #: of the system file
-    signals: Mapping[str, SignalFunction] | None = None  #: of the file, by name
-    files: list[str] = field(default_factory=list)  #: those that were read, to which each path is added
+    folder: Path  #: folder of the system file
+    signals: Mapping[str, SignalFunction] | None = None  #: signals of the system file, by name
+    files: list[str] = field(default_factory=list)  #: paths of the files that were read; each call appends to it
 
     def marker(self, value: Any, key: str = "marker") -> Marker:
         """Return the marker of {body = "wheel", marker = "hub", triad = [...]}."""
@@ -49,12 +49,12 @@ class TableReader:
         return marker_of(section.body, section.marker, section.triad)
 
     def function(self, value: Any, key: str = "function") -> TimeFunction:
-        """Return the function of a table such as those of motions, {type = "table", t = [...], values = [...]}."""
+        """Return the function of a table as for motions, {type = "table", t = [...], values = [...]}."""
         section = self.table(MotionSection, value, key, "the table of a function, such as {type = ..., ...}")
         return section.function(self.signals)
 
     def path(self, value: Any, key: str = "file") -> Path:
-        """Return the path of a file that exists, given relative to the system file."""
+        """Return the path of an existing file, which is given relative to the system file."""
         if not isinstance(value, str) or not value:
             raise ModelError(f"{self.where}.{key}: expected the path of a file, got {quoted(value)}")
         path = self.folder / value
@@ -64,7 +64,7 @@ class TableReader:
         return path
 
     def table(self, model: Any, value: Any, key: str, expected: str) -> Any:
-        """Return a table checked against a pydantic model."""
+        """Return a table validated with a pydantic model."""
         if not isinstance(value, dict):
             raise ModelError(f"{self.where}.{key}: expected a table {expected}, got {quoted(value)}")
         try:
@@ -77,7 +77,7 @@ class TableReader:
             raise ModelError(f"{self.where}.{key}: {'; '.join(told)}; expected a table {expected}") from None
 
     def value(self, kind: Any, value: Any, key: str) -> Any:
-        """Return a value of the file as the annotation of a field says."""
+        """Return a value converted to the type of a field."""
         origin, within = get_origin(kind), get_args(kind)
         if origin in (Union, types.UnionType):
             return self.value_of_union(within, value, key)
@@ -111,7 +111,7 @@ class TableReader:
         return value
 
     def value_of_union(self, kinds: Sequence[Any], value: Any, key: str) -> Any:
-        """Return a value as the first of some annotations says that fits."""
+        """Return a value converted to the first of several types that accepts it."""
         problems = []
         for kind in kinds:
             if kind is type(None):
@@ -123,7 +123,7 @@ class TableReader:
         raise problems[0]
 
     def list_of(self, kinds: Sequence[Any], value: Any, key: str) -> Any:
-        """Return a list as a tuple of values of one kind, or of one kind each."""
+        """Return a list as a tuple whose entries have one type, or one type each."""
         if not isinstance(value, list):
             raise ModelError(f"{self.where}.{key}: expected a list, got {quoted(value)}")
         own = [kind for kind in kinds if kind is not Ellipsis]
@@ -136,7 +136,7 @@ class TableReader:
         )
 
     def numbers(self, value: Any, key: str) -> Any:
-        """Return numbers of any shape as an array."""
+        """Return numbers of any shape, (...), as an array."""
         try:
             array = np.array(value, dtype=float)
         except (TypeError, ValueError):
@@ -146,7 +146,7 @@ class TableReader:
         return array
 
     def fields_of(self, kind: Any, table: Mapping[str, Any], **given: Any) -> Any:
-        """Return a dataclass whose fields are the keys of a table; `given`: fields that are not."""
+        """Return a dataclass whose fields are the keys of a table; fields without a key are passed as `given`."""
         own = {each.name: each for each in fields(kind) if each.init and each.name not in given}
         hints = get_type_hints(kind)
         for key in table:
@@ -169,7 +169,7 @@ WORDS: dict[Any, str] = {float: "a number", int: "a whole number", bool: "true o
 
 
 def words_of(kind: Any) -> str:
-    """Return what a key of an annotation is, in words."""
+    """Return the description of a value of a type, for messages."""
     if kind in WORDS:
         return WORDS[kind]
     if kind is Marker:
@@ -188,14 +188,14 @@ def element_of(
     signals: Mapping[str, SignalFunction] | None = None,
     files: list[str] | None = None,
 ) -> Element:
-    """Return the element of a table [elements.NAME]; the paths of files it reads are added to `files`.
+    """Return the element of a table [elements.NAME]; the paths of the files that it reads are appended to `files`.
 
-    A class with `from_table(name, table, read)` reads its table itself, `read` being a `TableReader`.
+    A class with a method `from_table(name, table, read)` reads its table itself; `read` is a `TableReader`.
 
     Raises
     ------
     ModelError
-        With the key path, if a value is missing or wrong.
+        If a value is missing or wrong; the message names the key path.
     """
     where = f"elements.{name}"
     kind = table.get("type")

@@ -58,7 +58,7 @@ KEYS_OF_FORCES = {
 }  # fmt: skip
 
 
-Signals = Mapping[str, SignalFunction] | None  #: of a file, by name
+Signals = Mapping[str, SignalFunction] | None  #: signals of a system file, by name
 
 
 class ForceSection(Table):
@@ -89,8 +89,12 @@ class ForceSection(Table):
     motor: MotionSection | None = Field(None, description="a table, the force as a function of time")
     characteristic: MotionSection | None = Field(None, description="a table, the force as a function of the elongation")
     friction: NotNegative | None = Field(None, description="a number, 0 or more, Coulomb friction")
-    friction_coefficient: NotNegative | None = Field(None, description="a number, 0 or more, friction by normal force")
-    friction_speed: Positive | None = Field(None, description="a number above 0, the speed of full friction")
+    friction_coefficient: NotNegative | None = Field(
+        None, description="a number, 0 or more, ratio of friction to normal force"
+    )
+    friction_speed: Positive | None = Field(
+        None, description="a number above 0, the speed at which friction is fully developed"
+    )
     triad_a: Matrix3 | None = Field(None, description="the axes of marker_a, [x axis, y axis, z axis]")
     triad_b: Matrix3 | None = Field(None, description="the axes of marker_b, [x axis, y axis, z axis]")
     characteristics: dict[str, MotionSection] | None = Field(
@@ -146,11 +150,11 @@ class ForceSection(Table):
 
 
 def bushing_of(name: str, section: ForceSection) -> Bushing:
-    """Return the bushing of a table; a body without a marker is met where the other marker is placed."""
+    """Return the bushing of a table; a body without a marker is attached at the position of the other marker."""
     ends: list[Place] = []
     for body, place, triad in ((section.body_a, section.marker_a, section.triad_a),
                                (section.body_b, section.marker_b, section.triad_b)):  # fmt: skip
-        assert body is not None  # checked by the table
+        assert body is not None  # ensured by the validation of the table
         ends.append(body if place is None and triad is None else marker_of(body, place, triad))
     given = {"stiffness": section.stiffness, "damping": section.damping, "preload": section.preload}
     options = {key: np.array(value) for key, value in given.items() if value is not None}
@@ -160,7 +164,7 @@ def bushing_of(name: str, section: ForceSection) -> Bushing:
 
 def contact_of(name: str, section: ForceSection) -> SphereContact:
     """Return the contact of a table."""
-    assert section.body_a is not None  # checked by the table
+    assert section.body_a is not None  # ensured by the validation of the table
     assert section.body_b is not None
     a = marker_of(section.body_a, section.marker_a, section.triad_a)
     b = marker_of(section.body_b, section.marker_b)
@@ -183,7 +187,7 @@ def user_force_of(name: str, section: ForceSection, signals: Signals = None) -> 
 
 
 def force_of(name: str, section: ForceSection, signals: Signals = None) -> Force:
-    """Return the force of a table; `signals`: those of the file by name."""
+    """Return the force of a table; `signals` are those of the system file, by name."""
     if section.motor is not None:
         require_quantity(f"forces.{name}.motor", section.motor, signals, ("force", "moment", "number"))
     laws = {"characteristic": section.characteristic} | {
@@ -204,7 +208,7 @@ def force_of(name: str, section: ForceSection, signals: Signals = None) -> Force
     if section.type == "user-force":
         return user_force_of(name, section, signals)
     if section.type == "body-load":
-        assert section.body is not None  # checked by the table
+        assert section.body is not None  # ensured by the validation of the table
         assert section.load_case is not None
         return BodyLoad(name, section.body, section.load_case, functions["amplitude"] or 1.0)
     if section.type == "joint-force":
@@ -215,7 +219,7 @@ def force_of(name: str, section: ForceSection, signals: Signals = None) -> Force
         }
         return JointForce(name, **options)
     if section.type == "point-force":
-        assert section.body is not None  # checked by the table
+        assert section.body is not None  # ensured by the validation of the table
         marker = marker_of(section.body, section.marker, section.triad)
         zero = (0.0, 0.0, 0.0)
         return PointForce(
@@ -226,10 +230,11 @@ def force_of(name: str, section: ForceSection, signals: Signals = None) -> Force
             bool(section.is_follower),
             functions["amplitude"],
         )
-    assert section.body_a is not None  # checked by the table
+    assert section.body_a is not None  # ensured by the validation of the table
     assert section.body_b is not None
     given = [each or 0.0 for each in (section.stiffness, section.damping, section.preload)]
-    stiffness, damping, preload = (each for each in given if isinstance(each, float))  # no lists: the table checks
+    # the validation of the table excludes lists
+    stiffness, damping, preload = (each for each in given if isinstance(each, float))
     return SpringDamper(
         name,
         marker_of(section.body_a, section.marker_a),

@@ -45,8 +45,10 @@ class JointSection(Table):
     distance: Positive | None = Field(None, description="a number above 0, the length of a rod; default: as placed")
     radius: Positive | None = Field(None, description="a number above 0, the radius of a rolling disc")
     line: list[Name] | None = Field(None, description="the names of further interfaces along the line of marker_a")
-    is_aligned: bool | None = Field(None, description="true or false: marker_b turns with the line")
-    normal: Vector3 | None = Field(None, description="a direction across the line, axes of body_a, [x, y, z]")
+    is_aligned: bool | None = Field(None, description="true or false: whether marker_b rotates with the line")
+    normal: Vector3 | None = Field(
+        None, description="a direction perpendicular to the line, in axes of body_a, [x, y, z]"
+    )
     motions: dict[str, MotionSection] | None = Field(
         None, description="tables [joints.NAME.motions.COORDINATE], functions of time"
     )
@@ -91,14 +93,16 @@ class TermSection(CoordinateSection):
 
 
 class LimitsSection(Table):
-    """[couplers.NAME.limits]: stops of a sum of coordinates."""
+    """[couplers.NAME.limits]: stops of a linear combination of coordinates."""
 
     lower: float | None = Field(None, description="a number in the unit of the sum")
     upper: float | None = Field(None, description="a number in the unit of the sum")
-    restitution: Annotated[float, Field(ge=0, le=1)] = Field(0.0, description="a number from 0 to 1, Newton's")
+    restitution: Annotated[float, Field(ge=0, le=1)] = Field(
+        0.0, description="a number from 0 to 1, Newton's coefficient of restitution"
+    )
 
     def found(self) -> Limits:
-        """Return the limits."""
+        """Return the limits of the table."""
         return Limits(self.lower, self.upper, self.restitution)
 
 
@@ -114,7 +118,7 @@ class CouplerSection(Table):
 
 
 def joint_of(name: str, section: JointSection, signals: Mapping[str, SignalFunction] | None = None) -> Joint:
-    """Return the joint of a table; an end without marker lies where the other end is placed."""
+    """Return the joint of a table; a marker without a place is put where the other marker is."""
     ends: list[Place] = []
     for body, place, triad in (
         (section.body_a, section.marker_a, section.triad_a),

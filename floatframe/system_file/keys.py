@@ -1,4 +1,4 @@
-"""Numbers and names as tables of the system file take them."""
+"""Types of numbers and names in the tables of the system file."""
 
 from typing import Annotated, Any
 
@@ -32,7 +32,7 @@ Count = Annotated[int, Field(ge=0)]
 
 
 def four_numbers(value: Any) -> tuple[float, ...]:
-    """Return Euler parameters."""
+    """Return four numbers, the Euler parameters."""
     try:
         return (*numbers(value[:3]), *numbers([value[3], 0.0, 0.0])[:1]) if len(value) == 4 else numbers(None)
     except (ValueError, TypeError):
@@ -40,7 +40,7 @@ def four_numbers(value: Any) -> tuple[float, ...]:
 
 
 def number_or_six(value: Any) -> Any:
-    """Return a number, or for a bushing six numbers or six rows of them."""
+    """Return a number; for a bushing also six numbers, or six rows of six."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         return float(value)
     try:
@@ -53,7 +53,7 @@ def number_or_six(value: Any) -> Any:
 
 
 def not_negative_or_six(value: Any) -> Any:
-    """Return the same, a single number not below zero."""
+    """Return the result of `number_or_six`; a single number must not be below zero."""
     result = number_or_six(value)
     if isinstance(result, float) and result < 0:
         raise ValueError("expected a number, 0 or more; for a bushing six numbers, or six rows of six numbers")
@@ -73,7 +73,7 @@ Number = Annotated[float, Field(allow_inf_nan=False)]
 
 
 def list_of_numbers(value: Any) -> Any:
-    """Return a list of the file as a tuple, which then is checked."""
+    """Return a list of the file as a tuple, which is validated afterwards."""
     return tuple(value) if isinstance(value, list) else value
 
 

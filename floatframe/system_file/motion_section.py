@@ -29,7 +29,7 @@ __all__ = ["TIME_FUNCTIONS", "MotionSection", "require_quantity"]
 
 
 def measured_signal(signal: TimeFunction, factor: float = 1.0) -> TimeFunction:
-    """Return a measured signal times a factor."""
+    """Return a measured signal multiplied by a factor."""
     pieces = signal.pieces.copy()
     pieces[:, :7] *= factor
     return replace(signal, pieces=pieces)
@@ -52,15 +52,15 @@ TIME_FUNCTIONS: dict[str, Callable[..., TimeFunction]] = {
 
 
 class MotionSection(Table):
-    """A function of time by its type; the other keys are the parameters of that type."""
+    """A function of time of a given type; the other keys are the parameters of that type."""
 
     type: choice("type of motion", lambda: tuple(TIME_FUNCTIONS)) = Field(  # type: ignore[valid-type]
         description=f"one of {', '.join(TIME_FUNCTIONS)}"
     )
     value: Number | None = Field(None, description="a number, the constant value")
-    coefficients: Numbers | None = Field(None, description="a list of numbers, of 1, t, t² and so on")
+    coefficients: Numbers | None = Field(None, description="a list of numbers, the coefficients of 1, t, t² and so on")
     amplitude: Number | None = Field(None, description="a number, the amplitude")
-    omega: Number | None = Field(None, description="a number, the angular frequency or speed in rad over time")
+    omega: Number | None = Field(None, description="a number, the angular frequency or speed in rad per unit of time")
     phase: Number | None = Field(None, description="a number, the phase in rad; default 0")
     offset: Number | None = Field(None, description="a number, the mean value; default 0")
     t_start: Number | None = Field(None, description="a number, the time where the step begins")
@@ -74,7 +74,7 @@ class MotionSection(Table):
     speed: Number | None = Field(None, description="a number above 0, the largest speed")
     acceleration: Number | None = Field(None, description="a number above 0, the largest acceleration")
     deceleration: Number | None = Field(None, description="a number above 0; default: as the acceleration")
-    degree: int | None = Field(None, description="3 or 5, of the spline; default 3")
+    degree: int | None = Field(None, description="3 or 5, the degree of the spline; default 3")
     duration: Number | None = Field(None, description="a number above 0, the duration of the motion")
     t: Numbers | None = Field(None, description="a list of rising times; piecewise: where each piece begins")
     values: Numbers | None = Field(None, description="a list of values, one for each time")
@@ -98,7 +98,7 @@ class MotionSection(Table):
         for key, parameter in allowed.items():
             if parameter.default is parameter.empty and getattr(self, key) is None:
                 raise ValueError(f"{key}: missing; expected {type(self).model_fields[key].description}")
-        if any(True for _ in self.signals()):  # known when all of the file is
+        if any(True for _ in self.signals()):  # signals are resolved once the whole file is read
             return self
         try:
             self.function()
@@ -107,14 +107,14 @@ class MotionSection(Table):
         return self
 
     def signals(self) -> Iterator[str]:
-        """Yield the names of the signals it is made of, those of its pieces too."""
+        """Yield the names of the signals that the function contains, including those in its pieces."""
         if self.signal is not None:
             yield self.signal
         for piece in self.pieces or ():
             yield from piece.signals()
 
     def function(self, signals: Mapping[str, SignalFunction] | None = None) -> TimeFunction:
-        """Return the function of the table; `signals`: those of the file by name."""
+        """Return the function of the table; `signals` are those of the system file, by name."""
         make = TIME_FUNCTIONS[self.type]
         given: dict[str, Any] = {key: getattr(self, key) for key in signature(make).parameters}
         if self.pieces is not None:
@@ -127,7 +127,7 @@ class MotionSection(Table):
 def require_quantity(
     where: str, section: MotionSection, signals: Mapping[str, SignalFunction] | None, expected: tuple[str, ...]
 ) -> None:
-    """Raise `SignalError` if a table takes a signal that measures something else than is expected there."""
+    """Raise `SignalError` if a table uses a signal of another quantity than expected."""
     for name in section.signals():
         found = function_named(name, signals or {}).quantity
         if found not in expected:

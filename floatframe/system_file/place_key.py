@@ -1,4 +1,4 @@
-"""A place on a body as a key of the system file: an interface, a position, or a node, element or set of its mesh."""
+"""Keys of the system file for a place on a body: an interface, a position, or a node, element or set of its mesh."""
 
 from typing import Annotated, Any
 
@@ -13,20 +13,22 @@ from floatframe.bodies.markers import Marker
 
 __all__ = ["TOLERANCE_WORDS", "MeasuredPlace", "MeshNumber", "NodeOrPosition", "PlaceOnBody", "address_at", "marker_at"]
 
-TOLERANCE_WORDS = f"how far a node may be from a position, of the size of the body; default: {TOLERANCE:g}"
+TOLERANCE_WORDS = (
+    f"largest distance of a node from a position, relative to the size of the body; default: {TOLERANCE:g}"
+)
 EXPECTED = 'the name of an interface ("big_end"), a position [x, y, z] in the body'
 Position = tuple[float, float, float]
 
 
 def mesh_number(value: Any) -> Any:
-    """Return a number of the user's mesh, or "INSTANCE.number"."""
+    """Return a number in the user's mesh, or "INSTANCE.number"."""
     if isinstance(value, bool) or not isinstance(value, int | str) or value == "":
         raise ValueError('expected a whole number of the mesh, or text "INSTANCE.number"')
     return value
 
 
 def place_on_body(value: Any) -> Any:
-    """Return the name of an interface, a position as three numbers, or the address of {node = 12}."""
+    """Return the name of an interface, a position as three numbers, or the address for {node = 12}."""
     if isinstance(value, str) and value:
         return value
     if isinstance(value, dict) and list(value) == ["node"]:
@@ -41,14 +43,14 @@ def place_on_body(value: Any) -> Any:
 
 
 def measured_place(value: Any) -> Any:
-    """Return the name of an interface, a position as three numbers, or the address of {node = 12}."""
+    """Return the name of an interface, a position as three numbers, or the address for {node = 12}."""
     if isinstance(value, str) and value:
         return value
     return node_or_position(value, f"{EXPECTED}, or a table such as {{node = 12}}")
 
 
 def node_or_position(value: Any, expected: str = "a position [x, y, z] in the body, or {node = 12}") -> Any:
-    """Return a position as three numbers, or the address of {node = 12}, {element = 4711}, {set = "HOTSPOT"}."""
+    """Return a position as three numbers, or the address for {node = 12}, {element = 4711}, {set = "HOTSPOT"}."""
     if isinstance(value, dict):
         return address_of_table(value)
     try:
@@ -58,7 +60,7 @@ def node_or_position(value: Any, expected: str = "a position [x, y, z] in the bo
 
 
 def address_of_table(table: dict[str, Any]) -> Address:
-    """Return the address of {node = 12}, {element = 4711}, {set = "HOTSPOT"} or {position = [...], tolerance = 0.1}."""
+    """Return the address for {node = 12}, {element = 4711}, {set = "HOTSPOT"}, {position = [...], tolerance = 0.1}."""
     keys = (*KINDS_OF_ADDRESS, "tolerance")
     for key in table:
         if key not in keys:
@@ -80,18 +82,18 @@ def address_of_table(table: dict[str, Any]) -> Address:
 
 
 MeshNumber = Annotated[int | str, BeforeValidator(mesh_number)]
-PlaceOnBody = Annotated[Any, BeforeValidator(place_on_body)]  #: of joints and forces: str, Position, or node
-MeasuredPlace = Annotated[Any, BeforeValidator(measured_place)]  #: of sensors: str, Position or Address
-NodeOrPosition = Annotated[Any, BeforeValidator(node_or_position)]  #: Position or Address
+PlaceOnBody = Annotated[Any, BeforeValidator(place_on_body)]  #: of joints and forces: `str`, `Position` or node
+MeasuredPlace = Annotated[Any, BeforeValidator(measured_place)]  #: of sensors: `str`, `Position` or `Address`
+NodeOrPosition = Annotated[Any, BeforeValidator(node_or_position)]  #: `Position` or `Address`
 
 
 def address_at(place: Any, tolerance: float) -> Address:
-    """Return the address of a position; an address as it is."""
+    """Return the address of a position; an address is returned unchanged."""
     return place if isinstance(place, Address) else Address(position=place, tolerance=tolerance)
 
 
 def marker_at(body: str, place: str | Position | Address | None, tolerance: float = TOLERANCE) -> Marker:
-    """Return a marker by interface, position, node, element or set."""
+    """Return a marker at an interface, position, node, element or set."""
     if isinstance(place, str):
         return Marker(body, place)
     if isinstance(place, Address):

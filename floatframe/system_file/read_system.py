@@ -1,11 +1,11 @@
-"""The system file: what `floatframe run` reads (docs/system_file.md).
+"""Reading of the system file, as `floatframe run` does it (docs/system_file.md).
 
     system, run = read_system("swing.toml")
     trajectory = integrate(system, run.integrator, run.t_end, run.h, output="swing.h5", output_every=run.output_every,
                            progress=callback)          # callback(Progress(t, t_end, n_steps, n_total, n_iterations))
     trajectory = read_results("swing.h5")
 
-All of them raise `FloatframeError`, whose text is one message for the user.
+All of them raise `FloatframeError`, whose text is a message for the user.
 """
 
 import logging
@@ -52,7 +52,7 @@ log = logging.getLogger(__name__)
 
 
 class SystemSection(Table):
-    """[system]: name, units, gravity."""
+    """[system]: name, units and gravity of the system."""
 
     name: Name | None = Field(None, description="the name of the system, text; default: the name of the file")
     units: choice("unit system", lambda: tuple(UNIT_SYSTEMS)) = Field(  # type: ignore[valid-type]
@@ -81,7 +81,7 @@ class SystemFile(Table):
     fmu: FmuSection | None = Field(None, description="a table [fmu] with inputs, outputs and parameters")
     fmus: dict[str, ForeignSection] = Field({}, description="tables [fmus.NAME]")
     cosimulation: CosimulationSection | None = Field(None, description="a table [cosimulation] with step and scheme")
-    scene: list[ShapeSection] = Field([], description="tables [[scene]], what stands around: ground, road, track")
+    scene: list[ShapeSection] = Field([], description="tables [[scene]], the surroundings: ground, road, track")
     run: RunSection | None = Field(None, description="a table [run] with t_end and h")
 
     @model_validator(mode="after")
@@ -108,19 +108,20 @@ class SystemFile(Table):
 def read_system(
     path: str | os.PathLike[str], changes: Mapping[str, Any] | None = None
 ) -> tuple[System, RunOptions | None]:
-    """Read and check a system file and the modal files it names; return the system, and its run if it has [run].
+    """Read and validate a system file and its modal files; return the system and, if there is a table [run], its run.
 
     Parameters
     ----------
     path
-        The file.
+        The system file.
     changes
-        Values that take the place of those in the file, by key path: {"bodies.rod.mass": 2.0}.
+        Values that replace those in the file, by key path, such as {"bodies.rod.mass": 2.0}.
 
     Raises
     ------
     SystemFileError
-        With every problem: key path, value, what was expected, choices and the nearest name.
+        If the file is not valid. The message lists every problem, with key path, value, expected value and nearest
+        name.
     """
     path = Path(path)
     content = changed(read_toml(path, SystemFileError), changes or {}, str(path), SystemFileError)
@@ -151,7 +152,7 @@ def read_system(
             source=str(path.resolve()),
             data_files=tuple(dict.fromkeys([*(str(each.file) for each in data.signals.values()), *element_files])),
         )  # fmt: skip
-        _ = compiled_system(system)  # markers and interfaces are looked up here
+        _ = compiled_system(system)  # looks up all markers and interfaces
         require_events(system)
         for signal in signals.values():
             if signal.notes:

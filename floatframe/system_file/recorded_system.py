@@ -1,4 +1,4 @@
-"""The system of a motion, read again from the system file that its results name."""
+"""The system of a recorded motion, read again from the system file that its results name."""
 
 import logging
 from pathlib import Path
@@ -15,16 +15,16 @@ log = logging.getLogger(__name__)
 
 
 def recorded_system(trajectory: Trajectory, path: str | Path | None = None) -> System | None:
-    """Return the system of a motion: from the file its results name, or from another path; None if there is no file.
+    """Return the system of a motion, from the file that its results name or another path; None if there is no file.
 
-    Sensors and names may have been added since the run; bodies, joints and springs must be the same.
+    Sensors and names may have been added since the run; bodies, joints and springs must be unchanged.
 
     Raises
     ------
     ResultsError
-        If the file describes other bodies or joints.
+        If the file describes other bodies or joints than the results.
     SystemFileError
-        If it is not valid.
+        If the file is not valid.
     """
     from floatframe.system_file.read_system import read_system
 
@@ -35,7 +35,7 @@ def recorded_system(trajectory: Trajectory, path: str | Path | None = None) -> S
     notes = logging.getLogger("floatframe.system_file.read_system")
     level = notes.level
     try:
-        notes.setLevel(logging.ERROR)  # they were told when the motion was computed
+        notes.setLevel(logging.ERROR)  # they were reported when the motion was computed
         system, _ = read_system(source)
     finally:
         notes.setLevel(level)
@@ -50,5 +50,5 @@ def recorded_system(trajectory: Trajectory, path: str | Path | None = None) -> S
                 f"{', '.join(expected) or 'none'}; give the system file of the run"
             )
     if path is None and run.get("system_file_digest", "") not in ("", file_digest(source)):
-        log.warning("%s has changed since the run; sensors are taken from it as it is now", source)
+        log.warning("%s has changed since the run; its present sensors are used", source)
     return system

@@ -1,4 +1,4 @@
-"""The table [run] of a system file: which integrator computes the motion, and how."""
+"""The table [run] of a system file: the integrator of the motion and its options."""
 
 import os
 from dataclasses import dataclass
@@ -22,14 +22,14 @@ from floatframe.relative.formulation import FORMULATIONS
 
 __all__ = ["RunOptions", "RunSection", "formulation_of", "required_run"]
 
-MOST_TIMES = 1e8  #: at which a driven motion is computed
+MOST_TIMES = 1e8  #: largest number of output times of a driven motion
 NOT_OF_A_METHOD = ("t_end", "h", "output_every", "scheme", "formulation", "watch")
-#: schemes that also know joint coordinates
+#: schemes that also work in joint coordinates
 OF_BOTH_FORMULATIONS = (GeneralizedAlpha, hht, newmark, trapezoidal)
 
 
 def keys_of(scheme: str) -> tuple[str, ...]:
-    """Return the keys that the method of that name takes, those of generalized-alpha where it is a case of it."""
+    """Return the keys of the method of that name; a special case of generalized-alpha has its keys too."""
     names = [name for name in signature(INTEGRATORS[scheme]).parameters if name not in ("options", "parameters")]
     if "options" in signature(INTEGRATORS[scheme]).parameters:
         names += [name for name in signature(GeneralizedAlpha).parameters if name not in ("rho_inf", "parameters")]
@@ -37,7 +37,7 @@ def keys_of(scheme: str) -> tuple[str, ...]:
 
 
 class RunSection(Table):
-    """[run]: how the motion is computed."""
+    """[run]: the integrator and its options."""
 
     t_end: Annotated[float, Field(gt=0)] = Field(description="a number above 0, the end time")
     h: Annotated[float, Field(gt=0)] = Field(description="a number above 0, the step size")
@@ -56,8 +56,12 @@ class RunSection(Table):
     alpha: Annotated[float, Field(ge=-1 / 3, le=0)] | None = Field(
         None, description="a number between -1/3 and 0, numerical damping of the scheme hht"
     )
-    beta: Annotated[float, Field(gt=0)] | None = Field(None, description="a number above 0, of the scheme newmark")
-    gamma: Annotated[float, Field(ge=0.5)] | None = Field(None, description="a number, 1/2 or more, of newmark")
+    beta: Annotated[float, Field(gt=0)] | None = Field(
+        None, description="a number above 0, a parameter of the scheme newmark"
+    )
+    gamma: Annotated[float, Field(ge=0.5)] | None = Field(
+        None, description="a number, 1/2 or more, a parameter of the scheme newmark"
+    )
     rtol: Annotated[float, Field(gt=0, lt=1)] | None = Field(
         None, description="a number between 0 and 1, the relative tolerance of the scheme ida"
     )
@@ -71,15 +75,17 @@ class RunSection(Table):
         None, description="a whole number above 0, the most iterations of Newton's method in a step"
     )
     error_tolerance: Annotated[float, Field(gt=0)] | None = Field(
-        None, description="a number above 0, error of a body in a step by the size of its assembly; none: fixed steps"
+        None,
+        description="a number above 0, error of a body in a step over the size of its assembly; none: fixed steps",
     )
     h_min: Annotated[float, Field(gt=0)] | None = Field(
-        None, description="a number above 0, the least step to which one that fails or meets a contact is divided"
+        None,
+        description="a number above 0, the smallest step when one that fails or meets a contact is divided",
     )
 
     watch: choice("watch", lambda: WATCHES) = Field(  # type: ignore[valid-type]
         "stop",
-        description="stop, tell or off: what a run does whose steps put its motion off or add energy to it",
+        description="stop, tell or off: what a run does if its steps distort the motion or add energy to it",
     )
 
     @model_validator(mode="after")
@@ -93,7 +99,7 @@ class RunSection(Table):
         return self
 
     def options(self) -> "RunOptions":
-        """Return what the table asks for."""
+        """Return the options that the table describes."""
         parameters: dict[str, Any] = {
             key: getattr(self, key) for key in keys_of(self.scheme) if getattr(self, key, None) is not None
         }
@@ -103,28 +109,28 @@ class RunSection(Table):
 
 @dataclass(frozen=True)
 class RunOptions:
-    """What the table [run] asks for."""
+    """The options in the table [run]."""
 
     t_end: float
     h: float
     output_every: int
     integrator: Integrator
-    coupling: Coupling | None = None  #: of units of other programs; None: explicit, in steps of h
-    watch: str = "stop"  #: what a run does whose steps put its motion off, see `integrate`
+    coupling: Coupling | None = None  #: coupling to FMUs of other programs; None: explicit, in steps of h
+    watch: str = "stop"  #: what a run does if its steps distort the motion, see `integrate`
 
     def output_times(self) -> Array:
-        """Return the times of the results of a run, (n_t,) [s]; `SystemFileError` if no memory would hold them."""
+        """Return the output times of a run, (n_t,) [s]; `SystemFileError` if there are too many for the memory."""
         wanted = self.t_end / (self.h * self.output_every)
         if not wanted <= MOST_TIMES:
             raise SystemFileError(
                 f"run: t_end = {self.t_end:g} with h = {self.h:g} and output_every = {self.output_every} are "
-                f"{wanted:.1e} times, expected up to {MOST_TIMES:.0e}; take t_end nearer, or a greater h"
+                f"{wanted:.1e} times, expected up to {MOST_TIMES:.0e}; choose a smaller t_end or a greater h"
             )
         return np.linspace(0.0, self.t_end, max(1, round(wanted)) + 1)
 
 
 def formulation_of(run: RunOptions | None) -> str:
-    """Return the formulation of a run, in which its analyses are made too; "absolute" without one."""
+    """Return the formulation of a run, which its analyses use too; "absolute" if there is no run."""
     return "relative" if run is not None and isinstance(run.integrator, RelativeGeneralizedAlpha) else "absolute"
 
 

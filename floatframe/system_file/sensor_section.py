@@ -45,10 +45,10 @@ from floatframe.system_file.place_key import (
 
 __all__ = ["SENSOR_TYPES", "SensorSection"]
 
-MESH = ("node", "element", "set")  #: keys that name a place by the user's mesh
+MESH = ("node", "element", "set")  #: keys that specify a place in the user's mesh
 AT = ("marker", *MESH, "tolerance")  #: keys of a place
 
-SENSOR_TYPES: dict[str, tuple[str, ...]] = {  # type -> keys; the first ones up to "|" are needed
+SENSOR_TYPES: dict[str, tuple[str, ...]] = {  # type -> keys; those before "|" are required
     **dict.fromkeys(PLACE_QUANTITIES, ("body", "|", *AT, "relative_to", "relative_marker")),
     "angle": ("body_a", "body_b", "|", "marker_a", "marker_b", "axis"),
     "bushing": ("of", "|"),
@@ -72,7 +72,7 @@ SENSOR_TYPES: dict[str, tuple[str, ...]] = {  # type -> keys; the first ones up 
 
 
 class SensorSection(Table):
-    """[sensors.NAME]: what is measured on a motion."""
+    """[sensors.NAME]: a quantity measured on a motion."""
 
     type: choice("type of sensor", lambda: tuple(SENSOR_TYPES)) = Field(  # type: ignore[valid-type]
         description=f"one of {', '.join(SENSOR_TYPES)}"
@@ -83,7 +83,7 @@ class SensorSection(Table):
     element: MeshNumber | None = Field(None, description="the number of an element on the surface of its mesh")
     set: str | None = Field(None, description="the name of a set of its mesh")
     tolerance: float | None = Field(None, ge=0, description=TOLERANCE_WORDS)
-    relative_to: str | None = Field(None, description="the name of the body that sees it")
+    relative_to: str | None = Field(None, description="the name of the body relative to which it is measured")
     relative_marker: MeasuredPlace | None = Field(None, description="an interface of, or a position in that body")
     body_a: str | None = Field(None, description='the name of a body, or "ground"')
     body_b: str | None = Field(None, description='the name of a body, or "ground"')
@@ -96,7 +96,7 @@ class SensorSection(Table):
     output: str | None = Field(None, description="the name of an output, state or multiplier of the element")
     interface: str | None = Field(None, description="the name of an interface of the body")
     table: str | None = Field(None, description="the name of a recovery table of the modal file")
-    rows: list[str] | None = Field(None, description="labels of rows, or how they begin; default: all")
+    rows: list[str] | None = Field(None, description="labels of rows, or their beginnings; default: all")
     axes: choice("kind of axes", lambda: (*AXES, "body")) | None = Field(  # type: ignore[valid-type]
         None, description=f"one of {', '.join(AXES)}; of an interface force {', '.join(INTERFACE_AXES)}"
     )
@@ -149,17 +149,17 @@ class SensorSection(Table):
 
     @property
     def limit(self) -> float:
-        """How far a node may be from a position."""
+        """Largest distance of a node from a position, relative to the size of the body."""
         return TOLERANCE if self.tolerance is None else self.tolerance
 
     def place(self) -> Marker:
-        """Return the marker of the table: an interface, a position, or a node, element or set."""
+        """Return the marker of the table, at an interface, a position, or a node, element or set."""
         if any(getattr(self, key) is not None for key in MESH):
             return Marker(str(self.body), node=self.node, element=self.element, set=self.set)
         return marker_at(str(self.body), self.marker, self.limit)
 
 
-BY_KEYS: dict[str, Any] = {  # sensors whose fields are the keys of their table
+BY_KEYS: dict[str, Any] = {  # sensor classes whose fields are the keys of their table
     "bushing": BushingSensor,
     "control": ControlSensor,
     "coordinate": CoordinateSensor,

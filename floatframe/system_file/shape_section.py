@@ -1,4 +1,4 @@
-"""Tables of the system file for what things look like: [[bodies.NAME.shapes]] and [[scene]]."""
+"""Tables of the system file for drawn shapes: [[bodies.NAME.shapes]] and [[scene]]."""
 
 from dataclasses import MISSING, fields
 from pathlib import Path
@@ -15,11 +15,11 @@ from floatframe.system_file.keys import Name, NotNegative, Positive
 __all__ = ["ShapeSection"]
 
 PLACE_KEYS = ("type", "position", "rotation_vector", "color", "opacity", "interface")
-FILE_KEYS = ("file", "scale")  #: of a mesh, in the place of its nodes and triangles
+FILE_KEYS = ("file", "scale")  #: of a mesh, instead of nodes and triangles
 
 
 class ShapeSection(Table):
-    """[[bodies.NAME.shapes]] or [[scene]]: a geometry with its numbers, its place and its colour."""
+    """[[bodies.NAME.shapes]] or [[scene]]: a geometry with its dimensions, position and colour."""
 
     type: choice("geometry", lambda: tuple(GEOMETRIES)) = Field(  # type: ignore[valid-type]
         description=f"one of {', '.join(GEOMETRIES)}"
@@ -81,7 +81,7 @@ class ShapeSection(Table):
 
     @property
     def shape(self) -> Shape:
-        """The shape; a file of a surface is read here."""
+        """The shape; the file of a surface is read here."""
         geometry: Any
         if self.type == "mesh":
             assert self.file is not None  # checked by the table
@@ -93,7 +93,7 @@ class ShapeSection(Table):
 
 
 def keys_of(kind: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the keys of a geometry, and those it cannot do without."""
+    """Return all keys of a geometry, and its required keys."""
     if kind == "mesh":
         return FILE_KEYS, FILE_KEYS[:1]
     own = fields(GEOMETRIES[kind])

@@ -24,24 +24,25 @@ from floatframe.system_file.keys import Name, NotNegative, Number, Positive
 
 __all__ = ["SignalFunction", "SignalSection", "function_named", "signal_functions"]
 
-SMOOTH = ("length", "angle")  #: quantities whose tables are quintic by default: motions; others are straight lines
+#: quantities that are motions: their tables are quintic by default, those of others linear
+SMOOTH = ("length", "angle")
 INTEGRATED = {"acceleration": "length", "angular acceleration": "angle"}
-NEAR = 0.02  #: of the gravity, for a mean that tells its unit
+NEAR = 0.02  #: relative difference from the gravity up to which a mean value suggests another unit
 CHANNEL = "a name or a number from 1, the channel"
 
 
 @dataclass(frozen=True)
 class SignalFunction:
-    """A measured signal as a function of time, in the units of a system, and what it is."""
+    """A measured signal as a function of time in the units of a system, with its quantity."""
 
     name: str
     function: TimeFunction
     quantity: str  #: "length", "angle", "force", ...
-    notes: tuple[str, ...]  #: what was done with the signal
+    notes: tuple[str, ...]  #: operations applied to the signal
 
 
 class SignalSection(Table):
-    """[signals.NAME]: a channel of a file, as a function of time."""
+    """[signals.NAME]: a channel of a file as a function of time."""
 
     file: Path = Field(description=f"the path of a file with signals ({', '.join(SIGNAL_FORMATS)})")
     channel: Annotated[str | int | None, Field(description=CHANNEL)] = None
@@ -52,14 +53,16 @@ class SignalSection(Table):
     decimal: choice("decimal sign", lambda: (".", ",")) | None = Field(  # type: ignore[valid-type]
         None, description='"." or ","'
     )
-    delimiter: str | None = Field(None, description="what stands between columns")
+    delimiter: str | None = Field(None, description="the separator of columns")
     fill: NotNegative = Field(0.0, description="a number, 0 or more, the longest gap in seconds that is filled")
-    scale: Number = Field(1.0, description="a number, by which its numbers are multiplied")
-    offset: Number = Field(0.0, description="a number in its unit, which is then added")
+    scale: Number = Field(1.0, description="a number by which its values are multiplied")
+    offset: Number = Field(0.0, description="a number in its unit that is then added")
     low_pass: Positive | None = Field(None, description="a number above 0, the corner of a low-pass in Hz")
     high_pass: Positive | None = Field(None, description="a number above 0, the corner of a high-pass in Hz")
     resample: Positive | None = Field(None, description="a number above 0, the new rate in Hz")
-    t_start: Number | None = Field(None, description="a number, the time of the first sample; default: as in the file")
+    t_start: Number | None = Field(
+        None, description="a number, the time of the first sample; default: that in the file"
+    )
     interpolation: choice("interpolation", lambda: tuple(INTERPOLATIONS)) | None = Field(  # type: ignore[valid-type]
         None, description=f"one of {', '.join(INTERPOLATIONS)}"
     )
@@ -93,7 +96,7 @@ class SignalSection(Table):
         return self
 
     def signal(self, name: str) -> Signal:
-        """Return the channel in its unit, filtered and resampled as the table says."""
+        """Return the channel with its unit, filtered and resampled as the table specifies."""
         signals = read_signals(
             self.file, time=self.time, rate=self.rate, fill=self.fill, uneven=self.resample is not None,
             decimal=self.decimal, delimiter=self.delimiter,
@@ -116,7 +119,7 @@ class SignalSection(Table):
         return found
 
     def function(self, name: str, units: Units) -> SignalFunction:
-        """Return the function of time in a unit system; angles in rad."""
+        """Return the function of time in a unit system, with angles in rad."""
         signal = self.signal(name)
         where = f"{self.file}: channel {quoted(signal.name)}"
         quantity = signal_unit(signal.unit, where).quantity
@@ -139,9 +142,9 @@ class SignalSection(Table):
 
 
 def agreed_unit(where: str, stated: str, given: str | None) -> str:
-    """Return the unit of a channel: what its file states or the table gives; `SignalError` if they contradict.
+    """Return the unit of a channel, as its file or the table states it; `SignalError` if the two disagree.
 
-    Neither is guessed: a channel without any unit is asked back.
+    No unit is guessed: if neither states one, `SignalError` is raised.
     """
     if given is None:
         if not stated:
@@ -158,12 +161,12 @@ def agreed_unit(where: str, stated: str, given: str | None) -> str:
 
 
 def same_unit(a: SignalUnit, b: SignalUnit) -> bool:
-    """Whether two units are the same but for rounding."""
+    """Return whether two units are equal within rounding."""
     return a.exponents == b.exponents and abs(a.factor / b.factor - 1) < 1e-6
 
 
 def doubts(values: Any, unit: str) -> tuple[str, ...]:
-    """Return in words that the mean of an acceleration is the gravity in another unit than it is said to be in."""
+    """Return a note if the mean of an acceleration equals the gravity in another unit than the stated one."""
     known = parsed_unit(unit)
     if known is None or known.quantity != "acceleration":
         return ()
@@ -176,7 +179,7 @@ def doubts(values: Any, unit: str) -> tuple[str, ...]:
 
 
 def signal_functions(sections: Mapping[str, SignalSection], units: Units) -> dict[str, SignalFunction]:
-    """Return the functions of the tables by name; `SignalError` that names the table."""
+    """Return the functions of the tables, by name; `SignalError` names the table."""
     functions = {}
     for name, section in sections.items():
         try:
@@ -187,7 +190,7 @@ def signal_functions(sections: Mapping[str, SignalSection], units: Units) -> dic
 
 
 def function_named(name: str, signals: Mapping[str, SignalFunction]) -> SignalFunction:
-    """Return a function; `SignalError` with the nearest name if there is no such table."""
+    """Return a function by name; `SignalError` with the nearest name if there is no such table."""
     if name not in signals:
         raise SignalError(f"signal {quoted(name)}: there is no table [signals.{name}]{nearest(name, signals)}")
     return signals[name]

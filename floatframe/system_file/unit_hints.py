@@ -1,4 +1,4 @@
-"""Numbers of a system that look as if they were in other units than it says."""
+"""Hints that numbers of a system seem to be in other units than stated."""
 
 import numpy as np
 
@@ -9,13 +9,13 @@ from floatframe.system import System
 __all__ = ["unit_hints"]
 
 EARTH = 9.80665  #: m/s²
-POWERS = (1e-6, 1e-3, 1e3, 1e6)  #: factors by which a mixture of m and mm, of kg and t, is wrong
-NEAR = 0.02  #: of such a factor
-FAR = 300.0  #: radius of gyration by the size of the system, or the reverse with its square, that no real part has
+POWERS = (1e-6, 1e-3, 1e3, 1e6)  #: factors by which a number is wrong if m and mm, or kg and t, are mixed up
+NEAR = 0.02  #: relative difference from such a factor
+FAR = 300.0  #: ratio of radius of gyration to size of the system, or the inverse with its square, that no real part has
 
 
 def unit_hints(system: System) -> tuple[str, ...]:
-    """Return in words what does not fit the units of a system: gravity off by 1000, inertia of a giant or a grain."""
+    """Return notes on numbers that do not fit the units of a system: gravity off by 1000, or implausible inertia."""
     hints = []
     units, where = system.units, f"system {system.name!r}, units {system.units.name}"
     for force in system.forces:

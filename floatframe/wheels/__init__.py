@@ -1,11 +1,11 @@
-"""Wheels on roads: tyres (linear, brush, Magic Formula), their property files, flat, measured and random roads."""
+"""Wheels on roads: tyres (linear, brush, Magic Formula), tyre property files, flat, measured and random roads."""
 
 import lazy_loader
 
-# the public names stand in __init__.pyi; each module is imported when its name is first used
+# the public names are listed in __init__.pyi; each module is imported when its name is first used
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
-#: type of an element in a system file, behind "wheels.": module and class
+#: module and class of each element, by its type in a system file without "wheels."
 ELEMENTS = {
     "linear-tyre": "floatframe.wheels.linear_tyre:LinearTyre",
     "brush-tyre": "floatframe.wheels.brush_tyre:BrushTyre",

@@ -1,4 +1,4 @@
-"""The law of the brush tyre: bristles that stick until the parabolic pressure times friction cannot hold them."""
+"""The brush tyre model: bristles stick until the parabolic pressure times the friction coefficient is exceeded."""
 
 import numpy as np
 from numba import njit
@@ -28,17 +28,17 @@ SLIP_STIFFNESS, HALF_LENGTH, LOAD, FRICTION, FLATTENING, RESISTANCE = range(COMM
 def brush_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     """Write wrenches, rates and outputs of a brush tyre.
 
-    The contact is 2a long, a = a_0 sqrt(F_z/F_0), pressed by q(s) = 3 F_z/(4a) (1 - s²/a²); bristles of stiffness c_p,
-    the same along and across, enter unbent and are bent by slip at the rate of the theoretical slip
+    The contact length is 2a, a = a_0 sqrt(F_z/F_0), with the pressure q(s) = 3 F_z/(4a) (1 - s²/a²). Bristles of
+    stiffness c_p, equal along and across, enter undeformed. They are bent by slip at the rate of the theoretical slip
 
         sigma_x = -V_sx/|V_r|, sigma_y = V_sy/|V_r|,   V_r = R_e Omega,
 
-    which is what the tread gives with V_r as transport speed. With C = 2 c_p a² = C_0 F_z/F_0, full sliding beyond
-    sigma_s = 3 mu F_z/C, and r = |sigma|/sigma_s:
+    as the tread does with V_r as transport speed. With C = 2 c_p a² = C_0 F_z/F_0, the whole contact slides beyond
+    sigma_s = 3 mu F_z/C. With r = |sigma|/sigma_s:
 
     (1) |F| = mu F_z (3 r - 3 r² + r³) for r < 1, mu F_z beyond, along (sigma_x, -sigma_y)
     (2) pneumatic trail t = (a/3) (1 - r)³/(1 - r + r²/3), zero beyond; M_z = -t F_y
-    (3) M_y as of the linear tyre
+    (3) M_y as for the linear tyre
     """
     x_W, y_W, n, _, point, d, rho, sine, cosine, V_x, V_y, Omega, rate, left = contact(x, data)
     is_down = d.real > 0.0
@@ -78,6 +78,6 @@ def brush_law(t, x, z, lam, data, wrench, z_dot, g, seen):
 
 @njit(error_model="numpy")
 def brush_law_at_rest(t, x, z, lam, data, wrench, z_dot, g, seen):
-    """Write the same for a wheel that stands: its tread is stretched by what it has moved."""
+    """Write the same for a standing wheel, whose tread is deformed by the displacement of the wheel."""
     brush_law(t, x, z, lam, data, wrench, z_dot, g, seen)
     hold_tread(x, data, seen[10], z, z_dot)

@@ -1,4 +1,4 @@
-"""A tyre of bristles with parabolic pressure and friction."""
+"""The brush tyre, with bristles, parabolic pressure and friction."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -28,30 +28,33 @@ SETTLING_TIME = Quantity(0.02, TIME)
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class BrushTyre(Element):
-    """Bristles that stick and slide: slip stiffness, contact length, friction; combined slip without more numbers.
+    """A brush tyre, defined by slip stiffness, contact length and friction; it includes combined slip.
 
-    The contact length grows with the square root of the load, so that slip stiffness grows with the load and sliding
-    sets in at the same slip. Outputs kappa and alpha are the theoretical slips, over the speed of rolling.
+    The contact length is proportional to the square root of the load. The slip stiffness therefore increases with the
+    load, and sliding begins at the same slip. The outputs kappa and alpha are theoretical slips, relative to the
+    rolling speed.
     """
 
     name: str
-    marker_a: Marker  #: of the road: z up, x along it
-    marker_b: Marker  #: the centre of the wheel, on the spinning body
+    marker_a: Marker  #: on the road: z up, x along the road
+    marker_b: Marker  #: at the wheel centre, on the spinning body
     radius: float  #: R_0, unloaded [m]
     stiffness: float  #: k, vertical [N/m]
-    nominal_load: float  #: F_0 at which the numbers below hold [N]
-    slip_stiffness: float  #: C_0 = 2 c_p a_0², of small slip along and across [N]
+    nominal_load: float  #: F_0, the load to which the parameters below refer [N]
+    slip_stiffness: float  #: C_0 = 2 c_p a_0², for small slip, along and across [N]
     contact_length: float  #: 2 a_0 [m]
     friction: float = 1.0  #: mu
     damping: float = 0.0  #: c, vertical [N s/m]
-    relaxation_x: float = 0.0  #: relaxation length along x [m]; 0: none, and then the wheel creeps at a standstill
+    #: relaxation length along x [m]; 0: no relaxation, so that the wheel creeps at a standstill
+    relaxation_x: float = 0.0
     relaxation_y: float = 0.0  #: relaxation length along y [m]
     rolling_resistance: float = 0.0  #: f_r: M_y = -f_r R_0 F_z
-    flattening: float = 1 / 3  #: q: effective rolling radius R_0 - q d
-    low_speed: float = LOW_SPEED  #: below it the wheel counts as coming to a standstill [m/s]
-    settling_time: float = SETTLING_TIME  #: tau, damping of the tread at a standstill [s]
-    landing_depth: float | None = None  #: deflection over which damping and tread set in [m]; None: radius/500
-    axis: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  #: spin axis to the left, axes of marker B
+    flattening: float = 1 / 3  #: q, in the effective rolling radius R_0 - q d
+    low_speed: float = LOW_SPEED  #: speed below which the wheel is treated as nearly standing [m/s]
+    settling_time: float = SETTLING_TIME  #: tau, settling time of the damped tread at a standstill [s]
+    landing_depth: float | None = None  #: deflection over which damping and tread forces build up [m]; None: radius/500
+    #: spin axis, pointing left, in axes of marker B
+    axis: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))
     road: Road = field(default_factory=FlatRoad)  #: in axes of marker A
 
     def __post_init__(self) -> None:
@@ -64,11 +67,11 @@ class BrushTyre(Element):
         return tyre_of_table(name, table, read, cls)
 
     def drawn(self) -> tuple[Drawn | Arrow, ...]:
-        """Show wheel, road and force."""
+        """Return the drawn wheel, road and force."""
         return tyre_looks(self.radius, self.axis, self.road)
 
     def law(self, placed: Placed) -> ElementLaw:
-        """Return the law between the markers as placed."""
+        """Return the element law for the markers in the assembled configuration."""
         own = [self.slip_stiffness, 0.5 * self.contact_length, self.nominal_load, self.friction]
         own += [self.flattening, self.rolling_resistance]
         data = tyre_numbers(f"element {self.name!r}", placed, common_numbers(self), self.axis, own, self.road)

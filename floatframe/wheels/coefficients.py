@@ -1,4 +1,4 @@
-"""The coefficients of the Magic Formula that are read, and what stands for one that is missing."""
+"""The coefficients of the Magic Formula that are used, and the defaults of those missing in a file."""
 
 __all__ = ["COEFFICIENTS", "LEFT_OUT", "NEEDED", "NEEDED_COMBINED", "ONLY_52", "ONLY_61", "SCALES"]
 
@@ -17,12 +17,12 @@ ZERO = (
 SCALES = (
     "LFZO LCX LMUX LEX LKX LHX LVX LGAX LCY LMUY LEY LKY LHY LVY LGAY LKYC LTR LRES LGAZ LKZC "
     "LXAL LYKA LVYKA LS LSGKP LSGAL LMX LVMX LMY"
-).split()  #: factors, one where the file has none
+).split()  #: scaling factors, 1 if missing in the file
 
-#: name: what stands for a coefficient that the file does not have
+#: default of each coefficient, by name
 COEFFICIENTS = {name: 0.0 for name in ZERO} | {name: 1.0 for name in SCALES} | {"PKY4": 2.0, "QRE0": 1.0, "QSY7": 1.0}
 
-#: of one version alone
+#: coefficients that only one version of the formula has
 ONLY_61 = set(
     "PPX1 PPX2 PPX3 PPX4 PPY1 PPY2 PPY3 PPY4 PPY5 PPZ1 PPZ2 PPMX1 RBX3 RBY4 PEY5 PKY4 PKY5 PKY6 PKY7 QDZ10 QDZ11 "
     "QSX4 QSX5 QSX6 QSX7 QSX8 QSX9 QSX10 QSX11 QSY5 QSY6 QSY7 QSY8 QRE0 QV1 QV2 QFZ1 QFZ2 PFZ1 "
@@ -30,10 +30,11 @@ ONLY_61 = set(
 )
 ONLY_52 = set("PHY3 PTX1 PTX2 PTX3 PTY1 PTY2 LGAX LGAY LGAZ".split())
 
-NEEDED = ("PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")  #: of every file, with load, radius and stiffness
-NEEDED_COMBINED = ("RBX1", "RCX1", "RBY1", "RCY1")  #: of files for combined slip
+#: required in every file, with load, radius and stiffness
+NEEDED = ("PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")
+NEEDED_COMBINED = ("RBX1", "RCX1", "RBY1", "RCY1")  #: required in files for combined slip
 
-#: name: what is left out of the formula here, said where a file has it
+#: effects that are neglected here, by coefficient; reported if a file has the coefficient
 LEFT_OUT = {
     "LMUV": "friction that falls with the sliding speed",
     "QFCX": "vertical deflection by longitudinal force",

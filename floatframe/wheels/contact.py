@@ -1,8 +1,8 @@
-"""Where a wheel meets the road, how fast, and with which normal force.
+"""The contact between wheel and road: its point, its velocities and the normal force.
 
-Axes (ISO 8855): the road's normal z_W points up, the spin axis e of the wheel to its left, x_W = e × z_W / |e × z_W|
-forward and y_W = z_W × x_W to the left in the road. In the plane of the wheel u = x_W × e points from the contact point
-up to the centre c; the inclination gamma, sin gamma = e · z_W, is positive when the top leans to the right.
+Axes (ISO 8855): the road normal z_W points up, and the spin axis e of the wheel to its left. x_W = e × z_W / |e × z_W|
+points forward, and y_W = z_W × x_W to the left in the road. In the plane of the wheel, u = x_W × e points up from the
+contact point to the centre c. The inclination gamma, sin gamma = e · z_W, is positive if the top leans to the right.
 """
 
 import numpy as np
@@ -14,13 +14,14 @@ __all__ = ["AXIS", "CENTRE_AT", "COMMON", "DAMPING", "LOW_SPEED", "RADIUS", "ROA
 __all__ += ["STIFFNESS", "TURN_AT", "contact", "cross", "dot", "grip_at", "moved", "normal_force", "put_wrenches"]
 __all__ += ["touching"]
 
-# places of the numbers that all tyres have in their data; those of their own begin at COMMON
+# indices of the parameters that all tyres have; the parameters of each law begin at `COMMON`
 RADIUS, STIFFNESS, DAMPING, LANDING, LOW_SPEED, SETTLING, SIGMA_X, SIGMA_Y = range(8)
-AXIS = 8  #: of the wheel in axes of its marker (3)
-CENTRE_AT, TURN_AT = 11, 14  #: of the wheel as placed: its centre (3) and axes (9) in axes of the road
-ROAD, COMMON = 23, 24  #: where the numbers of the road begin; where those of a law do
+AXIS = 8  #: of the wheel, in axes of its marker (3)
+CENTRE_AT, TURN_AT = 11, 14  #: of the assembled wheel: its centre (3) and axes (9), in axes of the road
+ROAD, COMMON = 23, 24  #: index of the first parameter of the road; index of the first parameter of a law
 
-FEET = 4  #: how often the foot on an uneven road is looked for; each time the error falls by radius times curvature
+#: iterations for the contact point on an uneven road; each reduces the error by the factor radius times curvature
+FEET = 4
 
 
 @register_jitable(error_model="numpy")
@@ -43,7 +44,7 @@ def along(c, a, s, b):
 
 @register_jitable(error_model="numpy")
 def turned(x, m, a):
-    """Return vector a, in axes of marker m, in ground axes: A a."""
+    """Return in ground axes a vector a given in axes of marker m: A a."""
     return (
         x[m, 3] * a[0] + x[m, 4] * a[1] + x[m, 5] * a[2],
         x[m, 6] * a[0] + x[m, 7] * a[1] + x[m, 8] * a[2],
@@ -53,7 +54,7 @@ def turned(x, m, a):
 
 @register_jitable(error_model="numpy")
 def turned_back(x, m, a):
-    """Return vector a, in ground axes, in axes of marker m: A.T a."""
+    """Return in axes of marker m a vector a given in ground axes: A.T a."""
     return (
         x[m, 3] * a[0] + x[m, 6] * a[1] + x[m, 9] * a[2],
         x[m, 4] * a[0] + x[m, 7] * a[1] + x[m, 10] * a[2],
@@ -63,33 +64,33 @@ def turned_back(x, m, a):
 
 @register_jitable(error_model="numpy")
 def contact(x, data):
-    """Return frame, geometry and velocities of the contact of the wheel of marker 1 with the road of marker 0.
+    """Return frame, geometry and velocities of the contact between the wheel of marker 1 and the road of marker 0.
 
-    (1) The centre in axes of the road; the foot below it, height and slopes there, normal n
-    (2) sin gamma = e · n, rho = h / cos gamma with the distance h of the centre from the plane of the foot, deflection
-        R_0 - rho; on uneven ground the foot moves to c - rho u, and (1) begins again
-    (3) velocities of the point of the rim there without the spin Omega e, over the road: V_x, V_y, V_n; rate of the
-        deflection, exact on planes: -rho_dot = -(c_dot · n) / cos gamma - rho tan gamma gamma_dot
+    (1) centre in axes of the road; point of the road below it, with height, slopes and normal n
+    (2) sin gamma = e · n; rho = h / cos gamma, with the distance h of the centre from the tangent plane there; the
+        deflection is R_0 - rho. On uneven ground, the point moves to c - rho u, and (1) is repeated
+    (3) velocities V_x, V_y, V_n of the rim at the contact point relative to the road, without the spin Omega e; rate
+        of the deflection, exact on planes: -rho_dot = -(c_dot · n) / cos gamma - rho tan gamma gamma_dot
 
     Returns
     -------
     x_W, y_W, n
-        Axes of the contact, each three numbers in ground axes.
+        Axes of the contact, each as three numbers in ground axes.
     e
-        The spin axis.
+        Spin axis.
     point
-        Of contact, in ground axes [m].
+        Contact point, in ground axes [m].
     deflection, rho, sine, cosine
-        R_0 - rho and the loaded radius rho [m], of the inclination.
+        R_0 - rho and the loaded radius rho [m]; sine and cosine of the inclination.
     V_x, V_y, Omega, deflection_rate
         Velocities [m/s], spin relative to the road [rad/s].
     left
-        What is left of the road ahead or behind [m].
+        Length of the road that is left, ahead or behind [m].
     """
     R_0, at = data[RADIUS], int(data[ROAD])
     e = turned(x, 1, (data[AXIS], data[AXIS + 1], data[AXIS + 2]))
     apart = x[1, 0] - x[0, 0], x[1, 1] - x[0, 1], x[1, 2] - x[0, 2]
-    c = turned_back(x, 0, apart)  # (1) in axes of the road
+    c = turned_back(x, 0, apart)  # in axes of the road
     e_road = turned_back(x, 0, e)
     foot_x, foot_y = c[0], c[1]
     is_centre = data[at + 4] == CENTRE
@@ -98,7 +99,7 @@ def contact(x, data):
         height, z_x, z_y, left = road_height(data, at, foot_x, foot_y)
         length = np.sqrt(1.0 + z_x * z_x + z_y * z_y)
         n = -z_x / length, -z_y / length, 1.0 / length
-        if is_centre:  # the disc touches where its centre is R_0 above the height, whatever the slope
+        if is_centre:  # the disc touches if its centre is R_0 above the height, at any slope
             h = R_0 - (R_0 + height - c[2]) / length
         else:
             h = (c[0] - foot_x) * n[0] + (c[1] - foot_y) * n[1] + (c[2] - height) * n[2]
@@ -130,16 +131,17 @@ def contact(x, data):
 
 @register_jitable(error_model="numpy")
 def grip_at(x, data, point):
-    """Return the factor of the road on the friction at a point of contact, given in ground axes."""
+    """Return the friction factor of the road at a contact point, given in ground axes."""
     along_road = turned_back(x, 0, (point[0] - x[0, 0], point[1] - x[0, 1], point[2] - x[0, 2]))
     return road_grip(data, int(data[ROAD]), along_road[0])
 
 
 @register_jitable(error_model="numpy")
 def moved(x, data):
-    """Return how far a standing wheel has moved since it was placed: along x, along y, turned about its axis and x.
+    """Return the displacement of a standing wheel since assembly: along x, along y, rotations about its axis and x.
 
-    In axes of the road, for small motions: the turn is half the skew part of the relative rotation.
+    In axes of the road, for small motions: the rotation is half the skew-symmetric part of the relative rotation
+    matrix.
     """
     axis = data[AXIS], data[AXIS + 1], data[AXIS + 2]
     c = turned_back(x, 0, (x[1, 0] - x[0, 0], x[1, 1] - x[0, 1], x[1, 2] - x[0, 2]))
@@ -148,7 +150,7 @@ def moved(x, data):
     length = np.sqrt(e[0] * e[0] + e[1] * e[1])
     ahead = e[1] / length, -e[0] / length
     turn, lean = 0.0 * gone[0], 0.0 * gone[0]
-    for k in range(3):  # columns of the placed axes, and where they are now
+    for k in range(3):  # assembled axes (columns), and where they are now
         old = data[TURN_AT + k], data[TURN_AT + 3 + k], data[TURN_AT + 6 + k]
         new = turned_back(x, 0, (x[1, 3 + k], x[1, 6 + k], x[1, 9 + k]))
         half = cross(old, new)
@@ -159,9 +161,10 @@ def moved(x, data):
 
 @register_jitable(error_model="numpy")
 def touching(data, deflection):
-    """Return how far a wheel has landed: s² (3 - 2 s) of s = d over the landing depth, 0 in the air, 1 beyond it.
+    """Return how far a wheel has landed, s² (3 - 2 s) with s = d / landing depth: 0 in the air, 1 beyond the depth.
 
-    With it damping and tread set in without a jump, so that a step in which a wheel lands has a solution.
+    Damping and tread forces are multiplied by it. They build up without a jump, so that a step in which a wheel lands
+    has a solution.
     """
     s = deflection / data[LANDING]
     if s.real <= 0.0:
@@ -173,9 +176,9 @@ def touching(data, deflection):
 
 @register_jitable(error_model="numpy")
 def normal_force(data, deflection, landed, rate, cosine, spring):
-    """Return F_z, which never pulls: (f(d) + c s d_dot) / cos gamma for d > 0, s how far the wheel has landed.
+    """Return F_z = (f(d) + c s d_dot) / cos gamma for d > 0, at least 0; s is how far the wheel has landed.
 
-    The spring acts in the plane of the wheel: divided by cos gamma the force along the normal does its work.
+    The spring acts in the plane of the wheel. Divided by cos gamma, the normal force does the same work as the spring.
     """
     if deflection.real <= 0.0:
         return 0.0 * deflection
@@ -185,19 +188,19 @@ def normal_force(data, deflection, landed, rate, cosine, spring):
 
 @register_jitable(error_model="numpy")
 def put_wrenches(x, wrench, frame, F, M):
-    """Write the wrench of the contact on the wheel (marker 1) and its reaction on the road (marker 0).
+    """Write the contact wrench on the wheel (marker 1) and its reaction on the road (marker 0).
 
     Parameters
     ----------
     frame
-        x_W, y_W, n, point of `contact`.
+        x_W, y_W, n and point, from `contact`.
     F, M
-        Force at the point of contact and moment, in axes of the contact [N, N m].
+        Force at the contact point and moment, in axes of the contact, (3,) each [N, N m].
 
     Returns
     -------
     power
-        What the wrenches give to both bodies [W].
+        Power of the wrenches on both bodies [W].
     """
     x_W, y_W, n, point = frame
     force = (

@@ -1,4 +1,4 @@
-"""The law of a linear tyre: forces in proportion to slip, up to the limit of friction."""
+"""The law of the linear tyre: forces proportional to slip, limited by friction."""
 
 import numpy as np
 from numba import njit
@@ -28,12 +28,12 @@ C_X, C_Y, C_GAMMA, TRAIL, FRICTION, FLATTENING, RESISTANCE = range(COMMON, COMMO
 def linear_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     """Write wrenches, rates and outputs of a linear tyre.
 
-    (1) contact, normal force F_z from k d; V_sx = V_x - R_e Omega, R_e = R_0 - q d
+    (1) contact; normal force F_z from k d; V_sx = V_x - R_e Omega, R_e = R_0 - q d
     (2) slips kappa, tan alpha of the tread
-    (3) F_x = C_x kappa, F_y = -C_y tan alpha - C_gamma sin gamma, and both shortened to |F| <= mu F_z; the grip of
-        the road multiplies mu
-    (4) M_z = t C_y tan alpha, shortened alike; M_y = -f_r R_0 F_z sgn Omega - (R_e - rho) F_x: the lever of F_x is
-        R_e, so that it loses F_x V_sx and no more
+    (3) F_x = C_x kappa and F_y = -C_y tan alpha - C_gamma sin gamma, both scaled so that |F| <= mu F_z; mu is
+        multiplied by the friction factor of the road
+    (4) M_z = t C_y tan alpha, scaled alike; M_y = -f_r R_0 F_z sgn Omega - (R_e - rho) F_x: the lever arm of F_x is
+        R_e, so that F_x dissipates exactly F_x V_sx
     """
     x_W, y_W, n, _, point, d, rho, sine, cosine, V_x, V_y, Omega, rate, left = contact(x, data)  # (1)
     is_down = d.real > 0.0
@@ -75,6 +75,6 @@ def linear_law(t, x, z, lam, data, wrench, z_dot, g, seen):
 
 @njit(error_model="numpy")
 def linear_law_at_rest(t, x, z, lam, data, wrench, z_dot, g, seen):
-    """Write the same for a wheel that stands: its tread is stretched by what it has moved."""
+    """Write the same for a standing wheel, whose tread is deformed by the displacement of the wheel."""
     linear_law(t, x, z, lam, data, wrench, z_dot, g, seen)
     hold_tread(x, data, seen[10], z, z_dot)

@@ -1,4 +1,4 @@
-"""A tyre whose forces are in proportion to slip."""
+"""The linear tyre, whose forces are proportional to slip."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -28,15 +28,15 @@ SETTLING_TIME = Quantity(0.02, TIME)
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class LinearTyre(Element):
-    """Forces in proportion to slip up to the limit of friction; the tyre of linear vehicle dynamics.
+    """A tyre with forces proportional to slip, limited by friction, as in linear vehicle dynamics.
 
-    Marker A lies on the road, its z up; marker B is the centre of the wheel on the body that spins. All lengths, forces
-    and speeds are in units of the system. Axes, slips and outputs: docs/wheels.md.
+    Marker A lies on the road, with z up. Marker B is at the wheel centre, on the spinning body. All lengths, forces and
+    speeds are in units of the system. Axes, slips and outputs: docs/wheels.md.
     """
 
     name: str
-    marker_a: Marker  #: of the road: z up, x along it
-    marker_b: Marker  #: the centre of the wheel, on the spinning body
+    marker_a: Marker  #: on the road: z up, x along the road
+    marker_b: Marker  #: at the wheel centre, on the spinning body
     radius: float  #: R_0, unloaded [m]
     stiffness: float  #: k, vertical [N/m]
     slip_stiffness: float  #: C_x = dF_x/dkappa [N]
@@ -45,14 +45,16 @@ class LinearTyre(Element):
     camber_stiffness: float = 0.0  #: C_gamma = -dF_y/dsin(gamma) [N]
     trail: float = 0.0  #: pneumatic trail t: M_z = t C_y tan(alpha) [m]
     friction: float = 1.0  #: mu, |(F_x, F_y)| <= mu F_z
-    relaxation_x: float = 0.0  #: relaxation length along x [m]; 0: none, and then the wheel creeps at a standstill
+    #: relaxation length along x [m]; 0: no relaxation, so that the wheel creeps at a standstill
+    relaxation_x: float = 0.0
     relaxation_y: float = 0.0  #: relaxation length along y [m]
     rolling_resistance: float = 0.0  #: f_r: M_y = -f_r R_0 F_z
-    flattening: float = 1 / 3  #: q: effective rolling radius R_0 - q d
-    low_speed: float = LOW_SPEED  #: below it the wheel counts as coming to a standstill [m/s]
-    settling_time: float = SETTLING_TIME  #: tau, damping of the tread at a standstill [s]
-    landing_depth: float | None = None  #: deflection over which damping and tread set in [m]; None: radius/500
-    axis: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  #: spin axis to the left, axes of marker B
+    flattening: float = 1 / 3  #: q, in the effective rolling radius R_0 - q d
+    low_speed: float = LOW_SPEED  #: speed below which the wheel is treated as nearly standing [m/s]
+    settling_time: float = SETTLING_TIME  #: tau, settling time of the damped tread at a standstill [s]
+    landing_depth: float | None = None  #: deflection over which damping and tread forces build up [m]; None: radius/500
+    #: spin axis, pointing left, in axes of marker B
+    axis: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))
     road: Road = field(default_factory=FlatRoad)  #: in axes of marker A
 
     def __post_init__(self) -> None:
@@ -65,11 +67,11 @@ class LinearTyre(Element):
         return tyre_of_table(name, table, read, cls)
 
     def drawn(self) -> tuple[Drawn | Arrow, ...]:
-        """Show wheel, road and force."""
+        """Return the drawn wheel, road and force."""
         return tyre_looks(self.radius, self.axis, self.road)
 
     def law(self, placed: Placed) -> ElementLaw:
-        """Return the law between the markers as placed."""
+        """Return the element law for the markers in the assembled configuration."""
         own = [self.slip_stiffness, self.cornering_stiffness, self.camber_stiffness, self.trail, self.friction]
         own += [self.flattening, self.rolling_resistance]
         data = tyre_numbers(f"element {self.name!r}", placed, common_numbers(self), self.axis, own, self.road)

@@ -1,4 +1,4 @@
-"""What tyres look like: their wheel on the body that spins, their road, the force of the ground."""
+"""Shapes of tyres for pictures: the wheel on the spinning body, the road and the contact force."""
 
 import numpy as np
 
@@ -8,26 +8,26 @@ from floatframe.wheels.roads.road import GridRoad, Road
 
 __all__ = ["tyre_looks"]
 
-WIDTH = 0.62  #: of a wheel whose tyre does not know its own, by the radius
-LANE = 0.04  #: half width of a road that knows one profile alone, by its length
-MOST_KNOTS = 3000  #: of a road as drawn
+WIDTH = 0.62  #: width of a tyre whose width is unknown, divided by its radius
+LANE = 0.04  #: half width of a road that is drawn from a single profile, divided by its length
+MOST_KNOTS = 3000  #: largest number of knots of a drawn road
 
 
 def tyre_looks(
     radius: float, axis: Array, road: Road, *, width: float | None = None, is_in_metres: bool = False
 ) -> tuple[Drawn | Arrow, ...]:
-    """Return wheel (unless its body has shapes of its own), road and force.
+    """Return the shapes of the wheel (unless its body has shapes of its own), the road and the force.
 
     Parameters
     ----------
     radius, width
-        Of the tyre [m]; width None: unknown.
+        Of the tyre [m]; None if the width is unknown.
     axis
         Spin axis in the axes of marker B, (3,).
     road
-        In the axes of marker A.
+        The road, in the axes of marker A.
     is_in_metres
-        Whether radius and width are, whatever the units of the system.
+        Whether radius and width are in metres, whatever the units of the system.
     """
     wheel = Shape(Wheel(radius, width or WIDTH * radius, axis=axis))
     return (
@@ -38,7 +38,7 @@ def tyre_looks(
 
 
 def ground(road: Road) -> Plane | Terrain:
-    """Return the ground of a road: a plane, or its heights; a single profile is drawn as a strip."""
+    """Return the shape of a road: a plane, or its heights; a single profile is drawn as a strip."""
     if not isinstance(road, GridRoad):
         return Plane()
     every = max(1, len(road.x) // MOST_KNOTS)

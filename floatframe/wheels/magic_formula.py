@@ -1,7 +1,7 @@
-"""The Magic Formula of version 5.2 and 6.1: forces and moments of one tyre from load, slip, inclination, pressure.
+"""The Magic Formula 5.2 and 6.1: forces and moments of a tyre as functions of load, slip, inclination and pressure.
 
-Numbers are those of the property file, in its own signs (ISO or adapted SAE) and of its own side; `magic_formula_law`
-turns them. Formulas, in the order of the code, stand in docs/wheels.md.
+Values have the signs of the property file (ISO or adapted SAE), and are for the side for which the file was made;
+`magic_formula_law` converts them. The formulas are in docs/wheels.md, in the order of the code.
 """
 
 import numpy as np
@@ -12,8 +12,9 @@ from floatframe.wheels.slip import magnitude, square
 
 __all__ = ["COEFFICIENTS_AT", "IS_61", "PRESSURE", "forces_and_moments", "peaks_and_stiffnesses"]
 
-# what stands before the coefficients: version 6.1 or 5.2, combined or pure slip; dp = (p - p_0)/p_0 and p/p_0; load
-# F_0, speed V_0; signs of the file against ISO, and of the side the tyre is mounted on against that of the file; ranges
+# indices of the parameters before the coefficients: version 6.1 (or 5.2); combined (or pure) slip; dp = (p - p_0)/p_0;
+# p/p_0; load F_0; speed V_0; sign of the file relative to ISO; sign of the mounted side relative to the side of the
+# file
 IS_61, IS_COMBINED, DP, PRESSURE, LOAD, SPEED, SIGN, SIDE = range(COMMON, COMMON + 8)
 KAPPA_LOW, KAPPA_HIGH, ALPHA_LOW, ALPHA_HIGH, GAMMA_LOW, GAMMA_HIGH, LOAD_LOW, LOAD_HIGH = range(
     COMMON + 8, COMMON + 16
@@ -35,8 +36,8 @@ COEFFICIENTS_AT = COMMON + 20
     LYKA, LVYKA, LS, LSGKP, LSGAL, LMX, LVMX, LMY,
 ) = range(COEFFICIENTS_AT, COEFFICIENTS_AT + 171)  # fmt: skip
 
-TINY = 1e-9  #: of the nominal load: keeps quotients of an unloaded tyre finite
-LESS_FRICTION = 10.0  #: A_mu of shifts that fade with friction, version 6.1
+TINY = 1e-9  #: relative to the nominal load; keeps quotients of an unloaded tyre finite
+LESS_FRICTION = 10.0  #: A_mu, by which shifts decrease with friction, version 6.1
 
 
 @register_jitable(error_model="numpy")
@@ -55,13 +56,13 @@ def cosine_curve(slip, B, C, E):
 
 @register_jitable(error_model="numpy")
 def at_most_one(E):
-    """Return E, held at one."""
+    """Return E, or 1 if E is above 1."""
     return E if E.real < 1.0 else 1.0 + 0.0 * E
 
 
 @register_jitable(error_model="numpy")
 def sign_of(a):
-    """Return the sign of a number, 1 for zero."""
+    """Return the sign of a number; 1 for zero."""
     return 1.0 if a.real >= 0.0 else -1.0
 
 
@@ -69,7 +70,7 @@ def sign_of(a):
 def peaks_and_stiffnesses(p, F_z, c, grip):
     """Return df, mu_x, K_x, mu_y, K_y at load F_z and inclination c (gamma in 5.2, sin gamma in 6.1).
 
-    The grip of the road multiplies lambda_mu, here and in `forces_and_moments`.
+    The friction factor of the road multiplies lambda_mu, here and in `forces_and_moments`.
 
     mu = (p_D1 + p_D2 df)(1 + p_3 dp + p_4 dp²)(1 - p_D3 c²) lambda_mu;
     K_x = F_z (p_K1 + p_K2 df) exp(p_K3 df)(1 + p_1 dp + p_2 dp²) lambda_K;
@@ -92,7 +93,7 @@ def peaks_and_stiffnesses(p, F_z, c, grip):
 
 @register_jitable(error_model="numpy")
 def lateral(p, F_z, s, c, df, mu_y, K_y, rolling, scale):
-    """Return F_y0 of pure side slip, S_Hy, S_Vy and B_y C_y; scale: lambda_mu_y with the grip of the road."""
+    """Return F_y0 of pure side slip, S_Hy, S_Vy and B_y C_y; `scale` is lambda_mu_y times the friction of the road."""
     F_0 = p[LFZO] * p[LOAD]
     c_y = p[LGAY] * c
     if p[IS_61] > 0.0:
@@ -115,22 +116,22 @@ def lateral(p, F_z, s, c, df, mu_y, K_y, rolling, scale):
 
 @register_jitable(error_model="numpy")
 def forces_and_moments(p, F_z, kappa, alpha, gamma, R_0, V_x, forward, rolling, grip):
-    """Return F_x, F_y, M_x, M_y (of rolling, positive), M_z in signs of the file.
+    """Return F_x, F_y, M_x, M_y (of rolling, positive) and M_z in the signs of the file.
 
     Parameters
     ----------
     p
-        Numbers of the tyre, see the top of the module.
+        Parameters of the tyre, see the top of the module.
     F_z
-        Load [N], within its range.
+        Load within its range [N].
     kappa, alpha, gamma
-        Slips and inclination [-, rad, rad], within their ranges.
+        Slips and inclination within their ranges [-, rad, rad].
     R_0, V_x
-        Free radius [m], speed [m/s].
+        Unloaded radius [m] and speed [m/s].
     forward, rolling
-        Direction of V_x from -1 to 1, and 1 for a wheel that rolls, 0 at a standstill.
+        Direction of V_x, from -1 to 1; 1 for a rolling wheel, 0 at a standstill.
     grip
-        Of the road, a factor on the friction.
+        Factor of the road on the friction.
     """
     is_61 = p[IS_61] > 0.0
     F_0 = p[LFZO] * p[LOAD]
@@ -150,7 +151,7 @@ def forces_and_moments(p, F_z, kappa, alpha, gamma, R_0, V_x, forward, rolling, 
     # lateral force of pure slip
     F_y0, S_Hy, S_Vy, BC_y = lateral(p, F_z, s, c, df, mu_y, K_y, rolling, scale_y)
     F_y, F_y_trail, S_Vyk = F_y0, F_y0, 0.0 * F_y0
-    if is_61:  # the trail carries the force of an upright wheel
+    if is_61:  # the trail multiplies the force of an upright wheel
         _, _, _, mu_upright, K_upright = peaks_and_stiffnesses(p, F_z, 0.0 * c, grip)
         F_y_trail, _, _, _ = lateral(p, F_z, s, 0.0 * c, df, mu_upright, K_upright, rolling, scale_y)
     if p[IS_COMBINED] > 0.0:

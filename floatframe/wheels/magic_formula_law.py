@@ -1,4 +1,4 @@
-"""The law of a tyre with the Magic Formula: its contact, tread and ranges round the formula itself."""
+"""The law of a tyre with the Magic Formula: contact, tread and validity ranges around the formula."""
 
 import numpy as np
 from numba import njit
@@ -66,12 +66,12 @@ from floatframe.wheels.slip import direction, hold_tread, magnitude, tread_slip
 
 __all__ = ["magic_formula_law", "magic_formula_law_at_rest"]
 
-SHORTEST = 0.05  #: of the radius: least relaxation length of a tyre that is hardly loaded
+SHORTEST = 0.05  #: least relaxation length of a tyre with a small load, divided by its radius
 
 
 @register_jitable(error_model="numpy")
 def held(value, low, high):
-    """Return a number held in a range, and 1 if it was outside."""
+    """Return a number clamped to a range, and 1 if it was outside (else 0)."""
     if value.real < low:
         return low + 0.0 * value, 1.0
     if value.real > high:
@@ -83,8 +83,8 @@ def held(value, low, high):
 def relaxation(data, df, load, K_x, K_y, gamma):
     """Return the relaxation lengths along x and y [m].
 
-    From the coefficients p_T where the file has them, else from slip stiffness over stiffness of the carcass; a number
-    of the element's own goes before both.
+    They are computed from the coefficients p_T if the file has them, else as slip stiffness divided by the stiffness of
+    the carcass. A value given for the element overrides both.
     """
     if data[SIGMA_FROM_FILE] == 0.0:
         return data[SIGMA_X] + 0.0 * load, data[SIGMA_Y] + 0.0 * load
@@ -111,9 +111,9 @@ def magic_formula_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     (1) contact; R_free = R_0 (q_re0 + q_V1 (R_0 Omega/V_0)²), deflection d = R_free - rho
     (2) F_z = (1 + q_V2 R_0/V_0 |Omega|)(1 + p_Fz1 dp)(q_Fz1 d/R_0 + q_Fz2 (d/R_0)²) F_0 + damping
     (3) R_e = R_free - F_0/c_z (D_reff atan(B_reff F_z/F_0) + F_reff F_z/F_0); V_sx = V_x - R_e Omega
-    (4) slips of the tread, held in the ranges of the file; a load below its range gives the forces at the lowest one in
-        proportion
-    (5) the formula in signs and on the side of the file; turned into ISO axes
+    (4) slips of the tread, clamped to the ranges of the file; below the range of the load, the forces at the lowest
+        load are scaled in proportion
+    (5) the formula, in signs and on the side of the file, converted to ISO axes
     """
     x_W, y_W, n, _, point, d, rho, sine, cosine, V_x, V_y, Omega, rate, left = contact(x, data)  # (1)
     zero = 0.0 * d
@@ -167,6 +167,6 @@ def magic_formula_law(t, x, z, lam, data, wrench, z_dot, g, seen):
 
 @njit(error_model="numpy")
 def magic_formula_law_at_rest(t, x, z, lam, data, wrench, z_dot, g, seen):
-    """Write the same for a wheel that stands: its tread is stretched by what it has moved."""
+    """Write the same for a standing wheel, whose tread is deformed by the displacement of the wheel."""
     magic_formula_law(t, x, z, lam, data, wrench, z_dot, g, seen)
     hold_tread(x, data, seen[10], z, z_dot)

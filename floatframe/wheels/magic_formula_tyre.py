@@ -1,4 +1,4 @@
-"""A tyre with the Magic Formula, from a tyre property file."""
+"""A tyre with the Magic Formula, defined by a tyre property file."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -29,8 +29,8 @@ SETTLING_TIME = Quantity(0.02, TIME)
 
 CONVENTIONS = {"iso": 1.0, "adapted-sae": -1.0}
 SIDES = ("left", "right")
-WIDEST = {"kappa": (-1.5, 1.5), "alpha": (-1.5, 1.5), "gamma": (-1.0, 1.0)}  #: where the file gives no range
-LOADS = 1e-3, 1e3  #: the same of the load, of the nominal one
+WIDEST = {"kappa": (-1.5, 1.5), "alpha": (-1.5, 1.5), "gamma": (-1.0, 1.0)}  #: ranges if the file gives none
+LOADS = 1e-3, 1e3  #: the same for the load, relative to the nominal load
 SI = UNIT_SYSTEMS["m-kg-s"]
 LENGTH, FORCE, SPEED = Dimensions(length=1), Dimensions(mass=1, length=1, time=-2), Dimensions(length=1, time=-1)
 STIFFNESS, DAMPING = Dimensions(mass=1, time=-2), Dimensions(mass=1, time=-1)
@@ -40,29 +40,31 @@ PRESSURE = Dimensions(mass=1, length=-1, time=-2)
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class MagicFormulaTyre(Element):
-    """The Magic Formula of version 5.2 or 6.1, combined slip, relaxation and standstill; turn slip is left out.
+    """A tyre with the Magic Formula 5.2 or 6.1: combined slip, relaxation and standstill, without turn slip.
 
-    Marker A lies on the road, its z up; marker B is the centre of the wheel on the body that spins. The file is
-    converted into units of the system; numbers here are in units of the system. Axes, signs and formulas:
+    Marker A lies on the road, with z up. Marker B is at the wheel centre, on the spinning body. The values of the file
+    are converted to units of the system; the fields here are in units of the system. Axes, signs and formulas:
     docs/wheels.md.
     """
 
     name: str
-    marker_a: Marker  #: of the road: z up, x along it
-    marker_b: Marker  #: the centre of the wheel, on the spinning body
-    tyre: TyreProperties  #: of `read_tyre_file`
-    convention: str = "iso"  #: signs of the file: "iso" (W axes of ISO 8855, as TYDEX) or "adapted-sae"
-    side: str | None = None  #: on which it is mounted: "left" or "right"; the other one than the file's mirrors it
-    pressure: float | None = None  #: of the tyre; None: as the file has it
-    is_combined: bool | None = None  #: forces of combined slip; None: as USE_MODE of the file says
-    relaxation_x: float | None = None  #: relaxation lengths; None: from the file; 0: none, then it creeps when standing
+    marker_a: Marker  #: on the road: z up, x along the road
+    marker_b: Marker  #: at the wheel centre, on the spinning body
+    tyre: TyreProperties  #: from `read_tyre_file`
+    convention: str = "iso"  #: sign convention of the file: "iso" (W axes of ISO 8855, as TYDEX) or "adapted-sae"
+    side: str | None = None  #: mounted side, "left" or "right"; the tyre is mirrored if the file is for the other side
+    pressure: float | None = None  #: inflation pressure; None: that of the file
+    is_combined: bool | None = None  #: whether slip is combined; None: according to USE_MODE of the file
+    #: relaxation lengths; None: from the file; 0: none, so that it creeps at a standstill
+    relaxation_x: float | None = None
     relaxation_y: float | None = None
     low_speed: float | None = (
-        None  #: below it the wheel counts as coming to a standstill; None: VXLOW of the file, or 1 m/s
+        None  #: speed below which the wheel is treated as nearly standing; None: VXLOW of the file, or 1 m/s
     )
-    settling_time: float = SETTLING_TIME  #: tau, damping of the tread at a standstill [s]
-    landing_depth: float | None = None  #: deflection over which damping and tread set in; None: radius/500
-    axis: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  #: spin axis to the left, axes of marker B
+    settling_time: float = SETTLING_TIME  #: tau, settling time of the damped tread at a standstill [s]
+    landing_depth: float | None = None  #: deflection over which damping and tread forces build up; None: radius/500
+    #: spin axis, pointing left, in axes of marker B
+    axis: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))
     road: Road = field(default_factory=FlatRoad)  #: in axes of marker A
 
     def __post_init__(self) -> None:
@@ -76,8 +78,8 @@ class MagicFormulaTyre(Element):
         if self.tyre.cornering_stiffness * CONVENTIONS[self.convention] > 0:
             other = next(name for name in CONVENTIONS if name != self.convention)
             raise ModelError(
-                f"{where}: convention: {self.tyre.source} has PKY1 = {self.tyre.coefficients['PKY1']:g}, a side force "
-                f"along positive slip angles that {self.convention!r} forbids; is it a file of {other!r}?"
+                f"{where}: convention: {self.tyre.source} has PKY1 = {self.tyre.coefficients['PKY1']:g}, lateral force "
+                f"of a sign at positive slip angles that {self.convention!r} excludes; is it a file of {other!r}?"
             )
         if (self.relaxation_x is None) != (self.relaxation_y is None):
             raise ModelError(f"{where}: expected relaxation_x and relaxation_y, or neither (then the file's)")
@@ -91,13 +93,13 @@ class MagicFormulaTyre(Element):
         self._combined(where)
 
     def _combined(self, where: str) -> bool:
-        """Return whether slip is combined; `ModelError` if the file does not say so, or lacks what that needs."""
+        """Return whether slip is combined; `ModelError` if the file does not state it, or lacks coefficients for it."""
         is_combined = self.tyre.is_combined if self.is_combined is None else self.is_combined
         lacking = [key for key in NEEDED_COMBINED if self.tyre.coefficients[key] == 0.0]
         if is_combined is None:
             raise ModelError(
                 f"{where}: is_combined: {self.tyre.source} has no USE_MODE of 3 (pure slip) or 4 (combined "
-                "slip); say which"
+                "slip); give is_combined"
             )
         if is_combined and lacking:
             raise ModelError(
@@ -108,16 +110,16 @@ class MagicFormulaTyre(Element):
 
     @classmethod
     def from_table(cls, name: str, table: Mapping[str, Any], read: Read) -> "MagicFormulaTyre":
-        """Return the tyre of [elements.NAME]: its file is `file` or `shipped`, with `version` if it does not say it."""
+        """Return the tyre of [elements.NAME]; its file is `file` or `shipped`, with `version` if the file lacks it."""
         values = dict(table)
         return tyre_of_table(name, values, read, cls, tyre=properties_of_table(values, read))
 
     def drawn(self) -> tuple[Drawn | Arrow, ...]:
-        """Show wheel, road and force."""
+        """Return the drawn wheel, road and force."""
         return tyre_looks(self.tyre.radius, self.axis, self.road, width=self.tyre.width, is_in_metres=True)
 
     def law(self, placed: Placed) -> ElementLaw:
-        """Return the law between the markers as placed, in units of the system."""
+        """Return the element law for the markers in the assembled configuration, in units of the system."""
         where = f"element {self.name!r}"
         units, tyre, p = placed.units, self.tyre, self.tyre.coefficients
         radius = tyre.radius * LENGTH.factor(SI, units)
@@ -150,11 +152,11 @@ class MagicFormulaTyre(Element):
         return tyre_law(magic_formula_law, magic_formula_law_at_rest, data, placed, sigma)
 
     def _side(self) -> float:
-        """Return -1 for a tyre on the other side than the file's."""
+        """Return -1 for a tyre on the side opposite to that of the file, else 1."""
         return -1.0 if self.side is not None and self.tyre.side in SIDES and self.side != self.tyre.side else 1.0
 
     def _carcass(self, where: str, units: Units, is_from_file: bool) -> list[float]:
-        """Return stiffnesses of the carcass for the relaxation lengths; `ModelError` if those are not in the file."""
+        """Return carcass stiffnesses for the relaxation lengths; `ModelError` if the file lacks them."""
         found = []
         for key, name, stiffness in (
             ("PTX1", "LONGITUDINAL_STIFFNESS", self.tyre.carcass[0]),
@@ -169,7 +171,7 @@ class MagicFormulaTyre(Element):
         return found
 
     def _relative_pressure(self, where: str, units: Units) -> float:
-        """Return pressure over nominal pressure; `ModelError` if it is out of the range of the file."""
+        """Return the pressure divided by the nominal pressure; `ModelError` if it is out of the range of the file."""
         tyre = self.tyre
         if self.pressure is not None:
             pressure = self.pressure * PRESSURE.factor(units, SI)
@@ -178,7 +180,7 @@ class MagicFormulaTyre(Element):
         if tyre.nominal_pressure is None:
             if self.pressure is not None:
                 raise ModelError(
-                    f"{where}: pressure: {tyre.source} has no NOMPRES, its forces do not know the pressure"
+                    f"{where}: pressure: {tyre.source} has no NOMPRES, so its forces do not depend on the pressure"
                 )
             return 1.0
         low, high = tyre.ranges.get("pressure", (0.0, np.inf))

@@ -1,4 +1,4 @@
-"""What all tyres have in their data: the numbers before those of their law, and the road behind them."""
+"""The parameters that all tyres share, which precede those of their law, and the road, which follows them."""
 
 from collections.abc import Callable, Sequence
 
@@ -15,19 +15,19 @@ from floatframe.wheels.roads.surface import FLAT
 
 __all__ = ["tyre_law", "tyre_numbers"]
 
-TREAD = 1e-3  #: typical deflection of the tread, of the radius
-UPRIGHT = 0.2  #: cosine of the inclination below which a wheel is not one that rolls on this road
+TREAD = 1e-3  #: typical deflection of the tread, divided by the radius
+UPRIGHT = 0.2  #: cosine of the inclination below which a wheel is taken as lying on its side
 
 
 def tyre_numbers(
     where: str, placed: Placed, common: Sequence[float], axis: Array, law: Sequence[float], road: Road
 ) -> Array:
-    """Return radius ... relaxation lengths (8), axis, place, where the road begins, numbers of the law, road.
+    """Return the data: radius ... relaxation lengths (8), axis, place, index of the road, parameters of the law, road.
 
     Raises
     ------
     ModelError
-        If the wheel as placed lies on its side, is below the road, or not on it.
+        If the assembled wheel lies on its side, is below the road, or is not on it.
     """
     A = placed.A[0].T @ placed.A[1]
     c = placed.A[0].T @ (placed.r[1] - placed.r[0])
@@ -51,18 +51,18 @@ def tyre_numbers(
 def tyre_law(
     function: Callable[..., None], rest: Callable[..., None], data: Array, placed: Placed, sigma: tuple[float, float]
 ) -> ElementLaw:
-    """Return the law of a tyre: states of the tread where it relaxes, wrenches on what can move, outputs.
+    """Return the law of a tyre: states of the relaxing tread, wrenches on movable bodies, outputs.
 
     Parameters
     ----------
     function, rest
-        In motion and for statics.
+        The law in motion, and the law for statics.
     data
-        Of `tyre_numbers`.
+        Data from `tyre_numbers`.
     placed
-        The markers as placed: a road that is the ground needs no wrench.
+        The assembled markers; a road on the ground needs no wrench.
     sigma
-        Relaxation lengths along x and y [m]; 0: no state.
+        Relaxation lengths along x and y [m]; a direction with 0 has no state.
     """
     states = tuple(name for name, length in zip(("u", "v"), sigma, strict=True) if length > 0)
     return ElementLaw(

@@ -1,11 +1,11 @@
-"""What every tyre shows to sensors."""
+"""The outputs that every tyre provides to sensors."""
 
 import numpy as np
 from numba.extending import register_jitable
 
 __all__ = ["OUTPUTS", "show", "show_energy"]
 
-#: of the contact, in its axes, on the wheel; slips as the law has used them (with relaxation)
+#: of the contact, in its axes, acting on the wheel; slips as used by the law (with relaxation)
 OUTPUTS = {
     "Fx": "N", "Fy": "N", "Fz": "N", "Mx": "N m", "My": "N m", "Mz": "N m",
     "kappa": "1", "alpha": "rad", "gamma": "rad", "deflection": "m", "loaded_radius": "m",
@@ -16,7 +16,7 @@ OUTPUTS = {
 
 @register_jitable(error_model="numpy")
 def show(seen, F, M, slips, shape, speeds, point):
-    """Write forces, moments, slips (kappa, tan alpha, sin gamma), deflection and loaded radius, velocities, contact."""
+    """Write forces, moments, slips (kappa, tan alpha, sin gamma), deflection, loaded radius, velocities and point."""
     for k in range(3):
         seen[k] = F[k]
         seen[3 + k] = M[k]
@@ -31,7 +31,7 @@ def show(seen, F, M, slips, shape, speeds, point):
 
 @register_jitable(error_model="numpy")
 def show_energy(seen, energy, lost, left, clamped):
-    """Write energy stored, power lost, what is left of the road, how many inputs were held in their ranges."""
+    """Write the energy stored, the power lost, the length of road left and the number of clamped inputs."""
     seen[17] = energy
     seen[18] = lost
     seen[19] = left

@@ -1,4 +1,4 @@
-"""Tyres and roads from tables of a system file."""
+"""Reading of tyres and roads from tables of a system file."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -18,28 +18,28 @@ __all__ = ["Read", "properties_of_table", "road_of_table", "tyre_of_table"]
 
 
 class Read(Protocol):
-    """Reads values of a table and names their keys in its messages."""
+    """Reads values of a table; its messages name the keys."""
 
     where: str
 
     def value(self, kind: Any, value: Any, key: str) -> Any:
-        """Return a value as a kind says."""
+        """Return a value converted to a type."""
 
     def path(self, value: Any, key: str = "file") -> Path:
-        """Return the path of a file that exists."""
+        """Return the path of an existing file."""
 
     def fields_of(self, kind: Any, table: Mapping[str, Any], **given: Any) -> Any:
         """Return a dataclass whose fields are the keys of a table."""
 
 
-#: obstacle: what makes its profile, and its numbers beside `length`
+#: function that makes the profile of each obstacle, and its arguments besides `length`
 OBSTACLES: dict[str, tuple[Callable[..., Polyline], tuple[str, ...]]] = {
     "step": (step, ("at", "height")),
     "ramp": (ramp, ("at", "height", "run")),
     "bump": (bump, ("at", "height", "width")),
     "cosine-bump": (cosine_bump, ("at", "height", "width")),
 }
-#: key of a random road: argument and kind
+#: argument and type for each key of a random road
 RANDOM = {
     "class": ("road_class", str), "length": ("length", float), "seed": ("seed", int), "tracks": ("tracks", np.ndarray),
     "spacing": ("spacing", float), "band": ("band", np.ndarray), "waviness": ("waviness", float),
@@ -51,10 +51,10 @@ TYPES = ("flat", "profile", "grid", "iso-8608", *OBSTACLES)
 def road_of_table(table: Any, read: Read) -> Road:
     """Return the road of {type = "profile", x = [...], z = [...], envelope = 0.3}.
 
-    Keys by type: flat; profile, grid: x, z, y, linear, or `file` (a text table, x in its first column, heights at `y`
-    in the others); iso-8608: those of `iso_8608_road`; step, ramp, bump, cosine-bump: at, height, run or width, length,
-    between. `envelope`, the radius of the wheel, and `envelope_width` give what a disc feels of it. `grip`, a table of
-    x and factor, multiplies the friction along it.
+    Keys by type: flat: none; profile and grid: x, z, y, linear, or `file` (a text table with x in its first column and
+    the heights at `y` in the others); iso-8608: those of `iso_8608_road`; step, ramp, bump and cosine-bump: at, height,
+    run or width, length, between. `envelope`, the radius of the wheel, and `envelope_width` replace the ground by its
+    envelope for a disc. `grip`, a table of x and factor, multiplies the friction along the road.
     """
     where = f"{read.where}.road"
     if not isinstance(table, dict) or not isinstance(table.get("type"), str):
@@ -94,7 +94,7 @@ def ground_of_table(where: str, kind: str, values: dict[str, Any], read: Read) -
         if envelope is not None:
             return profile.enveloped(envelope, between=between)
         if between is not None:
-            raise ModelError(f"{where}.between: needs envelope, the radius of the wheel")
+            raise ModelError(f"{where}.between: needs the key envelope, the radius of the wheel")
         return profile.road()
     elif kind == "iso-8608":
         given = {RANDOM[k][0]: read.value(RANDOM[k][1], values.pop(k), f"road.{k}") for k in RANDOM if k in values}
@@ -112,7 +112,7 @@ def ground_of_table(where: str, kind: str, values: dict[str, Any], read: Read) -
 
 
 def grid_of_table(where: str, values: dict[str, Any], read: Read) -> GridRoad:
-    """Return the road of knots and heights in the file itself, or in a text table beside it."""
+    """Return the road whose knots and heights are in the file itself, or in a separate text table."""
     given: dict[str, Any] = {}
     if "file" in values:
         path = read.path(values.pop("file"), "road.file")
@@ -130,7 +130,7 @@ def grid_of_table(where: str, values: dict[str, Any], read: Read) -> GridRoad:
     for key, name in (("x", "x"), ("y", "y"), ("z", "z")):
         if key in values:
             if name in given:
-                raise ModelError(f"{where}.{key}: stands in the file already")
+                raise ModelError(f"{where}.{key}: is already in the file")
             given[name] = read.value(np.ndarray, values.pop(key), f"road.{key}")
     for key in ("x", "z"):
         if key not in given:
@@ -141,13 +141,13 @@ def grid_of_table(where: str, values: dict[str, Any], read: Read) -> GridRoad:
 
 
 def refuse_others(where: str, kind: str, values: Mapping[str, Any]) -> None:
-    """Raise `ModelError` if keys are left that this type of road does not have."""
+    """Raise `ModelError` if there are keys left that this type of road does not have."""
     if values:
         raise ModelError(f"{where}: a road of type {kind!r} has no key {quoted(next(iter(values)))}")
 
 
 def tyre_of_table(name: str, table: Mapping[str, Any], read: Read, kind: type, **given: Any) -> Any:
-    """Return a tyre of a class whose fields are the keys of its table, but for the road."""
+    """Return a tyre of a class whose fields, except the road, are the keys of its table."""
     values = dict(table)
     if "road" in values:
         given["road"] = road_of_table(values.pop("road"), read)
@@ -155,7 +155,7 @@ def tyre_of_table(name: str, table: Mapping[str, Any], read: Read, kind: type, *
 
 
 def properties_of_table(values: dict[str, Any], read: Read) -> TyreProperties:
-    """Return the tyre of `file` (with `version` where the file does not say it) or `shipped`, taken out of a table."""
+    """Return the tyre of `file` (with `version` if the file lacks it) or `shipped`; these keys are removed."""
     version = read.value(str, values.pop("version"), "version") if "version" in values else None
     if ("file" in values) == ("shipped" in values):
         raise ModelError(

@@ -1,15 +1,16 @@
 """Slip of a rolling tyre, with relaxation and at a standstill.
 
-The tread is a string that the ground takes along at the slip velocity V_s and that rolling lets go over the relaxation
-length sigma, at the transport speed V = |V_x|:
+The tread is modelled as a string. The ground moves it with the slip velocity V_s, and rolling relaxes it over the
+relaxation length sigma, at the transport speed V = |V_x|:
 
     u_dot = -V_sx - (V/sigma_x + L) u        kappa'     = (u + tau u_dot) / sigma_x      steady: kappa = -V_sx/V
     v_dot =  V_sy - (V/sigma_y + L) v        tan alpha' = (v + tau v_dot) / sigma_y      steady: tan alpha = V_sy/V
 
-At a standstill V = 0: the tread is a spring, which holds without creep. What is added there fades out towards the low
-speed: a settling time tau, the damping of that spring, and the loss L, without which a tyre that slides at V = 0 would
-be stretched without end. L begins at the slip at which the tyre slides, s = 1, and holds s <= 2:
-L = w(s - 1) s_dot / 2 with s = |(u/(sigma_x kappa_s), v/(sigma_y alpha_s))| and s_dot the same of the slip velocity.
+At a standstill V = 0, and the tread is a spring, which holds without creep. Two terms are added near a standstill; they
+vanish towards the low speed: a settling time tau, the damping of that spring, and a loss L, without which a tyre that
+slides at V = 0 would be stretched without limit. L begins at the slip at which the tyre slides, s = 1, and keeps s <=
+2: L = w(s - 1) s_dot / 2 with s = |(u/(sigma_x kappa_s), v/(sigma_y alpha_s))|, and s_dot the same expression with the
+slip velocity.
 """
 
 import numpy as np
@@ -19,25 +20,25 @@ from floatframe.wheels.contact import LOW_SPEED, RADIUS, SETTLING, SIGMA_X, SIGM
 
 __all__ = ["direction", "hold_tread", "magnitude", "square", "tread_slip"]
 
-LEAST_SLIP = 1e-4  #: at which a tyre may slide; keeps the loss of a tyre that is hardly loaded finite
+LEAST_SLIP = 1e-4  #: least slip at which a tyre slides; keeps the loss of a tyre with a small load finite
 AIR = 20.0  #: a lifted tread relaxes at the rate (V + AIR V_low)/sigma
 
 
 @register_jitable(error_model="numpy")
 def magnitude(a):
-    """Return |a| of a real number, and with its sign for the imaginary part of a complex step."""
+    """Return |a| by the real part; the imaginary part of a complex step keeps its sign relative to the real part."""
     return a if a.real >= 0.0 else -a
 
 
 @register_jitable(error_model="numpy")
 def square(a):
-    """Return a²: a power of a complex number, compiled, loses a small imaginary part where the base is negative."""
+    """Return a². The compiled power of a complex number loses a small imaginary part if the real part is negative."""
     return a * a
 
 
 @register_jitable(error_model="numpy")
 def direction(V, low):
-    """Return the direction of a speed: -1 or 1 beyond the low speed, q (3 - q²)/2 with q = V/low within."""
+    """Return the direction of a speed: -1 or 1 beyond the low speed, q (3 - q²)/2 with q = V/low within it."""
     q = V / low
     if q.real >= 1.0:
         return 1.0 + 0.0 * q
@@ -48,22 +49,22 @@ def direction(V, low):
 
 @register_jitable(error_model="numpy")
 def tread_slip(data, sigma, scale, z, z_dot, transport, V_sx, V_sy, landed):
-    """Return kappa' and tan alpha' of the tread, and write the rates of its states.
+    """Return kappa' and tan alpha' of the tread; write the rates of its states.
 
     Parameters
     ----------
     data
-        Numbers of the tyre: low speed and settling time are used, and whether it has relaxation lengths.
+        Parameters of the tyre: low speed, settling time, and whether it has relaxation lengths.
     sigma
-        Relaxation lengths along x and y at this load [m].
+        Relaxation lengths along x and y at the present load [m].
     scale
         Slips kappa_s and alpha_s at which the tyre slides.
     z, z_dot
-        u and v [m], of the directions that relax, and their rates.
+        States u and v of the directions that relax [m], and their rates.
     transport
-        V [m/s], of either sign.
+        Transport speed V, with its sign [m/s].
     V_sx, V_sy
-        Slip velocity over the road [m/s].
+        Slip velocity relative to the road [m/s].
     landed
         From 0 in the air to 1 on the road.
 
@@ -79,7 +80,7 @@ def tread_slip(data, sigma, scale, z, z_dot, transport, V_sx, V_sy, landed):
     else:
         q = V / V_low
         fade = (1.0 - q * q) * (1.0 - q * q)
-        rolling = 0.5 * (V * q + V_low)  # of directions without relaxation: V without its corner at zero
+        rolling = 0.5 * (V * q + V_low)  # for directions without relaxation: V, smooth at zero
     has_x, has_y = data[SIGMA_X] > 0.0, data[SIGMA_Y] > 0.0
     kappa, tan_alpha = -V_sx / rolling, V_sy / rolling
     k = 0
@@ -116,10 +117,10 @@ def tread_slip(data, sigma, scale, z, z_dot, transport, V_sx, V_sy, landed):
 
 @register_jitable(error_model="numpy")
 def hold_tread(x, data, rho, z, z_dot):
-    """Write the rates that vanish where the tread is stretched by what a standing wheel has moved since it was placed.
+    """Write rates that vanish when the tread is deformed by the displacement of a standing wheel since assembly.
 
-    Without rolling u_dot = -V_sx and v_dot = V_sy, so that u = -(s_x - R_e phi) and v = s_y + rho times the lean, with
-    R_e of a flattening of a third: what statics asks for.
+    Without rolling, u_dot = -V_sx and v_dot = V_sy, so that u = -(s_x - R_e phi), and v = s_y + rho times the tilt
+    angle, with R_e for a flattening of 1/3. Statics uses this.
     """
     s_x, s_y, turn, lean = moved(x, data)
     R_e = (2.0 * data[RADIUS] + rho) / 3.0

@@ -1,4 +1,4 @@
-"""Checks of the fields that tyres have in common."""
+"""Validation of the fields that all tyres share."""
 
 from typing import Any
 
@@ -8,20 +8,20 @@ from floatframe.wheels.roads.road import FlatRoad, GridRoad
 
 __all__ = ["check_common", "check_road", "common_numbers", "landing_depth"]
 
-STEEPEST = 1.0  #: slope over which a wheel follows the ground itself; steeper ground needs the wheel's envelope
-LANDINGS = 500  #: landing depths in a radius
-FIT = 1e-6  #: relative difference of radius and radius of an envelope that is taken for rounding
+STEEPEST = 1.0  #: steepest slope on which a wheel can follow the ground itself; steeper ground needs an envelope
+LANDINGS = 500  #: ratio of radius to landing depth
+FIT = 1e-6  #: relative difference, taken as rounding, between the radius of a wheel and that of an envelope
 
 
 def check_common(
     tyre: Any, positive: tuple[str, ...], at_least_zero: tuple[str, ...], free: tuple[str, ...] = ()
 ) -> None:
-    """Check the numbers of a tyre and its road, and set them as floats.
+    """Validate the numbers of a tyre and its road, and set them as floats.
 
     Raises
     ------
     ModelError
-        If a number is out of its range, the road is none, or an envelope is that of another wheel.
+        If a number is out of its range, the road is not a road, or an envelope is for another wheel.
     """
     where = f"element {tyre.name!r}"
     for key in ("radius", "stiffness", "low_speed", *positive):
@@ -39,7 +39,7 @@ def check_common(
 
 
 def check_road(where: str, road: Any, radius: float) -> None:
-    """Raise `ModelError` unless it is a road, and its envelope that of a wheel of this radius."""
+    """Raise `ModelError` unless it is a road; an envelope must be for a wheel of this radius."""
     if not isinstance(road, FlatRoad | GridRoad):
         raise ModelError(
             f"{where}: road: expected FlatRoad, GridRoad or what makes one (profile_road, iso_8608_road, "
@@ -52,7 +52,7 @@ def check_road(where: str, road: Any, radius: float) -> None:
         if slope > STEEPEST:
             raise ModelError(
                 f"{where}: road: beyond x = {at:g} it rises with a slope of {slope:.3g}; a wheel cannot follow ground "
-                f"that is steeper than {STEEPEST:g}: give what it feels of it, road.enveloped({radius:g})"
+                f"that is steeper than {STEEPEST:g}: use its envelope, road.enveloped({radius:g})"
             )
     else:
         if abs(road.envelope_radius - radius) > FIT * radius:
@@ -63,12 +63,12 @@ def check_road(where: str, road: Any, radius: float) -> None:
 
 
 def landing_depth(given: float | None, radius: float) -> float:
-    """Return the deflection over which damping and tread set in."""
+    """Return the deflection over which damping and tread forces build up."""
     return radius / LANDINGS if given is None else given
 
 
 def common_numbers(tyre: Any) -> list[float]:
-    """Return the first numbers of the data, in the order of `contact`."""
+    """Return the first parameters in the data, in the order of `contact`."""
     return [
         tyre.radius,
         tyre.stiffness,

@@ -1,4 +1,4 @@
-"""Tyre property files (.tir) for the Magic Formula of version 5.2 and 6.1."""
+"""Reading of tyre property files (.tir) for the Magic Formula 5.2 and 6.1."""
 
 import re
 from collections.abc import Mapping
@@ -13,10 +13,11 @@ from floatframe.wheels.coefficients import COEFFICIENTS, LEFT_OUT, NEEDED, NEEDE
 
 __all__ = ["TyreProperties", "read_tyre_file", "shipped_tyre"]
 
-LARGEST = 1_000_000  #: bytes; such files have ten thousand
+LARGEST = 1_000_000  #: bytes; real files have about ten thousand
 VERSIONS = {"5.2": 52, "6.1": 61}
-FIT_TYPES = {"6": 52, "21": 52, "52": 52, "61": 61, "62": 61}  #: FITTYP: version of the formula
-FORMATS = {"PAC2002": 52, "MF_05": 52, "MF05": 52, "MF61": 61}  #: PROPERTY_FILE_FORMAT, where there is no FITTYP
+FIT_TYPES = {"6": 52, "21": 52, "52": 52, "61": 61, "62": 61}  #: version of the formula, by FITTYP
+#: version by PROPERTY_FILE_FORMAT, if there is no FITTYP
+FORMATS = {"PAC2002": 52, "MF_05": 52, "MF05": 52, "MF61": 61}
 LENGTHS = {"METER": 1.0, "METRE": 1.0, "M": 1.0, "MM": 1e-3, "MILLIMETER": 1e-3, "CM": 1e-2, "CENTIMETER": 1e-2}
 LENGTHS |= {"INCH": 0.0254, "IN": 0.0254, "FOOT": 0.3048, "FT": 0.3048, "KM": 1e3, "KILOMETER": 1e3}
 FORCES = {"NEWTON": 1.0, "N": 1.0, "KILONEWTON": 1e3, "KNEWTON": 1e3, "KN": 1e3, "DYNE": 1e-5}
@@ -30,29 +31,29 @@ LINE = re.compile(r"^(\w+)\s*=\s*(.*)$")
 
 @dataclass(frozen=True, eq=False)
 class TyreProperties:
-    """What a tyre property file says, in SI units."""
+    """The content of a tyre property file, in SI units."""
 
-    version: int  #: of the formula: 52 or 61
-    coefficients: Mapping[str, float]  #: all of `coefficients.COEFFICIENTS`
+    version: int  #: version of the formula: 52 or 61
+    coefficients: Mapping[str, float]  #: values of all `coefficients.COEFFICIENTS`
     radius: float  #: UNLOADED_RADIUS [m]
     load: float  #: FNOMIN [N]
     stiffness: float  #: VERTICAL_STIFFNESS [N/m]
     damping: float  #: VERTICAL_DAMPING [N s/m]
-    speed: float  #: LONGVL, at which it was measured [m/s]
+    speed: float  #: LONGVL, speed of the measurement [m/s]
     low_speed: float | None  #: VXLOW [m/s]
     width: float | None  #: WIDTH [m]
     side: str  #: TYRESIDE: "left", "right" or "symmetric"
-    is_combined: bool | None  #: by USE_MODE; None: it says neither
+    is_combined: bool | None  #: according to USE_MODE; None: it states neither
     pressure: float | None  #: INFLPRES [Pa]
     nominal_pressure: float | None  #: NOMPRES [Pa]
-    ranges: Mapping[str, tuple[float, float]]  #: of kappa, alpha, gamma, load and pressure, SI
+    ranges: Mapping[str, tuple[float, float]]  #: of kappa, alpha, gamma, load and pressure, in SI units
     carcass: tuple[float | None, float | None]  #: LONGITUDINAL_STIFFNESS and LATERAL_STIFFNESS [N/m]
-    source: str = "tyre"  #: what messages call it
-    notes: tuple[str, ...] = field(default=())  #: what was taken for missing coefficients, what is left out
+    source: str = "tyre"  #: name in messages
+    notes: tuple[str, ...] = field(default=())  #: defaults taken for missing coefficients, and effects neglected
 
     @property
     def cornering_stiffness(self) -> float:
-        """K_y at the nominal load, upright, at the nominal pressure, in signs of the file [N/rad]."""
+        """K_y of the upright tyre at the nominal load and pressure, in signs of the file [N/rad]."""
         p = self.coefficients
         return p["PKY1"] * self.load * np.sin(p["PKY4"] * np.arctan(1.0 / p["PKY2"]))
 
@@ -63,14 +64,15 @@ def read_tyre_file(path: str | Path, *, version: str | None = None) -> TyrePrope
     Parameters
     ----------
     path
-        Of the file.
+        The file.
     version
-        "5.2" or "6.1" where the file does not say it, or says what is not known.
+        "5.2" or "6.1", if the file states no version or an unknown one.
 
     Raises
     ------
     ModelError
-        If the file is none, lacks units, its version or needed coefficients, or has numbers that are none.
+        If it is not a property file; if units, version or needed coefficients are missing; or if values are not
+        numbers.
     """
     path = Path(path)
     try:
@@ -89,7 +91,7 @@ def read_tyre_file(path: str | Path, *, version: str | None = None) -> TyrePrope
 
 
 def shipped_tyre(name: str) -> Path:
-    """Return the property file of a tyre that is shipped, of coefficients made up for this project."""
+    """Return the property file of a shipped tyre, whose coefficients were made up for this project."""
     found = {path.stem: path for path in sorted((Path(__file__).parent / "data").glob("*.tir"))}
     if name not in found:
         raise ModelError(f"tyre: expected one of {', '.join(found)}, which are shipped, got {name!r}")
@@ -97,7 +99,7 @@ def shipped_tyre(name: str) -> Path:
 
 
 def tyre_from_text(text: str, where: str, *, version: str | None = None) -> TyreProperties:
-    """Return the tyre of the text of a property file; `where` begins its messages."""
+    """Return the tyre of the text of a property file; messages begin with `where`."""
     words = entries(text, where)
     if not words:
         raise ModelError(f"{where}: no line KEY = value; expected the text of a tyre property file")
@@ -164,7 +166,7 @@ def tyre_from_text(text: str, where: str, *, version: str | None = None) -> Tyre
 
 
 def entries(text: str, where: str) -> dict[str, tuple[int, str]]:
-    """Return line and value of each key; tables of shapes and comments are passed over."""
+    """Return line and value of each key; shape tables and comments are skipped."""
     found: dict[str, tuple[int, str]] = {}
     section = ""
     for k, raw in enumerate(text.splitlines(), start=1):
@@ -183,15 +185,13 @@ def entries(text: str, where: str) -> dict[str, tuple[int, str]]:
             )
         key, value = match[1].upper(), match[2].strip().strip("'\"").strip()
         if key in found and found[key][1] != value:
-            raise ModelError(
-                f"{where}, line {k}: {key} = {value} stands against {found[key][1]} in line {found[key][0]}"
-            )
+            raise ModelError(f"{where}, line {k}: {key} = {value} contradicts {found[key][1]} in line {found[key][0]}")
         found[key] = k, value
     return found
 
 
 def numeric(word: str) -> float | None:
-    """Return the number that a word is, with exponents of E or D, or None."""
+    """Return the number in a word, with an exponent E or D; None if it is not a number."""
     try:
         value = float(word.replace("D", "E").replace("d", "e"))
     except ValueError:
@@ -200,7 +200,7 @@ def numeric(word: str) -> float | None:
 
 
 def factors(words: dict[str, tuple[int, str]], where: str) -> tuple[float, float, float, float]:
-    """Return SI values of the units of length, force, time and pressure; `ModelError` if one is missing or unknown."""
+    """Return the SI values of the units of length, force, time and pressure; `ModelError` if missing or unknown."""
     found = []
     for key, known in (("LENGTH", LENGTHS), ("FORCE", FORCES), ("TIME", TIMES)):
         if key not in words:
@@ -236,7 +236,7 @@ def factors(words: dict[str, tuple[int, str]], where: str) -> tuple[float, float
 
 
 def formula_version(words: dict[str, tuple[int, str]], where: str, version: str | None) -> int:
-    """Return 52 or 61."""
+    """Return the version, 52 or 61."""
     if version is not None:
         if version not in VERSIONS:
             raise ModelError(f"{where}: version: expected one of {', '.join(VERSIONS)}, got {version!r}")
@@ -249,22 +249,22 @@ def formula_version(words: dict[str, tuple[int, str]], where: str, version: str 
         return FORMATS[file_format]
     said = f"FITTYP = {fit}" if fit else f"PROPERTY_FILE_FORMAT = {file_format or 'missing'}"
     raise ModelError(
-        f"{where}: version of the formula: {said} is none that is known (FITTYP {', '.join(FIT_TYPES)}; "
+        f"{where}: version of the formula: {said} is not known (FITTYP {', '.join(FIT_TYPES)}; "
         f'PROPERTY_FILE_FORMAT {", ".join(FORMATS)}); if it is 5.2 or 6.1, say version = "5.2" or "6.1"'
     )
 
 
 def chosen(numbers: dict[str, float], kind: int) -> dict[str, float]:
-    """Return all coefficients: of the file, or what stands for those that it, or this version, does not have.
+    """Return all coefficients, with defaults for those that the file, or this version of the formula, does not have.
 
-    Relaxation lengths by p_T are of version 5.2, but what files of 6.1 have of them is used.
+    Relaxation lengths by p_T belong to version 5.2; they are also used if a file of version 6.1 has them.
     """
     others = ONLY_61 if kind == 52 else {key for key in ONLY_52 if not key.startswith("PT")}
     return {key: default if key in others else numbers.get(key, default) for key, default in COEFFICIENTS.items()}
 
 
 def notes_of(words: dict[str, tuple[int, str]], numbers: dict[str, float], kind: int) -> list[str]:
-    """Return what the file does not have, and what of it is left out."""
+    """Return notes on coefficients that the file does not have, and on neglected ones."""
     notes = []
     others = ONLY_61 if kind == 52 else ONLY_52
     absent = [key for key in COEFFICIENTS if key not in numbers and key not in others]

@@ -1,1 +1,1 @@
-"""Roads: flat, profiles and grids, random ones of ISO 8608, obstacles, and what a disc feels of them."""
+"""Roads: flat, profiles and grids, random roads of ISO 8608, obstacles, and their envelopes for a disc."""

@@ -1,4 +1,4 @@
-"""What a rigid disc feels of a profile: the height of its lowest point when it touches, its centre above a place."""
+"""The envelope of a profile for a rigid disc: the height of its lowest point when it touches the ground."""
 
 import numpy as np
 
@@ -8,19 +8,21 @@ __all__ = ["profile_envelope"]
 
 
 def profile_envelope(x: Array, z: Array, radius: float, places: Array) -> Array:
-    """Return max over s of z(s) + sqrt(R² - (s - x)²) - R at places x, for a profile of straight pieces.
+    """Return the envelope max over s of z(s) + sqrt(R² - (s - x)²) - R at places x, for a piecewise linear profile.
 
-    Within a piece of slope m the disc touches where s - x = m R / sqrt(1 + m²), and lies R (sqrt(1 + m²) - 1) above the
-    line; else it touches corners: the exact maximum is the largest of both.
+    On a piece of slope m, the disc touches where s - x = m R / sqrt(1 + m²), and its lowest point lies R (sqrt(1 + m²)
+    - 1) above the line. Otherwise it touches a corner. The exact maximum is the largest value over all pieces and
+    corners.
 
     Parameters
     ----------
     x, z
-        Corners, (n,) [m], x not falling (upright steps). Before the first and behind the last the ground is level.
+        Corners, (n,) [m]; x must not decrease (equal values: upright steps). Before the first corner and beyond the
+        last, the ground is level.
     radius
         R [m].
     places
-        Where the centre stands, (n_places,) [m].
+        Positions of the centre, (n_places,) [m].
 
     Returns
     -------

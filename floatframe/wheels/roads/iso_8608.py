@@ -1,13 +1,14 @@
-"""Random roads of ISO 8608: one-sided density of the height G_d(n) = G_d(n_0) (n/n_0)^-w, n_0 = 0.1 cycles/m.
+"""Random roads of ISO 8608 with the one-sided density G_d(n) = G_d(n_0) (n/n_0)^-w of the height, n_0 = 0.1 cycles/m.
 
-A profile is the sum of cosines sqrt(2 G_d dn) cos(2 pi n x + phi) at equally spaced n with phases at random, so that
-its density is that of the class, not only its expectation. Tracks at distance b of a surface that is alike in all
-directions have the normalised cross density (the two-dimensional density falls with |n|^-(w + 1), its section at lag
-b is Basset's integral)
+A profile is the sum of cosines sqrt(2 G_d dn) cos(2 pi n x + phi) at equally spaced n with random phases, so that its
+density is exactly that of the class, not only on average. Tracks at distance b on an isotropic surface have the
+normalised cross density (the two-dimensional density is proportional to |n|^-(w + 1); its section at lag b is Basset's
+integral)
 
-    g(n, b) = 2/Gamma(w/2) (pi n b)^(w/2) K_(w/2)(2 pi n b),    1 for long waves, 0 for short ones,
+    g(n, b) = 2/Gamma(w/2) (pi n b)^(w/2) K_(w/2)(2 pi n b),
 
-and tracks are made from independent ones by the Cholesky factor of g between all of them. The coherence is g².
+which is 1 for long waves and 0 for short ones. Tracks are made from independent tracks with the Cholesky factor of the
+matrix of g between all of them. The coherence is g².
 """
 
 from collections.abc import Sequence
@@ -25,19 +26,19 @@ __all__ = ["ROUGHNESS", "density", "iso_8608_road", "track_correlation"]
 #: G_d(n_0) at the geometric mean of each class [m³]
 ROUGHNESS = {name: 16e-6 * 4.0**k for k, name in enumerate("ABCDEFGH")}
 REFERENCE = 0.1  #: n_0 [cycles/m]
-CLASS_RANGE = 0.011, 2.83  #: n of the standard's classes [cycles/m]
-WAVES = 8  #: of the longest wave in the period of the series
+CLASS_RANGE = 0.011, 2.83  #: range of n for the classes of the standard [cycles/m]
+WAVES = 8  #: periods of the longest wave in the period of the series
 
 
 def density(road_class: str, n: Array, *, waviness: float = 2.0) -> Array:
-    """Return the one-sided density G_d [m³] of the middle of a class at n [cycles/m]."""
+    """Return the one-sided density G_d [m³] at the middle of a class, at n [cycles/m]."""
     if road_class not in ROUGHNESS:
         raise ModelError(f"road: class: expected one of {', '.join(ROUGHNESS)}, got {road_class!r}")
     return ROUGHNESS[road_class] * (np.asarray(n) / REFERENCE) ** -waviness
 
 
 def track_correlation(n: Array, b: float, *, waviness: float = 2.0) -> Array:
-    """Return g(n, b) of tracks at distance b [m] on a surface alike in all directions, like n [cycles/m]."""
+    """Return g(n, b) of tracks at distance b [m] on an isotropic surface, with the shape of n [cycles/m]."""
     from scipy.special import gamma, kv  # slow to import
 
     a = np.pi * np.asarray(n, dtype=float) * abs(b)
@@ -66,29 +67,29 @@ def iso_8608_road(
     ----------
     road_class
         A to H.
-    length
+    Length of the road, which begins at x = 0 [m].
         Of the road, from x = 0 [m].
     seed
-        Of the phases: the same seed gives the same road.
+        Seed of the phases; the same seed gives the same road.
     tracks
-        y of the tracks [m], increasing; between them the road is interpolated, beyond them level.
+        Positions y of the tracks, increasing [m]; the road is interpolated between them and level beyond them.
     spacing
-        Of its knots [m].
+        Spacing of the knots [m].
     band
         Lowest and highest n [cycles/m].
     waviness
-        w.
+        Exponent w.
     run_in
-        Over this length [m] the heights grow from zero, as a haversine.
+        Length over which the heights grow from zero, as a haversine [m].
     coherence
-        Of each two tracks, at all n; None: that of a surface alike in all directions.
+        Coherence of every two tracks, at all n; None: that of an isotropic surface.
     metre
-        One metre in the units of the system: 1000 for mm. All lengths above are in metres.
+        One metre in units of the system, such as 1000 for mm. All lengths above are in metres.
 
     Raises
     ------
     ModelError
-        If a number is out of its range, or the spacing too wide for the highest n.
+        If a number is out of its range, or the spacing is too wide for the highest n.
     """
     length, spacing = number("road: length", length, above=0.0), number("road: spacing", spacing, above=0.0)
     low, high = array_of_shape("road: band", band, (2,))
@@ -111,7 +112,7 @@ def iso_8608_road(
     waves = amplitude * np.exp(1j * phases)
     if len(y) > 1:
         waves = mixed(waves, n, y, waviness, coherence)
-    z = np.fft.irfft(0.5 * n_samples * waves, n_samples, axis=1)  # cosines of the amplitude given
+    z = np.fft.irfft(0.5 * n_samples * waves, n_samples, axis=1)  # cosines with the given amplitudes
     x = np.arange(int(np.ceil(length / spacing - 1e-9)) + 1) * spacing
     z = z[:, : len(x)]
     if run_in > 0:
@@ -120,7 +121,7 @@ def iso_8608_road(
 
 
 def mixed(waves: Any, n: Any, y: Array, waviness: float, coherence: float | None) -> Any:
-    """Return independent waves, (n_tracks, n_n), mixed to the correlation of the tracks at each n."""
+    """Return independent waves, (n_tracks, n_n), combined so that the tracks have their correlation at each n."""
     apart = np.abs(y[:, None] - y[None, :])
     g = np.empty((len(n), len(y), len(y)))
     for i in range(len(y)):

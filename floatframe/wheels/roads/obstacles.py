@@ -1,4 +1,4 @@
-"""Obstacles of a test track as profiles: a step, a ramp, bumps."""
+"""Obstacles of a test track as profiles: step, ramp and bumps."""
 
 import numpy as np
 
@@ -8,17 +8,17 @@ from floatframe.wheels.roads.road import Polyline
 
 __all__ = ["bump", "cosine_bump", "ramp", "step"]
 
-PIECES = 64  #: straight pieces of a rounded bump
+PIECES = 64  #: number of straight pieces of a rounded bump
 
 
 def step(at: float, height: float, *, length: float) -> Polyline:
-    """Return a road that rises upright by a height at x = at, from x = 0 to a length [m]; a negative height falls."""
+    """Return a road from x = 0 to `length` [m] with an upright step at x = at; a negative height steps down."""
     at, length = place("step", at, length)
     return Polyline(np.array([0.0, at, at, length]), np.array([0.0, 0.0, 1.0, 1.0]) * number("step: height", height))
 
 
 def ramp(at: float, height: float, run: float, *, length: float) -> Polyline:
-    """Return a road that rises by a height over a run from x = at, and goes on level to a length [m]."""
+    """Return a road that rises by `height` over `run`, beginning at x = at, and is level up to `length` [m]."""
     at, length = place("ramp", at, length)
     run = number("ramp: run", run, above=0.0)
     x = np.array([0.0, at, at + run, max(length, at + run)])
@@ -26,7 +26,7 @@ def ramp(at: float, height: float, run: float, *, length: float) -> Polyline:
 
 
 def bump(at: float, height: float, width: float, *, length: float) -> Polyline:
-    """Return a level road with a cleat of a rectangular section from x = at to at + width [m]."""
+    """Return a level road with a cleat of rectangular section from x = at to at + width [m]."""
     at, length = place("bump", at, length)
     end = at + number("bump: width", width, above=0.0)
     x = np.array([0.0, at, at, end, end, max(length, end)])
@@ -43,7 +43,7 @@ def cosine_bump(at: float, height: float, width: float, *, length: float) -> Pol
 
 
 def place(where: str, at: float, length: float) -> tuple[float, float]:
-    """Return beginning of an obstacle and length of its road, checked."""
+    """Return the beginning of an obstacle and the length of its road, validated."""
     at, length = number(f"{where}: at", at, at_least=0.0), number(f"{where}: length", length, above=0.0)
     if at >= length:
         raise ModelError(f"{where}: at: expected a place on the road of length {length:g}, got {at:g}")

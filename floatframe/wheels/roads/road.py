@@ -1,4 +1,4 @@
-"""Roads: flat, or heights z(x, y) on a grid in axes of the marker they lie on, x along the road and z up."""
+"""Roads: flat, or heights z(x, y) on a grid, in axes of their marker, with x along the road and z up."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,16 +15,16 @@ from floatframe.wheels.roads.surface import CENTRE, CUBIC, FLAT, GRID, GRIP, roa
 
 __all__ = ["FlatRoad", "GridRoad", "Grip", "Polyline", "Road", "profile_road"]
 
-ENVELOPE_STEPS = 20  #: of an envelope in a radius
+ENVELOPE_STEPS = 20  #: number of steps of an envelope per radius
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Grip:
-    """A factor on the friction of tyres along the road, such as of a wet patch: straight between knots."""
+    """A friction factor along the road, for example of a wet patch, linear between knots."""
 
     x: Array  #: knots along the road, (n,) [m], increasing
-    factor: Array  #: above 0, (n,); held before the first knot and beyond the last
+    factor: Array  #: above 0, (n,); constant before the first knot and beyond the last
 
     def __post_init__(self) -> None:
         x = knots("road: grip: x", self.x)
@@ -37,7 +37,7 @@ class Grip:
 
 
 def with_grip(numbers: Array, grip: Grip | None) -> Array:
-    """Return the numbers of a road with those of its grip behind them, if it has one."""
+    """Return the data of a road, followed by that of its grip, if it has one."""
     if grip is None:
         return numbers
     begun = numbers.copy()
@@ -46,7 +46,7 @@ def with_grip(numbers: Array, grip: Grip | None) -> Array:
 
 
 def check_grip(road: Any) -> None:
-    """Raise `ModelError` unless the grip of a road is one, or none."""
+    """Raise `ModelError` unless the grip of a road is a `Grip` or None."""
     if not isinstance(road.grip, Grip | None):
         raise ModelError(f"road: grip: expected a Grip(x, factor) or None, got {road.grip!r}")
 
@@ -54,39 +54,39 @@ def check_grip(road: Any) -> None:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class FlatRoad:
-    """The plane z = 0 without an end."""
+    """The infinite plane z = 0."""
 
-    grip: Grip | None = None  #: factor on the friction of tyres along the road; None: one
+    grip: Grip | None = None  #: friction factor for tyres along the road; None: 1
 
     def __post_init__(self) -> None:
         check_grip(self)
 
     def numbers(self) -> Array:
-        """What `surface.road_height` and `surface.road_grip` read: header, grip."""
+        """Data for `surface.road_height` and `surface.road_grip`: header and grip."""
         return with_grip(np.array([FLAT, 0.0, 0.0, 0.0, 0.0, 0.0]), self.grip)
 
     def height(self, x: float, y: float = 0.0) -> float:
-        """Zero [m]."""
+        """Height, which is zero [m]."""
         return 0.0
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class GridRoad:
-    """Heights z at knots x, along the road, and y, to the left, with a level edge beyond them.
+    """Heights z at knots x, along the road, and y, to the left; beyond the knots the road is level.
 
-    One y: a profile, the same at all y. Two and more: tracks, or a surface. Between the knots runs a monotone cubic
-    (no overshoot, slopes without jumps) or, with `is_linear`, a straight line. What a wheel feels is the height and the
-    slope where it stands, found on the ground itself: waves should be longer than the wheel, R |z''| < 1. Shorter ones
-    are for `enveloped`.
+    One y gives a profile, the same at all y; two or more give tracks or a surface. Between the knots, the heights
+    follow a monotone cubic (no overshoot, continuous slope) or, with `is_linear`, a straight line. A wheel uses height
+    and slope at its contact point on the ground itself. Waves should therefore be longer than the wheel, R |z''| < 1;
+    for shorter waves, use `enveloped`.
     """
 
     x: Array  #: knots along the road, (n_x,) [m], increasing
     z: Array  #: heights, (n_x, n_y) or (n_x,) [m]
     y: Array = (0.0,)  # type: ignore[assignment]  #: knots across, (n_y,) [m], increasing
-    is_linear: bool = False  #: straight between the knots
-    envelope_radius: float | None = None  #: of the disc whose lowest point z is [m]; None: z is the ground itself
-    grip: Grip | None = None  #: factor on the friction of tyres along the road; None: one
+    is_linear: bool = False  #: linear between the knots
+    envelope_radius: float | None = None  #: radius of the disc whose envelope z is [m]; None: z is the ground itself
+    grip: Grip | None = None  #: friction factor for tyres along the road; None: 1
 
     def __post_init__(self) -> None:
         x, y = knots("road: x", self.x), knots("road: y", self.y, least=1)
@@ -101,12 +101,12 @@ class GridRoad:
 
     @property
     def steepest(self) -> tuple[float, float]:
-        """The steepest slope between knots along the road, and the x where it begins [m]."""
+        """Steepest slope between knots along the road, and the x at which it begins [m]."""
         rise = np.abs(np.diff(self.z, axis=0) / np.diff(self.x)[:, None]).max(axis=1)
         return float(rise.max()), float(self.x[int(rise.argmax())])
 
     def numbers(self) -> Array:
-        """What `surface.road_height` and `surface.road_grip` read: header, knots, z, z_x, z_y, z_xy, grip."""
+        """Data for `surface.road_height` and `surface.road_grip`: header, knots, z, z_x, z_y, z_xy, grip."""
         z_x = slopes(self.x, self.z)
         z_y = slopes(self.y, self.z.T).T
         z_xy = slopes(self.y, z_x.T).T
@@ -121,9 +121,9 @@ class GridRoad:
         return float(road_height(self.numbers(), 0, float(x), float(y))[0])
 
     def enveloped(self, radius: float, *, width: float = 0.0, step: float | None = None) -> "GridRoad":
-        """Return what a rigid disc of that radius [m] and width [m] feels: R below its centre when it touches.
+        """Return the envelope for a rigid disc of that radius [m] and width [m]: R below its centre when it touches.
 
-        The ground counts as straight between its knots. `step` of the result [m], a twentieth of the radius by default.
+        The ground is taken as linear between its knots. `step` is the spacing of the result [m], by default R/20.
         """
         R = number("envelope: radius", radius, above=0.0)
         half = 0.5 * number("envelope: width", width, at_least=0.0)
@@ -137,7 +137,7 @@ class GridRoad:
 
 
 def widest(y: Array, rows: Array, low: float, high: float) -> Array:
-    """Return the highest of rows (n_y, n) at y, straight between them, over low <= y <= high, (n,)."""
+    """Return the highest of the rows, (n_y, n), at y, interpolated linearly, over low <= y <= high, (n,)."""
     if len(y) == 1:
         return rows[0]
     ends = [at_row(y, rows, low), at_row(y, rows, high)]
@@ -145,7 +145,7 @@ def widest(y: Array, rows: Array, low: float, high: float) -> Array:
 
 
 def at_row(y: Array, rows: Array, place: float) -> Array:
-    """Return the row at a place between rows, straight between them and level beyond, (n,)."""
+    """Return the row at a position between rows, interpolated linearly and constant beyond them, (n,)."""
     k = int(np.clip(np.searchsorted(y, place) - 1, 0, len(y) - 2))
     s = float(np.clip((place - y[k]) / (y[k + 1] - y[k]), 0.0, 1.0))
     return (1 - s) * rows[k] + s * rows[k + 1]
@@ -154,9 +154,9 @@ def at_row(y: Array, rows: Array, place: float) -> Array:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Polyline:
-    """A profile of straight pieces, which may have upright steps: two corners at one x."""
+    """A profile of straight pieces, which may have upright steps: two corners with equal x."""
 
-    x: Array  #: of the corners, (n,) [m], never falling
+    x: Array  #: of the corners, (n,) [m], not decreasing
     z: Array  #: of the corners, (n,) [m]
 
     def __post_init__(self) -> None:
@@ -167,23 +167,23 @@ class Polyline:
             raise ModelError(f"profile: x: expected two corners or more, none behind the one before, got {x.tolist()}")
 
     def road(self) -> GridRoad:
-        """Return the profile as it stands, for wheels that are small against it."""
+        """Return the profile itself as a road, for wheels that are small compared with it."""
         return GridRoad(self.x, self.z, is_linear=True)
 
     def enveloped(
         self, radius: float, *, step: float | None = None, between: Sequence[float] | None = None
     ) -> GridRoad:
-        """Return what a rigid disc of that radius [m] feels.
+        """Return the envelope for a rigid disc of that radius [m].
 
         Parameters
         ----------
         radius
-            Of the wheel, unloaded [m].
+            Radius of the unloaded wheel [m].
         step
-            Of the result [m]; a twentieth of the radius by default.
+            Spacing of the result [m]; by default a twentieth of the radius.
         between
-            The obstacle lies between these two y [m], edges included; beside them the road is level at the height of
-            its first corner. None: at all y.
+            The obstacle lies between these two y [m], edges included; elsewhere the road is level at the height of its
+            first corner. None: at all y.
         """
         R = number("envelope: radius", radius, above=0.0)
         x = even_knots(self.x[0] - R, self.x[-1] + R, step or R / ENVELOPE_STEPS)
@@ -207,12 +207,12 @@ Road = FlatRoad | GridRoad
 
 
 def profile_road(x: Any, z: Any, *, is_linear: bool = False) -> GridRoad:
-    """Return the road of a profile, the same at all y: heights z at knots x, (n,) [m]."""
+    """Return the road of a profile, the same at all y, with heights z at knots x, (n,) [m]."""
     return GridRoad(x, z, is_linear=is_linear)
 
 
 def knots(where: str, values: Any, least: int = 2) -> Array:
-    """Return increasing numbers, at least so many; `ModelError` otherwise."""
+    """Return increasing numbers, at least `least` of them; `ModelError` otherwise."""
     array = array_of_shape(where, values, (len(np.atleast_1d(np.asarray(values, dtype=object))),))
     if len(array) < least:
         raise ModelError(f"{where}: expected {least} knots or more, got {len(array)}")
@@ -225,13 +225,13 @@ def knots(where: str, values: Any, least: int = 2) -> Array:
 
 
 def even_knots(low: float, high: float, step: float) -> Array:
-    """Return evenly spaced numbers from low to high, at most a step apart."""
+    """Return equally spaced numbers from low to high, at most a step apart."""
     number("envelope: step", step, above=0.0)
     return np.linspace(low, high, max(2, int(np.ceil((high - low) / step)) + 1))
 
 
 def slopes(x: Array, z: Array) -> Array:
-    """Return slopes of the monotone cubic through z (n, m) at knots x, (n, m); zero for a single knot."""
+    """Return the slopes, (n, m), of the monotone cubic through z, (n, m), at knots x; zero for a single knot."""
     from scipy.interpolate import PchipInterpolator  # slow to import
 
     if len(x) == 1:

@@ -1,20 +1,21 @@
-"""Height and slopes of a road under a wheel, from the numbers of the road: for real and complex numbers alike."""
+"""Height and slopes of a road under a wheel, from the data of the road, for real and complex numbers."""
 
 from numba.extending import register_jitable
 
 __all__ = ["CENTRE", "CUBIC", "FLAT", "GRID", "GRIP", "HEADER", "road_grip", "road_height"]
 
 FLAT, GRID = 0, 1  #: kinds of roads
-CENTRE = 1.0  #: heights are those that a disc sees whose centre is above the place; 0: those of the ground itself
+#: z is the envelope, the lowest point of a disc whose centre is above the place; 0: z is the ground itself
+CENTRE = 1.0
 CUBIC = 1.0  #: between the knots; 0: linear
 #: kind, n_x, n_y, interpolation, reference, grip; then x, y, and z, z_x, z_y, z_xy of (n_x, n_y)
 HEADER = 6
-GRIP = 5  #: where n, x (n), factors (n) of the grip begin, from the header on; 0: one everywhere
+GRIP = 5  #: index in the header of the beginning of the grip: n, x (n), factors (n); 0: factor 1 everywhere
 
 
 @register_jitable(error_model="numpy")
 def interval(data, at, n, x):
-    """Return k with knot[k] <= x < knot[k + 1] of n >= 2 knots at data[at:], the nearest outside."""
+    """Return k with knot[k] <= x < knot[k + 1], of n >= 2 knots at data[at:]; outside, the nearest interval."""
     low, high = 0, n - 1
     while high - low > 1:
         middle = (low + high) // 2
@@ -27,7 +28,7 @@ def interval(data, at, n, x):
 
 @register_jitable(error_model="numpy")
 def held(x, low, high):
-    """Return x held between two numbers."""
+    """Return x clamped to a range."""
     if x.real < low:
         return 0.0 * x + low
     if x.real > high:
@@ -49,9 +50,9 @@ def hermite(s, h, z_0, z_1, d_0, d_1):
 
 @register_jitable(error_model="numpy")
 def road_height(data, at, x, y):
-    """Return z, dz/dx, dz/dy of a road at (x, y), and how far x is from its nearer end (negative outside).
+    """Return z, dz/dx, dz/dy of a road at (x, y), and the distance of x from its nearer end (negative outside).
 
-    Beyond its knots a road goes on level at the height of its edge. A flat one has no end: 1e30.
+    Beyond its knots, a road is level at the height of its edge. A flat road has no end: the distance is 1e30.
     """
     zero = 0.0 * (x + y)
     if data[at] == FLAT:
@@ -102,7 +103,7 @@ def road_height(data, at, x, y):
 
 @register_jitable(error_model="numpy")
 def road_grip(data, at, x):
-    """Return the factor on the friction of tyres at x: straight between its knots, held beyond them."""
+    """Return the friction factor at x, linear between the knots and constant beyond them."""
     one = 1.0 + 0.0 * x
     if data[at + GRIP] == 0.0:
         return one
