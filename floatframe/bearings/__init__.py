@@ -1,4 +1,4 @@
-"""Bearings by their coefficients, as public elements."""
+"""Bearings described by coefficients, as public elements."""
 
 from floatframe.bearings.bearing import Bearing
 

@@ -1,15 +1,16 @@
-"""A bearing by its coefficients: radial with cross terms, axial and tilting, free to spin.
+"""A bearing described by coefficients: radial with cross coupling, axial, tilting; the shaft spins freely.
 
-d is the way from marker a (housing) to marker b (shaft) and d' its rate, both as seen in the axes of a, e the axis of
-the bearing there and s that of the shaft, w the angular velocity of b against a. On the shaft act, at marker b,
+d is the vector from marker a (housing) to marker b (shaft) and d' its rate, both in the axes of a. e is the axis of the
+bearing and s that of the shaft; w is the angular velocity of b relative to a. The following loads act on the shaft at
+marker b:
 
     across e:   F = -K (d_x, d_y) - D (d_x', d_y')           K, D (2, 2), such as those of an oil film or a seal
     along e:    F = -k_a d_z - d_a d_z'
     moment:     M = -k_t e x s - d_t s x (w x s)             e x s = (-s_y, s_x, 0)
 
-None of them has a moment about the axis of the shaft. The axes are those of the housing: a damper whose axes turned
-with the rotor would drive it. The part of K that is not symmetric has no energy; its power, which may drive the shaft,
-counts as lost.
+None of them has a moment about the axis of the shaft. The axes are those of the housing, because a damper in axes that
+rotate with the rotor would drive it. The skew-symmetric part of K has no energy; its power, which may drive the shaft,
+is counted as loss.
 """
 
 from dataclasses import dataclass
@@ -33,34 +34,35 @@ OUTPUTS = {
     "x": "m", "y": "m", "axial": "m", "tilt x": "rad", "tilt y": "rad", "force x": "N", "force y": "N",
     "axial force": "N", "energy": "J", "power lost": "W",
 }  # fmt: skip
-LEAST_COSINE = 0.5  #: between both axes as placed; less is taken for a marker that points elsewhere
+LEAST_COSINE = 0.5  #: least cosine between both axes as assembled; a smaller one indicates a wrong marker axis
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Bearing(Element):
-    """A shaft, of marker b, in a bearing, of marker a, by coefficients in axes of a; the shaft spins freely.
+    """A shaft at marker b in a bearing at marker a, described by coefficients in axes of a; the shaft spins freely.
 
-    Outputs: the way of marker b from marker a across the axis (x, y) and along it; the tilt of the shaft about x and y;
-    the forces on the shaft; energy and power lost. All is zero where the points and the axes coincide.
+    Outputs: the displacement of marker b from marker a across the axis (x, y) and along it; the tilt of the shaft about
+    x and y; the forces on the shaft; energy and power lost. All are zero where the points and the axes coincide.
 
     Raises
     ------
     ModelError
-        If a number is out of its range, all are zero, markers are none, or both axes are far apart as placed.
+        If a number is out of its range, all coefficients are zero, or both axes are far apart as assembled.
     """
 
     name: str
     marker_a: Marker
     marker_b: Marker
-    stiffness: Array  #: K across the axis, [[k_xx, k_xy], [k_yx, k_yy]], its diagonal, or one number [N/m]
+    stiffness: Array  #: K across the axis: [[k_xx, k_xy], [k_yx, k_yy]], its diagonal, or one number [N/m]
     damping: Array = 0.0  # type: ignore[assignment]  #: D, likewise [N s/m]
     axial_stiffness: float = 0.0  #: k_a [N/m]
     axial_damping: float = 0.0  #: d_a [N s/m]
     tilt_stiffness: float = 0.0  #: k_t [N m/rad]
     tilt_damping: float = 0.0  #: d_t [N m s/rad]
     axis: Array = (0.0, 0.0, 1.0)  # type: ignore[assignment]  #: e, in the axes of marker a, (3,)
-    #: towards x, in the axes of marker a, (3,); None: the axis of a that follows the one next to `axis`, x for z
+    #: direction of x, in the axes of marker a, (3,); None: the axis of a that follows the one nearest to `axis`: x for
+    #: z
     x_axis: Array | None = None
     shaft_axis: Array | None = None  #: s, in the axes of marker b, (3,); None: as `axis`
 
@@ -87,7 +89,7 @@ class Bearing(Element):
 
     @property
     def coefficients(self) -> list[float]:
-        """K and D row by row, and those along the axis and of the tilt."""
+        """K and D row by row, followed by the axial and tilting coefficients."""
         return [*np.ravel(self.stiffness), *np.ravel(self.damping), self.axial_stiffness, self.axial_damping,
                 self.tilt_stiffness, self.tilt_damping]  # fmt: skip
 
@@ -99,8 +101,8 @@ class Bearing(Element):
         if cosine < LEAST_COSINE:
             raise ModelError(
                 f"element {self.name!r}: expected the axis of the shaft within "
-                f"{np.degrees(np.arccos(LEAST_COSINE)):.3g}° of that of the bearing as placed, got "
-                f"{np.degrees(np.arccos(max(cosine, -1.0))):.3g}°; say axis in "
+                f"{np.degrees(np.arccos(LEAST_COSINE)):.3g}° of that of the bearing as assembled, got "
+                f"{np.degrees(np.arccos(max(cosine, -1.0))):.3g}°; give axis in "
                 "the axes of marker_a, and shaft_axis in those of marker_b"
             )
         y_axis = np.cross(self.axis, self.x_axis)
@@ -119,7 +121,7 @@ class Bearing(Element):
 
 
 def two_by_two(where: str, values: Array) -> Array:
-    """Return a matrix, (2, 2), given whole, by its diagonal, or by the number that stands there twice."""
+    """Return a (2, 2) matrix from the complete matrix, its diagonal, or one number for both diagonal entries."""
     if np.ndim(values) == 0:
         values = np.full(2, number(where, values))
     if np.ndim(values) == 1:
@@ -127,12 +129,12 @@ def two_by_two(where: str, values: Array) -> Array:
     return array_of_shape(where, values, (2, 2))
 
 
-AXIAL, TILT, DIRECTIONS = 8, 10, 12  #: places in `data`
+AXIAL, TILT, DIRECTIONS = 8, 10, 12  #: indices in `data`
 
 
 @njit
 def bearing_law(t, x, z, lam, data, wrench, z_dot, g, seen):
-    """Write the forces across and along the axis, the moment of the tilt, and the outputs."""
+    """Write the radial and axial forces, the tilting moment, and the outputs."""
     e_x, e_y = direction_of(x, 0, data, DIRECTIONS), direction_of(x, 0, data, DIRECTIONS + 3)
     e, s = direction_of(x, 0, data, DIRECTIONS + 6), direction_of(x, 1, data, DIRECTIONS + 9)
     d_x, rate_x = axial_motion(x, 0, 1, e_x)
@@ -156,7 +158,7 @@ def bearing_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     seen[3], seen[4] = inner_product(tilt, e_x), inner_product(tilt, e_y)
     seen[5], seen[6], seen[7] = F_x, F_y, F_z
     mean = 0.5 * (data[1] + data[2])
-    turned = inner_product(tilt, tilt) / (1.0 + inner_product(e, s))  # 1 - e · s, without its rounding
+    turned = inner_product(tilt, tilt) / (1.0 + inner_product(e, s))  # 1 - e · s without cancellation
     seen[8] = 0.5 * (data[0] * d_x * d_x + data[3] * d_y * d_y + data[AXIAL] * d_z * d_z) + mean * d_x * d_y
     seen[8] += data[TILT] * turned
     spring_x, spring_y = data[0] * d_x + mean * d_y, mean * d_x + data[3] * d_y

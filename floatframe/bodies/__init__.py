@@ -1,1 +1,1 @@
-"""Bodies and the places on them: rigid, flexible, ground; markers; mass properties."""
+"""Bodies (rigid, flexible, ground), markers on them, and mass properties."""

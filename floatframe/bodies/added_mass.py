@@ -1,9 +1,10 @@
-"""Small parts fixed to interfaces of a reduced body: their mass and inertia become part of the body.
+"""Small masses fixed to interfaces of a reduced body, whose mass and inertia become part of the body.
 
-A part turns and moves with its interface: a particle at rho from the interface node has the position c = p + rho and
-the shape phi = Psi_t + Psi_r × rho, so that every moment of the body grows by sums over particles (theory.md §5). An
-inertia is carried by six particles on its principal axes. Against a rigid body fixed to the interface nothing is left
-out but the terms of second order in the elastic rotation, and none at all for a mass in the interface node.
+An added mass moves and rotates with its interface. A particle at rho from the interface node has the position c = p +
+rho and the shape phi = Psi_t + Psi_r × rho, so that every inertia moment of the body grows by sums over particles
+(theory.md §5). An inertia tensor is represented by six particles on its principal axes. Compared with a rigid body
+fixed to the interface, only terms of second order in the elastic rotation are neglected; for a mass at the interface
+node, none are.
 
 rod = with_masses(rod, [AddedMass("small_end", 0.3), AddedMass("big_end", 0.5, offset=(0, 0, 0.02), inertia=J)])
 """
@@ -27,13 +28,13 @@ __all__ = ["AddedMass", "with_masses"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class AddedMass:
-    """A small part fixed to an interface."""
+    """A small rigid mass fixed to an interface."""
 
     interface: str  #: name of the interface
     mass: float  #: [kg]
-    #: centre of mass from the interface node, in the axes of the interface, (3,) [m]
+    #: position of the centre of mass relative to the interface node, in the axes of the interface, (3,) [m]
     offset: Array = field(default_factory=lambda: np.zeros(3))
-    #: about that centre, in the axes of the interface, (3, 3) [kg m²]
+    #: inertia tensor about the centre of mass, in the axes of the interface, (3, 3) [kg m²]
     inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
 
     def __post_init__(self) -> None:
@@ -51,7 +52,7 @@ class AddedMass:
             )
 
     def particles(self) -> tuple[float, Array]:
-        """Return mass of each particle and their places from the interface node, axes of the interface, (n, 3)."""
+        """Return the mass of each particle, and their positions relative to the interface node in its axes, (n, 3)."""
         if not self.inertia.any():
             return self.mass, self.offset[None, :]
         values, axes = np.linalg.eigh(second_moments(self.inertia))
@@ -60,21 +61,21 @@ class AddedMass:
 
 
 def second_moments(J: Array) -> Array:
-    """Return ∫ x xᵀ of an inertia tensor, tr(J)/2 1 - J, (3, 3)."""
+    """Return ∫ x xᵀ = tr(J)/2 1 - J of an inertia tensor J, (3, 3)."""
     return np.asarray(0.5 * np.trace(J) * np.eye(3) - J)
 
 
 def with_masses(body: ReducedBody, masses: Sequence[AddedMass]) -> ReducedBody:
-    """Return the body with small parts fixed to its interfaces.
+    """Return the body with small masses fixed to its interfaces.
 
-    Modes, stiffness and interfaces stay; mass matrix, moments and, where the body has it, the geometric stiffness of
-    its inertia loads grow. The modes are then no longer those of free vibration of the body, and its frame no longer
-    that of Tisserand if it was: neither is needed by the equations of motion.
+    Modes, stiffness and interfaces stay unchanged. Mass matrix, inertia moments and, if the body has it, the geometric
+    stiffness of its inertia loads are increased. The modes are then no longer vibration modes of the free body, and its
+    frame is no longer a Tisserand frame; the equations of motion require neither.
 
     Raises
     ------
     ModelError
-        If an interface is not there.
+        If an interface does not exist.
     """
     moments, M, geometric = body.moments, np.array(body.M), body.geometric
     for part in masses:
@@ -116,9 +117,10 @@ def with_masses(body: ReducedBody, masses: Sequence[AddedMass]) -> ReducedBody:
 
 
 def with_particle(geometric: GeometricStiffness, k: int, m: float, c: Array, rho: Array) -> GeometricStiffness:
-    """Return the geometric stiffness with the inertia loads of a particle at rho from the node of interface k.
+    """Return the geometric stiffness including the inertia loads of a particle at rho from the node of interface k.
 
-    Its unit loads (see `GeometricStiffness`) are forces at the particle: a force f and the moment rho × f at the node.
+    Its unit loads (see `GeometricStiffness`) are forces at the particle: a force f, and the moment rho × f, at the
+    node.
     """
     if not geometric.is_loaded[k]:
         raise ModelError(

@@ -1,4 +1,4 @@
-"""Coordinates of the motion that couplers and user forces see, each with the force that acts to increase it."""
+"""Coordinates of the motion for couplers and user forces; each has a force that acts to increase it."""
 
 from dataclasses import dataclass, field
 
@@ -15,16 +15,16 @@ __all__ = ["AxialAngle", "AxialDistance", "Coordinate", "JointCoordinate", "Poin
 
 @dataclass(frozen=True)
 class JointCoordinate:
-    """A coordinate of a joint: its distance or angle, free or prescribed."""
+    """A coordinate of a joint, a distance or an angle, free or prescribed."""
 
     joint: str  #: name of the joint
-    coordinate: str  #: of it, such as "angle"
+    coordinate: str  #: name of its coordinate, such as "angle"
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class AxialDistance:
-    """Distance of the point of marker B from that of marker A along an axis of A; a force acts at the point of B."""
+    """Distance of the point of marker B from that of marker A along an axis of A; its force acts at the point of B."""
 
     marker_a: Marker
     marker_b: Marker
@@ -37,10 +37,10 @@ class AxialDistance:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class AxialAngle:
-    """Angle of marker B about an axis of A, zero as placed; its rate is that of the angular velocity along the axis.
+    """Angle of marker B about an axis of A, zero as assembled; its rate is the angular velocity along the axis.
 
-    Made for markers that turn against each other about that axis: where the axis of B tilts by a small angle, value
-    and rate differ by its square.
+    It is intended for markers that rotate relative to each other about that axis. If the axis of B tilts by a small
+    angle, value and rate are inconsistent by the square of this angle.
     """
 
     marker_a: Marker
@@ -54,7 +54,7 @@ class AxialAngle:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class PointDistance:
-    """Distance of the points of two markers; a force acts along the line between them."""
+    """Distance between the points of two markers; its force acts along the line between them."""
 
     marker_a: Marker
     marker_b: Marker
@@ -64,7 +64,7 @@ Coordinate = JointCoordinate | AxialDistance | AxialAngle | PointDistance
 
 
 def coordinate_words(where: str, value: object) -> Coordinate:
-    """Return a coordinate as given; `ModelError` if it is none."""
+    """Return a coordinate unchanged; `ModelError` if it is not a coordinate."""
     if not isinstance(value, Coordinate):
         raise ModelError(
             f"{where}: expected a JointCoordinate, AxialDistance, AxialAngle or PointDistance, got {value!r}"

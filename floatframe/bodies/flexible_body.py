@@ -1,4 +1,4 @@
-"""A flexible body: a reduced body (modal file) with a place and a motion at the start."""
+"""A flexible body: a reduced body (modal file) with initial position and motion."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -22,33 +22,37 @@ __all__ = ["FlexibleBody"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class FlexibleBody:
-    """An instance of a reduced body; several instances share its data.
+    """An instance of a reduced body; several instances can share its data.
 
-    Place and motion are those of the *mesh* axes, so that a body stands where its mesh was drawn unless it is moved,
-    and an input does not change when the same part is reduced in another body frame (nodal or Tisserand).
+    Position and motion are those of the *mesh* axes. A body therefore stands where its mesh was drawn unless it is
+    moved, and the input does not change if the same part is reduced in another body frame (nodal or Tisserand).
 
     Raises
     ------
     ModelError
-        If a number is not finite or a shape is wrong.
+        If a number is not finite or an array has a wrong shape.
     """
 
     name: str
     reduced: ReducedBody
-    position: Array = field(default_factory=lambda: np.zeros(3))  #: of the mesh origin in ground axes, (3,) [m]
-    orientation: Array = field(default_factory=lambda: np.array([1.0, 0, 0, 0]))  #: Euler parameters, mesh axes, (4,)
-    velocity: Array = field(default_factory=lambda: np.zeros(3))  #: of the body point at the mesh origin, ground, (3,)
+    position: Array = field(default_factory=lambda: np.zeros(3))  #: of the mesh origin, in ground axes, (3,) [m]
+    #: Euler parameters of the mesh axes, (4,)
+    orientation: Array = field(default_factory=lambda: np.array([1.0, 0, 0, 0]))
+    #: of the body point at the mesh origin, in ground axes, (3,) [m/s]
+    velocity: Array = field(default_factory=lambda: np.zeros(3))
     #: angular velocity in mesh axes, (3,) [rad/s]
     omega_B: Array = field(default_factory=lambda: np.zeros(3))  # noqa: N815
-    q: Array = field(default_factory=lambda: np.zeros(0))  #: modal coordinates at the start, (n_q,); empty: undeformed
-    q_dot: Array = field(default_factory=lambda: np.zeros(0))  #: their rates, (n_q,); empty: zero
-    source: str = ""  #: path of the modal file, for the record and the animation
-    #: whether the geometric stiffness counts: loads stiffen or soften the body (theory.md §7); "auto": if it is there
+    q: Array = field(default_factory=lambda: np.zeros(0))  #: initial modal coordinates, (n_q,); empty: undeformed
+    #: initial rates of the modal coordinates, (n_q,); empty: zero
+    q_dot: Array = field(default_factory=lambda: np.zeros(0))
+    source: str = ""  #: path of the modal file, stored in results and used for films
+    #: whether to use the geometric stiffness, by which loads stiffen or soften the body (theory.md §7); "auto": if
+    #: present
     stiffening: bool | Literal["auto"] = "auto"
-    #: whether inertia terms that the reduced body does not know (`Moments.missing`) are left out of the motion, which
-    #: is then exact to first order in speeds and deformation; False: a body without them is refused
+    #: whether to neglect inertia terms that the reduced body lacks (`Moments.missing`); the motion is then exact to
+    #: first order in speeds and deformation. False: a body without them is refused
     leave_out_missing: bool = False
-    #: what it looks like besides its surface, in mesh axes or in those of interfaces
+    #: shapes drawn besides its surface, in mesh axes or in those of interfaces
     shapes: Sequence[Shape | Geometry] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
@@ -92,17 +96,17 @@ class FlexibleBody:
 
     @property
     def is_stiffened(self) -> bool:
-        """Whether the geometric stiffness of the reduced body counts."""
+        """Whether the geometric stiffness of the reduced body is used."""
         return self.stiffening is not False and self.reduced.geometric is not None
 
     @property
     def mean_axes(self) -> MeanAxes | None:
-        """How the engine moves a stiffened body of another frame: in mean axes; None: in the frame of its file."""
+        """Mean axes in which a stiffened body with another frame is computed; None: in the frame of its file."""
         return mean_axes(self.reduced) if self.is_stiffened else None
 
     @property
     def moved(self) -> ReducedBody:
-        """The reduced body in the frame in which the engine moves it."""
+        """The reduced body in the frame in which its motion is computed."""
         axes = self.mean_axes
         return self.reduced if axes is None else axes.reduced
 
@@ -113,16 +117,16 @@ class FlexibleBody:
 
     @property
     def frame_position(self) -> Array:
-        """Position of the frame origin at the start, ground axes, (3,) [m]."""
+        """Position of the frame origin at the start, in ground axes, (3,) [m]."""
         return self.position + rotation_matrix(self.orientation) @ self.reduced.frame.origin
 
     @property
     def frame_velocity(self) -> Array:
-        """Velocity of the frame origin at the start, ground axes, (3,) [m/s]."""
+        """Velocity of the frame origin at the start, in ground axes, (3,) [m/s]."""
         arm = np.cross(self.omega_B, self.reduced.frame.origin)
         return self.velocity + rotation_matrix(self.orientation) @ arm
 
     @property
     def frame_omega(self) -> Array:
-        """Angular velocity at the start in the axes of the body frame, (3,) [rad/s]."""
+        """Angular velocity at the start, in axes of the body frame, (3,) [rad/s]."""
         return self.reduced.frame.axes.T @ self.omega_B

@@ -1,4 +1,4 @@
-"""The ground: the frame G in which everything moves, and a body that does not."""
+"""The ground: the inertial frame G, and a body at rest in it."""
 
 from dataclasses import dataclass
 
@@ -7,9 +7,9 @@ __all__ = ["GROUND", "Ground"]
 
 @dataclass(frozen=True)
 class Ground:
-    """The inertial frame as a body: markers on it stand still."""
+    """The inertial frame as a body; markers on it are at rest."""
 
     name: str = "ground"
 
 
-GROUND = Ground()  #: the one ground there is
+GROUND = Ground()  #: the only instance

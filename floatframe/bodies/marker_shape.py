@@ -1,21 +1,21 @@
-"""A marker in its body: its place, how it moves with the modes, and its motion with the body. The one place for both.
+"""A marker in its body: its position, its motion due to the modes, and its motion with the body.
 
-With q the coordinates of the body and, of a stiffened body, K_P of second order (docs/theory.md §7), all in body axes:
+q are the modal coordinates. K_P is the second-order part for a stiffened body (docs/theory.md §7). In body axes:
 
     Psi(q) = Psi - K_P q                      derivative of displacement and rotation vector by q, (6, n)
     (d, theta) = 1/2 (Psi + Psi(q)) q         rho = c + d,  axes = exp(theta) triad
     rates      Psi(q) q_dot                   second rates  Psi(q) q_ddot - (K_P q_dot) q_dot
     spin       nu = L(theta) theta_dot        L the left Jacobian of the rotation vector, nu_dot as in rotations.py
 
-and with position r, matrix R = R_GB and velocities v (ground axes), omega (body axes) of its body:
+With position r, matrix R = R_GB and velocities v (ground axes), omega (body axes) of the body:
 
     position      r + R rho                         acceleration   v_dot + R (alpha × rho + omega × (omega × rho)
     velocity      v + R (omega × rho + rho_dot)                    + 2 omega × rho_dot + rho_ddot)
     axes          R exp(theta) triad                angular velocity  R (omega + nu)
     angular acceleration  R (alpha + omega × nu + nu_dot)
 
-For stacks: vectors along the last axis; what is taken at q alone takes complex q too. The time loop has the same
-formulas compiled, in kernels/marker.py; a test holds both to each other.
+Arrays may be stacks, with vectors along the last axis. Functions of q alone also accept complex q. The time loop uses
+the same formulas compiled, in kernels/marker.py; a test compares both.
 """
 
 from dataclasses import dataclass
@@ -51,7 +51,8 @@ class MarkerShape:
 
     position: Array  #: undeformed, body frame, (3,)
     triad: Array  #: undeformed axes as columns, body frame, (3, 3)
-    psi: Array | None = None  #: displacement and rotation by q, undeformed, (6, n); None: it does not move
+    #: displacement and rotation due to q, undeformed, (6, n); None: the marker does not deform
+    psi: Array | None = None
     bend: Array | None = None  #: K_P of a stiffened body, symmetric in the modes, (6, n, n); None: zero
 
     def shapes(self, q: Array) -> Array:
@@ -82,7 +83,7 @@ class MarkerShape:
         return self.position + d[..., :3], rotation_exp(d[..., 3:]) @ self.triad
 
     def jacobian(self, q: Array) -> Array:
-        """Return translation and rotation by the small motions (dx, dtheta, dq) of the body, (6, 6 + n), for q (n,)."""
+        """Return translation and rotation per small motion (dx, dtheta, dq) of the body, (6, 6 + n), at q, (n,)."""
         d = self.deformation(q)
         J = np.zeros((6, 6 + len(q)))
         J[:3, :3] = J[3:, 3:6] = np.eye(3)
@@ -101,7 +102,7 @@ def bent(K: Array, x: Array) -> Array:
 
 
 def bending_of(reduced: ReducedBody, name: str) -> Array:
-    """Return K_P of an interface, (6, n_q, n_q); zero where the body has none, or its loads were left out."""
+    """Return K_P of an interface, (6, n_q, n_q); zero if the body has none, or excludes loads of this interface."""
     if reduced.geometric is None:
         return np.zeros((6, reduced.n_q, reduced.n_q))
     place = [interface.name for interface in reduced.interfaces].index(name)
@@ -116,11 +117,12 @@ def interface_shape(reduced: ReducedBody, name: str, *, is_stiffened: bool) -> M
 
 
 def node_shape(reduced: ReducedBody, nodes: int | IntArray, *, is_stiffened: bool) -> MarkerShape:
-    """Return the marker at a kept node, or of the mean motion of several, with the axes of the body frame.
+    """Return the marker at a kept node, or of the mean motion of several nodes, with the axes of the body frame.
 
-    One node turns as its rotation is kept (`ReducedBody.kept`), and not at all where it is not (`is_turning`); several
-    turn by the mean rotation of their translations (an RBE3 of equal weights), and not at all where they lie on one
-    line. Of a stiffened body with quadratic modes the displacement is of second order, Phi q + ½ Σ q_k q_l g_kl.
+    A single node rotates if its rotation is kept (`ReducedBody.kept`), otherwise it does not rotate (`is_turning`).
+    Several nodes rotate by the mean rotation of their translations (an RBE3 with equal weights), or not at all if they
+    lie on a line. For a stiffened body with quadratic modes, the displacement is of second order, Phi q + ½ Σ q_k q_l
+    g_kl.
     """
     rows = np.atleast_1d(np.asarray(nodes, dtype=np.int64))
     psi = np.concatenate([reduced.Phi[rows].mean(axis=0), rotation_of_nodes(reduced, rows)])
@@ -132,7 +134,7 @@ def node_shape(reduced: ReducedBody, nodes: int | IntArray, *, is_stiffened: boo
 
 
 def rotation_of_nodes(reduced: ReducedBody, rows: IntArray) -> Array:
-    """Return the rotation of a node, or the mean one of several, over the modes, (3, n_q); zero where it is unknown."""
+    """Return the (mean) rotation of one or several nodes due to the modes, (3, n_q); zero if it is unknown."""
     if not is_turning(reduced, rows):
         return np.zeros((3, reduced.n_q))
     if len(rows) == 1:
@@ -144,14 +146,14 @@ def rotation_of_nodes(reduced: ReducedBody, rows: IntArray) -> Array:
 
 
 def is_turning(reduced: ReducedBody, rows: IntArray) -> bool:
-    """Whether the rotation of a node is kept, or several nodes have a mean one."""
+    """Return whether the rotation of a node is kept, or several nodes have a mean rotation."""
     if len(rows) == 1:
         return reduced.kept is not None and reduced.kept.of_node(int(rows[0])) is not None
     return are_spread(np.asarray(reduced.nodes[rows]))
 
 
 class MotionInBody(NamedTuple):
-    """Motion of a marker as its body sees it, body axes."""
+    """Motion of a marker relative to its body, in body axes."""
 
     rho: Array  #: from the frame origin, (..., 3)
     rho_dot: Array
@@ -162,7 +164,7 @@ class MotionInBody(NamedTuple):
 
 
 def motion_in_body(shape: MarkerShape, q: Array, q_dot: Array, q_ddot: Array) -> MotionInBody:
-    """Return the motion of a marker in its body, for stacks (..., n)."""
+    """Return the motion of a marker relative to its body, for stacks (..., n)."""
     rho, axes = shape.pose(q)
     rate, second = shape.rates(q, q_dot, q_ddot)
     zero = np.zeros((*q.shape[:-1], 3))
@@ -187,7 +189,7 @@ class BodyFrameMotion(NamedTuple):
 
 
 class MarkerMotion(NamedTuple):
-    """Motion of a marker, ground axes."""
+    """Motion of a marker in ground axes."""
 
     position: Array  #: (..., 3)
     velocity: Array
@@ -198,7 +200,7 @@ class MarkerMotion(NamedTuple):
 
 
 def marker_motion(body: BodyFrameMotion, own: MotionInBody) -> MarkerMotion:
-    """Return the motion of a marker whose motion in its body is known."""
+    """Return the motion of a marker from the motion of its body frame and its motion relative to the body."""
     R, omega, alpha = body.R, body.omega, body.alpha
     arm = cross(omega, own.rho)
     relative = cross(alpha, own.rho) + cross(omega, arm) + 2 * cross(omega, own.rho_dot) + own.rho_ddot

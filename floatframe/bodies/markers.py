@@ -1,4 +1,4 @@
-"""Markers: named places on bodies where joints and forces act."""
+"""Markers: points with axes on bodies, where joints and forces act."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -15,7 +15,7 @@ __all__ = ["Marker", "Named", "Place", "body_name"]
 
 
 class Named(Protocol):
-    """Anything with a name: a body, or the ground."""
+    """An object with a name: a body, or the ground."""
 
     @property
     def name(self) -> str:
@@ -25,18 +25,19 @@ class Named(Protocol):
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Marker:
-    """A place with axes on a body.
+    """A point with axes on a body.
 
-    On a flexible body: an interface by name, with its own triad. On a rigid body or the ground: a position and a
-    triad in the body frame, the frame itself by default. Sensors and channels also take a place on a flexible body that
-    is no interface: a kept node by its number in the user's mesh or by its position there, or the mean motion of the
-    nodes of an element or a set.
+    On a flexible body, a marker is at an interface, with its own triad. On a rigid body or the ground, it has a
+    position and a triad in the body frame (default: the body frame itself). Sensors and channels also accept a point on
+    a flexible body that is not an interface: a kept node, given by its number in the user's mesh or its position there,
+    or the mean motion of the nodes of an element or a set.
     """
 
     body: str | Named  #: the body or its name
     interface: str | None = None  #: interface of a flexible body
     position: Array | None = None  #: in the body frame of a rigid body or the ground, (3,) [m]; None: the origin
-    triad: Array | None = None  #: columns: axes of the marker in those of the body or interface, (3, 3); None: the same
+    #: axes of the marker as columns, in those of the body or interface, (3, 3); None: the same axes
+    triad: Array | None = None
     node: int | str | None = None  #: number of a kept node; "INSTANCE.number" where instances have the same numbers
     element: int | str | None = None  #: number of an element on the surface
     set: str | None = None  #: name of a set of nodes or elements
@@ -63,9 +64,10 @@ class Marker:
             raise ModelError(f"marker on {body_name(self.body)!r}: {error}") from error
 
 
-Place = Marker | Named | str  #: a marker, or a body (or its name): then where the other marker of the joint is placed
+#: a marker, or a body (or its name), which is then placed where the other marker of the joint is
+Place = Marker | Named | str
 
 
 def body_name(body: str | Named) -> str:
-    """Return the name of a body given by itself or by its name."""
+    """Return the name of a body, given as the body or its name."""
     return body if isinstance(body, str) else body.name

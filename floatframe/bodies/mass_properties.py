@@ -1,4 +1,4 @@
-"""Mass properties of rigid bodies, as CAD programs give them, and their sums.
+"""Mass properties of rigid bodies in the forms that CAD programs export, and their sums.
 
 rod = mass_properties(1.2, (0.1, 0, 0), inertia, axes=principal_axes)
 RigidBody("rod", **combined(rod, point_mass(0.3, (0.2, 0, 0))).arguments)
@@ -24,11 +24,11 @@ class MassProperties:
 
     mass: float  #: [kg]
     center_of_mass: Array  #: (3,) [m]
-    inertia: Array  #: about the centre of mass, products with their sign: I_xy = -∫ x y, (3, 3) [kg m²]
+    inertia: Array  #: about the centre of mass, products of inertia with their sign, I_xy = -∫ x y, (3, 3) [kg m²]
 
     @property
     def arguments(self) -> dict[str, Any]:
-        """The same as keyword arguments of `RigidBody`."""
+        """The mass properties as keyword arguments of `RigidBody`."""
         return {"mass": self.mass, "center_of_mass": self.center_of_mass, "inertia": self.inertia}
 
 
@@ -52,8 +52,8 @@ def mass_properties(
     inertia
         Tensor about the reference point, (3, 3) [kg m²].
     axes
-        Columns: axes in which the tensor is given, in those of the body frame, (3, 3); such as principal axes.
-        Default: those of the body frame.
+        Axes in which the tensor is given, as columns, in the body frame, (3, 3), such as principal axes. Default: those
+        of the body frame.
     reference
         Point about which the tensor is given, in the body frame, (3,) [m]; default: the centre of mass.
     positive_products
@@ -87,14 +87,14 @@ def mass_properties(
 def point_mass(
     mass: float, position: Array | tuple[float, float, float], inertia: Array | None = None
 ) -> MassProperties:
-    """Return the properties of a small part: a mass at a position, with its own inertia or none."""
+    """Return the properties of a small mass at a position, with or without an inertia of its own."""
     own = np.zeros((3, 3)) if inertia is None else array_of_shape("point_mass: inertia", inertia, (3, 3))
     m = number("point_mass: mass", mass, above=0.0)
     return MassProperties(m, array_of_shape("point_mass: position", position, (3,)), own)
 
 
 def combined(*parts: MassProperties) -> MassProperties:
-    """Return the properties of parts that are fixed to each other."""
+    """Return the total properties of parts that are fixed to each other."""
     if not parts:
         raise ModelError("combined: expected at least one part, got none")
     m = sum(part.mass for part in parts)

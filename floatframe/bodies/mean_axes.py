@@ -1,22 +1,22 @@
-"""A stiffened body in mean axes, and the motion of the frame of its file in them (docs/theory.md §7).
+"""A stiffened body in mean axes, and the transformation to the frame of its file (docs/theory.md §7).
 
-The engine moves a stiffened body in its mean axes B', whatever frame B its file has. The strain of a body does not
-depend on who looks at it, so that the coordinates of both frames belong to each other for good, q = Z q'. What is
-left is how B stands in B', by a rotation vector and the place of one point c_p of B, both to second order:
+The engine computes the motion of a stiffened body in its mean axes B', whatever frame B its file has. The strain of a
+body does not depend on the frame, so the modal coordinates of both frames are related by a constant matrix, q = Z q'.
+In addition, the rotation vector of B in B' and the position of one point c_p of B are needed, both to second order:
 
     R = R' exp(theta),  r + R c_p = r' + R' rho,  (rho, theta) = (rho_0, 0) + Psi q' - 1/2 q'ᵀ K q'
 
-That is the kinematics of a marker (`floatframe.bodies.marker_shape`), whose Psi and K follow from what mean axes are,
-seen from B (c̄ = c - S/m, Theta = -theta the rotation vector of B' in B):
+These are the kinematics of a marker (`floatframe.bodies.marker_shape`). Its Psi and K follow from the definition of
+mean axes, described in B (c̄ = c - S/m, Theta = -theta the rotation vector of B' in B):
 
 (1) the origin of B' is the centre of mass:        m r' = m r + R s(q),  s = S + 1C q + 1/2 qᵀ K_t q
-(2) no part of the deformation turns B':           ax(exp(-Theta) A(q)) = 0,  A = ∫ (c + u) c̄ᵀ
+(2) the deformation does not rotate B':            ax(exp(-Theta) A(q)) = 0,  A = ∫ (c + u) c̄ᵀ
 (3) first order, with R̄ = ∫ c̄ c̄ᵀ:                 (tr R̄ 1 - R̄) Theta_1 = ax(U_1),  U_1 = ∫ phi q c̄ᵀ
 (4) second order:                                  (tr R̄ 1 - R̄) Theta_2 = ax(U_2 - Theta_1~ U_1 + 1/2 Theta_1~² R̄)
     ax(U_2) = 1/2 qᵀ (K_r - S/m × K_t) q: the work of the unit loads of rotation and translation
 
-ax(U) = Σ o × f of U = Σ f oᵀ. Both directions are inverse to each other to rounding. c_p is the interface to which a
-nodal frame is attached: its marker then does not move in B at all, as the engine has it.
+ax(U) = Σ o × f of U = Σ f oᵀ. The two transformations are inverse to each other within rounding. c_p is the interface
+to which a nodal frame is attached; its marker then does not move in B, as the engine requires.
 """
 
 from dataclasses import dataclass
@@ -47,7 +47,7 @@ _made: WeakKeyDictionary[ReducedBody, "MeanAxes | None"] = WeakKeyDictionary()
 
 @dataclass(frozen=True, eq=False)
 class FrameMotion:
-    """Motion of a body frame and of the coordinates in it; any number of times in front."""
+    """Motion of a body frame and of the modal coordinates in it; arrays may have any number of time dimensions."""
 
     r: Array  #: origin, ground axes, (..., 3) [m]
     p: Array  #: Euler parameters, (..., 4)
@@ -67,20 +67,20 @@ class FrameMotion:
 
 @dataclass(frozen=True, eq=False)
 class MeanAxes:
-    """A stiffened body as the engine moves it, and the way to the frame of its file and back."""
+    """A stiffened body in mean axes, with the transformations to and from the frame of its file."""
 
-    reduced: ReducedBody  #: in mean axes B', parallel to those of the file while undeformed
+    reduced: ReducedBody  #: in mean axes B', which are parallel to those of the file while undeformed
     Z: Array  #: q = Z q', (n_q, n_q)
-    frame: MarkerShape  #: the point c_p with the axes of B, as B' sees them
+    frame: MarkerShape  #: the point c_p with the axes of B, in B'
     point: Array  #: c_p in B, (3,) [m]
 
     @cached_property
     def inverse(self) -> Array:
-        """Of Z, (n_q, n_q)."""
+        """Inverse of Z, (n_q, n_q)."""
         return np.asarray(np.linalg.inv(self.Z))
 
     def to_file(self, motion: FrameMotion) -> FrameMotion:
-        """Return the motion in the frame of the file of one in mean axes."""
+        """Return a motion, given in mean axes, in the frame of the file."""
         q = motion.q
         own = motion_in_body(self.frame, q, motion.q_dot, motion.q_ddot)
         at = marker_motion(motion.of_frame, own)
@@ -100,7 +100,7 @@ class MeanAxes:
         )
 
     def to_mean(self, motion: FrameMotion) -> FrameMotion:
-        """Return the motion in mean axes of one in the frame of the file."""
+        """Return a motion, given in the frame of the file, in mean axes."""
         q, q_dot, q_ddot = (x @ self.inverse.T for x in (motion.q, motion.q_dot, motion.q_ddot))
         own = motion_in_body(self.frame, q, q_dot, q_ddot)
         at = marker_motion(motion.of_frame, motion_in_body(MarkerShape(self.point, np.eye(3)), q, q_dot, q_ddot))
@@ -123,9 +123,9 @@ class MeanAxes:
         )
 
     def small_motions(self, q: Array) -> Array:
-        """Return small motions in the frame of the file by those in mean axes, at q' (n_q,): (6 + n_q, 6 + n_q).
+        """Return the matrix, (6 + n_q, 6 + n_q), from small motions in mean axes to the file frame, at q', (n_q,).
 
-        Both are translation and rotation of the frame in its own axes, and coordinates.
+        Both consist of translation and rotation of the frame in its own axes, and of modal coordinates.
         """
         n = self.reduced.n_q
         back = self.frame.pose(q)[1].T
@@ -137,14 +137,14 @@ class MeanAxes:
 
 
 def mean_axes(reduced: ReducedBody) -> MeanAxes | None:
-    """Return a body with geometric stiffness in mean axes; None for one that its file has in mean axes already.
+    """Return a body with geometric stiffness in mean axes; None if its file is already in mean axes.
 
-    Bodies of the same `ReducedBody` share it.
+    Bodies with the same `ReducedBody` share the result.
 
     Raises
     ------
     BodyError
-        If the body has no inertia about some axis, or a rigid-body motion is among its shapes.
+        If the body has no inertia about some axis, or a rigid-body motion is among its mode shapes.
     """
     if reduced not in _made:
         _made[reduced] = None if reduced.frame.kind == "tisserand" or reduced.n_q == 0 else made_mean_axes(reduced)
@@ -152,12 +152,12 @@ def mean_axes(reduced: ReducedBody) -> MeanAxes | None:
 
 
 def made_mean_axes(reduced: ReducedBody) -> MeanAxes:
-    """Return a reduced body in mean axes, in which its file's frame moves by steps (1) to (4)."""
+    """Return a reduced body in mean axes, and the motion of its file's frame in them by steps (1) to (4)."""
     x, y, z = ((float(a), float(b), float(c)) for a, b, c in reduced.frame.axes.T)
     mean, change = converted(reduced, TisserandFrame(axes=(x, y, z)))
     at = reduced.frame.at
     point = np.array(reduced.interface(at).position) if at else np.zeros(3)
-    turn = tuple(-form for form in turn_of_mean_axes(reduced))  # of B in B': the other way round
+    turn = tuple(-form for form in turn_of_mean_axes(reduced))  # of B in B', which is the inverse rotation
     rho = place_of_point(reduced, point, *turn)
     Psi, second = (np.concatenate(parts) for parts in zip(rho, turn, strict=True))
     Z = change.Z
@@ -167,7 +167,7 @@ def made_mean_axes(reduced: ReducedBody) -> MeanAxes:
 
 
 def turn_of_mean_axes(reduced: ReducedBody) -> tuple[Array, Array]:
-    """Return the rotation vector of the mean axes in B, A q + 1/2 qᵀ B q: A (3, n_q) and B (3, n_q, n_q)."""
+    """Return the rotation vector of the mean axes in B, A q + 1/2 qᵀ B q, as A, (3, n_q), and B, (3, n_q, n_q)."""
     moments, geometric = reduced.moments, reduced.geometric
     assert geometric is not None
     c_0 = moments.center_of_mass
@@ -184,9 +184,9 @@ def turn_of_mean_axes(reduced: ReducedBody) -> tuple[Array, Array]:
 
 
 def place_of_point(reduced: ReducedBody, point: Array, linear: Array, second: Array) -> tuple[Array, Array]:
-    """Return how a point of B moves in the mean axes, exp(theta) (c_p - s(q)/m) of q, step (1): linear and second.
+    """Return the linear and second-order position of a point of B in mean axes, exp(theta) (c_p - s(q)/m), step (1).
 
-    As `turn_of_mean_axes`, which with the other sign gives the rotation vector theta of B in the mean axes.
+    The rotation vector theta of B in the mean axes is the negative of `turn_of_mean_axes`.
     """
     moments, geometric = reduced.moments, reduced.geometric
     assert geometric is not None
@@ -199,7 +199,7 @@ def place_of_point(reduced: ReducedBody, point: Array, linear: Array, second: Ar
 
 
 def axial(V: Array) -> Array:
-    """Return Σ o × f of V = Σ f oᵀ, (3, ...) of (3, 3, ...)."""
+    """Return Σ o × f for V = Σ f oᵀ: (3, ...) from (3, 3, ...)."""
     return np.asarray(np.einsum("abc,cb...->a...", EPSILON, V))
 
 

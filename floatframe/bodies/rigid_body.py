@@ -1,4 +1,4 @@
-"""A rigid body from its mass properties."""
+"""A rigid body, defined by its mass properties."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -13,30 +13,31 @@ from floatframe.shapes.shape import Geometry, Shape, shape_tuple
 
 __all__ = ["RigidBody"]
 
-TRIANGLE_DEFECT = 1e-6  #: relative excess of one principal moment over the sum of the others taken for rounding
+#: relative excess of one principal moment over the sum of the other two, up to which it is taken as rounding
+TRIANGLE_DEFECT = 1e-6
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class RigidBody:
-    """A rigid body and its given motion at the start.
+    """A rigid body with its initial position and motion.
 
     Raises
     ------
     ModelError
-        If mass or inertia are impossible, or a number is not finite.
+        If mass or inertia is impossible, or a number is not finite.
     """
 
     name: str
     mass: float  #: [kg]
     inertia: Array  #: about the centre of mass, body axes, (3, 3) [kg m²]
     center_of_mass: Array = field(default_factory=lambda: np.zeros(3))  #: in the body frame, (3,) [m]
-    position: Array = field(default_factory=lambda: np.zeros(3))  #: of the frame origin in ground axes, (3,) [m]
+    position: Array = field(default_factory=lambda: np.zeros(3))  #: of the frame origin, in ground axes, (3,) [m]
     orientation: Array = field(default_factory=lambda: np.array([1.0, 0, 0, 0]))  #: Euler parameters p of R_GB, (4,)
-    velocity: Array = field(default_factory=lambda: np.zeros(3))  #: of the frame origin, ground axes, (3,) [m/s]
+    velocity: Array = field(default_factory=lambda: np.zeros(3))  #: of the frame origin, in ground axes, (3,) [m/s]
     #: angular velocity in body axes, (3,) [rad/s]
     omega_B: Array = field(default_factory=lambda: np.zeros(3))  # noqa: N815
-    shapes: Sequence[Shape | Geometry] = field(default=(), kw_only=True)  #: what it looks like, in the body frame
+    shapes: Sequence[Shape | Geometry] = field(default=(), kw_only=True)  #: drawn shapes, in the body frame
 
     def __post_init__(self) -> None:
         where = f"rigid body {self.name!r}"
@@ -70,7 +71,7 @@ class RigidBody:
 
 
 def euler_parameters_from_user(where: str, values: Array) -> Array:
-    """Return unit Euler parameters, (4,); `ModelError` if the numbers are further than 1e-6 from length one."""
+    """Return unit Euler parameters, (4,); `ModelError` if their length differs from one by more than 1e-6."""
     p = array_of_shape(where, values, (4,))
     length = float(np.linalg.norm(p))
     if abs(length - 1) > 1e-6:

@@ -61,7 +61,7 @@ def check_nodes(fluid: Fluid, components: Sequence[Component], nodes: Mapping[st
             raise ModelError(f"component {each.name!r}: expected two nodes, got {each.a!r} twice")
     for name in nodes:
         if name not in counts:
-            raise ModelError(f"nodes: {name}: no component uses it{nearest(name, tuple(counts))}")
+            raise ModelError(f"nodes: {name}: no component names it{nearest(name, tuple(counts))}")
     given = prescribed(fluid, components)
     for each in components:
         names = nodes_of(each)

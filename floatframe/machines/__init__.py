@@ -1,4 +1,4 @@
-"""Machines ready to copy: TOML files of jobs and systems, a room each, with what reads and judges their motions."""
+"""Machines ready to copy: TOML files of jobs and systems, each in its own room with functions to evaluate them."""
 
 from floatframe.machines.catalogue import MACHINES, Machine, copy_machine, machine_files
 

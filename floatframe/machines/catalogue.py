@@ -1,7 +1,7 @@
-"""Which machines there are, and their files in a folder of one's own.
+"""The machines and their files, which can be copied into a folder of the user.
 
-A machine is a folder `files` in a room here, with jobs of its flexible parts, system files, and a README.md that names
-the commands in their order. `MACHINES` has a line for each.
+A machine is a folder `files` in a room of this package, with jobs of its flexible parts, system files, and a README.md
+with the commands in order. `MACHINES` has an entry for each.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ class Machine:
 
     title: str
     room: str  #: folder in floatframe/machines
-    shows: str  #: what is in it, in a line
+    shows: str  #: its content in one line
 
 
 #: every machine by the name with which `floatframe machine` copies it
@@ -67,12 +67,12 @@ MACHINES: dict[str, Machine] = {
 
 
 def machine_files(name: str) -> Sequence[Path]:
-    """Return the files of a machine as they are shipped.
+    """Return the files of a machine, as shipped.
 
     Raises
     ------
     ModelError
-        If there is no such machine, with the nearest name.
+        If there is no such machine; the message has the nearest name.
     """
     if name not in MACHINES:
         raise ModelError(f"no machine {quoted(name)}{nearest(name, list(MACHINES))}")
@@ -81,12 +81,12 @@ def machine_files(name: str) -> Sequence[Path]:
 
 
 def copy_machine(name: str, folder: str | Path) -> Sequence[Path]:
-    """Copy the files of a machine into a folder, which is made; return where they are.
+    """Copy the files of a machine into a folder, which is created; return their paths.
 
     Raises
     ------
     ModelError
-        If there is no such machine, or one of its files stands there already: nothing is written then.
+        If there is no such machine, or one of its files already exists; nothing is written then.
     """
     sources, place = machine_files(name), Path(folder)
     origin = Path(__file__).parent / MACHINES[name].room / "files"

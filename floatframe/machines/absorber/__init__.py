@@ -1,1 +1,1 @@
-"""An absorber on an oscillator and its designs, as files."""
+"""A vibration absorber on an oscillator and its design, as files."""

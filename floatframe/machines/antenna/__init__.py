@@ -1,4 +1,4 @@
-"""A deployable antenna: petals hinged at a spacecraft, pushed outward by struts from one slider on a mast."""
+"""A deployable antenna with petals hinged to a spacecraft, pushed outward by struts from one slider on a mast."""
 
 from floatframe.machines.antenna.closed_forms import AntennaGeometry, mechanism
 from floatframe.machines.antenna.description import FINE, Antenna, HingePlay

@@ -1,14 +1,14 @@
-"""The antenna with pins in the place of hinges and massless rigid struts: positions and forces in closed form.
+"""The antenna with pins instead of hinges and massless rigid struts: positions and forces in closed form.
 
-One petal in its plane, r outward and z along the mast. The petal turns about its hinge (r_h, 0) by theta from the mast,
-its elbow, at c along it, is held by a strut of length l from the slider (r_s, s):
+One petal in its plane, with r outward and z along the mast. The petal rotates about its hinge (r_h, 0) by theta from
+the mast. Its elbow, at the distance c along it, is supported by a strut of length l from the slider (r_s, s):
 
     x² + (c cos theta - s)² = l²,    x = r_h + c sin theta - r_s,    s = c cos theta + sqrt(l² - x²)
     ds/dtheta = -c sin theta - x c cos theta / sqrt(l² - x²)
 
-Virtual work of n petals and the slider, M_theta the moment on one petal about its hinge that acts to open it,
-F the force on the slider along +z:  F ds + n M_theta dtheta + F_slider ds = 0. The strut force follows from the slider:
-n S (s - c cos theta)/l = -(F + F_slider), compression positive as it pushes the slider up.
+Virtual work of n petals and the slider:  F ds + n M_theta dtheta + F_slider ds = 0, with M_theta the opening moment on
+one petal about its hinge and F the force on the slider along +z. The strut force follows from the slider: n S (s - c
+cos theta)/l = -(F + F_slider); compression is positive and pushes the slider up.
 """
 
 from dataclasses import dataclass
@@ -32,14 +32,14 @@ class AntennaGeometry:
 
 @dataclass(frozen=True, eq=False)
 class Mechanism:
-    """What the mechanism does at some angles of the petals, each (n,)."""
+    """State of the mechanism at given angles of the petals, (n,) each."""
 
     theta: Array  #: of the petals from the mast [rad]
     slider: Array  #: height s of the slider [m]
     rate: Array  #: ds/dtheta [m/rad]
-    drive: Array  #: force F that the drive has to give to the slider along +z [N]
+    drive: Array  #: force F of the drive on the slider along +z [N]
     strut: Array  #: compression of one strut [N]
-    strut_angle: Array  #: of a strut from the mast, seen from its foot downward [rad]
+    strut_angle: Array  #: angle of a strut from the mast, at its foot, downward [rad]
 
 
 def mechanism(
@@ -59,11 +59,11 @@ def mechanism(
     theta
         Angles of the petals from the mast, (n,) [rad].
     n_petals
-        How many petals the slider drives.
+        Number of petals that the slider drives.
     petal_moment
-        About the hinge of one petal, acting to open it, by its weight, hinges and inertia [N m].
+        Moment on one petal about its hinge, opening if positive, due to weight, hinges and inertia [N m].
     slider_force
-        On the slider along +z beside the drive: its weight [N].
+        Force on the slider along +z besides the drive, due to its weight [N].
     """
     theta = np.atleast_1d(np.asarray(theta, dtype=float))
     c = geometry.elbow

@@ -1,4 +1,4 @@
-"""Where the petals of the antenna point, seen from the spacecraft."""
+"""Pointing directions of the petals of the antenna relative to the spacecraft."""
 
 from dataclasses import dataclass
 
@@ -25,7 +25,7 @@ class Pointing:
 
 
 def pointing(system: System, motion: Trajectory, antenna: Antenna) -> Pointing:
-    """Return where the petals of a system of an antenna point over a motion."""
+    """Return the pointing of the petals of an antenna during a motion."""
 
     def place(body: str, position: tuple[float, float, float]) -> PlaceMotion:
         return place_motion(system, motion, "pointing", Marker(body, position=np.array(position)))

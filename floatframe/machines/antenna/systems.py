@@ -1,4 +1,4 @@
-"""The antenna as systems of as many petals as wanted, and all its files."""
+"""The antenna as systems with any number of petals, and all its files."""
 
 import json
 from dataclasses import replace
@@ -41,12 +41,12 @@ def rotation_vector(R: np.ndarray) -> np.ndarray:
 
 
 def place_text(position: np.ndarray, R: np.ndarray) -> str:
-    """Return the keys of a body's place."""
+    """Return the keys for the position and orientation of a body."""
     return f"position = {numbers(*position)}\nrotation_vector = {numbers(*rotation_vector(R))}\n"
 
 
 def leaf(antenna: Antenna, k: int, theta: float) -> str:
-    """Return petal k and its strut, with their hinges."""
+    """Return petal k and its strut with their hinges."""
     geometry, turn = antenna.geometry, about("z", 2 * np.pi * k / antenna.n_petals)
     found = mechanism(geometry, theta, n_petals=antenna.n_petals)
     hinge = turn @ [geometry.hinge_radius, 0, 0]
@@ -82,7 +82,7 @@ marker_b = "head"
 
 
 def hinge_text(antenna: Antenna, k: int, hinge: np.ndarray, axis: str, theta: float) -> str:
-    """Return the hinge of petal k with its harness: a joint, or an element with play."""
+    """Return the hinge of petal k with its harness, as a joint or as an element with play."""
     if antenna.play is None:
         return f"""[joints.hinge_{k}]
 type = "revolute"
@@ -123,7 +123,7 @@ turn_free = {antenna.stowed - theta:.15g}
 
 
 def bus_and_slider(antenna: Antenna, theta: float, *, fixed: bool) -> str:
-    """Return the spacecraft, the slider on its mast, and the scene they are drawn in."""
+    """Return the spacecraft, the slider on its mast, and the drawn surroundings."""
     slider = mechanism(antenna.geometry, theta, n_petals=antenna.n_petals).slider[0]
     (Ix, Iy, Iz), J = antenna.bus_inertia, antenna.slider_inertia
     return f"""
@@ -170,7 +170,7 @@ axis = [0, 0, 1]
 def system_text(
     antenna: Antenna, title: str, *, theta: float, fixed: bool, gravity: bool, offload: float, tail: str
 ) -> str:
-    """Return a system file: bus, slider, petals and struts at an angle; offload is an upward force at every elbow."""
+    """Return a system file of bus, slider, petals and struts at an angle; `offload` is a force upward at each elbow."""
     text = f'# {title}\n[system]\nunits = "m-kg-s"\n' + ("gravity = [0, 0, -9.81]\n" if gravity else "")
     text += bus_and_slider(antenna, theta, fixed=fixed)
     for k in range(1, antenna.n_petals + 1):
@@ -187,7 +187,7 @@ force = [0, 0, {offload:.15g}]
 
 
 def driven_tail(antenna: Antenna) -> str:
-    """Return the drive of the slider from stowed to deployed, and what is measured."""
+    """Return the motion of the slider from stowed to deployed, and the sensors."""
     first, last = antenna.travel
     return f"""
 [joints.mast.motions.distance]
@@ -204,7 +204,7 @@ h = {antenna.duration / 60:.6g}
 
 
 def sensors(antenna: Antenna) -> str:
-    """Return the sensors that all systems of the antenna have."""
+    """Return the sensors that all systems of the antenna share."""
     hinge = 'type = "coordinate"\njoint = "hinge_1"\ncoordinate = "angle"'
     if antenna.play is not None:
         hinge = 'type = "element"\nof = "hinge_1"'
@@ -229,7 +229,7 @@ set = "TIP"
 
 
 def released_tail(antenna: Antenna) -> str:
-    """Return the push of the drive spring with its rate limiter, and the latch at the end of the travel."""
+    """Return the force of the drive spring with its rate limiter, and the latch at the end of the travel."""
     return f"""
 [forces.drive]
 type = "joint-force"
@@ -269,15 +269,15 @@ output_every = {5 if antenna.play is None else 10}
 
 
 def antenna_files(antenna: Antenna, *, petal_moment: float = 0.0) -> dict[str, str]:
-    """Return all files of the machine by name.
+    """Return all files of the machine, by name.
 
     Parameters
     ----------
     antenna
-        Its numbers.
+        Parameters of the antenna.
     petal_moment
-        First moment of the mass of a petal about its hinge, for the wires of the rig: mass times distance of the centre
-        of mass, as `cms info petal.h5` tells them [kg m].
+        First moment of mass of a petal about its hinge, for the wires of the rig: mass times distance of the centre of
+        mass, both reported by `cms info petal.h5` [kg m].
     """
     wire = 9.81 * petal_moment / antenna.geometry.elbow
     options: dict[str, Any] = {"theta": antenna.stowed, "fixed": True}
@@ -303,7 +303,7 @@ def antenna_files(antenna: Antenna, *, petal_moment: float = 0.0) -> dict[str, s
 
 
 def latching_text(antenna: Antenna) -> str:
-    """Return the system that opens in flight and is latched."""
+    """Return the system that opens in flight and is then latched."""
     title = "The antenna on its free spacecraft, opened by a motor against a damper, then latched"
     title += "" if antenna.play is None else "; its petal hinges have play"
     theta = antenna.stowed if antenna.begin is None else antenna.begin

@@ -1,4 +1,4 @@
-"""The railway vehicle placed in a circle."""
+"""The railway vehicle on a circular track."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,12 +14,12 @@ from floatframe.system import System
 
 __all__ = ["circle", "in_circle"]
 
-LEAD = 50.0  #: of the circle behind the middle of the vehicle [m]
+LEAD = 50.0  #: length of the circle behind the middle of the vehicle [m]
 LENGTH = 1e5  #: of the circle [m]
 
 
 def circle(radius: float, cant: float = 0.0) -> Track:
-    """Return a track that is a left circle about (0, radius), along x at the origin; cant in metres."""
+    """Return a track on a left-hand circle about (0, radius), along x at the origin; cant in metres."""
     if not radius >= 20.0:
         raise ModelError(f"circle: radius: expected 20 m or more, got {radius:g}")
     angle = LEAD / radius
@@ -38,14 +38,14 @@ def in_circle(
     is_independent: bool = False,
     frames: Sequence[FlexibleBody] = (),
 ) -> System:
-    """Return the vehicle on a circle, every body with the axes and the velocity of the track where it is.
+    """Return the vehicle on a circle; every body has the axes and the velocity of the track at its position.
 
     Parameters
     ----------
     data, speed, pair, laws, is_independent, frames
         As for `vehicle`.
     radius, cant
-        Of the circle; of the outer rail above the inner one [m].
+        Radius of the circle [m]; height of the outer rail above the inner one [m].
     """
     track = circle(radius, cant)
     straight = vehicle(data, speed, pair=pair, track=track, laws=laws, is_independent=is_independent, frames=frames)

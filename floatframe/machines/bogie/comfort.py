@@ -1,4 +1,4 @@
-"""Ride comfort: accelerations weighted over frequency as ISO 2631-1 weights them."""
+"""Ride comfort: accelerations with the frequency weighting of ISO 2631-1."""
 
 import numpy as np
 
@@ -7,8 +7,8 @@ from floatframe.errors import ModelError
 
 __all__ = ["WEIGHTINGS", "weighted_rms", "weighting"]
 
-#: corners [Hz] and qualities of the filters of ISO 2631-1: f3, f4, Q4 of the transition, then f5, Q5, f6, Q6 of the
-#: step, where there is one; all are limited to 0.4 to 100 Hz
+#: corner frequencies [Hz] and quality factors of the filters of ISO 2631-1: f3, f4, Q4 of the transition, then f5, Q5,
+#: f6, Q6 of the step, if there is one; all are limited to 0.4 to 100 Hz
 WEIGHTINGS = {
     "vertical": (12.5, 12.5, 0.63, 2.37, 0.91, 3.35, 0.91),  # W_k
     "lateral": (2.0, 2.0, 0.63, None, None, None, None),  # W_d
@@ -42,7 +42,7 @@ def weighting(f: Array, direction: str) -> Array:
 
 
 def weighted_rms(t: Array, acceleration: Array, direction: str) -> float:
-    """Return the frequency-weighted root mean square of an acceleration [m/s²], its mean taken out.
+    """Return the frequency-weighted root mean square of an acceleration without its mean [m/s²].
 
     Parameters
     ----------

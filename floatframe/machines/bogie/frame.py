@@ -1,4 +1,4 @@
-"""The flexible bogie frame: side members, a transom and posts to the springs, as beams."""
+"""The flexible bogie frame: side members, a transom and posts at the springs, as beams."""
 
 from collections.abc import Mapping
 from itertools import pairwise
@@ -15,7 +15,7 @@ DENSITY = 7850.0
 
 
 def area(section: dict[str, float]) -> float:
-    """Of a box [m²]."""
+    """Return the area of a box section [m²]."""
     inner = (section["width"] - 2 * section["web"]) * (section["height"] - 2 * section["flange"])
     return section["width"] * section["height"] - inner
 
@@ -25,12 +25,12 @@ def frame_files(
     axle_height: float = 0.46,
     supports: Mapping[str, tuple[float, float, float]] | None = None,
 ) -> dict[str, str]:
-    """Return the job of the frame and its tables, by name of the file.
+    """Return the job of the frame and its tables, by file name.
 
-    Brackets, brake gear and dampers are a mass per length that brings the frame to its mass. Interfaces: four seats of
-    the axle boxes (leading_left, ...), two of the air springs (air_left, air_right), the pivot. The origin is at the
-    height of the rails, below the pivot. `supports` are further interfaces by name, each on a
-    bracket, a box as the side members have, from the transom beside it.
+    Brackets, brake gear and dampers are represented by a mass per length, with which the frame has its total mass.
+    Interfaces: four seats of the axle boxes (leading_left, ...), two of the air springs (air_left, air_right), and the
+    pivot. The origin is at the height of the rails, below the pivot. `supports` are further interfaces by name, each on
+    a bracket (a box section as in the side members) that starts at the transom.
     """
     b, a, h = data.wheelbase, data.primary_arm, data.frame_height
     nodes: dict[str, tuple[float, float, float]] = {"pivot": (0.0, 0.0, h)}
@@ -79,14 +79,14 @@ def frame_files(
 
 
 def transom_node(y: float) -> str:
-    """Return the name of the node of the transom at y."""
+    """Return the name of the transom node at y."""
     return "pivot" if y == 0 else f"transom_{1e3 * y:+.0f}"
 
 
 def transom_lines(
     nodes: dict[str, tuple[float, float, float]], where: set[float], side: int, hand: str, arm: float, height: float
 ) -> list[tuple[str, str, str, int]]:
-    """Return the lines of half a transom, which has a node at each of the distances `where`; add those nodes."""
+    """Return the lines of half a transom with a node at each of the distances `where`; these nodes are added."""
     stops = sorted(y for y in where if 0 < y < arm)
     for y in stops:
         nodes[transom_node(side * y)] = (0.0, side * y, height)

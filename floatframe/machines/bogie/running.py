@@ -1,4 +1,4 @@
-"""Vehicles about steady running: linearised, their hunting, its damping and critical speed."""
+"""Vehicles in steady running: linearisation, hunting modes, their damping, and critical speed."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -31,22 +31,22 @@ __all__ = [
 
 
 def steady_motion_of(system: System, radius: float | None = None) -> SteadyMotion:
-    """Return a vehicle in steady running, pushed ahead at its body against what creep takes.
+    """Return a vehicle in steady running, with a driving force on its body that balances the creep losses.
 
-    Bodies that do not turn with the wheels (`spin_inertia` of the wheelsets) go along, and nothing depends on where it
-    is along the track.
+    Bodies that do not spin with the wheels (`spin_inertia` of the wheelsets) move along with the vehicle. Nothing
+    depends on the position along the track.
 
     Parameters
     ----------
     system
-        As `vehicle` places it on straight track, or `in_circle` on a circle.
+        The vehicle from `vehicle`, on straight track, or from `in_circle`, on a circle.
     radius
-        Of the circle [m]; None: straight on.
+        Radius of the circle [m]; None: straight track.
 
     Raises
     ------
     ConvergenceError
-        If it does not run steadily near there.
+        If no steady running is found near this state.
     """
     center = None if radius is None else np.array([0.0, radius, 0.0])
     return steady_motion(
@@ -60,7 +60,7 @@ def steady_motion_of(system: System, radius: float | None = None) -> SteadyMotio
 
 
 def pushed(system: System, push: float) -> System:
-    """Return the vehicle with a force ahead on its body [N]."""
+    """Return the vehicle with a forward force on its body [N]."""
     force = PointForce("push", Marker("body"), force=np.array([push, 0.0, 0.0]), is_follower=True)
     return replace(system, forces=[*system.forces, force])
 
@@ -72,14 +72,14 @@ def steady_running(system: System, radius: float | None = None) -> LinearSystem:
 
 
 def lateral_modes(linear: LinearSystem, *, lowest: float = 0.1, highest: float = 15.0) -> tuple[Array, SystemModes]:
-    """Return the eigenvalues of oscillations to the side, in roll and in yaw, and all modes.
+    """Return the eigenvalues of the lateral, roll and yaw oscillations, and all modes.
 
     Parameters
     ----------
     linear
-        Of `steady_running`.
+        The linearised vehicle from `steady_running`.
     lowest, highest
-        Natural frequencies that are looked at [Hz].
+        Range of natural frequencies to consider [Hz].
     """
     modes = system_modes(linear)
     sizes = [len(mass) for mass in linear.body_masses]
@@ -95,12 +95,12 @@ def lateral_modes(linear: LinearSystem, *, lowest: float = 0.1, highest: float =
 class Hunting(NamedTuple):
     """The lateral oscillation with the least damping."""
 
-    damping: float  #: ratio; below 0: it grows
+    damping: float  #: damping ratio; below 0 the oscillation grows
     frequency: float  #: [Hz]
 
 
 def hunting(system: System, radius: float | None = None) -> Hunting:
-    """Return the least damped lateral oscillation of a vehicle in steady running, straight on or in a circle."""
+    """Return the least damped lateral oscillation of a vehicle in steady running, on straight track or a circle."""
     roots, _ = lateral_modes(steady_running(system, radius))
     if not len(roots):
         raise ModelError("hunting: no oscillation to the side between 0.1 and 15 Hz")
@@ -112,23 +112,23 @@ def hunting(system: System, radius: float | None = None) -> Hunting:
 def critical_speed(
     build: Callable[[float], System], low: float, high: float, *, damping: float = 0.0, tolerance: float = 0.2
 ) -> float:
-    """Return the speed at which the least damping of lateral oscillations falls to a limit [m/s]: bisection.
+    """Return the speed at which the least damping of lateral oscillations falls to a limit, by bisection [m/s].
 
     Parameters
     ----------
     build
-        From a speed [m/s] to the vehicle.
+        Function that returns the vehicle at a speed [m/s].
     low, high
-        Speeds with more and with less damping.
+        Speeds with more and with less damping than the limit [m/s].
     damping
-        The limit: 0 for the critical speed, 0.1 for the one that is asked of a design.
+        The limit: 0 for the critical speed; 0.1 is a usual requirement for a design.
     tolerance
-        Of the speed [m/s].
+        Tolerance of the speed [m/s].
 
     Raises
     ------
     ModelError
-        If there is more damping than the limit at `high`, or less at `low`.
+        If the damping at `high` is above the limit, or that at `low` below it.
     """
     ends = [hunting(build(V)).damping - damping for V in (low, high)]
     if not ends[0] > 0 > ends[1]:
@@ -143,7 +143,7 @@ def critical_speed(
 
 
 def blown(system: System, kick: float) -> System:
-    """Return a vehicle on straight track whose axles all have a lateral velocity [m/s]."""
+    """Return a vehicle on straight track with an initial lateral velocity of all axles [m/s]."""
     bodies = [
         replace(each, velocity=np.array([float(np.asarray(each.velocity)[0]), kick, 0.0]))
         if each.name.startswith("axle")
@@ -154,11 +154,11 @@ def blown(system: System, kick: float) -> System:
 
 
 class Falling(NamedTuple):
-    """A vehicle that hunts while its speed falls."""
+    """Hunting of a vehicle with decreasing speed."""
 
     speed: Array  #: (n,) [m/s]
-    amplitude: Array  #: half the range of the lateral shift of an axle about each of these speeds, (n,) [m]
-    offset: Array  #: its mean [m]
+    amplitude: Array  #: half the range of the lateral displacement of an axle near each of these speeds, (n,) [m]
+    offset: Array  #: mean lateral displacement [m]
 
 
 def falling_speed(
@@ -171,25 +171,25 @@ def falling_speed(
     h: float = 2e-3,
     kick: float = 0.02,
 ) -> Falling:
-    """Return the amplitude of hunting while the speed falls: the stable branch of limit cycles, to where it ends.
+    """Return the amplitude of hunting with decreasing speed: the stable branch of limit cycles down to its end.
 
-    All bodies are braked by forces of their mass times the deceleration, so that no creep force brakes; only the spin
-    of the wheels follows by creep.
+    All bodies are braked by forces equal to their mass times the deceleration, so that no creep force brakes; only the
+    spin of the wheels is slowed down by creep.
 
     Parameters
     ----------
     system
-        As `vehicle` returns it, at the highest speed, on straight track.
+        The vehicle from `vehicle`, at the highest speed, on straight track.
     axle
-        Name of the body that is looked at.
+        Name of the body whose lateral displacement is evaluated.
     deceleration
-        [m/s²], small: the speed should hardly change within a wave.
+        Deceleration [m/s²]; so small that the speed hardly changes within a wave.
     end
-        Speed at which it ends [m/s].
+        Final speed [m/s].
     window
-        Time over which the range is taken [s].
+        Duration of the window in which the range is evaluated [s].
     h
-        Step [s].
+        Step size [s].
     kick
         Lateral velocity of all axles at the start [m/s].
     """

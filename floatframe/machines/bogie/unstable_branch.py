@@ -1,8 +1,8 @@
-"""The unstable limit cycle of a vehicle that hunts: oscillations below it die out, those above it grow.
+"""The unstable limit cycle of a hunting vehicle: smaller oscillations die out, larger ones grow.
 
-A vehicle in steady running is put into its least damped hunting mode with an amplitude a of one axle, x + a Re(phi),
-u + a Re(lambda phi), and left to itself. Between an a from which the oscillation dies out and one from which it grows
-lies, by bisection, the cycle that no motion follows by itself.
+A vehicle in steady running is displaced in its least damped hunting mode with an amplitude a of one axle, x + a
+Re(phi), u + a Re(lambda phi), and released. The unstable limit cycle lies between an a from which the oscillation dies
+out and one from which it grows; it is found by bisection.
 """
 
 from dataclasses import dataclass
@@ -24,38 +24,38 @@ from floatframe.system import System
 
 __all__ = ["Bracket", "Hunted", "Run", "bracket_of_unstable_cycle", "hunted"]
 
-SMALLER = 0.96  #: next amplitude after one from which a wheel climbs
-LASTING = 0.7  #: of the amplitude of a cycle, above which an oscillation ends on it
-SETTLING = 1.0  #: before an oscillation that starts as a mode is that of its amplitude [s]
+SMALLER = 0.96  #: factor of the next amplitude after one at which a wheel climbs the rail
+LASTING = 0.7  #: an oscillation above this fraction of the amplitude of the stable cycle is taken to end on the cycle
+SETTLING = 1.0  #: time after which an oscillation that starts as a mode has settled [s]
 
 
 class Run(NamedTuple):
-    """The lateral shift of an axle, half its range in two windows of a second."""
+    """Half the range of the lateral displacement of an axle, in two windows of one second."""
 
-    start: float  #: amplitude of the mode at the start [m]
+    start: float  #: initial amplitude of the mode [m]
     early: float  #: after the first second [m]
-    late: float  #: in the last second [m]; not a number: a wheel has climbed the rail
+    late: float  #: in the last second [m]; NaN if a wheel has climbed the rail
 
 
 class Bracket(NamedTuple):
-    """Two runs on either side of an unstable limit cycle, and the stable one."""
+    """Two runs that enclose an unstable limit cycle, and the stable cycle."""
 
-    decaying: Run | None  #: None: every oscillation goes on
+    decaying: Run | None  #: None: no oscillation dies out
     lasting: Run | None  #: None: every oscillation dies out
-    cycle: float  #: amplitude of the stable limit cycle, not a number if there is none [m]
+    cycle: float  #: amplitude of the stable limit cycle [m]; NaN if there is none
 
 
 @dataclass(frozen=True, eq=False)
 class Hunted:
-    """A vehicle in steady running and its least damped hunting mode."""
+    """A vehicle in steady running with its least damped hunting mode."""
 
     motion: SteadyMotion
     axle: str
     eigenvalue: complex  #: [1/s]
-    shape: Array  #: motions of the bodies, the lateral one of the axle 1, (n_u,) complex
+    shape: Array  #: motions of the bodies, scaled to 1 for the lateral motion of the axle, (n_u,) complex
 
     def state(self, amplitude: float) -> State:
-        """Return the state with an amplitude of the mode [m]."""
+        """Return the state displaced by an amplitude of the mode [m]."""
         steady = self.motion.equilibrium.state
         x, v = amplitude * self.shape.real, amplitude * (self.eigenvalue * self.shape).real
         r, p, q, u = steady.r.copy(), steady.p.copy(), steady.q.copy(), steady.u.copy()
@@ -72,7 +72,7 @@ class Hunted:
         return State(r, p, q, u, steady.w)
 
     def run(self, amplitude: float, *, seconds: float = 5.0, h: float = 2e-3) -> Run:
-        """Return how an oscillation of an amplitude goes on."""
+        """Return the run that starts with an amplitude of the mode [m]."""
         try:
             motion = integrate(
                 self.motion.system, GeneralizedAlpha(0.8, 1e-6), seconds, h, output_every=5, state=self.state(amplitude)
@@ -108,13 +108,13 @@ def bracket_of_unstable_cycle(
     Parameters
     ----------
     vehicle
-        Of `hunted`.
+        The vehicle from `hunted`.
     low, high
-        Amplitudes to begin with [m]. Where a wheel climbs after `high`, it is taken smaller.
+        Initial amplitudes [m]. If a wheel climbs the rail from `high`, a smaller one is taken.
     n_runs
-        Runs of the bisection between.
+        Number of runs of the bisection.
     seconds
-        Of each run [s].
+        Duration of each run [s].
     """
     if not (0 < low < high and seconds > SETTLING + 2.0):
         raise ModelError(
@@ -137,7 +137,7 @@ def bracket_of_unstable_cycle(
 
 
 def run_on_rails(vehicle: Hunted, amplitude: float, least: float, seconds: float) -> Run:
-    """Return the run from an amplitude, or the next smaller one, down to the least, after which no wheel climbs."""
+    """Return the run from an amplitude, or from the next smaller one, down to the least, in which no wheel climbs."""
     run = vehicle.run(amplitude, seconds=seconds)
     while not np.isfinite(run.late) and run.start > least:
         run = vehicle.run(SMALLER * run.start, seconds=seconds)

@@ -19,16 +19,16 @@ __all__ = ["NAMES", "RailVehicle", "flexible_frames", "vehicle", "vehicle_parts"
 GRAVITY = 9.81
 NAMES = ("front", "rear")
 SIDES = ((1, "left"), (-1, "right"))
-BOX_SHARE = 0.01  #: of the axle's inertia about itself that does not turn: its boxes
-PITCH = (5e4, 50.0)  #: stiffness and damping of a box against turning about the axle [N m/rad, N m s/rad]
+BOX_SHARE = 0.01  #: fraction of the axle's spin inertia that does not rotate, that of its boxes
+PITCH = (5e4, 50.0)  #: stiffness and damping of a box against rotation about the axle [N m/rad, N m s/rad]
 
 
 @dataclass(frozen=True)
 class RailVehicle:
-    """Masses, lengths and springs; x forward, y to the left, z up from the tops of the rails.
+    """Masses, dimensions and springs; x forward, y to the left, z up from the top of the rails.
 
-    After vehicle 1 of the Manchester benchmarks (Iwnicki 1998), simplified; stiffness and damping are of one spring on
-    one side.
+    Simplified from vehicle 1 of the Manchester benchmarks (Iwnicki 1998). Stiffness and damping are those of one spring
+    on one side.
     """
 
     body_mass: float = 32000.0  #: [kg]
@@ -39,23 +39,25 @@ class RailVehicle:
     frame_height: float = 0.6
     axle_mass: float = 1813.0
     axle_inertia: tuple[float, float, float] = (1120.0, 112.0, 1120.0)
-    pivot: float = 9.5  #: half the distance of the bogies [m]
-    wheelbase: float = 1.28  #: half of it [m]
-    primary_arm: float = 1.0  #: half the distance of the primary springs across
-    primary: tuple[float, float, float] = (31.391e6, 3.884e6, 1.22e6)  #: of an axle box, along, across, vertical [N/m]
+    pivot: float = 9.5  #: half the distance between the bogies [m]
+    wheelbase: float = 1.28  #: half the wheelbase [m]
+    primary_arm: float = 1.0  #: half the lateral distance between the primary springs [m]
+    #: of an axle box: longitudinal, lateral, vertical [N/m]
+    primary: tuple[float, float, float] = (31.391e6, 3.884e6, 1.22e6)
     primary_damping: float = 4000.0  #: vertical [N s/m]
     secondary_arm: float = 1.0
     secondary_height: float = 0.83
     secondary: tuple[float, float, float] = (160e3, 160e3, 430e3)  #: of an air spring [N/m]
-    secondary_damping: tuple[float, float, float] = (0.0, 16e3, 20e3)  #: along (yaw dampers), across, vertical [N s/m]
-    rod: float = 5e6  #: traction rod, along [N/m]
-    rod_damping: float = 25e3  #: [N s/m]
-    roll_bar: float = 940e3  #: [N m/rad] of a bogie
-    guide: float = 1.0  #: factor on the primary stiffness along and across
+    #: longitudinal (yaw dampers), lateral, vertical [N s/m]
+    secondary_damping: tuple[float, float, float] = (0.0, 16e3, 20e3)
+    rod: float = 5e6  #: of the traction rod, longitudinal [N/m]
+    rod_damping: float = 25e3  #: of the traction rod [N s/m]
+    roll_bar: float = 940e3  #: of the anti-roll bar of a bogie [N m/rad]
+    guide: float = 1.0  #: factor on the longitudinal and lateral primary stiffness
 
     @property
     def wheel_load(self) -> float:
-        """Vertical, of each wheel [N]."""
+        """Vertical load of each wheel [N]."""
         return GRAVITY * (self.body_mass + 2 * self.frame_mass + 4 * self.axle_mass) / 8
 
 
@@ -69,20 +71,21 @@ def vehicle(
     is_independent: bool = False,
     frames: Sequence[FlexibleBody] = (),
 ) -> System:
-    """Return the vehicle as it runs on at a speed, its springs preloaded to carry it where it is placed.
+    """Return the vehicle running at a speed, with springs preloaded to carry it in its assembled position.
 
     Parameters
     ----------
     data
         The vehicle.
     speed
-        [m/s].
+        Speed [m/s].
     pair, track, laws
-        Wheel and rail; the track begins straight, longer than the vehicle, about x = 0.
+        Profiles of wheel and rail, track, and laws of the contact; the track is straight about x = 0, for more than the
+        length of the vehicle.
     is_independent
-        Whether the two wheels of an axle turn by themselves.
+        Whether the two wheels of an axle rotate independently.
     frames
-        Flexible frames, as `flexible_frames` makes them; none: rigid ones.
+        Flexible frames from `flexible_frames`; none: rigid frames.
     """
     parts = vehicle_parts(data, speed, pair or Pair(), track or Track(), laws, is_independent, bool(frames))
     rigid = [
@@ -99,7 +102,7 @@ def vehicle(
 
 
 def flexible_frames(data: RailVehicle, frame: ReducedBody, speed: float) -> list[FlexibleBody]:
-    """Return the two frames of a vehicle from one reduced body, that of `frame_files`."""
+    """Return the two frames of a vehicle from one reduced body, made from `frame_files`."""
     return [
         FlexibleBody(
             f"frame_{name}",
@@ -128,7 +131,7 @@ def vehicle_parts(
     is_independent: bool,
     by_interface: bool,
 ) -> Parts:
-    """Return the parts; springs meet the frames at interfaces by name, or at positions in rigid frames."""
+    """Return the parts; springs are attached to the frames at interfaces by name, or at positions if rigid."""
     laws = laws or ContactLaws(friction=0.4)
     rolling = float(quasi_elastic(pair, np.zeros(1), smoothing=laws.smoothing, part="tread").radius[0])
     spin, velocity = speed / rolling, np.array([speed, 0.0, 0.0])

@@ -1,4 +1,4 @@
-"""System files of the vehicle, as they are shipped or for other numbers."""
+"""System files of the vehicle, with the shipped parameters or with others."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ __all__ = ["bogie_files"]
 
 IRREGULAR = 'irregularities = {spectrum = "erri-low", length = 420, seed = 1, start = 20}'
 CURVE = "curve = {radius = 300, length = 150, transition = 60, cant = 0.1, before = 30}"
-#: words, speed [m/s], seconds and track of each run
+#: title, speed [m/s], duration [s] and track of each run
 RUNS = {
     "straight": ("a straight track with irregular rails", 55.0, 8.0, IRREGULAR),
     "curve": ("a curve of 300 m", 15.0, 20.0, CURVE),
@@ -26,7 +26,7 @@ def numbers(values: Array | tuple[float, ...]) -> str:
 
 
 def bogie_files(data: RailVehicle | None = None) -> dict[str, str]:
-    """Return the files of the machine by their names: the frame, and the vehicle with flexible frames on two tracks."""
+    """Return the files of the machine, by name: the frame, and the vehicle with flexible frames on two tracks."""
     data = data or RailVehicle()
     files = dict(frame_files(data))
     for name, (words, speed, seconds, track) in RUNS.items():

@@ -1,15 +1,15 @@
-"""Optimal moves of an arm from rest to rest, by collocation on its generated equations.
+"""Optimal rest-to-rest moves of an arm, by collocation of its generated equations.
 
-The equations of motion are used as they are generated, a residual of positions, rates, accelerations and forces: no
-mass matrix is solved with. In each of N intervals of length h the accelerations a_i at the three points of Gauss and
-Legendre are unknowns, and with Butcher's A, b, c
+The equations of motion are used in the generated form, a residual of positions, rates, accelerations and forces; no
+mass matrix is inverted. In each of N intervals of length h, the accelerations a_i at the three Gauss-Legendre points
+are unknowns, and with Butcher's A, b, c
 
     v_i = v_0 + h Σ A_ij a_j,   z_i = z_0 + h c_i v_0 + h² Σ (A A)_ij a_j,   residual(z_i, v_i, a_i, B u_i) = 0
     v_1 = v_0 + h Σ b_i a_i,    z_1 = z_0 + h v_0 + h² Σ (b A)_i a_i
 
-(order six for z and v). Torques u are straight lines between the values at the ends of the intervals, zero in the
-first and the last of them. What is least is the sum of u² and of the squared bends of u, both in parts of the largest
-torque:
+(order six for z and v). The torques u are linear within each interval, and zero at the beginning of the first and the
+end of the last one. The objective is the sum of u² and of the squared second differences of u, both relative to the
+largest torque:
 
     Σ |u_k / u_max|² h + s⁴ Σ |(u_k+1 - 2 u_k + u_k-1) / (h² u_max)|² h
 
@@ -41,14 +41,14 @@ A = np.array([
 ])  # fmt: skip
 B = np.array([5 / 18, 4 / 9, 5 / 18])
 C = np.array([0.5 - ROOT / 10, 0.5, 0.5 + ROOT / 10])
-SMOOTHING = 0.05  #: s, the weight of bends of torques over time [s]
+SMOOTHING = 0.05  #: s, weight of the second differences of torques [s]
 
 
 @dataclass(frozen=True, eq=False)
 class OptimalMove:
-    """A move as the optimiser sees it, at the ends of the intervals."""
+    """An optimal move, at the ends of the intervals."""
 
-    names: tuple[str, ...]  #: of the positions
+    names: tuple[str, ...]  #: names of the positions
     driven: tuple[str, ...]  #: coordinates that have a motor
     t: Array  #: (n_t,) [s]
     z: Array  #: positions, (n_t, n_z)
@@ -58,11 +58,11 @@ class OptimalMove:
     iterations: int
 
     def torque_function(self, name: str) -> TimeFunction:
-        """Return the torque of a motor over time: straight lines, zero after the move."""
+        """Return the torque of a motor as a function of time, piecewise linear and zero after the move."""
         return linear_table(self.t, self.torque[:, self.driven.index(name)])
 
     def aim(self, name: str) -> TimeFunction:
-        """Return a position over time: cubics with values and rates of the move; at rest before and after it."""
+        """Return a position as a function of time: cubics through values and rates, at rest outside the move."""
         x, v = (rows[:, self.names.index(name)] for rows in (self.z, self.z_dot))
         h = np.diff(self.t)
         slope = np.diff(x) / h
@@ -71,7 +71,7 @@ class OptimalMove:
 
 
 def casadi_function(system: System, what: str) -> Callable[..., Any]:
-    """Return generated equations of a system as a casadi.Function, see `generate`."""
+    """Return generated equations of a system as a `casadi.Function`, see `generate`."""
     extra_module("casadi", extra="casadi", purpose="optimal moves")
     code = generate(system, what=what, language="casadi", name=f"generated_{what}")
     space: dict = {}
@@ -89,29 +89,29 @@ def optimal_move(
     n_intervals: int = 60,
     tolerance: float = 1e-9,
 ) -> OptimalMove:
-    """Return the move of least effort of a tree without gravity from where it is placed, at rest, to rest elsewhere.
+    """Return the move of least effort of a tree without gravity, from rest in the assembled position to rest elsewhere.
 
     Parameters
     ----------
     system
-        The tree; modes begin and end undeformed.
+        The tree; its modes are undeformed at both ends.
     target
-        Where coordinates are to end, by name ("shoulder/angle"); each of them has a motor.
+        Final values of coordinates, by name ("shoulder/angle"); each of them needs a motor.
     duration
-        Of the move [s].
+        Duration of the move [s].
     torque
-        The largest torque of each motor [N m].
+        Largest torque of each motor [N m].
     n_intervals
-        Of the collocation.
+        Number of intervals of the collocation.
     tolerance
-        Of the optimiser.
+        Tolerance of the optimiser.
 
     Raises
     ------
     ModelError
-        If a name or number is impossible.
+        If a name does not exist or a number is out of its range.
     ConvergenceError
-        If no move is found, such as where the motors are too weak.
+        If no move is found, for example because the motors are too weak.
     """
     model = relative_model(system)
     names, driven, limit = model.names, tuple(target), np.array(torque, dtype=float)
@@ -161,7 +161,7 @@ def optimal_move(
     options = {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes", "tol": tolerance, "max_iter": 200}}
     solver = casadi.nlpsol("move", "ipopt", {"x": unknowns, "f": cost, "g": held}, options)
 
-    s = np.linspace(0.0, 1.0, n_intervals + 1)  # a first guess: quintics from rest to rest
+    s = np.linspace(0.0, 1.0, n_intervals + 1)  # initial guess: quintics from rest to rest
     guess = begin[:, None] + (end - begin)[:, None] * (10 * s**3 - 15 * s**4 + 6 * s**5)
     first = np.concatenate([guess.ravel(order="F"), np.zeros(unknowns.numel() - guess.size)])
     free = unknowns.numel() - U.numel()

@@ -1,11 +1,12 @@
-"""Controllers of the arm as user forces: generated equations of the rigid arm as expressions in the loop.
+"""Controllers of the arm as user forces, with the generated equations of the rigid arm as expressions.
 
 Computed torque: the inverse dynamics of the rigid arm at the measured angles and rates, for accelerations
 
     a = phi_aim'' + 2 w (phi_aim' - phi_dot) + w² (phi_aim - phi)
 
-which is exact for a rigid arm. Following an optimal move: its torques, and the same feedback times the mass matrix of
-the rigid arm. Both know angles and rates of the hinges alone, and stop at the largest torques of the motors.
+which is exact for a rigid arm. Following an optimal move: the torques of the move, plus the same feedback times the
+mass matrix of the rigid arm. Both controllers use only angles and rates of the hinges, and are limited to the largest
+torques of the motors.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,7 +30,7 @@ SIGNS = {ADD: "+", SUB: "-", MUL: "*", DIV: "/"}
 
 
 def rate_of(function: TimeFunction) -> TimeFunction:
-    """Return the rate of a function of polynomials; `ModelError` if it has a sine."""
+    """Return the derivative of a piecewise polynomial function; `ModelError` if it contains a sine."""
     if function.pieces[:, 6].any():
         raise ModelError("rate_of: expected a function of polynomials, got one with a sine")
     pieces = np.zeros_like(function.pieces)
@@ -38,7 +39,7 @@ def rate_of(function: TimeFunction) -> TimeFunction:
 
 
 def expression(term: Scalar, names: Mapping[str, str]) -> str:
-    """Return a term as an expression of a user force; names: of the symbols."""
+    """Return a term as an expression of a user force; `names` are those of its symbols."""
     if term.kind == CONSTANT:
         return f"({term.value!r})"
     if term.kind == SYMBOL:
@@ -50,9 +51,9 @@ def expression(term: Scalar, names: Mapping[str, str]) -> str:
 
 
 def rigid_torques(rigid: System, accelerations: Mapping[str, str], *, is_turning: bool) -> dict[str, str]:
-    """Return the torques of the rigid arm for accelerations, both by hinge, as expressions of angles and rates.
+    """Return the torques of the rigid arm for given accelerations, by hinge, as expressions of angles and rates.
 
-    is_turning: whether rates count; without them M a is left.
+    `is_turning`: whether to include the rates; without them, the torques are M a.
     """
     model = relative_model(rigid)
     if any(not name.endswith("/angle") for name in model.names):
@@ -70,12 +71,12 @@ def rigid_torques(rigid: System, accelerations: Mapping[str, str], *, is_turning
 
 
 def limited(torque: str, largest: float) -> str:
-    """Return a torque between its limits."""
+    """Return an expression that limits a torque to both signs of the largest value."""
     return f"max(-{largest!r}, min({largest!r}, {torque}))"
 
 
 def user_force(name: str, torques: Mapping[str, str], functions: Mapping[str, TimeFunction]) -> UserForce:
-    """Return torques at hinges as a user force that sees their angles and rates."""
+    """Return torques at hinges as a user force that reads their angles and rates."""
     seen = {joint: JointCoordinate(joint, "angle") for joint in torques}
     return UserForce(name, seen, forces=dict(torques), functions=dict(functions))
 
@@ -83,18 +84,18 @@ def user_force(name: str, torques: Mapping[str, str], functions: Mapping[str, Ti
 def computed_torque(
     rigid: System, aims: Mapping[str, TimeFunction], bandwidth: float, torque: Sequence[float]
 ) -> UserForce:
-    """Return the computed-torque control of the arm by its rigid model.
+    """Return the computed-torque control of the arm, based on its rigid model.
 
     Parameters
     ----------
     rigid
         The arm without modes.
     aims
-        Angle of each hinge over time, by its name.
+        Desired angle of each hinge as a function of time, by its name.
     bandwidth
-        w [rad/s].
+        Bandwidth w [rad/s].
     torque
-        The largest of each motor, in the order of the aims [N m].
+        Largest torque of each motor, in the order of the aims [N m].
     """
     functions: dict[str, TimeFunction] = {}
     commands = {}
@@ -108,15 +109,15 @@ def computed_torque(
 
 
 def feedback(joint: str, bandwidth: float) -> str:
-    """Return the acceleration by which a hinge is led back to its aim."""
+    """Return the feedback acceleration that drives a hinge to its aim."""
     w = float(bandwidth)
     return f"{2 * w!r}*({joint}_aim_rate(t) - {joint}_dot) + {w * w!r}*({joint}_aim(t) - {joint})"
 
 
 def following(rigid: System, move: OptimalMove, bandwidth: float, torque: Sequence[float]) -> UserForce:
-    """Return the control that follows an optimal move: its torques, and feedback of the hinges times the rigid M.
+    """Return the control that follows an optimal move: its torques plus feedback of the hinges times the rigid M.
 
-    Parameters as in `computed_torque`.
+    Parameters as for `computed_torque`.
     """
     functions: dict[str, TimeFunction] = {}
     commands = {}

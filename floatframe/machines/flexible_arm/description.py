@@ -1,4 +1,4 @@
-"""The arm as a system: two strips of aluminium on hinges in a level plane, motor of the elbow and load as masses."""
+"""The arm as a system: two aluminium strips on hinges in a horizontal plane, with elbow motor and load as masses."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,34 +19,34 @@ __all__ = ["BENDING", "LENGTH", "FlexibleLinks", "arm", "links"]
 
 FILES = Path(__file__).parent / "files"
 LENGTH = 0.5  #: of each link [m]
-BENDING = (0, 1)  #: the two lowest modes of a link as its job reduces it
+BENDING = (0, 1)  #: the two lowest modes of a link, in the numbering of its job
 TIP = Marker("forearm", "tip")
 
 
 @dataclass(frozen=True, eq=False)
 class FlexibleLinks:
-    """The links as their jobs reduce them."""
+    """The reduced links."""
 
     upper: cms.ReducedBody
     forearm: cms.ReducedBody
 
 
 def links(folder: Path = FILES) -> FlexibleLinks:
-    """Reduce both links by their jobs in a folder; default: those that are shipped."""
+    """Reduce both links with the jobs in a folder; default: the shipped jobs."""
     return FlexibleLinks(*(cms.reduce_job(folder / f"{name}.toml") for name in ("upper", "forearm")))
 
 
 def arm(parts: FlexibleLinks, *, modes: Sequence[int] | None = None, is_rigid: bool = False) -> System:
-    """Return the arm stretched along x, at rest, free in its hinges `shoulder` and `elbow`, without gravity.
+    """Return the arm, stretched along x, at rest, with free hinges `shoulder` and `elbow`, without gravity.
 
     Parameters
     ----------
     parts
         The links.
     modes
-        Of each link, numbers from zero; None: all.
+        Numbers of the modes of each link, from zero; None: all.
     is_rigid
-        Without any mode.
+        Whether to leave out all modes.
     """
     bodies = []
     for name, x in (("upper", 0.0), ("forearm", LENGTH)):

@@ -1,4 +1,4 @@
-"""One fast move under the controllers: where the tip is, what it does after the move, which torques it takes."""
+"""A fast move under each controller: error of the tip, residual oscillation, and torques."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["BANDWIDTH", "DURATION", "LARGEST", "TARGET", "ArmMotion", "compared", "controlled", "moves", "plot_motions"]
 
-TARGET = {"shoulder": 1.2, "elbow": 0.9}  #: where the hinges are to be [rad]
+TARGET = {"shoulder": 1.2, "elbow": 0.9}  #: final angles of the hinges [rad]
 DURATION = 0.8  #: of the move [s]
 LARGEST = (8.0, 3.0)  #: torque of each motor [N m]
 BANDWIDTH = 10.0  #: of the feedback [rad/s]
@@ -33,17 +33,17 @@ T_END = 2.0  #: of the motions [s]
 
 @dataclass(frozen=True, eq=False)
 class ArmMotion:
-    """The full arm under one controller."""
+    """The motion of the complete arm under one controller."""
 
     system: System
     motion: Trajectory
-    tip: Array  #: place, (n_t, 2) [m]
-    error: Array  #: distance of the tip from where it is to be, (n_t,) [m]
+    tip: Array  #: position of the tip, (n_t, 2) [m]
+    error: Array  #: distance of the tip from its desired position, (n_t,) [m]
     torque: Array  #: of the motors, (n_t, 2) [N m]
 
     @property
     def residual(self) -> float:
-        """Return the largest distance after the move [m]."""
+        """Return the largest error after the move [m]."""
         return float(self.error[self.motion.t >= DURATION].max())
 
 
@@ -61,7 +61,7 @@ def controlled(plant: System, control: UserForce, *, t_end: float = T_END, h: fl
 
 
 def moves(parts: FlexibleLinks, *, n_intervals: int = 80, modes: Sequence[int] = BENDING) -> dict[str, OptimalMove]:
-    """Return the optimal moves of the rigid arm and of the one with some modes of each link."""
+    """Return the optimal moves of the rigid arm and of the arm with some modes of each link."""
     target = {f"{joint}/angle": value for joint, value in TARGET.items()}
     systems = {"rigid": arm(parts, is_rigid=True), "flexible": arm(parts, modes=modes)}
     return {
@@ -71,7 +71,7 @@ def moves(parts: FlexibleLinks, *, n_intervals: int = 80, modes: Sequence[int] =
 
 
 def compared(parts: FlexibleLinks, found: Mapping[str, OptimalMove]) -> dict[str, ArmMotion]:
-    """Return the motions of the arm with all its modes under computed torque, and following both optimal moves."""
+    """Return the motions of the arm with all its modes, under computed torque and following both optimal moves."""
     plant, rigid = arm(parts), arm(parts, is_rigid=True)
     aims = {joint: quintic(0.0, DURATION, 0.0, value) for joint, value in TARGET.items()}
     controls = {
@@ -83,7 +83,7 @@ def compared(parts: FlexibleLinks, found: Mapping[str, OptimalMove]) -> dict[str
 
 
 def plot_motions(motions: Mapping[str, ArmMotion]) -> "Figure":
-    """Draw the distance of the tip from where it is to be, the path of the tip, and the torques."""
+    """Plot the error of the tip, its path, and the torques."""
     import matplotlib.pyplot as plt
 
     figure = plt.figure(figsize=(11, 6.4), layout="constrained")

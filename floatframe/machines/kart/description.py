@@ -1,4 +1,4 @@
-"""The kart as files: the job of its chassis, and the system with a rigid or a flexible one."""
+"""The kart as files: the job of its chassis, and the system with a rigid or a flexible chassis."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ __all__ = ["Kart", "chassis_files", "kart_files"]
 
 @dataclass(frozen=True)
 class Kart:
-    """Numbers of the kart [m, kg, s]; docs/machines.md has their table. x ahead from the rear axle, y left, z up."""
+    """Parameters of the kart [m, kg, s], tabulated in docs/machines.md. x forward from the rear axle, y left, z up."""
 
     wheelbase: float = 1.05
     front_half_track: float = 0.53
@@ -20,14 +20,14 @@ class Kart:
     rear_height: float = 0.137
     rail_height: float = 0.06  #: of the tubes
     kingpin_y: float = 0.42
-    caster: float = np.deg2rad(14.0)  #: top of the kingpin to the rear
-    kingpin_inclination: float = np.deg2rad(10.0)  #: top of the kingpin inwards
+    caster: float = np.deg2rad(14.0)  #: inclination of the kingpin, with its top to the rear
+    kingpin_inclination: float = np.deg2rad(10.0)  #: inclination of the kingpin, with its top inwards
     pilot_mass: float = 75.0
     pilot_place: tuple[float, float, float] = (0.40, 0.0, 0.28)
     engine_mass: float = 20.0
-    speed: float = 9.0  #: held by the rear axle [m/s]
-    steer: float = 0.082  #: of the steering column [rad], in 0.1 s
-    steer_at: float = 1.0  #: when it begins to turn [s]
+    speed: float = 9.0  #: maintained by the rear axle [m/s]
+    steer: float = 0.082  #: step of the steering column within 0.1 s [rad]
+    steer_at: float = 1.0  #: time at which it begins to turn [s]
     duration: float = 3.5  #: of the run [s]
 
 
@@ -50,7 +50,7 @@ def chassis_nodes(kart: Kart) -> dict[str, tuple[float, float, float]]:
 
 
 def chassis_lines() -> list[tuple[str, str, str]]:
-    """Return the tubes of the frame: two nodes and the section."""
+    """Return the tubes of the frame, each with two nodes and the section."""
     lines = []
     for side in ("left", "right"):
         lines += [(f"rail_{side}_{k}", f"rail_{side}_{k + 1}", "TUBE") for k in range(8)]
@@ -280,7 +280,7 @@ def front_spin(kart: Kart) -> float:
 
 
 def rear_spin(kart: Kart) -> float:
-    """Return the same of a rear wheel."""
+    """Return the same for a rear wheel."""
     return kart.speed / (kart.rear_radius - (kart.rear_radius - kart.rear_height) / 3)
 
 

@@ -1,4 +1,4 @@
-"""What is read off a kart: its turn after a steering step, and the torsion of its chassis."""
+"""Evaluation of a kart: its turn after a steering step, and the torsional stiffness of its chassis."""
 
 from dataclasses import dataclass
 
@@ -17,10 +17,10 @@ WHEELS = ("front_left", "front_right", "rear_left", "rear_right")
 
 @dataclass(frozen=True, eq=False)
 class Turn:
-    """A kart over time, in the axes of its chassis."""
+    """Motion of a kart in the axes of its chassis."""
 
     t: Array  #: (n_t,) [s]
-    speed: Array  #: ahead, of the origin of the chassis, (n_t,) [m/s]
+    speed: Array  #: forward speed of the origin of the chassis, (n_t,) [m/s]
     yaw_rate: Array  #: (n_t,) [rad/s]
     loads: Array  #: F_z of front left, front right, rear left, rear right, (n_t, 4) [N]
 
@@ -31,11 +31,11 @@ class Turn:
 
     @property
     def radius(self) -> float:
-        """Of the turn at the end [m]."""
+        """Radius of the turn at the end [m]."""
         return float(self.speed[-1] / self.yaw_rate[-1])
 
     def transfer(self, axle: str) -> float:
-        """Load that the end of the run has on the right wheel of an axle more than on its left one [N]."""
+        """Return the load of the right wheel minus that of the left wheel of an axle, at the end of the run [N]."""
         k = 0 if axle == "front" else 2
         return float(self.loads[-1, k + 1] - self.loads[-1, k])
 
@@ -54,10 +54,10 @@ def turn_of(system: System, motion: Trajectory) -> Turn:
 
 
 def torsion_stiffness(chassis: ReducedBody) -> float:
-    """Return the torque over the twist between front and rear wheels [N m/rad].
+    """Return the torque divided by the twist between front and rear wheels [N m/rad].
 
-    Upward and downward forces on the ends of the axles, equal torques about x that balance each other:
-    q = K⁻¹ Σ Psi_zᵀ F, and each axle turns by (z_left - z_right) over its width.
+    Upward and downward forces act on the ends of the axles, with opposite equal torques about x: q = K⁻¹ Σ Psi_zᵀ F,
+    and each axle rotates by (z_left - z_right) divided by its width.
     """
     rows, widths = {}, {}
     for axle, name in (("front", "kingpin"), ("rear", "rear")):

@@ -1,4 +1,4 @@
-"""The kart in a steady turn: its curvature for a steer angle and a speed, and whether it stays there."""
+"""The kart in a steady turn: its curvature for a steer angle and a speed, and its stability."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -16,21 +16,21 @@ from floatframe.system import System
 
 __all__ = ["critical_speed_in_turn", "steady_turn", "turn_eigenvalues"]
 
-LONG_AFTER = 100.0  #: the steering step, in s from the start of a run
-NEUTRAL = 1e-6  #: eigenvalues of place, heading and turned wheels are this near to where they are [1/s]
+LONG_AFTER = 100.0  #: time of evaluation, so that the steering step is complete [s]
+NEUTRAL = 1e-6  #: distance within which an eigenvalue belongs to position, heading or wheel rotation [1/s]
 
 
 def steady_turn(system: System, speed: float, *, near: SteadyMotion | None = None) -> SteadyMotion:
-    """Return the turn of a kart after its steering step: curvature and the speed of the rear axle are found.
+    """Return the turn of a kart after its steering step; curvature and the speed of the rear axle are found.
 
     Parameters
     ----------
     system
-        As `kart_files` write it.
+        The system written by `kart_files`.
     speed
-        Of the chassis [m/s].
+        Speed of the chassis [m/s].
     near
-        A turn of the same kart at a speed near by, to begin with.
+        A turn of the same kart at a similar speed, as initial guess.
     """
     held = [each for each in system.elements if isinstance(each, SpeedControl)]
     if len(held) != 1:
@@ -52,7 +52,7 @@ def steady_turn(system: System, speed: float, *, near: SteadyMotion | None = Non
 
 
 def turn_eigenvalues(motion: SteadyMotion) -> Array:
-    """Return the eigenvalues of a steady turn without those of every turn: 0 and ± i times the yaw rate [1/s]."""
+    """Return the eigenvalues of a steady turn without 0 and ± i times the yaw rate, which every turn has [1/s]."""
     values = system_modes(linearize(motion.system, motion.equilibrium, inputs=(), outputs=())).eigenvalues
     rate = abs(motion.curvature) * motion.speed
     away = (np.abs(values) > NEUTRAL * max(rate, 1.0)) & (np.abs(values - 1j * rate) > NEUTRAL * max(rate, 1.0))
@@ -62,16 +62,16 @@ def turn_eigenvalues(motion: SteadyMotion) -> Array:
 def critical_speed_in_turn(
     build: Callable[[float], System], low: float, high: float, *, tolerance: float = 0.05
 ) -> tuple[float, float]:
-    """Return speeds between which the steady turn of a kart ceases to be stable, or to exist: bisection [m/s].
+    """Return two speeds between which the steady turn of a kart loses its stability or ceases to exist [m/s].
 
     Parameters
     ----------
     build
-        From a speed to the kart with its steer angle.
+        Function that returns the kart, with its steer angle, at a speed.
     low, high
-        Speeds with a stable turn, and without.
+        Speeds with and without a stable turn [m/s].
     tolerance
-        Of the speed [m/s].
+        Tolerance of the bisection [m/s].
     """
     last: list[SteadyMotion] = []
 

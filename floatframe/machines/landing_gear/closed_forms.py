@@ -1,8 +1,8 @@
-"""Retraction of a gear in its plane by circles: knee of the brace, length of the jack, force of the jack at rest.
+"""Retraction of a gear in its plane, by intersection of circles: knee of the brace, length and force of the jack.
 
-The leg turns by theta about its hinge, the origin: a point (y, z) of it is then at
-(y cos theta - z sin theta, y sin theta + z cos theta).
-The brace runs from its hinge on the airframe by the knee to a point of the leg, with two links of the same length.
+The leg rotates by theta about its hinge, the origin, which takes a point (y, z) of it to (y cos theta - z sin theta, y
+sin theta + z cos theta).
+The brace connects its hinge on the airframe to a point of the leg, by two links of equal length with a knee.
 """
 
 from dataclasses import dataclass
@@ -14,27 +14,28 @@ from fe_models.foundation.arrays import Array
 __all__ = ["Retraction", "retraction"]
 
 BRACE, FOOT, LINK = (0.55, 0.0), (0.05, -0.45), 0.34  #: hinge on the airframe, point of the leg, length of a link [m]
-JACK, HORN = (0.5, 0.1), (0.06, 0.15)  #: of the jack on the airframe and on the leg [m]
+JACK, HORN = (0.5, 0.1), (0.06, 0.15)  #: ends of the jack on the airframe and on the leg [m]
 LEG_MASS, LEG_CENTRE, LINK_MASS = 90.0, (0.0, -0.9), 4.0
 
 
 @dataclass(frozen=True, eq=False)
 class Retraction:
-    """The mechanism at angles of the leg, each (n,) or (n, 2) in its plane (y, z)."""
+    """The mechanism at angles of the leg, each array (n,), or (n, 2) in its plane (y, z)."""
 
     knee: Array  #: (n, 2) [m]
-    jack: Array  #: distance of the ends of the jack [m]
-    potential: Array  #: of leg and links over g, zero where all centres of mass are as high as the hinge [kg m]
+    jack: Array  #: distance between the ends of the jack [m]
+    #: of leg and links, divided by g, zero where all centres of mass are at the height of the hinge [kg m]
+    potential: Array
 
 
 def turned(theta: Array, point: tuple[float, float]) -> Array:
-    """Return a point of the leg, (n, 2)."""
+    """Return a point of the rotated leg, (n, 2)."""
     y, z = point
     return np.stack([y * np.cos(theta) - z * np.sin(theta), y * np.sin(theta) + z * np.cos(theta)], axis=1)
 
 
 def retraction(theta: Array) -> Retraction:
-    """Return the mechanism at the angles theta of the leg, zero where it is down, (n,) [rad]."""
+    """Return the mechanism at the angles theta of the leg, (n,) [rad]; zero is the extended gear."""
     theta = np.atleast_1d(np.asarray(theta, dtype=float))
     hinge, foot = np.array(BRACE), turned(theta, FOOT)
     between = foot - hinge

@@ -1,4 +1,4 @@
-"""Shimmy of a nose gear: oscillations to the side of a gear that rolls straight on, over its speed."""
+"""Shimmy of a nose gear: lateral oscillations of a gear that rolls straight, as a function of speed."""
 
 from collections.abc import Sequence
 
@@ -14,20 +14,20 @@ from floatframe.system import System
 
 __all__ = ["critical_speed", "growth", "rolling", "shimmy_locus"]
 
-BAND = 0.2, 100.0  #: natural frequencies among which shimmy is looked for [Hz]
+BAND = 0.2, 100.0  #: range of natural frequencies in which shimmy is sought [Hz]
 
 
 def rolling(system: System, speed: float, *, body: str = "carriage") -> LinearSystem:
-    """Return a gear linearised about rolling straight on with a speed [m/s]; `body` keeps its direction.
+    """Return a gear linearised about straight rolling at a speed [m/s]; `body` keeps its direction.
 
-    Forces that change with time (the blow of shimmy.toml) count as at its beginning.
+    Forces that change with time (the blow of shimmy.toml) have their initial value.
     """
     about = steady_motion(system, body, speed)
     return linearize(about.system, about.equilibrium, inputs=(), outputs=())
 
 
 def growth(system: System, speed: float) -> complex:
-    """Return the eigenvalue with the largest real part among oscillations to 100 Hz [1/s]: above zero, it shimmies."""
+    """Return the eigenvalue of largest real part among oscillations up to 100 Hz [1/s]; above zero means shimmy."""
     modes = system_modes(rolling(system, speed))
     f = modes.natural_frequencies
     swinging = modes.eigenvalues[(modes.eigenvalues.imag > 0) & (f > BAND[0]) & (f < BAND[1])]
@@ -35,7 +35,7 @@ def growth(system: System, speed: float) -> complex:
 
 
 def shimmy_locus(system: System, speeds: Sequence[float] | Array) -> Locus:
-    """Return the modes of a gear over its speed [m/s], each followed by its shape."""
+    """Return the modes of a gear as functions of its speed [m/s], each tracked by its shape."""
     return root_locus(lambda speed: rolling(system, speed), speeds, parameter="speed [m/s]")
 
 
@@ -45,7 +45,7 @@ def critical_speed(system: System, low: float, high: float, *, tolerance: float 
     Raises
     ------
     ModelError
-        If the gear shimmies at `low` already, or does not at `high`.
+        If the gear shimmies already at `low`, or not at `high`.
     """
     ends = [growth(system, speed).real for speed in (low, high)]
     if not ends[0] < 0 < ends[1]:

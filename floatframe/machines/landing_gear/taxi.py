@@ -1,4 +1,4 @@
-"""An aircraft that rolls steadily before it meets something."""
+"""An aircraft that rolls steadily before it meets an obstacle."""
 
 from floatframe.analyses.steady.steady_motion import steady_motion
 from floatframe.state import State
@@ -8,8 +8,8 @@ __all__ = ["rolling_state"]
 
 
 def rolling_state(system: System, speed: float, *, body: str = "fuselage") -> State:
-    """Return the state in which all rolls straight on with a speed [m/s], wings sagged, struts and tyres pressed.
+    """Return the state of straight rolling at a speed [m/s], with wings, struts and tyres under static load.
 
-    A motion that begins from it, `integrate(system, ..., state=...)`, shows nothing but what comes on the way.
+    A motion that begins from it, `integrate(system, ..., state=...)`, shows only the effect of the obstacles.
     """
     return steady_motion(system, body, speed).equilibrium.state

@@ -1,15 +1,15 @@
-"""Torque of an induction motor that turns evenly, on a supply with harmonics, by phasors.
+"""Torque of an induction motor at constant speed, on a supply with harmonics, by phasors.
 
-At a mechanical speed Omega the equations of the motor are linear with constant coefficients. Each part k of the supply,
-U_k e^(j k theta) with d theta/dt = w = 2 pi f, makes currents and fluxes e^(j k theta) of its own (docs/
-hydraulics_and_drives.md has the equations):
+At a constant mechanical speed Omega, the equations of the motor are linear with constant coefficients. Each component k
+of the supply, U_k e^(j k theta) with d theta/dt = w = 2 pi f, produces its own currents and fluxes e^(j k theta)
+(equations in docs/hydraulics_and_drives.md):
 
     [R_s + j k w L_s        j k w L_m         ] [i_s]   [U_k]
     [j (k w - p Omega) L_m  R_r + j (k w - p Omega) L_r] [i_r] = [0]
 
-The torque 3/2 p Im(conj(psi_s) i_s) has a line at n times the frequency of the supply of every pair b - a = ±n, with
-c_n = sum of conj(psi_a) i_b over b - a = n: its amplitude is 3/2 p |c_n - conj(c_-n)|, its mean 3/2 p Im c_0. Of a
-supply with the orders -5 and 7 these are n = 6 and 12, of one that is unbalanced (order -1) n = 2.
+The torque 3/2 p Im(conj(psi_s) i_s) has a line at n times the supply frequency for every pair of components with b - a
+= ±n. With c_n = sum of conj(psi_a) i_b over b - a = n, its amplitude is 3/2 p |c_n - conj(c_-n)|, and the mean torque
+is 3/2 p Im c_0. A supply with the orders -5 and 7 gives n = 6 and 12, an unbalanced supply (order -1) n = 2.
 """
 
 from collections.abc import Sequence
@@ -24,13 +24,13 @@ __all__ = [
 
 
 def supply_voltage(motor: Motor, f: float) -> float:
-    """Return the peak of a phase at a frequency of the supply [V], voltage over frequency constant up to the rated."""
+    """Return the phase peak voltage at a supply frequency [V]; voltage / frequency is constant up to the rated one."""
     share = min(1.0, abs(f) / motor.rated_frequency)
     return motor.boost + (motor.rated_voltage - motor.boost) * share
 
 
 def phasors(motor: Motor, order: float, voltage: complex, f: float, speed: float) -> tuple[complex, complex, complex]:
-    """Return current and flux linkage of the stator and flux linkage of the rotor of one part of the supply."""
+    """Return current and flux linkage of the stator, and flux linkage of the rotor, due to one supply component."""
     w, slip = 2 * np.pi * f * order, 2 * np.pi * f * order - motor.pole_pairs * speed
     L_m = motor.magnetizing
     L_s, L_r = motor.stator_leakage + L_m, motor.rotor_leakage + L_m
@@ -45,18 +45,18 @@ def phasors(motor: Motor, order: float, voltage: complex, f: float, speed: float
 
 
 def torque_lines(motor: Motor, harmonics: Sequence[Sequence[float]], f: float, speed: float) -> dict[int, float]:
-    """Return the mean torque (0) and the amplitudes of its ripple by multiples of the supply frequency [N m].
+    """Return the mean torque (key 0) and the amplitudes of its ripple, by multiple of the supply frequency [N m].
 
     Parameters
     ----------
     motor
         The motor.
     harmonics
-        Order and amplitude over the fundamental of each.
+        Order and amplitude (relative to the fundamental) of each harmonic.
     f
         Frequency of the supply [Hz].
     speed
-        Of the rotor [rad/s].
+        Speed of the rotor [rad/s].
     """
     U = supply_voltage(motor, f)
     parts = {1: phasors(motor, 1, U, f, speed)}
@@ -72,9 +72,10 @@ def torque_lines(motor: Motor, harmonics: Sequence[Sequence[float]], f: float, s
 
 
 def ripple_of_leakage(motor: Motor, f: float, orders: tuple[int, int] = (5, 7)) -> float:
-    """Return the usual estimate of the ripple at six times f by an inverter in six steps [N m].
+    """Return the usual estimate of the ripple at six times f for a six-step inverter [N m].
 
-    Harmonics see the leakage alone, the flux is U/w: 3/2 p (U/w) (I_5 - I_7), I_k = U/k / (k w L_leakage).
+    Harmonics are limited by the leakage alone, and the flux is U/w: 3/2 p (U/w) (I_5 - I_7), I_k = U/k / (k w
+    L_leakage).
     """
     w, U = 2 * np.pi * f, supply_voltage(motor, f)
     leakage = motor.stator_leakage + motor.rotor_leakage
@@ -83,7 +84,7 @@ def ripple_of_leakage(motor: Motor, f: float, orders: tuple[int, int] = (5, 7)) 
 
 
 def speed_of_torque(motor: Motor, f: float, torque: float) -> float:
-    """Return the speed at which a supply of pure sines gives a mean torque below the breakdown one [rad/s]."""
+    """Return the speed at which a sinusoidal supply gives a mean torque below the breakdown torque [rad/s]."""
     from scipy.optimize import brentq, minimize_scalar
 
     synchronous = 2 * np.pi * f / motor.pole_pairs
@@ -97,17 +98,17 @@ def speed_of_torque(motor: Motor, f: float, torque: float) -> float:
 
 
 def steady_fluxes(motor: Motor, f: float, speed: float) -> tuple[float, float, float, float]:
-    """Return the flux linkages at theta = 0 of even running on the fundamental, as the element has them [V s]."""
+    """Return the flux linkages at theta = 0 for constant speed on the fundamental, in the form of the element [V s]."""
     _, psi_s, psi_r = phasors(motor, 1, supply_voltage(motor, f), f, speed)
     return psi_s.real, psi_s.imag, psi_r.real, psi_r.imag
 
 
 def torque_over_speed(motor: Motor, f: float, speed: float, at: float) -> complex:
-    """Return what a small oscillation of the speed adds to the torque, over it, at a frequency [N m s].
+    """Return the torque change divided by a small oscillation of the speed, at a frequency [N m s].
 
-    In axes that turn with the field, fluxes psi = psi_0 + x with x in real parts, the equations of small motions are
-    dx/dt = A x + b dOmega with b = j p psi_r0 of the rotor's flux, and
-    dT = c x: c (2 pi j f' - A)^-1 b.
+    In axes that rotate with the field, fluxes are psi = psi_0 + x, with x separated into real and imaginary parts. The
+    equations of small motions are dx/dt = A x + b dOmega, with b = j p psi_r0 from the rotor flux, and dT = c x. The
+    result is c (2 pi j f' - A)^-1 b.
     """
     p, L_m = motor.pole_pairs, motor.magnetizing
     L = np.array([[motor.stator_leakage + L_m, L_m], [L_m, motor.rotor_leakage + L_m]])

@@ -1,4 +1,4 @@
-"""What is read off a start: modes, the lines of the supply in the loads of the mounts, and what they should be."""
+"""Evaluation of a start: modes, supply lines in the loads of the mounts, and their predictions."""
 
 from dataclasses import replace
 from typing import NamedTuple, cast
@@ -23,14 +23,14 @@ from floatframe.system import System
 
 __all__ = ["ModeOfBogie", "SupplyLines", "at_rest", "modes_of", "predicted_lines", "supply_lines", "supply_phase"]
 
-MULTIPLES = (6, 12)  #: of the supply frequency, of an inverter in six steps
+MULTIPLES = (6, 12)  #: multiples of the supply frequency, for a six-step inverter
 
 
 def at_rest(system: System, load: str = "leading_lower", column: str = "force x") -> LinearSystem:
     """Return the bogie without supply, linearised at rest.
 
-    Inputs are the air-gap torques of both motors, outputs a column of a mount and the speed of the leading rotor
-    against its motor. Wheels at rest stick to the rails, as they do while slipping little.
+    Inputs are the air-gap torques of both motors. Outputs are a column of a mount, and the speed of the leading rotor
+    relative to its motor. Wheels at rest stick to the rails, as they do at small slip.
     """
     drives = [each for each in system.elements if isinstance(each, InductionMotor)]
     bodies = [replace(each, velocity=np.zeros(3), omega_B=np.zeros(3)) for each in system.bodies]
@@ -46,12 +46,12 @@ def at_rest(system: System, load: str = "leading_lower", column: str = "force x"
 
 
 class ModeOfBogie(NamedTuple):
-    """An oscillation, and where most of its energy of motion is."""
+    """An oscillation, and the location of its kinetic energy."""
 
     frequency: float  #: [Hz]
     damping: float  #: ratio
-    where: str  #: the two bodies with most of it
-    flexible: float  #: part of the energy of motion that is in the modes of the frame
+    where: str  #: the two bodies with the largest shares
+    flexible: float  #: share of the kinetic energy in the modes of the frame
 
 
 def modes_of(linear: LinearSystem, lowest: float = 5.0, highest: float = 200.0) -> list[ModeOfBogie]:
@@ -77,7 +77,7 @@ def modes_of(linear: LinearSystem, lowest: float = 5.0, highest: float = 200.0) 
 
 
 class SupplyLines(NamedTuple):
-    """Amplitudes of what goes with multiples of the supply frequency."""
+    """Amplitudes at multiples of the supply frequency."""
 
     frequency: Array  #: of the supply, (n,) [Hz]
     torque: dict[int, Array]  #: in the air gap of the leading motor, by multiple, each (n,) [N m]
@@ -85,7 +85,7 @@ class SupplyLines(NamedTuple):
 
 
 def supply_phase(system: System, t: Array, drive: str = "leading_drive") -> tuple[Array, Array]:
-    """Return frequency [Hz] and phase [rad] of a motor's supply over time, each (n_t,)."""
+    """Return frequency [Hz] and phase [rad] of the supply of a motor, (n_t,) each."""
     motor = next(each for each in system.elements if each.name == drive)
     assert isinstance(motor, InductionMotor)
     frequency = motor.frequency.at(t)  # type: ignore[union-attr]
@@ -98,7 +98,7 @@ def supply_lines(
     system: System, motion: Trajectory, load: str = "leading_lower", column: str = "force x",
     *, multiples: tuple[int, ...] = MULTIPLES, slowest: float = 1.5,
 ) -> SupplyLines:  # fmt: skip
-    """Return the lines of a start by order tracking, the order being that of the supply, above a frequency [Hz]."""
+    """Return the supply lines of a start, by order tracking relative to the supply, above a supply frequency [Hz]."""
     t = np.asarray(motion.t)
     _, phase = supply_phase(system, t)
     torque = element_motion(system, motion, "leading_drive").outputs["torque"]
@@ -119,10 +119,11 @@ def supply_lines(
 def predicted_lines(
     data: MotorBogie, linear: LinearSystem, frequencies: Array, torque: float, multiples: tuple[int, ...] = MULTIPLES
 ) -> SupplyLines:
-    """Return the lines of even running at each frequency of the supply, from closed forms and frequency responses.
+    """Return the lines for constant speed at each supply frequency, from closed forms and frequency responses.
 
-    The ripple T_n of `torque_lines` turns the rotors by Y = speed over torque of the linearised bogie, which adds
-    G = `torque_over_speed` to the torque: T = T_n/(1 - G Y), and the load is the response H to both torques.
+    The ripple T_n of `torque_lines` rotates the rotors with the mobility Y = speed / torque of the linearised bogie.
+    This adds G = `torque_over_speed` times the speed to the torque: T = T_n/(1 - G Y). The load is the response H to
+    both torques.
     """
     f = np.asarray(frequencies, dtype=float)
     rotor = np.array([speed_of_torque(data.motor, each, torque) for each in f])

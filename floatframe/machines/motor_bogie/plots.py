@@ -1,4 +1,4 @@
-"""A start as one picture: electrical and mechanical frequencies over time, and the load where they cross."""
+"""A start as one figure: electrical and mechanical frequencies over time, and the load where they cross."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["plot_lines", "plot_map", "plot_start"]
 
-DECADES = 4.0  #: of amplitudes that colours show
+DECADES = 4.0  #: range of amplitudes that colours show, in decades
 
 
 def plot_start(
@@ -25,19 +25,19 @@ def plot_start(
     found: SupplyLines,
     predicted: SupplyLines,
 ) -> "Figure":
-    """Return a figure: spectra over time with the lines of the supply and the modes, and loads over their frequency.
+    """Return a figure with spectra over time, the supply lines and the modes, and loads over frequency.
 
     Parameters
     ----------
     maps
-        Of a current, a torque, the force of a mount, as `frequency_map` returns them, each with the multiples of the
-        supply frequency that are drawn as lines.
+        Maps of a current, a torque and the force of a mount, from `frequency_map`, each with the multiples of the
+        supply frequency to be drawn as lines.
     supply
-        Times [s] and the frequency of the supply [Hz], each (n_t,).
+        Times [s] and supply frequency [Hz], (n_t,) each.
     modes
-        Of the bogie, drawn as levels.
+        Modes of the bogie, drawn as horizontal lines.
     found, predicted
-        Of `supply_lines` and `predicted_lines`.
+        Results of `supply_lines` and `predicted_lines`.
     """
     from matplotlib.figure import Figure
 
@@ -58,7 +58,7 @@ def plot_map(
     ax: "Axes",
     highest: float,
 ) -> "Axes":
-    """Draw amplitudes as colours over time and frequency, lines of the supply dashed, modes dotted (green: frame)."""
+    """Draw amplitudes as colours over time and frequency, supply lines dashed, modes dotted (green: frame modes)."""
     t, f = supply
     shown = np.log10(np.maximum(spectrum.amplitudes, 1e-12)).T
     top = float(shown[1:].max())
@@ -88,7 +88,7 @@ def plot_map(
 
 
 def plot_lines(found: SupplyLines, predicted: SupplyLines, modes: Sequence[ModeOfBogie], ax: "Axes") -> "Axes":
-    """Draw the amplitude of each line in a load over its frequency, as the run has it and as even running would."""
+    """Draw the amplitude of each line in a load over frequency, from the run and for constant speed."""
     for k, n in enumerate(found.load):
         color = f"C{k}"
         ax.semilogy(n * found.frequency, found.load[n], color=color, label=f"{n} f, of the start")

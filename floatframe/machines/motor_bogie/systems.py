@@ -1,4 +1,4 @@
-"""Files of the bogie with induction motors: the frame with brackets, and its starts on several supplies."""
+"""Files of the bogie with induction motors: the frame with brackets, and starts on several supplies."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ from floatframe.rails import ContactLaws, Pair, Track, Wheelset, height_on_rails
 __all__ = ["SUPPLIES", "motor_bogie_file", "motor_bogie_files"]
 
 LAWS = ContactLaws(creep="kalker-saturated", friction=0.4)
-#: words and harmonics of each shipped start; None: those of the description
+#: title and harmonics of each shipped start; None: those of the description
 SUPPLIES = {
     "six_steps": ("an inverter in six steps", None),
     "sine": ("a supply of pure sines", ()),
@@ -29,7 +29,7 @@ def numbers(*values: float) -> str:
 
 
 def motor_bogie_files(data: MotorBogie | None = None) -> dict[str, str]:
-    """Return the files of the machine by their names, without README.md."""
+    """Return the files of the machine, by name, without README.md."""
     data = data or MotorBogie()
     files = dict(frame_files(data.vehicle, supports=data.supports()))
     plain = "geometric_stiffness = false  # its loads are far from buckling it"
@@ -62,7 +62,7 @@ def wheel_load(data: MotorBogie) -> float:
 
 
 def moving(speed: float, spin: float = 0.0) -> str:
-    """Return the velocities of a body that runs on and turns about its transverse axis."""
+    """Return the velocities of a body that moves forward and rotates about its transverse axis."""
     spinning = f"omega_B = {numbers(0, spin, 0)}\n" if spin else ""
     return (f"velocity = {numbers(speed, 0, 0)}\n" if speed else "") + spinning
 
@@ -83,7 +83,7 @@ def rigid(
 def bushing(
     name: str, a: tuple[str, str], b: tuple[str, str], stiffness: str, damping: str, preload: str | None = None
 ) -> str:
-    """Return the table of a bushing between two places, (body, marker)."""
+    """Return the table of a bushing between two markers, each given as (body, marker)."""
     given = "" if preload is None else f"preload = {preload}\n"
     return (
         f'[forces.{name}]\ntype = "bushing"\nbody_a = "{a[0]}"\nmarker_a = {a[1]}\nbody_b = "{b[0]}"\n'
@@ -92,7 +92,7 @@ def bushing(
 
 
 def vehicle_above(data: MotorBogie) -> str:
-    """Return half the body of the vehicle on its air springs, held against pitch and yaw as its other bogie does."""
+    """Return half of the vehicle body on its air springs, supported against pitch and yaw like by the other bogie."""
     v = data.vehicle
     load = 0.5 * v.body_mass * GRAVITY / 2
     I_x, I_y, I_z = (0.5 * each for each in v.body_inertia)
@@ -170,7 +170,7 @@ def axle_and_motor(data: MotorBogie, word: str, height: float) -> str:
 
 
 def hinge(name: str, body: str, at: tuple[float, float, float], turning: str) -> str:
-    """Return a revolute joint about the transverse axis, at the origin of what turns."""
+    """Return a revolute joint about the transverse axis, at the origin of the rotating body."""
     return (
         f'[joints.{name}]\ntype = "revolute"\nbody_a = "{body}"\nmarker_a = {numbers(*at)}\nbody_b = "{turning}"\n'
         "marker_b = [0, 0, 0]\naxis = [0, 1, 0]\n"
@@ -197,8 +197,8 @@ def primary_springs(data: MotorBogie, word: str) -> str:
 def mounts(data: MotorBogie, word: str, rotor_x: float, height: float) -> list[str]:
     """Return the three mounts of a motor, preloaded by its weight.
 
-    Each carries a third of the weight W; with its centre a distance d before them, the upper ones are pulled and the
-    lower one pressed by W d over the distance of their heights.
+    Each carries a third of the weight W. The centre of mass is at a distance d in front of them, so the upper mounts
+    are pulled and the lower one is pressed by W d divided by their difference in height.
     """
     end, (upper, lower) = ENDS[word], data.mount_heights
     W = data.motor_weight
@@ -224,7 +224,7 @@ def mounts(data: MotorBogie, word: str, rotor_x: float, height: float) -> list[s
 
 
 def electric(data: MotorBogie, word: str) -> str:
-    """Return a motor; its rotor turns against the axle, so its axis points to the right."""
+    """Return a motor; its rotor rotates opposite to the axle, so its axis points to the right."""
     m, (begin, soft) = data.motor, data.start
     text = [f'[elements.{word}_drive]\ntype = "drives.induction-motor"\n']
     text[0] += f'marker_a = {{body = "{word}_motor", marker = [0, 0, 0]}}\n'
@@ -247,7 +247,7 @@ def electric(data: MotorBogie, word: str) -> str:
 
 
 def sensors() -> str:
-    """Return what is measured: the motors, the forces of their mounts, the torques of the couplings."""
+    """Return the sensors: motors, forces of their mounts, and torques of the couplings."""
     found = []
     for word in ENDS:
         found.append(f'[sensors.{word}_drive]\ntype = "element"\nof = "{word}_drive"\n')

@@ -1,4 +1,4 @@
-"""Mode sets of the railway engine's body beside its full model: the study of docs/railway_engine.md."""
+"""Comparison of mode sets of the railway engine's body with its full model, for docs/railway_engine.md."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -30,7 +30,7 @@ __all__ = ["FREE", "MORE_SETS", "NAME", "PLACES", "SETS", "EngineStudy", "engine
 
 NAME, FREE = "carbody", ("bogie_1", "bogie_2")
 
-#: where stress is looked at: place -> point next to the cell, mesh axes [m]
+#: points of the stress: name -> point next to the cell, in mesh axes [m]
 PLACES = {
     "side wall over the seat": (5.0, 1.45, 1.6),
     "window corner": (7.2, 1.45, 2.0),
@@ -38,7 +38,7 @@ PLACES = {
     "floor beside the pivot": (5.0, 0.3, 1.2),
 }
 
-#: set -> what makes it of n vibration modes
+#: name -> function that makes the mode set with n vibration modes
 SETS: dict[str, Callable[[Families, int], ModeSet]] = {
     "craig-bampton": lambda families, n: cms.craig_bampton(families, n_modes=n),
     "craig-bampton-ir": lambda families, n: cms.craig_bampton_ir(families, n_modes=n),
@@ -49,7 +49,7 @@ SETS: dict[str, Callable[[Families, int], ModeSet]] = {
     "normal": lambda families, n: cms.normal_modes(families, n_modes=n),
 }
 
-#: sets that span the same as `rubin` with as many modes
+#: mode sets that span the same space as `rubin` with as many modes
 MORE_SETS: dict[str, Callable[[Families, int], ModeSet]] = {
     "herting": lambda families, n: cms.herting(families, n_modes=n),
     "macneal": lambda families, n: cms.macneal(families, n_modes=n),
@@ -60,7 +60,7 @@ MORE_SETS: dict[str, Callable[[Families, int], ModeSet]] = {
 
 
 def engine_loads(system: System) -> list[cms.InterfaceLoad]:
-    """Return what the bushings of the body put on its interfaces, for `cms.benfield_hruda`: springs to the ground."""
+    """Return the loads of the body's bushings on its interfaces for `cms.benfield_hruda`, as springs to the ground."""
     loads = []
     for force in system.forces:
         if isinstance(force, Bushing) and isinstance(force.marker_b, Marker) and force.marker_b.interface is not None:
@@ -71,7 +71,7 @@ def engine_loads(system: System) -> list[cms.InterfaceLoad]:
 
 @dataclass(frozen=True, eq=False)
 class EngineStudy:
-    """The full motions, and the error of every set."""
+    """The motions of the full model, and the errors of every mode set."""
 
     full: dict[str, SuspendedMotion]
     results: tuple[SetError, ...]
@@ -87,25 +87,25 @@ def engine_study(
     every: int = 1,
     on_case: Callable[[SetError], None] | None = None,
 ) -> EngineStudy:
-    """Compare mode sets with the full model under the systems of these files, beside their carbody.toml and .h5.
+    """Compare mode sets with the full model in the systems of these files, which lie next to carbody.toml and its .h5.
 
     Parameters
     ----------
     files
-        System files, as `write_railway_engine` writes them; results are named after them.
+        System files from `write_railway_engine`; results are named after them.
     n_modes
-        Numbers of vibration modes.
+        Numbers of vibration modes to compare.
     sets
-        Names of `SETS` and `MORE_SETS`, and "benfield-hruda", loaded with the springs of its bogies.
+        Names in `SETS` and `MORE_SETS`, and "benfield-hruda", which is loaded with the springs of its bogies.
     also
-        Further sets with one number of modes each.
+        Further sets, each with one number of modes.
     every
-        Errors are looked at every so many steps.
+        Number of steps between evaluations of the errors.
 
     Raises
     ------
     ModelError
-        If a set is not one of these.
+        If a set has an unknown name.
     """
     body, damping, stress = _body_of(Path(files[0]).with_name("carbody.toml"))
     loadings = {}

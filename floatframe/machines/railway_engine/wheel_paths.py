@@ -1,8 +1,8 @@
-"""Paths that the rails lead a wheelset along: a short defect seen through the envelope of the wheel, an S-curve.
+"""Prescribed paths of a wheelset on the rails: a short defect, filtered by the envelope of the wheel, and an S-curve.
 
-A wheel of radius R over a rail z(s) has its centre at R + max over x of [z(s + x) - (R - sqrt(R² - x²))]: it cannot
-follow what is shorter than its chord. Across, the flange leans on the rail: it stands at an angle gamma, and a
-horizontal cut through it recedes by x² / (2 R tan gamma), a disc of radius R tan gamma.
+A wheel of radius R on a rail z(s) has its centre at R + max over x of [z(s + x) - (R - sqrt(R² - x²))]; it cannot
+follow shapes shorter than its chord. Laterally, the flange touches the rail. The flange is inclined by an angle gamma,
+and a horizontal cut through it recedes by x² / (2 R tan gamma), like a disc of radius R tan gamma.
 """
 
 from collections.abc import Callable
@@ -17,8 +17,8 @@ from floatframe.errors import ModelError
 __all__ = ["Defect", "SCurve", "WheelPaths", "envelope", "path_table"]
 
 CHANNELS = ("x", "y", "yaw", "roll")  #: of each wheelset, in the order of the columns
-N_CONTACT = 1001  #: places along the wheel that are tried
-N_PATCH = 15  #: places in half a contact over which a path is rounded
+N_CONTACT = 1001  #: number of points along the wheel at which contact is tried
+N_PATCH = 15  #: number of points in half a contact, over which a path is rounded
 
 
 def envelope(rail: Callable[[Array], Array], s: Array, reach: float, radius: float) -> Array:
@@ -27,11 +27,11 @@ def envelope(rail: Callable[[Array], Array], s: Array, reach: float, radius: flo
     Parameters
     ----------
     rail
-        Height of the rail over the way.
+        Height of the rail as a function of the distance along it.
     s
-        Places of the wheel, (n_s,) [m].
+        Positions of the wheel, (n_s,) [m].
     reach
-        How far before and behind the wheel the rail is looked at, less than the radius [m].
+        Distance ahead of and behind the wheel in which the rail is considered, less than the radius [m].
     radius
         R of the disc [m].
     """
@@ -44,32 +44,32 @@ def envelope(rail: Callable[[Array], Array], s: Array, reach: float, radius: flo
 
 @dataclass(frozen=True, eq=False)
 class WheelPaths:
-    """Where the track leads each wheelset."""
+    """Prescribed path of each wheelset."""
 
     t: Array  #: (n_t,) [s]
-    places: Array  #: x, y of the track [m], yaw [rad], turn about the right rail [rad], (n_t, n_wheelsets, 4)
+    places: Array  #: x, y of the track [m], yaw [rad], rotation about the right rail [rad], (n_t, n_wheelsets, 4)
 
 
 @dataclass(frozen=True)
 class Defect:
-    """A bump on the left rail of a straight track, over which all wheelsets run: both of its curves are cosines.
+    """A bump on the left rail of a straight track, with vertical and lateral cosine shapes; all wheelsets cross it.
 
     Raises
     ------
     ModelError
-        If a number is none, or length, speed or a radius is not above zero.
+        If a value is not a number, or if length, speed or a radius is not above zero.
     """
 
     length: float = 0.1  #: of the defect along the rail [m]
-    vertical: float = 0.010  #: height of its crest; below zero it is a dip [m]
-    lateral: float = 0.004  #: by which the rail stands inwards there [m]
+    vertical: float = 0.010  #: height of its crest [m]; below zero it is a dip
+    lateral: float = 0.004  #: displacement of the rail inwards there [m]
     speed: float = 5.0  #: [m/s]
-    begin: float = 0.5  #: from the first wheelset to its middle at the start [m]
+    begin: float = 0.5  #: initial distance of the first wheelset from the middle of the defect [m]
     radius: float = 0.625  #: of the wheels [m]
-    gauge: float = 1.5  #: between the middles of the rails [m]
+    gauge: float = 1.5  #: distance between the middles of the rails [m]
     flange_angle: float = 1.2217  #: gamma, 70 degrees [rad]
     patch: float = 0.015  #: half length of the contact, over which kinks of the path are rounded [m]
-    rest: float = 0.8  #: time after the last wheelset [s]
+    rest: float = 0.8  #: duration after the last wheelset has passed [s]
 
     def __post_init__(self) -> None:
         for name in ("length", "speed", "radius", "gauge", "flange_angle", "patch"):
@@ -78,22 +78,22 @@ class Defect:
             number(f"defect: {name}", getattr(self, name))
 
     def shape(self, s: Array) -> Array:
-        """Return 1 at its middle, 0 from its ends on, (n,)."""
+        """Return the shape of the defect: 1 at its middle, 0 beyond its ends, (n,)."""
         return np.where(np.abs(s) < self.length / 2, 0.5 * (1 + np.cos(2 * np.pi * s / self.length)), 0.0)
 
     def lift(self, s: Array) -> Array:
-        """Return the height of the centre of a wheel over its radius, s from the middle of the defect, (n,) [m]."""
+        """Return the height of the wheel centre above its radius, at s from the middle of the defect, (n,) [m]."""
         reach = min(self.length / 2 + np.sqrt(2 * self.radius * abs(self.vertical)), self.radius)
         return self.rounded(lambda x: envelope(lambda r: self.vertical * self.shape(r), x, reach, self.radius), s)
 
     def push(self, s: Array) -> Array:
-        """Return the way by which the flange is pushed to the right, (n,) [m]."""
+        """Return the displacement of the flange to the right, (n,) [m]."""
         radius = self.radius * np.tan(self.flange_angle)
         reach = min(self.length / 2 + np.sqrt(2 * radius * abs(self.lateral)), radius)
         return self.rounded(lambda x: envelope(lambda r: self.lateral * self.shape(r), x, reach, radius), s)
 
     def rounded(self, path: Callable[[Array], Array], s: Array) -> Array:
-        """Return the mean of a path about s, weighted by a cosine over the contact, (n,) [m]."""
+        """Return the mean of a path about s with cosine weights over the contact, (n,) [m]."""
         step = self.patch / N_PATCH
         at = np.arange(s.min() - 2 * self.patch, s.max() + 2 * self.patch, step)
         weight = 1 + np.cos(np.pi * np.arange(-N_PATCH, N_PATCH + 1) / N_PATCH)
@@ -101,7 +101,7 @@ class Defect:
         return np.interp(s, at, smooth)
 
     def paths(self, wheelsets: Array, h: float) -> WheelPaths:
-        """Return the paths of wheelsets at these places x at the start, (n_wheelsets,), every h seconds."""
+        """Return the paths of wheelsets with initial positions x, (n_wheelsets,), every h seconds."""
         first, last = max(wheelsets), min(wheelsets)
         duration = (first - last + self.begin) / self.speed + self.rest
         t: Array = h * np.arange(int(np.ceil(duration / h)) + 1, dtype=np.float64)
@@ -117,16 +117,16 @@ class Defect:
 
 @dataclass(frozen=True)
 class SCurve:
-    """From one straight track to another beside it: y = shift (x/L - sin(2 pi x/L)/(2 pi)), without cant.
+    """A transition from a straight track to a parallel one: y = shift (x/L - sin(2 pi x/L)/(2 pi)), without cant.
 
-    Its curvature rises and falls as a sine, so that nothing jumps; the greatest is nearly 2 pi shift / L².
+    Its curvature rises and falls as a sine without jumps; the largest curvature is nearly 2 pi shift / L².
     """
 
     shift: float = 4.0  #: from the first track to the second [m]
     length: float = 50.0  #: L, along the first track [m]
-    speed: float = 7.0  #: along the way [m/s]
-    begin: float = 3.0  #: from the first wheelset to the curve at the start [m]
-    rest: float = 3.0  #: time after the last wheelset [s]
+    speed: float = 7.0  #: speed along the curve [m/s]
+    begin: float = 3.0  #: initial distance of the first wheelset from the curve [m]
+    rest: float = 3.0  #: duration after the last wheelset has passed [s]
 
     def __post_init__(self) -> None:
         for name in ("length", "speed"):
@@ -135,7 +135,7 @@ class SCurve:
             number(f"S-curve: {name}", getattr(self, name))
 
     def y(self, x: Array) -> Array:
-        """Return the place across over the place along, from the beginning of the curve, (n,) [m]."""
+        """Return the lateral position at a longitudinal position, from the beginning of the curve, (n,) [m]."""
         u = np.clip(x / self.length, 0.0, 1.0)
         return self.shift * (u - np.sin(2 * np.pi * u) / (2 * np.pi))
 
@@ -145,9 +145,9 @@ class SCurve:
         return self.shift / self.length * (1 - np.cos(2 * np.pi * u))
 
     def paths(self, wheelsets: Array, h: float) -> WheelPaths:
-        """Return the paths of wheelsets at these places x at the start, (n_wheelsets,), every h seconds."""
+        """Return the paths of wheelsets with initial positions x, (n_wheelsets,), every h seconds."""
         first, last = max(wheelsets), min(wheelsets)
-        x = np.linspace(0.0, self.length, 20001)  # the way s(x) = ∫ sqrt(1 + y'²) dx, by the trapezoidal rule
+        x = np.linspace(0.0, self.length, 20001)  # arc length s(x) = ∫ sqrt(1 + y'²) dx, by the trapezoidal rule
         steps = np.sqrt(1 + self.slope(x) ** 2)
         way = np.concatenate([[0.0], np.cumsum(0.5 * (steps[1:] + steps[:-1]) * np.diff(x))])
         duration = (first - last + self.begin + way[-1]) / self.speed + self.rest
@@ -163,7 +163,7 @@ class SCurve:
 
 
 def path_table(paths: WheelPaths) -> str:
-    """Return a table as text: time, then x, y, yaw and roll of each wheelset, numbers from 1, in m and rad."""
+    """Return a table as text: time, then x, y, yaw and roll of each wheelset (numbered from 1), in m and rad."""
     n = paths.places.shape[1]
     names = [f"{name} {k + 1} [{'m' if name in 'xy' else 'rad'}]" for k in range(n) for name in CHANNELS]
     rows = np.column_stack([paths.t, paths.places.reshape(len(paths.t), -1)])

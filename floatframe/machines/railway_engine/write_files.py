@@ -1,4 +1,4 @@
-"""The files of the railway engine with another track or another mesh than those that are shipped."""
+"""The files of the railway engine with another track or another mesh than the shipped ones."""
 
 import re
 import tomllib
@@ -15,9 +15,9 @@ from floatframe.machines.railway_engine.wheel_paths import Defect, SCurve, Wheel
 __all__ = ["CASES", "railway_engine_files", "write_railway_engine"]
 
 CASES: dict[str, type[Defect] | type[SCurve]] = {"defect": Defect, "s_curve": SCurve}
-SAMPLE = {"defect": 2e-3, "s_curve": 2e-2}  #: times between samples of the paths [s]
-MARGIN, STEP = 12.0, 2.0  #: of the track as drawn: how far it goes beyond the vehicle, between its points [m]
-SIZE = 0.75  #: largest edge of a cell of the mesh that is shipped [m]
+SAMPLE = {"defect": 2e-3, "s_curve": 2e-2}  #: sampling interval of the paths [s]
+MARGIN, STEP = 12.0, 2.0  #: of the drawn track: length beyond the vehicle, distance between its points [m]
+SIZE = 0.75  #: largest edge of a cell of the shipped mesh [m]
 
 
 def write_railway_engine(
@@ -28,32 +28,32 @@ def write_railway_engine(
     part: EngineBody | None = None,
     size: float = SIZE,
 ) -> Path:
-    """Write carbody.inp, carbody.toml, CASE.toml and CASE.csv; files of these names are replaced.
+    """Write carbody.inp, carbody.toml, CASE.toml and CASE.csv; existing files with these names are replaced.
 
-    `cms reduce carbody.toml -o carbody.h5` and `floatframe run CASE.toml` do the rest (docs/railway_engine.md).
+    Continue with `cms reduce carbody.toml -o carbody.h5` and `floatframe run CASE.toml` (docs/railway_engine.md).
 
     Parameters
     ----------
     folder
-        Where; made if it is not there.
+        Folder, which is created if it does not exist.
     case
         "defect" or "s_curve".
     track
-        What it runs over; None: the defaults of `Defect` or `SCurve`.
+        The track; None: the defaults of `Defect` or `SCurve`.
     part, size
         Dimensions of the body, and the largest edge of its cells [m].
 
     Returns
     -------
     Path
-        The system file.
+        Path of the system file.
 
     Raises
     ------
     ModelError
-        If there is no such case, or the track is one of the other.
+        If there is no such case, or the track is of the other case.
     PartError
-        If the dimensions do not fit.
+        If the dimensions are inconsistent.
     """
     contents = railway_engine_files(case, track=track, part=part, size=size)
     folder = Path(folder)
@@ -65,7 +65,7 @@ def write_railway_engine(
 def railway_engine_files(
     case: str, *, track: Defect | SCurve | None = None, part: EngineBody | None = None, size: float = SIZE
 ) -> dict[str, str]:
-    """Return name -> text of the four files; parameters and errors as `write_railway_engine`."""
+    """Return the text of the four files, by name; parameters and errors as for `write_railway_engine`."""
     if case not in CASES:
         raise ModelError(f"railway engine: unknown case {quoted(case)}{nearest(case, CASES)}")
     track = CASES[case]() if track is None else track
@@ -88,7 +88,7 @@ def railway_engine_files(
 
 
 def points_of(track: Defect | SCurve, paths: WheelPaths) -> str:
-    """Return the middle of the track as it is drawn, from before the vehicle to behind where it stops."""
+    """Return the middle line of the drawn track, from behind the vehicle's start to beyond its end."""
     along = paths.places[..., 0]
     x = np.arange(np.floor(along.min()) - MARGIN, np.ceil(along.max()) + MARGIN + STEP, STEP)
     y = track.y(x) if isinstance(track, SCurve) else np.zeros(len(x))

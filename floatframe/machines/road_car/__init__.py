@@ -1,4 +1,4 @@
-"""A road car: flexible body, double wishbones, interconnected hydraulic roll control, lane change."""
+"""A road car with flexible body, double wishbones, interconnected hydraulic roll control, and a lane change."""
 
 from floatframe.machines.road_car.body import body_files
 from floatframe.machines.road_car.closed_forms import CarOnPosts

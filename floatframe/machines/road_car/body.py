@@ -1,4 +1,4 @@
-"""The body in white: panels on a frame of thin-walled beams, what it carries as masses, as a mesh and the job of it."""
+"""The body in white as a mesh and its job: panels on a frame of thin-walled beams, with carried parts as masses."""
 
 import itertools
 from collections.abc import Iterator, Sequence
@@ -11,7 +11,7 @@ __all__ = ["body_files", "interface_nodes"]
 
 Node = tuple[float, float, float]
 
-# stations of the panels: along, across and up
+# coordinates of the panel nodes along, across and up
 X_FLOOR = (-0.95, -0.75, -0.55, -0.35, -0.05, 0.20, 0.475, 0.75)
 Y_FLOOR = (-0.70, -0.525, -0.35, -0.175, 0.0, 0.175, 0.35, 0.525, 0.70)
 Z_FIREWALL = (0.24, 0.42, 0.60, 0.85)
@@ -26,9 +26,9 @@ SECTIONS = {
     "header": (0.06, 0.05, 0.0012), "brace": (0.06, 0.07, 0.0018), "cross": (0.08, 0.10, 0.0015),
     "tunnel": (0.18, 0.14, 0.0012), "bead": (0.05, 0.04, 0.0010),
 }  # fmt: skip
-#: panels: thickness [m], and what is fixed to them, mass per area [kg/m²]
+#: panels: thickness [m], and mass per area of the parts fixed to them [kg/m²]
 PANELS = {"floor": (0.0010, 18.0), "firewall": (0.0012, 12.0), "bulkhead": (0.0010, 8.0), "roof": (0.0008, 6.0)}
-#: what the body carries: node, mass [kg], moment of inertia about each axis [kg m²], place from the node [m]
+#: carried parts: node, mass [kg], moment of inertia about each axis [kg m²], position relative to the node [m]
 CARRIED: dict[str, tuple[Node, float, float, Node]] = {
     "engine_left": ((1.25, 0.45, 0.42), 112.0, 3.0, (0.0, -0.25, 0.05)),
     "engine_right": ((1.25, -0.45, 0.42), 112.0, 3.0, (0.0, 0.25, 0.05)),
@@ -49,7 +49,7 @@ CARRIED: dict[str, tuple[Node, float, float, Node]] = {
 
 
 def interface_nodes(car: RoadCar) -> dict[str, Node]:
-    """Return where the interfaces of the body are: towers, mounts of the subframes, cockpit."""
+    """Return the positions of the interfaces of the body: towers, mounts of the subframes, cockpit."""
     nodes: dict[str, Node] = {"cockpit": car.cockpit}
     for name in ("front", "rear"):
         axle = car.axle(name)
@@ -70,7 +70,7 @@ def grids() -> dict[str, list[list[Node]]]:
 
 
 def cut(points: Sequence[Node], length: float = 0.2) -> list[Node]:
-    """Return the nodes of a line through points, its pieces no longer than a length."""
+    """Return the nodes of a line through points, in pieces no longer than a length."""
     line = [points[0]]
     for a, b in itertools.pairwise(np.array(points)):
         n = int(np.ceil(np.linalg.norm(b - a) / length - 1e-9))
@@ -126,7 +126,7 @@ def beams(car: RoadCar) -> Iterator[tuple[str, list[Node]]]:
 
 
 def body_files(car: RoadCar, *, n_modes: int = 12) -> dict[str, str]:
-    """Return mesh and job of the body by file name, with so many vibration modes beside its static ones."""
+    """Return mesh and job of the body, by file name, with a number of vibration modes besides the static modes."""
     number: dict[Node, int] = {}
 
     def node(place: Sequence[float]) -> int:

@@ -1,8 +1,8 @@
-"""Forces at the wheels of the car from volumes, gas and the lengths of the linkage: an independent second road.
+"""Wheel forces of the car from volumes, gas and linkage lengths, as an independent check.
 
-The oil of a line keeps its content (1) (V_chambers + V_0 - V_gas(p))/v(p), with v(p) = exp(-(p - p_a)/K) and the gas
-at p V^n = const (2). Forces at the wheels follow by virtual work (3): F_i = sum over springs, cylinders and bars of
-their force times the slope of their length, or angle, over the height of the wheel.
+(1) The oil content of a line is constant, (V_chambers + V_0 - V_gas(p))/v(p), with v(p) = exp(-(p - p_a)/K). (2) The
+    gas follows p V^n = const. (3) Wheel forces follow from virtual work: F_i = sum over springs, cylinders and bars of
+    force times the derivative of length, or angle, by the height of the wheel.
 """
 
 from dataclasses import dataclass
@@ -16,14 +16,14 @@ from floatframe.machines.road_car.linkage import Linkage, spring_preload
 
 __all__ = ["MODES", "CarOnPosts", "line_pressure", "roll_centre", "roll_control_stiffness", "transfer_shares"]
 
-#: heights of the wheels, front left, front right, rear left, rear right, in the four motions of the wheels
+#: heights of the wheels (front left, front right, rear left, rear right) in the four wheel motions
 MODES = {
     "heave": np.array([1.0, 1.0, 1.0, 1.0]),
     "pitch": np.array([1.0, 1.0, -1.0, -1.0]),
     "roll": np.array([1.0, -1.0, 1.0, -1.0]),
     "warp": np.array([1.0, -1.0, -1.0, 1.0]),
 }
-STEP = 1e-5  #: of differences of the linkage [m]
+STEP = 1e-5  #: step of finite differences of the linkage [m]
 
 
 def gas(control: RollControl, p: float) -> float:
@@ -41,7 +41,7 @@ def chambers_at_design(control: RollControl) -> float:
 def line_pressure(control: RollControl, growth: float) -> float:
     """Return the pressure of a line whose chambers have grown by a volume since the design height, by (1) [Pa].
 
-    At design height the chambers of two heads and two rod sides stand at `at_design`.
+    At design height, the chambers of two heads and two rod sides are at the stroke `at_design`.
     """
     c, chambers = control, chambers_at_design(control)
 
@@ -55,10 +55,11 @@ def line_pressure(control: RollControl, growth: float) -> float:
 
 
 def roll_control_stiffness(car: RoadCar) -> float:
-    """Return what both lines add to the roll stiffness at design height, in small motions [N m/rad].
+    """Return the contribution of both lines to the roll stiffness at design height, in small motions [N m/rad].
 
-    A line takes up (A_h + A_r) times the strokes of two cylinders, and rises by n p/V_gas beside the oil's K/V_oil:
-    k = 2 (dV/dphi)²/(V_gas/(n p) + V_oil/K), less what the forces of the cylinders do over their curved ways.
+    A line displaces (A_h + A_r) times the strokes of two cylinders. Its compliance is that of the gas, V_gas/(n p),
+    plus that of the oil, V_oil/K: k = 2 (dV/dphi)²/(V_gas/(n p) + V_oil/K), minus the work of the cylinder forces due
+    to the curvature of their paths.
     """
     c = car.control
     oil = chambers_at_design(c) + c.gas_volume - gas(c, c.pressure)
@@ -75,13 +76,13 @@ def roll_control_stiffness(car: RoadCar) -> float:
 
 @dataclass(frozen=True, eq=False)
 class CarOnPosts:
-    """The car with its body held and its wheels on posts."""
+    """The car with its body fixed and its wheels on posts."""
 
     car: RoadCar
     support: str = "hydraulic"
 
     def forces(self, heights: Array) -> Array:
-        """Return the upward forces of the posts at wheel heights over design height, without weight, (4,) [N]."""
+        """Return the upward forces of the posts at wheel heights above design height, without weight, (4,) [N]."""
         car, c = self.car, self.car.control
         places, slopes = [], []
         for (name, side), z in zip(CORNERS.values(), heights, strict=True):
@@ -108,7 +109,7 @@ class CarOnPosts:
         return np.array(found)
 
     def pressures(self, heights: Array) -> tuple[float, float]:
-        """Return the pressures of the left and of the right line at wheel heights [Pa]."""
+        """Return the pressures of the left and the right line at wheel heights [Pa]."""
         c = self.car.control
         left = right = 0.0
         for (name, side), z in zip(CORNERS.values(), heights, strict=True):
@@ -119,16 +120,16 @@ class CarOnPosts:
         return line_pressure(c, left), line_pressure(c, right)
 
     def stiffness(self, mode: str, height: float = 0.0, step: float = 1e-4) -> float:
-        """Return the stiffness of a motion of the wheels, force of a wheel along it over its height [N/m]."""
+        """Return the stiffness of a wheel motion, the force of a wheel divided by its height [N/m]."""
         way = MODES[mode]
         high, low = (self.forces((height + s) * way) @ way / 4 for s in (step, -step))
         return float((high - low) / (2 * step))
 
 
 def roll_centre(car: RoadCar, name: str) -> float:
-    """Return the height of the roll centre of an axle at design height, y times the slope of its contact [m].
+    """Return the height of the roll centre of an axle at design height: y times the slope of the contact path [m].
 
-    The contact moves across by dy where the wheel moves up by dz; a side force there lifts the wheel by F dy/dz.
+    The contact moves across by dy when the wheel moves up by dz; a lateral force there lifts the wheel by F dy/dz.
     """
     linkage = Linkage(car.axle(name), 1)
     low, high = (linkage.lifted(z) for z in (-1e-4, 1e-4))
@@ -139,10 +140,11 @@ def roll_centre(car: RoadCar, name: str) -> float:
 def transfer_shares(
     car: RoadCar, support: str, *, mass: float, x: float, height: float, tyre_stiffness: float
 ) -> tuple[float, float]:
-    """Return load that moves from the inner to the outer wheel of the front and rear axle over m a_y h/t [-].
+    """Return the load transfer of the front and rear axle, divided by m a_y h/t [-].
 
-    The classic closed form of small roll: each axle takes its part of the sprung mass at its roll centre, its unsprung
-    mass at wheel height, and the rest by its share of the roll stiffness, springs and tyres in series.
+    Classic closed form for small roll: each axle takes its part of the sprung mass at its roll centre, its unsprung
+    mass at wheel height, and a part of the remaining moment in proportion to its roll stiffness, with springs and tyres
+    in series.
     """
     unsprung = 2 * (car.wheel + car.upright + 0.5 * (car.lower_arm + car.upper_arm))
     axles = {name: car.axle(name) for name in ("front", "rear")}
@@ -163,7 +165,8 @@ def transfer_shares(
     for name, k in (("front", rate[:2].mean()), ("rear", rate[2:].mean())):
         stiffness[name] = 0.5 * track**2 / (1 / k + 1 / tyre_stiffness)
     lever = sprung_height - sum(part[name] * centre[name] for name in axles)
-    rolling = sum(stiffness.values()) / (sum(stiffness.values()) - sprung * 9.81 * lever)  # its weight leans out too
+    # the weight also leans outwards
+    rolling = sum(stiffness.values()) / (sum(stiffness.values()) - sprung * 9.81 * lever)
     found = [
         sprung * (part[name] * centre[name] + rolling * lever * stiffness[name] / sum(stiffness.values()))
         + unsprung * wheel_height

@@ -1,4 +1,4 @@
-"""Numbers of the road car; docs/road_car.md has their table with the sources."""
+"""Parameters of the road car, tabulated with sources in docs/road_car.md."""
 
 from dataclasses import dataclass, field
 
@@ -8,7 +8,7 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["CORNERS", "Axle", "RoadCar", "RollControl"]
 
-#: corners by name, axle and side (1: left)
+#: corners by name, with axle and side (1: left)
 CORNERS = {
     "front_left": ("front", 1), "front_right": ("front", -1), "rear_left": ("rear", 1), "rear_right": ("rear", -1),
 }  # fmt: skip
@@ -18,7 +18,7 @@ Point = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Axle:
-    """A double wishbone suspension: points of the left side in axes of the car [m, kg, s]."""
+    """A double wishbone suspension, with points of the left side in axes of the car [m, kg, s]."""
 
     centre: Point  #: of the wheel
     lower_front: Point  #: hinge of the lower wishbone
@@ -27,16 +27,16 @@ class Axle:
     upper_front: Point  #: hinge of the upper wishbone
     upper_rear: Point
     upper_ball: Point
-    rod_inner: Point  #: tie rod, or toe link of the rear axle
+    rod_inner: Point  #: of the tie rod, or of the toe link at the rear axle
     rod_outer: Point
     seat: Point  #: of spring and damper on the lower wishbone
     jack: Point  #: of the hydraulic cylinder on the lower wishbone
     tower: Point  #: of spring, damper and cylinder on the body
     mounts: tuple[Point, Point]  #: of the subframe on the body
     spring: float  #: [N/m]
-    preload: float  #: force that presses the spring at design height [N]
+    preload: float  #: compression force of the spring at design height [N]
     damper: float  #: [N s/m]
-    bar: float  #: anti-roll bar, torque on the wishbones over the sum of their turns [N m/rad]
+    bar: float  #: of the anti-roll bar, torque on the wishbones divided by the sum of their rotations [N m/rad]
 
     def point(self, name: str, side: int) -> Array:
         """Return a point on a side (1: left, -1: right), (3,)."""
@@ -45,10 +45,10 @@ class Axle:
 
 @dataclass(frozen=True)
 class RollControl:
-    """Cylinders at the corners; heads of one side and rods of the other side share a line with a gas volume."""
+    """Cylinders at the corners; the heads of one side and the rods of the other share a line with a gas volume."""
 
     head_area: float = 9.6e-4  #: 35 mm bore [m²]
-    rod_area: float = 7.6e-4  #: ring about a rod of 16 mm [m²]
+    rod_area: float = 7.6e-4  #: ring around a rod of 16 mm [m²]
     stroke: float = 0.24  #: [m]
     at_design: float = 0.12  #: stroke at design height [m]
     dead_volume: float = 2e-5  #: of each chamber [m³]
@@ -57,7 +57,7 @@ class RollControl:
     gas_volume: float = 6.5e-4  #: at the charge [m³]
     exponent: float = 1.4
     orifice: float = 4e-5  #: between line and gas [m²]
-    transition: float = 3e4  #: pressure difference over it below which the flow is laminar [Pa]
+    transition: float = 3e4  #: pressure difference across it below which the flow is laminar [Pa]
     density: float = 870.0
     bulk_modulus: float = 1.4e9
     ambient: float = 101325.0
@@ -86,23 +86,23 @@ REAR = Axle(
 
 @dataclass(frozen=True)
 class RoadCar:
-    """A passenger car, x ahead, y left, z up from the ground, in units m-kg-s."""
+    """A passenger car, with x forward, y left and z up from the ground, in units m-kg-s."""
 
     front: Axle = FRONT
     rear: Axle = REAR
     control: RollControl = field(default_factory=RollControl)
-    speed: float = 65 / 3.6  #: held by the rear wheels [m/s]
-    radius: float = 0.32  #: of the tyres without load [m]
+    speed: float = 65 / 3.6  #: maintained by the rear wheels [m/s]
+    radius: float = 0.32  #: of the unloaded tyres [m]
     lower_arm: float = 6.0  #: mass [kg]
     upper_arm: float = 3.0
     upright: float = 16.0  #: with brake
     wheel: float = 19.0
     spin_inertia: float = 1.1  #: of a wheel [kg m²]
     rack: float = 4.0
-    subframe: float = 26.0  #: of each axle, with what is on it
-    mount_stiffness: float | None = 1.0e7  #: of a mount of a subframe, each direction; None: fixed to the body [N/m]
+    subframe: float = 26.0  #: of each axle, including the attached parts
+    mount_stiffness: float | None = 1.0e7  #: of a mount of a subframe, in each direction; None: fixed to the body [N/m]
     mount_damping: float = 4.0e3  #: [N s/m]
-    bump_gap: float = 0.055  #: way of the spring to its bump stop [m]
+    bump_gap: float = 0.055  #: travel of the spring to its bump stop [m]
     rebound_gap: float = 0.055
     cockpit: Point = (-0.05, 0.0, 0.24)  #: where roll, side-slip and acceleration are measured
 
