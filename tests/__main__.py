@@ -4,7 +4,7 @@
     python -m tests --long       # studies of minutes, and those of --relative
     python -m tests --relative   # tests of the engine again, in the coordinates of joints
     python -m tests --external   # beside other programs; those that are not there are skipped, visibly
-    python -m tests --campaign   # seeded bad inputs, kills, random motions
+    python -m tests --campaign   # seeded bad inputs, kills, random motions and bodies
     python -m tests --changed    # lint, and tests that guard what changed since main (or --changed HEAD~3)
     python -m tests --guards cms/solvers/eigen.py    # which tests guard a module
 

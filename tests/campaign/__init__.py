@@ -1,4 +1,4 @@
-"""The campaign: bad inputs, kills and random motions, each with an oracle (`python -m tests --campaign`)."""
+"""The campaign: bad inputs, kills, random motions and bodies, each with an oracle (`python -m tests --campaign`)."""
 
 from tests.campaign.campaign import main
 

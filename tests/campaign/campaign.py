@@ -1,13 +1,13 @@
 """The campaign runs every case in a worker process with a limit of time, and counts what became of it.
 
-    python -m tests --campaign                     everything: 1400 bad inputs, 100 kills, 300 random motions
+    python -m tests --campaign                     1400 bad inputs, 100 kills, 300 random motions, 300 bodies
     python -m tests --campaign motions jobs        two families
     python -m tests --campaign jobs 147            one case, its verdict in words
     python -m tests --campaign motions --count 1000 --seed 5      so many cases of each, seeds from 5 on
 
-Motions have new seeds in each run, the other families those from 0 on; --seed gives the first. A fault prints its
-family and seed, which repeat it. A hang is a case beyond `LIMIT` seconds; a worker that ends is a traceback of its
-case. The exit code is 0 if there is no traceback, no hang, no wrong acceptance and no unclear message.
+Motions and bodies have new seeds in each run, the other families those from 0 on; --seed gives the first. A fault
+prints its family and seed, which repeat it. A hang is a case beyond `LIMIT` seconds; a worker that ends is a traceback
+of its case. The exit code is 0 if there is no traceback, no hang, no wrong acceptance and no unclear message.
 """
 
 import argparse
@@ -37,11 +37,12 @@ FAMILIES: dict[str, tuple[str, int]] = {  # what it is -> the function of a case
     "commands": ("tests.campaign.commands:command_case", 100),
     "decks": ("tests.campaign.imports:deck_case", 150),
     "matrices": ("tests.campaign.imports:matrix_case", 150),
-    "bodies": ("tests.campaign.imports:body_case", 100),
+    "reduced-bodies": ("tests.campaign.imports:body_case", 100),
     "kills": ("tests.campaign.kills:kill_case", 100),
     "motions": ("tests.campaign.motions:motion_case", 300),
+    "bodies": ("tests.campaign.bodies:body_case", 300),
 }
-NEW_SEEDS = ("motions",)  #: families whose seeds are new in each run
+NEW_SEEDS = ("motions", "bodies")  #: families whose seeds are new in each run
 LIMIT = 60.0  #: seconds of a case
 FIRST = 600.0  #: of the first one in a worker, before which it may compile the kernels
 PROCESSES = 2
@@ -140,9 +141,10 @@ def main(words: list[str] | None = None) -> int:
         sorts = ", ".join(f"{kind} {found[kind]}" for kind in SORTS if found[kind])
         print(f"{family}: {told}" + (f" (of those accepted {sorts})" if sorts else ""))
     total: Counter[str] = sum(counts.values(), Counter())
-    n_kills, n_motions = (sum(family == name for family, _ in cases) for name in ("kills", "motions"))
+    counted = {name: sum(family == name for family, _ in cases) for name in ("kills", "motions", "bodies")}
     print(
-        f"campaign: {len(cases) - n_kills - n_motions} bad inputs, {n_kills} kills, {n_motions} motions in "
+        f"campaign: {len(cases) - sum(counted.values())} bad inputs, "
+        f"{', '.join(f'{n} {name}' for name, n in counted.items())} in "
         f"{time.monotonic() - begun:.0f} s: {total[TRACEBACK]} tracebacks, {total[HANG]} hangs, {total[WRONG]} wrong "
         f"acceptances, {total[UNCLEAR]} unclear messages"
     )
