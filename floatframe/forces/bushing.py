@@ -78,11 +78,15 @@ class Bushing:
             raise ModelError(f"{where}: expected stiffness, damping or preload other than zero, got none")
 
     @property
+    def has_angles(self) -> bool:
+        """Whether its rotation vector affects it."""
+        of_rotations = [self.stiffness[3:], self.damping[3:], self.damping[:, 3:], self.preload[3:]]
+        return any(part.any() for part in of_rotations) or any(key.startswith("r") for key in self.characteristics)
+
+    @property
     def counts_turns(self) -> bool:
         """Whether rotations beyond half a turn affect it, and are counted."""
-        of_rotations = [self.stiffness[3:], self.damping[3:], self.damping[:, 3:], self.preload[3:]]
-        is_turned = any(part.any() for part in of_rotations) or any(key.startswith("r") for key in self.characteristics)
-        return is_turned and self.axes != "half way"
+        return self.has_angles and self.axes != "half way"
 
 
 def six_by_six(where: str, values: Array) -> Array:

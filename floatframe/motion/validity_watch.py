@@ -31,6 +31,7 @@ from floatframe.joints.rows import is_held
 from floatframe.kernels.memory import Rows
 from floatframe.kernels.model import JOINT, STIFFNESS
 from floatframe.kernels.work import new_work
+from floatframe.motion.small_angles import ANGLES_LIMIT, angle_measures
 from floatframe.results.validity import ValidityNote
 from floatframe.start.newton_equations import linearized, modal_matrix, set_iterate
 from floatframe.system import System
@@ -38,6 +39,10 @@ from floatframe.system import System
 __all__ = ["ValidityWatch"]
 
 MOST_CONVERTED = 80  #: modes of a body of which the rotations against mean axes are found
+ADVICE = {
+    "angles": "let it turn far about one axis alone, or take a joint for what turns far, a bearing for a shaft",
+    "tilt": "take a joint for what turns far",
+}
 N_INERTIAL = 12  #: amplitudes of inertial loads: 3 accelerations, 3 angular accelerations, 6 products
 
 
@@ -68,6 +73,7 @@ class ValidityWatch:
             (i, body) for i, body in enumerate(system.bodies) if isinstance(body, FlexibleBody) and is_elastic(body)
         ]
         frequencies = held_frequencies(compiled_system(system), [i for i, _ in elastic]) if elastic else []
+        self.angles = list(angle_measures(system))
         self.bodies = [watched(i, body, omega) for (i, body), omega in zip(elastic, frequencies, strict=True)]
         for part in self.bodies:
             if len(part.norms):
@@ -83,7 +89,7 @@ class ValidityWatch:
         if len(rows.t) == 0:
             return ()
         told = rows_of_file(compiled_system(self.system), rows)
-        new = []
+        new = self.observe_angles(rows)
         for part in self.bodies:
             for kind, values in self.measures(part, rows, told):
                 limit = getattr(part.limits, kind)
@@ -106,6 +112,23 @@ class ValidityWatch:
                     most = max(self.found[key].in_mean_axes, remedied)
                     self.found[key] = replace(self.found[key], largest=largest, t_largest=t, in_mean_axes=most)
         return tuple(new)
+
+    def observe_angles(self, rows: Rows) -> list[ValidityNote]:
+        """Take rows of results; return what is new about the angles of bushings and bearings."""
+        new = []
+        for where, kind, measure in self.angles:
+            values = measure(rows)
+            k = int(np.argmax(values))
+            largest, t, key = float(values[k]), float(rows.t[k]), (where, kind)
+            if not largest > ANGLES_LIMIT:
+                continue
+            if key not in self.found:
+                first = float(rows.t[int(np.argmax(values > ANGLES_LIMIT))])
+                self.found[key] = ValidityNote(where, kind, ANGLES_LIMIT, largest, first, t, advice=ADVICE[kind])
+                new.append(self.found[key])
+            elif largest > self.found[key].largest:
+                self.found[key] = replace(self.found[key], largest=largest, t_largest=t)
+        return new
 
     def measures(self, part: Watched, rows: Rows, told: Rows) -> list[tuple[str, Array]]:
         """Return what is compared, each over the rows of the engine, told in the frames of the files, (n_t,).

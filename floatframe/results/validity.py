@@ -9,7 +9,8 @@ __all__ = ["ValidityNote", "notes_from_json", "notes_to_json"]
 
 OF_FRAMES = ("rotation", "load", "speed", "inertia")  #: kinds of notes about the linear frame of a body
 OF_LAWS = ("frequency", "knots", "law")  #: about what acts over time: faster than the steps, or jumping inside them
-KINDS = (*OF_FRAMES, "steps", "energy", *OF_LAWS)
+OF_ANGLES = ("angles", "tilt")  #: about bushings and bearings that turn further than small angles allow
+KINDS = (*OF_FRAMES, "steps", "energy", *OF_LAWS, *OF_ANGLES)
 
 
 @dataclass(frozen=True)
@@ -20,11 +21,12 @@ class ValidityNote:
     "inertia", the field of `cms.reduced_body.linear_range.Limits`); one for the steps of the run ("steps": their
     estimated error over the way of the motion) and one for its energy ("energy": what the steps have added, over what
     moves about), with the body that is most concerned. One for each supply, load, drive or law of a user that the steps
-    do not follow ("frequency", "knots" of a table, "law"), with where it stands in the system in place of a body.
+    do not follow ("frequency", "knots" of a table, "law"), with where it stands in the system in place of a body; so
+    for each bushing and bearing whose angles are no small ones ("angles", "tilt": what another reading of them changes).
     """
 
     body: str
-    kind: str  #: "rotation", "load", "speed", "inertia", "steps", "energy", "frequency", "knots" or "law"
+    kind: str  #: one of `KINDS`
     limit: float
     largest: float  #: so far; rotation in rad, else a ratio
     t_first: float  #: when the limit was passed [s]
@@ -62,6 +64,16 @@ class ValidityNote:
             return (
                 f"{100 * self.largest:.2g} % of the energy in the motion comes from the steps, not from forces (limit "
                 f"{100 * self.limit:g} %)"
+            )
+        if self.kind == "angles":
+            return (
+                f"it turns about several axes so far that its angles, the components of the rotation vector, are "
+                f"{100 * self.largest:.2g} % off Cardan angles (limit {100 * self.limit:g} %)"
+            )
+        if self.kind == "tilt":
+            return (
+                f"its shaft tilts so far that the sine, by which its moment goes, is {100 * self.largest:.2g} % below "
+                f"the angle (limit {100 * self.limit:g} %)"
             )
         if self.kind == "rotation":
             return f"an interface turns by {self.largest:.3g} rad against the body frame (limit {self.limit:g})"
@@ -109,6 +121,8 @@ class ValidityNote:
         """Say it in one sentence, in the units of the system."""
         if self.kind in OF_LAWS:
             return f"{self.body}: {self.advice}"
+        if self.kind in OF_ANGLES:
+            return f"{self.body}, t = {self.t_first:.6g}: {self.what}; {self.action}"
         if not self.is_of_a_frame:
             return f"body {self.body!r}, t = {self.t_first:.6g}: {self.what}; {self.action}"
         return (
