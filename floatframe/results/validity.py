@@ -22,7 +22,7 @@ class ValidityNote:
     estimated error over the way of the motion) and one for its energy ("energy": what the steps have added, over what
     moves about), with the body that is most concerned. One for each supply, load, drive or law of a user that the steps
     do not follow ("frequency", "knots" of a table, "law"), with where it stands in the system in place of a body; so
-    for each bushing and bearing whose angles are no small ones ("angles", "tilt": what another reading of them changes).
+    for each bushing and bearing whose angles are no small ones ("angles", "tilt": what another reading changes).
     """
 
     body: str
