@@ -159,7 +159,9 @@ def formats_command(
 def export_command(
     file: ModalFile,
     to: Annotated[str, typer.Option("--to", help="Format, one of those cms formats lists by name: mbsim, exudyn, ...")],
-    units: Annotated[str | None, typer.Option(help="Unit system of the numbers, such as m-kg-s; required.")] = None,
+    units: Annotated[
+        str | None, typer.Option(help="Unit system of the numbers, such as m-kg-s; that of the file by default.")
+    ] = None,
     nodes: Annotated[
         str, typer.Option(help="Nodes, where the format leaves the choice: interfaces or all.")
     ] = "default",

@@ -258,6 +258,8 @@ def attached(tables: Mapping[str, Any], key: str, part: Any, cuts: "list[Cut]") 
     for name, table in tables.items():
         groups = [*getattr(table, "nodes", ()), *getattr(table, "followers", ())]
         groups += [table.node] if getattr(table, "node", None) else []
+        if any(isinstance(group, int) for group in groups):
+            raise JobError(f"{key}.{name}.node: a number belongs to the whole mesh; name a group of that node instead")
         there = [group for group in groups if group in part.node_sets]
         if any(set(part.node_sets[group].tolist()) & cut for group in there for cut in on_cut) and key != "links":
             raise JobError(

@@ -24,7 +24,7 @@ from cms.reduced_body.invariants import INERTIA_TERMS
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.paths import is_stream, replace_files
 from fe_models.foundation.seal import reason
-from fe_models.foundation.units import UNIT_SYSTEMS, Units, unit_system
+from fe_models.foundation.units import Units, unit_system
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["WRITERS", "Exported", "export_body"]
@@ -89,6 +89,7 @@ class Exported:
     files: tuple[Path, ...]
     left_out: tuple[str, ...]  #: descriptions of what the body has but the files do not
     notes: tuple[str, ...]  #: positions of the interfaces, and other facts for the user of the other program
+    units: Units  #: of the numbers in the files
 
 
 def export_body(
@@ -96,7 +97,7 @@ def export_body(
     path: str | os.PathLike[str],
     *,
     to: str,
-    units: Units | str,
+    units: Units | str | None = None,
     nodes: str = "default",
     loads: Mapping[str, float] | None = None,
 ) -> Exported:
@@ -111,7 +112,8 @@ def export_body(
     to
         Key of the format, as listed by `cms formats`.
     units
-        Unit system of the numbers, or its name. It is required, because most formats do not record their units.
+        Unit system of the numbers, or its name; default: that of the body, or the only one that the other program
+        knows. Most formats do not record their units.
     nodes
         Nodes in formats that allow a choice (SID_FEM, MBDyn): "interfaces", "all", or "default" for the usual choice.
     loads
@@ -134,13 +136,14 @@ def export_body(
     if to not in WRITERS:
         raise ExportError(f"export: unknown format {quoted(to)}{nearest(to, WRITERS)}")
     writer = WRITERS[to]
-    system = wanted_units(units, to, writer)
+    source = "" if isinstance(body, ReducedBody) else f"{Path(body).name}, digest {digest(body)}"
+    body = body if isinstance(body, ReducedBody) else read(body)
+    system = wanted_units(units or writer.units or body.units, to, writer)
     if nodes not in ("default", "interfaces", "all"):
         raise ExportError(f"export: nodes = {quoted(nodes)}: expected 'interfaces' or 'all'")
     if loads and not writer.takes_loads:
         raise ExportError(f"export: loads: {to} holds no constant loads; give them to the other program as forces")
-    source = "" if isinstance(body, ReducedBody) else f"{Path(body).name}, digest {digest(body)}"
-    converted = convert_units(body if isinstance(body, ReducedBody) else read(body), system)
+    converted = convert_units(body, system)
     require_content(converted, to, writer)
     request = Request(converted, with_suffix(Path(path), to), source, nodes, loads or {})
     made = writer.make(request)
@@ -151,22 +154,11 @@ def export_body(
         replace_files(made.files)
     except OSError as error:
         raise ExportError(f"{path}: cannot be written: {reason(error)}; nothing was written") from error
-    return Exported(tuple(made.files), left_out(converted, writer.holds), made.notes)
+    return Exported(tuple(made.files), left_out(converted, writer.holds), made.notes, system)
 
 
-def wanted_units(units: Units | str | None, to: str, writer: Writer) -> Units:
-    """Return the requested unit system.
-
-    Raises
-    ------
-    ExportError
-        If no unit system was given, or the other program only accepts another one.
-    """
-    if units is None:
-        raise ExportError(
-            f"export: units are missing: {to} does not name its own, so say which the numbers shall have; choices: "
-            f"{', '.join(UNIT_SYSTEMS)}"
-        )
+def wanted_units(units: Units | str, to: str, writer: Writer) -> Units:
+    """Return the requested unit system; `ExportError` if the other program only accepts another one."""
     system = unit_system(units) if isinstance(units, str) else units
     if writer.units and system.name != writer.units:
         raise ExportError(

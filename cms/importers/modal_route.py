@@ -123,8 +123,8 @@ def require_plausible(where: str, reduced: ReducedBody, accept: tuple[str, ...])
     """Raise `ForeignBodyError` if no body in these units has such a size, density or first frequency."""
     frequencies = np.asarray(reduced.free_frequencies)
     first = float(frequencies[0]) / reduced.units.time if len(frequencies) else None
-    for text in implausible_motion(reduced.units, reduced.nodes, reduced.moments.m, first):
-        if "units" not in accept:
+    for is_error, text in implausible_motion(reduced.units, reduced.nodes, reduced.moments.m, first):
+        if is_error and "units" not in accept:
             raise ForeignBodyError(
                 f'{where}: units {reduced.units.name}: {text}; name the units of the file, or accept = ["units"] if it '
                 "is meant"

@@ -111,8 +111,14 @@ def attachments_of(job: Job, mesh: "LineMesh | ShellMesh") -> tuple[list[Any], l
     return masses, springs, links
 
 
-def one_node(mesh: "LineMesh | ShellMesh", where: str, group: str) -> int:
-    """Return the node of a group with exactly one node; raise `JobError` with the key otherwise."""
+def one_node(mesh: "LineMesh | ShellMesh", where: str, group: str | int) -> int:
+    """Return the node of a number, or of a group with exactly one node; raise `JobError` with the key otherwise."""
+    if isinstance(group, int):
+        rows = np.flatnonzero(mesh.node_numbers == group)
+        if len(rows) != 1:
+            what = f"{len(rows)} nodes have this number" if mesh.node_numbers.size else "its nodes have no numbers"
+            raise JobError(f"{where} = {group}: in the mesh {what}; expected one node, or the name of a group of one")
+        return int(rows[0])
     nodes = nodes_named(mesh, where, group)
     if len(nodes) != 1:
         raise JobError(f'{where} = "{group}": expected a group of one node, got {len(nodes)} nodes')

@@ -22,6 +22,7 @@ SHAPE_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 }  #: required and optional keys of each shape
 
 Name = Annotated[str, StringConstraints(min_length=1)]
+NodeNumber = Annotated[int, Field(ge=0, strict=True)]
 Positive = Annotated[float, Field(gt=0)]
 Pair = tuple[float, float]
 
@@ -130,7 +131,7 @@ class BeamSection(Table):
 class MassSection(Table):
     """[masses.NAME]: a rigid piece at a node."""
 
-    node: Name = Field(description="the name of a group that holds one node")
+    node: Name | NodeNumber = Field(description="the name of a group that holds one node, or a node number")
     mass: Annotated[float, Field(ge=0)] = Field(description="a number, 0 or more")
     inertia: Annotated[Any, BeforeValidator(inertia_numbers)] = Field(
         0.0, description="about the centre of mass: one number, three principal values, or three rows of three"

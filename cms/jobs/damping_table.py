@@ -16,13 +16,14 @@ from fe_models.foundation.toml_file import Table, is_no_number
 
 __all__ = ["DampingSection"]
 
-Ratio = Annotated[float, Field(ge=0)]
+Ratio = Annotated[float, Field(ge=0, le=1)]
+Coefficient = Annotated[float, Field(ge=0)]
 
 
 def ratio_list(value: Any) -> tuple[float, ...]:
     """Return damping ratios, one for each mode."""
-    if not isinstance(value, list | tuple) or not value or any(is_no_number(x) or x < 0 for x in value):
-        raise ValueError("expected a list of numbers, 0 or more, one per mode; the last holds for all further modes")
+    if not isinstance(value, list | tuple) or not value or any(is_no_number(x) or not 0 <= x <= 1 for x in value):
+        raise ValueError("expected a list of numbers, 0 to 1, one per mode; the last holds for all further modes")
     return tuple(float(x) for x in value)
 
 
@@ -32,7 +33,11 @@ def ramp_steps(value: Any) -> tuple[tuple[float, float], ...]:
         return CUSTOMARY_STEPS
     pairs = value if isinstance(value, list | tuple) else ()
     is_pair = [
-        isinstance(p, list | tuple) and len(p) == 2 and not any(is_no_number(x) or x < 0 for x in p) for p in pairs
+        isinstance(p, list | tuple)
+        and len(p) == 2
+        and not any(is_no_number(x) or x < 0 for x in p)
+        and p[1] <= 1  # critical
+        for p in pairs
     ]
     frequencies = [pair[0] for pair, good in zip(pairs, is_pair, strict=True) if good]
     if not pairs or not all(is_pair) or frequencies[0] <= 0 or sorted(set(frequencies)) != frequencies:
@@ -43,16 +48,16 @@ def ramp_steps(value: Any) -> tuple[tuple[float, float], ...]:
 class DampingSection(Table):
     """[damping]: ratios of the modes, or Rayleigh damping."""
 
-    ratio: Ratio | None = Field(None, description="a number, 0 or more, of critical damping (0.01 is 1 %)")
+    ratio: Ratio | None = Field(None, description="a number, 0 to 1, of critical damping (0.01 is 1 %)")
     ratios: Annotated[tuple[float, ...], BeforeValidator(ratio_list)] | None = Field(
-        None, description="a list of numbers, 0 or more, of critical damping, one per mode"
+        None, description="a list of numbers, 0 to 1, of critical damping, one per mode"
     )
     ramp: Annotated[tuple[tuple[float, float], ...], BeforeValidator(ramp_steps)] | None = Field(
         None, description="true, or pairs [frequency in Hz, ratio below it]"
     )
-    above: Ratio | None = Field(None, description="a number, 0 or more, the ratio above the last step of the ramp")
-    alpha: Ratio | None = Field(None, description="a number, 0 or more, of D = alpha M + beta K")
-    beta: Ratio | None = Field(None, description="a number, 0 or more, of D = alpha M + beta K")
+    above: Ratio | None = Field(None, description="a number, 0 to 1, the ratio above the last step of the ramp")
+    alpha: Coefficient | None = Field(None, description="a number, 0 or more, of D = alpha M + beta K")
+    beta: Coefficient | None = Field(None, description="a number, 0 or more, of D = alpha M + beta K")
 
     @model_validator(mode="after")
     def _one_kind(self) -> "DampingSection":

@@ -301,9 +301,9 @@ def _mean_interfaces(job: Job, raw: "RawMesh") -> dict[str, str]:
     return found
 
 
-def _used_groups(job: Job) -> "list[tuple[str, str]]":
+def _used_groups(job: Job) -> "list[tuple[str, str | int]]":
     """Return (table, group of nodes) of everything that is attached to nodes or ties them."""
-    found = [(f"masses.{k}", each.node) for k, each in job.masses.items()]
+    found: list[tuple[str, str | int]] = [(f"masses.{k}", each.node) for k, each in job.masses.items()]
     found += [(f"springs.{k}", group) for k, each in job.springs.items() for group in each.nodes]
     found += [(f"links.{k}", group) for k, each in job.links.items() for group in (each.node, *each.followers)]
     found += [(f"couplings.{k}", group) for k, each in job.couplings.items() for group in (each.node, *each.members)]
@@ -418,8 +418,13 @@ def _placed(joined: "Joined", nodes: IntArray, where: str) -> IntArray:
     return np.asarray(place)
 
 
-def _group(raw: "RawMesh", where: str, group: str) -> IntArray:
-    """Return the rows of a group of nodes."""
+def _group(raw: "RawMesh", where: str, group: str | int) -> IntArray:
+    """Return the rows of a group of nodes, or the row of the node with a number."""
+    if isinstance(group, int):
+        found = np.flatnonzero(np.asarray(raw.node_numbers) == group) if raw.node_numbers is not None else np.zeros(0)
+        if len(found) != 1:
+            raise JobError(f"{where} = {group}: the deck has {len(found)} nodes with this number; expected one")
+        return found
     if group not in raw.node_sets:
         raise JobError(f'{where} = "{group}": the deck has no such group of nodes{nearest(group, raw.node_sets)}')
     return np.asarray(raw.node_sets[group])

@@ -7,12 +7,14 @@ from cms.errors import CmsError, ModalFileError
 from cms.modal_file.content import FORMAT, body_of, content_of, require_same_frequencies, require_same_invariants
 from cms.modal_file.entries import in_units
 from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.foundation.paths import is_stream
 from fe_models.foundation.seal import Kind
 from fe_models.foundation.sealed_hdf5 import read_sealed, write_sealed
 from fe_models.foundation.units import Units, unit_system
 
 __all__ = ["FORMAT", "VERSION", "convert_units", "digest", "read", "write"]
 
+SUFFIXES = (".h5", ".hdf5")
 VERSION = 6  #: version of the format; a reader rejects later versions and reads all earlier ones
 KIND = Kind(FORMAT, VERSION, ModalFileError, "`cms reduce` or `cms.write`")
 
@@ -23,8 +25,13 @@ def write(reduced: ReducedBody, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     ModalFileError
-        If the file cannot be written.
+        If the file cannot be written, or its name says that it is another kind of file.
     """
+    if (suffix := Path(path).suffix.lower()) and suffix not in SUFFIXES and not is_stream(Path(path)):
+        raise ModalFileError(
+            f"{path}: a modal file ends in {' or '.join(SUFFIXES)}, got {suffix}; other formats are written by "
+            "cms.export_body (cms export --to)"
+        )
     write_sealed(content_of(reduced, version_of(reduced)), path)
 
 

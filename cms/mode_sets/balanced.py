@@ -98,8 +98,8 @@ def balanced_truncation(
         raise ModeSetError(f"balanced_truncation: n_modes = {n_modes}; expected 0 or more")
     if tolerance is not None and not 0 < tolerance < 1:
         raise ModeSetError(f"balanced_truncation: tolerance = {tolerance}; expected a number between 0 and 1")
-    if not 0 <= damping_ratio < np.inf:
-        raise ModeSetError(f"balanced_truncation: damping_ratio = {damping_ratio}; expected 0 or more (0.01 is 1 %)")
+    if not 0 <= damping_ratio <= 1:
+        raise ModeSetError(f"balanced_truncation: damping_ratio = {damping_ratio}; expected 0 to 1 (0.01 is 1 %)")
     if n_rich is not None and n_rich < 1:
         raise ModeSetError(f"balanced_truncation: n_rich = {n_rich}; expected 1 or more")
     source, body = body, body_of(body)

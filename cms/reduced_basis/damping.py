@@ -119,5 +119,7 @@ def damping_ratios(
 
 def _require_ratios(key: str, ratios: tuple[float, ...]) -> None:
     for ratio in ratios:
-        if not 0 <= ratio < np.inf:
-            raise ModeSetError(f"damping: {key} = {ratio}; expected 0 or more (0.01 is 1 % of critical)")
+        if not 0 <= ratio <= 1:
+            raise ModeSetError(
+                f"damping: {key} = {ratio}; expected 0 to 1 (0.01 is 1 % of critical damping, 1 is critical)"
+            )

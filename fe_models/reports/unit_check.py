@@ -11,6 +11,7 @@ from fe_models.foundation.units import UNIT_SYSTEMS, Units
 __all__ = ["hull_volume", "implausible_matrices", "implausible_motion", "implausible_units"]
 
 SIZE = (1e-4, 1e3)  #: diagonal of the bounding box of a body [m]
+USUAL_SIZE = (1e-4, 50.0)  #: the same, outside of which it is told: a mesh in mm read in metres is large and slow [m]
 DENSITY = (10.0, 25_000.0)  #: from rigid foam to osmium [kg/m³]
 MODULUS = (1e3, 2e12)  #: from soft gel to above diamond [Pa]
 WAVE_SPEED = (10.0, 30_000.0)  #: sqrt(E / rho): from soft rubber to above diamond [m/s]
@@ -49,7 +50,8 @@ def implausible_units(units: Units, size: float, materials: Iterable[_Elastic]) 
     fitting = [u.name for u in UNIT_SYSTEMS.values() if u.name != units.name and _fits(u, size, materials)]
     advice = f"all numbers would fit {' or '.join(fitting)}" if fitting else "no known unit system fits all numbers"
     advice = f"{advice}; change the units or the numbers"
-    texts += [(is_error, f"units {units.name}: {text}. {advice}") for is_error, text in size_findings(units, size)]
+    for is_error, text in size_findings(units, size):
+        texts.append((is_error, f"units {units.name}: {text}" + (f". {advice}" if is_error else "")))
     for material in materials:
         rho = material.rho * units.to_si(mass=1, length=-3)
         E = material.E * units.to_si(mass=1, length=-1, time=-2)
@@ -145,33 +147,40 @@ def _matrix_findings(units: Units, nodes: Array, mass: float, speeds: Array) -> 
     return texts
 
 
-def implausible_motion(units: Units, nodes: Array, mass: float, frequency: float | None) -> list[str]:
-    """Return texts about implausible size, density or first elastic frequency of a body.
+def implausible_motion(units: Units, nodes: Array, mass: float, frequency: float | None) -> list[tuple[bool, str]]:
+    """Return (is an error, text) about implausible or unusual size, density or first elastic frequency of a body.
 
     Parameters
     ----------
     frequency
         Lowest elastic frequency of the free body [Hz]; None: it has no elastic modes.
     """
-    texts = [text for _, text in _matrix_findings(units, nodes, mass, np.zeros(0))] if len(nodes) else []
+    texts = _matrix_findings(units, nodes, mass, np.zeros(0)) if len(nodes) else []
     size = float(np.linalg.norm(np.ptp(nodes, axis=0))) * units.length if len(nodes) else 0.0
     if frequency is not None and size > 0:
         speed = 2 * frequency * size
         if not SWING_SPEED[0] <= speed <= SWING_SPEED[1]:
-            texts.append(
+            texts.append((
+                True,
                 f"it is {size:.4g} m large and vibrates from {frequency:.4g} Hz on, as if waves "
-                f"ran at {speed:.4g} m/s; expected {SWING_SPEED[0]:g} to {SWING_SPEED[1]:g} m/s"
-            )
+                f"ran at {speed:.4g} m/s; expected {SWING_SPEED[0]:g} to {SWING_SPEED[1]:g} m/s",
+            ))  # fmt: skip
+        elif texts and not any(is_error for is_error, _ in texts):
+            texts.append((False, f"its first elastic frequency is {frequency:.4g} Hz"))
     return texts
 
 
 def size_findings(units: Units, size: float) -> list[tuple[bool, str]]:
-    """Return the finding about a size in the length unit, if it is implausible."""
+    """Return the finding about a size in the length unit, if it is implausible or unusual."""
     metres = size * units.length
-    if size == 0 or SIZE[0] <= metres <= SIZE[1]:
+    words = f"the body is {size:.4g} {units.length_symbol} = {metres:.4g} m large"
+    if size == 0 or USUAL_SIZE[0] <= metres <= USUAL_SIZE[1]:
         return []
-    return [(True, f"the body is {size:.4g} {units.length_symbol} = {metres:.4g} m large; expected {SIZE[0]:g} to "
-                   f"{SIZE[1]:g} m")]  # fmt: skip
+    if SIZE[0] <= metres <= SIZE[1]:
+        other = f" (in mm the same numbers make {metres / 1e3:.4g} m)" if units.length == 1.0 else ""
+        expected = f"expected {USUAL_SIZE[0]:g} to {USUAL_SIZE[1]:g} m"
+        return [(False, f"{words}; {expected}: is the mesh in {units.length_symbol}?{other}")]
+    return [(True, f"{words}; expected {SIZE[0]:g} to {SIZE[1]:g} m")]
 
 
 def hull_volume(points: Array) -> float:

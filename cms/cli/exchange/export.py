@@ -31,16 +31,18 @@ def run_export(request: ExportRequest) -> None:
     CmsError
         If the format or the units are unknown or missing, the body does not fit, or the files cannot be written.
     """
-    from cms.exporters.export import WRITERS, export_body, wanted_units
+    from cms.exporters.export import WRITERS, export_body
     from cms.exporters.formats import FORMATS
 
     if request.to not in WRITERS:
         raise ExportError(f"--to {quoted(request.to)}: unknown format{nearest(request.to, WRITERS)}")
-    units = wanted_units(request.units, request.to, WRITERS[request.to])
     suffix = next(known.suffixes[0] for known in FORMATS if known.key == request.to and known.writes)
     default = request.file.with_name(f"{request.file.stem}_{request.to}{suffix}")
     path = output_path(request.output, default, ExportError, overwrite_of=(request.file,))
-    exported = export_body(request.file, path, to=request.to, units=units, nodes=request.nodes, loads=loads_of(request))
+    exported = export_body(
+        request.file, path, to=request.to, units=request.units, nodes=request.nodes, loads=loads_of(request)
+    )
+    units = exported.units
     for written in exported.files:
         say(f"wrote {written} ({written.stat().st_size / 1e6:.2f} MB)" if written.is_file() else f"wrote {written}")
     say(f"units: {units.name} ({units.length_symbol}, {units.mass_symbol}, {units.time_symbol})")

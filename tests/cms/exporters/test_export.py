@@ -11,6 +11,8 @@ from cms.cli.app import app
 from cms.errors import ExportError, ModalFileError, UnitsError
 from cms.exporters.export import WRITERS, export_body
 from cms.exporters.formats import FORMATS
+from cms.modal_file.file import convert_units
+from fe_models.foundation.units import unit_system
 from tests.cms.exporters.small_bodies import cloud_body
 from tests.synthetic import synthetic_reduced_body
 
@@ -109,8 +111,12 @@ def test_an_unknown_format_is_refused_with_the_nearest(body, tmp_path):
     refused(tmp_path, "unknown format 'mbsin'; did you mean 'mbsim'", body, to="mbsin")
 
 
-def test_units_have_to_be_said(body, tmp_path):
-    refused(tmp_path, "units are missing: mbsim does not name its own", body, units=None)
+def test_units_are_those_of_the_file_where_none_are_said(body, tmp_path):
+    assert export_body(body, tmp_path / "own.h5", to="mbsim").units == body.units
+    (tmp_path / "own.h5").unlink()
+    other = convert_units(body, unit_system("mm-t-s"))
+    assert export_body(other, tmp_path / "own.h5", to="mbsim").units.name == "mm-t-s"
+    (tmp_path / "own.h5").unlink()
     refused(tmp_path, "unknown unit system 'm-kg'", body, error=UnitsError, units="m-kg")
     refused(
         tmp_path, "units mm-t-s: the program behind ext_ptfm knows m-kg-s only", body, to="ext_ptfm", units="mm-t-s"
@@ -156,7 +162,6 @@ def test_no_modal_file_no_export(tmp_path):
 def test_the_command_refuses_before_any_work(modal_file, tmp_path):
     for arguments, words in (
         (("--to", "nastran"), "unknown format"),
-        (("--to", "mbdyn"), "units are missing"),
         (("--to", "mbdyn", "--units", "m-kg-s", "-o", tmp_path / "no" / "out.fem"), "does not exist; make it first"),
         (("--to", "mbdyn", "--units", "m-kg-s", "-o", modal_file), "this is an input"),
         (("--to", "ext_ptfm", "--units", "m-kg-s", "--load", "weight"), "expected NAME=AMPLITUDE"),

@@ -103,6 +103,21 @@ def test_a_job_of_beams_makes_the_body_of_its_tables(job_file):
     assert len(reduced.surface) > 0
 
 
+def test_a_mass_sits_at_the_node_of_its_number(job_file):
+    """Numbers are those of the file, in any order and with gaps."""
+    path = job_file(ROD)
+    for table, n in (("nodes", 1), ("lines", 2)):
+        head, *rows = path.with_name(f"{table}.csv").read_text().splitlines()
+        parts = [row.split(",", n) for row in rows]
+        rows = [",".join([*(str(100 - 7 * int(x)) for x in part[:n]), part[n]]) for part in parts]
+        path.with_name(f"{table}.csv").write_text("\n".join([head, *rows]) + "\n")
+    by_name = job_body(read_job(path)).M
+    by_number = job_body(read_job(job_file(ROD.replace('node = "tip"', f"node = {100 - 7 * N}", 1)))).M
+    assert abs(by_number - by_name).max() == 0
+    with pytest.raises(JobError, match=r"masses\.bob\.node = 6: in the mesh 0 nodes have this number"):
+        job_body(read_job(job_file(ROD.replace('node = "tip"', "node = 6", 1))))
+
+
 def test_a_job_keeps_the_stress_of_its_beams_each_by_itself(job_file):
     text = ROD.replace('units = "m-kg-s"', 'units = "m-kg-s"\nstress_points = ["rod"]')
     reduced = reduce_job(read_job(job_file(text)))

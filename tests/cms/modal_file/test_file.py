@@ -506,3 +506,10 @@ def test_a_mass_of_several_numbers_is_refused(body, tmp_path):
         several = {**content.datasets, name: sealed_hdf5.Dataset(np.ones(2))}
         with pytest.raises(ModalFileError, match=rf"dataset {name}: expected shape \(\)"):
             written_with(replace(content, datasets=several), tmp_path / "a.h5")
+
+
+@pytest.mark.parametrize("name", ["body.npz", "body.SID_FEM", "body.toml"])
+def test_a_name_of_another_kind_of_file_is_refused(tmp_path, name):
+    with pytest.raises(ModalFileError, match=r"a modal file ends in \.h5 or \.hdf5, got .*cms export --to"):
+        write(synthetic_reduced_body(), tmp_path / name)
+    assert list(tmp_path.iterdir()) == []

@@ -69,9 +69,12 @@ def test_the_ratios_are_those_of_the_modes_of_the_frame():
 
 def test_impossible_dampings_are_refused():
     for make, words in [
-        (lambda: ModalDamping(-0.1), "ratio = -0.1; expected 0 or more"),
+        (lambda: ModalDamping(-0.1), "ratio = -0.1; expected 0 to 1"),
         (lambda: PerModeDamping(()), "expected at least one"),
         (lambda: PerModeDamping((0.1, np.nan)), "ratios = nan"),
+        (lambda: ModalDamping(2.0), "ratio = 2.0; expected 0 to 1"),
+        (lambda: PerModeDamping((0.02, 1.01)), "ratios = 1.01; expected 0 to 1"),
+        (lambda: RampDamping(((50.0, 3.0),)), "steps = 3.0; expected 0 to 1"),
         (lambda: RampDamping(((100.0, 0.1), (50.0, 0.2))), "ascending"),
         (lambda: RampDamping(((0.0, 0.1),)), "ascending"),
         (lambda: RampDamping(()), "ascending"),

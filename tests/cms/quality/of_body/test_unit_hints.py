@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import cms
+import fe_models as fm
 from cms.quality.of_body.unit_hints import check_units
 from fe_models.foundation.units import unit_system
-from fe_models.reports.unit_check import hull_volume, implausible_motion
+from fe_models.reports.unit_check import hull_volume, implausible_motion, implausible_units
 from tests.bodies import bar, box_mesh
 
 SI = unit_system("m-kg-s")
@@ -43,3 +45,21 @@ def test_the_hull_of_a_box_is_the_box_and_that_of_a_plate_nothing():
     nodes = nodes.copy()
     nodes[:, 2] = 0.0
     assert hull_volume(nodes) == 0.0
+
+
+def test_a_mesh_in_mm_with_a_material_in_si_is_told():
+    """The shipped rod is 328 mm long; its numbers read as metres make it swing at 0.1 Hz, with the density of steel."""
+    steel = fm.Material("steel", E=2.1e11, nu=0.3, rho=7850.0)
+    line = fm.straight_line((0, 0, 0), (0, 0, 328.0), 8)
+    ends = [fm.line_interface(line, name, fm.NodeSet(name)) for name in ("start", "end")]
+    section = fm.BeamProperty(fm.Rectangle(20.0, 30.0), steel)
+    body = cms.couple(fm.beam_body(line, section, name="rod", units=SI, interfaces=ends))
+    reduced = cms.reduce(body, cms.craig_bampton(body, 4))
+    found = check_units(reduced)
+    assert found.verdict == "warn"
+    assert "m large; expected 0.0001 to 50 m: is the mesh in m? (in mm the same numbers make 0.3" in found.reason
+    assert f"its first elastic frequency is {reduced.free_frequencies[0]:.4g} Hz" in found.reason
+    size = float(np.linalg.norm(np.ptp(line.nodes, axis=0)))
+    texts = implausible_units(SI, size, [steel])
+    assert [is_error for is_error, _ in texts] == [False]
+    assert implausible_units(unit_system("mm-t-s"), size, [replace(steel, E=2.1e5, rho=7.85e-9)]) == []
