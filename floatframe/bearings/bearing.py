@@ -101,7 +101,7 @@ class Bearing(Element):
         if cosine < LEAST_COSINE:
             raise ModelError(
                 f"element {self.name!r}: expected the axis of the shaft within "
-                f"{np.degrees(np.arccos(LEAST_COSINE)):.3g}° of that of the bearing as assembled, got "
+                f"{np.degrees(np.arccos(LEAST_COSINE)):.3g}° of that of the bearing as placed, got "
                 f"{np.degrees(np.arccos(max(cosine, -1.0))):.3g}°; give axis in "
                 "the axes of marker_a, and shaft_axis in those of marker_b"
             )

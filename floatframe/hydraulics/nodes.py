@@ -79,7 +79,7 @@ def check_nodes(fluid: Fluid, components: Sequence[Component], nodes: Mapping[st
                 )
             if isinstance(each, Accumulator) and name in given:
                 raise ModelError(
-                    f"component {each.name!r}: the pressure of node {name!r} is prescribed; an accumulator there has "
+                    f"component {each.name!r}: the pressure of node {name!r} is given; an accumulator there has "
                     "no effect"
                 )
         if isinstance(each, DirectionalValve) and each.follow is not None:

@@ -134,12 +134,12 @@ class OleoStrut(Element):
         s = self.extended_length - distance
         if distance <= 0:
             raise ModelError(
-                f"{where}: marker_b lies {distance:.6g} along the axis from marker_a as assembled; expected above 0: "
+                f"{where}: marker_b lies {distance:.6g} along the axis from marker_a as placed; expected one above 0: "
                 "does the axis point from marker_a to marker_b?"
             )
         if not -0.5 * self.stroke <= s <= 1.5 * self.stroke:
             raise ModelError(
-                f"{where}: its markers are {distance:.6g} apart along the axis as assembled, stroke {s:.6g}; expected "
+                f"{where}: its markers are {distance:.6g} apart along the axis as placed, stroke {s:.6g}; expected "
                 f"0 to {self.stroke:g}: check extended_length = {self.extended_length:g}"
             )
         area, recoil = function_numbers(self.area), []  # type: ignore[arg-type]

@@ -78,8 +78,8 @@ class MagicFormulaTyre(Element):
         if self.tyre.cornering_stiffness * CONVENTIONS[self.convention] > 0:
             other = next(name for name in CONVENTIONS if name != self.convention)
             raise ModelError(
-                f"{where}: convention: {self.tyre.source} has PKY1 = {self.tyre.coefficients['PKY1']:g}, lateral force "
-                f"of a sign at positive slip angles that {self.convention!r} excludes; is it a file of {other!r}?"
+                f"{where}: convention: {self.tyre.source} has PKY1 = {self.tyre.coefficients['PKY1']:g}, a side force "
+                f"along positive slip angles that {self.convention!r} forbids; is it a file of {other!r}?"
             )
         if (self.relaxation_x is None) != (self.relaxation_y is None):
             raise ModelError(f"{where}: expected relaxation_x and relaxation_y, or neither (then the file's)")

@@ -185,7 +185,7 @@ def entries(text: str, where: str) -> dict[str, tuple[int, str]]:
             )
         key, value = match[1].upper(), match[2].strip().strip("'\"").strip()
         if key in found and found[key][1] != value:
-            raise ModelError(f"{where}, line {k}: {key} = {value} contradicts {found[key][1]} in line {found[key][0]}")
+            raise ModelError(f"{where}, line {k}: {key} = {value} stands against {found[key][1]} in line {found[key][0]}")
         found[key] = k, value
     return found
 
@@ -249,7 +249,7 @@ def formula_version(words: dict[str, tuple[int, str]], where: str, version: str 
         return FORMATS[file_format]
     said = f"FITTYP = {fit}" if fit else f"PROPERTY_FILE_FORMAT = {file_format or 'missing'}"
     raise ModelError(
-        f"{where}: version of the formula: {said} is not known (FITTYP {', '.join(FIT_TYPES)}; "
+        f"{where}: version of the formula: {said} is none that is known (FITTYP {', '.join(FIT_TYPES)}; "
         f'PROPERTY_FILE_FORMAT {", ".join(FORMATS)}); if it is 5.2 or 6.1, say version = "5.2" or "6.1"'
     )
 
