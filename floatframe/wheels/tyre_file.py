@@ -185,7 +185,9 @@ def entries(text: str, where: str) -> dict[str, tuple[int, str]]:
             )
         key, value = match[1].upper(), match[2].strip().strip("'\"").strip()
         if key in found and found[key][1] != value:
-            raise ModelError(f"{where}, line {k}: {key} = {value} stands against {found[key][1]} in line {found[key][0]}")
+            raise ModelError(
+                f"{where}, line {k}: {key} = {value} stands against {found[key][1]} in line {found[key][0]}"
+            )
         found[key] = k, value
     return found
 
