@@ -80,8 +80,8 @@ def phase_collinearity(shapes: np.ndarray) -> Array:
     """Return the modal phase collinearity of complex shapes, (n_rows, n) -> (n,); 1 if all points are in phase.
 
     With S_ab as products of real and imaginary parts, MPC = ((S_xx - S_yy)² + 4 S_xy²) / (S_xx + S_yy)². This is the
-    share of the larger eigenvalue of the 2 x 2 covariance of real and imaginary parts, scaled to 0 ... 1 (Pappa,
-    Elliott and Schenk 1993).
+    share of the larger eigenvalue of the 2 x 2 covariance of real and imaginary parts, scaled to 0 ... 1
+    (Pappa, Elliott and Schenk 1993).
     """
     x, y = shapes.real, shapes.imag
     xx, yy, xy = (x * x).sum(axis=0), (y * y).sum(axis=0), (x * y).sum(axis=0)

@@ -1,7 +1,7 @@
 """Cross-sections of beams: closed forms for common shapes, and a general section given by its properties.
 
 Local axes: x along the beam; y and z are principal axes through the centroid. Widths are along y, heights along z.
-Shear areas kappa A follow Cowper (1966) for circle, ring, rectangle, and thin-walled I and box sections along their
+Shear areas kappa A are Cowper's (1966) for circle, ring, rectangle, and thin-walled I and box sections along their
 webs. At nu = 0 they equal the values from the energy of the shear flow, kappa = I² / (A ∫ S²/t² dA), which the tests
 integrate.
 """

@@ -89,7 +89,7 @@ def interface_of(rng, name, kind, nodes, members, size) -> Interface:
 def solid(rng, kind, material, placed, size, units: Units):
     """Return a bent box of solids; its volume is not known here."""
     is_fine = kind in ("tetra", "hexahedron", "wedge", "pyramid")
-    n = rng.integers(1, 4, size=3) if is_fine else rng.integers(1, 3, size=3)
+    n = rng.integers([2, 1, 1], 4) if is_fine else rng.integers(1, 3, size=3)
     mesh = box_mesh(*n, *rng.uniform(0.3, 1.2, size=3), kind)
     mesh = Mesh(placed(mesh.nodes), mesh.cells, node_sets=mesh.node_sets)
     sides = [("left", mesh.node_sets["left"]), ("right", mesh.node_sets["right"])]

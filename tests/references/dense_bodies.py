@@ -33,8 +33,9 @@ def rigid_fields(nodes, dofs, origin, axes):
 
 def mean_motion(points, reference):
     """Return the rigid motion of a reference point that fits translations of points best, (6, 3 n)."""
-    G = np.vstack([np.hstack([np.eye(3), -cross_matrix(point - reference)]) for point in points])
-    return np.linalg.pinv(G)
+    size = np.abs(points - reference).max(initial=0.0) or 1.0
+    G = np.vstack([np.hstack([np.eye(3), -cross_matrix(point - reference) / size]) for point in points])
+    return np.linalg.pinv(G, rcond=1e-10) / np.r_[1, 1, 1, size, size, size][:, None]
 
 
 def cross_matrix(a):
@@ -164,7 +165,7 @@ class DenseBody:
             return self.T @ np.hstack([self.constraint_modes(), self.fixed_modes()[1][:, :n]])
         if name == "normal":
             return self.T @ self.free_modes()[1][:, :n]
-        if name in ("rubin", "craig-chang", "herting"):
+        if name in ("rubin", "craig-chang", "dual-craig-bampton", "macneal"):
             return self.T @ np.hstack([self.attachment_modes(), self.free_modes()[1][:, :n]])
         return None
 
