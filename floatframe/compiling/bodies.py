@@ -14,6 +14,8 @@ from floatframe.kernels.model import N_BLOCKS, BodyTypes
 from floatframe.kernels.records import filled, flat
 from floatframe.system import Body
 
+SYMMETRIC = 0.02  #: difference of two moments of inertia of an axisymmetric body, by the largest one
+
 __all__ = ["body_n_q", "body_types", "integers", "offsets", "type_arrays"]
 
 
@@ -49,6 +51,19 @@ def body_types(bodies: Sequence[Body]) -> tuple[list[RigidBody | ReducedBody], I
             types.append(data)
         kind.append(keys.index(key))
     return types, integers(kind)
+
+
+def axis_of_symmetry(mass: float, S: Array, J0: Array) -> Array:
+    """Return the axis about which the inertia at the centre of mass is symmetric, (3,), zero if there is none.
+
+    Of a sphere, to which every axis is one, none.
+    """
+    s = S / mass if mass > 0 else np.zeros(3)
+    moments, axes = np.linalg.eigh(J0 - mass * (s @ s * np.eye(3) - np.outer(s, s)))
+    gaps = np.diff(moments)
+    if gaps.min() > SYMMETRIC * moments[2] or gaps.max() <= SYMMETRIC * moments[2]:
+        return np.zeros(3)
+    return axes[:, 0 if gaps[1] < gaps[0] else 2]
 
 
 def type_arrays(types: list[RigidBody | ReducedBody]) -> BodyTypes:
@@ -99,6 +114,7 @@ def type_arrays(types: list[RigidBody | ReducedBody]) -> BodyTypes:
         mass=mass,
         S=S,
         J0=J0,
+        axis=[axis_of_symmetry(m, s, J) for m, s, J in zip(mass, S, J0, strict=True)],
         blocks=flat(blocks),
         block0=block0,
         is_diagonal=is_diagonal,

@@ -191,7 +191,7 @@ def required_scheme(integrator: Integrator) -> GeneralizedAlpha:
             "sensitivities: steps that follow the motion (error_tolerance, h_min) jump with the parameters; take "
             "fixed steps"
         )
-    return replace(integrator, tolerance=min(integrator.tolerance, TOLERANCE))
+    return replace(integrator, tolerance=min(integrator.tolerance, TOLERANCE), stabilized=False)
 
 
 def require_no_memory(system: System) -> None:

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from math import ceil
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array
 from floatframe.compiling.system import CompiledSystem, compiled_system
@@ -23,12 +24,19 @@ from floatframe.integrators.carry import (
 )
 from floatframe.joints.rows import is_held_position
 from floatframe.kernels.memory import Rows, new_rows
-from floatframe.kernels.model import MASS, Model
+from floatframe.kernels.model import COUPLER, JOINT, MASS, Model
 from floatframe.kernels.work import Work
 from floatframe.start.constraint_words import open_joints
 from floatframe.start.initial import ConsistentState, consistent_motion, solve_accelerations, work_from
 from floatframe.start.newton_equations import displaced, modal_diagonals
-from floatframe.start.step_filter import Beginning, StepFilter, beginning_of, closing_velocities, step_filter
+from floatframe.start.step_filter import (
+    Beginning,
+    StepFilter,
+    beginning_of,
+    closing_velocities,
+    spin_of,
+    step_filter,
+)
 from floatframe.state import State
 from floatframe.system import System
 
@@ -87,6 +95,9 @@ class GeneralizedAlpha:
     h_min: float | None = None
     #: alpha_m, alpha_f, beta, gamma in place of those that follow from rho_inf (see `newmark`, `hht`)
     parameters: tuple[float, float, float, float] | None = None
+    #: hold velocities of joints as well as positions, and take the spin of axisymmetric bodies by itself; False: the
+    #: equations of [2]_ as they are, whose steps sensitivities differentiate
+    stabilized: bool = True
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.rho_inf <= 1.0:
@@ -191,6 +202,7 @@ class GeneralizedAlpha:
             length=compiled.length,
             most_error=self.error_tolerance or 0.0,
             h_min=self.least_step(h, compiled),
+            stabilized=self.stabilized,
         )
         after = carry_of(memory, carry.n_iterations + int(work.counted.iterations) - iterations)
         rows = Rows(*(array[: outcome.n_rows] for array in rows))
@@ -210,11 +222,14 @@ class GeneralizedAlpha:
         s = 1.0 if full else min(gamma - 0.5, 1.0)
         if s <= 0.0:
             return None
-        return step_filter(compiled, consistent_of(carry), t, c_d=s * gamma * h, c_k=s * beta * h**2)
+        spin = spin_of(compiled, consistent_of(carry)) if self.stabilized else None
+        return step_filter(compiled, consistent_of(carry), t, c_d=s * gamma * h, c_k=s * beta * h**2, spin=spin)
 
     def filtered(self, compiled: CompiledSystem, carry: Carry, h: float, t: float, *, full: bool) -> Beginning:
         """Return accelerations and their rates with which a motion begins, by the filter of `filter_at`."""
-        return beginning_of(compiled, consistent_of(carry), t, h, self.filter_at(compiled, carry, h, t, full=full))
+        spin = spin_of(compiled, consistent_of(carry)) if self.stabilized else None
+        z = self.filter_at(compiled, carry, h, t, full=full)
+        return beginning_of(compiled, consistent_of(carry), t, h, z, spin=spin)
 
     def first_step(self, compiled: CompiledSystem, carry: Carry, h: float, t: float) -> float:
         """Return the size of the first step: what its estimated error allows, an equal part of h."""
@@ -245,23 +260,26 @@ class GeneralizedAlpha:
         alpha_m, alpha_f, beta, _ = self.coefficients
         begun = self.filtered(compiled, carry, h, t, full=False)
         u_dot, a = begun.u_dot, begun.u_dot + (alpha_m - alpha_f) * h * begun.rates
-        state = carry.state
-        if is_held_position(compiled.model.rows.kind).any():
-            z = self.filter_at(compiled, carry, h, t, full=True)
+        state, plain = carry.state, replace(self, stabilized=False)
+        rows = rows_closed_by_positions(compiled.model, self.stabilized)
+        if rows.any():
+            z = plain.filter_at(compiled, carry, h, t, full=True)
             assert z is not None
             begun = beginning_of(compiled, consistent_of(carry), t, h, z)
             x = h * state.u + h**2 * (0.5 * begun.u_dot + ((alpha_m - alpha_f) / 2 + beta) * h * begun.rates)
             after = displaced(compiled.model, state, x)
-            state = replace(state, u=state.u + closing_velocities(z, after, carry.w, t, h))
+            state = replace(state, u=state.u + closing_velocities(z, after, carry.w, t, h, rows))
         return replace(carry, state=state, u_dot=u_dot, a=a, h=h, h_next=h)
 
     def explain(self, system: System, work: Work, outcome: tuple, least: float) -> Failure:
         """Say why a step failed."""
         from floatframe.kernels.generalized_alpha import (
             INACCURATE,
+            MOST_TURN,
             SINGULAR_BODY,
             SINGULAR_CONNECTION,
             STOPPED,
+            TURNED,
             UNRESOLVED,
         )
 
@@ -282,6 +300,14 @@ class GeneralizedAlpha:
         if status == SINGULAR_CONNECTION:
             name = compiled.connection_names[index]
             return Failure(f"the constraints of joint {name!r} depend on others here (a singular position)", excess)
+        if status == TURNED:
+            name, turn = compiled.body_names[index], float(np.linalg.norm(work.state.theta[index]))
+            words = (
+                f"body {name!r} turns by {turn:.3g} rad in a step, with a joint away from its axis of turning: expected "
+                f"at most {MOST_TURN:g} rad, beyond which its joints could give it energy; choose a smaller h, joint "
+                'coordinates (formulation = "relative") or EnergyMomentum, or put the frame of the body on the axis'
+            )
+            return Failure(words, excess)
         if status == STOPPED:
             return Failure(compiled.stop_words[index], excess)
         if status == UNRESOLVED:
@@ -359,6 +385,12 @@ def mass_weights(model: Model) -> Array:
         parts = [np.full(3, model.body_types.mass[t]), np.diag(model.body_types.J0[t]), modal_diagonals(model, i, MASS)]
         result[model.bodies.u0[i] : model.bodies.u0[i + 1]] = np.concatenate(parts)
     return result
+
+
+def rows_closed_by_positions(model: Model, stabilized: bool) -> NDArray[np.bool_]:
+    """Return which rows hold positions, but no velocities after a step, (n_w,): stabilised, those of elements alone."""
+    is_stabilized = np.repeat(np.isin(model.connections.law, (JOINT, COUPLER)), model.connections.size)
+    return is_held_position(model.rows.kind) & ~(is_stabilized & stabilized)
 
 
 def consistent_of(carry: Carry) -> ConsistentState:

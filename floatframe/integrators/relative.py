@@ -52,6 +52,7 @@ class RelativeGeneralizedAlpha:
     h_min: float | None = None  #: least step, to which one that fails is divided [s]; None as in `GeneralizedAlpha`
     #: alpha_m, alpha_f, beta, gamma in place of those that follow from rho_inf
     parameters: tuple[float, float, float, float] | None = None
+    stabilized: bool = True  #: of `GeneralizedAlpha`; joint coordinates take no notice of it
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parameters", self.absolute.parameters)
@@ -60,6 +61,11 @@ class RelativeGeneralizedAlpha:
     def absolute(self) -> GeneralizedAlpha:
         """The same method in absolute coordinates."""
         return GeneralizedAlpha(**asdict(self))
+
+    @property
+    def plain(self) -> GeneralizedAlpha:
+        """The same method in absolute coordinates without stabilisation, whose start and jumps are those of trees."""
+        return replace(self.absolute, stabilized=False)
 
     def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
         """Return the memory at the beginning: the state made consistent and its accelerations."""
@@ -70,7 +76,7 @@ class RelativeGeneralizedAlpha:
         if carry.h == 0.0:
             return started_anew(self, system, t, carry, work)
         compiled, tree = compiled_system(system), tree_of(system).tree
-        exact, change = self.absolute.jump(compiled, carry, t)
+        exact, change = self.plain.jump(compiled, carry, t)
         after, rows = self.observe(system, t, exact, work)
         a, u_dot = carry.a.copy(), carry.u_dot + change
         for sign, each in ((1.0, u_dot), (-1.0, carry.u_dot)):
@@ -123,7 +129,7 @@ class RelativeGeneralizedAlpha:
 
         At the start, and where longer steps follow: as `start.step_filter` says, in the coordinates of the joints.
         """
-        compiled, method = compiled_system(system), self.absolute
+        compiled, method = compiled_system(system), self.plain
         is_divided = method.least_step(h, compiled) > 0.0
         if carry.h != 0.0 and (is_divided or h <= LONGER * carry.h):
             return replace(carry, h_next=min(carry.h_next or h, h) if is_divided else h)

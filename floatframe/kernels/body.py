@@ -37,6 +37,7 @@ from floatframe.kernels.vector import (
     transposed,
     turned,
     turned_back,
+    unit,
     unit_matrix,
     vector,
 )
@@ -280,6 +281,27 @@ def body_tangent(model, work, i, c_m, c_d, c_k, H, turn):
     put_block(turn, 3, 0, product(tilde(s), tilde(a)))
     if n > 0:
         modal_tangent(model, work, i, c_m, c_d, c_k, H, turn)
+    if work.state.spins[i] != 0:
+        spin_columns(model, work, i, c_d, H)
+
+
+@loops
+def spin_columns(model, work, i, c_d, H):
+    """Add what the rate of turn of the axis e of a body that spins adds to its angular acceleration, w dtheta × e.
+
+    w: spin; see `kernels.generalized_alpha`. The columns of alpha in (1) to (3) are -tilde(s), J, Bᵀ.
+    """
+    types, bodies = model.body_types, work.bodies
+    t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
+    e = vector(types.axis[t])
+    turn = scaled(c_d * dot(e, vector(work.state.u[u0 + 3 :])), e)
+    s = vector(bodies.s[i])
+    for r in range(3):
+        put_sum(H[r], 3, cross(turn, cross(s, unit(r))))
+        put_sum(H[3 + r], 3, cross(turn, vector(bodies.J[i, r])))
+    W, second = bodies.W[9 * q0 : 9 * (q0 + n)], block(types, t, C2, 3 * n)
+    for k in range(n):
+        put_sum(H[6 + k], 3, cross(turn, add(column(second, n, k), axial(tensor(W, n, k)))))
 
 
 @loops

@@ -71,6 +71,7 @@ class Order(NamedTuple):
     length: Array = real(unit="m")  #: size of the system
     most_error: Array = real()  #: of a step, 0 for none asked
     h_min: Array = real(unit="s")  #: into which a step may be divided, 0 if it may not
+    stabilized: IntArray = integer()  #: whether velocities are held too, and spins taken by themselves
 
 
 class Outcome(NamedTuple):
@@ -206,11 +207,12 @@ def advance_steps(
     length: float,
     most_error: float,
     h_min: float,
+    stabilized: bool,
 ) -> Outcome:
     """Advance the memory by n_steps of the generalized-alpha method; see `kernels.generalized_alpha.advance`."""
     alpha_m, alpha_f, beta, gamma = coefficients
     return call(
         model, work, memory, rows, what=ADVANCE, t0=t0, h=h, first=first, n_steps=n_steps, every=every,
         alpha_m=alpha_m, alpha_f=alpha_f, beta=beta, gamma=gamma, tolerance=tolerance, max_iterations=max_iterations,
-        length=length, most_error=most_error, h_min=h_min,
+        length=length, most_error=most_error, h_min=h_min, stabilized=int(stabilized),
     )  # fmt: skip

@@ -11,9 +11,9 @@ from floatframe.kernels.marker import (
     marker_stiffness,
     wrench_to_body,
 )
-from floatframe.kernels.rotation import right_jacobian
+from floatframe.kernels.rotation import right_jacobian, split_spin, turned_about
 from floatframe.kernels.time_function import time_function
-from floatframe.kernels.vector import put, put_matrix, put_sum, scaled, turned, turned_back, vector
+from floatframe.kernels.vector import add, put, put_matrix, put_sum, scaled, sub, turned, turned_back, vector
 
 __all__ = ["evaluate", "evaluate_bodies", "evaluate_markers", "linearize", "slide_markers", "tangent_of_body"]
 
@@ -100,13 +100,34 @@ def tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning):
 
 
 @inner
+def turning_by_unknown(model, work, i):
+    """Return the rotation of body i by its unknown dtheta, body axes.
+
+    R exp(theta) turns by T(theta) dtheta. Where the spin is taken by itself, R exp(x) exp(xi e) with x across e and
+    unknowns in the axes of the iterate, it turns by e along e, and across it by T(x) in these axes.
+    """
+    theta = vector(work.state.theta[i])
+    if work.state.spins[i] == 0:
+        return right_jacobian(theta)
+    e = vector(model.body_types.axis[model.bodies.kind[i]])
+    along, across = split_spin(e, theta)
+    T = right_jacobian(turned_about(e, -along, across))
+    bent = sub(e, turned(T, e))
+    return (
+        add(T[0], scaled(bent[0], e)),
+        add(T[1], scaled(bent[1], e)),
+        add(T[2], scaled(bent[2], e)),
+    )
+
+
+@inner
 def linearize(model, work, c_m, c_d, c_k):
     """Write H of every body, J_row and J_column of every end, and P, V of every connection (nothing factorised)."""
     rate = c_d / c_k if c_k > 0.0 else 0.0
     for i in range(model.bodies.kind.shape[0]):
         n = 6 + model.bodies.n_q[i]
         turning = work.bodies.T_right[i]
-        put_matrix(turning, right_jacobian(vector(work.state.theta[i])))
+        put_matrix(turning, turning_by_unknown(model, work, i))
         H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((n, n))
         tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning)
         for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):

@@ -10,14 +10,40 @@ from floatframe.kernels.connections.user_force import resize_states
 from floatframe.kernels.diagnostics import diagnose, power
 from floatframe.kernels.evaluation import evaluate
 from floatframe.kernels.memory import WORK_GIVEN, WORK_TAKEN
-from floatframe.kernels.model import MASS, STIFFNESS
+from floatframe.kernels.model import JOINT, MASS, STIFFNESS
 from floatframe.kernels.past import keep_past
-from floatframe.kernels.rotation import exp_matrix, matrix_of_euler_parameters, rotate_euler_parameters
-from floatframe.kernels.schur import correction, factorize_bodies, settle_accelerations, share_reactions
+from floatframe.kernels.rotation import (
+    exp_matrix,
+    matrix_of_euler_parameters,
+    rotate_euler_parameters,
+    split_spin,
+    turned_about,
+)
+from floatframe.kernels.schur import (
+    correction,
+    factorize_bodies,
+    settle_accelerations,
+    share_reactions,
+    velocity_correction,
+)
 from floatframe.kernels.step_start import accelerate, begin_step
 from floatframe.kernels.time_function import time_function
 from floatframe.kernels.turns import count_turns
-from floatframe.kernels.vector import dot, product, put, put_matrix, put_sum, scaled, turned, turned_back, vector
+from floatframe.kernels.vector import (
+    add,
+    cross,
+    dot,
+    norm,
+    product,
+    put,
+    put_matrix,
+    put_sum,
+    scaled,
+    sub,
+    turned,
+    turned_back,
+    vector,
+)
 
 __all__ = [
     "DIVERGED",
@@ -26,6 +52,7 @@ __all__ = [
     "SINGULAR_BODY",
     "SINGULAR_CONNECTION",
     "STOPPED",
+    "TURNED",
     "UNRESOLVED",
     "advance",
     "error_factor",
@@ -42,6 +69,9 @@ __all__ = [
 
 DONE, DIVERGED, SINGULAR_BODY, SINGULAR_CONNECTION, INACCURATE, STOPPED = 0, 1, 2, 3, 4, 5
 UNRESOLVED = 7  # a step is too long for a contact; 6 is `relative.kernels.steps.SINGULAR`
+TURNED = 8  # a body turns too far in a step
+MOST_TURN = 1.0  #: rad in a step, of a body on joints away from the axis: above 1.15 joints can give it energy
+OFF_AXIS = 1e-3  # of the size of the system: how far from the axis of turning a joint counts as away from it
 SLOW = 0.2  # ratio of corrections above which the factors are made anew
 OF_MOTION = 1e-5  # of the way of a step counts beside what accelerations move in it
 FAST = 0.1  # corrections that shrink this fast end a step where the next one is expected to be small enough:
@@ -51,6 +81,7 @@ ROUNDOFF = 2e-15  # of a position
 NOISE = 1e-7  # accelerations by rounding of positions, over those of the motion, that reach results
 SAFETY = 0.9  # of the step that would just meet the error that is allowed
 LEAST, MOST, WORTH = 0.2, 2.0, 1.2  # a step becomes this much shorter, longer at most; longer only if by this much
+STEADY = 0.1  # of an angular acceleration by its size without the turn of the axis: below, the body turns steadily
 SAME = 1e-12  # relative difference of step sizes that are one
 
 
@@ -89,6 +120,7 @@ def load_state(state, memory):
     copy(memory.w, state.w)
     copy(memory.angle, state.angle)
     for i in range(memory.p.shape[0]):
+        state.spins[i] = 0
         for k in range(3):
             state.theta[i, k] = 0.0
     for i in range(memory.p.shape[0]):
@@ -96,10 +128,59 @@ def load_state(state, memory):
 
 
 @inner
-def turn_body(state, memory, i):
-    """Write R of body i: that of the beginning of the step, turned by theta."""
-    R_start = matrix_of_euler_parameters(memory.p[i])
-    put_matrix(state.R[i], product(R_start, exp_matrix(vector(state.theta[i]))))
+def turn_body(model, state, memory, i):
+    """Write R of body i: that of the beginning of the step, turned by theta, or by both parts of it if it spins."""
+    R_start, theta = matrix_of_euler_parameters(memory.p[i]), vector(state.theta[i])
+    if state.spins[i] == 0:
+        put_matrix(state.R[i], product(R_start, exp_matrix(theta)))
+        return
+    e = spin_axis(model, i)
+    along, across = split_spin(e, theta)
+    put_matrix(state.R[i], product(product(R_start, exp_matrix(across)), exp_matrix(scaled(along, e))))
+
+
+@small
+def spin_axis(model, i):
+    """Return the axis about which the inertia of body i is symmetric, body axes; zero: none."""
+    return vector(model.body_types.axis[model.bodies.kind[i]])
+
+
+@inner
+def turn_of_axis(model, i, omega):
+    """Return the part of the angular acceleration by which the axis e of body i carries its spin about: w omega × e."""
+    e = spin_axis(model, i)
+    return scaled(dot(e, omega), cross(omega, e))
+
+
+@inner
+def begin_spin(model, work, memory, i):
+    """Choose whether the step takes the spin of body i by itself; return what its accelerations are less then.
+
+    So it is done where its axis of symmetry does not hold still in the body's angular velocity, but in space: the
+    angular acceleration is small without w omega × e, or is not much smaller with it.
+    """
+    u0, zero = model.bodies.u0[i] + 3, (0.0, 0.0, 0.0)
+    turn, alpha = turn_of_axis(model, i, memory.u[u0:]), vector(memory.u_dot[u0:])
+    rest = sub(alpha, turn)
+    work.state.spins[i] = 0
+    if dot(turn, turn) > 0.0 and dot(alpha, alpha) >= STEADY * STEADY * dot(rest, rest):
+        work.state.spins[i] = 1
+        return turn
+    return zero
+
+
+@inner
+def take_to_body(model, state, i):
+    """Turn omega and alpha - w omega × e of body i from the axes that do not spin with it into omega and alpha of its own.
+
+    These axes are those of the beginning of the step turned by exp(across).
+    """
+    e, u0 = spin_axis(model, i), model.bodies.u0[i] + 3
+    angle = -dot(e, vector(state.theta[i]))
+    omega = turned_about(e, angle, vector(state.u[u0:]))
+    rest = turned_about(e, angle, vector(state.u_dot[u0:]))
+    put(state.u, u0, omega)
+    put(state.u_dot, u0, add(rest, turn_of_axis(model, i, omega)))
 
 
 @inner
@@ -115,27 +196,34 @@ def take_age(solver, n_iterations):
 
 
 @inner
-def predict(model, work, memory, h, alpha_f):
+def predict(model, work, memory, h, order):
     """(1): a_new = a. Return the squared size of the acceleration and of the increment, in the norm of `weight`."""
-    begin_step(model, work, memory, h, alpha_f)
+    begin_step(model, work, memory, h, order.alpha_f)
     size, size_x = 0.0, 0.0
     for i in range(model.bodies.kind.shape[0]):
         n, u0, q0 = model.bodies.n_q[i], model.bodies.u0[i], model.bodies.q0[i]
-        for k in range(u0, u0 + 6 + n):
-            a, u = memory.a[k], memory.u[k]
+        turn = (0.0, 0.0, 0.0)
+        work.state.spins[i] = 0
+        if order.stabilized != 0:
+            turn = begin_spin(model, work, memory, i)
+        for j in range(6 + n):
+            k = u0 + j
+            less = turn[j - 3] if 3 <= j < 6 else 0.0
+            a, u = memory.a[k] - less, memory.u[k]
             x = h * (u + 0.5 * h * a)
             work.state.u[k] = u + h * a
-            work.state.u_dot[k] = (a - alpha_f * memory.u_dot[k]) / (1 - alpha_f)
+            work.state.u_dot[k] = (a - order.alpha_f * (memory.u_dot[k] - less)) / (1 - order.alpha_f)
             size += work.solver.weight[k] * work.state.u_dot[k] ** 2
             size_x += work.solver.weight[k] * x * x
-            j = k - u0
             if j < 3:
                 work.state.r[i, j] = memory.r[i, j] + x
             elif j < 6:
                 work.state.theta[i, j - 3] = x
             else:
                 work.state.q[q0 + j - 6] = memory.q[q0 + j - 6] + x
-        turn_body(work.state, memory, i)
+        if work.state.spins[i] != 0:
+            take_to_body(model, work.state, i)
+        turn_body(model, work.state, memory, i)
     return size, size_x
 
 
@@ -145,22 +233,89 @@ def update(model, work, memory, by_rate, by_acceleration, c_k):
     total = 0.0
     for i in range(model.bodies.kind.shape[0]):
         n, u0, q0 = model.bodies.n_q[i], model.bodies.u0[i], model.bodies.q0[i]
-        R, y = work.state.R[i], work.solver.y[u0 : u0 + 6 + n]
+        y = work.solver.y[u0 : u0 + 6 + n]
         for k in range(6 + n):
             total += work.solver.weight[u0 + k] * y[k] * y[k]
-        dx = turned(R, y)
-        put_sum(work.state.r[i], 0, dx)
-        put_sum(work.state.theta[i], 0, y[3:])
-        put_sum(work.state.u, u0, scaled(by_rate, dx))
-        put_sum(work.state.u_dot, u0, scaled(by_acceleration, dx))
-        for k in range(3, 6 + n):
-            work.state.u[u0 + k] += by_rate * y[k]
-            work.state.u_dot[u0 + k] += by_acceleration * y[k]
+        put_sum(work.state.r[i], 0, turned(work.state.R[i], y))
         for k in range(n):
             work.state.q[q0 + k] += y[6 + k]
-        turn_body(work.state, memory, i)
+        change_rates(model, work, i, vector(y[3:]), by_rate, by_acceleration)
+        turn_body(model, work.state, memory, i)
     for k in range(work.solver.mu.shape[0]):
         work.state.w[k] += work.solver.mu[k] / c_k
+    return total
+
+
+@inner
+def change_rates(model, work, i, by_theta, by_rate, by_acceleration):
+    """Add y by_rate to the velocities of body i, y by_acceleration to its accelerations, and by_theta to theta.
+
+    A body that spins has them in the axes that do not spin with it: omega and alpha - w omega × e follow y there, which
+    is that of theta or, where theta stays, of a velocity.
+    """
+    n, u0, state = model.bodies.n_q[i], model.bodies.u0[i], work.state
+    y = work.solver.y[u0 : u0 + 6 + n]
+    dx = turned(state.R[i], y)
+    put_sum(state.u, u0, scaled(by_rate, dx))
+    put_sum(state.u_dot, u0, scaled(by_acceleration, dx))
+    for k in range(6, 6 + n):
+        state.u[u0 + k] += by_rate * y[k]
+        state.u_dot[u0 + k] += by_acceleration * y[k]
+    omega, turning = vector(state.u[u0 + 3 :]), vector(y[3:])
+    if state.spins[i] == 0:
+        put_sum(state.theta[i], 0, by_theta)
+        put_sum(state.u, u0 + 3, scaled(by_rate, turning))
+        put_sum(state.u_dot, u0 + 3, scaled(by_acceleration, turning))
+        return
+    e = spin_axis(model, i)
+    rest = sub(vector(state.u_dot[u0 + 3 :]), turn_of_axis(model, i, omega))
+    put_sum(state.theta[i], 0, turned_about(e, dot(e, vector(state.theta[i])), by_theta))
+    further = -dot(e, by_theta)
+    omega = turned_about(e, further, add(omega, scaled(by_rate, turning)))
+    rest = turned_about(e, further, add(rest, scaled(by_acceleration, turning)))
+    put(state.u, u0 + 3, omega)
+    put(state.u_dot, u0 + 3, add(rest, turn_of_axis(model, i, omega)))
+
+
+@inner
+def turns_too_far(model, work, length):
+    """Return the first body that turns by more than `MOST_TURN` in the step and has a joint away from the axis, or -1.
+
+    A spin that is taken by itself does not count. Where all joints lie on the axis through the frame, its origin does
+    not move on a circle, and any turn is followed.
+    """
+    for i in range(model.bodies.kind.shape[0]):
+        theta = vector(work.state.theta[i])
+        if work.state.spins[i] != 0:
+            _, theta = split_spin(spin_axis(model, i), theta)
+        turn = norm(theta)
+        if turn <= MOST_TURN:
+            continue
+        for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):
+            m = model.bodies.ends[e]
+            if model.connections.law[model.markers.connection[m]] == JOINT:
+                if norm(cross(theta, vector(work.markers.rho[m]))) > OFF_AXIS * length * turn:
+                    return i
+    return -1
+
+
+@inner
+def hold_velocities(model, work, by_rate, by_acceleration, c_k):
+    """Add the correction of velocities that the held positions ask for to the iterate; return its squared norm.
+
+    Accelerations change with velocities and reactions with accelerations, as in `update`. Positions stay.
+    """
+    velocity_correction(model, work, by_rate)
+    total = 0.0
+    for i in range(model.bodies.kind.shape[0]):
+        n, u0 = model.bodies.n_q[i], model.bodies.u0[i]
+        y = work.solver.y[u0 : u0 + 6 + n]
+        for k in range(6 + n):
+            total += work.solver.weight[u0 + k] * y[k] * y[k]
+        change_rates(model, work, i, (0.0, 0.0, 0.0), by_rate, by_acceleration)
+    for k in range(work.solver.mu.shape[0]):
+        if model.rows.holds[k] != NOTHING:
+            work.state.w[k] += work.solver.mu[k] / c_k
     return total
 
 
@@ -221,6 +376,10 @@ def local_error(model, work, memory, order, h):
         for k in range(6 + n):
             mean = (1 - alpha_f) * work.state.u_dot[u0 + k] + alpha_f * memory.u_dot[u0 + k]
             jump[k] = (mean - alpha_m * memory.a[u0 + k]) / (1 - alpha_m) - memory.a[u0 + k]
+        if work.state.spins[i] != 0:
+            e = spin_axis(model, i)
+            a, turning = angular_accelerations(model, work, memory, i, alpha_m, alpha_f)
+            put(jump, 3, turned_about(e, -dot(e, vector(work.state.theta[i])), sub(turning, a)))
         largest = max(largest, mean_square(model, work, i, jump))
     return error_factor(order, h) * math.sqrt(largest)
 
@@ -257,7 +416,7 @@ def one_step(model, work, memory, order, h):
     c_k = beta * h * h
     c_d = gamma * h
     c_m = (1 - alpha_m) / (1 - alpha_f)
-    size, size_x = predict(model, work, memory, h, alpha_f)
+    size, size_x = predict(model, work, memory, h, order)
     mass = 0.0
     for i in range(model.bodies.kind.shape[0]):
         mass += model.body_types.mass[model.bodies.kind[i]]
@@ -286,16 +445,20 @@ def one_step(model, work, memory, order, h):
         if connection >= 0:
             work.solver.is_due = 1
             return SINGULAR_CONNECTION, connection, excess, -1.0
-        norm = math.sqrt(update(model, work, memory, c_d / c_k, c_m / c_k, c_k))
+        squares = update(model, work, memory, c_d / c_k, c_m / c_k, c_k)
+        of_states = 0.0
+        if has_states:  # they follow the bodies by one iteration
+            of_states = correction_of_states(model, work, c_k) / order.tolerance
+        if order.stabilized != 0 and solver.mu.shape[0] > 0:
+            squares += hold_velocities(model, work, c_d / c_k, c_m / c_k, c_k)
+        norm = math.sqrt(squares)
         work.counted.iterations += 1
         if not math.isfinite(norm):
             work.solver.is_due = 1
             return DIVERGED, -1, math.inf, -1.0
         excess = norm / allowed if allowed > 0.0 else math.inf
         is_new = False
-        of_states = 0.0
-        if has_states:  # they follow the bodies by one iteration
-            of_states = correction_of_states(model, work, c_k) / order.tolerance
+        if has_states:
             if not math.isfinite(of_states):
                 work.solver.is_due = 1
                 return DIVERGED, -1, math.inf, -1.0
@@ -308,6 +471,10 @@ def one_step(model, work, memory, order, h):
         is_small = is_enough(norm, last, wanted, allowed) or is_stuck
         if is_small and (of_states <= 1.0 or (of_states <= 1e3 and of_states > 0.5 * last_of_states and iteration > 2)):
             take_age(work.solver, iteration + 1)
+            if order.stabilized != 0:
+                body = turns_too_far(model, work, order.length)
+                if body >= 0:
+                    return TURNED, body, excess, -1.0
             error = -1.0
             if is_too_long(model, work, h):
                 return UNRESOLVED, -1, excess, error
@@ -337,13 +504,37 @@ def is_too_long(model, work, h):
 @inner
 def accept(model, work, memory, h, alpha_m, alpha_f):
     """(3): write the iterate and the new algorithmic acceleration into the memory."""
-    for k in range(memory.a.shape[0]):
-        mean = (1 - alpha_f) * work.state.u_dot[k] + alpha_f * memory.u_dot[k]
-        memory.a[k] = (mean - alpha_m * memory.a[k]) / (1 - alpha_m)
     for i in range(model.bodies.kind.shape[0]):
-        p = memory.p[i]
-        p[0], p[1], p[2], p[3] = rotate_euler_parameters(p, vector(work.state.theta[i]))
+        u0 = model.bodies.u0[i]
+        _, turning = angular_accelerations(model, work, memory, i, alpha_m, alpha_f)
+        for k in range(u0, u0 + 6 + model.bodies.n_q[i]):
+            mean = (1 - alpha_f) * work.state.u_dot[k] + alpha_f * memory.u_dot[k]
+            memory.a[k] = (mean - alpha_m * memory.a[k]) / (1 - alpha_m)
+        p, theta = memory.p[i], vector(work.state.theta[i])
+        if work.state.spins[i] != 0:
+            e = spin_axis(model, i)
+            along, across = split_spin(e, theta)
+            now = turn_of_axis(model, i, vector(work.state.u[u0 + 3 :]))
+            put(memory.a, u0 + 3, add(turned_about(e, -along, turning), now))
+            p[0], p[1], p[2], p[3] = rotate_euler_parameters(p, across)
+            theta = scaled(along, e)
+        p[0], p[1], p[2], p[3] = rotate_euler_parameters(p, theta)
     keep_iterate(model, work, memory, h)
+
+
+@inner
+def angular_accelerations(model, work, memory, i, alpha_m, alpha_f):
+    """Return the algorithmic angular acceleration of body i before and after the step, in axes that do not spin."""
+    u0 = model.bodies.u0[i] + 3
+    a, before, now = vector(memory.a[u0:]), vector(memory.u_dot[u0:]), vector(work.state.u_dot[u0:])
+    if work.state.spins[i] != 0:
+        e = spin_axis(model, i)
+        turn = turn_of_axis(model, i, vector(memory.u[u0:]))
+        a, before = sub(a, turn), sub(before, turn)
+        rest = sub(now, turn_of_axis(model, i, vector(work.state.u[u0:])))
+        now = turned_about(e, dot(e, vector(work.state.theta[i])), rest)
+    mean = add(scaled(1 - alpha_f, now), scaled(alpha_f, before))
+    return a, scaled(1 / (1 - alpha_m), sub(mean, scaled(alpha_m, a)))
 
 
 @inner

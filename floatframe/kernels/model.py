@@ -89,6 +89,7 @@ class BodyTypes(NamedTuple):
     mass: Array = real(n_t, unit="kg")
     S: Array = real(n_t, 3, unit="kg m")  #: first moment
     J0: Array = real(n_t, 3, 3, unit="kg m²")  #: inertia about the frame origin, undeformed
+    axis: Array = real(n_t, 3)  #: about which the inertia at the centre of mass is symmetric; zero: no such axis
     #: C1 [a,k], C2 [a,k], C3 [ab,k], S_ab [l,ab,k], C4 [l,a,k], M, K, D; of stiffened types (whose S_ab hold more, see
     #: compiling/stiffening.py) K_t [l,a,k], K_r [l,a,k]; of all types, flat
     blocks: Array = real(Size("numbers of types"), unit="kg m^n, K: N/m, D: N s/m")

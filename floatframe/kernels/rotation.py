@@ -16,6 +16,8 @@ __all__ = [
     "matrix_of_euler_parameters",
     "right_jacobian",
     "rotate_euler_parameters",
+    "split_spin",
+    "turned_about",
 ]
 
 SERIES_BELOW = 0.25  # t² at the switch
@@ -126,6 +128,21 @@ def left_jacobian_derivative(th, v, sign):
         slope_row(unit(1), f, b, d, a, th, v),
         slope_row(unit(2), f, b, d, a, th, v),
     )
+
+
+@inner
+def turned_about(e, angle, x):
+    """Return exp(angle e) x for a unit vector e."""
+    s, half = math.sin(angle), math.sin(0.5 * angle)
+    c = cross(e, x)
+    return add(x, add(scaled(s, c), scaled(2.0 * half * half, cross(e, c))))
+
+
+@inner
+def split_spin(e, th):
+    """Return the part of th along the unit vector e, as a number, and the part across it."""
+    along = dot(e, th)
+    return along, sub(th, scaled(along, e))
 
 
 @inner

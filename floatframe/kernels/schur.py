@@ -11,7 +11,12 @@ import math
 
 from floatframe.joints.rows.kinds import NOTHING
 from floatframe.kernels.compiler.compilation import inner
-from floatframe.kernels.connections.connection import connection_derivatives, constraint_rates
+from floatframe.kernels.connections.connection import (
+    connection_derivatives,
+    constraint_rates,
+    has_cheap_rate,
+    held_rate,
+)
 from floatframe.kernels.dense import lu_factor, lu_solve, lu_solve_columns
 from floatframe.kernels.evaluation import linearize
 from floatframe.kernels.model import MASS, STIFFNESS
@@ -25,6 +30,7 @@ __all__ = [
     "factorize_tangents",
     "settle_accelerations",
     "share_reactions",
+    "velocity_correction",
 ]
 
 SOFTER = 1e3  # s of `share_reactions`: well above the rounding of A
@@ -283,6 +289,29 @@ def take_motions(model, work):
                 mu[w0 + r] -= total
             if markers.accelerated[m] >= 0:
                 take_accelerated(model, work, m, n, y[u0 : u0 + n], mu)
+
+
+@inner
+def velocity_correction(model, work, by_rate):
+    """Write (y, mu) that takes the rates of held positions, y by_rate being the change of u; residuals stay.
+
+    `correction` has been called for the iterate and its y added to it; rates are those before, so that they count with
+    what y has changed in them, -by_rate g. Rows of positions that have no cheap rate, and all others, stay as they are.
+    Unknowns of rotation turn a body by `T_right` of them, velocities at once: y is what they turn it by.
+    """
+    y, mu = work.solver.y, work.solver.mu
+    for c in range(model.connections.size.shape[0]):
+        for k in range(model.connections.w0[c], model.connections.w0[c + 1]):
+            mu[k] = 0.0
+            if has_cheap_rate(model, c, k):
+                mu[k] = work.connections.g[k] - held_rate(model, work, c, k) / by_rate
+    for k in range(y.shape[0]):
+        y[k] = 0.0
+    solve_connections(model.elimination, model.connections, work.solver)
+    add_wrenches(model, work)
+    for i in range(model.bodies.kind.shape[0]):
+        u0 = model.bodies.u0[i] + 3
+        put(y, u0, turned(work.bodies.T_right[i], y[u0:]))
 
 
 @inner

@@ -51,6 +51,7 @@ class Iterate(NamedTuple):
     u: Array = real(n_u, unit="m/s, rad/s, 1/s")  #: velocities
     u_dot: Array = real(n_u, unit="m/s², rad/s², 1/s²")  #: accelerations
     theta: Array = real(n_b, 3, unit="rad")  #: rotation since the beginning of the step, body axes
+    spins: IntArray = integer(n_b)  #: whether the step takes the spin about the axis of symmetry by itself
     w: Array = real(n_w, unit="N, N m")  #: wrenches of the connections on their markers A
     w_start: Array = real(n_w, unit="N, N m")  #: the same at the beginning of the step
     time: Array = real(unit="s")

@@ -54,6 +54,7 @@ def set_iterate(
     work.state.u_dot[:] = 0.0 if u_dot is None else u_dot
     work.state.w[:] = 0.0 if w is None else w
     work.state.theta[:] = 0.0
+    work.state.spins[:] = 0
 
 
 def linearized(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> Linearized:

@@ -6,14 +6,19 @@ kernels/joints/row_formulas.py. Held rows with `soft` s give way by s c_k times 
 of positions, so that redundant ones share their load.
 """
 
-from floatframe.joints.rows.kinds import NOTHING, VELOCITY
+from floatframe.joints.rows.kinds import DOT, NOTHING, POINT, POSITION, VELOCITY
 from floatframe.kernels.compiler.compilation import inner, small
-from floatframe.kernels.connections.coupler import coupler_derivatives, coupler_rates, coupler_rows
+from floatframe.kernels.connections.coupler import (
+    coupler_derivatives,
+    coupler_rate,
+    coupler_rates,
+    coupler_rows,
+)
 from floatframe.kernels.connections.element_law import law_derivatives, law_rates, law_rows
 from floatframe.kernels.connections.pair_force import pair_derivatives, pair_rows
 from floatframe.kernels.connections.spring_damper import spring_derivatives, spring_rows
 from floatframe.kernels.connections.user_force import user_force_derivatives, user_force_rows
-from floatframe.kernels.joints.relative_motion import put_pair, relative_velocity
+from floatframe.kernels.joints.relative_motion import direction, put_pair, relative_velocity
 from floatframe.kernels.joints.row_formulas import (
     held_by_place,
     held_rates,
@@ -23,9 +28,9 @@ from floatframe.kernels.joints.row_formulas import (
 )
 from floatframe.kernels.marker import marker_acceleration_bias
 from floatframe.kernels.model import BUSHING, CONTACT, COUPLER, ELEMENT, JOINT, SPRING, USER_FORCE
-from floatframe.kernels.vector import dot, put, put_sum, scaled, sub, vector
+from floatframe.kernels.vector import cross, dot, put, put_sum, scaled, sub, vector
 
-__all__ = ["connection_derivatives", "connection_rows", "constraint_rates", "row_rates"]
+__all__ = ["connection_derivatives", "connection_rows", "constraint_rates", "has_cheap_rate", "held_rate", "row_rates"]
 
 
 @inner
@@ -125,6 +130,33 @@ def joint_row_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
     if soft > 0.0:
         put_sum(V[r], 0, scaled(-soft, n))
         put_sum(V[r], model.rows.part[k], scaled(-soft, m_b))
+
+
+@small
+def has_cheap_rate(model, c, k):
+    """Whether row k of connection c holds a position whose rate is known without its second rate.
+
+    Not of elements: theirs asks for the law many times.
+    """
+    law = model.connections.law[c]
+    return model.rows.holds[k] == POSITION and (law == JOINT or law == COUPLER)
+
+
+@inner
+def held_rate(model, work, c, k):
+    """Return the rate of the position that row k of joint or coupler c holds."""
+    if model.connections.law[c] == COUPLER:
+        return coupler_rate(model, work, c)
+    a, b, kind, markers = model.connections.a[c], model.connections.b[c], model.rows.kind[k], work.markers
+    if kind == POINT:
+        return -dot(vector(model.rows.x[k]), relative_velocity(markers, a, b))
+    if kind == DOT:  # E · D, which is held by what turns about E × D
+        E, D = direction(markers, a, model.rows.x[k]), direction(markers, b, model.rows.y[k])
+        return dot(cross(E, D), sub(vector(markers.omega[a]), vector(markers.omega[b])))
+    _, n, m_a, m_b = held_value(kind, model, work, k, a, b)
+    rate, _ = held_rates(kind, model, work, k, a, b)
+    rate += dot(n, relative_velocity(markers, a, b))
+    return rate + dot(m_a, vector(markers.omega[a])) + dot(m_b, vector(markers.omega[b]))
 
 
 @inner

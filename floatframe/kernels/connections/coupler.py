@@ -17,7 +17,7 @@ from floatframe.kernels.connections.coordinate import (
 )
 from floatframe.kernels.joints.relative_motion import prescribed
 
-__all__ = ["coupler_derivatives", "coupler_power", "coupler_rates", "coupler_rows"]
+__all__ = ["coupler_derivatives", "coupler_power", "coupler_rate", "coupler_rates", "coupler_rows"]
 
 
 @inner
@@ -61,22 +61,35 @@ def coupler_derivatives(model, work, c, c_k):
 
 
 @inner
+def coupler_rate(model, work, c):
+    """Return the rate of the held row of coupler c; zero while it is not engaged."""
+    i = model.connections.item[c]
+    k = model.elements.core[i]
+    if model.rows.kind[k] == RELEASED:
+        return 0.0
+    _, rate, _ = prescribed(model, work, k)
+    total = -rate
+    for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
+        total += model.coordinates.factor[p] * coordinate_tangent_rate(model, work, p)
+    return model.rows.x[k, 0] * total
+
+
+@inner
 def coupler_rates(model, work, c, rate, bias):
     """Write the rate of the held row of coupler c, and its second rate at zero u_dot."""
     i = model.connections.item[c]
     k = model.elements.core[i]
-    rate[k], bias[k] = 0.0, 0.0
+    rate[k], bias[k] = coupler_rate(model, work, c), 0.0
     if model.rows.kind[k] == RELEASED:
         return
-    _, first, second = prescribed(model, work, k)
-    first, second = -first, -second
+    _, _, second = prescribed(model, work, k)
+    second = -second
     for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
         factor = model.coordinates.factor[p]
-        first += factor * coordinate_tangent_rate(model, work, p)
         second += factor * coordinate_second_rate(
             model, work, p, work.markers.bias[model.coordinates.a[p]], work.markers.bias[model.coordinates.b[p]]
         )
-    rate[k], bias[k] = model.rows.x[k, 0] * first, model.rows.x[k, 0] * second
+    bias[k] = model.rows.x[k, 0] * second
 
 
 @inner

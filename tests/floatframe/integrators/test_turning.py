@@ -1,0 +1,169 @@
+"""Bodies that turn far in a step: joints give them no energy, and rotors precess as they should.
+
+A rigid arm on a hinge, its frame away from the hinge, keeps its speed; a pendulum its energy. A fast rotor whose weight
+is carried beside its point of suspension precesses with m g l/(J w), however far it spins in a step; a wheel on a tilted
+shaft turns steadily. Beyond one radian a step an arm is refused by name.
+"""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from floatframe import (
+    ConvergenceError,
+    DistanceJoint,
+    GeneralizedAlpha,
+    Gravity,
+    Marker,
+    RevoluteJoint,
+    RigidBody,
+    SphericalJoint,
+    System,
+    UniversalJoint,
+    integrate,
+    trapezoidal,
+)
+from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_exp, rotation_matrix
+from tests.floatframe.orders import slope
+
+#: general position: where the system stands and how it is turned
+PLACE, ORIENTATION = np.array([3.0, -40.0, 7.0]), euler_parameters_of_rotation_vector(np.array([0.4, -0.8, 0.3]))
+TURN = rotation_matrix(ORIENTATION)
+G = 9.81
+
+
+def on_ground(x=0.0):
+    return Marker("ground", position=PLACE + x * TURN[:, 0])
+
+
+def at(body, x):
+    return Marker(body, position=np.array([x, 0.0, 0.0]))
+
+
+def body_at(name, mass, inertia, point, velocity, omega_B):
+    """Return a body at a point of the turned axes, with a velocity in them."""
+    return RigidBody(
+        name, mass, inertia, position=PLACE + TURN @ np.array(point), orientation=ORIENTATION,
+        velocity=TURN @ np.array(velocity), omega_B=omega_B,
+    )  # fmt: skip
+
+
+def arm(speed, J, mass=1.0):
+    """Return an arm of unit length that turns about its end."""
+    body = body_at("arm", mass, J * np.diag([0.3, 0.8, 1.0]), (1, 0, 0), (0, speed, 0), (0, 0, speed))
+    hinge = RevoluteJoint("hinge", on_ground(), at("arm", -1.0), axis=TURN[:, 2])
+    return System([body], [hinge])
+
+
+@pytest.mark.parametrize("rho_inf", [1.0, 0.95, 0.9, 0.8, 0.5])
+@pytest.mark.parametrize("turn", [0.05, 0.5], ids=["0.05 rad a step", "0.5 rad a step"])
+def test_a_hinge_gives_a_rotating_arm_no_energy(rho_inf, turn):
+    motion = integrate(arm(10.0, 0.01), GeneralizedAlpha(rho_inf), 20 * turn, turn / 10.0)
+    speed = motion.body("arm").omega_B[:, 2]
+    assert speed.max() < 10.0 * (1 + 1e-3)
+    if rho_inf >= 0.9:  # more damping takes what it does of a point on a circle
+        assert speed.min() > 10.0 * (1 - 0.03)
+
+
+@pytest.mark.parametrize("method", [trapezoidal(), GeneralizedAlpha(0.95), GeneralizedAlpha(0.8)], ids=repr)
+@pytest.mark.parametrize("h", [5e-3, 2e-2])
+def test_a_rod_gives_a_pendulum_no_energy(method, h):
+    ball = body_at("ball", 2.0, np.eye(3), (1, 0, 0), (0, 0, 0), (0, 0, 0))
+    rod = DistanceJoint("rod", on_ground(), at("ball", 0.0))
+    motion = integrate(System([ball], [rod], [Gravity(-G * TURN[:, 2])]), method, 10.0, h)
+    total = motion.energies.total - motion.energies.total[0]
+    assert total.max() < 5e-3 * 2.0 * G  # where it swings fast, the error of the scheme of second order
+    assert total.min() > -2e-2 * 2.0 * G
+
+
+def test_an_arm_that_turns_too_far_in_a_step_is_refused_by_name():
+    words = "body 'arm' turns by .* rad in a step, with a joint away from its axis.*expected at most 1 rad"
+    with pytest.raises(ConvergenceError, match=words):
+        integrate(arm(10.0, 0.01), GeneralizedAlpha(0.8), 10.0, 0.15)
+
+
+def test_a_step_of_an_arm_that_turns_too_far_is_divided():
+    motion = integrate(arm(10.0, 0.01), GeneralizedAlpha(0.95, h_min=1e-3), 1.5, 0.15)
+    assert_allclose(motion.body("arm").omega_B[:, 2], 10.0, rtol=3e-2, atol=0)
+
+
+M, L, J, ACROSS = 1.0, 0.3, 0.02, 0.012  # a rotor: its mass, its distance from the suspension, its moments of inertia
+
+
+def precession(motion):
+    """Return the mean rate at which the rotor goes about the vertical, and how far it leaves the level."""
+    r = (motion.body("rotor").r - PLACE) @ TURN
+    return np.unwrap(np.arctan2(r[:, 1], r[:, 0]))[-1] / motion.t[-1], np.abs(r[:, 2]).max()
+
+
+def rotor(spin, rate):
+    return body_at("rotor", M, np.diag([J, ACROSS, ACROSS]), (L, 0, 0), (0, rate * L, 0), (spin, 0, rate))
+
+
+def gyroscope(spin, rate):
+    """Return a rotor on a hinge in a light frame, which stands on a universal joint."""
+    frame = body_at("frame", 0.01, 1e-4 * np.eye(3), (0, 0, 0), (0, 0, 0), (0, 0, rate))
+    joints = [
+        UniversalJoint("gimbal", on_ground(), at("frame", 0.0), axis=TURN[:, 2], axis_b=(0, 1, 0)),
+        RevoluteJoint("hinge", at("frame", L), at("rotor", 0.0), axis=(1, 0, 0)),
+    ]
+    return System([frame, rotor(spin, rate)], joints, [Gravity(-G * TURN[:, 2])])
+
+
+def top(spin, rate):
+    """Return a rotor on a ball joint."""
+    pin = SphericalJoint("pin", on_ground(), at("rotor", -L))
+    return System([rotor(spin, rate)], [pin], [Gravity(-G * TURN[:, 2])])
+
+
+@pytest.mark.parametrize("system", [gyroscope, top])
+@pytest.mark.parametrize("rho_inf", [0.9, 0.8, 0.5])
+@pytest.mark.parametrize("turn", [0.1, 0.4, 1.0, 5.0], ids=lambda turn: f"{turn} rad a step")
+def test_a_spinning_rotor_precesses_as_its_weight_asks(system, rho_inf, turn):
+    """Steady precession with a level axis: m g l = J w W, exactly."""
+    spin = 1000.0 if turn > 1 else 200.0
+    rate = M * G * L / (J * spin)
+    found, height = precession(integrate(system(spin, rate), GeneralizedAlpha(rho_inf), 1.0, turn / spin))
+    assert_allclose(found, rate, rtol=5e-3, atol=0)
+    assert height < 5e-3 * L
+
+
+def test_a_spinning_rotor_precesses_with_a_step_that_follows_its_error():
+    rate = M * G * L / (J * 200.0)
+    motion = integrate(gyroscope(200.0, rate), GeneralizedAlpha(0.8, error_tolerance=1e-6), 1.0, 0.02)
+    assert_allclose(precession(motion)[0], rate, rtol=2e-3, atol=0)
+
+
+@pytest.mark.parametrize("turn", [0.3, 3.0])
+def test_a_wheel_tilted_on_its_shaft_turns_steadily_in_steps_of_any_size(turn):
+    """Its axis of symmetry is not that of the hinge: the moment (J - J') w² sin cos of the tilt turns with it."""
+    tilt, spin = 0.2, 50.0
+    tilted = rotation_exp(np.array([0.0, tilt, 0.0]))
+    wheel = body_at("wheel", M, tilted @ np.diag([J, ACROSS, ACROSS]) @ tilted.T, (0, 0, 0), (0, 0, 0), (spin, 0, 0))
+    hinge = RevoluteJoint("hinge", on_ground(), at("wheel", 0.0), axis=TURN[:, 0])
+    motion = integrate(System([wheel], [hinge]), GeneralizedAlpha(0.8), 100 * turn / spin, turn / spin)
+    assert_allclose(motion.body("wheel").omega_B, np.tile([spin, 0, 0], (len(motion.t), 1)), rtol=0, atol=1e-9 * spin)
+    moment = np.linalg.norm(motion.reaction("hinge").moment, axis=1)
+    assert_allclose(moment, (J - ACROSS) * spin**2 * np.sin(tilt) * np.cos(tilt), rtol=1e-9, atol=0)
+
+
+def test_a_free_axisymmetric_body_follows_its_closed_form_with_second_order():
+    """Its axis goes about the angular momentum H with |H|/J' while it spins by w (1 - J/J') against that."""
+    omega, inertia, end = np.array([8.0, 1.5, -1.0]), np.array([J, ACROSS, ACROSS]), 1.0
+    H = TURN @ (inertia * omega)
+    turned = rotation_exp(H / ACROSS * end) @ TURN
+    exact = turned @ rotation_exp(np.array([omega[0] * (1 - J / ACROSS) * end, 0, 0]))
+    steps, errors = np.array([0.04, 0.02, 0.01, 0.005]), []
+    for h in steps:
+        body = body_at("free", M, np.diag(inertia), (0, 0, 0), (1, 2, 3), omega)
+        motion = integrate(System([body], []), GeneralizedAlpha(0.8, 1e-11), end, h)
+        errors.append(np.abs(rotation_matrix(motion.body("free").p[-1]) - exact).max())
+    assert abs(slope(steps, errors) - 2) < 0.15
+
+
+def test_free_bodies_without_an_axis_of_symmetry_move_as_without_stabilisation():
+    body = body_at("free", M, np.diag([0.01, 0.02, 0.027]), (0, 0, 0), (1, 2, 3), (0.2, 9.0, -0.4))
+    plain, stabilized = (
+        integrate(System([body], []), GeneralizedAlpha(0.8, stabilized=each), 1.0, 0.02) for each in (False, True)
+    )
+    np.testing.assert_array_equal(plain.body("free").p, stabilized.body("free").p)
