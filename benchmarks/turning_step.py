@@ -1,4 +1,4 @@
-"""How far bodies may turn in a step of generalized-alpha, with velocities held and spins taken by themselves, and without.
+"""How far bodies may turn in a step of generalized-alpha, stabilised (velocities held, spins by themselves) and plain.
 
     python -m benchmarks.turning_step
 
@@ -76,7 +76,7 @@ def first_within(error, choices):
 
 
 def main():
-    print("| rho_inf | arm: steps a turn, plain | arm, stabilised | gyroscope: rad a step, plain | gyroscope, stabilised |")
+    print("| rho_inf | arm: steps a turn, plain | arm, stabilised | gyroscope: rad a step, plain | stabilised |")
     print("|---|---|---|---|---|")
     for rho in RHO:
         plain, stabilized = GeneralizedAlpha(rho, stabilized=False), GeneralizedAlpha(rho)

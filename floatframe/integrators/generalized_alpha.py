@@ -303,9 +303,9 @@ class GeneralizedAlpha:
         if status == TURNED:
             name, turn = compiled.body_names[index], float(np.linalg.norm(work.state.theta[index]))
             words = (
-                f"body {name!r} turns by {turn:.3g} rad in a step, with a joint away from its axis of turning: expected "
-                f"at most {MOST_TURN:g} rad, beyond which its joints could give it energy; choose a smaller h, joint "
-                'coordinates (formulation = "relative") or EnergyMomentum, or put the frame of the body on the axis'
+                f"body {name!r} turns by {turn:.3g} rad in a step, with a joint away from its axis of turning: "
+                f"expected at most {MOST_TURN:g} rad, beyond which joints can give it energy; choose a smaller h, "
+                'joint coordinates (formulation = "relative"), EnergyMomentum, or the frame of the body on the axis'
             )
             return Failure(words, excess)
         if status == STOPPED:

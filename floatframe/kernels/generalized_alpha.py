@@ -171,7 +171,7 @@ def begin_spin(model, work, memory, i):
 
 @inner
 def take_to_body(model, state, i):
-    """Turn omega and alpha - w omega × e of body i from the axes that do not spin with it into omega and alpha of its own.
+    """Turn omega and alpha - w omega × e of body i, in axes that do not spin, into omega and alpha in its own axes.
 
     These axes are those of the beginning of the step turned by exp(across).
     """

@@ -59,7 +59,7 @@ def differences_of_runs(system, path, outputs, step, *, t_end, h, rho_inf=0.8):
 
     def run(value):
         changed = with_value(system, path, value)
-        motion = ff.integrate(changed, ff.GeneralizedAlpha(rho_inf, tolerance=1e-13), t_end, h)
+        motion = ff.integrate(changed, ff.GeneralizedAlpha(rho_inf, tolerance=1e-13, stabilized=False), t_end, h)
         return np.array([last(changed, motion, of) for of in outputs])
 
     p = value_at(system, path)
@@ -145,7 +145,7 @@ def test_direct_and_adjoint_agree_and_are_the_derivatives_of_whole_runs():
 def test_values_are_those_of_the_run():
     system = crank()
     found = ff.sensitivities(system, {"x": "x x", "rms": ("v x", "rms")}, ["bodies.rod.mass"], t_end=0.05, h=2.5e-3)
-    motion = ff.integrate(system, ff.GeneralizedAlpha(0.8, tolerance=1e-12), 0.05, 2.5e-3)
+    motion = ff.integrate(system, ff.GeneralizedAlpha(0.8, tolerance=1e-12, stabilized=False), 0.05, 2.5e-3)
     measured = ff.measured(system, motion)
     assert_allclose(found.values[0], measured["x"].columns["x"][-1], rtol=1e-11)
     assert_allclose(found.values[1], np.sqrt((measured["v"].columns["x"] ** 2).mean()), rtol=1e-9)
@@ -164,7 +164,7 @@ def test_what_is_taken_over_time_has_its_derivative(take):
 
     def taken(value):
         changed = with_value(system, path, value)
-        motion = ff.integrate(changed, ff.GeneralizedAlpha(0.8, tolerance=1e-13), **run)
+        motion = ff.integrate(changed, ff.GeneralizedAlpha(0.8, tolerance=1e-13, stabilized=False), **run)
         return TAKES[take](ff.measured(changed, motion)["v"].columns["x"])
 
     p, step = value_at(system, path), 1e-4
