@@ -4,7 +4,7 @@ import math
 
 from floatframe.joints.rows.kinds import NOTHING
 from floatframe.kernels.body import body_mass_product
-from floatframe.kernels.compiler.compilation import inner
+from floatframe.kernels.compiler.compilation import inner, small
 from floatframe.kernels.connections.gap import next_step, step_before_contact, take_ends
 from floatframe.kernels.connections.user_force import resize_states
 from floatframe.kernels.diagnostics import diagnose, power
@@ -22,6 +22,7 @@ from floatframe.kernels.rotation import (
 from floatframe.kernels.schur import (
     correction,
     factorize_bodies,
+    renew_connections,
     settle_accelerations,
     share_reactions,
     velocity_correction,
@@ -279,7 +280,7 @@ def change_rates(model, work, i, by_theta, by_rate, by_acceleration):
 
 @inner
 def turns_too_far(model, work, length):
-    """Return the first body that turns by more than `MOST_TURN` in the step and has a joint away from the axis, or -1.
+    """Return the first body that would turn by more than `MOST_TURN` and has a joint away from the axis, or -1.
 
     A spin that is taken by itself does not count. Where all joints lie on the axis through the frame, its origin does
     not move on a circle, and any turn is followed.
@@ -288,9 +289,9 @@ def turns_too_far(model, work, length):
         theta = vector(work.state.theta[i])
         if work.state.spins[i] != 0:
             _, theta = split_spin(spin_axis(model, i), theta)
-        turn = norm(theta)
-        if turn <= MOST_TURN:
+        if dot(theta, theta) <= MOST_TURN * MOST_TURN:
             continue
+        turn = norm(theta)
         for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):
             m = model.bodies.ends[e]
             if model.connections.law[model.markers.connection[m]] == JOINT:
@@ -303,18 +304,27 @@ def turns_too_far(model, work, length):
 def hold_velocities(model, work, by_rate, by_acceleration, c_k):
     """Add the correction of velocities that the held positions ask for to the iterate; return its squared norm.
 
-    Accelerations change with velocities and reactions with accelerations, as in `update`. Positions stay.
+    Accelerations change with velocities and reactions with accelerations, as in `update`. Positions stay: so forces of
+    the modal stiffness, which the factors take along, stay too, and residuals become less by them.
     """
     velocity_correction(model, work, by_rate)
     total = 0.0
     for i in range(model.bodies.kind.shape[0]):
-        n, u0 = model.bodies.n_q[i], model.bodies.u0[i]
-        y = work.solver.y[u0 : u0 + 6 + n]
+        n, u0, t = model.bodies.n_q[i], model.bodies.u0[i], model.bodies.kind[i]
+        y, residual = work.solver.y[u0 : u0 + 6 + n], work.bodies.residual[u0 + 6 : u0 + 6 + n]
         for k in range(6 + n):
             total += work.solver.weight[u0 + k] * y[k] * y[k]
+        K = model.body_types.blocks[model.body_types.block0[t, STIFFNESS] :]
+        is_diagonal = model.body_types.is_diagonal[t, STIFFNESS - MASS]
+        for k in range(n):
+            if is_diagonal:
+                residual[k] -= K[k] * y[6 + k]
+            else:
+                for j in range(n):
+                    residual[k] -= K[k * n + j] * y[6 + j]
         change_rates(model, work, i, (0.0, 0.0, 0.0), by_rate, by_acceleration)
     for k in range(work.solver.mu.shape[0]):
-        if model.rows.holds[k] != NOTHING:
+        if model.rows.holds[k] != NOTHING and model.rows.soft[k] == 0.0:  # in soft ones rates disagree by rounding
             work.state.w[k] += work.solver.mu[k] / c_k
     return total
 
@@ -434,6 +444,10 @@ def one_step(model, work, memory, order, h):
     has_states = model.states.row.shape[0] + model.laws.equation.shape[0] > 0
     for iteration in range(order.max_iterations):
         evaluate(model, work, c_k)
+        if iteration == 0 and order.stabilized != 0:
+            body = turns_too_far(model, work, order.length)
+            if body >= 0:
+                return TURNED, body, excess, -1.0
         if work.solver.is_due == 1:
             body = factorize_bodies(model, work, c_m, c_d, c_k)
             if body >= 0:
@@ -441,24 +455,26 @@ def one_step(model, work, memory, order, h):
             solver.c_m, solver.c_d, solver.c_k = c_m, c_d, c_k
             work.solver.is_due, solver.n_steps, solver.n_spent = 0, 0, solver.price
             is_new = True
-        connection = correction(model, work, c_k, is_new)
+        connection = -1
+        if is_new and solver.mu.shape[0] > 0:
+            connection = renew_connections(model, work, c_k)
         if connection >= 0:
             work.solver.is_due = 1
             return SINGULAR_CONNECTION, connection, excess, -1.0
-        squares = update(model, work, memory, c_d / c_k, c_m / c_k, c_k)
-        of_states = 0.0
-        if has_states:  # they follow the bodies by one iteration
-            of_states = correction_of_states(model, work, c_k) / order.tolerance
+        of_rates = 0.0
         if order.stabilized != 0 and solver.mu.shape[0] > 0:
-            squares += hold_velocities(model, work, c_d / c_k, c_m / c_k, c_k)
-        norm = math.sqrt(squares)
+            of_rates = hold_velocities(model, work, c_d / c_k, c_m / c_k, c_k)
+        correction(model, work, c_k, False)
+        norm = math.sqrt(of_rates + update(model, work, memory, c_d / c_k, c_m / c_k, c_k))
         work.counted.iterations += 1
         if not math.isfinite(norm):
             work.solver.is_due = 1
             return DIVERGED, -1, math.inf, -1.0
         excess = norm / allowed if allowed > 0.0 else math.inf
         is_new = False
-        if has_states:
+        of_states = 0.0
+        if has_states:  # they follow the bodies by one iteration
+            of_states = correction_of_states(model, work, c_k) / order.tolerance
             if not math.isfinite(of_states):
                 work.solver.is_due = 1
                 return DIVERGED, -1, math.inf, -1.0
@@ -471,10 +487,6 @@ def one_step(model, work, memory, order, h):
         is_small = is_enough(norm, last, wanted, allowed) or is_stuck
         if is_small and (of_states <= 1.0 or (of_states <= 1e3 and of_states > 0.5 * last_of_states and iteration > 2)):
             take_age(work.solver, iteration + 1)
-            if order.stabilized != 0:
-                body = turns_too_far(model, work, order.length)
-                if body >= 0:
-                    return TURNED, body, excess, -1.0
             error = -1.0
             if is_too_long(model, work, h):
                 return UNRESOLVED, -1, excess, error

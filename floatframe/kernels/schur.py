@@ -15,7 +15,7 @@ from floatframe.kernels.connections.connection import (
     connection_derivatives,
     constraint_rates,
     has_cheap_rate,
-    held_rate,
+    write_held_rates,
 )
 from floatframe.kernels.dense import lu_factor, lu_solve, lu_solve_columns
 from floatframe.kernels.evaluation import linearize
@@ -28,6 +28,7 @@ __all__ = [
     "factorize_bodies",
     "factorize_connections",
     "factorize_tangents",
+    "renew_connections",
     "settle_accelerations",
     "share_reactions",
     "velocity_correction",
@@ -202,16 +203,20 @@ def solve_connections(elimination, connections, solver):
             i = elimination.after[e]
             o = elimination.after_lower[e]
             for r in range(connections.size[i]):
+                total = mu[connections.w0[i] + r]
                 for k in range(n):
-                    mu[connections.w0[i] + r] -= s[o + r * n + k] * own[k]
+                    total -= s[o + r * n + k] * own[k]
+                mu[connections.w0[i] + r] = total
     for step in range(elimination.order.shape[0] - 1, -1, -1):
         j = elimination.order[step]
         for e in range(elimination.after0[step], elimination.after0[step + 1]):
             i = elimination.after[e]
             o, columns = elimination.after_upper[e], connections.size[i]
             for r in range(connections.size[j]):
+                total = mu[connections.w0[j] + r]
                 for k in range(columns):
-                    mu[connections.w0[j] + r] -= s[o + r * columns + k] * mu[connections.w0[i] + k]
+                    total -= s[o + r * columns + k] * mu[connections.w0[i] + k]
+                mu[connections.w0[j] + r] = total
 
 
 @inner
@@ -229,6 +234,13 @@ def take_accelerated(model, work, m, n, y, mu):
     for r in range(model.connections.size[c]):
         for k in range(6):
             mu[model.connections.w0[c] + r] -= P_a[r, k] * motion[k]
+
+
+@inner
+def renew_connections(model, work, c_k):
+    """Assemble and factorise the connections at the iterate. Return the connection with a singular block, or -1."""
+    assemble(model, work, c_k)
+    return factorize_connections(model.elimination, model.connections, work.solver)
 
 
 @inner
@@ -251,8 +263,7 @@ def correction(model, work, c_k, is_new):
     if mu.shape[0] == 0:
         return -1
     if is_new:
-        assemble(model, work, c_k)
-        singular = factorize_connections(model.elimination, connections, solver)
+        singular = renew_connections(model, work, c_k)
         if singular >= 0:
             return singular
     for k in range(mu.shape[0]):
@@ -293,18 +304,18 @@ def take_motions(model, work):
 
 @inner
 def velocity_correction(model, work, by_rate):
-    """Write (y, mu) that takes the rates of held positions, y by_rate being the change of u; residuals stay.
+    """Write (y, mu) that takes the rates of held positions, y by_rate being the change of u.
 
-    `correction` has been called for the iterate and its y added to it; rates are those before, so that they count with
-    what y has changed in them, -by_rate g. Rows of positions that have no cheap rate, and all others, stay as they are.
-    Unknowns of rotation turn a body by `T_right` of them, velocities at once: y is what they turn it by.
+    The positions will be closed by a `correction` of their own, which changes their rates by -by_rate g. Rows of
+    positions that have no cheap rate, and all others, keep theirs. Unknowns of rotation turn a body by `T_right` of
+    them, velocities at once: y is what they turn it by.
     """
-    y, mu = work.solver.y, work.solver.mu
+    y, mu, g = work.solver.y, work.solver.mu, work.connections.g
     for c in range(model.connections.size.shape[0]):
-        for k in range(model.connections.w0[c], model.connections.w0[c + 1]):
-            mu[k] = 0.0
-            if has_cheap_rate(model, c, k):
-                mu[k] = work.connections.g[k] - held_rate(model, work, c, k) / by_rate
+        w0, end = model.connections.w0[c], model.connections.w0[c + 1]
+        write_held_rates(model, work, c, mu)
+        for k in range(w0, end):
+            mu[k] = g[k] - mu[k] / by_rate if has_cheap_rate(model, c, k) else 0.0
     for k in range(y.shape[0]):
         y[k] = 0.0
     solve_connections(model.elimination, model.connections, work.solver)

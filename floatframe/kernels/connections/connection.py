@@ -30,7 +30,14 @@ from floatframe.kernels.marker import marker_acceleration_bias
 from floatframe.kernels.model import BUSHING, CONTACT, COUPLER, ELEMENT, JOINT, SPRING, USER_FORCE
 from floatframe.kernels.vector import cross, dot, put, put_sum, scaled, sub, vector
 
-__all__ = ["connection_derivatives", "connection_rows", "constraint_rates", "has_cheap_rate", "held_rate", "row_rates"]
+__all__ = [
+    "connection_derivatives",
+    "connection_rows",
+    "constraint_rates",
+    "has_cheap_rate",
+    "row_rates",
+    "write_held_rates",
+]
 
 
 @inner
@@ -143,20 +150,28 @@ def has_cheap_rate(model, c, k):
 
 
 @inner
-def held_rate(model, work, c, k):
-    """Return the rate of the position that row k of joint or coupler c holds."""
-    if model.connections.law[c] == COUPLER:
-        return coupler_rate(model, work, c)
-    a, b, kind, markers = model.connections.a[c], model.connections.b[c], model.rows.kind[k], work.markers
-    if kind == POINT:
-        return -dot(vector(model.rows.x[k]), relative_velocity(markers, a, b))
-    if kind == DOT:  # E · D, which is held by what turns about E × D
-        E, D = direction(markers, a, model.rows.x[k]), direction(markers, b, model.rows.y[k])
-        return dot(cross(E, D), sub(vector(markers.omega[a]), vector(markers.omega[b])))
-    _, n, m_a, m_b = held_value(kind, model, work, k, a, b)
-    rate, _ = held_rates(kind, model, work, k, a, b)
-    rate += dot(n, relative_velocity(markers, a, b))
-    return rate + dot(m_a, vector(markers.omega[a])) + dot(m_b, vector(markers.omega[b]))
+def write_held_rates(model, work, c, rate):
+    """Write the rates of the positions that joint or coupler c holds, as far as `has_cheap_rate`."""
+    law, a, b, markers = model.connections.law[c], model.connections.a[c], model.connections.b[c], work.markers
+    if law == COUPLER:
+        rate[model.elements.core[model.connections.item[c]]] = coupler_rate(model, work, c)
+        return
+    if law != JOINT:
+        return
+    v = relative_velocity(markers, a, b)
+    omega = sub(vector(markers.omega[b]), vector(markers.omega[a]))
+    for k in range(model.connections.w0[c], model.connections.w0[c + 1]):
+        kind = model.rows.kind[k]
+        if kind == POINT:
+            rate[k] = -dot(vector(model.rows.x[k]), v)
+        elif kind == DOT:  # E · D, which is held by what turns about E × D
+            E, D = direction(markers, a, model.rows.x[k]), direction(markers, b, model.rows.y[k])
+            rate[k] = -dot(cross(E, D), omega)
+        elif model.rows.holds[k] == POSITION:
+            _, n, m_a, m_b = held_value(kind, model, work, k, a, b)
+            first, _ = held_rates(kind, model, work, k, a, b)
+            first += dot(n, v) + dot(m_a, vector(markers.omega[a]))
+            rate[k] = first + dot(m_b, vector(markers.omega[b]))
 
 
 @inner
