@@ -10,6 +10,8 @@ from tests.floatframe.relative.mechanisms import MECHANISMS
 
 METHOD = GeneralizedAlpha(0.8, 1e-10)
 T_END, H = 0.12, 2e-3
+#: a top spins by itself in absolute coordinates, whose error is then small; that of the others falls as it should here
+FINER = {"top": 1e-3}
 
 
 def seen(system, motion):
@@ -29,9 +31,9 @@ def seen(system, motion):
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_both_formulations_agree_to_the_error_of_the_integrator(name):
     """They differ by less than half of what halving the step changes in both; joints of the tree stay closed."""
-    system = MECHANISMS[name]()
+    system, h = MECHANISMS[name](), FINER.get(name, H)
     motions = {
-        (formulation, k): integrate(system, METHOD, T_END, H / k, output_every=k, formulation=formulation)
+        (formulation, k): integrate(system, METHOD, T_END, h / k, output_every=k, formulation=formulation)
         for formulation in ("absolute", "relative")
         for k in (1, 2)
     }
