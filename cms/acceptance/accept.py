@@ -21,6 +21,7 @@ from cms.jobs.job import Job, read_job
 from cms.jobs.mesh_of_job import is_cad, solid_mesh_of
 from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
 from cms.jobs.parts_of_job import materials_of, part_of_mesh
+from cms.jobs.reduce_job import reduction_options
 from cms.modal_file.file import digest as digest_of
 from cms.modal_file.file import read
 from cms.quality.body_check import check_body
@@ -148,7 +149,10 @@ def against_job(
                 modes = job_mode_set(families, reduction_of(job, body))
             top = usable_band(modes, reduced) if band is None else band
             with stages("compare"), FullReference(families, band=top) as reference:
-                records = check_reduction(body, modes, reduced, reference=reference, uncoupled=uncoupled, own=own)
+                options = reduction_options(job, body)
+                records = check_reduction(
+                    body, modes, reduced, reference=reference, uncoupled=uncoupled, own=own, options=options
+                )
         return records, f"{name}, and its mode set"
     records = compare_with_model(body, reduced, band=band or band_of(reduced))
     return (*own, *records), f"{name}; the body was made otherwise"

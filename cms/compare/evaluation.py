@@ -15,7 +15,7 @@ from cms.quality.of_reduction.frequencies import compare_shapes, frequency_recor
 from cms.quality.of_reduction.frf import ResponseComparison, compare_responses, response_record
 from cms.quality.of_reduction.held_mass import answered_statically
 from cms.quality.of_reduction.residuals import ResidualBounds, residual_record
-from cms.quality.record import QualityRecord, judge
+from cms.quality.record import QualityRecord, information, judge
 from cms.quality.reference.free_basis import FreeBasis
 from cms.quality.reference.port_model import FrequencyResponse, PortModel, modal_response
 from fe_models.foundation.arrays import Array
@@ -34,7 +34,7 @@ class Reference:
     damping: float  #: ratio of every mode in it
     port_names: tuple[str, ...]
     drawn: tuple[int, int]  #: entry of the response that is drawn: output, input
-    static_labels: tuple[tuple[str, ...], tuple[str, ...]]  #: of the loads of Psi_A and Psi_H
+    static_labels: tuple[tuple[str, ...], ...]  #: of the loads of Psi_A, Psi_H and Psi_L
     length: float  #: of the body, that makes rotations comparable to translations
     time: float  #: [s] of the body's time unit
 
@@ -79,14 +79,18 @@ def frequency_part(
 def static_part(
     reference: Reference, c: Coordinates, basis: FreeBasis, targets: dict[str, Array]
 ) -> tuple[QualityRecord, ...]:
-    """Static completeness for interface loads and rigid-body accelerations."""
-    interface_loads, inertia_loads = reference.static_labels
-    return completeness_records(
+    """Static completeness for interface loads, rigid-body accelerations and the load cases of the body."""
+    interface_loads, inertia_loads, cases = reference.static_labels
+    loaded = targets["Psi_L"]
+    records = completeness_records(
         StaticCompleteness(
             interface_loads, energy_error(c, basis, targets["Psi_A"]),
             inertia_loads, energy_error(c, basis, targets["Psi_H"]),
+            cases, np.array([energy_error(c, basis, loaded[:, [k]])[0] for k in range(loaded.shape[1])]),
         )
     )  # fmt: skip
+    none = () if cases else (information("static-load-cases", "the body has no load cases"),)
+    return (*records, *none)
 
 
 def energy_error(c: Coordinates, basis: FreeBasis, U: Array) -> Array:

@@ -14,7 +14,7 @@ from cms.compare.pulse import Pulse
 from cms.errors import CompareError
 from cms.families.families import Families
 from cms.families.rigid_modes import geometric_rigid_modes
-from cms.quality.of_reduction.completeness import acceleration_labels
+from cms.quality.of_reduction.completeness import acceleration_labels, load_case_responses
 from cms.quality.reference.port_model import PortModel
 from cms.quality.reference.ports import Ports
 from cms.quality.reference.reference_response import reference_response
@@ -29,7 +29,7 @@ __all__ = ["FullModel", "read_full_model", "reference_digest", "solve_full_model
 
 log = logging.getLogger(__name__)
 
-VERSION = "1"  #: of what is computed; a file of another version is made anew
+VERSION = "2"  #: of what is computed; a file of another version is made anew
 MODES_BEYOND = 2.0  #: multiple of the band up to which free modes follow a motion dynamically
 FIRST_SEARCH = 3  #: free modes found at first for each one in the band; mostly enough for twice its frequency
 MASS_TOLERANCE = 1e-10  #: relative residual of the solutions with M_II
@@ -48,6 +48,7 @@ class FullModel:
     Phi: Array  #: M-orthonormal elastic free modes in the band, (n_dof, n_band)
     Psi_A: Array  #: attachment modes: static interface loads, (n_dof, n_e)
     Psi_H: Array  #: inertia-relief modes: static inertia loads, (n_dof, n_r)
+    Psi_L: Array  #: the free body under its load cases, (n_dof, n_load_cases); zero: the load does not deform it
     moved: Array  #: columns of the motion, (n_dof, k)
     amplitudes: Array  #: of those columns, (k, n_t)
     t: Array  #: of the motion, (n_t,) [time unit]
@@ -79,7 +80,7 @@ class FullModel:
     def parts(self) -> dict[str, slice]:
         """Where the families stand in `columns`."""
         slices, at = {}, 0
-        for name in ("rigid", "Phi", "Psi_A", "Psi_H", "moved", "directions"):
+        for name in ("rigid", "Phi", "Psi_A", "Psi_H", "Psi_L", "moved", "directions"):
             width = getattr(self, name).shape[1]
             slices[name], at = slice(at, at + width), at + width
         return slices
@@ -155,6 +156,7 @@ def solve_full_model(
         Phi=modes.Phi[:, :n_band],
         Psi_A=deformation(families, families.Psi_A),
         Psi_H=deformation(families, families.Psi_H),
+        Psi_L=deformation(families, load_case_responses(families)),
         moved=deformation(families, motion.columns),
         amplitudes=motion.amplitudes,
         t=motion.t,
@@ -169,10 +171,11 @@ def solve_full_model(
     )
 
 
-def static_labels(families: Families, full: FullModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return names of the loads of Psi_A and Psi_H."""
+def static_labels(families: Families, full: FullModel) -> tuple[tuple[str, ...], ...]:
+    """Return names of the loads of Psi_A, Psi_H and Psi_L."""
     held = families.held_labels("load")
-    return tuple(held[k] for k in families.free.e), acceleration_labels(full.Psi_H.shape[1])
+    cases = tuple(case.name for case in families.body.load_cases)
+    return tuple(held[k] for k in families.free.e), acceleration_labels(full.Psi_H.shape[1]), cases
 
 
 def deformation(families: Families, u: Array) -> Array:
@@ -222,6 +225,9 @@ def reference_digest(body: FEBody, *asked: object) -> str:
     for matrix in (whole_matrix(body.K), whole_matrix(body.M)):
         for array in (matrix.data, matrix.indices, matrix.indptr):
             digest.update(np.ascontiguousarray(array).data)
+    for case in body.load_cases:
+        digest.update(case.name.encode())
+        digest.update(np.ascontiguousarray(case.f).data)
     for interface in body.interfaces:
         digest.update(interface.name.encode())
         for part in (interface.nodes, interface.reference, interface.weights):

@@ -31,6 +31,7 @@ DECIDING = {
     "mac": "mode shapes (1 - MAC)",
     "static-interface": "static interface loads",
     "static-inertia": "static inertia loads",
+    "static-load-cases": "static load cases",
     "frequency-response": "frequency response",
     "deformation-error": "deformation in the motion",
 }

@@ -22,9 +22,10 @@ from fe_models.foundation.stages import Stages
 if TYPE_CHECKING:
     from cms.families.families import Families
     from cms.mode_set import ModeSet
+    from cms.quality.of_reduction.contents import ReductionOptions
     from cms.second_order.unit_states import UnitStates
 
-__all__ = ["reduce_job"]
+__all__ = ["reduce_job", "reduction_options"]
 
 log = logging.getLogger(__name__)
 
@@ -213,3 +214,26 @@ def expected_columns(job: Job, body: FEBody) -> int:
     if job.reduction.set not in OF_INTERFACES:
         found = 0
     return found + (job.reduction.n_modes if isinstance(job.reduction.n_modes, int) else 0)
+
+
+def reduction_options(job: Job, body: FEBody) -> "ReductionOptions":
+    """Return what the file of a job is meant to hold.
+
+    Parameters
+    ----------
+    body
+        The coupled body of the job.
+    """
+    from cms.jobs.tables.recovery_section import requests_of
+    from cms.quality.of_reduction.contents import ReductionOptions
+
+    asked = job.reduction.geometric_stiffness
+    is_made = asked is True or bool(job.reduction.quadratic_modes)
+    return ReductionOptions(
+        damping=None if job.damping is None else job.damping.damping,
+        frame=frame_of(job, held=body.is_held),
+        stress=job.reduction.stress is not False,
+        geometric=tuple(asked) if isinstance(asked, list) else is_made,
+        quadratic=bool(job.reduction.quadratic_modes),
+        recovery=requests_of(job.recovery),
+    )

@@ -16,9 +16,12 @@ from cms.quality.of_body.interface_motions import (
     check_rigid_interfaces,
 )
 from cms.quality.of_body.mesh_order import check_mesh_order
-from cms.quality.of_body.recovery_rows import check_recovery_forces, check_recovery_motions
+from cms.quality.of_body.moments_of_mass import check_gram, check_moments_of_shapes
+from cms.quality.of_body.recovery_rows import check_recovery_forces, check_recovery_motions, check_recovery_shapes
+from cms.quality.of_body.second_order import check_second_order, check_turned_loads
 from cms.quality.of_body.step_size import check_damping, check_dropped_columns, check_step_size
 from cms.quality.of_body.symmetry import check_definiteness, check_kinetic_energy, check_symmetry
+from cms.quality.of_body.told import check_damping_told, check_labels, check_scope
 from cms.quality.of_body.unit_hints import check_units
 from cms.quality.record import QualityRecord
 from cms.reduced_body.reduced_body import ReducedBody
@@ -34,19 +37,27 @@ BODY_CHECKS = (
     check_free_frequencies,
     check_inertia_tensor,
     check_inertia_terms,
+    check_gram,
+    check_moments_of_shapes,
+    check_turned_loads,
+    check_second_order,
     check_rigid_interfaces,
     check_interface_places,
     check_interface_motions,
     check_energy_shares,
+    check_labels,
     check_recovery_motions,
     check_recovery_forces,
+    check_recovery_shapes,
     check_driven_mass,
     check_buckling,
     check_mesh_order,
     check_units,
     check_step_size,
     check_damping,
+    check_damping_told,
     check_dropped_columns,
+    check_scope,
 )
 
 

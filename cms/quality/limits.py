@@ -43,6 +43,22 @@ LIMITS: dict[str, Limit] = {
         "inertia tensor that masses can have", 1e-9, 1e-6,
         "check density, units and the origin of the inertia; no distribution of mass has this tensor",
     ),
+    "gram": Limit(
+        "moments are those of one mass", 1e-9, 1e-6,
+        "the moments contradict each other: a sign, an order or a unit is wrong; reduce again",
+    ),
+    "moments-shapes": Limit(
+        "direction of the moments by masses at the kept nodes, (1 - cosine) / 2", 0.9, 0.95,
+        "a moment has the wrong sign, or belongs to another mode; reduce again",
+    ),
+    "turned-loads": Limit(
+        "geometric stiffness over a rotation by the loads that turn", 1e-6, 0.1,
+        "moments or geometric stiffness have a wrong sign, order or unit; reduce again",
+    ),
+    "second-order": Limit(
+        "geometric stiffness of interfaces by quadratic modes", 1e-6, 1e-4,
+        "geometric stiffness or quadratic modes have a wrong sign, order or unit; reduce again",
+    ),
     "rigid-interfaces": Limit(
         "members of rigid interfaces move rigidly", 1e-8, 1e-4,
         "the interface motions do not fit the modes at its nodes; reduce again",
@@ -56,6 +72,10 @@ LIMITS: dict[str, Limit] = {
         "add constraint or attachment modes: joints at these interfaces meet a body that cannot follow",
     ),
     "energy-shares": Limit("energy shares of the sources sum to one", 1e-9, 1e-3, REDUCE_AGAIN),
+    "labels": Limit(
+        "labels and shares are those of the columns on record", 1e-9, 1e-3,
+        "modes are called otherwise than their columns say; reduce again",
+    ),
     "recovery-motions": Limit(
         "recovery rows of motions follow a rigid motion", 1e-6, 1e-4,
         "the rows are of another place, frame or unit than they say; make the table again",
@@ -63,6 +83,10 @@ LIMITS: dict[str, Limit] = {
     "recovery-forces": Limit(
         "recovery rows of stress and forces in a rigid motion", 1e-6, 1e-3,
         "the rows are of another body or in axes of other nodes; make the table again",
+    ),
+    "recovery-shapes": Limit(
+        "recovery rows of kept nodes and interfaces by the modes of the file", 1e-6, 1e-4,
+        "rows or what they belong to are of another body, order or unit; make the table again",
     ),
     "driven-mass": Limit("mass that does not vibrate when one interface is driven", None, None, ""),
     "buckling": Limit(
@@ -94,6 +118,11 @@ LIMITS: dict[str, Limit] = {
         "share of modes without damping", None, None,
         "",
     ),
+    "damping-told": Limit(
+        "damping is at least that which the provenance names", 1e-9, 1e-6,
+        "the damping was lost or changed after the reduction; reduce again",
+    ),
+    "scope": Limit("what the file alone cannot show", None, None, ""),
     # A mode set against its full model -----------------------------------------------------------------------------
     "same-body": Limit(
         "the reduced body is that of this model and mode set", 1e-6, 1e-6,
@@ -107,9 +136,62 @@ LIMITS: dict[str, Limit] = {
         "mass, centre and inertia: full matrix against moments", 1e-9, 1e-4,
         "check the density, the mass matrix (lumped, rotated, scaled?) and the units",
     ),
+    # all fields of the file in its own modes, `cms.quality.of_reduction.contents`
+    "points": Limit(
+        "nodes, numbers, sets and surface of the model", 1e-9, 1e-6,
+        "the file's nodes are not those of the model: another mesh, an origin or axes; check with its own job",
+    ),
+    "frame": Limit(
+        "modes satisfy the frame that the file names", 1e-6, 1e-4,
+        "the frame named in the file is not that of its modes; reduce again in the wanted frame",
+    ),
+    "interfaces": Limit(
+        "interfaces of the model: names, places, axes, members, motions", 1e-6, 1e-4,
+        "an interface of the file is not that of the model; joints and forces there would be wrong: reduce again",
+    ),
     "invariants": Limit(
-        "linear invariants by a second route", 1e-8, 1e-4,
-        "the moments are not those of the mass matrix; reduce again from a body with its element model",
+        "all inertia invariants, 1C to 5C, of the model", 1e-8, 1e-4,
+        "the moments are not those of the modes and the mass; reduce again from a body with its element model",
+    ),
+    "damping-matrix": Limit(
+        "damping of the model and the job", 1e-6, 1e-4,
+        "the file is damped otherwise than the job says; reduce again, or check with the job it was made from",
+    ),
+    "load-cases": Limit(
+        "load cases of the model", 1e-6, 1e-4,
+        "a load case of the file is not that of the model; reduce again",
+    ),
+    "stress-modes": Limit(
+        "stress of the modes", 1e-6, 1e-4,
+        "stresses from this file would be wrong: components, units or nodes are mixed up; reduce again",
+    ),
+    "geometric-stiffness": Limit(
+        "geometric stiffness of the unit loads", 1e-6, 1e-4,
+        "loads would stiffen the body wrongly; reduce again, or leave it out (geometric_stiffness = false)",
+    ),
+    "quadratic-modes": Limit(
+        "displacement of second order", 1e-6, 1e-4,
+        "nodes would shorten wrongly; reduce again, or leave it out (quadratic_modes = false)",
+    ),
+    "kept-rotations": Limit(
+        "rotations of kept nodes", 1e-6, 1e-4,
+        "markers at these nodes would turn wrongly; reduce again",
+    ),
+    "recovery-rows": Limit(
+        "recovery tables of the job", 1e-5, 1e-3,
+        "the tables are not those of this job and body; reduce again, or make them anew",
+    ),
+    "nodal-sums": Limit(
+        "sums over the nodes, for a Buckens frame", 1e-6, 1e-4,
+        "a Buckens frame made of this file would be wrong; reduce again",
+    ),
+    "sources": Limit(
+        "labels, shares and columns of the mode set", 1e-5, 1e-3,
+        "labels and columns are not those of the modes; reduce again",
+    ),
+    "origin": Limit(
+        "name, mode set and digests of what the file was made of", 0.0, None,
+        "the file was made of something else; check with its own job, or reduce again",
     ),
     "frequency-error": Limit(
         "error of the free-free frequencies in the band", 0.01, 0.05,
@@ -120,7 +202,7 @@ LIMITS: dict[str, Limit] = {
         "keep more modes, or hold the frequency band lower",
     ),
     "mac-nodal": Limit(
-        "modes in the band that the set does not recover (1 - MAC, nodal)", 0.02, None,
+        "modes in the band that the set does not recover (1 - MAC, nodal)", 0.02, 0.2,
         "keep more modes, or hold the frequency band lower",
     ),
     "static-interface": Limit(

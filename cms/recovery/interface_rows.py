@@ -38,6 +38,13 @@ class PartOfTable:
     dynamic: Array  #: (3, n_rows, 6 + n_q)
     static: Array  #: (n_rows, n_loads)
 
+    def over(self, Z: Array | None) -> "PartOfTable":
+        """Return the rows over combinations of the modes, the columns of Z, (n_q, k); None: as they are."""
+        if Z is None:
+            return self
+        dynamic = np.concatenate([self.dynamic[..., :N_RIGID], self.dynamic[..., N_RIGID:] @ Z], axis=2)
+        return PartOfTable(self.names, dynamic, self.static)
+
 
 def interface_part(body: ReducedBody, rows: Rows, loads: LoadColumns, forces: Array) -> PartOfTable:
     """Return rows of interface forces or of a net force, in mesh axes.

@@ -119,6 +119,8 @@ def recovery_of_model(
     condition: FrameCondition,
     reduced: ReducedBody,
     requests: RecoveryRequest | Iterable[RecoveryRequest],
+    *,
+    over: Array | None = None,
 ) -> Mapping[str, RecoveryTable]:
     """Return the tables of a body during its reduction.
 
@@ -130,6 +132,9 @@ def recovery_of_model(
         Shapes of the body in the frame of `condition`, (n_dof, n_q).
     reduced
         The reduced body with these shapes.
+    over
+        Combinations of the modes, (n_q, k): the tables are then over (d, theta) and these, which costs k static
+        solutions in place of n_q; None: over all modes.
 
     Raises
     ------
@@ -145,7 +150,7 @@ def recovery_of_model(
     Psi_B = np.zeros((body.n_dof, N_RIGID))
     if not body.is_held:
         Psi_B = geometric_rigid_modes(body, origin=frame.origin) @ np.kron(np.eye(2), frame.axes)
-    motion = np.hstack([Psi_B, Phi])
+    motion = np.hstack([Psi_B, Phi if over is None else Phi @ over])
     with families_of(source) as families:
         for request in wanted:
             blocks = [None if rows.quantity in OF_INTERFACES else model_block(body, rows) for rows in request.rows]
@@ -155,9 +160,9 @@ def recovery_of_model(
                 residual = residual_response(families, condition, Phi, reduced.K, np.hstack([F, -(body.M @ motion)]))
             columns = np.hstack([motion, residual])
             parts = [
-                interface_part(reduced, rows, loads, motion.T @ F)
+                interface_part(reduced, rows, loads, np.vstack([Psi_B.T, Phi.T]) @ F).over(over)
                 if block is None
-                else part_of_block(block, columns, reduced, loads)
+                else part_of_block(block, columns, motion.shape[1], reduced, loads)
                 for rows, block in zip(request.rows, blocks, strict=True)
             ]
             tables[request.name] = table_of(reduced, request.name, parts, loads, OF_MODEL)
@@ -174,16 +179,17 @@ def residual_response(families: Families, condition: FrameCondition, Phi: Array,
     return np.asarray(u - Phi @ ((Phi.T @ F) / np.diag(K)[:, None]))
 
 
-def part_of_block(block: Block, columns: Array, reduced: ReducedBody, loads: LoadColumns) -> PartOfTable:
+def part_of_block(block: Block, columns: Array, width: int, reduced: ReducedBody, loads: LoadColumns) -> PartOfTable:
     """Return the rows of one block: step (5).
 
     Parameters
     ----------
     columns
         [Psi_B, Phi], residual responses to the loads, and residual responses to the inertia forces, (n_dof, .).
+    width
+        Columns of [Psi_B, Phi].
     """
-    width, n_loads = N_RIGID + reduced.n_q, len(loads.names)
-    n = len(block.names)
+    n, n_loads = len(block.names), len(loads.names)
     dynamic, static = np.zeros((3, n, width)), np.zeros((n, n_loads))
     if block.order:
         dynamic[block.order] = block.values(columns[:, :width])

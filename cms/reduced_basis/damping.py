@@ -5,6 +5,7 @@ nodal frame the nodes of the frame are held; in the mean-axis frame the frequenc
 two frames are therefore two different dampings.
 """
 
+import ast
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,7 @@ __all__ = [
     "PerModeDamping",
     "RampDamping",
     "RayleighDamping",
+    "damping_of_words",
     "modal_damping",
 ]
 
@@ -80,6 +82,19 @@ class RayleighDamping:
 
 
 Damping = ModalDamping | PerModeDamping | RampDamping | RayleighDamping
+
+
+def damping_of_words(words: str) -> Damping | None:
+    """Return the damping that prints as these words, as provenance has it; None for "none" and for other words."""
+    known = {kind.__name__: kind for kind in (ModalDamping, PerModeDamping, RampDamping, RayleighDamping)}
+    try:
+        call = ast.parse(words, mode="eval").body
+        if not isinstance(call, ast.Call) or not isinstance(call.func, ast.Name):
+            return None
+        made: Damping = known[call.func.id](**{str(each.arg): ast.literal_eval(each.value) for each in call.keywords})
+    except (SyntaxError, KeyError, TypeError, ValueError):
+        return None
+    return made
 
 
 def modal_damping(damping: Damping, M: Array, K: Array, *, second: float = 1.0) -> Array:

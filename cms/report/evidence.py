@@ -38,6 +38,8 @@ SEEN = {
     "constraint or attachment modes answer them exactly, down to rounding.",
     "static-inertia": "Error in energy of the static response to rigid-body accelerations with the interfaces held. "
     "Sets with inertia-relief or residual modes answer it exactly from the start.",
+    "static-load-cases": "Error in energy of the static response of the free body to its load cases. Residual vectors "
+    "of the load cases answer it exactly.",
     "frequency-response": "Error of all receptances between the interfaces, root mean square over the band.",
     "deformation-error": "Largest part of the deformation in the reference motion that lies outside the set, in "
     "energy.",

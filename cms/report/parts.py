@@ -30,6 +30,7 @@ COLUMNS = {
     "mac": "shapes (1\u2009\u2212\u2009MAC)",
     "static-interface": "static, interface loads",
     "static-inertia": "static, inertia loads",
+    "static-load-cases": "static, load cases",
     "frequency-response": "frequency response",
     "deformation-error": "motion, \u03b5(t)",
 }

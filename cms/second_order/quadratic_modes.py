@@ -61,16 +61,25 @@ def quadratic_modes(source: FEBody | Families, Phi: Array, condition: FrameCondi
     with families_of(source) as families:
         for begin in range(0, len(nodes), NODES_AT_ONCE):
             part = slice(begin, begin + NODES_AT_ONCE)
-            g[part] = -unit_force_stiffness(body, Phi, condition, nodes[part], families)
+            forces = np.eye(3 * len(nodes[part]))
+            K = force_stiffness(body, Phi, condition, nodes[part], forces, families)
+            g[part] = -K.reshape(len(nodes[part]), 3, n, n)
     return g
 
 
-def unit_force_stiffness(
-    body: FEBody, Phi: Array, condition: FrameCondition, nodes: IntArray, families: Families
+def force_stiffness(
+    body: FEBody, Phi: Array, condition: FrameCondition, nodes: IntArray, forces: Array, families: Families
 ) -> Array:
-    """Return the geometric stiffness of unit forces along the axes of B at nodes, (n_nodes, 3, n_q, n_q)."""
+    """Return the geometric stiffness of forces at nodes, (k, n_q, n_q).
+
+    Parameters
+    ----------
+    forces
+        Along the axes of B, node by node, one load a column, (3 n_nodes, k). Each costs a static solution.
+    """
     axes = condition.frame.axes
-    along_b = np.kron(np.eye(len(nodes)), axes)  # components in mesh axes as columns, node by node
+    # components in mesh axes, node by node
+    along_b = np.einsum("ab,nbk->nak", axes, forces.reshape(len(nodes), 3, -1)).reshape(3 * len(nodes), -1)
     on_dofs = np.asarray(translation_rows(body, nodes).T @ along_b)
     loads = balanced(body, together(body, MassLoads.none(on_dofs.shape[1]), on_dofs), condition)
     K = elastic_part(body, families.flexibility(loads.F), loads.mass, Phi)
@@ -83,4 +92,4 @@ def unit_force_stiffness(
         rows = np.flatnonzero((dofs[:, 1] >= 0) & (dofs[:, 1] < 3) & (place[dofs[:, 0]] >= 0))
         applied[rows] = along_b[3 * place[dofs[rows, 0]] + dofs[rows, 1]]
         K -= link_work(body.recovery.matrix, dofs, body.dofs, applied, Phi)
-    return K.reshape(len(nodes), 3, *K.shape[1:])
+    return K

@@ -43,6 +43,7 @@ def check_against(reduced: ReducedBody, path: Path, band: float | None) -> tuple
     from cms.jobs.body_of_job import coupled_body, uncoupled_body
     from cms.jobs.job import read_job
     from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
+    from cms.jobs.reduce_job import reduction_options
     from cms.quality.reduction_check import check_reduction, require_same_units
     from cms.quality.reference.full_reference import FullReference, usable_band
 
@@ -57,7 +58,8 @@ def check_against(reduced: ReducedBody, path: Path, band: float | None) -> tuple
                 modes = job_mode_set(families, reduction_of(job, body))
             top = usable_band(modes, reduced) if band is None else band
             with clock("compare"), FullReference(families, band=top) as reference:
-                return check_reduction(body, modes, reduced, reference=reference, uncoupled=uncoupled)
+                options = reduction_options(job, body)
+                return check_reduction(body, modes, reduced, reference=reference, uncoupled=uncoupled, options=options)
 
 
 def quality_report(reduced: ReducedBody, records: Sequence[QualityRecord]) -> dict[str, Any]:

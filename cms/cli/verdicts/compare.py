@@ -27,6 +27,7 @@ SHORT = {
     "mac": "1-MAC",
     "static-interface": "static",
     "static-inertia": "inertia",
+    "static-load-cases": "load cases",
     "frequency-response": "response",
     "deformation-error": "\u03b5(t)",
 }

@@ -54,6 +54,8 @@ def check_frame_condition(reduced: ReducedBody) -> QualityRecord:
         reason = f"largest momentum of a mode is {value:.1e} of what its mass could carry (mode {k + 1})"
         return judge("frame-condition", value, reason, {"linear": linear, "angular": angular})
     if frame.kind == "nodal":
+        if frame.at and frame.at not in [each.name for each in reduced.interfaces]:
+            return judge("frame-condition", np.inf, f"the frame is carried by {frame.at!r}, which is no interface")
         motion, where = held_motion(reduced)
         if len(motion):
             relative = np.abs(motion).max(axis=0) / mode_size(reduced)

@@ -55,10 +55,20 @@ def check_interface_places(reduced: ReducedBody) -> QualityRecord:
 
 
 def rigid_defect(reduced: ReducedBody, interface: ReducedInterface) -> float:
-    """Largest departure of the members from rigid motion, over the largest displacement of the mode."""
+    """Largest departure of the members from rigid motion, over the largest displacement of the mode.
+
+    Rotations of members that are on record, times the body length, are those of the reference point.
+    """
     motion = rigid_motion_of_points(reduced.nodes[interface.members], interface.position) @ interface.Psi
-    own = reduced.Phi[interface.members]
-    return float((np.abs(own - motion) / mode_size(reduced)).max())
+    size = mode_size(reduced)
+    largest = float((np.abs(reduced.Phi[interface.members] - motion) / size).max())
+    for row in interface.members.tolist() if reduced.kept is not None else ():
+        assert reduced.kept is not None
+        turn = reduced.kept.of_node(row)
+        is_dofs = turn is not None and reduced.kept.source[int(np.flatnonzero(reduced.kept.nodes == row)[0])] == "dofs"
+        if is_dofs:  # half the curl of a solid is that of its elements, which bend beside the rigid face
+            largest = max(largest, float((np.abs(turn - interface.Psi[3:]) * body_length(reduced) / size).max()))
+    return largest
 
 
 def check_interface_motions(reduced: ReducedBody) -> QualityRecord:

@@ -1,13 +1,19 @@
-"""Recovery rows of a reduced body in rigid motions: no stress and no force, and every point where it belongs."""
+"""Recovery rows of a reduced body in rigid motions, and beside what the modes of the file give themselves."""
 
 import numpy as np
 
+from cms.errors import RecoveryError
+from cms.quality.of_body.identities import body_length, mode_size
 from cms.quality.record import QualityRecord, information, judge
+from cms.recovery.interface_rows import interface_part
+from cms.recovery.kept_rows import kept_part
+from cms.recovery.load_columns import loads_of_body
+from cms.recovery.request import Rows
 from cms.reduced_body.recovery_table import N_RIGID, RecoveryTable
 from cms.reduced_body.reduced_body import ReducedBody
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, IntArray
 
-__all__ = ["check_recovery_forces", "check_recovery_motions"]
+__all__ = ["check_recovery_forces", "check_recovery_motions", "check_recovery_shapes"]
 
 MOTIONS = ("displacement", "velocity", "acceleration")
 NO_TABLE = "the body has no recovery tables"
@@ -33,6 +39,9 @@ def check_recovery_forces(reduced: ReducedBody) -> QualityRecord:
                 own = rows[(table.dimensions[rows] == dimensions).all(axis=1)]
                 rigid = np.abs(table.dynamic[0][own, :N_RIGID] * lengths).max()
                 elastic = (np.abs(table.dynamic[0][own, N_RIGID:]) / np.where(shape > 0, shape, 1.0)).max(initial=0.0)
+                if quantity == "stress" and reduced.stress is not None:  # a place that is held rigid has none itself
+                    whole = np.abs(reduced.stress).max(axis=(0, 1), initial=0.0)
+                    elastic = max(elastic, (whole / np.where(shape > 0, shape, 1.0)).max(initial=0.0))
                 key = f"{name}: {quantity}"
                 found = float(rigid / elastic) if elastic > 0 else float(rigid > 0)
                 defects[key] = max(defects.get(key, 0.0), found)
@@ -99,3 +108,72 @@ def known_place(reduced: ReducedBody, place: str) -> Array | None:
         return next((each.position for each in reduced.interfaces if each.name == name), None)
     rows = [k for k in range(len(reduced.nodes)) if reduced.node_name(k) == name]
     return reduced.nodes[rows[0]] if rows else None
+
+
+def check_recovery_shapes(reduced: ReducedBody) -> QualityRecord:
+    """Rows of kept nodes, stress points and interfaces are those of the modes, stress and matrices of the file itself.
+
+    Over the largest entry of their quantity, modes at unit strain energy; what only the model can give is left out.
+    """
+    if not reduced.recovery or not reduced.n_q:
+        return information("recovery-shapes", NO_TABLE)
+    stiffness = np.diag(reduced.K)
+    by_energy = 1 / np.sqrt(np.where(stiffness > 0, stiffness, 1.0))
+    defects: dict[str, float] = {}
+    for name, table in reduced.recovery.items():
+        for quantity in dict.fromkeys(table.quantities):
+            if quantity not in (*MOTIONS, "stress", "interface force"):
+                continue
+            own, made = rows_by_label(reduced, table, quantity)
+            if not len(own):
+                continue
+            a, b = ((x[..., N_RIGID:] * by_energy) for x in (table.dynamic[:, own], made))
+            if quantity == "stress":  # what the modes lack of it is the model's alone
+                a, b = a[:1], b[:1]
+            elif quantity in MOTIONS:
+                order = MOTIONS.index(quantity)
+                a, b = a[order], b[order]
+            if quantity in MOTIONS:  # rotations times the size of the body; places that a frame holds do not move
+                lengths = np.where(table.dimensions[own, 1] == 0, body_length(reduced), 1.0)
+                a, b = a * lengths[:, None], b * lengths[:, None]
+            at_least = 1e-3 * float((mode_size(reduced) * by_energy).max()) if quantity in MOTIONS else 0.0
+            size = np.maximum(np.abs(b).max(axis=(-2, -1), keepdims=True, initial=0.0), at_least)
+            size = np.maximum(size, 1e-9 * size.max(initial=0.0))
+            apart = np.abs(a - b)
+            defects[f"{name}: {quantity}"] = float((apart / np.where(size > 0, size, 1.0)).max(initial=0.0))
+    if not defects:
+        return information("recovery-shapes", "no rows of what the file holds itself")
+    worst = max(defects, key=lambda key: defects[key])
+    reason = f"largest difference from what modes and matrices of the file give is {defects[worst]:.1e}, of {worst}"
+    return judge("recovery-shapes", defects[worst], reason, {"defects": defects})
+
+
+def rows_by_label(reduced: ReducedBody, table: RecoveryTable, quantity: str) -> tuple[IntArray, Array]:
+    """Return the rows of a quantity that the file can make itself, and these, (n,) and (3, n, 6 + n_q)."""
+    loads, forces = loads_of_body(reduced)
+    made: dict[str, Array] = {}
+    rows = [k for k, each in enumerate(table.quantities) if each == quantity]
+    requests = [Rows(quantity)] if quantity == "interface force" else []
+    if quantity != "interface force":
+        requests = [Rows(quantity, (place,)) for place in dict.fromkeys(place_of(table, k) for k in rows)]
+    for request in requests:
+        try:
+            if quantity == "interface force":
+                part = interface_part(reduced, request, loads, forces)
+            else:
+                part = kept_part(reduced, request, loads)
+        except RecoveryError:  # the file does not hold what it would be made of
+            continue
+        made |= {each.label: part.dynamic[:, k] for k, each in enumerate(part.names)}
+    found = [k for k in rows if table.labels[k] in made]
+    width = N_RIGID + reduced.n_q
+    values = np.array([made[table.labels[k]] for k in found]).reshape(len(found), 3, width)
+    return np.array(found, dtype=np.int64), values.transpose(1, 0, 2)
+
+
+def place_of(table: RecoveryTable, row: int) -> str | int:
+    """Return the node, point or interface that a row is of, as it is asked for."""
+    words = table.labels[row].removeprefix(f"{table.entities[row]} ")
+    place = words.removesuffix(f" {table.components[row]}").removesuffix(f" {table.quantities[row]}")
+    node = place.partition(" skin ")[0]
+    return int(node) if table.entities[row] == "node" and node.isdigit() else node

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from cms.families.families import Families
 from cms.quality.record import QualityRecord, information, judge
 from cms.quality.reference.free_basis import FreeBasis
 from cms.quality.reference.full_reference import FullReference
@@ -11,7 +12,9 @@ from fe_models.body.fe_body import FEBody
 from fe_models.body.load_cases import load_columns
 from fe_models.foundation.arrays import Array, frozen
 
-__all__ = ["StaticCompleteness", "completeness_records", "energy_error", "static_completeness"]
+__all__ = [
+    "StaticCompleteness", "completeness_records", "energy_error", "load_case_responses", "static_completeness",
+]  # fmt: skip
 
 NO_LOAD = 1e-10  #: part of a load that is not in balance with rigid acceleration, below which it is rounding
 NO_ENERGY = 1e-24  #: strain energy of a response over the largest of its kind, below which there is none
@@ -75,14 +78,26 @@ def load_case_error(reference: FullReference, basis: FreeBasis) -> Array:
 
     A load that only accelerates the body, such as gravity, gives NaN.
     """
-    body, families = reference.body, reference.families
+    U = load_case_responses(reference.families)
+    error = np.full(U.shape[1], np.nan)
+    for k in np.flatnonzero(U.any(axis=0)):
+        error[k] = energy_error(reference.body, basis, U[:, [k]])[0]
+    return error
+
+
+def load_case_responses(families: Families) -> Array:
+    """Return the static response of the free body to each of its load cases, (n_dof, n_load_cases).
+
+    Zero of a load that only accelerates the body.
+    """
+    body = families.body
     F = load_columns(body.load_cases, body.n_dof)
     balanced = families.project(F)
     deforms = np.linalg.norm(balanced, axis=0) > NO_LOAD * np.linalg.norm(F, axis=0)
-    error = np.full(F.shape[1], np.nan)
-    for k in np.flatnonzero(deforms):
-        error[k] = energy_error(body, basis, families.flexibility(F[:, [k]]))[0]
-    return error
+    U = np.zeros(F.shape)
+    if deforms.any():
+        U[:, deforms] = families.flexibility(F[:, deforms])
+    return U
 
 
 def acceleration_labels(n_r: int) -> tuple[str, ...]:
