@@ -17,6 +17,7 @@ import numpy as np
 
 from cms.errors import CmsError
 from cms.families.families import Families
+from cms.families.mechanism import rounding_of_energy
 from cms.families.rigid_modes import geometric_rigid_modes
 from cms.mode_set import ModeSet
 from cms.quality.of_body.identities import mode_size
@@ -28,7 +29,7 @@ from cms.recovery.load_columns import forces_of_loads
 from cms.recovery.matrices import recovery_of_model
 from cms.recovery.request import OF_INTERFACES, OF_MOTION, RecoveryRequest
 from cms.reduced_basis.damping import Damping, damping_of_words, modal_damping
-from cms.reduced_basis.finishing import ZERO_ENERGY, FinishedBasis, rounding_of_energy
+from cms.reduced_basis.finishing import SUSPECT_ENERGY, FinishedBasis
 from cms.reduced_basis.frames import Frame, FrameCondition, HeldFrame, frame_condition
 from cms.reduced_basis.stress_modes import nodal_stress_modes, point_stress_modes
 from cms.reduced_body.geometric_stiffness import UNIT_LOADS
@@ -411,7 +412,7 @@ def compare_sources(case: Case) -> Iterator[Compared]:
     K_Phi = case.body.K @ (case.Phi @ Z)
     G, F, A = V.T @ K_Phi, np.asarray(file.columns.F) @ Z, np.asarray(file.columns.A) @ Z
     energy = np.einsum("nc,nc->c", V, case.body.K @ V)
-    works = energy > ZERO_ENERGY * rounding_of_energy(case.body, V)  # the others are rigid-body motions
+    works = energy > SUSPECT_ENERGY * rounding_of_energy(case.body, V)  # the others are rigid-body motions
     works &= np.asarray(file.columns.F).any(axis=1)  # a column without forces is on record as zero
     size = np.where(works, np.sqrt(np.maximum(energy, 0.0)), np.inf)
     own = np.einsum("ck,ck->c", F, F)
@@ -420,7 +421,7 @@ def compare_sources(case: Case) -> Iterator[Compared]:
     back = np.divide(A, scale[:, None], out=np.zeros_like(A), where=scale[:, None] != 0)
     u = V @ back
     E = u - case.Phi @ Z
-    rounding = ZERO_ENERGY * rounding_of_energy(case.body, np.abs(V) @ np.abs(back))
+    rounding = SUSPECT_ENERGY * rounding_of_energy(case.body, np.abs(V) @ np.abs(back))
     error = np.sqrt(np.maximum(np.einsum("nk,nk->k", E, case.body.K @ E) - rounding, 0.0))
     energy = np.sqrt(np.maximum(np.einsum("nk,nk->k", case.Phi @ Z, K_Phi), 0.0))
     yield apart("columns.A", error, np.zeros_like(error), energy, axes=case.axes_words)
