@@ -145,7 +145,6 @@ def _groups(body: FEBody, model: object, at: _Place) -> Iterator[ElementGroup]:
             forces = _spring_forces(model, at.rows)
             yield ElementGroup("spring force", at.part, *named, SPRING, six, forces, model, at.rows, at.first_node)
 
-
     elif isinstance(model, SolidModel):
         for kind in model.mesh.cells:
             part = " ".join(word for word in (at.part, kind) if word)

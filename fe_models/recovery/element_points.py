@@ -1,4 +1,4 @@
-"""Stress points of elements: ends of beams at their section points, corners of shells on both faces.
+"""Stress points of elements: ends of beams at their section points, corners of shells on both faces, nodes of solids.
 
 The stress at a node is an average over the adjoining elements. Where a frame branches, a bending moment is applied or a
 surface bends, parts of it cancel. A strength assessment looks at each element separately:
@@ -6,6 +6,9 @@ surface bends, parts of it cancel. A strength assessment looks at each element s
 (1) beams: every section point at both ends, from the section forces of that element, sigma_xx = N/A + My z/Iy - Mz
     y/Iz, tau from shear forces and Saint-Venant torsion; warping stress is neglected
 (2) shells: every corner of every cell at top and bottom, from the resultants extrapolated linearly to the corner
+(3) solids: every node of every cell, extrapolated within the cell without a mean over its neighbours
+(4) borders of solids: where materials meet, the mean over the cells of each material by itself; stress jumps there, and
+    the stress of the node is that of the stiffest
 """
 
 from collections.abc import Iterable
@@ -19,15 +22,18 @@ from fe_models.errors import BeamError
 from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.errors import BodyError
 from fe_models.foundation.words import nearest, quoted
+from fe_models.meshes.mesh import Mesh
 from fe_models.recovery.element_forces import ElementGroup, element_groups
 from fe_models.shells.elements import ShellCells
 from fe_models.shells.model import BOTTOM, TOP
+from fe_models.solids.body import SolidModel
+from fe_models.solids.stress import nodal_stress
 
 __all__ = ["ElementPoints", "element_points"]
 
 FACES = {"top": TOP, "bottom": BOTTOM}
 ENDS = ("A", "B")
-ALL = "all"
+ALL, BORDERS = "all", "borders"
 NOTE = "stress points"  #: key of the provenance
 
 
@@ -75,15 +81,68 @@ class ShellCorners:
 
 
 @dataclass(frozen=True, eq=False)
+class SolidNodes:
+    """Nodes of solid cells of one type, cell after cell."""
+
+    model: SolidModel
+    kind: str
+    chosen: IntArray  #: (n,)
+    names: tuple[str, ...]
+    positions: Array
+    rows: slice  #: rows among the mesh dofs
+
+    def stress(self, u: Array) -> Array:
+        """Return the stress of step (3), (n_points, 6, k) [Pa]: nodal stress of the cells with nodes of their own."""
+        mesh, cells = self.model.mesh, self.model.mesh.cells[self.kind][self.chosen]
+        of_mesh = u[self.rows].reshape(len(mesh.nodes), 3, -1)[cells.ravel()]
+        apart = Mesh(mesh.nodes[cells.ravel()], {self.kind: np.arange(cells.size).reshape(cells.shape)})
+        material = self.model.of_cell[self.kind][self.chosen]
+        return nodal_stress(
+            apart,
+            self.model.materials,
+            {self.kind: material},
+            np.repeat(material, cells.shape[1]),
+            of_mesh.reshape(3 * cells.size, -1),
+            incompatible=self.model.incompatible,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class MaterialBorders:
+    """Nodes where solid cells of several materials meet, one point for each material."""
+
+    model: SolidModel
+    members: tuple[IntArray, ...]  #: nodes of the borders of each material
+    names: tuple[str, ...]
+    positions: Array
+    rows: slice  #: rows among the mesh dofs
+
+    def stress(self, u: Array) -> Array:
+        """Return the stress of step (4), (n_points, 6, k) [Pa]."""
+        model, parts = self.model, []
+        for material, nodes in enumerate(self.members):
+            shown = np.full(len(model.mesh.nodes), material)
+            whole = nodal_stress(
+                model.mesh, model.materials, model.of_cell, shown, u[self.rows],
+                nodes=nodes, incompatible=model.incompatible,
+            )  # fmt: skip
+            parts.append(whole[nodes])
+        return np.concatenate(parts)
+
+
+Points = BeamEnds | ShellCorners | SolidNodes | MaterialBorders
+
+
+@dataclass(frozen=True, eq=False)
 class ElementPoints:
     """Stress points of elements, after the existing ones of the body (`fe_models.body.fe_body.StressPointModel`)."""
 
-    parts: tuple[BeamEnds | ShellCorners, ...]
+    parts: tuple[Points, ...]
     before: StressPointModel | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Name of each point: "beam 17 end A point 3", "shell 21 node 5 top", (n_points,)."""
+        """Name of each point: "beam 17 end A point 3", "shell 21 node 5 top", "solid 3 node 5 inside", (n_points,)."""
         own = () if self.before is None else tuple(self.before.names)
         return (*own, *(name for part in self.parts for name in part.names))
 
@@ -100,14 +159,15 @@ class ElementPoints:
 
 
 def element_points(body: FEBody, at: Iterable[int | str] = (ALL,)) -> FEBody:
-    """Return the body with stress points at beam ends and shell corners, each with the stress of its own element.
+    """Return the body with stress points at beam ends, shell corners and nodes of solid cells, each of its own element.
 
     Parameters
     ----------
     body
-        Body of beams or shells, coupled or not, welded, joined or neither.
+        Body of beams, shells or solids, coupled or not, welded, joined or neither.
     at
-        Numbers of elements, or names of sets or parts; "all" selects all elements.
+        Numbers of elements, or names of sets or parts; "all" selects all beams and shells, or all solid cells of a body
+        that has no others; "borders" selects the nodes of solids at which materials meet, with a point for each.
 
     Raises
     ------
@@ -115,25 +175,32 @@ def element_points(body: FEBody, at: Iterable[int | str] = (ALL,)) -> FEBody:
         If the body has no such elements, a name or number is unknown, or a beam section is given by its properties
         without an outline, so that its extreme fibres are unknown.
     """
-    groups = [group for group in element_groups(body) if group.quantity in ("beam force", "shell resultant")]
+    known_groups = element_groups(body)
+    groups = [group for group in known_groups if group.quantity in ("beam force", "shell resultant", "element stress")]
     where = f"body {body.name!r}: stress points"
     if not groups:
-        raise BodyError(f"{where}: it has no beams and no shells; the stress of solids is that of their nodes")
+        raise BodyError(f"{where}: it has no elements whose stress is known")
+    n_thin = sum(group.quantity != "element stress" for group in groups)
     chosen = [np.zeros(group.count, dtype=bool) for group in groups]
     asked = (at,) if isinstance(at, str) else tuple(at)
     for each in asked:
-        found = False
+        found = each == BORDERS
         for group, mask in zip(groups, chosen, strict=True):
-            rows = np.arange(group.count) if each == ALL else group.members(each, is_only=len(groups) == 1)
+            rows = group.members(each, is_only=len(groups) == 1)
+            if each == ALL and (group.quantity != "element stress" or not n_thin):
+                rows = np.arange(group.count)
             mask[rows] = True
             found |= len(rows) > 0
         if not found:
             known = [ALL, *(n for g in groups for n in (*g.groups, g.part, *g.names) if n)]
             unique = list(dict.fromkeys(known))
-            raise BodyError(f"{where}: no beam or shell, set or part {quoted(str(each))}{nearest(str(each), unique)}")
-    if not any(mask.any() for mask in chosen):
+            raise BodyError(f"{where}: no element, set or part {quoted(str(each))}{nearest(str(each), unique)}")
+    borders = [b for g in groups for b in material_borders(body, g)] if BORDERS in asked else []
+    if BORDERS in asked and not borders:
+        raise BodyError(f"{where}: {BORDERS}: it has no node at which solid cells of different materials meet")
+    if not borders and not any(mask.any() for mask in chosen):
         raise BodyError(f"{where}: expected numbers of elements, names of sets, or {ALL!r}, got none")
-    parts: list[BeamEnds | ShellCorners] = []
+    parts: list[Points] = [*borders]
     notes = []
     for group, mask in zip(groups, chosen, strict=True):
         rows = np.flatnonzero(mask)
@@ -141,6 +208,9 @@ def element_points(body: FEBody, at: Iterable[int | str] = (ALL,)) -> FEBody:
             continue
         if isinstance(group.source, ShellCells):
             parts.append(shell_corners(body, group, group.source, rows))
+            continue
+        if isinstance(group.source, SolidModel):
+            parts.append(solid_nodes(body, group, group.source, rows))
             continue
         assert isinstance(group.source, BeamModel)
         parts.append(beam_ends(where, group, group.source, rows))
@@ -189,3 +259,35 @@ def shell_corners(body: FEBody, group: ElementGroup, cells: ShellCells, rows: In
         for node in cells.cells[row].tolist()
     ]
     return ShellCorners(cells, rows, tuple(names), frozen(places.reshape(-1, 3)), group.rows)
+
+
+def solid_nodes(body: FEBody, group: ElementGroup, model: SolidModel, rows: IntArray) -> SolidNodes:
+    """Return the nodes of some cells of a group."""
+    kind = next(kind for kind in model.mesh.cells if group.part.rpartition(" ")[2] == kind)
+    cells = model.mesh.cells[kind][rows]
+    names = [
+        f"solid {group.names[row]} node {body.numbering.called(group.first_node + node)} inside"
+        for row, own in zip(rows.tolist(), cells.tolist(), strict=True)
+        for node in own
+    ]
+    return SolidNodes(model, kind, rows, tuple(names), frozen(model.mesh.nodes[cells.ravel()]), group.rows)
+
+
+def material_borders(body: FEBody, group: ElementGroup) -> list[MaterialBorders]:
+    """Return the borders of the solid model of a group, once for its groups of all cell types; none without any."""
+    model = group.source
+    if not isinstance(model, SolidModel) or group.part.rpartition(" ")[2] != next(iter(model.mesh.cells)):
+        return []
+    has = np.zeros((len(model.materials), len(model.mesh.nodes)), dtype=bool)
+    for kind, cells in model.mesh.cells.items():
+        has[np.repeat(model.of_cell[kind], cells.shape[1]), cells.ravel()] = True
+    members = tuple(np.flatnonzero(own & (has.sum(axis=0) > 1)) for own in has)
+    nodes = np.concatenate(members)
+    if not len(nodes):
+        return []
+    names = tuple(
+        f"{material.name} node {body.numbering.called(group.first_node + node)} border"
+        for material, own in zip(model.materials, members, strict=True)
+        for node in own.tolist()
+    )
+    return [MaterialBorders(model, members, names, frozen(model.mesh.nodes[nodes]), group.rows)]

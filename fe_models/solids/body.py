@@ -326,6 +326,8 @@ def provenance(mesh: Mesh, materials: tuple[AnyMaterial, ...], of_cell: Mapping[
     for number, material in enumerate(materials):
         count = sum(int((index == number).sum()) for index in of_cell.values())
         record[f"material {material.name}"] = f"{material_words(material)}, {count} cells"
+    if len(materials) > 1:
+        record["stress where materials meet"] = 'of the stiffest; of each with stress_points = "borders"'
     return {key: value for key, value in record.items() if value} | {"scikit-fem": version("scikit-fem")}
 
 

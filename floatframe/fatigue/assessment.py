@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from cms.modal_file.file import digest, read
 from cms.reduced_body.address import Address
@@ -37,6 +38,8 @@ from floatframe.shaking.shake import shake
 from floatframe.shaking.shake_file import read_shake
 
 __all__ = ["Assessment", "assess", "equivalent_repeats"]
+
+SAME_PLACE = 1e-9  #: of the size of a body, within which a stress point sits at a node
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +168,13 @@ def places_named(key: str, section: PlacesSection, body: ReducedBody) -> tuple[I
             has = "it has no stress points" if not known else f"{nearest(begin, known).removeprefix('; ')}"
             raise FatigueError(f"{key}.points: body {body.name!r}: no stress point {quoted(begin)}: {has}")
         points.append(np.array(found, dtype=np.int64))
-    return np.unique(np.concatenate(nodes)), np.unique(np.concatenate(points))
+    of_nodes, of_points = np.unique(np.concatenate(nodes)), np.unique(np.concatenate(points))
+    if body.point_stress is not None:  # at borders of materials nodes show the stiffest; chosen points stand for them
+        own = body.point_stress.positions[[k for k in of_points if known[k].endswith(" border")]]
+        if len(own) and len(of_nodes):
+            distance, _ = cKDTree(own).query(body.nodes[of_nodes])
+            of_nodes = of_nodes[distance > SAME_PLACE * np.ptp(body.nodes, axis=0).max()]
+    return of_nodes, of_points
 
 
 def places_of_set(body: ReducedBody, name: str, where: str) -> tuple[IntArray, IntArray]:
@@ -192,9 +201,9 @@ def points_of_elements(body: ReducedBody, triangles: IntArray) -> IntArray:
 
 
 def element_of_point(name: str) -> str | None:
-    """Return the element in the name of a stress point, "beam 17 end A point 0" or "part: shell 21 node 5 top"."""
+    """Return the element in the name of a stress point, "beam 17 end A point 0", "part: shell 21 node 5 top"."""
     words = name.rpartition(": ")[2].split(" ")
-    return words[1] if len(words) > 2 and words[0] in ("beam", "shell") else None
+    return words[1] if len(words) > 2 and words[0] in ("beam", "shell", "solid") else None
 
 
 def places_of(given: FatigueFile, body: ReducedBody) -> tuple[IntArray | None, IntArray | None]:

@@ -10,6 +10,7 @@ import fe_models as fm
 from fe_models.body.numbering import NamedSet
 from fe_models.errors import BeamError
 from fe_models.foundation.errors import BodyError
+from tests.bodies import box_mesh
 from tests.fe_models.small_frames import SI, STEEL, space_frame, straight
 from tests.fe_models.small_shells import of_nodes, plate, solved
 
@@ -94,7 +95,7 @@ def test_elements_are_chosen_by_number_and_set_and_refused_by_name():
     body = replace(body, numbering=numbering)
     assert {name.split()[1] for name in fm.element_points(body, [101]).stress_points.names} == {"101"}
     assert {name.split()[1] for name in fm.element_points(body, "LAST").stress_points.names} == {"102"}
-    with pytest.raises(BodyError, match="no beam or shell, set or part 'LOST'"):
+    with pytest.raises(BodyError, match="no element, set or part 'LOST'"):
         fm.element_points(body, ["LOST"])
     with pytest.raises(BodyError, match="or 'all', got none"):
         fm.element_points(body, [])
@@ -118,3 +119,66 @@ def one_triangle():
     nodes = np.array([[0.0, 0, 0], [1, 0, 0.2], [0.1, 0.8, 0]])
     mesh = fm.ShellMesh(nodes, {"triangle": np.array([[0, 1, 2]])})
     return fm.shell_body(mesh, fm.ShellProperty(0.05, STEEL), name="one", units=SI)
+
+
+def layered(incompatible=False, kind="hexahedron"):
+    """A bar of two materials without lateral contraction, side by side in x."""
+    stiff, soft = (fm.Material(n, E=E, nu=0.0, rho=1000.0) for n, E in (("stiff", 2e11), ("soft", 5e8)))
+    mesh = box_mesh(4, 2, 2, 1.0, 0.3, 0.2, kind)
+    materials = {"left half": soft, "right half": stiff}
+    return fm.solid_body(mesh, materials, name="b", units=SI, incompatible_modes=incompatible)
+
+
+@pytest.mark.parametrize("incompatible", [False, True])
+def test_at_borders_each_material_has_its_own_stress(incompatible):
+    """A strain of one size in both: E eps in each, and the node shows the stiffest."""
+    body = fm.element_points(layered(incompatible), "borders")
+    eps = 1e-3
+    u = np.zeros((body.n_dof, 1))
+    u[0::3, 0] = eps * body.nodes[:, 0]
+    points = body.stress_points
+    stress = points.stress(u)[:, :, 0]
+    assert len(points.names) == 2 * 9
+    assert_allclose(points.positions[:, 0], 0.5)
+    for name, value in zip(points.names, stress, strict=True):
+        modulus = 5e8 if name.startswith("soft node ") else 2e11
+        assert_allclose(value, [modulus * eps, 0, 0, 0, 0, 0], rtol=0, atol=1e-9 * modulus * eps)
+    at_border = np.abs(body.nodes[:, 0] - 0.5) < 1e-12
+    nodal = body.element_model.nodal_stress(u)[at_border, 0, 0]
+    assert_allclose(nodal, 2e11 * eps, rtol=1e-9)
+    with pytest.raises(BodyError, match="borders: it has no node at which solid cells of different materials meet"):
+        fm.element_points(fm.solid_body(box_mesh(2, 1, 1), STEEL, name="one", units=SI), "borders")
+
+
+def test_solid_cells_have_their_own_stress_where_the_nodal_one_is_a_mean():
+    """Strains that jump from cell to cell: at a node between them each cell keeps its own, the node has their mean."""
+    mesh = box_mesh(2, 1, 1, 1.0, 0.3, 0.2, "hexahedron20")
+    body = fm.element_points(fm.solid_body(mesh, fm.Material("m", E=2e11, nu=0.0, rho=1.0), name="b", units=SI), "all")
+    x, first, second = body.nodes[:, 0], 1e-3, -4e-4
+    u = np.zeros((body.n_dof, 1))
+    u[0::3, 0] = first * np.minimum(x, 0.5) + second * np.maximum(x - 0.5, 0.0)
+    points, stress = body.stress_points, body.stress_points.stress(u)[:, :, 0]
+    assert len(points.names) == 2 * 20
+    cells = mesh.cells["hexahedron20"]
+    is_first = np.repeat(mesh.nodes[cells].mean(axis=1)[:, 0] < 0.5, 20)
+    assert_allclose(stress[:, 0], 2e11 * np.where(is_first, first, second), rtol=1e-9)
+    assert_allclose(points.positions, mesh.nodes[cells.ravel()], rtol=0, atol=0)
+    middle = np.abs(x - 0.5) < 1e-12
+    assert_allclose(body.element_model.nodal_stress(u)[middle, 0, 0], 2e11 * (first + second) / 2, rtol=1e-9)
+    assert points.names[0].startswith("solid ")
+    assert points.names[0].endswith(" inside")
+
+
+def test_nodal_stress_at_a_clamp_is_that_of_bending():
+    """F L z / I at the root of a cantilever without lateral contraction, extrapolated from the points inside."""
+    length, b, h, F = 1.0, 0.06, 0.1, 1e3
+    mesh = box_mesh(10, 1, 2, length, b, h, "hexahedron20")
+    body = fm.solid_body(mesh, fm.Material("m", E=2e11, nu=0.0, rho=1.0), name="b", units=SI)
+    root, tip = (np.flatnonzero(np.abs(mesh.nodes[:, 0] - x) < 1e-12) for x in (0.0, length))
+    f = np.zeros(body.n_dof)
+    f[3 * tip + 2] = F / len(tip)
+    u = solved(body, f, (3 * root[:, None] + np.arange(3)).ravel())
+    stress = body.element_model.nodal_stress(mesh_columns(body, u))[root, 0, 0]
+    z = mesh.nodes[root, 2] - h / 2
+    expected = -F * length * z / (b * h**3 / 12)
+    assert_allclose(stress, expected, rtol=0, atol=0.02 * np.abs(expected).max())

@@ -19,6 +19,7 @@ from floatframe.fatigue.outputs import csv_of, fatigue_record, nodes_of_places, 
 from floatframe.fatigue.report import fatigue_html
 from floatframe.fatigue.spectral.spectra import spectra_of_history
 from floatframe.fatigue.surface_damage import spectral_damage
+from tests.bodies import box_mesh
 from tests.fe_models.small_frames import STEEL
 
 UNITS = cms.unit_system("m-kg-s")
@@ -214,3 +215,31 @@ def test_places_are_nodes_or_points_as_asked(folder, mast):
 def test_places_that_are_not_there_are_refused(folder, where, message):
     with pytest.raises(Exception, match=message):
         assess(read(folder, where))
+
+
+def test_points_of_a_material_stand_for_the_nodes_of_its_border(tmp_path):
+    """In a bar of two materials the soft one is judged with its own stress where they meet."""
+    from floatframe.fatigue.assessment import places_named
+    from floatframe.fatigue.fatigue_file import PlacesSection
+
+    stiff, soft = (fm.Material(n, E=E, nu=0.3, rho=1000.0) for n, E in (("stiff", 2e11), ("soft", 5e8)))
+    mesh = box_mesh(4, 2, 2, 1.0, 0.3, 0.2)
+    mesh = replace(mesh, node_sets={**mesh.node_sets, "soft part": np.flatnonzero(mesh.nodes[:, 0] <= 0.5)})
+    block = fm.solid_body(mesh, {"left half": soft, "right half": stiff}, name="b", units=UNITS)
+    ends = [
+        fm.Interface(n, "rigid", mesh.node_sets[n], mesh.nodes[mesh.node_sets[n]].mean(0)) for n in ("left", "right")
+    ]
+    coupled = cms.couple(fm.element_points(block.with_interfaces(*ends), "borders"))
+    body = cms.reduce(coupled, cms.craig_bampton(coupled, n_modes=2))
+    given = {"sn_exponent": 5.0, "fatigue_strength": 1e8, "stress_unit": "Pa"}
+    keys = {key: value for key, value in given.items() if key in PlacesSection.model_fields}
+    everywhere = PlacesSection.model_construct(sets=("soft part",), elements=(), nodes=(), points=(), **keys)
+    nodes, points = places_named("materials.soft", everywhere, body)
+    x = body.nodes @ np.asarray(body.frame.axes).T + body.frame.origin
+    assert not len(points)
+    assert np.isclose(x[nodes, 0], 0.5).sum() >= 8
+    own = PlacesSection.model_construct(sets=("soft part",), elements=(), nodes=(), points=("soft",), **keys)
+    nodes, points = places_named("materials.soft", own, body)
+    assert x[nodes, 0].max() < 0.5 - 1e-9
+    assert len(points) == 9
+    assert all(body.point_stress.names[k].startswith("soft node ") for k in points)
