@@ -1,4 +1,4 @@
-"""Cables over points of bodies, as public elements."""
+"""Cables that run over points of bodies, as public elements."""
 
 from floatframe.cables.cable import Cable
 

@@ -1,10 +1,10 @@
-"""A cable without mass over a row of points: it pulls, and does not push.
+"""A massless cable over a sequence of points, which can only pull.
 
-With l the sum of the distances from point to point, e = l - l_0 and the directions d_i from point i to the next,
+With l the sum of the distances between consecutive points, e = l - l_0, and d_i the direction from point i to the next:
 
     T = k e + c l_dot where this is above zero and e > 0, else 0;      force on point i:  T (d_i - d_(i-1))
 
-It runs over its inner points without friction, so that its tension is the same everywhere.
+The cable runs over its inner points without friction, so its tension is the same everywhere.
 """
 
 from collections.abc import Sequence
@@ -27,20 +27,20 @@ __all__ = ["Cable"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Cable(Element):
-    """A cable from point to point of bodies, with its stiffness as a whole, preloaded as placed or slack.
+    """A cable between points of bodies, with the stiffness of the whole cable; preloaded or slack as assembled.
 
     Raises
     ------
     ModelError
-        If there are fewer than two points, a number is out of its range, or length and preload are both given.
+        If there are fewer than two points, a number is out of its range, or both length and preload are given.
     """
 
     name: str
-    points: Sequence[Marker]  #: its ends, and what it runs over between them
-    stiffness: float  #: of the whole cable, E A over its length [N/m]
+    points: Sequence[Marker]  #: ends and inner points, in order
+    stiffness: float  #: of the whole cable, E A / length [N/m]
     damping: float = 0.0  #: acts while the cable is taut [N s/m]
-    preload: float | None = None  #: tension as placed [N]; None: 0, or what follows from `length`
-    length: float | None = None  #: without tension [m]; None: from the preload
+    preload: float | None = None  #: tension as assembled [N]; None: 0, or the value that follows from `length`
+    length: float | None = None  #: length without tension [m]; None: from the preload
 
     def __post_init__(self) -> None:
         where = f"element {self.name!r}"
@@ -65,7 +65,7 @@ class Cable(Element):
         return tuple(self.points)
 
     def law(self, placed: Placed) -> ElementLaw:
-        """Return the law of the cable; `ModelError` if two points after each other coincide as placed."""
+        """Return the law of the cable; `ModelError` if two consecutive points coincide as assembled."""
         parts = [float(((b - a) @ (b - a)) ** 0.5) for a, b in zip(placed.r[:-1], placed.r[1:], strict=True)]
         if min(parts) == 0:
             k = parts.index(0.0)
@@ -92,13 +92,13 @@ class Cable(Element):
         )
 
     def drawn(self) -> Sequence[Stretched]:
-        """Return its straight parts."""
+        """Return its straight segments."""
         return tuple(Stretched("line", first=k, second=k + 1) for k in range(len(self.points) - 1))
 
 
 @njit
 def cable_law(t, x, z, lam, data, wrench, z_dot, g, seen):
-    """Write the pull at every point and the outputs."""
+    """Write the force at every point, and the outputs."""
     stiffness, damping, free = data[0], data[1], data[2]
     total, rate = 0.0 * x[0, 0], 0.0 * x[0, 0]
     for k in range(x.shape[0] - 1):

@@ -1,4 +1,4 @@
-"""Play in joints: hinges and balls whose pin moves in its bearing, and dead bands along or about an axis."""
+"""Joints with play: hinges and ball joints whose pin moves in its bearing, and dead bands along or about an axis."""
 
 from floatframe.clearances.backlash import Backlash
 from floatframe.clearances.ball import BallWithPlay

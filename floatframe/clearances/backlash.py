@@ -1,4 +1,4 @@
-"""Backlash: a dead band along or about an axis, between two stops that are springs with losses."""
+"""Backlash: a dead band along or about an axis, between two dissipative spring stops."""
 
 from dataclasses import dataclass
 
@@ -24,22 +24,22 @@ from floatframe.errors import ModelError
 
 __all__ = ["Backlash"]
 
-MOTIONS = {"along": ("N", "m"), "about": ("N m", "rad")}  #: units of force and way
+MOTIONS = {"along": ("N", "m"), "about": ("N m", "rad")}  #: units of force and displacement
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Backlash(Element):
-    """A dead band of the motion of marker b against marker a along an axis, or about it.
+    """A dead band in the motion of marker b relative to marker a, along an axis or about it.
 
-    Free for `lower` < way < `upper`; beyond, with the depth x, the force k xⁿ max(0, 1 + chi x_dot) back. The way along
-    the axis is the distance of the markers along it, the angle is zero as placed and within half a turn. Give it the
-    markers of the joint along or about whose axis it acts.
+    The motion is free for `lower` < displacement < `upper`. Beyond, with the depth x, the force is k xⁿ max(0, 1 + chi
+    x_dot). The displacement along the axis is the distance of the markers along it; the angle is zero as assembled and
+    must stay within half a turn. Use the markers of the joint along or about whose axis the backlash acts.
 
     Raises
     ------
     ModelError
-        If a number is out of its range, or markers are none.
+        If a number is out of its range, or a marker is not a `Marker`.
     """
 
     name: str
@@ -49,7 +49,7 @@ class Backlash(Element):
     upper: float  #: above `lower` [m, rad]
     stiffness: float  #: k of the stops [N/mⁿ, N m/radⁿ]
     exponent: float = 1.0  #: n
-    damping: float = 0.0  #: chi, loss by the speed of the approach [s/m, s/rad]
+    damping: float = 0.0  #: chi, damping proportional to the approach velocity [s/m, s/rad]
     motion: str = "along"  #: "along" the axis, or "about" it
     axis: Array = (0.0, 0.0, 1.0)  # type: ignore[assignment]  #: in the axes of marker a, (3,)
 
@@ -83,7 +83,7 @@ class Backlash(Element):
 
 @njit
 def backlash_law(t, x, z, lam, data, wrench, z_dot, g, seen):
-    """Write the force of the stop that is met, and the outputs."""
+    """Write the force of the stop that is touched, and the outputs."""
     lower, upper, is_turn = data[3], data[4], data[5] > 0.0
     e = direction_of(x, 0, data, 6)
     if is_turn:

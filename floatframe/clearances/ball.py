@@ -1,4 +1,4 @@
-"""A ball joint with play: a ball in a socket that is wider than it."""
+"""A ball joint with play: a ball in a larger socket."""
 
 from dataclasses import dataclass
 
@@ -21,14 +21,14 @@ OUTPUTS = {"eccentricity": "m", "force": "N", "energy": "J", "power lost": "W", 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class BallWithPlay(Element):
-    """A ball about marker b in a wider socket about marker a; see `contact` for the force where they meet.
+    """A ball at marker b in a larger socket at marker a; the contact force is described in `contact`.
 
-    Outputs: how far the centres are apart, the normal force, energy and power lost.
+    Outputs: distance between the centres, normal force, energy and power lost.
 
     Raises
     ------
     ModelError
-        If a number is out of its range, or markers are none.
+        If a number is out of its range, or a marker is not a `Marker`.
     """
 
     name: str
@@ -37,10 +37,10 @@ class BallWithPlay(Element):
     play: float  #: difference of the radii [m]
     stiffness: float  #: k of the contact [N/mⁿ]
     exponent: float = 1.0  #: n
-    damping: float = 0.0  #: chi, loss by the speed of the approach [s/m]
+    damping: float = 0.0  #: chi, damping proportional to the approach velocity [s/m]
     friction: float = 0.0  #: mu
     friction_speed: float = FRICTION_SPEED  #: v_s, slip at which friction is 0.71 of its value [m/s]
-    radius: float = 0.0  #: of the ball, arm of the friction [m]
+    radius: float = 0.0  #: radius of the ball, lever arm of the friction [m]
 
     def __post_init__(self) -> None:
         require_numbers(self, {"play": Range(above=0.0)})

@@ -1,13 +1,13 @@
-"""The force where a pin meets its bearing: nothing in the play, then a spring with losses, and friction.
+"""The force between a pin and its bearing: zero within the play, then a dissipative spring with friction.
 
-With the depth x = (way from the middle) - play and its rate, u the outward direction from the middle of the bearing,
+With the depth x = (distance from the middle) - play and its rate, and u the outward direction from the bearing middle:
 
     N = k xⁿ max(0, 1 + chi x_dot)  for x > 0, else 0
     F = -N u - mu N V_t/sqrt(|V_t|² + v_s²)  on the pin, at the point q = p + r u of its surface
 
-and -F on the bearing at the same point, V_t what of the velocity of the pin against the bearing at q is normal to u.
-What the spring holds is k x^(n+1)/(n+1), what is lost (N - k xⁿ) x_dot + mu N |V_t|²/sqrt(|V_t|² + v_s²), never below
-zero. All take real and complex numbers, see `floatframe.elements.smooth`.
+and -F on the bearing at the same point. V_t is the tangential velocity, normal to u, of the pin relative to the bearing
+at q. The stored energy is k x^(n+1)/(n+1); the dissipated power is (N - k xⁿ) x_dot + mu N |V_t|²/sqrt(|V_t|² + v_s²),
+never below zero. All functions accept real and complex numbers, see `floatframe.elements.smooth`.
 """
 
 from dataclasses import dataclass
@@ -23,12 +23,12 @@ from floatframe.errors import ModelError
 
 __all__ = ["NUMBERS", "add_contact", "contact_numbers", "depth_force", "require_numbers"]
 
-NUMBERS = 6  #: of a contact in `data`: k, n, chi, mu, v_s, r
+NUMBERS = 6  #: parameters of a contact in `data`: k, n, chi, mu, v_s, r
 
 
 @dataclass(frozen=True)
 class Range:
-    """Which values a number of a contact may have."""
+    """The allowed range of a parameter of a contact."""
 
     above: float | None = None
     at_least: float | None = None
@@ -45,7 +45,7 @@ RANGES = {
 
 
 def require_numbers(element: Any, more: dict[str, Range]) -> None:
-    """Check the markers and numbers of an element with play, and keep them as floats; `ModelError` for wrong ones."""
+    """Check the markers and parameters of an element with play, and store floats; `ModelError` for invalid values."""
     where = f"element {element.name!r}"
     for key in ("marker_a", "marker_b"):
         if not isinstance(getattr(element, key), Marker):
@@ -58,15 +58,15 @@ def require_numbers(element: Any, more: dict[str, Range]) -> None:
 
 
 def contact_numbers(element: Any) -> list[float]:
-    """Return the numbers of the contact of an element as its law reads them."""
+    """Return the parameters of the contact of an element, in the order in which its law reads them."""
     return [getattr(element, key, 0.0) for key in RANGES]
 
 
 @register_jitable
 def depth_force(depth, rate, data, at):
-    """Return N, what of it the spring gives, and the energy that the spring holds, for a depth above zero or zero.
+    """Return the normal force N, its spring part and the energy of the spring, for a depth >= 0.
 
-    data: k, n, chi from `at` on.
+    data: k, n, chi, from index `at` on.
     """
     k, n, chi = data[at], data[at + 1], data[at + 2]
     if depth.real < 0.0:
@@ -82,10 +82,10 @@ def depth_force(depth, rate, data, at):
 
 @register_jitable
 def add_contact(wrench, x, p, out, way, play, data, at):
-    """Add the contact between the pin of marker 1 and the bearing of marker 0 at a place of the pin.
+    """Add the contact between the pin of marker 1 and the bearing of marker 0, at a point of the pin.
 
-    p: the place, ground axes; out: from the middle of the bearing towards it, (way times the outward direction);
-    play: the way that is free. Return the normal force, the energy held and the power lost.
+    p: the point, in ground axes. out: vector from the middle of the bearing to it (distance times outward direction).
+    play: free distance. Return the normal force, the stored energy and the dissipated power.
     """
     mu, slow, radius = data[at + 3], data[at + 4], data[at + 5]
     none = 0.0 * way

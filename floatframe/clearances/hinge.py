@@ -1,9 +1,10 @@
-"""A hinge with play: a pin in a bearing that is wider than it.
+"""A hinge with play: a pin in a larger bearing.
 
-The axis of the bearing goes through marker a, that of the pin through marker b. In two planes of the pin, at the ends
-of the bearing (s = ±L/2 from marker b along the pin), the pin may be off the axis of the bearing by the radial play c;
-so it may tilt by up to 2 c/L. Along the axis marker b moves by the axial play to each side. Beyond, see `contact`.
-About the axis a spring and a damper may act, such as a harness: torque -k_t (angle - free) - d_t (rate of the angle).
+The axis of the bearing passes through marker a, that of the pin through marker b. In two planes of the pin, at the ends
+of the bearing (s = ±L/2 from marker b along the pin), the pin can be displaced from the axis of the bearing by the
+radial play c, so that it can tilt by up to 2 c/L. Along the axis, marker b can move by the axial play to each side.
+Beyond the play, see `contact`. A spring and a damper, such as a harness, can act about the axis, with the torque -k_t
+(angle - free) - d_t (rate of the angle).
 """
 
 from dataclasses import dataclass
@@ -45,16 +46,16 @@ OUTPUTS = {
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class HingeWithPlay(Element):
-    """A pin, of marker b, in a wider bearing, of marker a, that turns about an axis.
+    """A pin at marker b in a larger bearing at marker a, which rotates about an axis.
 
-    Outputs: the angle of b against a about the axis, zero as placed; how far marker b is off the axis of the bearing
-    and along it; the angle between both axes; the resultant of the contacts in the bearing; how many of its planes
-    touch; energy and power lost. Axial contact has no friction.
+    Outputs: the angle of b relative to a about the axis, zero as assembled; the displacements of marker b from the axis
+    of the bearing and along it; the angle between both axes; the resultant contact force in the bearing; the number of
+    planes in contact; energy and power lost. Axial contact has no friction.
 
     Raises
     ------
     ModelError
-        If a number is out of its range, or markers are none.
+        If a number is out of its range, or a marker is not a `Marker`.
     """
 
     name: str
@@ -62,18 +63,18 @@ class HingeWithPlay(Element):
     marker_b: Marker
     radial_play: float  #: from the middle to the contact, half the difference of the diameters [m]
     stiffness: float  #: k of the contact in one plane [N/mⁿ]
-    length: float = 0.0  #: L of the bearing [m]; 0: one plane, about which the pin tilts freely
+    length: float = 0.0  #: L of the bearing [m]; 0: a single plane, in which the pin tilts freely
     axial_play: float = 0.0  #: to each side [m]
     slides: bool = False  #: whether the pin moves freely along the axis
     axial_stiffness: float | None = None  #: [N/mⁿ]; None: as `stiffness`
     exponent: float = 1.0  #: n
-    damping: float = 0.0  #: chi, loss by the speed of the approach [s/m]
+    damping: float = 0.0  #: chi, damping proportional to the approach velocity [s/m]
     friction: float = 0.0  #: mu
     friction_speed: float = FRICTION_SPEED  #: v_s, slip at which friction is 0.71 of its value [m/s]
-    radius: float = 0.0  #: of the pin, arm of the friction [m]
+    radius: float = 0.0  #: radius of the pin, lever arm of the friction [m]
     turn_stiffness: float = 0.0  #: k_t about the axis [N m/rad]
     turn_damping: float = 0.0  #: d_t [N m s/rad]
-    turn_free: float = 0.0  #: angle at which the spring about the axis is free, from the angle as placed [rad]
+    turn_free: float = 0.0  #: angle at which the spring about the axis is free, relative to the assembled angle [rad]
     axis: Array = (0.0, 0.0, 1.0)  # type: ignore[assignment]  #: in the axes of marker a, (3,)
 
     def __post_init__(self) -> None:
@@ -92,7 +93,7 @@ class HingeWithPlay(Element):
         object.__setattr__(self, "axis", unit_vector(f"element {self.name!r}: axis", self.axis))
 
     def law(self, placed: Placed) -> ElementLaw:
-        """Return the law of the hinge; its axes coincide as placed."""
+        """Return the law of the hinge, whose axes must coincide as assembled."""
         axial = self.stiffness if self.axial_stiffness is None else self.axial_stiffness
         gaps = {"gap": GapSpring(self.stiffness, self.exponent)}
         if self.length > 0.0:
@@ -118,7 +119,7 @@ class HingeWithPlay(Element):
         )
 
 
-PLAY, LENGTH, AXIAL, AXIAL_PLAY = NUMBERS, NUMBERS + 1, NUMBERS + 2, NUMBERS + 5  #: places in `data`
+PLAY, LENGTH, AXIAL, AXIAL_PLAY = NUMBERS, NUMBERS + 1, NUMBERS + 2, NUMBERS + 5  #: indices in `data`
 ALONG, ABOUT, TURN = NUMBERS + 6, NUMBERS + 9, NUMBERS + 18
 
 
@@ -160,7 +161,7 @@ def hinge_law(t, x, z, lam, data, wrench, z_dot, g, seen):
 
 @register_jitable
 def off_axis(x, p, e):
-    """Return how far a point is off the axis e through marker 0, and the way from it, normal to e."""
+    """Return the distance of a point from the axis e through marker 0, and the vector from the axis, normal to e."""
     d = p[0] - x[0, 0], p[1] - x[0, 1], p[2] - x[0, 2]
     along = inner_product(d, e)
     out = d[0] - along * e[0], d[1] - along * e[1], d[2] - along * e[2]
@@ -169,6 +170,6 @@ def off_axis(x, p, e):
 
 @register_jitable
 def length_of(a):
-    """Return the length of a vector of three, without a derivative where it is zero."""
+    """Return the length of a vector with three components; its derivative is zero for the zero vector."""
     squared = inner_product(a, a)
     return np.sqrt(squared) if squared.real > 0.0 else 0.0 * squared

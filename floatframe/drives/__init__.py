@@ -1,6 +1,7 @@
-"""Electric motors, brakes, controllers and maps with states of their own, as public elements on a shaft.
+"""Electric motors, brakes, controllers and maps on a shaft, with their own states, as public elements.
 
-`pid` is the controller of them all, `shaft` and `turns` what they share; each other module is one drive with its law.
+All drives share the controller in `pid` and the functions in `shaft` and `turns`. Each other module contains one drive
+and its law.
 """
 
 from floatframe.drives.anti_skid_brake import AntiSkidBrake

@@ -1,4 +1,4 @@
-"""A wheel brake with anti-skid: pressure by a valve that watches the speed of the wheel, and the torque it makes."""
+"""A wheel brake with anti-skid control: a valve adapts the pressure to the wheel speed."""
 
 from dataclasses import dataclass
 
@@ -31,48 +31,49 @@ OUTPUTS = (
     ("torque", "N m"), ("pressure", "Pa"), ("pilot pressure", "Pa"), ("speed", "rad/s"), ("wheel speed", "m/s"),
     ("reference speed", "m/s"), ("slip", "1"), ("skid", "1"), ("power lost", "W"),
 )  # fmt: skip
-PILOT = 17  #: where the pilot's pressure begins in the data
+PILOT = 17  #: index in the data of the pilot's pressure
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class AntiSkidBrake(Element):
-    """Torque of a brake on marker b against marker a about an axis, with a valve that lets go of a wheel that skids.
+    """Brake torque on marker b relative to marker a about an axis, with a valve that releases a skidding wheel.
 
-    omega is the angular velocity of b against a, v_w = R omega_s what the sensor makes of it, R the rolling radius:
+    omega is the angular velocity of b relative to a, omega_s the measured one, v_w = R omega_s with the rolling radius
+    R:
 
     (1) sensor: d omega_s/dt = (omega - omega_s)/sensor_time
-    (2) reference speed: dv/dt = (v_w - v)/reference_time, but it falls by `reference_deceleration` at the most, as the
-        vehicle does: what falls faster is the wheel
+    (2) reference speed: dv/dt = (v_w - v)/reference_time, but v falls by `reference_deceleration` at most, as the speed
+        of the vehicle does; a faster fall is attributed to the wheel
     (3) slip s = (v - v_w)/max(v, drop_out); skid e = the larger of (s - slip)/slip_band and, where `deceleration` is
         given, (-dv_w/dt - deceleration)/deceleration_band
-    (4) valve: dp_v/dt = build_rate for e <= -1, falls in proportion to zero at e = 0, and on to -release_rate for
-        e >= 1; p_v stays between zero and what the pilot gives (it turns to these limits within `time_constant`)
+    (4) valve: dp_v/dt = build_rate for e <= -1, falls linearly to zero at e = 0, and on to -release_rate for e >= 1;
+        p_v stays between zero and the pilot's pressure (it approaches these limits with `time_constant`)
     (5) brake: dp/dt = (p_v - p)/time_constant, torque -gain p tanh(omega/friction_speed)
 
-    Between drop_out/2 and `drop_out` of the reference speed the valve is taken out of (4), as a cubic, so that the
-    vehicle can stop; with `anti_skid = False` it is never in.
+    Between drop_out/2 and `drop_out` of the reference speed, a cubic blends (4) out, so that the vehicle can stop; with
+    `anti_skid = False`, (4) never acts.
     """
 
     name: str
-    marker_a: Marker  #: of what carries the brake
-    marker_b: Marker  #: of the wheel
-    pressure: TimeFunction | float  #: of the pilot over time, above ambient [Pa]
-    gain: float  #: torque over pressure [m³]
+    marker_a: Marker  #: on the brake support
+    marker_b: Marker  #: on the wheel
+    pressure: TimeFunction | float  #: pilot's pressure above ambient, a function of time [Pa]
+    gain: float  #: torque divided by pressure [m³]
     build_rate: float  #: [Pa/s]
     release_rate: float  #: [Pa/s]
     radius: float  #: R, rolling radius [m]
-    slip: float  #: threshold of slip
-    slip_band: float  #: beyond and below it over which the valve opens and shuts
-    reference_deceleration: float  #: most that the vehicle is thought to brake with [m/s²]
-    drop_out: float  #: reference speed below which there is no anti-skid [m/s]
-    deceleration: float | None = None  #: threshold of the rim's deceleration [m/s²]; None: slip alone counts
+    slip: float  #: threshold of the slip
+    slip_band: float  #: half width of the range around the threshold in which the valve opens and closes
+    reference_deceleration: float  #: largest assumed deceleration of the vehicle [m/s²]
+    drop_out: float  #: reference speed below which anti-skid is off [m/s]
+    deceleration: float | None = None  #: threshold of the rim deceleration [m/s²]; None: only slip is used
     deceleration_band: float | None = None  #: needed with it [m/s²]
-    reference_time: float = LAG  #: in which the reference speed follows a wheel that is faster [s]
-    sensor_time: float = SENSOR_TIME  #: [s]
-    time_constant: float = LAG  #: of valve and brake [s]
-    friction_speed: float = FRICTION_SPEED  #: of the disc [rad/s]: a locked wheel creeps, below it
-    speed: float = 0.0  #: of the wheel at the start [rad/s]
+    reference_time: float = LAG  #: time constant with which the reference speed follows a faster wheel [s]
+    sensor_time: float = SENSOR_TIME  #: time constant of the sensor [s]
+    time_constant: float = LAG  #: time constant of valve and brake [s]
+    friction_speed: float = FRICTION_SPEED  #: speed scale of the disc friction [rad/s]; a locked wheel creeps below it
+    speed: float = 0.0  #: initial speed of the wheel [rad/s]
     anti_skid: bool = True
     axis: Array = Y_AXIS  # type: ignore[assignment]  #: in the axes of marker a, (3,)
 
@@ -94,7 +95,7 @@ class AntiSkidBrake(Element):
 
     def law(self, placed: Placed) -> ElementLaw:
         """Return the law of the brake."""
-        assert isinstance(self.pressure, TimeFunction)  # by __post_init__
+        assert isinstance(self.pressure, TimeFunction)  # ensured by __post_init__
         pressure = float(self.pressure.at(np.zeros(1))[0])
         number(f"element {self.name!r}: pressure at the start", pressure, at_least=0.0)
         data = [self.gain, self.build_rate, self.release_rate, self.radius, self.slip, self.slip_band]
@@ -119,13 +120,13 @@ class AntiSkidBrake(Element):
 
 @register_jitable
 def part(x):
-    """Return x between zero and one."""
+    """Return x clamped to 0 .. 1."""
     return 0.0 * x if x.real < 0.0 else (1.0 + 0.0 * x if x.real > 1.0 else x)
 
 
 @register_jitable
 def hyperbolic_tangent(x):
-    """Return tanh(x), by a formula that bears large numbers and complex ones."""
+    """Return tanh(x), by a formula that is valid for large and complex numbers."""
     y = x if x.real >= 0.0 else -x
     h = np.exp(-2.0 * y)
     value = (1.0 - h) / (1.0 + h)
@@ -134,7 +135,7 @@ def hyperbolic_tangent(x):
 
 @register_jitable
 def brake(t, x, z, data, wrench, z_dot, seen, is_watched):
-    """Write torque, rates and outputs, steps (1) to (5) of `AntiSkidBrake`."""
+    """Write torque, rates and outputs; steps (1) to (5) of `AntiSkidBrake`."""
     gain, build, release, R, slip, slip_band = data[0], data[1], data[2], data[3], data[4], data[5]
     falling, drop_out, deceleration, band = data[6], data[7], data[8], data[9]
     lag = data[12]
@@ -164,11 +165,11 @@ def brake(t, x, z, data, wrench, z_dot, seen, is_watched):
 
 @njit
 def anti_skid_brake_law(t, x, z, lam, data, wrench, z_dot, g, seen):
-    """Write what a brake does whose valve watches the wheel."""
+    """Write torque, rates and outputs of a brake with anti-skid."""
     brake(t, x, z, data, wrench, z_dot, seen, True)
 
 
 @njit
 def brake_law(t, x, z, lam, data, wrench, z_dot, g, seen):
-    """Write what a brake does that follows the pilot alone."""
+    """Write torque, rates and outputs of a brake that follows only the pilot's pressure."""
     brake(t, x, z, data, wrench, z_dot, seen, False)

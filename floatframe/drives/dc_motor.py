@@ -1,4 +1,4 @@
-"""A direct current motor on a shaft: armature current as a state, supply by a function of time or a controller."""
+"""A direct current motor on a shaft, with the armature current as a state and a voltage or controller as supply."""
 
 from dataclasses import dataclass
 
@@ -23,9 +23,10 @@ __all__ = ["DcMotor"]
 
 FRICTION_SPEED = Quantity(1.0, RATE)
 
-CONTROLLED = {"speed": "rad/s", "angle": "rad", "current": "A"}  #: what a controller may see, and its unit
+#: quantities that a controller can use, with their units
+CONTROLLED = {"speed": "rad/s", "angle": "rad", "current": "A"}
 BY_FUNCTION, SPEED, ANGLE, CURRENT = range(4)
-SUPPLY = 18  #: where the voltage or the controller begins in the data
+SUPPLY = 18  #: index in the data of the voltage or the controller
 OUTPUTS = (
     ("current", "A"), ("voltage", "V"), ("torque", "N m"), ("speed", "rad/s"), ("angle", "rad"), ("power in", "W"),
     ("power lost", "W"), ("power out", "W"), ("energy", "J"),
@@ -35,16 +36,17 @@ OUTPUTS = (
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class DcMotor(Element):
-    """Torque k i on marker b (rotor) against marker a (stator) about an axis, with L di/dt = u - R i - k ratio omega.
+    """Torque k i on marker b (rotor) relative to marker a (stator) about an axis; L di/dt = u - R i - k ratio omega.
 
-    omega is the angular velocity of b against a about `axis`; a gear makes the motor turn `ratio` times as fast, and
-    its torque on b, friction subtracted, `ratio` times as large. The voltage u is a function of time, or the output
-    of a controller of `controlled`: the speed omega, the angle (zero as placed, with all its turns), or the current.
+    omega is the angular velocity of b relative to a about `axis`. With a gear, the motor rotates `ratio` times as fast,
+    and its torque on b, minus friction, is multiplied by `ratio`. The voltage u is a function of time, or the output of
+    a controller for `controlled`: the speed omega, the angle (zero as assembled, counted through full turns) or the
+    current.
 
     Raises
     ------
     ModelError
-        For a missing supply, or both a voltage and a controller.
+        If neither or both of a voltage and a controller are given.
     """
 
     name: str
@@ -52,16 +54,16 @@ class DcMotor(Element):
     marker_b: Marker
     resistance: float  #: R [ohm]
     inductance: float  #: L [H]
-    constant: float  #: k, torque over current and voltage over speed [N m/A = V s/rad]
-    voltage: TimeFunction | float | None = None  #: u over time [V]
-    controller: Pid | None = None  #: of u, instead
-    controlled: str = "speed"  #: what the controller sees: "speed", "angle" or "current"
+    constant: float  #: k, torque divided by current, or voltage divided by speed [N m/A = V s/rad]
+    voltage: TimeFunction | float | None = None  #: u as a function of time [V]
+    controller: Pid | None = None  #: controller of u, instead of `voltage`
+    controlled: str = "speed"  #: quantity that the controller controls: "speed", "angle" or "current"
     axis: Array = Z_AXIS  #: in the axes of marker a, (3,)
-    ratio: float = 1.0  #: of the gear: speed of the motor over omega
+    ratio: float = 1.0  #: gear ratio, speed of the motor divided by omega
     friction: float = 0.0  #: dry friction of the motor [N m]
-    friction_speed: float = FRICTION_SPEED  #: w in friction ω/√(ω² + w²), ω of the motor [rad/s]
-    damping: float = 0.0  #: of the motor, torque over speed [N m s]
-    current: float = 0.0  #: at the start [A]
+    friction_speed: float = FRICTION_SPEED  #: w in friction ω/√(ω² + w²), with ω the speed of the motor [rad/s]
+    damping: float = 0.0  #: damping of the motor, torque divided by speed [N m s]
+    current: float = 0.0  #: initial current [A]
 
     def __post_init__(self) -> None:
         check_shaft(self)
@@ -86,7 +88,7 @@ class DcMotor(Element):
         ]
         states = [("current", "A", self.current)]
         if self.controller is None:
-            assert isinstance(self.voltage, TimeFunction)  # by __post_init__
+            assert isinstance(self.voltage, TimeFunction)  # ensured by __post_init__
             supply = function_numbers(self.voltage)
         else:
             supply = self.controller.numbers

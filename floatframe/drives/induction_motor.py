@@ -1,15 +1,15 @@
-"""A three-phase induction motor on a shaft: flux linkages of stator and rotor as states, in axes of the stator.
+"""A three-phase induction motor on a shaft, with flux linkages of stator and rotor as states, in stator axes.
 
-Space vectors a + j b (amplitude-invariant: as long as the peak of the phase quantities) of voltage u, currents i and
-flux linkages psi, p pole pairs, omega the mechanical speed of the rotor, currents and fluxes of the rotor seen from
-the stator:
+Space vectors a + j b (amplitude-invariant: their magnitude is the peak of the phase quantities) describe voltage u,
+currents i and flux linkages psi. p is the number of pole pairs and omega the mechanical speed of the rotor. Rotor
+currents and fluxes are referred to the stator:
 
     dpsi_s/dt = u - R_s i_s,    dpsi_r/dt = j p omega psi_r - R_r i_r,
     psi_s = L_s i_s + L_m i_r,  psi_r = L_m i_s + L_r i_r,    L_s = L_ls + L_m, L_r = L_lr + L_m,
     T = 3/2 p Im(conj(psi_s) i_s).
 
-The power 3/2 Re(u conj(i_s)) is 3/2 (R_s |i_s|² + R_r |i_r|²) + T omega and the rate of 3/4 Re(psi_s conj(i_s) +
-psi_r conj(i_r)).
+The input power 3/2 Re(u conj(i_s)) equals 3/2 (R_s |i_s|² + R_r |i_r|²) + T omega plus the rate of the magnetic energy
+3/4 Re(psi_s conj(i_s) + psi_r conj(i_r)).
 """
 
 from collections.abc import Sequence
@@ -45,36 +45,37 @@ FIRST_HARMONIC = 23
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class InductionMotor(Element):
-    """Torque on marker b (rotor) against marker a (stator) about an axis, by a supply of given frequency and amplitude.
+    """Torque on marker b (rotor) relative to marker a (stator) about an axis, for a supply frequency and amplitude.
 
-    The voltage is the peak value of a phase. Without it the amplitude follows the frequency (V/f): boost +
-    (rated_voltage - boost) |f|/rated_frequency, and rated_voltage above the rated frequency. A negative frequency
-    turns the field backwards. `harmonics` are added to the supply, each [order, amplitude over the fundamental]; an
-    inverter in six steps has [-5, 1/5], [7, -1/7], [-11, -1/11], [13, 1/13], a negative order turning backwards; an
-    unbalanced supply has the order -1.
+    The voltage is the peak value of a phase. Without it, the amplitude follows the frequency (V/f): boost +
+    (rated_voltage - boost) |f|/rated_frequency, and rated_voltage above the rated frequency. With a negative frequency
+    the field rotates backwards. `harmonics` are added to the supply, each as [order, amplitude relative to the
+    fundamental]; a negative order rotates backwards. A six-step inverter has [-5, 1/5], [7, -1/7], [-11, -1/11], [13,
+    1/13]; an unbalanced supply has the order -1.
 
-    A gear makes the motor turn `ratio` times as fast as b against a, its torque on b is `ratio` times as large.
+    With a gear, the motor rotates `ratio` times as fast as b relative to a, and its torque on b is multiplied by
+    `ratio`.
     """
 
     name: str
     marker_a: Marker
     marker_b: Marker
     stator_resistance: float  #: R_s [ohm]
-    rotor_resistance: float  #: R_r seen from the stator [ohm]
+    rotor_resistance: float  #: R_r referred to the stator [ohm]
     stator_leakage: float  #: L_ls [H]
-    rotor_leakage: float  #: L_lr seen from the stator [H]
+    rotor_leakage: float  #: L_lr referred to the stator [H]
     magnetizing: float  #: L_m [H]
     pole_pairs: int
-    frequency: TimeFunction | float  #: of the supply over time [Hz]
-    voltage: TimeFunction | float | None = None  #: peak of a phase over time [V]; None: by V/f
-    rated_voltage: float | None = None  #: peak of a phase, of V/f [V]
-    rated_frequency: float | None = None  #: of V/f [Hz]
-    boost: float = 0.0  #: amplitude at standstill, of V/f [V]
-    harmonics: Sequence[Sequence[float]] = ()  #: order and amplitude over the fundamental of each
+    frequency: TimeFunction | float  #: supply frequency as a function of time [Hz]
+    voltage: TimeFunction | float | None = None  #: phase peak as a function of time [V]; None: by V/f
+    rated_voltage: float | None = None  #: phase peak at the rated frequency, for V/f [V]
+    rated_frequency: float | None = None  #: for V/f [Hz]
+    boost: float = 0.0  #: amplitude at standstill, for V/f [V]
+    harmonics: Sequence[Sequence[float]] = ()  #: order, and amplitude relative to the fundamental, of each
     axis: Array = Z_AXIS  #: in the axes of marker a, (3,)
-    ratio: float = 1.0  #: of the gear: speed of the motor over that of b
-    damping: float = 0.0  #: of the motor, torque over speed [N m s]
-    fluxes: Sequence[float] = (0.0, 0.0, 0.0, 0.0)  #: at the start, stator a, b, rotor a, b [V s]
+    ratio: float = 1.0  #: gear ratio, speed of the motor divided by that of b
+    damping: float = 0.0  #: damping of the motor, torque divided by speed [N m s]
+    fluxes: Sequence[float] = (0.0, 0.0, 0.0, 0.0)  #: initial flux linkages: stator a, b, rotor a, b [V s]
 
     def __post_init__(self) -> None:
         where = f"element {self.name!r}"
@@ -101,8 +102,8 @@ class InductionMotor(Element):
         object.__setattr__(self, "fluxes", array_of_shape(f"{where}: fluxes", self.fluxes, (4,)))
 
     def frequencies(self, t: Array) -> Array:
-        """Return the highest frequency of the supply at times t, (n_t,): its own, or that of a harmonic [Hz]."""
-        assert isinstance(self.frequency, TimeFunction)  # by __post_init__
+        """Return the highest supply frequency at times t, (n_t,), including harmonics [Hz]."""
+        assert isinstance(self.frequency, TimeFunction)  # ensured by __post_init__
         orders = np.abs(np.asarray(self.harmonics)[:, 0])
         return np.abs(self.frequency.at(t)) * max([1.0, *orders])
 
@@ -112,7 +113,7 @@ class InductionMotor(Element):
         data = [self.stator_resistance, self.rotor_resistance, L_s, L_r, self.magnetizing, self.pole_pairs, self.ratio]
         data += [self.damping, self.rated_voltage or 0.0, self.rated_frequency or 0.0, self.boost]
         harmonics = np.asarray(self.harmonics)
-        assert isinstance(self.frequency, TimeFunction)  # by __post_init__
+        assert isinstance(self.frequency, TimeFunction)  # ensured by __post_init__
         at_frequency = FIRST_HARMONIC + harmonics.size
         frequency = function_numbers(self.frequency)
         amplitude = [] if self.voltage is None else function_numbers(self.voltage)  # type: ignore[arg-type]
@@ -149,7 +150,7 @@ class InductionMotor(Element):
 
 @njit
 def induction_motor_law(t, x, z, lam, data, wrench, z_dot, g, seen):
-    """Write the torque of a motor, the rates of its fluxes and its outputs, see the module docstring."""
+    """Write the torque of a motor, the rates of its fluxes, and its outputs; see the module docstring."""
     R_s, R_r, L_s, L_r, L_m, p, ratio = data[0], data[1], data[2], data[3], data[4], data[5], data[6]
     n_harmonics, at_frequency, at_amplitude = int(data[19]), int(data[20]), int(data[21])
     f = function_at(data, at_frequency, t)

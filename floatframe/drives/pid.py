@@ -1,4 +1,4 @@
-"""PID controllers that do not wind up, for drives: the numbers, and the law of their states."""
+"""PID controllers with anti-windup, for drives: their data, and the law of their states."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ __all__ = ["ANTI_WINDUP", "Pid", "pid_law", "target_of"]
 
 ANTI_WINDUP = ("none", "clamping", "back-calculation")
 NONE, CLAMPING, BACK_CALCULATION = range(3)
-BAND = 1e-3  #: of the range between the limits, over which clamping sets in
+BAND = 1e-3  #: width, relative to the range between the limits, over which clamping sets in
 PROPORTIONAL, INTEGRAL, DERIVATIVE, FILTER, LOW, HIGH, MODE, TRACKING, WIDTH, TARGET = range(10)
 
 
@@ -25,22 +25,23 @@ PROPORTIONAL, INTEGRAL, DERIVATIVE, FILTER, LOW, HIGH, MODE, TRACKING, WIDTH, TA
 class Pid:
     """u = kp e + I + kd d, limited, with e = target - value, dI/dt = ki e, and d the filtered rate of e.
 
-    d = (e - x)/filter_time with dx/dt = d. Beyond its limits the output would let I grow on (wind up):
+    d = (e - x)/filter_time with dx/dt = d. Without anti-windup, I would continue to grow while the output is limited:
 
-    - "clamping": I stands while the output is beyond a limit and e drives it further (faded over 1e-3 of the range);
+    - "clamping": I is constant while the output is beyond a limit and e drives it further (blended over 1e-3 of the
+      range);
     - "back-calculation": dI/dt = ki e + (u_limited - u)/tracking_time.
     """
 
-    target: TimeFunction | float  #: what the value should be, over time
+    target: TimeFunction | float  #: desired value, as a function of time
     kp: float
     ki: float = 0.0  #: [1/s times the unit of kp]
     kd: float = 0.0  #: [s times the unit of kp]
-    filter_time: float | None = None  #: of the rate of e; needed with kd [s]
-    lower: float | None = None  #: least output; None: no limit
-    upper: float | None = None  #: greatest output; None: no limit
+    filter_time: float | None = None  #: time constant of the filter of e; needed with kd [s]
+    lower: float | None = None  #: lower limit of the output; None: no limit
+    upper: float | None = None  #: upper limit of the output; None: no limit
     anti_windup: str = "clamping"
-    tracking_time: float | None = None  #: of back-calculation [s]
-    integral: float = 0.0  #: I at the start
+    tracking_time: float | None = None  #: time constant of back-calculation [s]
+    integral: float = 0.0  #: initial value of I
 
     def __post_init__(self) -> None:
         for key in ("kp", "ki", "kd", "integral"):
@@ -67,22 +68,22 @@ class Pid:
 
     @property
     def states(self) -> list[str]:
-        """Names of its states: I where there is ki, x where there is kd."""
+        """Names of its states: I if there is ki, x if there is kd."""
         return [name for name, factor in (("integral", self.ki), ("filtered error", self.kd)) if factor != 0]
 
     def start(self, value: float, seen: str, output: str) -> list[tuple[str, str, float]]:
-        """Return name, unit and start of each state, where the value is as given: no jump of the derivative.
+        """Return name, unit and initial value of each state at a given value, such that the derivative does not jump.
 
-        seen, output: units in SI of what it sees and of what it gives.
+        seen, output: SI units of the controlled value and of the output.
         """
-        assert isinstance(self.target, TimeFunction)  # by __post_init__
+        assert isinstance(self.target, TimeFunction)  # ensured by __post_init__
         starts = {"integral": (output, self.integral), "filtered error": (seen, self.target(0.0) - value)}
         return [(name, *starts[name]) for name in self.states]
 
     @property
     def numbers(self) -> list[float]:
-        """What `pid_law` reads."""
-        assert isinstance(self.target, TimeFunction)  # by __post_init__
+        """Data of `pid_law`."""
+        assert isinstance(self.target, TimeFunction)  # ensured by __post_init__
         huge = np.finfo(float).max
         limits = [-huge if self.lower is None else self.lower, huge if self.upper is None else self.upper]
         mode = ANTI_WINDUP.index(self.anti_windup) if self.lower is not None or self.upper is not None else NONE
@@ -94,7 +95,7 @@ class Pid:
 
 @register_jitable
 def margin(x, band):
-    """Return 0 at x <= 0 and 1 at x >= band, smoothly between."""
+    """Return 0 for x <= 0 and 1 for x >= band, smooth in between."""
     if x.real <= 0.0:
         return 0.0 * x
     if x.real >= band:
@@ -105,13 +106,13 @@ def margin(x, band):
 
 @register_jitable
 def target_of(t, data, at):
-    """Return the target of the controller in `data` from `at` on."""
+    """Return the target of the controller whose data begin at data[at]."""
     return function_at(data, at + TARGET, t)
 
 
 @register_jitable
 def pid_law(t, value, data, at, z, z_dot, first):
-    """Return the output of the controller in `data` from `at` on, and write the rates of its states from `first` on."""
+    """Return the output of the controller whose data begin at data[at]; write its state rates from index `first` on."""
     e = target_of(t, data, at) - value
     u = data[at + PROPORTIONAL] * e
     state = first

@@ -1,4 +1,4 @@
-"""A controller that acts by itself: a torque about an axis or a force along it, from angle, speed, distance or rate."""
+"""A PID controller that acts directly as a torque about an axis or a force along it."""
 
 from dataclasses import dataclass
 
@@ -20,17 +20,17 @@ __all__ = ["PidDrive"]
 CONTROLLED = ("angle", "speed", "distance", "rate")
 ANGLE, SPEED, DISTANCE, RATE = range(4)
 UNITS = ("rad", "rad/s", "m", "m/s")
-CONTROLLER = 12  #: where the controller begins in the data
+CONTROLLER = 12  #: index in the data of the controller
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class PidDrive(Element):
-    """The output of a PID controller as a torque about, or a force along, the axis of marker a, on b and back on a.
+    """The output of a PID controller as a torque about, or a force along, the axis of marker a, acting on b and on a.
 
-    `controlled`: "angle" (zero as placed, with all its turns) or "speed" about the axis, which get a torque;
-    "distance" of marker b along the axis from marker a or its "rate", which get a force. `time_constant`: the torque
-    or force follows the output of the controller with this lag.
+    `controlled` is "angle" (zero as assembled, counted through full turns) or "speed" about the axis, with a torque, or
+    "distance" of marker b from marker a along the axis or its "rate", with a force. With `time_constant`, the torque or
+    force follows the output of the controller with this lag.
     """
 
     name: str
@@ -39,7 +39,7 @@ class PidDrive(Element):
     controller: Pid
     controlled: str = "angle"
     axis: Array = Z_AXIS  #: in the axes of marker a, (3,)
-    time_constant: float = 0.0  #: of the actuator [s]
+    time_constant: float = 0.0  #: time constant of the actuator [s]
 
     def __post_init__(self) -> None:
         check_shaft(self)

@@ -1,4 +1,4 @@
-"""What drives on a shaft have in common: two markers, an axis, a gear ratio, and what a controller sees."""
+"""Functions shared by drives on a shaft: two markers, an axis, a gear ratio and a controller."""
 
 from typing import Any
 
@@ -29,7 +29,7 @@ def check_shaft(element: Any) -> None:
 def required(
     element: Any, *, above: tuple[str, ...] = (), at_least: tuple[str, ...] = (), real: tuple[str, ...] = ()
 ) -> None:
-    """Check numbers of a drive by their bounds; None passes."""
+    """Check numbers of a drive against their bounds; None is accepted."""
     where = f"element {element.name!r}"
     for keys, bounds in ((above, {"above": 0.0}), (at_least, {"at_least": 0.0}), (real, {})):
         for key in keys:
@@ -38,7 +38,7 @@ def required(
 
 
 def time_functions(element: Any, *keys: str) -> None:
-    """Make constants of those that are numbers; None stays."""
+    """Convert fields that are numbers to constant time functions; None is kept."""
     for key in keys:
         value = getattr(element, key)
         if value is not None and not isinstance(value, TimeFunction):
@@ -46,7 +46,7 @@ def time_functions(element: Any, *keys: str) -> None:
 
 
 def check_controller(element: Any, quantities: tuple[str, ...]) -> None:
-    """Check the controller of a drive and what it sees."""
+    """Check the controller of a drive and its controlled quantity."""
     where = f"element {element.name!r}"
     if not isinstance(element.controller, Pid | None):
         raise ModelError(f"{where}: controller: expected a Pid, got {element.controller!r}")
@@ -58,5 +58,5 @@ def check_controller(element: Any, quantities: tuple[str, ...]) -> None:
 
 
 def shaft_numbers(axis: Array, placed: Placed) -> list[float]:
-    """Return what `turns.turned_angle` reads: axis and normals of the shaft as placed, the rate 1/s of its state."""
+    """Return the data of `turns.turned_angle`: axis and normals of the assembled shaft, rate 1/s of its state."""
     return [*angle_numbers(axis, placed.A[0], placed.A[1]), placed.units.time]

@@ -1,4 +1,4 @@
-"""A wheel torque that holds a speed: C = K ((target - omega) - lambda domega/dt)."""
+"""A torque that controls the speed of a wheel: C = K ((target - omega) - lambda domega/dt)."""
 
 from dataclasses import dataclass
 
@@ -21,24 +21,24 @@ __all__ = ["SpeedControl"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class SpeedControl(Element):
-    """Torque C = K ((target - omega) - lambda domega/dt) on marker b against marker a about an axis.
+    """Torque C = K ((target - omega) - lambda domega/dt) on marker b relative to marker a about an axis.
 
-    omega is the angular velocity of b against a about `axis`. The rate of omega is seen through a filter of first
-    order, dx/dt = (omega - x)/filter_time, as (omega - x)/filter_time: what changes slowly against `filter_time` it
-    sees exactly, of omega = sin(w t) the rate is off by the factor 1/(1 + i w filter_time). The filter starts at
-    `speed`. Up to the filter, lambda acts as the moment of inertia K lambda on the axis.
+    omega is the angular velocity of b relative to a about `axis`. Its rate is obtained with a first-order filter, dx/dt
+    = (omega - x)/filter_time, as (omega - x)/filter_time. The result is exact for changes that are slow compared with
+    `filter_time`; for omega = sin(w t), it is wrong by the factor 1/(1 + i w filter_time). The filter starts at
+    `speed`. Apart from the filter, lambda acts like a moment of inertia K lambda on the axis.
     """
 
     name: str
     marker_a: Marker
     marker_b: Marker
-    target: TimeFunction | float  #: of omega over time [rad/s]
+    target: TimeFunction | float  #: desired omega as a function of time [rad/s]
     gain: float  #: K [N m s]
     rate_time: float = 0.0  #: lambda [s]
-    filter_time: float | None = None  #: needed with lambda; a tenth of it or less is usual [s]
+    filter_time: float | None = None  #: time constant of the filter, needed with lambda; at most lambda/10 is usual [s]
     axis: Array = Z_AXIS  #: in the axes of marker a, (3,)
-    limit: float | None = None  #: most torque, either way [N m]; None: none
-    speed: float = 0.0  #: omega at the start, where the filter begins [rad/s]
+    limit: float | None = None  #: largest torque in both directions [N m]; None: no limit
+    speed: float = 0.0  #: initial omega, at which the filter starts [rad/s]
 
     def __post_init__(self) -> None:
         check_shaft(self)
@@ -52,7 +52,7 @@ class SpeedControl(Element):
 
     def law(self, placed: Placed) -> ElementLaw:
         """Return the law of the control."""
-        assert isinstance(self.target, TimeFunction)  # by __post_init__
+        assert isinstance(self.target, TimeFunction)  # ensured by __post_init__
         has_state = self.rate_time > 0
         outputs = (("torque", "N m"), ("speed", "rad/s"), ("target", "rad/s"), ("power in", "W"))
         data = [self.gain, self.rate_time, self.filter_time or 0.0, self.limit or 0.0, *self.axis]

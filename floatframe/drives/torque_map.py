@@ -1,4 +1,4 @@
-"""A motor or engine by its map: torque over speed and throttle, efficiency over speed and torque."""
+"""A motor or engine described by maps: torque over speed and throttle, efficiency over speed and torque."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,26 +29,26 @@ OUTPUTS = (
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class TorqueMap(Element):
-    """Torque by a map over the speed of the motor and the throttle, bilinear, held beyond its edges.
+    """Torque from a map over the speed of the motor and the throttle, bilinear and constant beyond its edges.
 
-    The throttle is a function of time or the output of a controller of the speed of marker b against marker a about
-    `axis`. A gear makes the motor turn `ratio` times as fast, its torque on b is `ratio` times as large. The torque
-    follows the map with a lag of first order where `time_constant` is given. With an efficiency map eta the power in
-    is T omega/eta where the motor drives, and T omega eta where it brakes.
+    The throttle is a function of time, or the output of a controller of the speed of marker b relative to marker a
+    about `axis`. With a gear, the motor rotates `ratio` times as fast, and its torque on b is multiplied by `ratio`.
+    With `time_constant`, the torque follows the map with a first-order lag. With an efficiency map eta, the input power
+    is T omega/eta if the motor drives and T omega eta if it brakes.
     """
 
     name: str
     marker_a: Marker
     marker_b: Marker
-    speeds: Sequence[float]  #: of the motor, rising [rad/s]
-    throttles: Sequence[float]  #: rising
+    speeds: Sequence[float]  #: speeds of the motor, increasing [rad/s]
+    throttles: Sequence[float]  #: increasing
     torques: Sequence[Sequence[float]]  #: one row for each speed, one column for each throttle [N m]
-    throttle: TimeFunction | float | None = None  #: over time
-    controller: Pid | None = None  #: of the throttle, instead; it sees the speed of b
-    time_constant: float = 0.0  #: of the torque [s]
-    ratio: float = 1.0  #: of the gear: speed of the motor over that of b
+    throttle: TimeFunction | float | None = None  #: function of time
+    controller: Pid | None = None  #: controller of the throttle from the speed of b, instead of `throttle`
+    time_constant: float = 0.0  #: lag of the torque [s]
+    ratio: float = 1.0  #: gear ratio, speed of the motor divided by that of b
     axis: Array = Z_AXIS  #: in the axes of marker a, (3,)
-    efficiency_torques: Sequence[float] | None = None  #: rising, sizes of the torque of the motor [N m]
+    efficiency_torques: Sequence[float] | None = None  #: magnitudes of the motor torque, increasing [N m]
     efficiencies: Sequence[Sequence[float]] | None = None  #: one row for each of `speeds`, one column for each torque
     controlled: str = "speed"
 
@@ -68,7 +68,7 @@ class TorqueMap(Element):
         self.maps()
 
     def maps(self) -> tuple[list[float], list[float]]:
-        """Return the numbers of both maps; that of the efficiency is empty if there is none."""
+        """Return the data of both maps; the second is empty if there is no efficiency map."""
         where = f"element {self.name!r}"
         torque = grid_numbers(f"{where}: torques over speeds and throttles", self.speeds, self.throttles, self.torques)
         if self.efficiencies is None or self.efficiency_torques is None:
@@ -92,7 +92,7 @@ class TorqueMap(Element):
         torque, efficiency = self.maps()
         at = 11
         if self.controller is None:
-            assert isinstance(self.throttle, TimeFunction)  # by __post_init__
+            assert isinstance(self.throttle, TimeFunction)  # ensured by __post_init__
             supply = function_numbers(self.throttle)
         else:
             supply = self.controller.numbers
@@ -119,7 +119,7 @@ class TorqueMap(Element):
 
 @njit
 def torque_map_law(t, x, z, lam, data, wrench, z_dot, g, seen):
-    """Write the torque of a map, the rates of its states and its outputs."""
+    """Write the torque from a map, the rates of its states, and its outputs."""
     ratio, lag = data[0], data[1]
     at, at_efficiency, at_supply = int(data[6]), int(data[7]), int(data[8])
     e = direction_of(x, 0, data, 3)

@@ -1,11 +1,12 @@
-"""Functions of one number and grids over two, written into the data of a law and evaluated there.
+"""Functions of one variable and grids over two, stored in the data of a law and evaluated there.
 
-An element writes them where it makes its law, and keeps where they begin:
+An element writes them when it makes its law, and keeps the index where they begin:
 
     at = len(data)
     data += function_numbers(smooth_step(0.0, 1.0, 0.0, 5.0))
 
-and the law asks `function_at(data, at, t)`. They take real and complex numbers, called from compiled functions and from
+and the law evaluates `function_at(data, at, t)`. The functions accept real and complex numbers, and can be called from
+compiled functions and from Python.
 Python alike.
 """
 
@@ -23,7 +24,7 @@ __all__ = ["function_at", "function_integral_at", "function_numbers", "grid_at",
 
 
 def function_numbers(function: TimeFunction) -> list[float]:
-    """Return n, n beginnings of pieces, n integrals from the first beginning to theirs, n rows of coefficients."""
+    """Return n, n beginnings of pieces, n integrals up to these beginnings, and n rows of coefficients."""
     begins, pieces = function.begins, function.pieces
     lengths = np.diff(begins)
     parts = [piece_integral(c, length) for c, length in zip(pieces[:-1], lengths, strict=True)]
@@ -32,7 +33,7 @@ def function_numbers(function: TimeFunction) -> list[float]:
 
 
 def piece_integral(c: Array, x: float) -> float:
-    """Return the integral of a piece from its beginning to x after it."""
+    """Return the integral of a piece from its beginning to a distance x after it."""
     value = sum(c[k] * x ** (k + 1) / (k + 1) for k in range(6))
     if c[6] != 0.0:
         omega, phase = c[7], c[8]
@@ -42,7 +43,7 @@ def piece_integral(c: Array, x: float) -> float:
 
 @register_jitable
 def piece_of(data, at, x):
-    """Return the number of the piece that holds at x: the last that begins at or before it, or the first."""
+    """Return the index of the piece that is valid at x: the last that begins at or before x, else the first."""
     low, high = 0, int(data[at]) - 1
     while low < high:
         middle = (low + high + 1) // 2
@@ -55,7 +56,7 @@ def piece_of(data, at, x):
 
 @register_jitable
 def function_at(data, at, x):
-    """Return the value at x of the function that stands in `data` from `at` on."""
+    """Return the value at x of the function that begins at data[at]."""
     n, k = int(data[at]), piece_of(data, at, x)
     y, c = x - data[at + 1 + k], at + 1 + 2 * n + 9 * k
     value = 0.0 * y
@@ -68,7 +69,7 @@ def function_at(data, at, x):
 
 @register_jitable
 def function_integral_at(data, at, x):
-    """Return the integral from where its first piece begins to x of the function that stands in `data` from `at` on."""
+    """Return the integral, from the beginning of the first piece to x, of the function that begins at data[at]."""
     n, k = int(data[at]), piece_of(data, at, x)
     y, c = x - data[at + 1 + k], at + 1 + 2 * n + 9 * k
     value = 0.0 * y
@@ -84,12 +85,12 @@ def function_integral_at(data, at, x):
 
 
 def grid_numbers(where: str, x: Sequence[float], y: Sequence[float], values: Sequence[Sequence[float]]) -> list[float]:
-    """Return n_x, n_y, x, y and the values over them, row by row; `ModelError` naming `where` if they do not fit.
+    """Return n_x, n_y, x, y and the values row by row; `ModelError` with `where` if they are inconsistent.
 
     Parameters
     ----------
     x, y
-        Rising, two or more of each.
+        Increasing, two or more of each.
     values
         One row for each x, one column for each y, (n_x, n_y).
     """
@@ -105,7 +106,7 @@ def grid_numbers(where: str, x: Sequence[float], y: Sequence[float], values: Seq
 
 @register_jitable
 def interval_of(data, at, n, x):
-    """Return the number of the interval of n rising numbers from `at` on that holds x, the nearest if none does."""
+    """Return the index of the interval that contains x, of n increasing numbers from data[at] on; else the nearest."""
     low, high = 0, n - 2
     while low < high:
         middle = (low + high + 1) // 2
@@ -118,7 +119,7 @@ def interval_of(data, at, n, x):
 
 @register_jitable
 def part_of(data, at, x):
-    """Return where x is between the numbers at `at` and after it, 0 and 1 at the ends and beyond."""
+    """Return the position of x between data[at] and data[at + 1] as a fraction, clamped to 0 .. 1."""
     part = (x - data[at]) / (data[at + 1] - data[at])
     if part.real < 0.0:
         return 0.0 * part
@@ -129,7 +130,7 @@ def part_of(data, at, x):
 
 @register_jitable
 def grid_at(data, at, x, y):
-    """Return the value at (x, y) of the grid that stands in `data` from `at` on: bilinear, held beyond its edges."""
+    """Return the value at (x, y) of the grid that begins at data[at]: bilinear, constant beyond its edges."""
     n_x, n_y = int(data[at]), int(data[at + 1])
     at_x, at_y = at + 2, at + 2 + n_x
     i, j = interval_of(data, at_x, n_x, x), interval_of(data, at_y, n_y, y)

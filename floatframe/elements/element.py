@@ -1,16 +1,17 @@
-"""What an element is: markers, and a law that gives wrenches, rates of states and what is held from their motion.
+"""The element interface: markers, and a law that computes wrenches, state rates and constraints from their motion.
 
 The function of a law, with n markers, n_z states and n_lam multipliers,
 
     function(t, x, z, lam, data, wrench, z_dot, g, seen)
 
-reads the time, x (n, 18), each marker's position (3), axes (9, row by row: A[i, j] = x[3 + 3 i + j], the columns are
-its axes), velocity (3) and angular velocity (3), all in ground axes, the states z, the multipliers lam and the numbers
-`data` of the element. It writes wrench (n, 6), force and moment about the marker's origin on the body of each marker,
-ground axes; z_dot (n_z,); g (n_lam,), which is to be zero; seen (n_outputs,). All that it writes is zero before.
+reads the time t; x, (n, 18), with the position (3), axes (9, row by row: A[i, j] = x[3 + 3 i + j], with the axes as
+columns), velocity (3) and angular velocity (3) of each marker, all in ground axes; the states z; the multipliers lam;
+and the numbers `data` of the element. It writes wrench, (n, 6), the force and the moment about the marker's origin on
+the body of each marker, in ground axes; z_dot, (n_z,); g, (n_lam,), which is to be zero; and seen, (n_outputs,), the
+outputs. All output arrays are zero before the call.
 
-Made by `numba.njit` it runs at the speed of the kernels, a plain Python function slowly. It must depend on its
-arguments alone: it is called several times a step, also for motions that are not reached in the end.
+Compiled with `numba.njit`, the function runs at the speed of the kernels; a Python function is slow. It must depend
+only on its arguments, because it is called several times per step, also for motions that are discarded.
 """
 
 import math
@@ -34,24 +35,25 @@ __all__ = [
 ]  # fmt: skip
 
 TANGENTS = ("differences", "complex")
-ACTS = {"wrench": (0, 1, 2, 3, 4, 5), "force": (0, 1, 2), "moment": (3, 4, 5), "none": ()}  #: parts of a wrench
+#: components of a wrench that act
+ACTS = {"wrench": (0, 1, 2, 3, 4, 5), "force": (0, 1, 2), "moment": (3, 4, 5), "none": ()}
 
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """The markers of an element as the bodies are placed, ground axes."""
+    """The markers of an element in the assembled configuration, in ground axes."""
 
     r: Array  #: (n, 3) [m]
     A: Array  #: axes as columns, (n, 3, 3)
-    on_ground: tuple[bool, ...]  #: of each marker
+    on_ground: tuple[bool, ...]  #: whether each marker is on the ground
     units: Units  #: of the system
 
 
 @dataclass(frozen=True)
 class GapSpring:
-    """The spring k xⁿ of a contact, x its depth."""
+    """The spring k xⁿ of a contact with depth x."""
 
-    stiffness: float  #: k [N/mⁿ], of an angle [N m/radⁿ]
+    stiffness: float  #: k [N/mⁿ], for an angle [N m/radⁿ]
     exponent: float = 1.0  #: n
 
     def __post_init__(self) -> None:
@@ -62,51 +64,55 @@ class GapSpring:
 @frozen_copies
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ElementLaw:
-    """What an element brings to the equations of motion; see the module docstring for its function.
+    """The contribution of an element to the equations of motion; its function is described in the module docstring.
 
     Raises
     ------
     ModelError
-        If names, units and starts do not fit together.
+        If names, units and initial values are inconsistent.
     """
 
     function: Callable[..., None]
-    data: Array | Sequence[float] = ()  #: all numbers, tables and grids of the element, flat
+    data: Array | Sequence[float] = ()  #: all numbers, tables and grids of the element, in one flat array
     states: Sequence[str] = ()
-    start: Sequence[float] = ()  #: values of the states
+    start: Sequence[float] = ()  #: initial values of the states
     state_units: Sequence[str] = ()
-    state_sizes: Sequence[float] = ()  #: typical sizes, by which convergence is measured; default: from the values
-    multipliers: Sequence[str] = ()  #: unknowns lam with the equations 0 = g
+    state_sizes: Sequence[float] = ()  #: typical magnitudes, by which convergence is measured; default: from the values
+    multipliers: Sequence[str] = ()  #: names of the unknowns lam, with the equations g = 0
     multiplier_units: Sequence[str] = ()
-    multiplier_sizes: Sequence[float] = ()  #: typical sizes of those that hold nothing, as `state_sizes`
-    holds: Sequence[int] = ()  #: of each: POSITION, VELOCITY or NOTHING
-    held_units: Sequence[str] = ()  #: of g; default "m", or "m/s" of a velocity; "rad" and "1" are measured as angles
-    outputs: Sequence[str] = ()  #: what sensors and reports may ask for
+    multiplier_sizes: Sequence[float] = ()  #: typical magnitudes of multipliers that hold nothing, as `state_sizes`
+    holds: Sequence[int] = ()  #: for each multiplier: POSITION, VELOCITY or NOTHING
+    #: units of g; default "m", or "m/s" for a velocity; "rad" and "1" are measured as angles
+    held_units: Sequence[str] = ()
+    outputs: Sequence[str] = ()  #: names of quantities that sensors and reports can read
     output_units: Sequence[str] = ()
-    off: Callable[..., None] | None = None  #: what it does while events have it off; default: nothing
+    #: function used while events have switched the element off; default: it does nothing
+    off: Callable[..., None] | None = None
     #: derivatives: "differences" (central), "complex" (a step along the imaginary axis: exact, see
     #: `floatframe.elements.smooth`), or tangent(t, x, z, lam, data, slopes), which writes d(wrench, z_dot, g) by dr,
     #: dphi, dv, domega of each marker (3 each, ground axes), z and lam, into slopes (6 n + n_z + n_lam,
     #: 12 n + n_z + n_lam)
     tangent: Callable[..., None] | str = "differences"
-    rest: Callable[..., None] | None = None  #: what statics take instead of `function`; default: the same
-    acts: Sequence[str] | None = None  #: on each marker: "wrench" (default), "force", "moment" or "none"
-    is_opposite: bool = False  #: of two markers: the force on the second is minus that on the first
-    length: float | None = None  #: over which the law changes [m]; default: the size of its smallest body
-    #: over which it changes by the time alone and with velocities [s], `math.inf` if the time does not enter; default:
+    rest: Callable[..., None] | None = None  #: function used in statics instead of `function`; default: the same
+    acts: Sequence[str] | None = None  #: load on each marker: "wrench" (default), "force", "moment" or "none"
+    is_opposite: bool = False  #: for two markers: whether the force on the second is the negative of that on the first
+    length: float | None = None  #: length scale on which the law changes [m]; default: the size of its smallest body
+    #: time scale on which it changes with time alone and with velocities [s]; `math.inf` if time does not enter;
+    #: default: unknown
     #: not known
     time: float | None = None
     accelerations: bool = False  #: whether accelerations are inputs
-    energy: str | None = None  #: output that is the energy it stores
-    power_in: str | None = None  #: output that is the power it gives to the system from outside
-    power_lost: str | None = None  #: output that is the power it takes from the system
-    #: outputs that end a run where they are above zero after a step, with what is then said
+    energy: str | None = None  #: name of the output that is the stored energy
+    power_in: str | None = None  #: name of the output that is the power supplied to the system from outside
+    power_lost: str | None = None  #: name of the output that is the power dissipated
+    #: outputs that end a run if they are above zero after a step, each with the message of the run
     stops: Mapping[str, str] = field(default_factory=dict)
-    knots: Sequence[float] = ()  #: times at which the law jumps, where steps of a run end [s]
-    #: outputs at whose zeros the law jumps with its motion. For each of them the engine adds its sign at the end of
-    #: `data`: 1 or -1, which stands still in a step; 0 outside of runs, where the law takes the sign of its own value
+    knots: Sequence[float] = ()  #: times at which the law jumps, and steps of a run end [s]
+    #: outputs at whose zeros the law jumps during the motion. For each, the engine appends a sign to `data`: 1 or -1,
+    #: constant within a step; 0 outside of runs, where the law uses the sign of its own value
     switches: Sequence[str] = ()
-    #: outputs that are gaps, below zero minus the depth of a contact, with the spring of it: steps become short near it
+    #: outputs that are gaps (below zero: minus the depth of a contact), with the contact spring; steps become short
+    #: near it
     gaps: Mapping[str, GapSpring] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -162,7 +168,7 @@ class ElementLaw:
             object.__setattr__(self, "time", number("law: time", self.time, above=0.0))
 
     def _held(self) -> None:
-        """Check what the multipliers hold."""
+        """Check the entries of `holds`."""
         holds = tuple(self.holds) or (POSITION,) * len(self.multipliers)
         require_length("holds", holds, "multipliers", self.multipliers)
         if any(each not in (NOTHING, POSITION, VELOCITY) for each in holds):
@@ -174,7 +180,7 @@ class ElementLaw:
 
 
 def require_names(where: str, names: Sequence[str]) -> None:
-    """Raise `ModelError` unless all names are words that differ."""
+    """Raise `ModelError` unless all names are distinct words."""
     if isinstance(names, str) or any(not isinstance(name, str) or not name.strip() for name in names):
         raise ModelError(f"law: {where}: expected names, got {names!r}")
     if len(set(names)) < len(names):
@@ -188,10 +194,10 @@ def require_length(where: str, values: Sequence[Any], names: str, named: Sequenc
 
 
 class Element:
-    """The description of an element: frozen dataclasses of users derive from it.
+    """Base class of elements; users derive frozen dataclasses from it.
 
-    The fields are the keys of the system file; `name` comes first. Markers are all fields that hold one, or a sequence
-    of them, in the order of the fields, unless `markers` says otherwise.
+    The fields are the keys of the system file; `name` comes first. The markers are all fields that contain a marker or
+    a sequence of markers, in the order of the fields, unless `markers` is overridden.
     """
 
     name: str
@@ -200,26 +206,26 @@ class Element:
 
         @property
         def markers(self) -> Sequence[Marker]:
-            """The markers it connects, on bodies or the ground."""
+            """The markers that the element connects, on bodies or the ground."""
 
     def law(self, placed: Placed) -> ElementLaw:
-        """Return the law of the element between its markers as they are placed."""
+        """Return the law of the element, for the markers in the assembled configuration."""
         raise ModelError(f"{type(self).__name__}: expected a method law(placed) that returns an ElementLaw")
 
     def events(self) -> Sequence[Any]:
-        """Return the events that the element brings with it, `floatframe.Event` on "NAME.OUTPUT"; none by default.
+        """Return the events of the element, as `floatframe.Event` on "NAME.OUTPUT"; none by default.
 
-        What they watch is measured after blocks of steps, in Python; `ElementLaw.stops` costs nothing.
+        Events are evaluated after blocks of steps, in Python; `ElementLaw.stops` has no such cost.
         """
         return ()
 
     def drawn(self) -> Sequence[Drawn | Stretched | Arrow]:
-        """Return what is seen of it in films and pages, fixed to its markers; nothing, unless it says so."""
+        """Return the shapes, fixed to its markers, by which it is drawn in films and pages; by default none."""
         return ()
 
 
 def markers_of(element: Element) -> tuple[Marker, ...]:
-    """Return the markers of an element in their order; `ModelError` if there are none."""
+    """Return the markers of an element, in order; `ModelError` if there are none."""
     where = f"element {element.name!r}"
     given = getattr(element, "markers", None)
     if given is None:
@@ -230,12 +236,12 @@ def markers_of(element: Element) -> tuple[Marker, ...]:
 
 
 def fields_of(element: Any) -> list[Any]:
-    """Return the values of the fields of a dataclass, nothing of another class."""
+    """Return the values of the fields of a dataclass; an empty list for other classes."""
     return [getattr(element, each.name) for each in fields(element)] if is_dataclass(element) else []
 
 
 def markers_in(value: Any) -> list[Marker]:
-    """Return a marker, or those of a sequence that holds nothing else."""
+    """Return a marker, or those of a sequence that contains only markers, as a list."""
     if isinstance(value, Marker):
         return [value]
     is_list = isinstance(value, list | tuple) and all(isinstance(one, Marker) for one in value)

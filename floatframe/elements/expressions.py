@@ -1,13 +1,13 @@
-"""An element of expressions: forces and moments between markers, states and outputs, written down in a system file.
+"""An element defined by expressions in a system file: forces and moments between markers, states and outputs.
 
-Quantities of each marker but the first, `b` say, in the axes of the first:
+Quantities of each marker except the first, in the axes of the first; for a marker b:
 
-    b_x, b_y, b_z       its place seen from the first       b_vx, b_vy, b_vz    its velocity as the first sees it
-    b_rx, b_ry, b_rz    its rotation vector                 b_wx, b_wy, b_wz    its angular velocity against it
+    b_x, b_y, b_z       its position relative to it     b_vx, b_vy, b_vz    its velocity relative to it
+    b_rx, b_ry, b_rz    its rotation vector             b_wx, b_wy, b_wz    its angular velocity relative to it
 
-besides the time t, the states by their names, parameters, functions of one number, and terms: expressions with names,
-made of what is known and the terms before. Forces b_Fx, b_Fy, b_Fz act at b, moments b_Mx, b_My, b_Mz on it; the first
-marker takes the opposite, with the moment of the arm.
+Further names in expressions are the time t, states, parameters, functions of one variable, and terms (named expressions
+of all these and of earlier terms). Forces b_Fx, b_Fy, b_Fz act at b and moments b_Mx, b_My, b_Mz on it. The opposite
+loads act on the first marker, including the moment of the lever arm.
 """
 
 from collections.abc import Mapping
@@ -33,8 +33,8 @@ from floatframe.functions.time_switches import OfTime, TimeParts, time_parts
 __all__ = ["ExpressionElement"]
 
 SEEN = ("x", "y", "z", "rx", "ry", "rz", "vx", "vy", "vz", "wx", "wy", "wz")  #: quantities of a marker
-GIVEN = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")  #: what acts on it
-SMALL = 1e-4  #: squared sine of an angle below which its series serves
+GIVEN = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")  #: loads on a marker
+SMALL = 1e-4  #: squared sine of an angle below which its series is used
 
 
 @register_jitable
@@ -49,14 +49,14 @@ def in_axes_of_first(x, v):
 
 @register_jitable
 def write_rotation(x, m, out, o):
-    """Write the rotation vector of marker m against the first, in axes of both, shorter than pi."""
+    """Write the rotation vector of marker m relative to the first, in axes of both, shorter than pi."""
     c0 = in_axes_of_first(x, (x[m, 3], x[m, 6], x[m, 9]))
     c1 = in_axes_of_first(x, (x[m, 4], x[m, 7], x[m, 10]))
     c2 = in_axes_of_first(x, (x[m, 5], x[m, 8], x[m, 11]))
     s0, s1, s2 = 0.5 * (c1[2] - c2[1]), 0.5 * (c2[0] - c0[2]), 0.5 * (c0[1] - c1[0])  # sin n
     cos = 0.5 * (c0[0] + c1[1] + c2[2] - 1.0)
     square = s0 * s0 + s1 * s1 + s2 * s2
-    if square.real < SMALL and cos.real > 0.0:  # angle by its sine
+    if square.real < SMALL and cos.real > 0.0:  # angle from its sine
         by_sine = 1.0 + square * (1 / 6 + square * (3 / 40 + square * (15 / 336 + square * 105 / 3456)))
     else:
         sine = np.sqrt(square)
@@ -82,7 +82,7 @@ def write_quantities(x, m, out, o):
 
 @njit
 def expression_law(t, x, z, lam, data, wrench, z_dot, g, seen):
-    """Evaluate all expressions; data: most operations of one, number of terms, where tapes begin (-1: none), tapes."""
+    """Evaluate all expressions; data: largest number of operations, number of terms, indices of tapes (or -1), tapes."""
     n, n_z, n_terms = x.shape[0], z.shape[0], int(data[1])
     n_inputs = 1 + 12 * (n - 1) + n_z
     inputs = np.empty(n_inputs + n_terms, x.dtype)
@@ -101,7 +101,7 @@ def expression_law(t, x, z, lam, data, wrench, z_dot, g, seen):
             if data[at + k] >= 0.0:
                 f[k] = tape_at(data, int(data[at + k]), inputs, results)
         at += 6
-        for k in range(3):  # into ground axes
+        for k in range(3):  # to ground axes
             row = 3 + 3 * k
             for part in range(0, 6, 3):
                 value = x[0, row] * f[part] + x[0, row + 1] * f[part + 1] + x[0, row + 2] * f[part + 2]
@@ -120,20 +120,20 @@ def expression_law(t, x, z, lam, data, wrench, z_dot, g, seen):
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ExpressionElement(Element):
-    """Forces, states and outputs as expressions of the motion of markers against the first; see the module."""
+    """Forces, states and outputs as expressions of the motion of markers relative to the first; see the module."""
 
     name: str
-    places: Mapping[str, Marker]  #: markers by the names that expressions use
-    forces: Mapping[str, str] = field(default_factory=dict)  #: expressions of b_Fx, ..., b_Mz
-    states: Mapping[str, float] = field(default_factory=dict)  #: values at the start
-    rates: Mapping[str, str] = field(default_factory=dict)  #: expressions of the rates of the states
-    terms: Mapping[str, str] = field(default_factory=dict)  #: expressions that the others, and later terms, name
-    outputs: Mapping[str, str] = field(default_factory=dict)  #: expressions of what is seen
+    places: Mapping[str, Marker]  #: markers, by their names in expressions
+    forces: Mapping[str, str] = field(default_factory=dict)  #: expressions for b_Fx, ..., b_Mz
+    states: Mapping[str, float] = field(default_factory=dict)  #: initial values of the states
+    rates: Mapping[str, str] = field(default_factory=dict)  #: expressions for the rates of the states
+    terms: Mapping[str, str] = field(default_factory=dict)  #: expressions that others, and later terms, use by name
+    outputs: Mapping[str, str] = field(default_factory=dict)  #: expressions for the outputs
     output_units: Mapping[str, str] = field(default_factory=dict)
     parameters: Mapping[str, float] = field(default_factory=dict)
-    functions: Mapping[str, TimeFunction] = field(default_factory=dict, metadata=NOT_OF_TIME)  #: of one number
-    energy: str | None = None  #: output that is the energy it stores
-    power_lost: str | None = None  #: output that is the power it takes
+    functions: Mapping[str, TimeFunction] = field(default_factory=dict, metadata=NOT_OF_TIME)  #: of one variable
+    energy: str | None = None  #: name of the output that is the stored energy
+    power_lost: str | None = None  #: name of the output that is the dissipated power
 
     def __post_init__(self) -> None:
         where = f"element {self.name!r}"
@@ -158,17 +158,17 @@ class ExpressionElement(Element):
 
     @property
     def markers(self) -> tuple[Marker, ...]:
-        """The markers in their order."""
+        """The markers, in order."""
         return tuple(self.places.values())
 
     @property
     def inputs(self) -> list[str]:
-        """Names of the numbers that expressions are made of, in their order."""
+        """Names of the inputs of expressions, in order."""
         seen = [f"{place}_{each}" for place in list(self.places)[1:] for each in SEEN]
         return ["t", *seen, *self.states]
 
     def parts_of_time(self) -> TimeParts:
-        """Return what of the expressions depends on time alone; terms may be functions of time."""
+        """Return the parts of the expressions that depend only on time; terms may be functions of time."""
         parts = TimeParts()
         numbers, known = {key: k for k, key in enumerate(self.functions)}, self.inputs
         of_time: dict[int, OfTime] = {0: np.asarray}
@@ -184,7 +184,7 @@ class ExpressionElement(Element):
         return parts
 
     def law(self, placed: Placed) -> ElementLaw:
-        """Return the law: tapes and functions in its data."""
+        """Return the law, with tapes and functions in its data."""
         forces = [f"{place}_{each}" for place in list(self.places)[1:] for each in GIVEN]
         texts: list[tuple[str, str, str | None]] = [("terms", key, text) for key, text in self.terms.items()]
         texts += [("forces", key, self.forces.get(key)) for key in forces]

@@ -1,4 +1,4 @@
-"""An element whose switching functions have signs that stand still, as in a step of a run."""
+"""An element whose switching functions have constant signs, as within a step of a run."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,7 +12,7 @@ __all__ = ["HeldSigns"]
 
 @dataclass(frozen=True, eq=False)
 class HeldSigns(Element):
-    """An element in the place of another, with the same markers and unknowns, whose law takes the given signs."""
+    """Replaces an element, with the same markers and unknowns; its law uses given signs."""
 
     element: Element
     signs: Sequence[int]  #: of its switching functions, 1 or -1
@@ -39,5 +39,5 @@ class HeldSigns(Element):
         return self.element.events()
 
     def drawn(self) -> Any:
-        """Return what is seen of it."""
+        """Return its shapes."""
         return self.element.drawn()

@@ -1,7 +1,7 @@
-"""The motion of two markers against each other, and forces between them that balance, for laws of elements.
+"""Relative motion of two markers, and opposite forces between them, for laws of elements.
 
-x is the motion of all markers as laws get it, a and b are numbers of markers, e is a unit vector in ground axes. They
-take real and complex numbers, called from compiled functions and from Python alike.
+x is the motion of all markers as passed to laws, a and b are indices of markers, and e is a unit vector in ground axes.
+The functions accept real and complex numbers, and can be called from compiled functions and from Python.
 """
 
 import math
@@ -26,7 +26,7 @@ __all__ = [
 
 @register_jitable
 def direction_of(x, a, data, at):
-    """Return the direction whose components in the axes of marker a stand in `data` from `at` on, in ground axes."""
+    """Return in ground axes the direction whose components in the axes of marker a begin at data[at]."""
     c0, c1, c2 = data[at], data[at + 1], data[at + 2]
     return (
         x[a, 3] * c0 + x[a, 4] * c1 + x[a, 5] * c2,
@@ -37,25 +37,25 @@ def direction_of(x, a, data, at):
 
 @register_jitable
 def inner_product(a, b):
-    """Return a · b of two vectors of three."""
+    """Return a · b for vectors of length 3."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @register_jitable
 def vector_product(a, b):
-    """Return a x b of two vectors of three."""
+    """Return a x b for vectors of length 3."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @register_jitable
 def turning_speed(x, a, b, e):
-    """Return the angular velocity of marker b against marker a about e [rad/s]."""
+    """Return the angular velocity of marker b relative to marker a about e [rad/s]."""
     return e[0] * (x[b, 15] - x[a, 15]) + e[1] * (x[b, 16] - x[a, 16]) + e[2] * (x[b, 17] - x[a, 17])
 
 
 @register_jitable
 def add_torque(wrench, a, b, torque, e):
-    """Add a torque about e on marker b and its opposite on marker a."""
+    """Add a torque about e on marker b, and the opposite torque on marker a."""
     for k in range(3):
         wrench[b, 3 + k] += torque * e[k]
         wrench[a, 3 + k] -= torque * e[k]
@@ -63,7 +63,7 @@ def add_torque(wrench, a, b, torque, e):
 
 @register_jitable
 def line_between(x, a, b):
-    """Return the distance from marker a to marker b, its rate, and its direction."""
+    """Return the distance from marker a to marker b, its rate and its direction."""
     d = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
     length = np.sqrt(inner_product(d, d))
     e = d[0] / length, d[1] / length, d[2] / length
@@ -72,7 +72,7 @@ def line_between(x, a, b):
 
 @register_jitable
 def axial_motion(x, a, b, e):
-    """Return the distance of marker b from marker a along e, a direction that turns with marker a, and its rate."""
+    """Return the distance of marker b from marker a along e, a direction that rotates with marker a, and its rate."""
     d = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
     v = x[b, 12] - x[a, 12], x[b, 13] - x[a, 13], x[b, 14] - x[a, 14]
     turned = vector_product((x[a, 15], x[a, 16], x[a, 17]), e)
@@ -81,7 +81,7 @@ def axial_motion(x, a, b, e):
 
 @register_jitable
 def add_axial_force(wrench, x, a, b, force, e):
-    """Add a force along e at the place of marker b, on the body of b, and its opposite there on the body of a."""
+    """Add a force along e at the point of marker b, on the body of b, and the opposite force there on the body of a."""
     f = force * e[0], force * e[1], force * e[2]
     m = vector_product((x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]), f)
     for k in range(3):
@@ -91,9 +91,9 @@ def add_axial_force(wrench, x, a, b, force, e):
 
 
 def angle_numbers(axis: Array, A_a: Array, A_b: Array) -> list[float]:
-    """Return what `angle_about` reads: the axis and a normal in the axes of marker a, and that normal in those of b.
+    """Return the data of `angle_about`: the axis and a normal in the axes of marker a, and that normal in those of b.
 
-    axis: in the axes of marker a; A_a, A_b: axes of the markers as placed, (3, 3), where the angle is zero.
+    axis: in the axes of marker a; A_a, A_b: axes of the assembled markers, (3, 3), at which the angle is zero.
     """
     e = unit_vector("axis", axis)
     normal = np.cross(e, np.eye(3)[int(np.argmin(np.abs(e)))])
@@ -103,7 +103,7 @@ def angle_numbers(axis: Array, A_a: Array, A_b: Array) -> list[float]:
 
 @register_jitable
 def angle_about(x, a, b, data, at):
-    """Return the angle of marker b against marker a about the axis in `data`, in -pi .. pi, zero as placed."""
+    """Return the angle of marker b relative to a about the axis in `data`, in -pi .. pi, zero as assembled."""
     e, u = direction_of(x, a, data, at), direction_of(x, a, data, at + 3)
     d = direction_of(x, b, data, at + 6)
     c, s = inner_product(u, d), inner_product(vector_product(e, u), d)

@@ -1,10 +1,10 @@
-"""Elements by name: "wheels.magic-formula-tyre" is the entry of that name in ELEMENTS of the package `wheels`.
+"""Elements by name: "wheels.magic-formula-tyre" is an entry in `ELEMENTS` of the package `wheels`.
 
-A package of elements, of the project or of a user, says in its `__init__`
+A package of elements, of the project or of a user, defines in its `__init__`
 
     ELEMENTS = {"magic-formula-tyre": "wheels.magic_formula:MagicFormulaTyre"}
 
-and is imported when one of its names is used, the module of an element when that element is.
+The package is imported when one of its names is used, and the module of an element when the element is used.
 """
 
 import sys
@@ -21,7 +21,7 @@ from floatframe.errors import ModelError
 
 __all__ = ["element_class"]
 
-OWN = "floatframe"  #: package in which packages of elements are looked for first
+OWN = "floatframe"  #: package in which packages of elements are sought first
 
 
 def element_class(name: str, folder: Path | None = None) -> type[Element]:
@@ -30,9 +30,9 @@ def element_class(name: str, folder: Path | None = None) -> type[Element]:
     Parameters
     ----------
     name
-        "PACKAGE.ELEMENT"; the package is one of floatframe, or one that Python finds.
+        "PACKAGE.ELEMENT"; the package is one of floatframe, or one on the Python path.
     folder
-        Where Python looks besides, last: that of the system file.
+        Folder of the system file, in which modules are sought last.
 
     Raises
     ------
@@ -60,7 +60,7 @@ EXPECTED = 'expected ELEMENTS = {"name": "module:Class"} in its __init__.py'
 
 @contextmanager
 def searched(folder: Path | None) -> Iterator[None]:
-    """Let Python look for modules in a folder too, last."""
+    """Append a folder to the module search path of Python within a `with` block."""
     added = None if folder is None else str(folder.resolve())
     if added is None or added in sys.path:
         yield
@@ -73,7 +73,7 @@ def searched(folder: Path | None) -> Iterator[None]:
 
 
 def package_named(name: str, package: str) -> ModuleType:
-    """Return the package of elements."""
+    """Return the imported package of elements."""
     where = f"type of element {quoted(name)}"
     for each in (f"{OWN}.{package}", package):
         try:

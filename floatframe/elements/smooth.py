@@ -1,8 +1,9 @@
-"""Functions for laws with a complex tangent: the same for real and for complex numbers, by one formula.
+"""Functions for laws with a complex tangent, which use one formula for real and for complex numbers.
 
-A step along the imaginary axis takes derivatives without rounding where a law is made of smooth functions of complex
-numbers. sqrt, exp, log, sin, cos, tan, arctan, sinh, cosh, tanh of NumPy are; comparisons look at the real part, and so
-do these functions. Powers of compiled complex numbers lose the step where the base is negative: write products.
+A step along the imaginary axis gives derivatives without rounding errors, if a law consists of smooth functions of
+complex numbers. These include sqrt, exp, log, sin, cos, tan, arctan, sinh, cosh and tanh of NumPy. Comparisons use the
+real part, as do the functions here. Compiled powers of complex numbers lose the step if the base is negative; use
+products instead.
 """
 
 import math
@@ -15,19 +16,19 @@ __all__ = ["absolute", "atan2", "larger", "smaller", "square"]
 
 @register_jitable
 def absolute(x):
-    """Return x or -x, whichever is not negative in its real part."""
+    """Return x or -x, whichever has a non-negative real part."""
     return x if x.real >= 0.0 else -x
 
 
 @register_jitable
 def larger(x, y):
-    """Return the one with the larger real part."""
+    """Return the argument with the larger real part."""
     return x if x.real >= y.real else y
 
 
 @register_jitable
 def smaller(x, y):
-    """Return the one with the smaller real part."""
+    """Return the argument with the smaller real part."""
     return x if x.real <= y.real else y
 
 

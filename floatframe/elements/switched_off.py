@@ -1,7 +1,7 @@
-"""An element that is switched off by an event: it is there with all its rows, and does nothing.
+"""An element that is switched off by an event; its rows remain, but it does nothing.
 
-Its wrenches and the rates of its states are zero, unless its law says by `off` what it does then (a valve that is shut,
-a clutch that drags); what its multipliers hold is let go, they are zero.
+Its wrenches and state rates are zero, unless its law defines by `off` what it does then (a closed valve, a dragging
+clutch). Its constraints are released, and its multipliers are zero.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,7 +21,7 @@ __all__ = ["SwitchedOff", "law_switched_off", "off_at_start", "times_off"]
 
 @dataclass(frozen=True, eq=False)
 class SwitchedOff(Element):
-    """An element in the place of another, with the same markers and unknowns, that does nothing."""
+    """Replaces an element, with the same markers and unknowns; it does nothing."""
 
     element: Element
 
@@ -46,12 +46,12 @@ class SwitchedOff(Element):
         return self.element.events()
 
     def drawn(self) -> Any:
-        """Return what is seen of it."""
+        """Return its shapes."""
         return self.element.drawn()
 
 
 def law_switched_off(law: ElementLaw) -> ElementLaw:
-    """Return the law of an element while it is off, with rows in the same places."""
+    """Return the law of an element while it is off, with the same rows."""
     if law.off is not None:
         tangent = "differences" if callable(law.tangent) else law.tangent
         return replace(law, function=law.off, tangent=tangent, rest=None)
@@ -71,7 +71,7 @@ def off_at_start(events: Sequence[Any]) -> frozenset[str]:
 
 
 def times_off(events: Sequence[Any], happened: Sequence[Mapping[str, Any]], t: Array, name: str) -> NDArray[np.bool_]:
-    """Return at which times t, (n_t,), the events of a system that have happened have an element switched off."""
+    """Return, for each of the times t, (n_t,), whether an element is switched off by the events that have happened."""
     is_off = np.full(len(t), name in off_at_start(events))
     for event in happened:
         if name in (*event["switch_on"], *event["switch_off"]):
@@ -81,7 +81,7 @@ def times_off(events: Sequence[Any], happened: Sequence[Mapping[str, Any]], t: A
 
 @njit
 def still(t, x, z, lam, data, wrench, z_dot, g, seen):
-    """Write what an element does that does nothing."""
+    """Write the outputs of an element that does nothing."""
     for k in range(lam.shape[0]):
         g[k] = lam[k]
 

@@ -1,4 +1,4 @@
-"""Expressions in the laws of elements: the tape of an expression in `data`, evaluated for real and complex numbers."""
+"""Expressions in laws of elements: the tape of an expression in `data`, evaluated for real and complex numbers."""
 
 from collections.abc import Sequence
 
@@ -40,11 +40,11 @@ from floatframe.functions.expressions import (
 
 __all__ = ["tape_at", "tape_numbers"]
 
-WHOLE = 16  #: largest exponent whose power is a product
+WHOLE = 16  #: largest exponent for which a power is computed as a product
 
 
 def tape_numbers(tape: Tape, functions_at: Sequence[int]) -> list[float]:
-    """Return the number of operations and four numbers of each; functions_at: where functions stand in `data`."""
+    """Return the number of operations and four numbers for each; `functions_at`: indices of functions in `data`."""
     numbers = [float(len(tape.op))]
     for op, a, b, c in zip(tape.op, tape.a, tape.b, tape.c, strict=True):
         numbers += [float(op), float(a), float(functions_at[b]) if op == CALL else float(b), c]
@@ -53,7 +53,7 @@ def tape_numbers(tape: Tape, functions_at: Sequence[int]) -> list[float]:
 
 @register_jitable
 def power(x, y):
-    """Return x to the power y; of whole exponents by products, whose complex step is exact for all x."""
+    """Return x to the power y; whole exponents by products, so that a complex step is exact for all x."""
     n = int(abs(y.real) + 0.5)
     if abs(y.real) != n or n > WHOLE or y.imag != 0.0:
         return x**y
@@ -65,7 +65,7 @@ def power(x, y):
 
 @register_jitable
 def of_one(op, x):
-    """Return a function of one number."""
+    """Return the result of an operation with one operand."""
     if op == NEGATIVE:
         return -x
     if op == SIN:
@@ -102,7 +102,7 @@ def of_one(op, x):
 
 @register_jitable
 def of_two(op, x, y):
-    """Return a function of two numbers."""
+    """Return the result of an operation with two operands."""
     if op == ADD:
         return x + y
     if op == SUBTRACT:
@@ -126,7 +126,7 @@ def of_two(op, x, y):
 
 @register_jitable
 def tape_at(data, at, inputs, results):
-    """Return the value of the tape that stands in `data` from `at` on; what its operations yield goes into results."""
+    """Return the value of the tape that begins at data[at]; the results of its operations are written to `results`."""
     n = int(data[at])
     for k in range(n):
         o = at + 1 + 4 * k
@@ -137,7 +137,7 @@ def tape_at(data, at, inputs, results):
             results[k] = inputs[a]
         elif op == CALL:
             results[k] = function_at(data, b, results[a])
-        elif op == SELECT:  # the operation before holds the condition
+        elif op == SELECT:  # the previous operation holds the condition
             results[k] = results[a] if results[k - 1].real != 0.0 else results[b]
         elif op < ADD:
             results[k] = of_one(op, results[a])

@@ -1,4 +1,4 @@
-"""Units of what an element shows, in the units of the system, from their names in SI units."""
+"""Units of the outputs of elements, converted from SI names to the units of a system."""
 
 from collections.abc import Sequence
 
@@ -24,7 +24,7 @@ SI = "m-kg-s"
 
 
 def in_units(units: Units, names: Sequence[str]) -> list[str]:
-    """Return the names of units in SI as those of a system; names that are none of mechanics stay.
+    """Return SI unit names converted to those of a system; non-mechanical units are unchanged.
 
     >>> from fe_models.foundation.units import unit_system
     >>> in_units(unit_system("mm-t-s"), ["Pa", "m^3/s", "N m", "rad/s", "A"])
@@ -36,7 +36,7 @@ def in_units(units: Units, names: Sequence[str]) -> list[str]:
 
 
 def in_unit(units: Units, name: str) -> str:
-    """Return one name."""
+    """Return one converted unit name."""
     if name not in DIMENSIONS:
         return name
     if name in ("rad/s", "Hz"):

@@ -1,4 +1,4 @@
-"""Friction that sticks and slips, as public elements."""
+"""Friction with sticking and slipping, as public elements."""
 
 from floatframe.friction.bristle_friction import BristleFriction
 

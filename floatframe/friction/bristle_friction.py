@@ -1,13 +1,13 @@
-"""Stick-slip friction along or about an axis by the deflection of bristles, that does not creep while it sticks.
+"""Stick-slip friction along or about an axis, modelled by the deflection of bristles, without creep while sticking.
 
-With v the sliding velocity, z the mean deflection of the bristles and z_ss(v) = G(v)/sigma_0 that of steady sliding,
+v is the sliding velocity, z the mean deflection of the bristles, and z_ss(v) = G(v)/sigma_0 that in steady sliding:
 
     G(v) = F_C + (F_S - F_C) exp(-(v/v_S)²)
     dz/dt = v (1 - alpha(z, v) z/z_ss sign(v)),      F = sigma_0 z + sigma_1 dz/dt + sigma_2 v
 
-Canudas de Wit and others (1995) have alpha = 1 (LuGre): then the bristles slip a little under any load that swings, and
-what should stick creeps. With Dupont et al. (2002) alpha is 0 while |z| is below a part of z_ss (the deflection is
-elastic) or falls, 1 from z_ss on, and rises smoothly between.
+Canudas de Wit and others (1995) use alpha = 1 (LuGre). The bristles then slip slightly under any oscillating load, so
+that a contact that should stick creeps. In the model of Dupont et al. (2002), alpha is 0 while |z| is below a fraction
+of z_ss (the deflection is elastic) or decreases, 1 for |z| >= z_ss, and rises smoothly in between.
 """
 
 import math
@@ -34,30 +34,30 @@ MOTIONS = {"along": ("N", "m", "m/s"), "about": ("N m", "rad", "rad/s")}  #: uni
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class BristleFriction(Element):
-    """Friction between marker b and marker a, of sliding along an axis or of turning about it, that sticks.
+    """Friction between markers b and a, for sliding along an axis or rotation about it, which can stick.
 
-    Up to `static` it holds like a stiff spring; beyond, it slips with `coulomb` and, near rest, up to `static`. Give it
-    the markers of the joint it brakes; its level does not follow the force in the joint.
+    Up to `static`, it holds like a stiff spring. Beyond, it slips with `coulomb` and, near rest, with up to `static`.
+    Use the markers of the joint in which the friction acts; its level does not depend on the force in the joint.
 
     Raises
     ------
     ModelError
-        If a number is out of its range, or markers are none.
+        If a number is out of its range, or a marker is not a `Marker`.
     """
 
     name: str
     marker_a: Marker
     marker_b: Marker
-    coulomb: float  #: F_C, friction of fast sliding [N, N m]
+    coulomb: float  #: F_C, friction at high sliding velocity [N, N m]
     stiffness: float  #: sigma_0 of the bristles [N/m, N m/rad]
-    static: float | None = None  #: F_S, most it holds [N, N m]; None: as `coulomb`
+    static: float | None = None  #: F_S, largest force while sticking [N, N m]; None: as `coulomb`
     stribeck_speed: float | None = None  #: v_S, needed with `static` [m/s, rad/s]
     damping: float = 0.0  #: sigma_1 of the bristles [N s/m, N m s/rad]
     viscous: float = 0.0  #: sigma_2 [N s/m, N m s/rad]
-    elastic: float = 0.7  #: part of the steady deflection below which nothing slips; 0 with `creeps`
-    creeps: bool = False  #: True: the bristles slip from the first deflection on (LuGre as published)
+    elastic: float = 0.7  #: fraction of the steady deflection below which nothing slips; 0 with `creeps`
+    creeps: bool = False  #: True: the bristles slip at any deflection (LuGre as published)
     motion: str = "along"  #: "along" the axis, or "about" it
-    speed: float = 0.0  #: sliding velocity at the start, where the bristles begin deflected as in steady sliding
+    speed: float = 0.0  #: initial sliding velocity, with the bristles deflected as in steady sliding
     axis: Array = (0.0, 0.0, 1.0)  # type: ignore[assignment]  #: in the axes of marker a, (3,)
 
     def __post_init__(self) -> None:
@@ -78,8 +78,8 @@ class BristleFriction(Element):
         static = self.coulomb if self.static is None else number(f"{where}: static", self.static, above=0.0)
         if static < self.coulomb:
             raise ModelError(
-                f"{where}: static: expected coulomb = {self.coulomb:g} at least, got {static:g}: what resists more "
-                "when it slides than when it sticks would never stick"
+                f"{where}: static: expected coulomb = {self.coulomb:g} at least, got {static:g}: friction "
+                "that is larger when sliding would never stick"
             )
         if static > self.coulomb and self.stribeck_speed is None:
             raise ModelError(f"{where}: stribeck_speed: missing; static falls to coulomb over this speed")
@@ -115,7 +115,7 @@ class BristleFriction(Element):
 
 @njit
 def slipping(z, v, steady, elastic, creeps):
-    """Return alpha: which part of the motion is slip, 0 (sticks) to 1."""
+    """Return alpha, the fraction of the motion that is slip, from 0 (sticks) to 1."""
     if creeps > 0.0:
         return 0.0 * z + 1.0
     size = absolute(z)

@@ -1,4 +1,4 @@
-"""Ready systems, each a function that returns a `System`: rigid by default, flexible with reduced bodies."""
+"""Example systems, each as a function that returns a `System`: rigid by default, flexible with reduced bodies."""
 
 from floatframe.mechanisms.beam_benchmarks import (
     buckling_beam,

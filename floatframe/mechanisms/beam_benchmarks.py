@@ -1,9 +1,9 @@
 """The four benchmark problems of flexible beams of Bauchau, Betsch, Cardona and others (2016).
 
-Every beam is a `BeamLine`, the numbers per length of the problem; `describe` says as what it moves: a function from the
-line to what places it, such as `lambda line: partial(finite_segments, line=line, n=9, stations=...)`. Parts have the
-places "start" and "end", those of the shaft and of the beam that buckles "middle" as well. Local y and z of a line
-begin along those of its orientation.
+Every beam is a `BeamLine` with the properties per length given in the problem. `describe` chooses the model of the
+beam: it maps the line to a part maker, such as `lambda line: partial(finite_segments, line=line, n=9, stations=...)`.
+Parts have the places "start" and "end"; the shaft and the buckling beam also have "middle". The local y and z axes of a
+line begin along those of its orientation.
 
 References: Bauchau and others (2016) and Masarati and others (MBDyn), docs/bibliography.md.
 """
@@ -42,7 +42,8 @@ Describe = Callable[[BeamLine], PartMaker]
 X, Y, Z = np.eye(3)
 UNITS = "m-kg-s"
 
-#: the beam of Princeton's experiment: stiff bending in the x-y plane; it is statics, the mass is that of aluminium
+#: the beam of Princeton's experiment, with its stiff axis in the x-y plane; the problem is static, the mass that of
+#: aluminium
 PRINCETON_LINE = BeamLine(
     0.508, rho_A=0.1070, EA=2.84191e6, EIy=2.42873, EIz=36.2794, GJ=3.10338, rho_Iy=9.147e-8, rho_Iz=1.3664e-6,
     GAy=9.03881e5, GAz=6.40131e5,
@@ -50,7 +51,7 @@ PRINCETON_LINE = BeamLine(
 
 
 def square(length: float, *, rho_A: float, EA: float, EI: float, GJ: float, GA: float, rho_I: float) -> BeamLine:
-    """Return a line that is the same in both planes."""
+    """Return a line with equal properties in both planes."""
     return BeamLine(
         length, rho_A=rho_A, EA=EA, EIy=EI, EIz=EI, GJ=GJ, rho_Iy=rho_I, rho_Iz=rho_I, GAy=GA, GAz=GA
     )  # fmt: skip
@@ -62,9 +63,9 @@ FOUR_BAR_LINES = (
     square(0.24, rho_A=1.997, EA=52.99e6, EI=1131.0, GJ=733.5, GA=16.88e6, rho_I=42.6e-6),
     square(0.12, rho_A=0.4992, EA=13.25e6, EI=70.66, GJ=45.84, GA=4.22e6, rho_I=2.662e-6),
 )
-#: a steel tube of 100 mm and 5 mm
+#: a steel tube with 100 mm diameter and 5 mm wall
 SHAFT_LINE = square(6.0, rho_A=11.64, EA=313.4e6, EI=354.5e3, GJ=272.7e3, GA=60.5e6, rho_I=13.17e-3)
-#: aluminium: the beam, 100 mm high and 10 mm wide, the link and the crank, steel tubes
+#: the beam of aluminium, 100 mm high and 10 mm wide; link and crank, steel tubes
 BUCKLING_LINES = (
     BeamLine(
         1.0, rho_A=2.68, EA=73e6, EIy=60830.0, EIz=608.3, GJ=877.2, rho_Iy=2233e-6, rho_Iz=22.33e-6, GAy=5.025e6,
@@ -80,7 +81,7 @@ def loaded_cantilever(
 ) -> System:
     """Return a beam along x, clamped at the origin, with a dead load at its end: the Princeton experiment.
 
-    Body parts "beam ...", joint "clamp", force "load" [N], at an angle from -y towards z [rad]: at zero the beam bends
+    Parts "beam ...", joint "clamp", and force "load" [N] at an angle from -y towards z [rad]; at zero the beam bends
     about its stiff axis.
     """
     beam = placed(describe(line), "beam", np.zeros(3), X, Y)
@@ -91,10 +92,10 @@ def loaded_cantilever(
 
 
 def misaligned_four_bar(describe: Describe, *, turn: TimeFunction, defect: float = np.deg2rad(5.0)) -> System:
-    """Return three bars on four hinges, of which that at C is out of line by `defect` [rad].
+    """Return three bars with four hinges, of which the hinge at C is misaligned by `defect` [rad].
 
-    A = 0, B = (0, 0.12, 0), C = (0.24, 0.12, 0), D = (0.24, 0, 0). Rigid bars would be locked. Parts "bar 1" to "bar
-    3", joints "A" (its angle over time is prescribed by `turn`, about z), "B", "C", "D".
+    A = 0, B = (0, 0.12, 0), C = (0.24, 0.12, 0), D = (0.24, 0, 0). With rigid bars it could not move. Parts "bar 1" to
+    "bar 3"; joints "A" (its angle about z is prescribed by `turn`), "B", "C", "D".
     """
     A, B, C, D = np.zeros(3), 0.12 * Y, 0.24 * X + 0.12 * Y, 0.24 * X
     lines = FOUR_BAR_LINES
@@ -102,7 +103,7 @@ def misaligned_four_bar(describe: Describe, *, turn: TimeFunction, defect: float
         placed(describe(line), f"bar {k + 1}", start, direction, across)
         for k, (line, start, direction, across) in enumerate(zip(lines, (A, B, C), (Y, X, -Y), (-X, Y, X), strict=True))
     ]
-    # axes in those of the marker they belong to: z of all bars begins along z, x and y do not
+    # in the axes of their marker: z of all bars begins along z, x and y do not
     tilted = np.sin(defect) * X + np.cos(defect) * Z
     joints: list[Joint] = [
         RevoluteJoint("A", Marker(GROUND), bars[0].marker("start"), axis=Z, motions={"angle": turn}),
@@ -114,10 +115,10 @@ def misaligned_four_bar(describe: Describe, *, turn: TimeFunction, defect: float
 
 
 def unbalanced_shaft(describe: Describe, *, turn: TimeFunction, gravity: float = 9.81) -> System:
-    """Return a shaft along x on two bearings with a disk, 50 mm out of its axis, in the middle.
+    """Return a shaft along x on two bearings, with a disk in the middle that is 50 mm eccentric.
 
-    Part "shaft", body "disk"; joints "drive" (angle over time prescribed by `turn`), "bearing" (it slides), "seat".
-    Gravity acts along -z, where the centre of the disk lies above the shaft at the start.
+    Part "shaft", body "disk"; joints "drive" (its angle is prescribed by `turn`), "bearing" (which slides), "seat".
+    Gravity acts along -z; initially the centre of the disk lies above the shaft.
     """
     mass, radius, width = 70.573, 0.24, 0.05
     across = mass * (radius**2 / 4 + width**2 / 12)
@@ -133,11 +134,11 @@ def unbalanced_shaft(describe: Describe, *, turn: TimeFunction, gravity: float =
 
 
 def shaft_turn(omega: float = 60.0) -> TimeFunction:
-    """Return the angle of the shaft: to 0.8 omega within 0.5 s, from 1 s to 1.25 s on to 1.2 omega [rad]."""
+    """Return the angle of the shaft; its rate rises to 0.8 omega in 0.5 s, and to 1.2 omega from 1 s to 1.25 s [rad]."""
     first, last = 0.8 * omega, 1.2 * omega
 
     def rise(begin: float, rate: float, by: float, T: float) -> TimeFunction:
-        """From an angle on, the rate raised by (1 - cos(pi t/T))/2 times a step."""
+        """Continue from an angle; the rate changes by a step times (1 - cos(pi t/T))/2."""
         return one_piece([begin, rate + by / 2], (-by / 2 * T / np.pi, np.pi / T, 0.0))
 
     at = (0.0, first * 0.25, first * 0.75, first * 0.75 + (first + last) / 2 * 0.25)
@@ -151,10 +152,10 @@ def shaft_turn(omega: float = 60.0) -> TimeFunction:
 
 
 def buckling_beam(describe: Describe, *, turn: TimeFunction, gap: float = 1e-4) -> System:
-    """Return a thin cantilever whose end a crank pushes upwards through a link, until it buckles sideways.
+    """Return a thin cantilever whose end a crank pushes upwards through a link until it buckles laterally.
 
-    Parts "beam", "link", "crank"; joints "root", "ball" (the link hangs `gap` [m] beside the line of the beam), "pin",
-    "crank": its angle over time is prescribed by `turn`, half a turn lifts the end by 0.1 m.
+    Parts "beam", "link", "crank"; joints "root", "ball" (the link is attached `gap` [m] beside the axis of the beam),
+    "pin" and "crank", whose angle is prescribed by `turn`; half a turn lifts the end by 0.1 m.
     """
     beam_line, link_line, crank_line = BUCKLING_LINES
     tip = X + gap * Y
@@ -188,7 +189,7 @@ def crank_turn(duration: float = 0.4) -> TimeFunction:
 
 
 def carried(marker: Marker, offset: Array, place: Array) -> tuple[Marker, list[Joint]]:
-    """Return a place beside a marker: of its rigid body, or of a small one fixed to an interface."""
+    """Return a marker at an offset from a marker, on its rigid body or on a small body fixed to its interface."""
     if marker.interface is None:
         at = np.zeros(3) if marker.position is None else marker.position
         return Marker(marker.body, position=at + offset), []
@@ -196,7 +197,7 @@ def carried(marker: Marker, offset: Array, place: Array) -> tuple[Marker, list[J
 
 
 def placed(maker: PartMaker, name: str, start: Array, direction: Array, across: Array) -> FlexiblePart:
-    """Return a part from a place on along a direction, its y axis along another."""
+    """Return a part from a point along a direction, with its y axis along another direction."""
     R = np.column_stack([direction, across, np.cross(direction, across)])
     return maker(name, position=start, orientation=euler_parameters(R))
 
@@ -204,7 +205,7 @@ def placed(maker: PartMaker, name: str, start: Array, direction: Array, across: 
 def made(
     parts: list[FlexiblePart], bodies: list[RigidBody], joints: list[Joint], forces: list[Force], name: str
 ) -> System:
-    """Return the system of parts and what is between them."""
+    """Return the system of the parts and the bodies, joints and forces between them."""
     all_bodies: list[Body] = [body for part in parts for body in part.bodies] + list(bodies)
     all_joints = [joint for part in parts for joint in part.joints] + joints
     all_forces = [force for part in parts for force in part.forces] + forces

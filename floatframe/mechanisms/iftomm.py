@@ -1,8 +1,8 @@
-"""Rigid mechanisms of the library of computational benchmark problems of the IFToMM technical committee.
+"""Rigid mechanisms from the IFToMM library of computational benchmark problems.
 
-Data: [1]_, the pages of the library as it was then, and [2]_; where they come from, line by line, stands on the page
-docs/field_benchmarks.md. Joints are chosen such that nothing is held twice, where that is possible: a planar link
-between two others hangs at a ball and at a universal joint.
+Sources: [1]_, the pages of the library at that time, and [2]_; docs/field_benchmarks.md lists the source of each value.
+Joints are chosen without redundant constraints where possible: a planar link between two others has a ball joint and a
+universal joint.
 
 .. [1] González et al. (2006), docs/bibliography.md.
 .. [2] Mazzia & Magherini (2008), docs/bibliography.md.
@@ -39,7 +39,8 @@ UNITS = "m-kg-s"
 def point_pendulum(*, x: float = -1.0, length: float = 1.0, mass: float = 1.0) -> System:
     """Return a point mass on a massless rod from the origin, at rest at (x, y) with y >= 0: A01 of the library.
 
-    Body "mass", joint "rod". The rod is a distance, along which nothing turns the body: its inertia does not matter.
+    Body "mass", joint "rod". The rod is a distance constraint, which exerts no moment; the inertia of the body has no
+    effect.
     """
     if not abs(x) <= length:
         raise ModelError(f"point_pendulum: expected |x| up to the length {length:g}, got x = {x:g}")
@@ -50,10 +51,10 @@ def point_pendulum(*, x: float = -1.0, length: float = 1.0, mass: float = 1.0) -
 
 
 def n_four_bar(n: int = 2, *, length: float = 1.0, mass: float = 1.0, speed: float = 1.0) -> System:
-    """Return n four-bar windows in a row, 2 n + 1 equal rods: A02 of the library.
+    """Return n four-bar windows in a row, with 2 n + 1 equal rods: A02 of the library.
 
-    All cranks stand upright at the start and their tops move at `speed` along x. Where the rods lie on one line every
-    window could go its own way: the constraints are singular there. Bodies "crank 0" to "crank n" and "coupler 1" to
+    All cranks are initially upright, and their tops move at `speed` along x. When the rods lie on one line, every
+    window could move differently; the constraints are singular there. Bodies "crank 0" to "crank n" and "coupler 1" to
     "coupler n"; joints "hinge k", "ball k", "cross k".
     """
     if n < 1:
@@ -78,7 +79,8 @@ def n_four_bar(n: int = 2, *, length: float = 1.0, mass: float = 1.0, speed: flo
     return System(bodies, joints, [Gravity(-G * Y)], units, f"{n} four-bar windows")
 
 
-#: mass [kg], inertia about the centre [kg m²], centre from the point it hangs at, in its axes [m]; Andrews' mechanism
+#: mass [kg], inertia about the centre [kg m²], centre relative to the suspension point in body axes [m]; Andrews'
+#: mechanism
 ANDREWS = {
     "OF": (0.04325, 2.194e-6, (0.00092, 0.0)),
     "FE": (0.00365, 4.410e-7, (-0.0115, 0.0)),
@@ -88,7 +90,7 @@ ANDREWS = {
     "HE": (0.00706, 5.667e-7, (0.02 - 0.01421, 0.0)),
     "AH": (0.05498, 1.912e-5, (-0.00449, -0.01228)),
 }
-#: beta, Theta, gamma, Phi, delta, Omega, epsilon at the start, to the digits of the test set of initial value problems
+#: initial beta, Theta, gamma, Phi, delta, Omega, epsilon, with the digits of the test set of initial value problems
 ANDREWS_START = (
     -0.0617138900142764496358948458001,
     0.0,
@@ -103,9 +105,9 @@ ANDREWS_START = (
 def andrews_mechanism(*, torque: float = 0.033) -> System:
     """Return Andrews' squeezer: seven planar links, a spring, and a motor of constant torque [N m]; A03 of the library.
 
-    Angles of the links to the x axis are beta (OF), beta + Theta (FE), gamma (BDE), delta + Phi (GE), delta (AG),
-    epsilon + Omega (HE) and epsilon (AH), with the start `ANDREWS_START`. F on OF is 7 mm from O; joints "motor", "B",
-    "A 1", "A 2" are hinges, "F", "G", "H" balls, "E 1", "E 2", "E 3" universal joints; force "spring", "torque".
+    The angles of the links to the x axis are beta (OF), beta + Theta (FE), gamma (BDE), delta + Phi (GE), delta (AG),
+    epsilon + Omega (HE) and epsilon (AH), with initial values `ANDREWS_START`. F on OF is 7 mm from O. Joints: hinges
+    "motor", "B", "A 1", "A 2"; balls "F", "G", "H"; universal joints "E 1", "E 2", "E 3". Forces: "spring", "torque".
     """
     beta, theta, gamma, phi, delta, omega, epsilon = ANDREWS_START
     origin, A, B, C = (np.array([*p, 0.0]) for p in ((0, 0), (-0.06934, -0.00227), (-0.03635, 0.03273), (0.014, 0.072)))
@@ -154,11 +156,11 @@ def andrews_mechanism(*, torque: float = 0.033) -> System:
 
 
 def bricard_mechanism(*, length: float = 1.0, mass: float = 1.0, side: float = 0.1) -> System:
-    """Return Bricard's mechanism: five rods along the edges of a cube between six hinges at right angles; A04.
+    """Return Bricard's mechanism, with five rods along the edges of a cube between six perpendicular hinges: A04.
 
-    By its count of constraints it could not move, but it does: one of them repeats others, and the joints share the
-    load (`redundant = "minimum-norm"`). Bodies "rod 1" to "rod 5", joints "hinge 1" to "hinge 6", the first and the
-    last on the ground; rod 4 begins at P_3 = (1, -1, 1).
+    By the count of constraints it could not move, but one constraint is redundant, and the joints share the load
+    (`redundant = "minimum-norm"`). Bodies "rod 1" to "rod 5"; joints "hinge 1" to "hinge 6", of which the first and the
+    last are on the ground. Rod 4 begins at P_3 = (1, -1, 1).
     """
     corners = length * np.array([[0, 0, 0], [1, 0, 0], [1, -1, 0], [1, -1, 1], [0, -1, 1], [0, 0, 1]], dtype=float)
     axes = (Y, Z, X, Y, Z, X)
@@ -186,11 +188,12 @@ def bricard_mechanism(*, length: float = 1.0, mass: float = 1.0, side: float = 0
 
 
 def flyball_governor(*, stiffness: float = 8e5, damping: float = 4e4, speed: float = 2 * np.pi) -> System:
-    """Return Watt's governor whose coupler rods are stiff springs and dampers; A05 of the library.
+    """Return Watt's governor, with stiff springs and dampers as coupler rods; A05 of the library.
 
-    A shaft along z, 1 m, turns freely from `speed` on; from its top two rods of 1 m hang 30 degrees below the horizon
-    with 5 kg at their ends, their middles joined to a slider at the height of 0.5 m. Bodies "shaft", "slider", "rod 1",
-    "rod 2"; joints "bearing", "guide", "hinge 1", "hinge 2"; coordinate "distance" of "guide": the way of the slider.
+    A shaft along z, 1 m long, spins freely, initially at `speed`. From its top, two rods of 1 m hang 30 degrees below
+    the horizontal, with 5 kg at their ends; their middles are connected to a slider at the height of 0.5 m. Bodies
+    "shaft", "slider", "rod 1", "rod 2"; joints "bearing", "guide", "hinge 1", "hinge 2"; the coordinate "distance" of
+    "guide" is the position of the slider.
     """
     density, side, ball, height, arm = 3000.0, 0.01, 5.0, 1.0, 0.05
     m = density * side**2 * 1.0
@@ -205,7 +208,7 @@ def flyball_governor(*, stiffness: float = 8e5, damping: float = 4e4, speed: flo
         PrismaticJoint("guide", Marker("shaft", position=np.zeros(3)), Marker("slider", position=np.zeros(3)), axis=Z),
     ]
     forces: list[Force] = [Gravity(-G * Z)]
-    # rod and ball together: centre, and inertia about it
+    # rod and ball together: centre of mass, and inertia about it
     total, center = m + ball, (m * 0.5 + ball) / (m + ball)
     I_across = across + m * (center - 0.5) ** 2 + ball * (1 - center) ** 2
     for k, sign in ((1, 1.0), (2, -1.0)):
@@ -231,7 +234,7 @@ def flyball_governor(*, stiffness: float = 8e5, damping: float = 4e4, speed: flo
 
 
 def rod(name: str, mass: float, inertia: Array, length: float, start: Array, direction: Array) -> RigidBody:
-    """Return a rod along its x axis from `start`, with principal moments about its centre, (3,), in a direction."""
+    """Return a rod along its x axis in a direction from `start`, with principal moments about its centre, (3,)."""
     z = Z if abs(direction @ Z) < 0.5 else X
     A = np.column_stack([direction, np.cross(z, direction), z])
     return RigidBody(
@@ -245,6 +248,6 @@ def rod(name: str, mass: float, inertia: Array, length: float, start: Array, dir
 
 
 def axes_of(body: Body) -> Array:
-    """Return R_GB of a rigid body as placed, (3, 3)."""
+    """Return R_GB of a rigid body as assembled, (3, 3)."""
     assert isinstance(body, RigidBody)
     return rotation_matrix(body.orientation)

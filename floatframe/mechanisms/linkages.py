@@ -1,4 +1,4 @@
-"""Planar linkages in the xy plane with one degree of freedom and no redundant constraint."""
+"""Planar linkages in the xy plane with one degree of freedom and no redundant constraints."""
 
 import numpy as np
 
@@ -33,28 +33,28 @@ def slider_crank(
     ends: tuple[str, str] = ("start", "end"),
     units: Units | None = None,
 ) -> System:
-    """Return a crank at the origin, a rod and a slider on the x axis.
+    """Return a slider-crank: a crank at the origin, a rod, and a slider on the x axis.
 
     Bodies "crank", "rod", "slider"; joints "main" (ground, crank), "pin" (crank, rod), "gudgeon" (rod, slider: a point
-    on the line of the pin) and "guide" (ground, slider).
+    on the pin axis) and "guide" (ground, slider).
 
     Parameters
     ----------
     crank, rod
         Lengths [m].
     crank_mass, rod_mass, slider_mass
-        [kg]
+        Masses [kg].
     angle
-        Of the crank to the x axis at the start [rad].
+        Initial angle from the x axis to the crank [rad].
     speed
-        Of the crank at the start, where no drive says it [rad/s].
+        Initial angular velocity of the crank, if there is no drive [rad/s].
     drive
-        Angle of the crank over time, from `angle` on; None: it turns freely.
+        Angle of the crank as a function of time, relative to `angle`; None: it rotates freely.
     flexible_rod
-        A reduced body in place of the rigid rod, its interfaces `ends` at the pin and at the slider; or another
-        description that is placed here, such as `partial(finite_segments, line=line, n=10)`.
+        A reduced body instead of the rigid rod, with its interfaces `ends` at pin and slider; or a part maker, such as
+        `partial(finite_segments, line=line, n=10)`.
     ends
-        Interfaces of it, or places of the part.
+        Interfaces of the reduced body, or places of the part.
     units
         Default: those of a reduced `flexible_rod`, or m-kg-s.
     """
@@ -64,7 +64,7 @@ def slider_crank(
     end = np.array([knee[0] + np.sqrt(rod**2 - knee[1] ** 2), 0.0, 0.0])
     arm = Rod("crank", np.zeros(3), knee, crank_mass)
     link = Rod("rod", knee, end, rod_mass, flexible_rod, ends)
-    # velocities of the undeformed mechanism: the rod turns so that its end stays on the x axis
+    # velocities of the undeformed mechanism: the rod rotates so that its end stays on the x axis
     omega = (speed if drive is None else drive(0.0, 1)) * Z
     v_knee = np.cross(omega, knee)
     omega_rod = -v_knee[1] / (end[0] - knee[0]) * Z
@@ -96,7 +96,7 @@ def four_bar(
     ends: tuple[str, str] = ("start", "end"),
     units: Units | None = None,
 ) -> System:
-    """Return a four-bar linkage with its fixed hinges at the origin and on the x axis, the coupler above.
+    """Return a four-bar linkage, with its fixed hinges at the origin and on the x axis, and the coupler above.
 
     Bodies "crank", "coupler", "rocker"; joints "main" and "rest" (hinges on the ground), "pin" (crank, coupler) and
     "knee" (a universal joint between coupler and rocker): no constraint is redundant.
@@ -106,13 +106,13 @@ def four_bar(
     ground, crank, coupler, rocker
         Lengths [m].
     mass_per_length
-        Of the rigid bars [kg/m].
+        Mass per length of the rigid bars [kg/m].
     angle
-        Of the crank to the x axis at the start [rad].
+        Initial angle from the x axis to the crank [rad].
     drive
-        Angle of the crank over time, from `angle` on.
+        Angle of the crank as a function of time, relative to `angle`.
     flexible_coupler, ends
-        A reduced body in place of the coupler, its interfaces at pin and knee.
+        A reduced body instead of the coupler, with its interfaces `ends` at pin and knee.
     units
         Default: those of `flexible_coupler`, or m-kg-s.
     """

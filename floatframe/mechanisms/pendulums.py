@@ -27,7 +27,7 @@ def pendulum(
     ends: tuple[str, str] = ("start", "end"),
     units: Units | None = None,
 ) -> System:
-    """Return a rod on a hinge at the ground origin, let go at an angle to the x axis [rad]: `chain` of one."""
+    """Return a rod on a hinge at the ground origin, released at an angle from the x axis [rad]: `chain` of one."""
     return chain(1, length=length, mass=mass, angles=(angle,), gravity=gravity, rod=rod, ends=ends, units=units)
 
 
@@ -41,7 +41,7 @@ def double_pendulum(
     ends: tuple[str, str] = ("start", "end"),
     units: Units | None = None,
 ) -> System:
-    """Return two equal rods that hang on each other, at angles to the x axis [rad]: `chain` of two."""
+    """Return two equal rods, one hanging on the other, at angles from the x axis [rad]: `chain` of two."""
     return chain(2, length=length, mass=mass, angles=angles, gravity=gravity, rod=rod, ends=ends, units=units)
 
 
@@ -56,7 +56,7 @@ def chain(
     ends: tuple[str, str] = ("start", "end"),
     units: Units | None = None,
 ) -> System:
-    """Return n equal rods "rod 1", "rod 2", ... in a row, on hinges "hinge 1", ... along z, the first at the origin.
+    """Return n equal rods "rod 1", "rod 2", ... in a row, with hinges "hinge 1", ... about z, the first at the origin.
 
     Parameters
     ----------
@@ -65,11 +65,11 @@ def chain(
     length, mass
         Of each rigid rod [m, kg].
     angles
-        Of each rod to the x axis [rad]; level by default.
+        Angle of each rod from the x axis [rad]; zero by default.
     gravity
-        Along -y [m/s²].
+        Gravity along -y [m/s²].
     rod
-        A reduced body for all of them, instances of one; `length` is then that between its interfaces `ends`.
+        A reduced body, of which all rods are instances; `length` is then the distance between its interfaces `ends`.
     ends
         Interfaces of `rod` at its start and end.
     units
@@ -98,7 +98,7 @@ def chain(
 
 
 def _axes_of(place: Marker, rod: ReducedBody | None, body: object) -> np.ndarray:
-    """Return the axes of an interface as placed, ground axes, (3, 3)."""
+    """Return the axes of an assembled interface, in ground axes, (3, 3)."""
     from floatframe.bodies.flexible_body import FlexibleBody
 
     assert rod is not None and isinstance(body, FlexibleBody) and place.interface is not None  # noqa: PT018

@@ -1,4 +1,4 @@
-"""Slender rods as parts of mechanisms: rigid, or an instance of a reduced body."""
+"""Slender rods as parts of mechanisms: rigid bodies, or instances of a reduced body."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ from floatframe.system import Body
 
 __all__ = ["Rod", "between", "slender_inertia", "turning"]
 
-THICKNESS = 0.02  #: of a rigid rod, part of its length; gives it inertia about its axis
+THICKNESS = 0.02  #: diameter of a rigid rod divided by its length; gives it an inertia about its axis
 
 
 def slender_inertia(mass: float, length: float) -> Array:
@@ -29,7 +29,7 @@ def slender_inertia(mass: float, length: float) -> Array:
 
 
 class Rod:
-    """A rod between two points of the xy plane, with markers at its ends; its x axis points from start to end."""
+    """A rod between two points in the xy plane, with markers at its ends; its x axis points from start to end."""
 
     def __init__(
         self,
@@ -40,7 +40,7 @@ class Rod:
         reduced: ReducedBody | PartMaker | None = None,
         ends: tuple[str, str] = ("start", "end"),
     ) -> None:
-        """Place the rod; a reduced body is laid with its interfaces `ends` on the points, a part with its x axis."""
+        """Place the rod: a reduced body with its interfaces `ends` at the points, a part with its x axis along them."""
         start, end = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
         self.length = float(np.linalg.norm(end - start))
         self.joints: tuple[Joint, ...] = ()
@@ -88,20 +88,20 @@ class Rod:
 
     @property
     def body(self) -> Body:
-        """The one body of a rod that is rigid or reduced."""
+        """The single body of a rigid or reduced rod."""
         return self.bodies[0]
 
 
 def between(reduced: ReducedBody, interface: str) -> Array:
-    """Return the place of an interface in mesh axes, (3,)."""
+    """Return the position of an interface in mesh axes, (3,)."""
     return np.asarray(reduced.frame.origin + reduced.frame.axes @ reduced.interface(interface).position)
 
 
 def turned(to: Array, direction: Array) -> Array:
-    """Return Euler parameters of the least rotation that lays a direction along another, (4,)."""
+    """Return Euler parameters, (4,), of the smallest rotation that takes one direction to another."""
     a, b = direction / np.linalg.norm(direction), to / np.linalg.norm(to)
     axis, cosine = np.cross(a, b), float(a @ b)
-    if cosine < -1 + 1e-12:  # half a turn, about z where that is possible
+    if cosine < -1 + 1e-12:  # half a turn, about z if possible
         axis = np.array([0.0, 0.0, 1.0]) if abs(a[2]) < 0.9 else np.array([1.0, 0.0, 0.0])
         axis = axis - (axis @ a) * a
         return np.concatenate([[0.0], axis / np.linalg.norm(axis)])
@@ -112,7 +112,7 @@ def turned(to: Array, direction: Array) -> Array:
 def turning(body: Body, omega: Array, *, point: Array | None = None, velocity: Array | None = None) -> Body:
     """Return the body with the velocities of a rigid rotation omega, (3,), ground axes.
 
-    It turns about the origin of ground, or about a point, (3,), that moves with a velocity, (3,).
+    The rotation is about the ground origin, or about a point, (3,), that moves with a velocity, (3,).
     """
     omega = np.asarray(omega, dtype=float)
     arm = body.position if point is None else body.position - point

@@ -25,20 +25,20 @@ def satellite(
     ends: tuple[str, str] = ("start", "end"),
     units: Units | None = None,
 ) -> System:
-    """Return a hub (a ball) with two equal booms along +x and -x, fixed to its surface; all spins about z.
+    """Return a spherical hub with two equal booms along +x and -x, fixed to its surface, all spinning about z.
 
     Parameters
     ----------
     hub_mass, hub_radius
-        [kg, m]
+        Mass and radius of the hub [kg, m].
     boom_length, boom_mass
-        Of rigid booms [m, kg]; with `boom` the length is that between its interfaces.
+        Mass and length of rigid booms [m, kg]; with `boom`, the length is the distance between its interfaces.
     spin
-        Angular velocity about z at the start, of hub and booms, which are undeformed [rad/s].
+        Initial angular velocity about z of hub and undeformed booms [rad/s].
     boom
-        A reduced body for both booms, two instances of one.
+        A reduced body, of which both booms are instances.
     ends
-        Interfaces of it at the hub and at the tip.
+        Interfaces of `boom` at the hub and at the tip.
     units
         Default: those of `boom`, or m-kg-s.
     """

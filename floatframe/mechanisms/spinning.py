@@ -1,6 +1,6 @@
-"""Slender bodies that spin: where a linear frame fails without geometric stiffness.
+"""Spinning slender bodies, for which a linear floating frame fails without geometric stiffness.
 
-The bodies come as reduced bodies with their axis along x of their mesh.
+The bodies are given as reduced bodies whose axis is the x axis of their mesh.
 """
 
 from typing import Literal
@@ -35,7 +35,7 @@ def spin_up_beam(
     root: str = "root",
     stiffening: Stiffening = "auto",
 ) -> System:
-    """Return a beam along x that a driven hub brings to a spin about z (Kane, Ryan and Banerjee's problem).
+    """Return a beam along x that a driven hub accelerates to a spin about z (problem of Kane, Ryan and Banerjee).
 
     Bodies "hub" (rigid, its motion prescribed) and "beam"; joints "drive" (ground, hub) and "root" (hub, beam).
     The angle of the drive is `cycloidal_spin_up(speed, duration)`.
@@ -45,15 +45,15 @@ def spin_up_beam(
     beam
         A reduced body with an interface at its root.
     speed, duration
-        Of the spin-up [rad/s, s].
+        Final speed and duration of the spin-up [rad/s, s].
     hub_radius
         Distance of the root from the axis [m].
     pitch
-        Angle of the root about the axis of the beam over time, on top of the spin; None: it is fixed to the hub.
+        Rotation of the root about the beam axis as a function of time, in addition to the spin; None: fixed to the hub.
     root
         Interface of the beam.
     stiffening
-        As that of `FlexibleBody`.
+        As for `FlexibleBody`.
     """
     at = np.array([hub_radius, 0.0, 0.0])
     size = float(np.linalg.norm(np.ptp(beam.nodes, axis=0))) or 1.0
@@ -76,7 +76,7 @@ def rotating_blade(
     root: str = "root",
     stiffening: Stiffening = "auto",
 ) -> System:
-    """Return a blade along x, fixed to a hub that turns freely about z.
+    """Return a blade along x, fixed to a hub that rotates freely about z.
 
     Bodies "hub" and "blade"; joints "main" (ground, hub) and "root". With `floatframe.analyses.campbell` or
     `steady_rotation` it gives the frequencies of the rotating blade.
@@ -88,11 +88,11 @@ def rotating_blade(
     hub_radius
         Distance of the root from the axis [m].
     hub_inertia
-        Of the hub about z [kg m²]; default: 1e9 times that of the blade, so that it turns steadily.
+        Inertia of the hub about z [kg m²]; default: 1e9 times that of the blade, so that the speed is constant.
     root
         Interface of the blade.
     stiffening
-        As that of `FlexibleBody`.
+        As for `FlexibleBody`.
     """
     at = np.array([hub_radius, 0.0, 0.0])
     size = float(np.linalg.norm(np.ptp(blade.nodes, axis=0))) + hub_radius
@@ -116,20 +116,20 @@ def spinning_shaft(
     ends: tuple[str, str] = ("left", "right"),
     stiffening: Stiffening = "auto",
 ) -> System:
-    """Return a shaft along x on two bearings that let it bend freely and slide at the right; it spins about x.
+    """Return a shaft along x that spins about x on two bearings, which allow bending, and sliding at the right end.
 
-    Body "shaft"; joints "left" (a ball) and "right" (a point on the axis).
+    Body "shaft"; joints "left" (spherical) and "right" (a point on the axis).
 
     Parameters
     ----------
     shaft
-        A reduced body with interfaces at its bearings.
+        A reduced body with interfaces at the bearings.
     speed
-        Of the spin at the start [rad/s].
+        Initial spin [rad/s].
     ends
         Interfaces at the bearings.
     stiffening
-        As that of `FlexibleBody`.
+        As for `FlexibleBody`.
     """
     a, b = (between(shaft, end) for end in ends)
     body = FlexibleBody("shaft", shaft, position=-a, omega_B=speed * X, stiffening=stiffening)

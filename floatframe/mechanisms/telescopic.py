@@ -1,4 +1,4 @@
-"""A rod that a crank pushes through a fixed ring: a telescopic slider-crank with a flexible rod."""
+"""A telescopic slider-crank: a crank pushes a flexible rod through a fixed ring."""
 
 from collections.abc import Sequence
 
@@ -37,19 +37,19 @@ def telescopic_slider_crank(
     Parameters
     ----------
     rod
-        Its interfaces `stations` lie on a straight line, the first at the pin.
+        The rod, whose interfaces `stations` lie on a straight line; the first is at the pin.
     stations
-        Names of interfaces along the rod, in order, the more the finer its line.
+        Names of interfaces along the rod, in order; more of them give a more accurate line.
     crank, ring
-        Length of the crank, and distance of the ring from its hinge [m]; the rod must reach through the ring always.
+        Length of the crank, and distance of the ring from its hinge [m]; the rod must always reach through the ring.
     crank_mass
-        [kg]
+        Mass [kg].
     angle
-        Of the crank to the x axis at the start [rad].
+        Initial angle from the x axis to the crank [rad].
     speed
-        Of the crank at the start, where no drive says it [rad/s].
+        Initial angular velocity of the crank, if there is no drive [rad/s].
     drive
-        Angle of the crank over time, from `angle` on; None: it turns freely.
+        Angle of the crank as a function of time, relative to `angle`; None: it rotates freely.
     """
     names = tuple(stations)
     if len(names) < 2:

@@ -1,4 +1,4 @@
-"""The heavy symmetric top on a fixed point."""
+"""The heavy symmetric top with a fixed point."""
 
 import numpy as np
 
@@ -28,19 +28,19 @@ def spinning_top(
     Parameters
     ----------
     mass
-        [kg]
+        Mass [kg].
     arm
         Distance of the centre of mass from the tip [m].
     inertia
-        Moments about the centre of mass, across and along the axis [kg m²].
+        Principal moments about the centre of mass, transverse and axial [kg m²].
     tilt
         Angle of the axis from the vertical [rad].
     spin
-        Angular velocity about its axis [rad/s].
+        Initial angular velocity about the axis of the top [rad/s].
     precession
-        Angular velocity about the vertical at the start [rad/s].
+        Initial angular velocity about the vertical [rad/s].
     gravity
-        [m/s²]
+        Gravity along -z [m/s²].
     """
     across, along = inertia
     up = np.array([0.0, np.sin(tilt), np.cos(tilt)])  # the vertical in body axes
