@@ -82,7 +82,7 @@ def write_quantities(x, m, out, o):
 
 @njit
 def expression_law(t, x, z, lam, data, wrench, z_dot, g, seen):
-    """Evaluate all expressions; data: largest number of operations, number of terms, indices of tapes (or -1), tapes."""
+    """Evaluate all expressions; data: largest number of operations, number of terms, tape indices (or -1), tapes."""
     n, n_z, n_terms = x.shape[0], z.shape[0], int(data[1])
     n_inputs = 1 + 12 * (n - 1) + n_z
     inputs = np.empty(n_inputs + n_terms, x.dtype)

@@ -134,7 +134,7 @@ def unbalanced_shaft(describe: Describe, *, turn: TimeFunction, gravity: float =
 
 
 def shaft_turn(omega: float = 60.0) -> TimeFunction:
-    """Return the angle of the shaft; its rate rises to 0.8 omega in 0.5 s, and to 1.2 omega from 1 s to 1.25 s [rad]."""
+    """Return the angle of the shaft; its rate rises to 0.8 omega in 0.5 s, to 1.2 omega from 1 s to 1.25 s [rad]."""
     first, last = 0.8 * omega, 1.2 * omega
 
     def rise(begin: float, rate: float, by: float, T: float) -> TimeFunction:
