@@ -41,7 +41,23 @@ PLAIN = (
     "kernels by plain numba", "pytest", "-q", "-m", "not long", "tests/floatframe/kernels",
     "tests/floatframe/integrators/test_pendulum.py",
 )  # fmt: skip
-TESTS = ("tests", "pytest", "-q", *SPREAD, "-m", "not long and not external", "tests")
+#: files that take more than ten seconds of a processor, the longest first: begun last, one would keep a worker alone
+SLOWEST = tuple(
+    f"tests/{name}.py"
+    for name in (
+        "floatframe/discrete/test_every_element", "floatframe/generation/units/test_generated_unit",
+        "floatframe/discrete/test_every_part", "floatframe/discrete/test_connections",
+        "floatframe/discrete/test_every_force", "floatframe/motion/test_jumps_of_laws",
+        "floatframe/motion/test_wrong_motions_are_told", "floatframe/optimization/test_optimization",
+        "floatframe/gradients/test_sensitivities", "floatframe/general_position/test_every_part_in_other_units",
+        "floatframe/elements/test_element_faults", "fe_models/shells/test_geometric", "pipeline/test_line",
+        "floatframe/cli/test_commands", "floatframe/laboratory/test_laboratory", "floatframe/generation/test_generate",
+        "floatframe/cosimulation/test_fmu", "pipeline/test_split_line", "floatframe/clearances/test_clearances",
+    )
+)  # fmt: skip
+TESTS = (
+    "tests", "pytest", "-q", *SPREAD, "--no-loadscope-reorder", "-m", "not long and not external", *SLOWEST, "tests",
+)  # fmt: skip
 LONG = ("long tests", "pytest", "-q", "--durations=0", "-m", "long and not external", "tests")
 RELATIVE = (
     "engine in joint coordinates", "pytest", "-q", *SPREAD, "--formulation", "relative",

@@ -9,7 +9,7 @@ import textwrap
 
 import pytest
 
-from tests.__main__ import GROUPS, Group, main, run
+from tests.__main__ import GROUPS, SLOWEST, Group, main, run
 from tests.floatframe.formulations import EXCEPTIONS, ROOMS, SHORT
 from tests.import_graph import modules, named_modules, used_modules
 from tests.root import ROOT
@@ -159,8 +159,9 @@ def test_exceptions_of_the_relative_formulation_name_tests_that_exist():
         assert file.split("/")[0] in ROOMS
         assert f"def {test.partition('[')[0]}(" in (folder / file).read_text(), name
         assert len(reason) > 20
-    for file in SHORT:
+    for file in (*SHORT, *SLOWEST):
         assert (ROOT / file).is_file()
+    for file in SHORT:
         assert file.split("/")[2] in ROOMS
 
 
