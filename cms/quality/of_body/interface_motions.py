@@ -65,8 +65,10 @@ def rigid_defect(reduced: ReducedBody, interface: ReducedInterface) -> float:
     for row in interface.members.tolist() if reduced.kept is not None else ():
         assert reduced.kept is not None
         turn = reduced.kept.of_node(row)
-        is_dofs = turn is not None and reduced.kept.source[int(np.flatnonzero(reduced.kept.nodes == row)[0])] == "dofs"
-        if is_dofs:  # half the curl of a solid is that of its elements, which bend beside the rigid face
+        if turn is None:
+            continue
+        # half the curl of a solid is that of its elements, which bend beside the rigid face
+        if reduced.kept.source[int(np.flatnonzero(reduced.kept.nodes == row)[0])] == "dofs":
             largest = max(largest, float((np.abs(turn - interface.Psi[3:]) * body_length(reduced) / size).max()))
     return largest
 

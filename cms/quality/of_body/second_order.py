@@ -40,8 +40,8 @@ def check_second_order(reduced: ReducedBody) -> QualityRecord:
 def check_turned_loads(reduced: ReducedBody) -> QualityRecord:
     """Turned loads follow from the moments: the difference over the sum of both, modes at unit strain energy.
 
-    Exact for solids. Nodes that turn take a couple beside a force, which counts by half when it is turned, and of beams
-    and shells the moments are as small where they bend: these are not judged.
+    Exact for solids but for the quadrature of distorted cells. Nodes that turn take a couple beside a force, which counts
+    by half when it is turned, and of beams and shells the moments are as small where they bend: these are not judged.
     """
     geometric = reduced.geometric
     if geometric is None or geometric.turned is None or not reduced.n_q or not (np.diag(reduced.K) > 0).all():
@@ -81,7 +81,7 @@ def turned_defects(reduced: ReducedBody, geometric: GeometricStiffness) -> Itera
         scale = np.ones(len(own)) if name != "interfaces" else np.tile(np.repeat([1.0, L], 3), len(own) // 6)
         a, b = (x * by_energy / scale[:, None, None] for x in (own, made))
         unit = shape * force[name]
-        size = max(np.linalg.norm(a) + np.linalg.norm(b), NEGLIGIBLE * unit)
+        size = max(float(np.linalg.norm(a) + np.linalg.norm(b)), NEGLIGIBLE * unit)
         yield name, max(0.0, float(np.linalg.norm(a - b) - rounding * unit * np.sqrt(a.size)) / size)
 
 

@@ -288,7 +288,8 @@ def compare_sums(case: Case) -> Iterator[Compared]:
         return
     w, L, size = expected.w, case.reach, mode_size(case.reduced)
     yield same("nodal_sums.is_volume", file.is_volume, expected.is_volume)
-    for name, scale in {"w": w, "S": w * L, "R": w * L**2, "U1": w * size, "U2": w * L * size}.items():
+    scales: dict[str, Array | float] = {"w": w, "S": w * L, "R": w * L**2, "U1": w * size, "U2": w * L * size}
+    for name, scale in scales.items():
         yield apart(f"nodal_sums.{name}", getattr(file, name), getattr(expected, name), scale)
 
 

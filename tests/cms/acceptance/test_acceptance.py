@@ -23,6 +23,7 @@ from cms.acceptance.pdf_pages import pdf_pages
 from cms.acceptance.range_of_use import range_of_use
 from cms.acceptance.write import write_acceptance
 from cms.cli import main
+from cms.cli.verdicts.check import check_file
 from cms.jobs.reduce_job import reduce_job
 from cms.modal_file.file import read, write
 from cms.quality import reduction_check
@@ -160,6 +161,41 @@ def test_shapes_of_another_model_are_told_apart(folder):
     assert wrong["model-mass"].verdict == "pass"
     assert wrong["mac-nodal"].value > 5 * found["mac-nodal"].value
     assert wrong["frequency-error"].value > 0.2
+
+
+@pytest.mark.parametrize("what", ["shuffled", "of the wrong sign"])
+def test_a_received_body_whose_inner_shapes_are_garbage_is_not_accepted(folder, what):
+    """Mass, frequencies and interfaces are right; nodes between the interfaces move as others do."""
+    body = read(folder / "bar.h5")
+    inner = np.setdiff1d(np.arange(len(body.nodes)), np.concatenate([each.members for each in body.interfaces]))
+    Phi = np.array(body.Phi)
+    Phi[inner] = Phi[np.random.default_rng(1).permutation(inner)] if what == "shuffled" else -Phi[inner]
+    provenance = {"program": "another"}
+    deck = folder / "received.inp"
+    deck.write_text(
+        (folder / "bar.inp").read_text() + f"*MATERIAL, NAME=steel\n*ELASTIC\n{YOUNG}, 0.3\n*DENSITY\n{DENSITY}\n"
+        "*SOLID SECTION, ELSET=all, MATERIAL=steel\n"
+    )
+    full = FullModel(deck=deck, program="calculix")
+    right = accept_body(replace(body, provenance=provenance), full, most_dofs=0, band=9000.0)
+    wrong = accept_body(replace(body, Phi=Phi, provenance=provenance), full, most_dofs=0, band=9000.0)
+    assert right.verdict != "fail"
+    failed = [{record.name for record in found.records if record.verdict == "fail"} for found in (right, wrong)]
+    assert failed[1] - failed[0] - {"band-asked"} == {"mac-nodal"}
+
+
+def test_a_body_that_is_not_that_of_its_job_is_not_accepted_by_name(folder, capsys):
+    """Damping ten times that of the job, and stress in Pa in a file in MPa, for `accept --full` and `check --job`."""
+    body = read(folder / "bar.h5")
+    bad = replace(body, D=10 * np.asarray(body.D), stress=1e6 * np.asarray(body.stress))
+    found = accept_body(bad, FullModel(job=folder / "bar.toml"), most_dofs=0)
+    assert {record.name for record in found.records if record.verdict == "fail"} == {"damping-matrix", "stress-modes"}
+    (damping,) = (record for record in found.records if record.name == "damping-matrix")
+    assert "the job: ModalDamping(ratio=0.01)" in damping.reason
+    write(bad, folder / "bad.h5")
+    assert check_file(folder / "bad.h5", folder / "bar.toml", band=None, as_json=True) == 1
+    records = json.loads(capsys.readouterr().out)["records"]
+    assert {r["name"] for r in records if r["verdict"] == "fail"} == {"damping-matrix", "stress-modes"}
 
 
 def test_changed_and_missing_sources_are_told(folder, tmp_path):

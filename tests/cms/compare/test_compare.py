@@ -30,6 +30,7 @@ from cms.quality.reduction_check import check_reduction
 from cms.quality.reference.full_reference import FullReference
 from cms.quality.reference.port_model import FrequencyResponse, port_model
 from cms.quality.reference.transient import Snapshots
+from fe_models.body.load_cases import LoadCase
 from tests.bodies import bar, beam, box_mesh, chain
 from tests.decks import JOB, write_deck
 
@@ -150,6 +151,28 @@ def test_records_are_those_of_the_reduced_body_itself(name, body, motion, compar
     assert_allclose(ours["frequency-response"].value, response.mean_error, rtol=1e-5)
     for key in records.keys() & ours.keys() - {"effective-mass"}:
         assert ours[key].verdict == records[key].verdict, key
+
+
+def test_load_cases_are_judged_as_the_check_of_the_reduced_body_judges_them():
+    """A force across the middle of the bar, which the modes answer in part, and gravity, which deforms nothing."""
+    free = bar(nx=6, kind="hexahedron")
+    f, along = np.zeros(free.n_dof), (free.dofs[:, 1] == 2).astype(float)
+    f[np.flatnonzero((np.abs(free.nodes[free.dofs[:, 0], 0] - 0.5) < 0.01) & (along > 0))] = 10.0
+    cases = LoadCase("push", "force", f), LoadCase("weight", "gravity", free.M @ along)
+    body = cms.couple(free.with_load_cases(*cases))
+    found = compare(body, ["craig-bampton", "guyan"], [3], n_reference=4)
+    with Families(body) as families, FullReference(families, band=found.full.band_hz) as reference:
+        for modes in (cms.craig_bampton(families, n_modes=3), cms.guyan(families)):
+            records = check_reduction(body, modes, cms.reduce(body, modes), reference=reference)
+            expected = {record.name: record for record in records}["static-load-cases"]
+            own = found.set(modes.name).points[0].record("static-load-cases")
+            assert own.verdict == expected.verdict
+            assert_allclose(own.data["errors"], expected.data["errors"], rtol=1e-6, atol=1e-9)
+            assert np.isnan(own.data["errors"]).tolist() == [False, True]
+    assert own.verdict == "warn"
+    assert "static load cases" in found.set("guyan").sentence
+    plain = compare(cms.couple(free), ["guyan"], [0], n_reference=4)
+    assert plain.set("guyan").points[0].record("static-load-cases").verdict == "info"
 
 
 def test_frequencies_fall_towards_the_full_ones_as_a_set_grows(comparison):
