@@ -40,8 +40,8 @@ def check_second_order(reduced: ReducedBody) -> QualityRecord:
 def check_turned_loads(reduced: ReducedBody) -> QualityRecord:
     """Turned loads follow from the moments: the difference over the sum of both, modes at unit strain energy.
 
-    Exact for solids but for the quadrature of distorted cells. Nodes that turn take a couple beside a force, which counts
-    by half when it is turned, and of beams and shells the moments are as small where they bend: these are not judged.
+    Exact for solids but for the quadrature of distorted cells. Nodes that turn take a couple beside a force, which
+    counts by half when it is turned, and of beams and shells the moments are as small where they bend: not judged.
     """
     geometric = reduced.geometric
     if geometric is None or geometric.turned is None or not reduced.n_q or not (np.diag(reduced.K) > 0).all():
