@@ -1,4 +1,4 @@
-"""Forces of the air as public elements."""
+"""Aerodynamic forces as public elements."""
 
 from floatframe.aerodynamics.lifting_surface import LiftingSurface
 

@@ -1,4 +1,4 @@
-"""Lift and drag of a wing, a part of one or a tail by its angle of attack: a strip in quasi-steady flow."""
+"""Lift and drag of a wing, a part of it or a tail as functions of the angle of attack, in quasi-steady strip theory."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -23,24 +23,24 @@ STILL: Any = (0.0, 0.0, 0.0)
 OUTPUTS = (
     ("lift", "N"), ("drag", "N"), ("alpha", "rad"), ("speed", "m/s"), ("lift coefficient", "1"), ("power lost", "W"),
 )  # fmt: skip
-FACTOR = 10  #: where the factor on the lift begins in the data
-LEAST_SPEED = 1e-6  #: below which there is no force and no angle
+FACTOR = 10  #: index in the data of the factor on the lift
+LEAST_SPEED = 1e-6  #: speed below which force and angle are zero
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class LiftingSurface(Element):
-    """Lift and drag at a marker whose x points forward along the chord and z up from the surface.
+    """Lift and drag at a marker whose x axis points forward along the chord, and z upward from the surface.
 
-    With the components v_x, v_z of the marker's velocity through the air (that along the span leaves the flow as it
-    is), V² = v_x² + v_z²:
+    v_x and v_z are components of the marker's velocity through the air, V² = v_x² + v_z²; the spanwise component has no
+    effect:
 
         alpha = atan2(-v_z, v_x),   C_L = lift_slope (alpha - zero_lift(t)) factor(t), held at ±most_lift,
         C_D = zero_drag + induced_drag C_L²,   lift rho/2 V² area C_L, drag rho/2 V² area C_D.
 
-    Lift is normal to the flow in the plane of x and z, drag against the velocity. Beyond `most_lift` the lift stays, it
-    does not break down. Left out: ground effect, downwash of one surface on another, and the lag of the circulation
-    (some chords of way).
+    Lift is normal to the flow in the plane of x and z, and drag is opposite to the velocity. Beyond `most_lift`, the
+    lift stays constant; it does not break down (stall). Neglected are ground effect, downwash of one surface on
+    another, and the lag of the circulation (over a distance of some chords).
     """
 
     name: str
@@ -48,12 +48,13 @@ class LiftingSurface(Element):
     area: float  #: [m²]
     lift_slope: float  #: dC_L/dalpha [1/rad]
     density: float  #: rho of the air [kg/m³]
-    #: alpha without lift, over time [rad]: incidence and flaps make it negative, an elevator that is pulled positive
+    #: alpha without lift as a function of time [rad]: negative for incidence and flaps, positive for an elevator pulled
+    #: up
     zero_lift: TimeFunction | float = 0.0
-    most_lift: float = 1.5  #: largest size of C_L
+    most_lift: float = 1.5  #: largest magnitude of C_L
     zero_drag: float = 0.0  #: C_D without lift
     induced_drag: float = 0.0  #: 1/(pi e aspect ratio)
-    factor: TimeFunction | float = 1.0  #: on the lift over time, such as of spoilers
+    factor: TimeFunction | float = 1.0  #: factor on the lift as a function of time, such as for spoilers
     wind: Array = STILL  #: velocity of the air, ground axes, (3,) [m/s]
 
     def __post_init__(self) -> None:
@@ -71,7 +72,7 @@ class LiftingSurface(Element):
 
     def law(self, placed: Placed) -> ElementLaw:
         """Return the law of the surface."""
-        assert isinstance(self.factor, TimeFunction)  # by __post_init__
+        assert isinstance(self.factor, TimeFunction)  # ensured by __post_init__
         assert isinstance(self.zero_lift, TimeFunction)
         if placed.on_ground[0]:
             raise ModelError(f"element {self.name!r}: marker: expected one on a body that flies, got one on the ground")
@@ -90,7 +91,7 @@ class LiftingSurface(Element):
 
 @njit
 def lifting_surface_law(t, x, z, lam, data, wrench, z_dot, g, seen):
-    """Write the force of the air at the marker and the outputs."""
+    """Write the aerodynamic force at the marker, and the outputs."""
     rho, area, slope, most, zero_drag, induced = data[0], data[1], data[2], data[4], data[5], data[6]
     v = x[0, 12] - data[7], x[0, 13] - data[8], x[0, 14] - data[9]
     ahead = x[0, 3] * v[0] + x[0, 6] * v[1] + x[0, 9] * v[2]  # v_x and v_z
@@ -106,7 +107,7 @@ def lifting_surface_law(t, x, z, lam, data, wrench, z_dot, g, seen):
         C = -most + 0.0 * C
     D = zero_drag + induced * C * C
     q = 0.5 * rho * area * V
-    a = -q * (C * up + D * ahead)  # along x: lift leans forward when sinking
+    a = -q * (C * up + D * ahead)  # along x: lift has a forward component when sinking
     b = q * (C * ahead - D * up)  # along z
     lost = 0.0 * V
     for k in range(3):

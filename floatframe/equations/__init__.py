@@ -1,4 +1,4 @@
-"""Open equations: residual, matrices, constraints and maps of a system in Python, for integrators of one's own."""
+"""Open equations of a system (residual, matrices, constraints, maps) in Python, for integrators of the user."""
 
 from floatframe.equations.body_equations import BodyEquations, body_equations
 from floatframe.equations.configuration import Configurations

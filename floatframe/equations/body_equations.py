@@ -1,11 +1,11 @@
 """The equations of one reduced body as plain arrays and functions, for other programs (docs/theory.md §5-7).
 
-With velocities (v, omega, q_dot), v that of the frame origin in body axes, and loads (f, tau, h) of §6,
+With velocities (v, omega, q_dot), where v is that of the frame origin in body axes, and loads (f, tau, h) of §6,
 
     M(q) (a, alpha, q_ddot) + k_omega(omega, q, q_dot) + k_e(q, q_dot) = (f, tau, h),
 
-a the acceleration of the frame origin in body axes minus gravity. Plain NumPy from the formulas of §6, apart from the
-kernels; tests hold both to each other.
+where a is the acceleration of the frame origin in body axes minus gravity. The formulas of §6 are written in NumPy,
+independently of the kernels; tests compare both.
 """
 
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ __all__ = ["BodyEquations", "body_equations"]
 
 @dataclass(frozen=True, eq=False)
 class BodyEquations:
-    """Invariants of a body about its frame and the terms of its equations; all in axes of the frame."""
+    """Invariants of a body about its frame, and the terms of its equations; all in axes of the frame."""
 
     m: float  #: mass [kg]
     S: Array  #: first moment, (3,) [kg m]
@@ -34,12 +34,12 @@ class BodyEquations:
     C2: Array  #: 2C = ∫ c × phi_k, (3, n)
     C3: Array  #: 3C_k = ∫ (c·phi_k 1 - phi_k cᵀ), (n, 3, 3)
     C4: Array  #: 4C_kl = ∫ phi_l × phi_k, (n, n, 3)
-    S_ab: Array  #: ∫ phi_a,k phi_b,l, (3, 3, n, n); of a stiffened body with K_ab and K_r in it (§7)
+    S_ab: Array  #: ∫ phi_a,k phi_b,l, (3, 3, n, n); for a stiffened body including K_ab and K_r (§7)
     M: Array  #: modal mass M*, (n, n)
     K: Array  #: modal stiffness K*, (n, n)
     D: Array  #: modal damping D*, (n, n)
-    K_t: Array  #: geometric stiffness of unit accelerations, (3, n, n); zero unless stiffened
-    K_r: Array  #: of unit angular accelerations, (3, n, n); zero unless stiffened
+    K_t: Array  #: geometric stiffness for unit accelerations, (3, n, n); zero unless stiffened
+    K_r: Array  #: geometric stiffness for unit angular accelerations, (3, n, n); zero unless stiffened
 
     @property
     def n_q(self) -> int:
@@ -55,7 +55,7 @@ class BodyEquations:
         return np.asarray(self.C1 + self.K_t @ q)
 
     def coupling(self, q: Array) -> Array:
-        """Return B(q), (3, n): 2C_k + Σ 4C_kl q_l, of a stiffened body with K_r q: of rotation and modes."""
+        """Return the coupling of rotation and modes, B(q), (3, n): 2C_k + Σ 4C_kl q_l, plus K_r q if stiffened."""
         W = np.einsum("abkl,l->abk", self.S_ab, q)
         return np.asarray(self.C2 + np.stack([W[2, 1] - W[1, 2], W[0, 2] - W[2, 0], W[1, 0] - W[0, 1]]))
 
@@ -76,8 +76,8 @@ class BodyEquations:
     def mass_matrix(self, q: Array, theta: Array | None = None) -> Array:
         """Return M(theta, q), (6 + n, 6 + n), over (v, omega, q_dot), symmetric.
 
-        theta: Euler parameters of the frame, (4,), for v in ground axes; without them v is in body axes, and the
-        matrix does not depend on how the body is turned.
+        theta: Euler parameters of the frame, (4,), if v is in ground axes. Without them, v is in body axes, and the
+        matrix does not depend on the orientation of the body.
         """
         s, B, C1 = self.first_moment(q), self.coupling(q), self.first_moment_rate(q)
         M = np.block(
@@ -94,7 +94,7 @@ class BodyEquations:
         return np.asarray(turn @ M @ turn.T)
 
     def quadratic_velocity(self, omega: Array, q: Array, q_dot: Array) -> Array:
-        """Return k_omega, (6 + n,): forces of inertia without accelerations, body axes [N, N m, N].
+        """Return k_omega, (6 + n,): inertia forces at zero accelerations, in body axes [N, N m, N].
 
         omega × (omega × s) + 2 omega × 1C(q) q_dot + q_dotᵀ K_t q_dot; omega × J omega + 2 Σ q_dot_k D_k omega +
         q_dotᵀ K_r q_dot; 2 Σ_l 4C_kl·omega q_dot_l - omegaᵀ D_k omega.
@@ -123,14 +123,14 @@ def body_equations(body: ReducedBody | FlexibleBody, *, stiffening: bool | Liter
     ----------
     body
         A reduced body, in the frame of its file; or a flexible body of a system, in the frame in which the engine
-        moves it (mean axes if it is stiffened), as its `stiffening` says.
+        computes it (mean axes if it is stiffened), with its own `stiffening`.
     stiffening
-        Of a reduced body: whether its geometric stiffness counts; "auto": if it is there.
+        For a reduced body: whether to use its geometric stiffness; "auto": if it has one.
 
     Raises
     ------
     ModelError
-        If stiffening is asked for and the body holds no geometric stiffness.
+        If stiffening is requested for a body without geometric stiffness.
     """
     if isinstance(body, FlexibleBody):
         return body_equations(body.moved, stiffening=body.is_stiffened)

@@ -1,8 +1,9 @@
 """The group of configurations R³ × SO(3) × Rⁿ of each body, and its maps (docs/theory.md §0, §9).
 
-A configuration x = (r, p, q) per body: position of the frame origin in ground axes (3), Euler parameters (4), modal
-coordinates. A displacement dx = (dr in ground axes, rotation vector in body axes, dq) and a velocity v = (v_GO in
-ground axes, omega_B in body axes, q_dot) have one number less. Everything here is NumPy, and takes complex dx.
+A configuration x = (r, p, q) of a body consists of the position of the frame origin in ground axes (3), Euler
+parameters (4) and modal coordinates. A displacement dx = (dr in ground axes, rotation vector in body axes, dq) and a
+velocity v = (v_GO in ground axes, omega_B in body axes, q_dot) have one component less. All functions use NumPy and
+accept complex dx.
 """
 
 from dataclasses import dataclass
@@ -26,22 +27,22 @@ __all__ = ["Configurations", "inverse_right_jacobian"]
 
 @dataclass(frozen=True, eq=False)
 class Configurations:
-    """The group of configurations of a system: the maps that an integrator on it needs."""
+    """The configuration group of a system, with the maps that integrators on it need."""
 
-    n_q: IntArray  #: modes of each body, (n_b,)
+    n_q: IntArray  #: number of modes of each body, (n_b,)
 
     @property
     def n_x(self) -> int:
-        """Numbers of a configuration: 7 n_b + n_q."""
+        """Number of components of a configuration: 7 n_b + n_q."""
         return 7 * len(self.n_q) + int(self.n_q.sum())
 
     @property
     def n_v(self) -> int:
-        """Numbers of a displacement or velocity: 6 n_b + n_q."""
+        """Number of components of a displacement or velocity: 6 n_b + n_q."""
         return 6 * len(self.n_q) + int(self.n_q.sum())
 
     def parts(self) -> list[tuple[int, int, int]]:
-        """Return for each body where its part begins in x and in v, and its number of modes."""
+        """Return, for each body, the first index of its part in x and in v, and its number of modes."""
         starts, x0, v0 = [], 0, 0
         for n in (int(n) for n in self.n_q):
             starts.append((x0, v0, n))
@@ -59,14 +60,14 @@ class Configurations:
         return result
 
     def normalized(self, x: Array) -> Array:
-        """Return x with Euler parameters of length one: products of many rotations lose it by rounding."""
+        """Return x with Euler parameters normalised to length one; products of many rotations lose it by rounding."""
         result = np.array(x, dtype=float)
         for i, _, _ in self.parts():
             result[i + 3 : i + 7] /= np.linalg.norm(result[i + 3 : i + 7])
         return result
 
     def difference(self, x: Array, other: Array) -> Array:
-        """Return the dx with x (+) dx = other, (n_v,); rotations of up to half a turn."""
+        """Return dx, (n_v,), with x (+) dx = other; rotations up to half a turn."""
         result = np.zeros(self.n_v)
         for i, j, n in self.parts():
             result[j : j + 3] = other[i : i + 3] - x[i : i + 3]
@@ -76,7 +77,7 @@ class Configurations:
         return result
 
     def rate(self, x: Array, v: Array) -> Array:
-        """Return x_dot, (n_x,), of the velocities v, (n_v,): p_dot = p * omega/2, the others are rates themselves."""
+        """Return x_dot, (n_x,), from velocities v, (n_v,): p_dot = p * omega/2; the other components are equal."""
         result = np.zeros(self.n_x)
         for i, j, n in self.parts():
             result[i : i + 3] = v[j : j + 3]
@@ -85,7 +86,7 @@ class Configurations:
         return result
 
     def velocity(self, x: Array, x_dot: Array) -> Array:
-        """Return the velocities v, (n_v,), of x_dot, (n_x,): omega_B = 2 p⁻¹ * p_dot."""
+        """Return the velocities v, (n_v,), from x_dot, (n_x,): omega_B = 2 p⁻¹ * p_dot."""
         result = np.zeros(self.n_v)
         for i, j, n in self.parts():
             back = np.array(x[i + 3 : i + 7]) * (1, -1, -1, -1)
@@ -95,7 +96,7 @@ class Configurations:
         return result
 
     def tangent(self, dx: Array) -> Array:
-        """Return T(dx), (n_v, n_v): x (+) dx moves by T d(dx), so that v = T(dx) d(dx)/dt while x is held."""
+        """Return T(dx), (n_v, n_v): x (+) dx moves by T d(dx), so that v = T(dx) d(dx)/dt at constant x."""
         return self.by_bodies(dx, right_jacobian)
 
     def inverse_tangent(self, dx: Array) -> Array:
@@ -103,7 +104,7 @@ class Configurations:
         return self.by_bodies(dx, inverse_right_jacobian)
 
     def by_bodies(self, dx: Array, of_rotation) -> Array:
-        """Return the identity with a matrix of the rotation vector at the rotations of each body."""
+        """Return the identity, with a matrix function of the rotation vector in the rotation block of each body."""
         result = np.eye(self.n_v)
         for _, j, _ in self.parts():
             result[j + 3 : j + 6, j + 3 : j + 6] = of_rotation(np.asarray(dx)[j + 3 : j + 6])
@@ -111,7 +112,7 @@ class Configurations:
 
 
 def rotation_vector(p: Array) -> Array:
-    """Return the rotation vector, (3,) [rad], of Euler parameters, of at most half a turn, accurate near zero too."""
+    """Return the rotation vector, (3,) [rad], from Euler parameters, at most half a turn; accurate also near zero."""
     p = np.asarray(p) if p[0] >= 0 else -np.asarray(p)
     sine = float(np.linalg.norm(p[1:]))
     scale = 2.0 / p[0] if sine == 0.0 else 2 * np.arctan2(sine, p[0]) / sine
@@ -121,7 +122,8 @@ def rotation_vector(p: Array) -> Array:
 def inverse_right_jacobian(theta: Array) -> Array:
     """Return T(theta)⁻¹ = 1 + S/2 + c S², (3, 3), S = tilde(theta), c = (1 - s/(2 a))/t² (s, a of `rotations`).
 
-    From (1 - a S + b S²)(1 + S/2 + c S²) = 1 and S³ = -t² S; below t = 1/2 by solving with T, which is then near one.
+    From (1 - a S + b S²)(1 + S/2 + c S²) = 1 and S³ = -t² S; for t < 1/2, T, which is close to one, is inverted
+    instead.
     """
     theta = np.asarray(theta)
     x = dot(theta, theta)

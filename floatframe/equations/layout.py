@@ -1,4 +1,4 @@
-"""Where each number of x, v and lambda stands, its name and its unit."""
+"""The position, name and unit of each component of x, v and lambda."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,33 +16,33 @@ AXES = ("x", "y", "z")
 
 @dataclass(frozen=True)
 class Component:
-    """One number of a vector."""
+    """A component of a vector."""
 
     index: int
     owner: str  #: body, joint or coupler
-    name: str  #: what it is of its owner
+    name: str  #: quantity of the owner
     unit: str
 
     def __str__(self) -> str:
-        """Return the line of a table."""
+        """Return the component as a line of a table."""
         return f"{self.index:5d}  {self.owner + ' ' + self.name:40s}  {self.unit}"
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Components of x, v and lambda in their order."""
+    """The components of x, v and lambda, in order."""
 
     x: tuple[Component, ...]  #: positions, (n_x,)
-    v: tuple[Component, ...]  #: velocities; accelerations and the rows of the residual stand alike, (n_v,)
-    lam: tuple[Component, ...]  #: rows of the constraint and their multipliers, (n_lam,)
+    v: tuple[Component, ...]  #: velocities, (n_v,); accelerations and rows of the residual have the same order
+    lam: tuple[Component, ...]  #: rows of the constraints, and their multipliers, (n_lam,)
 
     def index(self, vector: str, owner: str, name: str) -> int:
-        """Return where a component stands in "x", "v" or "lam".
+        """Return the index of a component in "x", "v" or "lam".
 
         Raises
         ------
         ModelError
-            With the nearest name if there is none.
+            If there is none; the message has the nearest name.
         """
         components: Sequence[Component] = {"x": self.x, "v": self.v, "lam": self.lam}[vector]
         for component in components:
@@ -53,13 +53,13 @@ class Layout:
         raise ModelError(f"layout: no component {quoted(asked)} of {vector}{nearest(asked, choices)}")
 
     def __str__(self) -> str:
-        """Return the table."""
+        """Return the layout as a table."""
         parts = (("x", self.x), ("v", self.v), ("lambda", self.lam))
         return "\n".join(line for name, rows in parts for line in (f"{name} ({len(rows)},)", *map(str, rows)))
 
 
 def layout_of(compiled: CompiledSystem, held: Sequence[int], units: Units) -> Layout:
-    """Return the layout of a compiled system; `held`: numbers of the rows that hold something."""
+    """Return the layout of a compiled system; `held` are the indices of the rows that are constraints."""
     model = compiled.model
     m, s, F = units.length_symbol, units.time_symbol, units.force_symbol
     x: list[Component] = []
@@ -84,5 +84,5 @@ def layout_of(compiled: CompiledSystem, held: Sequence[int], units: Units) -> La
 
 
 def named(first: int, owner: str, parts: Sequence[tuple[str, str]]) -> list[Component]:
-    """Return components that stand one after the other."""
+    """Return consecutive components of an owner."""
     return [Component(first + k, owner, name, unit) for k, (name, unit) in enumerate(parts)]

@@ -1,10 +1,10 @@
-"""An integrator on the open equations alone: Radau IIA with three stages, fifth order. An example to start from.
+"""An example of an integrator based on the open equations: Radau IIA with three stages, fifth order.
 
-On the index-two form M a = f + Gᵀ lam, G v = g_1 [1]_: with stages i at t + c_i h and the coefficients A of the method
+For the index-two form M a = f + Gᵀ lam, G v = g_1 [1]_, with stages i at t + c_i h and coefficients A of the method:
 
     v_i = v + h Σ A_ij a_j,   x_i = x (+) D_i,   D_i = h Σ A_ij T(D_j)⁻¹ v_j       (Munthe-Kaas' local coordinates [2]_)
 
-unknown are the accelerations and multipliers of the stages. The last stage is the end of the step.
+The unknowns are the accelerations and multipliers of the stages. The last stage is the end of the step.
 
 References
 ----------
@@ -26,12 +26,12 @@ A = np.linalg.solve(np.vander(C, 3, increasing=True).T, (np.vander(C, 4, increas
 
 
 def radau(eq: Equations, x: Array, v: Array, times: Array, *, tolerance: float = 1e-11) -> tuple[Array, Array, Array]:
-    """Return x, v and lam at all times, (n_t, n_x), (n_t, n_v) and (n_t, n_lam), from a consistent x, v at the first.
+    """Return x, v, lam at all times, (n_t, n_x), (n_t, n_v), (n_t, n_lam), from consistent x, v at the first.
 
     Raises
     ------
     ModelError
-        If an element may end a run (`stops`).
+        If an element can end a run (`stops`).
     ConvergenceError
         If Newton's method fails in a step.
     """
@@ -50,18 +50,19 @@ def radau(eq: Equations, x: Array, v: Array, times: Array, *, tolerance: float =
         else:
             raise ConvergenceError("radau: Newton's method failed", t=t, h=h, residual=float(np.abs(change).max()))
         x, v = ends
-        a, lam = eq.accelerations(t + h, x, v)  # of the order of x and v; those of the stages are of the third
+        # these have the same order as x and v; those of the stages have order three
+        a, lam = eq.accelerations(t + h, x, v)
         kept.append((x, v, lam))
     return tuple(np.array(part) for part in zip(*kept, strict=True))  # type: ignore[return-value]
 
 
 def stage_rows(eq: Equations, t: float, h: float, x: Array, v: Array, stages: Array) -> tuple[Array, tuple]:
-    """Return the residuals of all stages, then their constraints; and x, v of the last stage."""
+    """Return the residuals of all stages followed by their constraints, and x, v of the last stage."""
     a, lam = np.split(stages, [3 * eq.n_v])
     a, lam = a.reshape(3, eq.n_v), lam.reshape(3, eq.n_lam)
     v_i, group = v + h * A @ a, eq.configurations
     D = h * A @ v_i
-    for _ in range(12):  # D is the fixed point of a small equation of its own: rotations do not commute
+    for _ in range(12):  # D is the fixed point of its own small equation, because rotations do not commute
         D, before = h * A @ np.array([group.inverse_tangent(d) @ w for d, w in zip(D, v_i, strict=True)]), D
         if np.abs(D - before).max() <= 1e-15 * max(np.abs(D).max(), 1.0):
             break
@@ -72,7 +73,7 @@ def stage_rows(eq: Equations, t: float, h: float, x: Array, v: Array, stages: Ar
 
 
 def stage_matrix(eq: Equations, t: float, x: Array, v: Array, a: Array, lam: Array, h: float) -> Array:
-    """Return the Newton matrix of the stages, with the derivatives at about the middle of the step for all of them."""
+    """Return the Newton matrix of the stages, with derivatives near the middle of the step for all stages."""
     t, x, v = t + h / 2, eq.configurations.retract(x, h / 2 * v + h**2 / 8 * a), v + h / 2 * a
     by, G = eq.tangents(t, x, v, a, lam), eq.jacobian(t, x)
     bodies = np.kron(np.eye(3), by.by_a) + h * np.kron(A, by.by_v) + h**2 * np.kron(A @ A, by.by_x)

@@ -1,10 +1,10 @@
-"""RATTLE, written on the open equations alone: symplectic, second order. An example to start from.
+"""An example of an integrator based on the open equations: RATTLE, symplectic, second order.
 
-For systems whose mass matrix is constant and whose forces do not depend on velocities: bodies that translate, or turn
-in a plane about their centres of mass (origins of rigid bodies there), and springs [1]_:
+For systems with constant mass matrix and forces that do not depend on velocities: bodies that translate, or rotate in a
+plane about their centres of mass (which must be the origins of rigid bodies), and springs [1]_:
 
-    (1) half a kick:  M v_h = M v + h/2 (f(x) + Gᵀ lam),   x_1 = x (+) h v_h,   lam such that g(x_1) = 0
-    (2) half a kick:  M v_1 = M v_h + h/2 (f(x_1) + G_1ᵀ mu),   mu such that G_1 v_1 = 0
+    (1) half a kick:  M v_h = M v + h/2 (f(x) + Gᵀ lam),   x_1 = x (+) h v_h,   with lam such that g(x_1) = 0
+    (2) half a kick:  M v_1 = M v_h + h/2 (f(x_1) + G_1ᵀ mu),   with mu such that G_1 v_1 = 0
 
 References
 ----------
@@ -21,15 +21,15 @@ __all__ = ["rattle"]
 
 
 def rattle(eq: Equations, x: Array, v: Array, times: Array, *, tolerance: float = 1e-13) -> tuple[Array, Array]:
-    """Return x and v at all times, (n_t, n_x) and (n_t, n_v), from a consistent x, v at the first.
+    """Return x and v at all times, (n_t, n_x) and (n_t, n_v), from consistent x, v at the first.
 
     Raises
     ------
     ModelError
-        If an element may end a run (`stops`), or the mass matrix changes with the configuration, or forces with the
-        velocity, over the motion.
+        If an element can end a run (`stops`), or if, during the motion, the mass matrix changes with the configuration
+        or the forces with the velocity.
     ConvergenceError
-        If the constraints cannot be closed.
+        If the constraints cannot be satisfied.
     """
     eq.require_no_stops("rattle")
     M, group, kept = eq.mass(x), eq.configurations, [(x, v)]

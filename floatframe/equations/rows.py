@@ -1,4 +1,4 @@
-"""Rows of a system at one state, connection by connection, as the kernels evaluate them: no matrix of the whole."""
+"""Rows of a system at one state, for each connection, as the kernels evaluate them; no global matrix is assembled."""
 
 from dataclasses import dataclass
 
@@ -22,39 +22,39 @@ class End:
     marker: int
     body: int
     connection: int
-    w0: int  #: first of its rows and wrench components
-    size: int  #: of the connection
-    u0: int  #: first velocity of the body
-    n: int  #: velocities of the body
-    x0: int  #: where its columns begin in the store
-    places: tuple[tuple[int, int], ...]  #: (part of the motion, part of the wrench) of force and moment on it
+    w0: int  #: first index of its rows and wrench components
+    size: int  #: number of rows of the connection
+    u0: int  #: index of the first velocity of the body
+    n: int  #: number of velocities of the body
+    x0: int  #: index of the first of its columns in the store
+    places: tuple[tuple[int, int], ...]  #: (part of the motion, part of the wrench) for force and moment on it
     sign: float
 
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """What does not change with the state: ends, and which rows of each connection hold something."""
+    """Data that do not change with the state: ends, and the constraint rows of each connection."""
 
     ends: tuple[End, ...]
     holds: NDArray[np.bool_]  #: (n_w,)
-    held: IntArray  #: numbers of the rows that do, (n_lam,)
-    lam0: IntArray  #: first multiplier of each connection, (n_c + 1,)
+    held: IntArray  #: indices of the constraint rows, (n_lam,)
+    lam0: IntArray  #: index of the first multiplier of each connection, (n_c + 1,)
     n_u: int
 
 
 @dataclass(frozen=True, eq=False)
 class RowParts:
-    """Rows at one state, over displacements in ground axes."""
+    """Rows at one state, with derivatives by displacements in ground axes."""
 
     structure: Structure
     model: Model
-    G: tuple[Array, ...]  #: all rows of its connection by the displacement of the body of each end, (size, n)
-    J: tuple[Array, ...]  #: wrench of its connection to the body of each end, forces = J.T @ w, (size, n)
+    G: tuple[Array, ...]  #: all rows of the connection by the displacement of the body at each end, (size, n)
+    J: tuple[Array, ...]  #: wrench of the connection to the body at each end, forces = J.T @ w, (size, n)
     V: tuple[Array, ...]  #: rows of each connection by its own wrench, (size, size)
     g: Array  #: residual of all rows, (n_w,)
 
     def held_force(self, lam: Array) -> Array:
-        """Return Gᵀ lam over the rows that hold something, (n_u,)."""
+        """Return Gᵀ lam for the constraint rows, (n_u,)."""
         at = self.structure
         every, result = np.zeros(len(at.holds)), np.zeros(at.n_u)
         every[at.held] = lam
@@ -70,13 +70,13 @@ class RowParts:
         return result
 
     def held_jacobian(self) -> sp.csr_array:
-        """Return G over the rows that hold something, (n_lam, n_u)."""
+        """Return G for the constraint rows, (n_lam, n_u)."""
         at = self.structure
         parts = [(G, end.w0, end.u0) for end, G in zip(at.ends, self.G, strict=True)]
         return sp.csr_array(summed(parts, (len(at.holds), at.n_u))[at.held])
 
     def of_connection(self, c: int) -> tuple[Array, Array]:
-        """Return the rows of connection c over all velocities of its bodies, and its wrench to them: (size, n_own)."""
+        """Return the rows of connection c by the velocities of its bodies, and its wrench to them, (size, n_own) each."""
         own = [k for k, end in enumerate(self.structure.ends) if end.connection == c]
         places: dict[int, int] = {}
         n = 0
@@ -96,7 +96,7 @@ class RowParts:
 
 
 def structure_of(model: Model) -> Structure:
-    """Return what does not change with the state."""
+    """Return the data that do not change with the state."""
     ends = []
     for m in (int(m) for m in model.bodies.ends):
         i, c = int(model.markers.body[m]), int(model.markers.connection[m])
@@ -114,7 +114,7 @@ def structure_of(model: Model) -> Structure:
 
 
 def row_parts(structure: Structure, model: Model, work: Work) -> RowParts:
-    """Return the rows that `evaluate_and_linearize` has left in `work`."""
+    """Return the rows that `evaluate_and_linearize` has stored in `work`."""
     G, J = [], []
     for end in structure.ends:
         R, n = work.state.R[end.body], end.n

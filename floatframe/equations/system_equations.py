@@ -1,14 +1,14 @@
-"""The equations of motion of a system, for integrators and controllers of one's own.
+"""The equations of motion of a system, for integrators and controllers of the user.
 
     M(x) a = f(t, x, v) + G(t, x)ᵀ lam,     g(t, x) = 0,     x_dot = v (see `Configurations`)
 
-with rates of the constraint G v = g_1(t, x) and G a = g_2(t, x, v). Every number comes from the kernels that
-`integrate` uses (docs/theory.md §6, §10). These know the whole wrench w of each connection as an unknown, with as many
-rows: those that hold something, and those that say what the wrench is, C w = b. Here the latter are solved,
+with constraint rates G v = g_1(t, x) and G a = g_2(t, x, v). All values come from the kernels that `integrate` uses
+(docs/theory.md §6, §10). In the kernels, the complete wrench w of each connection is unknown, with as many rows:
+constraint rows, and rows that define the wrench, C w = b. Here the latter are solved,
 
     w = w_0(t, x, v) + W(t, x) lam,   C w_0 = b (least norm),   C W = 0,   Jᵀ W = Gᵀ,
 
-so that what is left are the forces f = f_bodies + Jᵀ w_0 and a multiplier for each row that holds something.
+which leaves the forces f = f_bodies + Jᵀ w_0, and one multiplier for each constraint row.
 """
 
 from dataclasses import dataclass, replace
@@ -45,25 +45,25 @@ from floatframe.system import System
 
 __all__ = ["Equations", "Tangents", "open_equations"]
 
-AGREES = 1e-9  #: relative defect of rows and forces that are affine, or the transposed of each other
-STEP = 2e-3  #: of the differences by which a wrench with fixed multipliers changes with x
+AGREES = 1e-9  #: relative defect below which rows and forces are taken as affine, or as transposes of each other
+STEP = 2e-3  #: step of the finite differences of a wrench by x at fixed multipliers
 
 
 @dataclass(frozen=True, eq=False)
 class Tangents:
-    """Derivatives of the residual M a - f - Gᵀ lam, each (n_v, n_v)."""
+    """Derivatives of the residual M a - f - Gᵀ lam, (n_v, n_v) each."""
 
-    by_x: Array  #: along the displacement dx of x (+) dx; rotations in rad, translations in m
+    by_x: Array  #: by the displacement dx of x (+) dx; rotations in rad, translations in m
     by_v: Array
     by_a: Array  #: the mass matrix
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Equations:
-    """Open equations of a system; positions, velocities and multipliers as in `layout`, in the units of the system.
+    """Open equations of a system; positions, velocities and multipliers as in `layout`, in units of the system.
 
-    A stiffened flexible body moves in mean axes (docs/equations.md): `state` and `vectors` turn
-    vectors into the states that results and sensors speak of, and back.
+    A stiffened flexible body is computed in mean axes (docs/equations.md). `state` and `vectors` convert vectors to
+    states in the frames of the files, as in results and sensors, and back.
     """
 
     system: System
@@ -71,33 +71,33 @@ class Equations:
     model: Model  #: without the compliance of redundant rows
     work: Work
     structure: Structure  #: of its rows
-    configurations: Configurations  #: the maps x (+) dx, log, T, velocities and rates
+    configurations: Configurations  #: the maps x (+) dx, log, T, and conversions between velocities and rates
     layout: Layout  #: names and units of x, v, lam
-    #: unknowns of connections from which angles of couplers and user forces are counted, (n_w,), see `followed`
+    #: unknowns of connections at which counting the angles of couplers and user forces starts, (n_w,), see `followed`
     near: Array
 
     @property
     def n_x(self) -> int:
-        """Numbers of x."""
+        """Number of components of x."""
         return self.configurations.n_x
 
     @property
     def n_v(self) -> int:
-        """Numbers of v, of a and of the residual."""
+        """Number of components of v, of a and of the residual."""
         return self.configurations.n_v
 
     @property
     def n_lam(self) -> int:
-        """Constraints and multipliers."""
+        """Number of constraints and multipliers."""
         return len(self.structure.held)
 
     @cached_property
     def is_holonomic(self) -> NDArray[np.bool_]:
-        """Which constraints hold a position, (n_lam,) bool; the others hold a velocity (rolling) alone."""
+        """Whether each constraint is holonomic, (n_lam,) bool; the others (rolling) only constrain a velocity."""
         return ~is_held_velocity(self.model.rows.kind[self.structure.held])
 
     def require_no_stops(self, method: str) -> None:
-        """Raise `ModelError` naming an element that may end a run, for methods that look at no outputs."""
+        """Raise `ModelError` naming an element that can end a run, for methods that do not evaluate outputs."""
         if self.compiled.stop_words:
             raise ModelError(
                 f"{method}: {self.compiled.stop_words[0]}: an output that may end a run, which this method does not "
@@ -107,11 +107,11 @@ class Equations:
     # states
 
     def vectors(self, state: State) -> tuple[Array, Array]:
-        """Return x, (n_x,), and v, (n_v,), of a state in the frames of the files, such as one of a trajectory."""
+        """Return x, (n_x,), and v, (n_v,), of a state in the frames of the files, such as a state of a trajectory."""
         return self.vectors_of_engine(state_of_engine(self.compiled, state))
 
     def state(self, x: Array, v: Array) -> State:
-        """Return the state of x and v, in the frames of the files: for `integrate`, `snapshot` and comparisons."""
+        """Return the state of x and v in the frames of the files, for `integrate`, `snapshot` and comparisons."""
         return state_of_file(self.compiled, self.engine_state(x, v))
 
     def vectors_of_engine(self, state: State) -> tuple[Array, Array]:
@@ -122,7 +122,7 @@ class Equations:
         return x, np.array(state.u)
 
     def engine_state(self, x: Array, v: Array | None = None) -> State:
-        """Return the state of x and v in the frames of the engine; v zero if not given."""
+        """Return the state of x and v in the frames of the engine; v is zero by default."""
         x = vector("x", x, self.n_x)
         r, p, q = [], [], [np.zeros(0)]
         for j, _, n in self.configurations.parts():
@@ -133,26 +133,26 @@ class Equations:
         return State(np.array(r), np.array(p), np.concatenate(q), u)
 
     def start(self, state: State | None = None, *, t: float = 0.0) -> tuple[Array, Array, Array, Array]:
-        """Return consistent x, v, a, lam at time t near a state (default: the bodies as placed).
+        """Return consistent x, v, a, lam at time t near a state (default: the assembled bodies).
 
         Raises
         ------
         ModelError
-            If the joints cannot be closed, or some constraints repeat others.
+            If the joint constraints cannot be satisfied, or some constraints are redundant.
         """
         x, v = self.vectors_of_engine(consistent_motion(self.system, state, t=t).state)
         return x, v, *self.accelerations(t, x, v)
 
     def project(self, t: float, x: Array, v: Array) -> tuple[Array, Array]:
-        """Return x and v put back on g = 0 and G v = g_1 with the least motion, as the start of `integrate` does."""
+        """Return x and v projected onto g = 0 and G v = g_1 with the least motion, as at the start of `integrate`."""
         self.work.state.time[...] = t
         state = assembled(self.compiled, self.work, self.engine_state(self.configurations.normalized(x), v))
         return self.vectors_of_engine(with_compatible_velocities(self.compiled, self.work, state))
 
     def followed(self, t: float, x: Array) -> "Equations":
-        """Return equations whose angles of couplers and user forces are counted on from those at x.
+        """Return equations in which the angles of couplers and user forces are counted on from their values at x.
 
-        Angles are the ones within half a turn of the last that were followed, at first of zero. Where a gear turns
+        Each angle is the one within half a turn of the last followed value, initially zero. If a coordinate rotates
         further, call this between steps: `eq = eq.followed(t, x)`.
         """
         rows = self.model.coordinates.row
@@ -164,12 +164,12 @@ class Equations:
     # the equations
 
     def residual(self, t: float, x: Array, v: Array, a: Array, lam: Array) -> Array:
-        """Return M a - f - Gᵀ lam, (n_v,) [N, N m, N]: zero along a motion."""
+        """Return the residual M a - f - Gᵀ lam, (n_v,) [N, N m, N], which is zero in a motion."""
         parts, own = self.at(t, x, v, vector("a", a, self.n_v))
         return np.asarray(own - parts.held_force(vector("lam", lam, self.n_lam)))
 
     def force(self, t: float, x: Array, v: Array) -> Array:
-        """Return f, (n_v,) [N, N m, N]: loads, weight, elastic, damping and inertia forces without accelerations."""
+        """Return f, (n_v,) [N, N m, N]: loads, weight, elastic, damping and inertia forces at zero accelerations."""
         return -self.at(t, x, v)[1]
 
     @overload
@@ -180,7 +180,7 @@ class Equations:
     def mass(self, x: Array, *, sparse: Literal[True]) -> sp.csr_array: ...
 
     def mass(self, x: Array, *, sparse: bool = False) -> Array | sp.csr_array:
-        """Return M(x), (n_v, n_v) [kg, kg m, kg m²], symmetric; `sparse`: its blocks as a csr_array."""
+        """Return the symmetric M(x), (n_v, n_v) [kg, kg m, kg m²]; with `sparse`, as a csr_array of its blocks."""
         set_iterate(self.work, self.engine_state(x))
         blocks = linearized(self.model, self.work, 1.0, 0.0, 0.0).H
         for R, block in zip(self.work.state.R, blocks, strict=True):
@@ -189,7 +189,7 @@ class Equations:
         return sp.csr_array(sp.block_diag(blocks)) if sparse else np.asarray(la.block_diag(*blocks))
 
     def constraint(self, t: float, x: Array) -> Array:
-        """Return g, (n_lam,) [m, rad]; zero for rows that hold a velocity alone (`is_holonomic`)."""
+        """Return g, (n_lam,) [m, rad]; zero for rows that only constrain a velocity (`is_holonomic`)."""
         return np.where(self.is_holonomic, self.rows_at(t, x).g[self.structure.held], 0.0)
 
     @overload
@@ -205,7 +205,7 @@ class Equations:
         return G if sparse else G.toarray()
 
     def velocity_right(self, t: float, x: Array) -> Array:
-        """Return g_1 with G v = g_1, (n_lam,) [m/s, rad/s]: zero but for prescribed motions."""
+        """Return g_1 with G v = g_1, (n_lam,) [m/s, rad/s]; nonzero only for prescribed motions."""
         return -self.rates(t, x, np.zeros(self.n_v))[0]
 
     def velocity_defect(self, t: float, x: Array, v: Array) -> Array:
@@ -217,12 +217,12 @@ class Equations:
         return -self.rates(t, x, v)[1]
 
     def accelerations(self, t: float, x: Array, v: Array) -> tuple[Array, Array]:
-        """Return a, (n_v,), and lam, (n_lam,), of M a - Gᵀ lam = f, G a = g_2; of redundant rows the least lam.
+        """Return a, (n_v,), and lam, (n_lam,), from M a - Gᵀ lam = f, G a = g_2; for redundant rows the least lam.
 
         Raises
         ------
         ModelError
-            If the matrix is singular: a mode without mass, or a singular position.
+            If the matrix is singular, due to a mode without mass or a singular position.
         """
         M, f = self.mass(x), self.force(t, x, v)
         G, right = self.jacobian(t, x), self.acceleration_right(t, x, v)
@@ -242,18 +242,18 @@ class Equations:
         return solution[:n], solution[n:]
 
     def ordinary(self, t: float, y: Array) -> Array:
-        """Return y_dot of y = (x, v), (n_x + n_v,): the underlying ordinary differential equation, index one.
+        """Return y_dot for y = (x, v), (n_x + n_v,): the underlying ordinary differential equation, index one.
 
-        For `scipy.integrate.solve_ivp`; constraints drift off as its tolerances allow (`project` closes them).
+        For `scipy.integrate.solve_ivp`; constraints drift within its tolerances (`project` corrects them).
         """
         x, v = y[: self.n_x], y[self.n_x :]
         a, _ = self.accelerations(t, self.configurations.normalized(x), v)
         return np.concatenate([self.configurations.rate(x, v), a])
 
     def null_space(self, t: float, x: Array) -> Array:
-        """Return an M-orthonormal basis N of the motions that the constraints allow, (n_v, n_free).
+        """Return an M-orthonormal basis N of the motions allowed by the constraints, (n_v, n_free).
 
-        G N = 0, Nᵀ M N = 1: v = N z + (a velocity that fulfils G v = g_1), and z_dot = Nᵀ (f - M N_dot z - ...).
+        G N = 0, Nᵀ M N = 1: v = N z + (a velocity that satisfies G v = g_1), and z_dot = Nᵀ (f - M N_dot z - ...).
         """
         L = np.linalg.cholesky(self.mass(x))
         scaled = la.solve_triangular(L, self.jacobian(t, x).T, lower=True).T
@@ -266,12 +266,13 @@ class Equations:
         return float(0.5 * v @ self.mass(x) @ v)
 
     def wrenches(self, t: float, x: Array, v: Array, lam: Array) -> Array:
-        """Return w = w_0 + W lam, (n_w,): wrenches of all connections on their markers A, as in results, ground axes.
+        """Return w = w_0 + W lam, (n_w,): wrenches of all connections on their markers A in ground axes, as in results.
 
         Raises
         ------
         ModelError
-            If a joint carries what is not the transposed of what it holds: some do where they are open.
+            If the reaction of a joint is not the transpose of its constraint; this occurs for some joints with open
+            constraints.
         """
         parts, lam = self.rows_at(t, x, v), vector("lam", lam, self.n_lam)
         w, at = self.law(parts), self.structure
@@ -294,11 +295,11 @@ class Equations:
         return w
 
     def tangents(self, t: float, x: Array, v: Array, a: Array, lam: Array) -> Tangents:
-        """Return the derivatives of the residual by x, v and a at fixed multipliers.
+        """Return the derivatives of the residual by x, v and a, at fixed multipliers.
 
-        Those by v and a, and that by x at fixed wrenches, are those of Newton's method in the kernels. How the wrenches
-        w_0 and the forces Gᵀ lam change with x is found by central differences of fourth order (relative error about
-        1e-10 of these forces).
+        The derivatives by v and a, and by x at fixed wrenches, are those of Newton's method in the kernels. The
+        derivatives of the wrenches w_0 and the forces Gᵀ lam by x are central differences of fourth order (relative
+        error about 1e-10 of these forces).
         """
         v, a = vector("v", v, self.n_v), vector("a", a, self.n_v)
         _, own = self.at(t, x, v, a)  # leaves w_0 in the working arrays
@@ -319,7 +320,7 @@ class Equations:
     # parts
 
     def change_of_wrenches(self, t: float, x: Array, v: Array, lam: Array) -> tuple[Array, Array]:
-        """Return the derivatives of w_0, (n_w, n_v), and of Gᵀ lam, (n_v, n_v), by x: differences of fourth order."""
+        """Return the derivatives of w_0, (n_w, n_v), and Gᵀ lam, (n_v, n_v), by x, as differences of fourth order."""
         scale = np.ones(self.n_v)
         for _, j, n in self.configurations.parts():
             scale[j : j + 3] = self.compiled.length
@@ -341,12 +342,12 @@ class Equations:
 
     @cached_property
     def modal_scale(self) -> float:
-        """A modal coordinate that moves markers by about a thousandth of the size of the system."""
+        """A modal coordinate that moves markers by about 0.1 % of the size of the system."""
         largest = float(np.abs(self.model.markers.psi).max(initial=0.0))
         return 1e-2 * self.compiled.length / largest if largest > 0 else 1.0
 
     def turned_forces(self, own: Array) -> Array:
-        """Return how a residual in ground axes changes since the axes of the bodies turn, (n_v, n_v)."""
+        """Return the derivative of a residual in ground axes due to the rotation of the body axes, (n_v, n_v)."""
         result = np.zeros((self.n_v, self.n_v))
         for i, (_, j, _) in enumerate(self.configurations.parts()):
             R = self.work.state.R[i]
@@ -354,7 +355,7 @@ class Equations:
         return result
 
     def turning(self, x: Array) -> Array:
-        """Return the matrix that turns translations from body to ground axes, (n_v, n_v)."""
+        """Return the matrix that rotates translations from body to ground axes, (n_v, n_v)."""
         result = np.eye(self.n_v)
         for j, k, _ in self.configurations.parts():
             result[k : k + 3, k : k + 3] = rotation_matrix(x[j + 3 : j + 7])
@@ -365,7 +366,7 @@ class Equations:
         return slice(int(self.model.connections.w0[c]), int(self.model.connections.w0[c + 1]))
 
     def rows_at(self, t: float, x: Array, v: Array | None = None, a: Array | None = None) -> RowParts:
-        """Evaluate at a state and wrenches of zero; the residual of the bodies is in the working arrays."""
+        """Return the rows at a state with zero wrenches; the residual of the bodies is left in the working arrays."""
         from floatframe.kernels.entry import evaluate_and_linearize
 
         set_iterate(self.work, self.engine_state(x, v), a, self.near.copy())
@@ -380,7 +381,7 @@ class Equations:
         Raises
         ------
         ModelError
-            If a force is not affine in the wrench of its connection.
+            If a force is not an affine function of the wrench of its connection.
         """
         from floatframe.kernels.entry import rates_of_constraints
 
@@ -388,7 +389,7 @@ class Equations:
         w = self.law(parts)
         if (w != self.work.state.w).any():
             self.work.state.w[:] = w
-            rates_of_constraints(self.model, self.work)  # evaluates
+            rates_of_constraints(self.model, self.work)  # evaluates the rates
             left = np.where(self.structure.holds, 0.0, self.work.connections.g)
             allowed = AGREES * max(np.abs(w).max(initial=0.0), np.abs(parts.g).max(initial=0.0))
             if np.abs(left).max(initial=0.0) > allowed:
@@ -403,7 +404,7 @@ class Equations:
         return parts, result
 
     def law(self, parts: RowParts) -> Array:
-        """Return w_0: the least wrenches that fulfil the rows that say what they are, (n_w,)."""
+        """Return w_0, (n_w,): the least wrenches that satisfy the rows which define them."""
         w = self.near.copy()
         for c, V in enumerate(parts.V):
             own = self.own_rows(c)
@@ -413,7 +414,7 @@ class Equations:
         return w
 
     def rates(self, t: float, x: Array, v: Array) -> tuple[Array, Array]:
-        """Return rate and second rate at zero a of what the held rows hold, each (n_lam,)."""
+        """Return rate and second rate (at a = 0) of the constraint rows, (n_lam,) each."""
         from floatframe.kernels.entry import rates_of_constraints
 
         set_iterate(self.work, self.engine_state(x, v), w=self.near.copy())
@@ -423,18 +424,18 @@ class Equations:
 
 
 def open_equations(system: System) -> Equations:
-    """Return the open equations of a system: M a = f + Gᵀ lam with its constraints, as functions of Python.
+    """Return the open equations of a system: M a = f + Gᵀ lam with its constraints, as Python functions.
 
     Parameters
     ----------
     system
-        The system. Each call makes working arrays of its own, so that two threads need two `Equations`.
+        The system. Each call allocates its own working arrays, so two threads need two `Equations`.
 
     Raises
     ------
     ModelError
-        If a force has states of its own, an element asks for accelerations, or friction follows the force in its joint:
-        none is a function of t, x and v.
+        If a force has its own states, an element uses accelerations, or friction depends on the joint force: these are
+        not functions of t, x and v.
     """
     compiled = compiled_system(system)
     model = compiled.model

@@ -1,4 +1,4 @@
-"""Other descriptions of flexible parts than one floating frame, each a handful of bodies, joints and forces."""
+"""Alternatives to a single floating frame for flexible parts; each consists of several bodies, joints and forces."""
 
 from floatframe.flexible_parts.exact_beams import exact_beams
 from floatframe.flexible_parts.finite_segments import finite_segments

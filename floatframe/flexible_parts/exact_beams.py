@@ -1,17 +1,19 @@
-"""Geometrically exact beams: the lines of a finite element model at any displacement and rotation.
+"""Geometrically exact beams: the lines of a finite element model with arbitrary displacements and rotations.
 
-Two-node elements of Simo and Reissner's beam [1]_ in absolute coordinates. Node i has a place r_i and axes R_i; in the
-frame C half way between the rotations of both nodes of an element (R_1 to C and C to R_2 are one rotation)
+Two-node elements of the Simo-Reissner beam [1]_ in absolute coordinates. Node i has a position r_i and axes R_i. In the
+frame C half way between the rotations of both nodes of an element (the rotations from R_1 to C and from C to R_2 are
+equal):
 
     Gamma = C^T (r_2 - r_1) / L - e_x,   kappa = theta / L,   theta the rotation vector of R_1^T R_2,
     V = L/2 (Gamma, kappa)^T K (Gamma, kappa)
 
-(1) Gamma and kappa are those of the middle, with the line straight and the rotation about a fixed axis between the
-    nodes: one point, which does not lock. They do not change when the element moves as a rigid one, however far
-(2) L² K⁻¹ is the flexibility of the piece under forces at its middle, with the bending that is linear within it
-    (L³/12 EI beside L/GA): loads at the nodes deflect small pieces exactly
-(3) V is that of a `Bushing` between markers at the nodes that is at rest at the distance L: preload -K e_x / L
-(4) half of the mass of each piece goes to its nodes as rigid bodies; errors fall with the square of the piece
+(1) Gamma and kappa are evaluated at the middle, with a straight line and a rotation about a fixed axis between the
+    nodes; a single point does not lock. They do not change in an arbitrary rigid-body motion of the element
+(2) L² K⁻¹ is the flexibility of the piece under forces at its middle, including the linear bending within it (L³/12 EI
+    in addition to L/GA), so that the deflection of small pieces under nodal loads is exact
+(3) V is that of a `Bushing` between markers at the nodes, with its zero at the distance L: preload -K e_x / L
+(4) half of the mass of each piece is assigned to each node as a rigid body; errors decrease with the square of the
+    piece
 
 .. [1] Simo & Vu-Quoc (1986), docs/bibliography.md.
 """
@@ -39,7 +41,7 @@ E_X = np.array([1.0, 0.0, 0.0])
 
 @dataclass
 class Lump:
-    """A rigid body in the making: sums over the mass of a node, about the node, mesh axes."""
+    """Sums over the mass of a node, about the node in mesh axes, from which a rigid body is made."""
 
     place: Array  #: (3,)
     mass: float = 0.0
@@ -47,7 +49,7 @@ class Lump:
     inertia: Array | float = 0.0  #: ∫ |o|² 1 - o oᵀ, (3, 3)
 
     def add(self, mass: float, center: Array, inertia: Array) -> None:
-        """Add a rigid piece by its centre of mass and the inertia about it."""
+        """Add a rigid piece, given its centre of mass and the inertia about it."""
         arm = center - self.place
         self.mass += mass
         self.moment = self.moment + mass * arm
@@ -65,21 +67,21 @@ def exact_beams(
     omega_B: Array | None = None,
     damping: float = 0.0,
 ) -> FlexiblePart:
-    """Return a body of beam elements as geometrically exact beams, parts of a system.
+    """Return a body of beam elements as geometrically exact beams, to be put into a system.
 
     Parameters
     ----------
     name
-        Of the part; its bodies are "name 12" at node 12 of the mesh, and "name line 3.1", ... between the nodes.
+        Name of the part; its bodies are "name 12" at node 12 of the mesh, and "name line 3.1", ... between the nodes.
     body
-        A body of lines (`fe_models.beam_body`, or of a job with sections), with interfaces of one node each; point
-        masses and springs come along. Coupled or not.
+        A body of lines (`fe_models.beam_body`, or from a job with sections), coupled or not, whose interfaces have one
+        node each; point masses and springs are included.
     pieces
-        Elements that each line is divided into.
+        Number of elements per line.
     position, orientation, velocity, omega_B
-        Of its mesh axes, as of a `FlexibleBody`: it begins undeformed, moving as one rigid body.
+        Those of its mesh axes, as for a `FlexibleBody`; the part is initially undeformed and moves as a rigid body.
     damping
-        Of the elements: their stiffness times this time [s].
+        Stiffness-proportional damping of the elements: damping matrix divided by stiffness matrix [s].
 
     Returns
     -------
@@ -89,7 +91,8 @@ def exact_beams(
     Raises
     ------
     ModelError
-        If the body is not of lines alone, has rigid links, an interface joins several nodes, or a node has no inertia.
+        If the body does not consist of lines only, has rigid links, an interface joins several nodes, or a node has no
+        inertia.
     """
     where = f"exact_beams {name!r}"
     model = body.element_model
@@ -165,7 +168,7 @@ def exact_beams(
 
 
 def linked(body: FEBody, model: BeamModel) -> bool:
-    """Return whether dofs of nodes that no interface has were eliminated."""
+    """Return whether dofs of nodes were eliminated that do not belong to an interface."""
     inside = np.concatenate([np.zeros(0, np.int64), *(interface.nodes for interface in body.interfaces)])
     there = body.dofs[body.dofs[:, 0] < model.n_nodes, 0]
     alone = np.setdiff1d(np.arange(model.n_nodes), inside)
@@ -173,19 +176,19 @@ def linked(body: FEBody, model: BeamModel) -> bool:
 
 
 def piece_stiffness(K_local: Array, L: float, pieces: int) -> Array:
-    """Return the stiffness of a piece of a line by the relative motion of its ends in its middle, (6, 6): (2).
+    """Return the stiffness of a piece of a line for the relative motion of its ends at its middle, (6, 6): step (2).
 
-    (a) flexibility F of the line: of the relative motion of both ends under a force and moment at the middle
-    (b) F = L c + L³/12 Eᵀ c E, with c that of the section and E f = (0, e_x × f): uniform along the line
+    (a) flexibility F of the line: relative motion of both ends under a force and a moment at the middle
+    (b) F = L c + L³/12 Eᵀ c E, with the flexibility c of the section and E f = (0, e_x × f); uniform along the line
     (c) the same for L / pieces
     """
     E = np.zeros((6, 6))
     E[3:, :3] = tilde(E_X)
     arm = np.eye(6)
-    arm[:3, 3:] = -tilde(L / 2 * E_X)  # the motion of the middle, carried by the first end
+    arm[:3, 3:] = -tilde(L / 2 * E_X)  # motion of the middle, carried by the first end
     other = np.eye(6)
     other[:3, 3:] = tilde(L / 2 * E_X)
-    # the second end loaded by a force at the middle, the first held: relative motion at the middle
+    # relative motion at the middle, for a force at the middle on the second end and a fixed first end
     F = other @ np.linalg.solve(K_local[6:, 6:], other.T)
     c = F / L
     c[:3, :3] -= L**2 / 12 * (E.T @ c @ E)[:3, :3]
@@ -196,13 +199,13 @@ def piece_stiffness(K_local: Array, L: float, pieces: int) -> Array:
 
 
 def sectional_inertia(lines: Slices, k: int) -> Array:
-    """Return the inertia of all sections of a line about its axis, in its axes, (3, 3) [kg m²]."""
+    """Return the inertia of all sections of a line about its axis, in line axes, (3, 3) [kg m²]."""
     E = np.diag(lines.moments[k].sum(axis=0))
     return np.asarray(np.trace(E) * np.eye(3) - E)
 
 
 def rigid_body(where: str, name: str, lump: Lump, origin: Array, p: Array, velocity: Array, omega: Array) -> RigidBody:
-    """Return the body of a node."""
+    """Return the rigid body of a node."""
     center = np.asarray(lump.moment) / lump.mass if lump.mass > 0 else np.zeros(3)
     about = np.asarray(lump.inertia) - lump.mass * (center @ center * np.eye(3) - np.outer(center, center))
     about = (about + about.T) / 2

@@ -31,41 +31,41 @@ def finite_segments(
     stations: Mapping[str, float] | None = None,
     damping: float = 0.0,
 ) -> FlexiblePart:
-    """Return a straight, uniform or tapered beam as n rigid segments with springs between them.
+    """Return a straight beam, uniform or tapered, as n rigid segments with springs between them.
 
-    (1) nodes at equal distances h = length / (n - 1), the first and the last at the ends; segment k is what lies
-        nearer to node k than to the others: its mass, centre and inertia are integrals of the laws over it, the end
-        ones half as long
-    (2) between two nodes a `Bushing` in their middle has the stiffness of the piece of beam between the nodes: relative
-        motion (d, theta) of its two halves at the middle under the section force f and moment m there,
+    (1) nodes at equal distances h = length / (n - 1), the first and the last at the ends. Segment k contains the points
+        nearer to node k than to the others; its mass, centre and inertia are integrals of the laws over it. The end
+        segments are half as long
+    (2) between two nodes, a `Bushing` in the middle has the stiffness of the piece of beam between them. With the
+        relative motion (d, theta) of its halves at the middle, under the section force f and moment m there:
         F = ∫ Bᵀ diag(1/EA, 1/GAy, 1/GAz, 1/GJ, 1/EIy, 1/EIz) B dx, B (f, m) = (f, m + (x_m - x) e_x × f);  K = F⁻¹
 
-    For a uniform beam K = diag(EA/h, 1/(h³/12EIz + h/GAy), 1/(h³/12EIy + h/GAz), GJ/h, EIy/h, EIz/h): under loads at
-    the nodes the deflection is exact, and frequencies converge with h². Displacements and rotations of the whole are
-    unrestricted; only the rotation from one segment to the next has to stay moderate.
+    For a uniform beam, K = diag(EA/h, 1/(h³/12EIz + h/GAy), 1/(h³/12EIy + h/GAz), GJ/h, EIy/h, EIz/h). The deflection
+    under nodal loads is exact, and frequencies converge with h². Displacements and rotations of the whole beam are
+    unrestricted; only the rotation between adjacent segments must stay moderate.
 
     Parameters
     ----------
     name
-        Of the part; its bodies are "name 1", "name 2", ..., its forces "name spring 1", ....
+        Name of the part; its bodies are "name 1", "name 2", ..., its forces "name spring 1", ....
     line
-        Mass and stiffness along x; rotary inertia about x is needed.
+        Mass and stiffness along x, including rotary inertia about x.
     n
         Number of rigid bodies, 2 or more.
     position, orientation
-        Of the start of the beam in ground axes, (3,) [m], and Euler parameters of its axes, (4,).
+        Position of the start of the beam in ground axes, (3,) [m], and Euler parameters of its axes, (4,).
     velocity, omega_B
-        Velocity of the start in ground axes, (3,) [m/s], and angular velocity in the axes of the beam, (3,) [rad/s]:
-        the part begins to move as one rigid body.
+        Velocity of the start in ground axes, (3,) [m/s], and angular velocity in the axes of the beam, (3,) [rad/s];
+        initially the part moves as a rigid body.
     stations
-        Places with a marker: name -> x; default: "start" and "end". Between nodes they are fixed to their segment.
+        Points with a marker: name -> x; default: "start" and "end". Points between nodes are fixed to their segment.
     damping
-        Of the springs: their stiffness times this time [s].
+        Stiffness-proportional damping of the springs: damping divided by stiffness [s].
 
     Raises
     ------
     ModelError
-        If n or damping is impossible, a station lies beside the beam, or the beam has no rotary inertia about x.
+        If n or damping is out of its range, a station is not on the beam, or the beam has no rotary inertia about x.
     """
     where = f"finite_segments {name!r}"
     if n < 2:
@@ -109,7 +109,7 @@ def finite_segments(
 
 
 def between(line: BeamLine, start: float, end: float) -> tuple[Array, Array]:
-    """Return Gauss points and weights from start to end, exact for polynomial laws times x²."""
+    """Return Gauss points and weights from start to end, exact for a polynomial law times x²."""
     xi, weight = np.polynomial.legendre.leggauss(line.degree // 2 + 2)
     cuts = np.array([start, *(x for x in line.breaks if start < x < end), end])
     half, middle = np.diff(cuts)[:, None] / 2, (cuts[1:] + cuts[:-1])[:, None] / 2
@@ -117,7 +117,7 @@ def between(line: BeamLine, start: float, end: float) -> tuple[Array, Array]:
 
 
 def segment(where: str, line: BeamLine, start: float, end: float) -> tuple[float, float, Array]:
-    """Return mass, place x of the centre of mass and inertia about it of the beam from start to end."""
+    """Return the mass, the x of the centre of mass, and the inertia about it, of the beam from start to end."""
     x, weight = between(line, start, end)
     mass = weight * line.at("rho_A", x)
     Iy, Iz = (float(weight @ line.at(law, x)) for law in ("rho_Iy", "rho_Iz"))
@@ -133,8 +133,9 @@ def segment(where: str, line: BeamLine, start: float, end: float) -> tuple[float
 
 
 def element_stiffness(line: BeamLine, start: float, end: float) -> Array:
-    """Return the stiffness between both halves of a piece of beam, relative motion at its middle, (6, 6): (2)."""
-    xi, weight = np.polynomial.legendre.leggauss(max(8, line.degree + 2))  # of one over a law: no polynomial
+    """Return the stiffness between both halves of a piece of beam, for relative motion at its middle, (6, 6): (2)."""
+    # for the inverse of a law, which is not a polynomial
+    xi, weight = np.polynomial.legendre.leggauss(max(8, line.degree + 2))
     cuts = np.array([start, *(x for x in line.breaks if start < x < end), end])
     half, middle = np.diff(cuts)[:, None] / 2, (cuts[1:] + cuts[:-1])[:, None] / 2
     x, weight = (middle + half * xi).ravel(), (half * weight).ravel()

@@ -1,4 +1,4 @@
-"""A flexible part that is made of several bodies of a system."""
+"""A flexible part that consists of several bodies of a system."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ __all__ = ["FlexiblePart", "PartMaker"]
 
 @dataclass(frozen=True, eq=False)
 class FlexiblePart:
-    """Bodies, joints and forces to be put into a system, and markers at named places of the part."""
+    """Bodies, joints and forces for a system, and markers at named points of the part."""
 
     name: str
     bodies: tuple[Body, ...]
@@ -26,14 +26,14 @@ class FlexiblePart:
     markers: Mapping[str, Marker]
 
     def marker(self, place: str) -> Marker:
-        """Return the marker at a place; `ModelError` with the choices if there is none."""
+        """Return the marker at a named point; `ModelError` with the choices if there is none."""
         if place not in self.markers:
             raise ModelError(f"part {self.name!r}: no place {quoted(place)}{nearest(place, self.markers)}")
         return self.markers[place]
 
 
 class PartMaker(Protocol):
-    """A description that is placed by whom it is given to, such as `partial(finite_segments, line=line, n=10)`."""
+    """A function that returns a part at a given position, such as `partial(finite_segments, line=line, n=10)`."""
 
     def __call__(self, name: str, *, position: Array, orientation: Array) -> FlexiblePart:
-        """Return the part with its origin at a position, (3,), turned by Euler parameters, (4,)."""
+        """Return the part with its origin at a position, (3,), rotated by Euler parameters, (4,)."""

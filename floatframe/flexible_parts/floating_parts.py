@@ -1,4 +1,4 @@
-"""A slender body in parts: reduced bodies in a row, each in a floating frame of its own."""
+"""A slender body divided into parts: reduced bodies in a row, each with its own floating frame."""
 
 from collections.abc import Sequence
 
@@ -31,26 +31,26 @@ def floating_parts(
 ) -> FlexiblePart:
     """Return reduced bodies in a row, fixed to each other at their ends.
 
-    The whole may bend and turn as far as it likes; what has to stay small is the bending of a part in its own frame
-    (docs/multibody.md, The range of a linear frame), which falls with the square of its length.
+    The row may bend and rotate arbitrarily. Only the bending of each part in its own frame must stay small
+    (docs/multibody.md, The range of a linear frame); it decreases with the square of the part's length.
 
     Parameters
     ----------
     name
-        Of the part; its bodies are "name 1", "name 2", ..., its joints "name joint 1", ....
+        Name of the part; its bodies are "name 1", "name 2", ..., its joints "name joint 1", ....
     reduced
-        Bodies in a row, instances of one where they are equal: each lies with its first interface on the second one of
-        that before it.
+        Bodies in a row (repeated instances if they are equal); the first interface of each lies on the second interface
+        of the previous one.
     position, orientation
-        Of the mesh axes of the first body in ground axes, (3,) [m], and Euler parameters, (4,); all mesh axes are
-        parallel.
+        Position of the mesh axes of the first body in ground axes, (3,) [m], and their Euler parameters, (4,); all mesh
+        axes are parallel.
     velocity, omega_B
-        Velocity of that origin in ground axes, (3,) [m/s], and angular velocity in mesh axes, (3,) [rad/s]: the part
-        begins to move as one rigid body.
+        Velocity of this origin in ground axes, (3,) [m/s], and angular velocity in mesh axes, (3,) [rad/s]; initially
+        the part moves as a rigid body.
     ends
-        Interfaces of every body, with rotations.
+        Interfaces of every body; they need rotations.
     stiffening
-        Whether their geometric stiffness is used; they have to have it.
+        Whether their geometric stiffness, which is then required, is used.
 
     Returns
     -------
@@ -60,7 +60,7 @@ def floating_parts(
     Raises
     ------
     ModelError
-        If there is no body, or one has no geometric stiffness and is to be stiffened.
+        If there is no body, or a body lacks the geometric stiffness that `stiffening` requires.
     """
     where = f"floating_parts {name!r}"
     if not reduced:

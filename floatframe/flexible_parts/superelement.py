@@ -1,4 +1,4 @@
-"""The corotational superelement: a reduced body by the absolute positions and rotations of its two interface nodes."""
+"""The corotational superelement: a reduced body described by position and rotation of its two interface nodes."""
 
 from collections.abc import Sequence
 
@@ -16,8 +16,8 @@ from floatframe.rotations import euler_parameters, rotation_matrix, tilde
 
 __all__ = ["corotational", "node_inertias", "relative_stiffness"]
 
-RANK = 1e-12  #: least eigenvalue of the flexibility between the nodes, scaled, that is none
-ALIKE = 1e-6  #: by which axes of one node, seen from two elements, may differ
+RANK = 1e-12  #: eigenvalue of the scaled flexibility between the nodes below which it is taken as zero
+ALIKE = 1e-6  #: difference up to which the axes of a node, in two elements, are taken as equal
 
 
 def corotational(
@@ -29,33 +29,34 @@ def corotational(
     ends: tuple[str, str] = ("start", "end"),
     damping: float = 0.0,
 ) -> FlexiblePart:
-    """Return a reduced body, or several in a row, by the motion of their interface nodes.
+    """Return a reduced body, or several in a row, described by the motion of their interface nodes.
 
-    Each node is a rigid body with its share of the mass; elements in a row share the node between them. The modal file
-    is the same; its frame and its vibration modes do not matter, only the static shapes that belong to its interfaces.
+    Each node is a rigid body with its share of the mass; elements in a row share the node between them. The usual modal
+    file is used; its frame and its vibration modes have no effect, only the static shapes of its interfaces.
 
-    (1) flexibility between both nodes at the middle point p between them: F = Psi_p K⁻¹ Psi_pᵀ, Psi_p = X_2(p) - X_1(p)
-        with X_i(p) the motion of the point p carried by node i; its inverse K_p is all of the free stiffness of two
-        nodes
-    (2) the corotated frame lies half way between the axes of the nodes, as the `Bushing` at p with stiffness K_p has
-        it: the energy is that of the deformation there, however the element turns, and forces follow from it
-    (3) inertia: the consistent mass of the static shapes times a rigid motion, M Psi_R, of which each node takes its
-        rows, as a rigid body; mass, centre and inertia of the whole are kept. It does not depend on a frame
+    (1) flexibility between both nodes at the point p in the middle between them: F = Psi_p K⁻¹ Psi_pᵀ, Psi_p = X_2(p) -
+        X_1(p), with X_i(p) the motion of the point p carried by node i; its inverse K_p is the complete free stiffness
+        of two nodes
+    (2) the corotated frame is half way between the axes of the nodes, as in the `Bushing` at p with stiffness K_p. Its
+        energy is the deformation energy in this frame for any rotation of the element, and the forces are its
+        derivatives
+    (3) inertia: the consistent mass of the static shapes times a rigid motion, M Psi_R. Each node takes its rows as a
+        rigid body; mass, centre and inertia of the whole are preserved, independently of the frame
 
-    Vibration within an element is left out: an element must be short against the waves, several in a row otherwise.
+    Vibration within an element is neglected. An element must be short compared with the waves; otherwise use several.
 
     Parameters
     ----------
     name
-        Of the part; its bodies are "name 1", "name 2", ..., its forces "name element 1", ....
+        Name of the part; its bodies are "name 1", "name 2", ..., its forces "name element 1", ....
     reduced
-        One body, or bodies in a row: each lies with its first interface on the second one of that before it.
+        One body, or bodies in a row; the first interface of each lies on the second interface of the previous one.
     position, orientation
-        Of the mesh axes of the first body, as of a `FlexibleBody`.
+        Those of the mesh axes of the first body, as for a `FlexibleBody`.
     ends
-        Interfaces of every body that are its nodes.
+        Interfaces of every body that become its nodes.
     damping
-        Of the elements: their stiffness times this time [s].
+        Stiffness-proportional damping of the elements: damping divided by stiffness [s].
 
     Returns
     -------
@@ -65,7 +66,7 @@ def corotational(
     Raises
     ------
     ModelError
-        If a body has no flexibility between its nodes in some direction, or the share of a node is no rigid body.
+        If a body has no flexibility between its nodes in some direction, or the share of a node is not a rigid body.
     """
     where = f"corotational {name!r}"
     parts = [reduced] if isinstance(reduced, ReducedBody) else list(reduced)
@@ -77,13 +78,13 @@ def corotational(
     R = rotation_matrix(
         euler_parameters_from_user(f"{where}: orientation", np.eye(4)[0] if orientation is None else orientation)
     )
-    places: list[tuple[Array, Array]] = []  #: position and axes of the nodes, ground
+    places: list[tuple[Array, Array]] = []  #: position and axes of the nodes, in ground axes
     inertias: list[tuple[float, Array, Array]] = []  #: mass, first moment and inertia about the node, in its axes
     elements = []
     for number, body in enumerate(parts):
         a, b = (body.interface(end) for end in ends)
-        axes = R @ body.frame.axes  # of B in ground
-        if number:  # laid on the node before
+        axes = R @ body.frame.axes  # axes of B in ground axes
+        if number:  # placed on the previous node
             r = places[-1][0] - axes @ a.position - R @ body.frame.origin
         for interface in (a, b):
             place = (r + R @ body.frame.origin + axes @ interface.position, axes @ interface.triad)
@@ -126,13 +127,13 @@ def corotational(
 
 
 def carried(interface: ReducedInterface, point: Array) -> Array:
-    """Return X, (6, n_q): motion with the modes of a point that an interface carries, axes of B."""
+    """Return X, (6, n_q): motion due to the modes of a point carried by an interface, in axes of B."""
     lever = tilde(point - interface.position)
     return np.asarray(np.vstack([interface.Psi[:3] - lever @ interface.Psi[3:], interface.Psi[3:]]))
 
 
 def relative_stiffness(where: str, body: ReducedBody, a: ReducedInterface, b: ReducedInterface) -> Array:
-    """Return the stiffness between two interfaces at the middle between them, axes of B, (6, 6): (1)."""
+    """Return the stiffness between two interfaces at the middle between them, in axes of B, (6, 6): step (1)."""
     middle = (a.position + b.position) / 2
     Psi = carried(b, middle) - carried(a, middle)
     stiffness = np.diag(body.K)
@@ -150,7 +151,7 @@ def relative_stiffness(where: str, body: ReducedBody, a: ReducedInterface, b: Re
 def node_inertias(
     where: str, body: ReducedBody, a: ReducedInterface, b: ReducedInterface
 ) -> tuple[tuple[float, Array, Array], tuple[float, Array, Array]]:
-    """Return mass, first moment and inertia of both nodes, each about its node and in its axes: (3)."""
+    """Return mass, first moment and inertia of both nodes, each about its node and in its axes: step (3)."""
     middle, moments = (a.position + b.position) / 2, body.moments
     Psi = carried(b, middle) - carried(a, middle)
     K_p = relative_stiffness(where, body, a, b)
@@ -169,7 +170,7 @@ def node_inertias(
         motion = np.vstack([rigid(node.position - interface.position) for node in (a, b)])
         block = (M @ motion)[6 * k : 6 * k + 6]
         shares.append(rigid_form((block + block.T) / 2))
-    # what the rigid form of the shares leaves of the whole goes to both in halves
+    # the difference between the whole body and the rigid parts of the shares is divided equally between both nodes
     (m_a, S_a, J_a), (m_b, S_b, J_b) = shares
     half = (moments.S - S_a - m_a * a.position - S_b - m_b * b.position) / 2
     S_a, S_b = S_a + half, S_b + half
@@ -189,7 +190,7 @@ def node_inertias(
 
 
 def rigid(arm: Array) -> Array:
-    """Return [1, -arm~; 0, 1]: motion at a point by motion and rotation at another, arm from this to that, (6, 6)."""
+    """Return the matrix [1, -arm~; 0, 1], (6, 6), from motion at a point to motion at another, arm from it to this."""
     return np.block([[np.eye(3), -tilde(arm)], [np.zeros((3, 3)), np.eye(3)]])
 
 
@@ -200,11 +201,11 @@ def rigid_form(B: Array) -> tuple[float, Array, Array]:
 
 
 def about(J: Array, S: Array, m: float, arm: Array) -> Array:
-    """Return the inertia about a point from which the node lies at `arm`."""
+    """Return the inertia about a point, where `arm` leads from the point to the node."""
     cross = np.outer(S, arm)
     return J + (2 * S @ arm + m * arm @ arm) * np.eye(3) - cross - cross.T - m * np.outer(arm, arm)
 
 
 def sum_of(a: tuple[float, Array, Array], b: tuple[float, Array, Array]) -> tuple[float, Array, Array]:
-    """Return both shares of one node together."""
+    """Return the sum of both shares of a node."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]

@@ -1,1 +1,1 @@
-"""Small motions about a steady one: how markers, coordinates and wrenches change, and what sensors see of it."""
+"""Small motions about a steady motion: linearised markers, coordinates and wrenches, and outputs of sensors."""

@@ -1,4 +1,4 @@
-"""Rates of joint coordinates by the velocities of the bodies, for the names of what is free and of what is driven."""
+"""Derivatives of joint-coordinate rates by body velocities, used to name free and driven coordinates."""
 
 import numpy as np
 
@@ -17,7 +17,7 @@ __all__ = ["coordinate_rows", "driven_coordinates"]
 
 
 def driven_coordinates(system: System) -> tuple[str, ...]:
-    """Return the joint coordinates with a prescribed motion, by the name "joint.coordinate"."""
+    """Return the names "joint.coordinate" of the joint coordinates with a prescribed motion."""
     return tuple(f"{joint.name}.{name}" for joint in system.joints for name in getattr(joint, "motions", {}))
 
 
@@ -27,7 +27,7 @@ def coordinate_rows(system: System, compiled: CompiledSystem, work: Work, state:
     Parameters
     ----------
     work
-        Evaluated at the state.
+        Working arrays, evaluated at the state.
     """
     model, placed, n_q = compiled.model, compiled.placed, n_q_of(system)
     rows: dict[str, Array] = {}
@@ -44,7 +44,7 @@ def coordinate_rows(system: System, compiled: CompiledSystem, work: Work, state:
             continue
         (r_a, A_a), (r_b, A_b) = (marker_pose(end, state, n_q) for end in ends)
         place = RelativePlace(A_a, A_b, r_b - r_a)
-        J = np.zeros((2, 6, int(model.bodies.u0[-1])))  # of A and B: translation and rotation in ground axes
+        J = np.zeros((2, 6, int(model.bodies.u0[-1])))  # for A and B: translation and rotation in ground axes
         for k, end in enumerate(ends):
             if end.body >= 0:
                 J[k][:, int(model.bodies.u0[end.body]) : int(model.bodies.u0[end.body + 1])] = marker_jacobian(
@@ -58,7 +58,7 @@ def coordinate_rows(system: System, compiled: CompiledSystem, work: Work, state:
 
 
 def sliding_row(compiled: CompiledSystem, work: Work, k: int, marker_b: MarkerData) -> Array:
-    """Return the row of the rate along deformed line k: n·(v_B - v_A)/|r'|, A fixed in the line, (n_u,)."""
+    """Return the row of the rate along deformed line k: n·(v_B - v_A)/|r'|, with A fixed in the line, (n_u,)."""
     model = compiled.model
     m = int(model.lines.marker[k])
     i = int(model.markers.body[m])

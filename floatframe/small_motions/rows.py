@@ -1,9 +1,9 @@
-"""Linear rows over small motions: what an output is of them.
+"""Outputs as linear functions of small motions.
 
     y = X x + V x' + A x'' + W dw
 
-with x = (xi, s): the small motions of all bodies, and of what inputs move (bases, drives), and dw the change of the
-wrenches of the connections; all in axes that turn with a steady rotation.
+with x = (xi, s), the small motions of all bodies and of prescribed inputs (bases, drives), and dw the change of the
+wrenches of the connections; all in axes that rotate with a steady rotation.
 """
 
 from collections.abc import Mapping
@@ -18,12 +18,12 @@ __all__ = ["LinearColumns", "Rows", "joined"]
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Rows of outputs, each (n_rows, ...)."""
+    """Coefficients of outputs, each (n_rows, ...)."""
 
-    x: Array  #: by small motions, (n_rows, n_x)
-    v: Array  #: by their rates, (n_rows, n_x)
-    a: Array  #: by their second rates, (n_rows, n_x)
-    w: Array  #: by wrenches, (n_rows, n_w)
+    x: Array  #: coefficients of small motions, (n_rows, n_x)
+    v: Array  #: coefficients of their rates, (n_rows, n_x)
+    a: Array  #: coefficients of their second rates, (n_rows, n_x)
+    w: Array  #: coefficients of wrenches, (n_rows, n_w)
 
     def __add__(self, other: "Rows") -> "Rows":
         """Return the sum, row by row."""
@@ -49,21 +49,21 @@ class Rows:
 
     @property
     def rate(self) -> "Rows":
-        """The rows of y', of rows of motions alone."""
-        assert not self.a.any()  # third rates are no part of small motions
+        """The rows of y'; only for rows without rates of second order."""
+        assert not self.a.any()  # small motions have no third rates
         assert not self.w.any()
         return Rows(np.zeros_like(self.x), self.x, self.v, self.w)
 
 
 def joined(parts: list[Rows]) -> Rows:
-    """Return rows one below the other."""
+    """Return rows stacked below each other."""
     return Rows(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("x", "v", "a", "w")))
 
 
 @dataclass(frozen=True, eq=False)
 class LinearColumns:
-    """What a sensor sees of small motions: named columns as those of its measurement, each with its unit."""
+    """The linearised outputs of a sensor: columns with the names and units of its measurement."""
 
-    columns: Mapping[str, Rows]  #: one row each
+    columns: Mapping[str, Rows]  #: one row for each column
     units: Mapping[str, str]
-    not_linear: Mapping[str, str]  #: the other columns of its measurement, and why they are not linear here
+    not_linear: Mapping[str, str]  #: other columns of its measurement, with the reason why they are not linear here

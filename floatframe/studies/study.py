@@ -1,7 +1,7 @@
-"""Parameter studies from a file: every point is a task of its own, its failure a row like any other.
+"""Parameter studies from a file: every point is a separate task, and a failed point is a row of the table.
 
 study = read_study("crank_study.toml")
-table = run_study(study)                     # rows: values of the parameters, numbers asked for, or why not
+table = run_study(study)                     # rows: parameter values, and outputs or an error
 """
 
 import os
@@ -43,11 +43,11 @@ EXTREMES: dict[str, Callable[[Array], float]] = {"least": np.nanmin, "greatest":
 
 @dataclass(frozen=True)
 class StudyTable:
-    """All points of a study in their order."""
+    """All points of a study, in order."""
 
     study: Study
     rows: tuple[StudyRow, ...]
-    n_known: int = 0  #: rows that came from the journal
+    n_known: int = 0  #: number of rows taken from the journal
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -56,11 +56,11 @@ class StudyTable:
 
     @property
     def n_failed(self) -> int:
-        """Points without result."""
+        """Number of failed points."""
         return sum(bool(row.error) for row in self.rows)
 
     def column(self, name: str) -> Array:
-        """Return the numbers of an output at all points, (n_points,), NaN where a point failed."""
+        """Return the values of an output at all points, (n_points,); NaN if a point failed."""
         names = [output.name for output in self.study.outputs]
         if name not in names:
             raise ModelError(f"study: no output {quoted(name)}{nearest(name, names)}")
@@ -74,28 +74,28 @@ def run_study(
     journal: str | os.PathLike[str] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> StudyTable:
-    """Compute all points of a study; the numbers do not depend on the workers.
+    """Compute all points of a study; the results do not depend on the workers.
 
     Parameters
     ----------
     study
-        As `read_study` returns it.
+        The study, from `read_study`.
     workers
-        Where points are computed (docs/cluster.md); default: as the study says, or one process a processor.
+        Workers that compute points (docs/cluster.md); default: those in the study, or one process per processor.
     journal
-        A file that every point is appended to; what it holds is not computed again. None: nothing is written.
+        A file to which every point is appended; points in it are not computed again. None: nothing is written.
     progress
-        Called with the numbers of points done and of all.
+        Called with the number of completed points and the total number.
 
     Raises
     ------
     ModelError, SystemFileError
-        Before any work, if the system as it stands in its file is not valid, a parameter names no key of it, or an
-        output nothing that it measures.
+        Before any work, if the system in its file is not valid, a parameter does not name a key of it, or an output
+        does not exist.
     ResultsError
-        If the journal is one of another system, other numbers or another version of the program.
+        If the journal belongs to another system, other outputs or another version of the program.
     WorkerError
-        If no workers can be had.
+        If no workers are available.
     """
     from floatframe.system_file.read_system import read_system
 
@@ -125,13 +125,13 @@ def run_study(
 
 
 def sendable_study(study: Study) -> Study:
-    """Return what workers need of a study: the system by its full path, no values, of which there may be many."""
+    """Return the study as sent to workers: the system with its full path, without values, which may be many."""
     parameters = tuple(replace(parameter, values=()) for parameter in study.parameters)
     return replace(study, system=os.path.abspath(study.system), parameters=parameters)
 
 
 def check(study: Study, point: tuple[Any, ...]) -> None:
-    """Raise if the system, a key path or an output is not there; before the long work, in this process."""
+    """Raise if the system, a key path or an output does not exist; run in this process before the long work."""
     from floatframe.system_file.read_system import read_system
 
     plain, run = read_system(study.system)
@@ -143,27 +143,27 @@ def check(study: Study, point: tuple[Any, ...]) -> None:
         read_system_keys(study)
         if "unknown key" in str(error):
             raise
-        system = plain  # the values of this point are impossible: that is a row
+        system = plain  # the values of this point are impossible, which gives a failed row
     if study.analysis == "eig":
         for output in study.outputs:
             mode_and_part(output)
         return
     try:
         placed = as_placed(system)
-    except Exception:  # what this point brings about is a row, if the file without it does better
+    except Exception:  # a failure caused by this point is a row, if the unchanged file does not fail
         system, placed = plain, as_placed(plain)
     for output in study.outputs:
         taken(output, system, placed)
 
 
 def as_placed(system: System) -> Trajectory:
-    """Return the bodies as placed as a motion of one time."""
+    """Return the assembled bodies as a motion with one time."""
     compiled = compiled_system(system)
     return snapshot(system, state_of_file(compiled, compiled.placed))
 
 
 def read_system_keys(study: Study) -> None:
-    """Raise `SystemFileError` if a key path leads nowhere."""
+    """Raise `SystemFileError` if a key path does not exist."""
     from fe_models.foundation.toml_file import changed, read_toml
     from floatframe.errors import SystemFileError
 
@@ -174,7 +174,7 @@ def read_system_keys(study: Study) -> None:
 
 @dataclass(frozen=True)
 class StudyPoint:
-    """The function that computes a point; it can be sent to another process."""
+    """The function that computes a point, which can be sent to another process."""
 
     study: Study
 
@@ -192,7 +192,7 @@ class StudyPoint:
         return StudyRow(point, tuple(value for value, _ in found), tuple(unit for _, unit in found))
 
     def failed(self, point: tuple[Any, ...], error: Exception) -> StudyRow:
-        """Return the row of a point that went wrong, whatever it was: its error in words."""
+        """Return the row of a failed point, with its error as text."""
         words = str(error) if isinstance(error, ReportedError) else f"{type(error).__name__}: {error}"
         n = len(self.study.outputs)
         told = " ".join(words.split()) or type(error).__name__
@@ -200,7 +200,7 @@ class StudyPoint:
         return StudyRow(point, (float("nan"),) * n, ("",) * n, told, is_lasting)
 
     def motion(self, system: System, given: RunOptions | None) -> Trajectory:
-        """Return the motion of the analysis; an equilibrium as one of one time."""
+        """Return the motion of the analysis; an equilibrium is a motion with one time."""
         if self.study.analysis == "static":
             return equilibrium_of(system, formulation_of(given))
         return MOTIONS[self.study.analysis](system, required_run(given, self.study.system))
@@ -212,7 +212,7 @@ def motion_of_run(system: System, run: RunOptions) -> Trajectory:
 
 
 def equilibrium_of(system: System, formulation: str) -> Trajectory:
-    """Return the equilibrium at rest, a motion of one time."""
+    """Return the equilibrium at rest as a motion with one time."""
     rest = static_equilibrium(system, formulation=formulation)
     return snapshot(system, rest.state, rest.u_dot, rest.w)
 
@@ -225,13 +225,13 @@ MOTIONS: dict[str, Callable[[System, RunOptions], Trajectory]] = {
 
 
 def taken(output: Output, system: System, motion: Trajectory) -> tuple[float, str]:
-    """Return the number of an output, and its unit; `ModelError` with the choices if there is no such column."""
+    """Return the value of an output and its unit; `ModelError` with the choices if there is no such column."""
     values, unit = column_of(output, system, motion)
     return float(TAKES[output.take](values)), unit
 
 
 def column_of(output: Output, system: System, motion: Trajectory) -> tuple[Array, str]:
-    """Return the values over time of what an output is taken from, (n_t,), and their unit."""
+    """Return the values over time from which an output is computed, (n_t,), and their unit."""
     coordinates = [f"{joint.name}.{name}" for joint in system.joints for name in joint.coordinates]
     sensors = [*(sensor.name for sensor in system.sensors), *coordinates]
     fitting = [name for name in sensors if output.of == name or output.of.startswith(name + " ")]
@@ -252,7 +252,7 @@ def column_of(output: Output, system: System, motion: Trajectory) -> tuple[Array
 
 
 def taken_of_modes(output: Output, modes: SystemModes, per_second: float) -> tuple[float, str]:
-    """Return the number of an output of the modes about the equilibrium, and its unit."""
+    """Return the value of an output of the modes about the equilibrium, and its unit."""
     part, which = mode_and_part(output)
     k = which if isinstance(which, int) else 1
     if k > len(modes.eigenvalues):
@@ -267,7 +267,7 @@ def taken_of_modes(output: Output, modes: SystemModes, per_second: float) -> tup
 
 
 def mode_and_part(output: Output) -> tuple[str, int | str]:
-    """Return what of which mode (or "least", "greatest" of all) an output is; `ModelError` if it says neither."""
+    """Return the part and the mode ("least" or "greatest" over all) of an output; `ModelError` if it names neither."""
     part, _, number = output.of.partition(" ")
     if part in OF_MODES and number in EXTREMES:
         return part, number

@@ -1,4 +1,4 @@
-"""The study file: what `floatframe sweep` reads (docs/analyses.md, "Parameter sweeps")."""
+"""The study file, which `floatframe sweep` reads (docs/analyses.md, "Parameter sweeps")."""
 
 import itertools
 import os
@@ -21,7 +21,7 @@ __all__ = ["ANALYSES", "TAKES", "Output", "Parameter", "Study", "read_study", "w
 ANALYSES = ("run", "static", "eig", "kinematics", "inverse")
 COMBINATIONS = ("all", "together")
 SCALES = ("linear", "log")
-TAKES = {  # name -> of the values over time, (n_t,), one number
+TAKES = {  # name -> function from the values over time, (n_t,), to a number
     "last": lambda values: values[-1],
     "first": lambda values: values[0],
     "least": lambda values: values.min(),
@@ -35,7 +35,7 @@ MOST_POINTS = 100_000
 
 
 def workers_of_file(value: Any) -> int | str:
-    """Return workers as a file says them."""
+    """Return the workers given in a file."""
     if isinstance(value, bool) or not isinstance(value, int | str):
         raise ValueError(f"expected {WORKERS_HELP}")
     try:
@@ -79,7 +79,7 @@ class ParameterSection(Table):
         return self
 
     def all_values(self) -> tuple[Any, ...]:
-        """Return the values as they go into the system file."""
+        """Return the values in the form used in the system file."""
         if self.values is not None:
             return self.values
         assert self.first is not None and self.last is not None and self.number is not None  # noqa: PT018
@@ -88,7 +88,7 @@ class ParameterSection(Table):
 
 
 class OutputSection(Table):
-    """[outputs.NAME]: a number taken from the result of every point."""
+    """[outputs.NAME]: a number computed from the result of every point."""
 
     of: str = Field(description='a sensor and its column ("tip size"), or of eig "frequency 1", "damping 1"')
     take: choice("way to take a number", lambda: tuple(TAKES)) = Field(  # type: ignore[valid-type]
@@ -139,7 +139,7 @@ class StudyFile(Table):
 
 @dataclass(frozen=True)
 class Parameter:
-    """A key of the system file and the values it takes."""
+    """A key of the system file and its values."""
 
     name: str
     path: str
@@ -148,7 +148,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Output:
-    """A number taken from the result of a point."""
+    """A number computed from the result of a point."""
 
     name: str
     of: str
@@ -157,22 +157,22 @@ class Output:
 
 @dataclass(frozen=True)
 class Study:
-    """A system, its parameters, and the numbers asked for."""
+    """A system, its parameters, and the outputs."""
 
     system: str  #: path of the system file
     analysis: str
-    is_grid: bool  #: every value with every other
+    is_grid: bool  #: whether all combinations of values are computed
     workers: int | str | None
     parameters: tuple[Parameter, ...]
     outputs: tuple[Output, ...]
 
     def points(self) -> Iterator[tuple[Any, ...]]:
-        """Yield the values of the parameters at every point, the last parameter fastest."""
+        """Yield the parameter values of every point; the last parameter varies fastest."""
         values = [parameter.values for parameter in self.parameters]
         yield from itertools.product(*values) if self.is_grid else zip(*values, strict=True)
 
     def changes(self, point: tuple[Any, ...]) -> dict[str, Any]:
-        """Return the values of a point by key path."""
+        """Return the values of a point, by key path."""
         return {parameter.path: value for parameter, value in zip(self.parameters, point, strict=True)}
 
 
@@ -182,7 +182,8 @@ def read_study(path: str | os.PathLike[str]) -> Study:
     Raises
     ------
     SystemFileError
-        With every problem: key path, value, what was expected, choices and the nearest name.
+        If the file is not valid. The message lists every problem, with key path, value, expected value and nearest
+        name.
     """
     path = Path(path)
     data = validated(StudyFile, read_toml(path, SystemFileError), path, SystemFileError, context=path.parent)

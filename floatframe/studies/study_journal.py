@@ -1,4 +1,4 @@
-"""The journal of a study: every point is a line as soon as it is known, for a second call to go on with."""
+"""The journal of a study: every completed point is a line, so that a later call can continue."""
 
 import hashlib
 import json
@@ -19,7 +19,7 @@ KIND = "floatframe sweep journal 1"
 
 
 class StudyJournal:
-    """A file to which rows are appended, and those that it held when it was opened."""
+    """A file to which rows are appended, with the rows that it contained when opened."""
 
     def __init__(self, journal: TaskJournal, study: Study) -> None:
         self.journal = journal
@@ -43,20 +43,20 @@ class StudyJournal:
         return StudyRow(point, tuple(record["outputs"]), tuple(record["units"]), str(record.get("error", "")))
 
     def append(self, row: StudyRow) -> None:
-        """Write a row; not one that another try may give."""
+        """Write a row, unless a repeated attempt could give another result."""
         if row.is_lasting:
             outputs = [float(value) for value in row.outputs]
             key = self.key(row.values)
             self.journal.append({"point": key, "outputs": outputs, "units": row.units, "error": row.error})
 
     def key(self, point: tuple[Any, ...]) -> str:
-        """Return a point as text: its values, and digests of the files that they name."""
+        """Return the key of a point as text: its values, and digests of the files that they name."""
         digests = [file_digest(self.folder / text) for text in texts(point)]
         return json.dumps([point, [digest for digest in digests if digest]], default=str)
 
 
 def texts(value: Any) -> Iterator[str]:
-    """Yield all texts in a value of a file that may be names of files."""
+    """Yield all texts in a value of a file that can be names of files."""
     if isinstance(value, str):
         if 0 < len(value) < 1000 and "\0" not in value:
             yield value
@@ -69,20 +69,20 @@ def texts(value: Any) -> Iterator[str]:
 
 
 def open_study_journal(path: Path, study: Study, files: tuple[str, ...]) -> StudyJournal:
-    """Return the journal at a path, new or with what it holds.
+    """Return the journal at a path, either new or with its existing rows.
 
     Raises
     ------
     ResultsError
-        If the file is no journal, or one of another system, other numbers or another version of the program; it is left
-        as it is.
+        If the file is not a journal, or belongs to another system, other outputs or another version of the program; it
+        is left unchanged.
     """
     digest = study_digest(study, files)
     return StudyJournal(open_task_journal(path, KIND, digest, f"the study of {study.system}", ResultsError), study)
 
 
 def study_digest(study: Study, files: tuple[str, ...]) -> str:
-    """Return the SHA-256 of what the numbers depend on: this program, files of the system, key paths, outputs."""
+    """Return the SHA-256 of everything the results depend on: program, files of the system, key paths, outputs."""
     asked = [(output.of, output.take) for output in study.outputs]
     text = repr((source_mark(), study.analysis, [parameter.path for parameter in study.parameters], asked))
     digest = hashlib.sha256(text.encode())

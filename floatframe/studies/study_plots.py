@@ -1,4 +1,4 @@
-"""Plots of parameter studies: a panel for each output over the first parameter, curves by the other ones."""
+"""Plots of parameter studies: a panel for each output over the first parameter, with curves for the other ones."""
 
 from typing import TYPE_CHECKING
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 __all__ = ["plot_study", "plot_study_output"]
 
-MOST_CURVES = 9  #: of which the legend tells the values; more are coloured alike
+MOST_CURVES = 9  #: largest number of curves listed in the legend; further curves share one colour
 
 
 def plot_study(table: StudyTable) -> "Figure":
@@ -41,7 +41,7 @@ def plot_study(table: StudyTable) -> "Figure":
 
 
 def plot_study_output(table: StudyTable, name: str, ax: "Axes") -> "Axes":
-    """Draw an output over the first parameter, a curve for each combination of the others; failures as ticks below."""
+    """Plot an output over the first parameter, a curve for each combination of the others; failures as ticks below."""
     study, values = table.study, table.column(name)
     k = [output.name for output in study.outputs].index(name)
     first = study.parameters[0]

@@ -1,4 +1,4 @@
-"""One point of a study and what came out."""
+"""A point of a study and its result."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -8,10 +8,10 @@ __all__ = ["StudyRow"]
 
 @dataclass(frozen=True)
 class StudyRow:
-    """Values of the parameters at a point, and what came out."""
+    """Parameter values of a point, and its outputs or error."""
 
     values: tuple[Any, ...]
-    outputs: tuple[float, ...]  #: NaN where the point failed
+    outputs: tuple[float, ...]  #: NaN if the point failed
     units: tuple[str, ...]
-    error: str = ""  #: why it failed
-    is_lasting: bool = True  #: another try would give the same; not so for a process that was killed
+    error: str = ""  #: reason of a failure
+    is_lasting: bool = True  #: whether a repeated attempt would give the same result; False for a killed process
