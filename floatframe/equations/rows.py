@@ -76,7 +76,7 @@ class RowParts:
         return sp.csr_array(summed(parts, (len(at.holds), at.n_u))[at.held])
 
     def of_connection(self, c: int) -> tuple[Array, Array]:
-        """Return the rows of connection c by the velocities of its bodies, and its wrench to them, (size, n_own) each."""
+        """Return the rows of connection c by the velocities of its bodies, and its wrench to them: (size, n_own)."""
         own = [k for k, end in enumerate(self.structure.ends) if end.connection == c]
         places: dict[int, int] = {}
         n = 0

@@ -1,1 +1,1 @@
-"""Computed motions: the file, the trajectory, and what is recovered from it."""
+"""Computed motions: results file, trajectory, and quantities evaluated from them."""

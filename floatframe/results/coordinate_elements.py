@@ -1,4 +1,4 @@
-"""Couplers and user forces over a motion: their coordinates, forces and states."""
+"""Coordinates, forces and states of couplers and user forces during a motion."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,9 +21,9 @@ class CouplerMotion:
     """Coordinates of a coupler over time, in the order of its terms, and the forces along them."""
 
     t: Array  #: (n_t,) [s]
-    value: Array  #: distances, angles beyond full turns, (n_t, n_terms) [m, rad]
+    value: Array  #: distances, and angles counted through full turns, (n_t, n_terms) [m, rad]
     rate: Array  #: (n_t, n_terms) [m/s, rad/s]
-    force: Array  #: that acts to increase the coordinate, (n_t, n_terms) [N, N m]
+    force: Array  #: positive if it acts to increase the coordinate, (n_t, n_terms) [N, N m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,19 +31,19 @@ class UserForceMotion:
     """Coordinates, forces and states of a user force over time, by name, each (n_t,)."""
 
     t: Array  #: (n_t,) [s]
-    value: Mapping[str, Array]  #: of the coordinates; angles beyond full turns
+    value: Mapping[str, Array]  #: of the coordinates; angles are counted through full turns
     rate: Mapping[str, Array]
-    force: Mapping[str, Array]  #: that acts to increase its coordinate
+    force: Mapping[str, Array]  #: positive if it acts to increase its coordinate
     states: Mapping[str, Array]
 
 
 def user_force_motion(system: System, trajectory: Trajectory, name: str) -> UserForceMotion:
-    """Return what a user force sees and does over a motion of the system.
+    """Return coordinates, forces and states of a user force during a motion of the system.
 
     Raises
     ------
     ResultsError
-        If there is no such force, or the motion is one of another system.
+        If there is no such force, or the motion is of another system.
     """
     forces = [force for force in system.forces if isinstance(force, UserForce)]
     names = [force.name for force in forces]
@@ -64,7 +64,7 @@ def user_force_motion(system: System, trajectory: Trajectory, name: str) -> User
 
 
 def unknowns(system: System, trajectory: Trajectory) -> Array:
-    """Return all unknowns of connections, (n_t, n_w); `ResultsError` if they are those of another system."""
+    """Return all unknowns of connections, (n_t, n_w); `ResultsError` if the motion is of another system."""
     w = trajectory.source.read("w")
     if w.shape[1] != int(compiled_system(system).model.connections.w0[-1]):
         raise ResultsError(f"the motion of {trajectory.head.system!r} is not one of the system {system.name!r}")
@@ -72,12 +72,12 @@ def unknowns(system: System, trajectory: Trajectory) -> Array:
 
 
 def coupler_motion(system: System, trajectory: Trajectory, name: str) -> CouplerMotion:
-    """Return the coordinates and forces of a coupler over a motion of the system.
+    """Return the coordinates and forces of a coupler during a motion of the system.
 
     Raises
     ------
     ResultsError
-        If there is no such coupler, or the motion is one of another system.
+        If there is no such coupler, or the motion is of another system.
     """
     names = [coupler.name for coupler in system.couplers]
     if name not in names:

@@ -1,4 +1,4 @@
-"""Public elements over a motion: their outputs, states, multipliers and wrenches."""
+"""Outputs, states, multipliers and wrenches of public elements during a motion."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ __all__ = ["ElementMotion", "element_motion", "placed_law"]
 
 @dataclass(frozen=True, eq=False)
 class ElementMotion:
-    """What an element sees and does over time, by name, each (n_t,)."""
+    """Outputs, states and multipliers of an element over time, by name, (n_t,) each, and its wrenches."""
 
     t: Array  #: (n_t,) [s]
     outputs: Mapping[str, Array]
@@ -35,7 +35,7 @@ class ElementMotion:
 
 
 def placed_law(system: System, name: str, where: str = "element_motion") -> PlacedLaw:
-    """Return an element as it is compiled; `ResultsError` with the nearest name if there is none."""
+    """Return the compiled law of an element; `ResultsError` with the nearest name if there is none."""
     laws = compiled_system(system).laws
     names = [placed.element.name for placed in laws]
     if name not in names:
@@ -44,15 +44,15 @@ def placed_law(system: System, name: str, where: str = "element_motion") -> Plac
 
 
 def element_motion(system: System, trajectory: Trajectory, name: str) -> ElementMotion:
-    """Return what a public element sees and does over a motion of the system.
+    """Return outputs, states, multipliers and wrenches of a public element during a motion of the system.
 
-    States and multipliers are those of the motion; outputs and wrenches follow from them and from the motion of the
-    markers, by the law of the element, while events have it off by what it does then.
+    States and multipliers are taken from the motion. Outputs and wrenches are evaluated by the law of the element from
+    these and the motion of the markers; while events have switched the element off, by its `off` law.
 
     Raises
     ------
     ResultsError
-        If there is no such element, or the motion is one of another system.
+        If there is no such element, or the motion is of another system.
     """
     placed = placed_law(system, name)
     w = unknowns(system, trajectory)
@@ -91,7 +91,7 @@ def marker_place(system: System, trajectory: Trajectory, marker: MarkerData) -> 
 
 
 def motion_row(place: PlaceMotion, accelerations: bool) -> Array:
-    """Return position, axes row by row, velocity and angular velocity, (n_t, 18), with their rates (n_t, 24)."""
+    """Return position, axes row by row, velocity, angular velocity, (n_t, 18), or also their rates, (n_t, 24)."""
     parts = [place.position, place.axes.reshape(-1, 9), place.velocity, place.omega]
     if accelerations:
         parts += [place.acceleration, np.zeros_like(place.omega) if place.alpha is None else place.alpha]

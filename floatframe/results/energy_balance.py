@@ -1,4 +1,4 @@
-"""How well a computed motion keeps its energy."""
+"""The energy error of a computed motion."""
 
 import numpy as np
 
@@ -9,10 +9,10 @@ __all__ = ["balance_defect", "energy_scale"]
 
 
 def energy_scale(trajectory: Trajectory) -> float:
-    """Return the largest energy that moves about in the motion [J]: what an energy error is measured by.
+    """Return the largest energy in motion [J], relative to which energy errors are judged.
 
-    Kinetic, strain and spring energy, the range of the potential of gravity (its zero is arbitrary), and the work of
-    forces and dampers.
+    It is the largest of kinetic, strain and spring energy, the range of the potential of gravity (whose zero is
+    arbitrary), and the work of forces and dampers.
     """
     e = trajectory.energies
     parts = (e.kinetic, e.strain, e.springs, e.gravity - e.gravity.min(initial=np.inf), e.work, e.dissipated)
@@ -20,6 +20,6 @@ def energy_scale(trajectory: Trajectory) -> float:
 
 
 def balance_defect(trajectory: Trajectory) -> Array:
-    """Return total energy - work + dissipated, less its value at the start, (n_t,) [J]; exactly computed: zero."""
+    """Return total energy - work + dissipated, minus its initial value, (n_t,) [J]; zero for an exact motion."""
     balance = trajectory.energies.balance
     return np.asarray(balance - balance[:1])

@@ -1,4 +1,4 @@
-"""Motions for other programs: a table (CSV), and a series of deformed surfaces for ParaView (PVD and VTU)."""
+"""Motions for other programs, as a table (CSV) or a series of deformed surfaces for ParaView (PVD and VTU)."""
 
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -27,11 +27,11 @@ __all__ = ["export_csv", "export_vtk", "motion_table"]
 def motion_table(
     trajectory: Trajectory, bodies: Mapping[str, ReducedBody] | None = None, system: System | None = None
 ) -> dict[str, Array]:
-    """Return the columns of a motion by name with unit, each (n_t,).
+    """Return the columns of a motion, named with their units, (n_t,) each.
 
-    Time; of every body the place and motion of its frame; of the interfaces of the bodies given, position, velocity
-    and elastic displacement in B; of joints and springs force and moment on marker A; energies. With the system, also
-    its joint coordinates (value, rate, force along them) and all that its sensors measure.
+    The columns are time; position and motion of every body frame; position, velocity and elastic displacement in B for
+    the interfaces of the given bodies; force and moment on marker A for joints and springs; and energies. With the
+    system, also its joint coordinates (value, rate and force along them) and the measurements of all its sensors.
     """
     units = trajectory.units
     m, s = units.length_symbol, units.time_symbol
@@ -70,7 +70,7 @@ def motion_table(
 
 
 def sensor_table(trajectory: Trajectory, chosen: Sequence[Measurement]) -> dict[str, Array]:
-    """Return the time and the columns of measurements by name with unit, each (n_t,)."""
+    """Return the time and the columns of measurements, named with their units, (n_t,) each."""
     table: dict[str, Array] = {f"t [{trajectory.units.time_symbol}]": trajectory.t}
     for measurement in chosen:
         table |= dict(zip(measurement.headers, measurement.columns.values(), strict=True))
@@ -85,9 +85,9 @@ def export_csv(
     *,
     chosen: Sequence[Measurement] | None = None,
 ) -> None:
-    """Write `motion_table` as comma-separated values, with 17 digits, so that every number reads back as it was.
+    """Write `motion_table` as comma-separated values with 17 digits, so that every number is read back exactly.
 
-    With `chosen` only the time and what these sensors measured.
+    With `chosen`, only the time and these measurements are written.
     """
     table = motion_table(trajectory, bodies, system) if chosen is None else sensor_table(trajectory, chosen)
     names = [f'"{name}"' if "," in name else name for name in table]
@@ -104,19 +104,19 @@ def export_vtk(
     every: int = 1,
     on_frame: Callable[[int, int], None] | None = None,
 ) -> list[Path]:
-    """Write the deformed surfaces of the bodies given as a series for ParaView: one .pvd and a folder of .vtu files.
+    """Write the deformed surfaces of the given bodies as a series for ParaView: a .pvd file and a folder of .vtu files.
 
-    Point data: elastic displacement in ground axes, and the von Mises stress where every body knows it; "node" and, of
-    cells, "element": the numbers in the user's meshes, -1 where there is none.
+    Point data: elastic displacement in ground axes, the von Mises stress if every body has stress modes, and "node".
+    Cell data: "element". "node" and "element" are the numbers in the user's meshes, -1 if there is none.
 
     Parameters
     ----------
     path
-        Ends in .pvd; the .vtu files go into a folder of the same name without the ending.
+        Name that ends in .pvd; the .vtu files go into a folder with the same name without the ending.
     every
-        Take every so many output times.
+        Step between the output times that are written.
     on_frame
-        Called with the numbers of times written and of all.
+        Called with the number of times written so far and the total number.
 
     Returns
     -------
@@ -126,7 +126,7 @@ def export_vtk(
     Raises
     ------
     ResultsError
-        If no body has a surface, or one does not fit the motion.
+        If no body has a surface, or a body does not match the motion.
     """
     import meshio
 
@@ -176,7 +176,7 @@ def export_vtk(
 
 
 def numbers_of(bodies: list[ReducedBody]) -> tuple[dict[str, IntArray], dict[str, list[IntArray]]]:
-    """Return the user's numbers of nodes and elements of several bodies as data of points and cells; none: nothing."""
+    """Return the user's numbers of nodes and elements of several bodies as point and cell data, if there are any."""
     nodes = [filled(body.numbering.nodes, len(body.nodes)) for body in bodies]
     elements = [filled(body.numbering.elements, len(body.surface)) for body in bodies]
     by_node = {"node": np.concatenate(nodes)} if any(body.numbering.nodes.size for body in bodies) else {}
@@ -185,5 +185,5 @@ def numbers_of(bodies: list[ReducedBody]) -> tuple[dict[str, IntArray], dict[str
 
 
 def filled(numbers: IntArray, n: int) -> IntArray:
-    """Return numbers, or n times none."""
+    """Return the numbers, or -1 for each of n entries if there are none."""
     return numbers if numbers.size else np.full(n, NONE)

@@ -1,4 +1,4 @@
-"""Angles over a motion through full turns: by the turns that the run has counted, else from one output to the next."""
+"""Angles counted through full turns: with the turns that a run has counted, else from one output to the next."""
 
 import numpy as np
 
@@ -10,29 +10,30 @@ from floatframe.results.trajectory import Trajectory
 __all__ = ["followed_angle", "through_turns"]
 
 TURN = 2 * np.pi
-DOUBTFUL = 0.5 * np.pi  #: rad, by which an angle may be off from where its rates lead between two outputs
+#: largest difference between an angle and its extrapolation by the rates over an output interval [rad]
+DOUBTFUL = 0.5 * np.pi
 
 
 def through_turns(trajectory: Trajectory, where: str, angle: CountedAngle, value: Array, rate: Array) -> Array:
-    """Return an angle, known but for full turns, as it is, (n_t,) [rad].
+    """Return an angle, known up to full turns, with its full turns, (n_t,) [rad].
 
     Parameters
     ----------
     trajectory
         The motion.
     where
-        What it is, for messages.
+        Description of the angle, for messages.
     angle
-        How it is measured; a run counts the angles of its joints and of the sensors its system has.
+        Definition of the angle; a run counts the angles of its joints and of the sensors of its system.
     value
-        Between -pi and pi, (n_t,) [rad].
+        The angle between -pi and pi, (n_t,) [rad].
     rate
-        (n_t,) [rad/s].
+        Its rate, (n_t,) [rad/s].
 
     Raises
     ------
     ResultsError
-        If the run has not counted it, and its outputs are too far apart to follow it.
+        If the run has not counted it, and the outputs are too far apart to follow it.
     """
     for k, known in enumerate(trajectory.head.angles or ()):
         if known.is_same(angle):
@@ -42,12 +43,12 @@ def through_turns(trajectory: Trajectory, where: str, angle: CountedAngle, value
 
 
 def followed_angle(where: str, t: Array, value: Array, rate: Array) -> Array:
-    """Return an angle that was not counted: each value is the one nearest to where the mean rate leads, (n_t,) [rad].
+    """Return an angle that was not counted, each value the one nearest to its extrapolation by the mean rate, (n_t,).
 
     Raises
     ------
     ResultsError
-        If a value is more than a quarter of a turn away from there.
+        If a value differs from the extrapolation by more than a quarter of a turn.
     """
     expected = 0.5 * (rate[1:] + rate[:-1]) * np.diff(t)
     step = np.diff(value)

@@ -1,4 +1,4 @@
-"""The head of a results file: what it says besides numbers, as JSON text, and checked when it is read."""
+"""The head of a results file: its content besides arrays, as JSON text, which is validated when it is read."""
 
 import json
 import math
@@ -18,20 +18,20 @@ NUMBERS_OF_RUN = ("t_start", "t_end", "h")
 
 @dataclass(frozen=True)
 class BodyEntry:
-    """Where the columns of a body are."""
+    """The position of the columns of a body."""
 
     name: str
     n_q: int
     q0: int  #: first column in q
     u0: int  #: first column in u
     source: str = ""  #: path of the modal file; "" for rigid bodies and bodies made in memory
-    digest: str = ""  #: of that file
-    is_stiffened: bool = False  #: whether its geometric stiffness counts
+    digest: str = ""  #: digest of that file
+    is_stiffened: bool = False  #: whether its geometric stiffness is used
 
 
 @dataclass(frozen=True)
 class Head:
-    """What a results file says besides numbers."""
+    """The content of a results file besides arrays."""
 
     system: str
     units: str  #: name of the unit system
@@ -40,10 +40,11 @@ class Head:
     springs: tuple[str, ...]
     w0: tuple[int, ...]  #: first column in w of each connection (joints, springs, couplers, user forces), and the end
     run: Mapping[str, Any]  #: integrator and its parameters, h, t_end, version
-    #: of a run that has ended: n_steps, n_rejected, n_iterations (of Newton's method), wall_time [s]
+    #: of a completed run: n_steps, n_rejected, n_iterations (of Newton's method), wall_time [s]
     summary: Mapping[str, Any] = field(default_factory=dict)
     angles: tuple[CountedAngle, ...] | None = None  #: of the columns of `angle`; None: not counted
-    #: sensor -> in words, the places on flexible bodies that it takes and how far they are from those asked for
+    #: by sensor: descriptions of the nodes used for places on flexible bodies, and their distance from the requested
+    #: places
     places: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     loads: tuple[str, ...] | None = None  #: point forces, in the order of `load`; None: not written
     load_cases: tuple[str, ...] | None = None  #: forces that are load cases, in the order of `load_case`
@@ -60,7 +61,7 @@ def head_of_text(text: Any) -> Head:
     Raises
     ------
     ValueError
-        If it is no head, or does not fit together; the text names the key.
+        If it is not a head, or is inconsistent; the message names the key.
     """
     try:
         data = json.loads(text)
@@ -77,7 +78,7 @@ def head_of_text(text: Any) -> Head:
     require(is_list(data["bodies"], dict) and data["bodies"], "bodies", "a list of objects", data["bodies"])
     bodies = entries_of(data["bodies"])
     n_connections, w0 = len(data["joints"]) + len(data["springs"]), data["w0"]
-    # couplers and user forces have columns too, behind those of joints and springs, but no names here
+    # couplers and user forces have columns too, after those of joints and springs, but no names here
     require(is_list(w0, int) and len(w0) > n_connections and w0[0] == 0 and w0 == sorted(w0),
             "w0", f"at least {n_connections + 1} whole numbers that ascend from 0", w0)  # fmt: skip
     summary = data.get("summary", {})
@@ -100,13 +101,13 @@ def head_of_text(text: Any) -> Head:
 
 
 def angles_of(tables: Any, n_bodies: int) -> tuple[CountedAngle, ...]:
-    """Return the angles whose turns were counted."""
+    """Return the angles whose full turns were counted."""
     require(is_list(tables, dict), "angles", "a list of objects", tables)
     keys = [part.name for part in fields(CountedAngle)]
     angles = []
     for k, table in enumerate(tables):
         where = f"angles[{k}]"
-        table = {"part": -1} | table  # older files have none
+        table = {"part": -1} | table  # missing in older files
         require(set(table) == set(keys), where, f"an object with {', '.join(keys)}", table)
         for name in ("holder", "other"):
             is_body = type(table[name]) is int and -1 <= table[name] < n_bodies
@@ -123,7 +124,7 @@ def angles_of(tables: Any, n_bodies: int) -> tuple[CountedAngle, ...]:
 
 
 def entries_of(tables: list[dict[str, Any]]) -> tuple[BodyEntry, ...]:
-    """Return the bodies, whose columns must follow each other."""
+    """Return the bodies, whose columns must be consecutive."""
     kinds = {part.name: part.type for part in fields(BodyEntry)}
     entries: list[BodyEntry] = []
     q0 = u0 = 0
@@ -147,7 +148,7 @@ def entries_of(tables: list[dict[str, Any]]) -> tuple[BodyEntry, ...]:
 
 
 def check_run(run: Any) -> None:
-    """Raise unless the table of the run has the kinds of values that are used."""
+    """Raise unless the entries of the run that are used have valid types."""
     require(isinstance(run, dict), "run", "an object", run)
     for name in NUMBERS_OF_RUN:
         if name in run:
@@ -164,7 +165,7 @@ def check_run(run: Any) -> None:
 
 
 def check_summary(summary: Mapping[str, Any]) -> None:
-    """Raise unless the summary of a run has the kinds of values that are used."""
+    """Raise unless the entries of the summary that are used have valid types."""
     for name in ("n_steps", "n_rejected", "n_iterations"):
         value = summary.get(name, 0)
         require(type(value) is int and value >= 0, f"summary.{name}", "a whole number", value)
@@ -181,12 +182,12 @@ def check_summary(summary: Mapping[str, Any]) -> None:
 
 
 def is_list(value: Any, kind: Any) -> bool:
-    """Whether a value is a list of items of a kind."""
+    """Return whether a value is a list of items of a type."""
     return isinstance(value, list) and all(isinstance(x, kind) and not isinstance(x, bool) for x in value)
 
 
 def is_number(value: Any) -> bool:
-    """Whether a value is a finite number that fits a float."""
+    """Return whether a value is a finite number that fits a float."""
     try:
         return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
     except OverflowError:
@@ -194,6 +195,6 @@ def is_number(value: Any) -> bool:
 
 
 def require(holds: Any, where: str, expected: str, got: Any) -> None:
-    """Raise `ValueError` naming a key of the head unless a condition holds."""
+    """Raise `ValueError` that names a key of the head unless a condition holds."""
     if not holds:
         raise ValueError(f"head: {where}: expected {expected}, got {quoted(got)}")

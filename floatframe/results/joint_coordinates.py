@@ -1,4 +1,4 @@
-"""Joint coordinates over a motion: value, rate, and the force along them."""
+"""Joint coordinates during a motion: value, rate, and the force along them."""
 
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
@@ -32,14 +32,15 @@ class CoordinateMotion:
     """A coordinate of a joint over time."""
 
     t: Array  #: (n_t,) [s]
-    value: Array  #: distance, or angle with all its turns, (n_t,) [m, rad]
+    value: Array  #: distance, or angle counted through full turns, (n_t,) [m, rad]
     rate: Array  #: (n_t,) [m/s, rad/s]
-    force: Array  #: force or torque that acts to increase it: of the drive, or of joint forces, (n_t,) [N, N m]
+    #: force or torque of the drive or of joint forces, positive if it acts to increase the coordinate, (n_t,) [N, N m]
+    force: Array
     is_angle: bool = False  #: an angle [rad], else a distance [m]
 
 
 def joint_coordinates(system: System, trajectory: Trajectory) -> dict[str, CoordinateMotion]:
-    """Return all coordinates of all joints by the name "joint.coordinate"."""
+    """Return all coordinates of all joints, by name "joint.coordinate"."""
     return {
         f"{joint.name}.{name}": joint_coordinate(system, trajectory, joint.name, name)
         for joint in system.joints
@@ -48,12 +49,12 @@ def joint_coordinates(system: System, trajectory: Trajectory) -> dict[str, Coord
 
 
 def joint_coordinate(system: System, trajectory: Trajectory, joint: str, coordinate: str) -> CoordinateMotion:
-    """Return a coordinate of a joint over a motion of the system.
+    """Return a joint coordinate during a motion of the system.
 
     Raises
     ------
     ResultsError
-        If there is no such joint or coordinate, or the motion is one of another system.
+        If there is no such joint or coordinate, or the motion is of another system.
     """
     names = [each.name for each in system.joints]
     if joint not in names or names != list(trajectory.head.joints):
@@ -79,14 +80,14 @@ def joint_coordinate(system: System, trajectory: Trajectory, joint: str, coordin
     return CoordinateMotion(a.t, value, rate, own.force(place, w), own.is_angle)
 
 
-#: markers and coordinates by joint and name: runs with events ask for them again and again
+#: markers and coordinates by joint and name, cached because runs with events need them repeatedly
 PLACED: WeakKeyDictionary[System, dict[tuple[str, str], tuple]] = WeakKeyDictionary()
 
 
 def as_placed(
     system: System, joint: Joint, name: str
 ) -> tuple[tuple[MarkerData, MarkerData], RowCoordinate | None]:  # fmt: skip
-    """Return the markers of a joint, and a coordinate of it; None along a deformed line."""
+    """Return the markers of a joint and one of its coordinates (None along a deformed line), as assembled."""
     known = PLACED.setdefault(system, {})
     key = joint.name, name
     if key not in known:
@@ -97,16 +98,16 @@ def as_placed(
 
 
 def row_coordinate(system: System, joint: Joint, ends: tuple[MarkerData, MarkerData], name: str) -> RowCoordinate:
-    """Return a coordinate of a joint with its directions, as placed."""
+    """Return a coordinate of a joint with its directions, as assembled."""
     (r_a, A_a), (r_b, A_b) = (marker_pose(end, compiled_system(system).placed, n_q_of(system)) for end in ends)
     rows = joint.rows(A_a, A_b, r_b - r_a)
     return next(row.coordinate for row in rows if row.coordinate is not None and row.coordinate.name == name)
 
 
 def force_rows(small: SmallMotions, joint: str, coordinate: str) -> Rows | None:
-    """Return the change of the force along a coordinate: -E · dw - w · dE, one row; None along a deformed line.
+    """Return the change of the force along a coordinate, -E · dw - w · dE, one row; None along a deformed line.
 
-    E turns with the marker that holds it, or with the line of the points of a distance.
+    E rotates with the marker in which it is fixed, or with the line between the points of a distance.
     """
     found = next(each for each in small.system.joints if each.name == joint)
     if isinstance(found, SlidingJoint):
@@ -131,7 +132,7 @@ def force_rows(small: SmallMotions, joint: str, coordinate: str) -> Rows | None:
 def sliding_motion(
     system: System, trajectory: Trajectory, joint: SlidingJoint, marker_b: MarkerData
 ) -> CoordinateMotion:
-    """Return the place along a deformed line; the force is that of its drive, zero where it slides freely."""
+    """Return the position along a deformed line; the force is that of its drive, zero if it slides freely."""
     b = end_motion(system, trajectory, marker_b)
     place = sliding_place(system, trajectory, joint, b)
     first = trajectory.head.w0[[each.name for each in system.joints].index(joint.name)]

@@ -1,4 +1,4 @@
-"""What is measured on a motion: place, velocity and acceleration of an interface or point, angles, stress.
+"""Quantities evaluated from a motion: motion of interfaces and points, angles, stress.
 
 The kinematics of a marker are in bodies/marker_shape.py.
 """
@@ -55,7 +55,7 @@ class PlaceMotion:
     acceleration: Array  #: (n_t, 3) [m/s²]
     axes: Array  #: columns, (n_t, 3, 3)
     omega: Array  #: angular velocity of the axes, (n_t, 3) [rad/s]
-    alpha: Array | None = None  #: their angular acceleration, (n_t, 3) [rad/s²]; None: they do not turn
+    alpha: Array | None = None  #: angular acceleration of the axes, (n_t, 3) [rad/s²]; None: they do not rotate
 
 
 def interface_motion(trajectory: Trajectory, body: str, reduced: ReducedBody, interface: str) -> PlaceMotion:
@@ -64,7 +64,7 @@ def interface_motion(trajectory: Trajectory, body: str, reduced: ReducedBody, in
     Raises
     ------
     ResultsError
-        If there is no such body, or the reduced body is another one.
+        If there is no such body, or `reduced` does not match it.
     BodyError
         If there is no such interface.
     """
@@ -80,14 +80,14 @@ def shape_motion(motion: BodyMotion, shape: MarkerShape) -> PlaceMotion:
 
 
 def still_place(t: Array, shape: MarkerShape) -> PlaceMotion:
-    """Return the motion of a marker on the ground: none."""
+    """Return the motion of a marker on the ground, which is at rest."""
     still = np.zeros((len(t), 3))
     axes = np.broadcast_to(shape.triad, (len(t), 3, 3))
     return PlaceMotion(t, still + shape.position, still, still, axes, still)
 
 
 def as_moved(trajectory: Trajectory, body: str, reduced: ReducedBody) -> tuple[BodyMotion, ReducedBody]:
-    """Return the motion of a body as the engine has it, and the reduced body in that frame: in it joints are closed."""
+    """Return the motion of a body and the reduced body in the engine's frame, in which joint constraints hold."""
     motion = trajectory.body(body)
     axes = mean_axes(reduced) if trajectory.entry(body)[1].is_stiffened else None
     if axes is None:
@@ -101,16 +101,16 @@ def as_moved(trajectory: Trajectory, body: str, reduced: ReducedBody) -> tuple[B
 
 
 def node_motion(trajectory: Trajectory, body: str, reduced: ReducedBody, node: int | IntArray) -> PlaceMotion:
-    """Return the motion of a kept node (its row in `ReducedBody.nodes`), or the mean motion of several.
+    """Return the motion of a kept node (its row in `ReducedBody.nodes`), or the mean motion of several nodes.
 
-    In the body it moves as `nodal_displacements` says: by Phi q, and of a stiffened body with quadratic modes by
-    ½ Σ q_k q_l g_kl besides. Its axes are those of the body frame, turned as the node turns where its rotation is kept
+    Its displacement in the body is that of `nodal_displacements`: Phi q, plus ½ Σ q_k q_l g_kl for a stiffened body
+    with quadratic modes. Its axes are those of the body frame, rotated by the rotation of the node if this is kept
     (`floatframe.bodies.marker_shape.node_shape`).
 
     Raises
     ------
     ResultsError
-        If there is no such body or node, or the reduced body is another one.
+        If there is no such body or node, or `reduced` does not match it.
     """
     require_same_modes(trajectory, body, reduced)
     rows = np.atleast_1d(node)
@@ -129,26 +129,26 @@ def point_motion(
     tolerance: float = TOLERANCE,
     undeformed: bool = False,
 ) -> PlaceMotion:
-    """Return the motion of a point of a body, with the axes of its frame; on a flexible body it deforms with the body.
+    """Return the motion of a point of a body, with the axes of its frame; on a flexible body, it follows a node.
 
     Parameters
     ----------
     trajectory, body
-        The motion, and a body of it.
+        The motion, and the name of a body.
     point
         Position in the frame of the body, (3,) [m].
     reduced
-        Of a flexible body: what it was run with. A kept node must stand at the point, which moves and turns as it does
-        (`node_motion`), as `interface_motion` does at interfaces.
+        For a flexible body: the reduced body of the run. A kept node must be at the point; its motion is returned
+        (`node_motion`), as `interface_motion` does for interfaces.
     tolerance
-        How far that node may be away, of the size of the body.
+        Largest distance of that node, relative to the size of the body.
     undeformed
-        Whether the point of a flexible body is meant to move with its frame alone.
+        Whether the point of a flexible body moves only with the body frame.
 
     Raises
     ------
     ResultsError
-        If there is no such body; or it is flexible, and no reduced body is given, or none of its kept nodes is there.
+        If there is no such body; or if it is flexible, and `reduced` is missing or has no kept node at the point.
     """
     if reduced is not None and undeformed:
         raise ResultsError(f"body {body!r}: expected either its reduced body or undeformed=True, got both")
@@ -170,7 +170,7 @@ def point_motion(
 
 
 def place_of(motion: BodyMotion, own: MotionInBody) -> PlaceMotion:
-    """Return the motion of a place, from its motion in its body."""
+    """Return the motion of a point from its motion relative to the body."""
     body = BodyFrameMotion(
         motion.r, rotation_matrix(motion.p), motion.v, motion.omega_B, motion.v_dot, motion.omega_B_dot
     )
@@ -178,20 +178,20 @@ def place_of(motion: BodyMotion, own: MotionInBody) -> PlaceMotion:
 
 
 def rotation_angle(a: PlaceMotion, b: PlaceMotion, axis: Array | tuple[float, float, float]) -> Array:
-    """Return the angle by which place b has turned against place a about an axis in a, (n_t,) [rad].
+    """Return the rotation angle of place b relative to place a about an axis in a, (n_t,) [rad].
 
-    Zero is where the axes of both agree; from one time to the next the angle goes on to where its rate leads.
+    It is zero if the axes of both coincide. Full turns are counted by extrapolation of the rate from time to time.
 
     Raises
     ------
     ResultsError
-        If the axis has no direction, or the times are too far apart to follow the angle.
+        If the axis is zero, or the times are too far apart to follow the angle.
     """
     return followed_angle("rotation_angle", a.t, *angle_and_rate(a, b, *normals_of_axis(axis)))
 
 
 def normals_of_axis(axis: Array | tuple[float, float, float]) -> tuple[Array, Array]:
-    """Return two directions x, y normal to an axis, which is along x × y."""
+    """Return two directions x, y normal to an axis, with the axis along x × y."""
     e = np.asarray(axis, dtype=float)
     size = np.linalg.norm(e)
     if size == 0:
@@ -204,7 +204,7 @@ def normals_of_axis(axis: Array | tuple[float, float, float]) -> tuple[Array, Ar
 
 
 def angle_and_rate(a: PlaceMotion, b: PlaceMotion, x: Array, y: Array) -> tuple[Array, Array]:
-    """Return the angle of the direction x of b from x of a towards y, between -pi and pi, and its rate, (n_t,) each."""
+    """Return the angle from x of a, towards y, to the direction x of b, between -pi and pi, and its rate, (n_t,)."""
     X, Y, D = a.axes @ x, a.axes @ y, b.axes @ x
     D_dot = cross(b.omega - a.omega, D)
     C, S = dot(X, D), dot(Y, D)
@@ -215,13 +215,13 @@ def angle_and_rate(a: PlaceMotion, b: PlaceMotion, x: Array, y: Array) -> tuple[
 def nodal_stress(trajectory: Trajectory, body: str, reduced: ReducedBody, i_time: int) -> Array:
     """Return the stress at the kept nodes at an output time, axes of B, (n_kept, 6) [Pa]: xx yy zz yz xz xy.
 
-    All modes count, static ones included: interface loads are carried exactly where the mode set is statically
+    All modes including static ones contribute; stresses due to interface loads are exact if the mode set is statically
     complete.
 
     Raises
     ------
     ResultsError
-        If the modal file holds no stress modes, or the reduced body is another one.
+        If the modal file has no stress modes, or `reduced` does not match the body.
     """
     require_same_modes(trajectory, body, reduced)
     return np.asarray(stress_of(stress_modes(body, reduced), trajectory.body(body).q[i_time]))
@@ -230,12 +230,12 @@ def nodal_stress(trajectory: Trajectory, body: str, reduced: ReducedBody, i_time
 def largest_von_mises(
     trajectory: Trajectory, body: str, reduced: ReducedBody, *, rows: IntArray | None = None
 ) -> tuple[Array, IntArray]:
-    """Return the largest von Mises stress of kept nodes over time, (n_t,) [Pa], and the row of its node, (n_t,).
+    """Return the largest von Mises stress of the kept nodes over time, (n_t,) [Pa], and the row of the node, (n_t,).
 
     Parameters
     ----------
     rows
-        Of the nodes among which it is sought, (n,); None: all.
+        Rows of the nodes to consider, (n,); None: all.
     """
     require_same_modes(trajectory, body, reduced)
     modes = stress_modes(body, reduced)
@@ -248,7 +248,7 @@ def largest_von_mises(
 
 
 def stress_modes(body: str, reduced: ReducedBody) -> Array:
-    """Return the stress modes of a body, (n_kept, 6, n_q); `ResultsError` if its file holds none."""
+    """Return the stress modes of a body, (n_kept, 6, n_q); `ResultsError` if its file has none."""
     if reduced.stress is None:
         raise ResultsError(
             f"body {body!r}: its modal file holds no stress modes; reduce it again with stress (and from a mesh, since "

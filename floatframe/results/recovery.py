@@ -1,4 +1,4 @@
-"""From a motion back to the body: positions of nodes and interfaces in ground axes."""
+"""Positions of nodes and interfaces of bodies, in ground axes, from a motion."""
 
 import numpy as np
 
@@ -28,15 +28,15 @@ def require_same_modes(trajectory: Trajectory, body_name: str, reduced: ReducedB
 
 
 def nodal_positions(trajectory: Trajectory, body_name: str, reduced: ReducedBody, i_time: int) -> Array:
-    """Return positions of the kept nodes of a flexible body at an output time, ground axes, (n_kept, 3) [m].
+    """Return the positions of the kept nodes of a flexible body at an output time, in ground axes, (n_kept, 3) [m].
 
-    r + R (c + Phi q), with all modes of the body, static ones included; of a stiffened body with quadratic modes also
-    the part of second order.
+    r + R (c + Phi q), with all modes of the body including static ones; for a stiffened body with quadratic modes also
+    the second-order part.
 
     Raises
     ------
     ResultsError
-        If there is no such body, or the reduced body is another one.
+        If there is no such body, or `reduced` does not match it.
     """
     require_same_modes(trajectory, body_name, reduced)
     motion = trajectory.body(body_name)
@@ -45,9 +45,9 @@ def nodal_positions(trajectory: Trajectory, body_name: str, reduced: ReducedBody
 
 
 def nodal_displacements(trajectory: Trajectory, body_name: str, reduced: ReducedBody, i_time: int | IntArray) -> Array:
-    """Return displacements of the kept nodes in the body frame at one or several output times, (..., n_kept, 3) [m].
+    """Return the displacements of the kept nodes in the body frame at output times, (..., n_kept, 3) [m].
 
-    Phi q, and of a stiffened body with quadratic modes ½ Σ q_k q_l g_kl besides.
+    Phi q, plus ½ Σ q_k q_l g_kl for a stiffened body with quadratic modes.
     """
     require_same_modes(trajectory, body_name, reduced)
     _, entry = trajectory.entry(body_name)
@@ -59,7 +59,7 @@ def nodal_displacements(trajectory: Trajectory, body_name: str, reduced: Reduced
 
 
 def interface_positions(trajectory: Trajectory, body_name: str, reduced: ReducedBody, interface: str) -> Array:
-    """Return positions of the reference point of an interface over time, ground axes, (n_t, 3) [m]."""
+    """Return the positions of the reference point of an interface over time, in ground axes, (n_t, 3) [m]."""
     require_same_modes(trajectory, body_name, reduced)
     motion = trajectory.body(body_name)
     d = elastic_displacements(trajectory, body_name, reduced, interface)
@@ -69,7 +69,7 @@ def interface_positions(trajectory: Trajectory, body_name: str, reduced: Reduced
 def elastic_displacements(trajectory: Trajectory, body_name: str, reduced: ReducedBody, interface: str) -> Array:
     """Return the displacement of an interface in the body frame over time, (n_t, 3) [m].
 
-    Psi q, and of a stiffened body with the part of second order, such as the shortening of a bent rod.
+    Psi q, plus the second-order part for a stiffened body, such as the shortening of a bent rod.
     """
     require_same_modes(trajectory, body_name, reduced)
     _, entry = trajectory.entry(body_name)

@@ -1,4 +1,4 @@
-"""Results on disk as they are read: one file, or the segments of a run that did not end (docs/results_file.md)."""
+"""Reading of results on disk: one file, or the segments of an unfinished run (docs/results_file.md)."""
 
 import logging
 import os
@@ -36,14 +36,14 @@ __all__ = [
 log = logging.getLogger(__name__)
 
 FORMAT = "floatframe-results"
-VERSION = 2  #: of the format; 1 had neither seal nor checksums
+VERSION = 2  #: version of the format; version 1 had neither seal nor checksums
 KIND = Kind("results-file", VERSION, ResultsError, "`floatframe run` or `integrate`")
-SEGMENTS = ".segments"  #: added to the name of the results file
-VALIDITY = "validity"  #: attribute with the notes of a run about itself
-ROWS_CHECKED = 1000  #: at once
-RESTART = "restart"  #: group in a segment with the memory of the integrator at its end
+SEGMENTS = ".segments"  #: appended to the name of the results file
+VALIDITY = "validity"  #: attribute with the validity notes of a run
+ROWS_CHECKED = 1000  #: number of rows checked at a time
+RESTART = "restart"  #: group in a segment with the state of the integrator at its end
 
-DATASETS = {  # name in the file -> field of Rows, what it is
+DATASETS = {  # name in the file -> field of `Rows`, description
     "t": ("t", "time"),
     "position": ("r", "of the frame origins, ground axes, (n_t, n_bodies, 3)"),
     "euler_parameters": ("p", "w, x, y, z of R_GB, (n_t, n_bodies, 4)"),
@@ -64,7 +64,7 @@ DATASETS = {  # name in the file -> field of Rows, what it is
 
 
 class ArraySource(Protocol):
-    """Where the arrays of a trajectory are: in memory or in files."""
+    """The location of the arrays of a trajectory, in memory or in files."""
 
     def read(self, name: str) -> Array:
         """Return a whole dataset by its name in `DATASETS`."""
@@ -85,13 +85,13 @@ class MemorySource:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class FileSource:
-    """Arrays in one file, or in consecutive segments, which were checked."""
+    """Arrays in one file, or in consecutive segments, which have been checked."""
 
     paths: tuple[Path, ...]
-    shapes: Mapping[str, tuple[int, ...]]  #: of one row, for the case that there is no segment
+    shapes: Mapping[str, tuple[int, ...]]  #: shapes of one row, needed if there is no segment
 
     def read(self, name: str) -> Array:
-        """Return a whole dataset; `ResultsError` if a file is gone or was changed since it was checked."""
+        """Return a whole dataset; `ResultsError` if a file is missing or has changed since the check."""
         parts = [np.zeros((0, *self.shapes[name]))]
         for path in self.paths:
             try:
@@ -125,13 +125,13 @@ def row_shapes(head: Head) -> dict[str, tuple[int, ...]]:
 
 
 def segments_folder(path: str | os.PathLike[str]) -> Path:
-    """Return the folder of the segments of a results file, or the folder itself if that is given."""
+    """Return the folder of the segments of a results file; the folder itself is also accepted."""
     path = Path(path)
     return path if path.name.endswith(SEGMENTS) else path.with_name(path.name + SEGMENTS)
 
 
 def segment_paths(folder: Path) -> list[Path]:
-    """Return the closed segments in their order; `ResultsError` if one is missing among them."""
+    """Return the closed segments in order; `ResultsError` if one of them is missing."""
     paths = sorted(folder.glob("[0-9]*.h5"))
     for k, path in enumerate(paths):
         if path.name != f"{k:06d}.h5":
@@ -141,9 +141,9 @@ def segment_paths(folder: Path) -> list[Path]:
 
 @contextmanager
 def checked(path: Path, *, tell_age: bool = True) -> Iterator[tuple[Any, dict[str, Any]]]:
-    """Open a results file, or a segment, whose seal or digest holds, and return it with its groups and datasets.
+    """Open a results file or a segment whose seal or digest is valid, and return it with its groups and datasets.
 
-    A file of version 1 has neither: it is read, and that is said.
+    A file of version 1 has neither; it is read with a warning.
     """
     has_seal = check_seal(path, KIND)
     with opened(path, KIND, has_seal=has_seal) as file:
@@ -164,7 +164,7 @@ def checked(path: Path, *, tell_age: bool = True) -> Iterator[tuple[Any, dict[st
 
 
 def read_head(path: Path, file: Any) -> tuple[Head, bool]:
-    """Return the head of an open results file and whether the run was complete."""
+    """Return the head of an open results file, and whether the run was complete."""
     try:
         head = head_of_text(as_attribute(file.attrs.get("head")))
     except ValueError as error:
@@ -173,7 +173,7 @@ def read_head(path: Path, file: Any) -> tuple[Head, bool]:
 
 
 def require_datasets(path: Path, items: Mapping[str, Any], shapes: Mapping[str, tuple[int, ...]]) -> int:
-    """Raise `ResultsError` unless all datasets have numbers in the shapes of the head; return the number of rows."""
+    """Raise `ResultsError` unless all datasets are numeric with the shapes of the head; return the number of rows."""
     t = items.get("/t")
     n_t = t.shape[0] if isinstance(t, h5py.Dataset) and len(t.shape) == 1 else -1
     for name, shape in shapes.items():
@@ -190,7 +190,7 @@ def require_datasets(path: Path, items: Mapping[str, Any], shapes: Mapping[str, 
 
 
 def open_segments(folder: Path) -> tuple[Head, FileSource]:
-    """Return the head and the closed segments of an unfinished run, all of them checked."""
+    """Return the head and the closed segments of an unfinished run, after checking all of them."""
     try:
         with checked(folder / "head.h5") as (file, _):
             head, _ = read_head(folder, file)
@@ -207,12 +207,12 @@ def open_segments(folder: Path) -> tuple[Head, FileSource]:
 
 
 def open_results(path: str | os.PathLike[str]) -> tuple[Head, FileSource, bool]:
-    """Return head, arrays and completeness of a results file, or of the segments that a killed run left in its place.
+    """Return head, arrays and completeness of a results file, or of the segments left by a killed run.
 
     Raises
     ------
     ResultsError
-        If there is neither, or the file is of another kind, a newer version or damaged.
+        If there is neither, or the file is of another kind, of a newer version, or damaged.
     """
     path = Path(path)
     folder = segments_folder(path)
@@ -229,7 +229,7 @@ def open_results(path: str | os.PathLike[str]) -> tuple[Head, FileSource, bool]:
 
 
 def validity_text(path: Path) -> str:
-    """Return the notes of a run about itself in a results file, or in its last segment, as text."""
+    """Return the validity notes of a run from a results file, or from its last segment, as text."""
     paths = [path] if path.is_file() else segment_paths(path if path.is_dir() else segments_folder(path))
     if not paths:
         return "[]"

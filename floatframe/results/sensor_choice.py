@@ -1,4 +1,4 @@
-"""Which sensors of a system are meant: names, columns, wildcards."""
+"""Selection of the sensors of a system by names, columns and wildcards."""
 
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
@@ -16,15 +16,15 @@ WILD = "*?"
 
 
 def chosen_measurements(system: System, trajectory: Trajectory, names: Sequence[str]) -> list[Measurement]:
-    """Return what the sensors of some names measured, each once, in the order of the names.
+    """Return the measurements of the sensors with the given names, each once, in the order of the names.
 
-    A name is that of a sensor, a column "sensor.column", or a coordinate "joint.coordinate"; * stands for any letters
-    and ? for one, in names of sensors and coordinates, and where none fits in "sensor.column".
+    A name is that of a sensor, a column "sensor.column", or a coordinate "joint.coordinate". In names of sensors and
+    coordinates, * stands for any letters and ? for one letter; if none matches, also in "sensor.column".
 
     Raises
     ------
     ModelError
-        With every name that fits nothing, and the nearest to each.
+        If names match nothing; the message lists each with the nearest name.
     """
     coordinates = [f"{joint.name}.{c}" for joint in system.joints for c in joint.coordinates]
     known = [*(sensor.name for sensor in sensors_of(system)), *coordinates]
@@ -60,10 +60,10 @@ def chosen_measurements(system: System, trajectory: Trajectory, names: Sequence[
 
 
 def is_wild(name: str, known: Sequence[str]) -> bool:
-    """Whether a name is a pattern, not a name of the system that holds such a letter."""
+    """Return whether a name is a pattern, and not an existing name that contains such a character."""
     return any(letter in name for letter in WILD) and name not in known
 
 
 def pattern_of(name: str) -> str:
-    """Return a pattern in which brackets are letters."""
+    """Return a pattern in which brackets are literal characters."""
     return name.replace("[", "[[]")

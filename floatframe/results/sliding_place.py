@@ -1,4 +1,4 @@
-"""The coordinate of a sliding joint over a motion: the place of B along the deformed line, from the results."""
+"""The coordinate of a sliding joint during a motion: the position of B along the deformed line."""
 
 from dataclasses import dataclass
 
@@ -21,16 +21,17 @@ MOST = 30
 
 @dataclass(frozen=True, eq=False)
 class SlidingPlace:
-    """Place of marker B along the line over time."""
+    """Position of marker B along the line over time."""
 
-    s: Array  #: from marker A, length of the undeformed line, (n_t,) [m]
+    s: Array  #: from marker A, measured on the undeformed line, (n_t,) [m]
     rate: Array  #: (n_t,) [m/s]
-    tangent: Array  #: unit vector along the deformed line, ground axes, (n_t, 3)
-    turning: Array  #: rotation of the line by s over its slope, ground axes, (n_t, 3) [1/m]
+    tangent: Array  #: unit vector along the deformed line, in ground axes, (n_t, 3)
+    #: derivative of the line's rotation by s, divided by the slope of the line, in ground axes, (n_t, 3) [1/m]
+    turning: Array
 
 
 def sliding_place(system: System, trajectory: Trajectory, joint: SlidingJoint, end: PlaceMotion) -> SlidingPlace:
-    """Return where marker B, whose motion is given, is along the line; as in kernels/joints/deformed_line.py."""
+    """Return the position along the line of marker B with a given motion; as in kernels/joints/deformed_line.py."""
     name = body_name(joint.marker_a.body)
     body = system.body(name)
     assert isinstance(body, FlexibleBody)
@@ -65,7 +66,7 @@ def sliding_place(system: System, trajectory: Trajectory, joint: SlidingJoint, e
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """Cubics through stations over time, body axes."""
+    """Cubics through stations over time, in body axes."""
 
     places: Array  #: (n,)
     e: Array  #: (3,)
@@ -73,7 +74,7 @@ class Line:
     rates: Array  #: (n, n_t, 6)
 
     def piece(self, s: Array) -> tuple[IntArray, Array, Array]:
-        """Return the number of the piece at each time, its length and how far beyond it s lies."""
+        """Return the index of the piece at each time, its length, and the distance of s from its beginning."""
         j = np.clip(np.searchsorted(self.places[1:-1], s, side="left"), 0, len(self.places) - 2)
         h = self.places[j + 1] - self.places[j]
         return j, h, s - self.places[j]

@@ -1,4 +1,4 @@
-"""A computed motion: what is read from a results file or returned by `integrate`."""
+"""A computed motion, read from a results file or returned by `integrate`."""
 
 import os
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ __all__ = ["BodyMotion", "Drift", "Energies", "Reaction", "Trajectory", "read_re
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class BodyMotion:
-    """Motion of one body: its frame B and its modal coordinates."""
+    """Motion of a body: its frame B and its modal coordinates."""
 
     t: Array  #: (n_t,) [s]
     r: Array  #: position of the frame origin, ground axes, (n_t, 3) [m]
@@ -44,10 +44,10 @@ class Energies:
 
     kinetic: Array
     strain: Array
-    gravity: Array  #: zero for all mass at the ground origin
+    gravity: Array  #: zero if all mass is at the ground origin
     springs: Array
-    work: Array  #: done by point forces since the start
-    dissipated: Array  #: by dampers and modal damping since the start
+    work: Array  #: work of point forces since the start
+    dissipated: Array  #: energy dissipated by dampers and modal damping since the start
 
     @property
     def total(self) -> Array:
@@ -56,23 +56,23 @@ class Energies:
 
     @property
     def balance(self) -> Array:
-        """Total minus work plus dissipated, (n_t,): constant but for the error of the integrator."""
+        """Total minus work plus dissipated, (n_t,); constant except for the error of the integrator."""
         return self.total - self.work + self.dissipated
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Reaction:
-    """Force and moment that a joint or spring exerts on its marker A, ground axes."""
+    """Force and moment that a joint or spring exerts on its marker A, in ground axes."""
 
     force: Array  #: (n_t, 3) [N]
-    moment: Array  #: (n_t, 3) [N m]; zero where there is none
+    moment: Array  #: (n_t, 3) [N m]; zero if the connection has no moment
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """How far a joint is from being closed, each (n_t,)."""
+    """The constraint error of a joint, (n_t,) each."""
 
     distance: Array  #: [m]
     angle: Array  #: [rad]
@@ -83,13 +83,13 @@ class Drift:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """A motion, in memory or (read when asked for) on disk."""
+    """A motion, in memory or on disk (arrays are then read on demand)."""
 
     head: Head
     source: ArraySource
     is_complete: bool  #: False for a run that was interrupted
     path: Path | None = None  #: results file, or None for a motion in memory
-    validity: tuple[ValidityNote, ...] = ()  #: what the run says about itself: see `ValidityNote`
+    validity: tuple[ValidityNote, ...] = ()  #: notes of the run about its own validity, see `ValidityNote`
 
     @cached_property
     def t(self) -> Array:
@@ -113,12 +113,12 @@ class Trajectory:
 
     @property
     def files(self) -> tuple[str, ...]:
-        """The files it was computed from, as far as they are on record: system file, modal files."""
+        """The recorded files from which it was computed: system file, modal files."""
         sources = (self.head.run.get("system_file", ""), *(body.source for body in self.head.bodies))
         return tuple(str(source) for source in sources if source)
 
     def entry(self, name: str) -> tuple[int, BodyEntry]:
-        """Return number and entry of a body; `ResultsError` with the choices if there is none."""
+        """Return index and entry of a body; `ResultsError` with the choices if there is none."""
         for i, body in enumerate(self.head.bodies):
             if body.name == name:
                 return i, body
@@ -143,12 +143,12 @@ class Trajectory:
         )
 
     def state(self, i_time: int) -> State:
-        """Return the state at an output time, such as one to begin another motion from; -1: the last."""
+        """Return the state at an output time (-1: the last), for example as initial state of another motion."""
         arrays = [self.source.read(name)[i_time] for name in ("position", "euler_parameters", "q", "u")]
         return State(*arrays)
 
     def reaction(self, name: str) -> Reaction:
-        """Return what a joint or spring-damper exerts on its marker A."""
+        """Return force and moment that a joint or spring-damper exerts on its marker A."""
         if name not in self.connection_names:
             raise ResultsError(f"trajectory: no joint or spring {quoted(name)}{nearest(name, self.connection_names)}")
         c = self.connection_names.index(name)
@@ -157,7 +157,7 @@ class Trajectory:
         return Reaction(w[:, :3], moment)
 
     def drift(self, name: str) -> Drift:
-        """Return how far a joint is from being closed."""
+        """Return the constraint error of a joint."""
         if name not in self.head.joints:
             raise ResultsError(f"trajectory: no joint {quoted(name)}{nearest(name, self.head.joints)}")
         return Drift(*self.source.read("drift")[:, self.head.joints.index(name)].T)
@@ -170,22 +170,22 @@ class Trajectory:
 
     @property
     def linear_momentum(self) -> Array:
-        """Ground axes, (n_t, 3) [kg m/s]."""
+        """Linear momentum in ground axes, (n_t, 3) [kg m/s]."""
         return self.source.read("diagnostics")[:, 4:7]
 
     @property
     def angular_momentum(self) -> Array:
-        """About the ground origin, ground axes, (n_t, 3) [kg m²/s]."""
+        """Angular momentum about the ground origin, in ground axes, (n_t, 3) [kg m²/s]."""
         return self.source.read("diagnostics")[:, 7:10]
 
 
 def read_results(path: str | os.PathLike[str]) -> Trajectory:
-    """Return the trajectory in a results file, or what a killed run left of it (then `is_complete` is False).
+    """Return the trajectory in a results file, or the part left by a killed run (with `is_complete` False).
 
     Raises
     ------
     ResultsError
-        If there is nothing, or the file is of another kind, a newer version or damaged.
+        If there is no such file, or it is of another kind, of a newer version, or damaged.
     """
     head, source, is_complete = open_results(path)
     try:

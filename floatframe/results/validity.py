@@ -1,4 +1,4 @@
-"""Notes of a run about itself: bodies beyond the range of their linear frame, steps that err, energy from nothing."""
+"""Notes of a run about its validity: bodies beyond the linear range, inaccurate steps, spurious energy."""
 
 import json
 from collections.abc import Iterable
@@ -8,53 +8,55 @@ from typing import Any
 __all__ = ["ValidityNote", "notes_from_json", "notes_to_json"]
 
 OF_FRAMES = ("rotation", "load", "speed", "inertia")  #: kinds of notes about the linear frame of a body
-OF_LAWS = ("frequency", "knots", "law")  #: about what acts over time: faster than the steps, or jumping inside them
-OF_ANGLES = ("angles", "tilt")  #: about bushings and bearings that turn further than small angles allow
+#: notes on functions of time that are faster than the steps, or jump within them
+OF_LAWS = ("frequency", "knots", "law")
+OF_ANGLES = ("angles", "tilt")  #: notes on bushings and bearings that rotate beyond the validity of small angles
 KINDS = (*OF_FRAMES, "steps", "energy", *OF_LAWS, *OF_ANGLES)
 
 
 @dataclass(frozen=True)
 class ValidityNote:
-    """What a run says about itself: a limit that is passed, and what to do.
+    """A note of a run about its validity: a limit that is exceeded, and the remedy.
 
-    One per body and kind where a body has left the range of its linear frame ("rotation", "load", "speed" or
-    "inertia", the field of `cms.reduced_body.linear_range.Limits`); one for the steps of the run ("steps": their
-    estimated error over the way of the motion) and one for its energy ("energy": what the steps have added, over what
-    moves about), with the body that is most concerned. One for each supply, load, drive or law of a user that the steps
-    do not follow ("frequency", "knots" of a table, "law"), with where it stands in the system in place of a body; so
-    for each bushing and bearing whose angles are no small ones ("angles", "tilt": what another reading changes).
+    There is one note per body and kind for the linear frame of a body ("rotation", "load", "speed" or "inertia", fields
+    of `cms.reduced_body.linear_range.Limits`); one for the steps of the run ("steps": their estimated error relative to
+    the motion); and one for its energy ("energy": the energy added by the steps, relative to the energy in motion). The
+    latter two name the body most affected. There is one note for each supply, load, drive or user law that the steps do
+    not resolve ("frequency", "knots" of a table, "law"), and for each bushing and bearing with large angles ("angles",
+    "tilt": the difference between interpretations of the angles). These have their place in the system instead of a
+    body.
     """
 
     body: str
     kind: str  #: one of `KINDS`
     limit: float
-    largest: float  #: so far; rotation in rad, else a ratio
-    t_first: float  #: when the limit was passed [s]
-    t_largest: float  #: [s]
+    largest: float  #: largest value so far; rotation in rad, otherwise a ratio
+    t_first: float  #: time at which the limit was first exceeded [s]
+    t_largest: float  #: time of the largest value [s]
     is_stiffened: bool = False
-    has_matrices: bool = False  #: whether the reduced body holds geometric stiffness
-    in_mean_axes: float = -1.0  #: the same rotation against mean axes, where the body has another frame; -1: not known
-    advice: str = ""  #: what to do about steps or energy; of what acts over time: what is the matter, and what to do
+    has_matrices: bool = False  #: whether the reduced body has geometric stiffness
+    in_mean_axes: float = -1.0  #: the same rotation relative to mean axes, if the body has another frame; -1: unknown
+    advice: str = ""  #: remedy for steps or energy; for functions of time: problem and remedy
 
     @classmethod
     def of_law(cls, kind: str, words: str, t: float) -> "ValidityNote":
-        """Return the note of a sentence "where: what; what to do" about something that acts over time."""
+        """Return the note of a sentence "where: problem; remedy" about a function of time."""
         where, _, rest = words.partition(": ")
         return cls(where, kind, 0.0, 0.0, t, t, advice=rest)
 
     @property
     def key(self) -> tuple[str, ...]:
-        """What a run has one note of."""
+        """Identification of a note; a run has one note for each key."""
         return (self.body, self.kind, self.advice) if self.kind in OF_LAWS else (self.body, self.kind)
 
     @property
     def is_of_a_frame(self) -> bool:
-        """Whether it is about the linear frame of a body, which shorter steps do not change."""
+        """Whether the note is about the linear frame of a body, which shorter steps do not change."""
         return self.kind in OF_FRAMES
 
     @property
     def what(self) -> str:
-        """Say what is too large."""
+        """Return the problem as text."""
         if self.kind == "steps":
             return (
                 f"the steps put it off by about {100 * self.largest:.2g} % of the motion (limit {100 * self.limit:g} "
@@ -94,7 +96,7 @@ class ValidityNote:
 
     @property
     def action(self) -> str:
-        """Say what to do."""
+        """Return the remedy as text."""
         if not self.is_of_a_frame:
             return self.advice
         if self.kind == "inertia":
@@ -108,7 +110,7 @@ class ValidityNote:
 
     @property
     def next_action(self) -> str:
-        """Say what to do where another frame does not help, or not enough."""
+        """Return the remedy if another frame does not help, or not enough, as text."""
         if self.is_stiffened:
             more = "reduce it with more modes, or " if self.kind == "speed" else ""
             return f"{more}split it into parts (cms split, [body] part)"
@@ -118,7 +120,7 @@ class ValidityNote:
 
     @property
     def words(self) -> str:
-        """Say it in one sentence, in the units of the system."""
+        """Return the note as one sentence, in the units of the system."""
         if self.kind in OF_LAWS:
             return f"{self.body}: {self.advice}"
         if self.kind in OF_ANGLES:
@@ -142,13 +144,13 @@ def notes_from_json(text: str) -> tuple[ValidityNote, ...]:
     Raises
     ------
     ValueError
-        If it is not one of `notes_to_json`.
+        If it is not text from `notes_to_json`.
     """
     kinds: dict[str, Any] = {part.name: part.type for part in fields(ValidityNote)}
     try:
         notes = json.loads(text)
         for note in notes:
-            note.setdefault("in_mean_axes", -1.0)  # of older files
+            note.setdefault("in_mean_axes", -1.0)  # missing in older files
             note.setdefault("advice", "")
             if set(note) != set(kinds) or note["kind"] not in KINDS:
                 raise ValueError

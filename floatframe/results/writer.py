@@ -1,9 +1,9 @@
-"""Results as they are written: closed segments while a motion is computed, one file when it is done.
+"""Writing of results: closed segments while a motion is computed, and one file at the end.
 
-A run that writes to swing.h5 first fills the folder swing.h5.segments with head.h5 and 000000.h5, 000001.h5, ...:
-each is written under a temporary name and moved into place, so that a killed run leaves every closed segment readable.
-At the end the segments are copied into one file, which is moved to swing.h5, and the folder is removed. The folder is
-locked as long as the run lasts.
+A run that writes to swing.h5 first fills the folder swing.h5.segments with head.h5 and 000000.h5, 000001.h5, .... Each
+is written under a temporary name and then renamed, so that a killed run leaves all closed segments readable. At the
+end, the segments are copied into one file, which is renamed to swing.h5, and the folder is removed. The folder is
+locked during the run.
 """
 
 import os
@@ -44,26 +44,26 @@ from floatframe.results.results_file import (
 
 __all__ = ["ResultsPlace", "ResultsWriter", "arrays_of", "last_restart"]
 
-UNFINISHED = ".unfinished"  #: added to the name of a file being written
+UNFINISHED = ".unfinished"  #: appended to the name of a file that is being written
 LOCK = "lock"  #: file in the folder of segments
 
 
 class ResultsPlace(AbstractContextManager["ResultsPlace"]):
-    """Where a run writes its results, which is its own as long as the run lasts.
+    """The place to which a run writes its results, locked for other runs.
 
     Parameters
     ----------
     path
         The results file, or its folder of segments.
     inputs
-        Files the run is made from, which it must not overwrite.
+        Input files of the run, which it must not overwrite.
     is_begun
-        Whether the folder of segments has to be there, of a run that is to go on.
+        Whether the folder of segments must exist, because an interrupted run is continued.
 
     Raises
     ------
     ResultsError
-        If it cannot be written there, or another run writes there now.
+        If the place is not writable, or another run is writing there.
     """
 
     def __init__(
@@ -81,7 +81,7 @@ class ResultsPlace(AbstractContextManager["ResultsPlace"]):
         for source in inputs:
             if same_file(self.path, Path(source)):
                 raise ResultsError(f"{where}: this is an input of the run; choose another name")
-        self.path = self.path.resolve()  # through a link, so that the link stays one
+        self.path = self.path.resolve()  # resolves a link, so that the link is kept
         self.folder = segments_folder(self.path)
         if is_begun and not self.folder.is_dir():
             state = "the run is complete" if self.path.is_file() else "no run to this name was begun"
@@ -89,13 +89,13 @@ class ResultsPlace(AbstractContextManager["ResultsPlace"]):
         self.lock = self.locked(where)
 
     def locked(self, where: str) -> FileLock:
-        """Take the lock of the folder, which is made where it is missing."""
+        """Take the lock of the folder, which is created if it does not exist."""
         try:
             while True:
                 self.folder.mkdir(exist_ok=True)
                 try:
                     return FileLock(self.folder / LOCK)
-                except FileNotFoundError:  # a run that ended just now has removed the folder
+                except FileNotFoundError:  # a run that has just ended has removed the folder
                     continue
         except LockedError as holder:
             raise ResultsError(
@@ -105,23 +105,23 @@ class ResultsPlace(AbstractContextManager["ResultsPlace"]):
             raise ResultsError(f"{where}: cannot be written: {reason(error)}") from error
 
     def clear(self) -> None:
-        """Remove the files of a run from the folder, but for the lock."""
+        """Remove the files of a run from the folder, except the lock."""
         for path in (*self.folder.glob(f"*{UNFINISHED}"), *self.folder.glob("[0-9]*.h5"), self.folder / "head.h5"):
             path.unlink(missing_ok=True)
 
     def remove(self) -> None:
-        """Remove the folder; what is not of a run stays in it."""
+        """Remove the folder; it stays if it contains other files."""
         self.clear()
         self.lock.path.unlink(missing_ok=True)
         try:
             self.folder.rmdir()
-        except OSError:  # another run has begun there, or somebody keeps files in it
+        except OSError:  # another run has begun there, or the folder contains other files
             pass
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Give the place back: an empty folder goes, segments stay."""
+        """Release the place; an empty folder is removed, segments are kept."""
         if self.lock.is_held() and not (self.folder / "head.h5").exists():
             self.remove()
         self.lock.release()
@@ -137,23 +137,23 @@ class ResultsWriter:
     """
 
     def __init__(self, place: ResultsPlace, head: Head, *, goes_on: bool = False) -> None:
-        """Begin with an empty folder of segments, or go on after the last restart record of the one that is there."""
+        """Begin with an empty folder of segments, or continue after the last restart record in an existing one."""
         self.place = place
         self.path, self.folder = place.path, place.folder
         self.head = head
         self.n_segments = 0
-        self.n_rows = 0  #: in closed segments
+        self.n_rows = 0  #: number of rows in closed segments
         self.open_rows: list[Rows] = []
-        self.validity = "[]"  #: notes of the run about itself, see results/validity.py
+        self.validity = "[]"  #: validity notes of the run, see results/validity.py
         self.guarded(self.go_on if goes_on else self.begin)
 
     def begin(self) -> None:
-        """Leave nothing in the folder of segments but the head."""
+        """Remove everything from the folder of segments except the head."""
         self.place.clear()
         self.write_file(self.folder / "head.h5", lambda file: self.write_head(file, is_complete=False))
 
     def go_on(self) -> None:
-        """Take away what comes after the last restart record: it will be computed again."""
+        """Remove the segments after the last restart record, which will be computed again."""
         for path in self.folder.glob(f"*{UNFINISHED}"):
             path.unlink()
         paths = segment_paths(self.folder)
@@ -163,7 +163,7 @@ class ResultsWriter:
         self.n_rows = sum(rows_in(path) for path in paths)
 
     def guarded(self, action: Callable[[], None]) -> None:
-        """Run an action; say in words why it cannot write."""
+        """Run an action; if it cannot write, raise an error with a description."""
         try:
             action()
         except OSError as error:
@@ -175,7 +175,7 @@ class ResultsWriter:
         write_sealed_file(path, KIND, fill, part=path.with_name(path.name + UNFINISHED))
 
     def write_head(self, file: h5py.File, *, is_complete: bool) -> None:
-        """Write a file of the head alone."""
+        """Write a file that contains only the head."""
         manifest = Manifest(file)
         manifest.attributes("/", self.attributes(is_complete=is_complete))
         manifest.close()
@@ -191,7 +191,7 @@ class ResultsWriter:
         }
 
     def append(self, rows: Rows) -> None:
-        """Take rows into the open segment."""
+        """Append rows to the open segment."""
         if len(rows.t):
             self.open_rows.append(rows)
 
@@ -202,7 +202,7 @@ class ResultsWriter:
         return arrays
 
     def close_segment(self, restart: Mapping[str, Array] | None = None) -> None:
-        """Write the open segment, if it holds anything, with a record from which the run can go on."""
+        """Write the open segment, unless it is empty, with a record for a restart of the run."""
         if not self.open_rows:
             return
         arrays = self.open_arrays()
@@ -222,11 +222,11 @@ class ResultsWriter:
         self.open_rows = []
 
     def finish(self, summary: Mapping[str, Any] | None = None) -> None:
-        """Join the segments, the open one too, into the results file, with the summary of the run, and remove them."""
+        """Join all segments, including the open one, into the results file with the summary of the run; remove them."""
         try:
             self.join(summary or {})
         except BaseException:
-            self.close_segment()  # nothing is lost
+            self.close_segment()  # so that no row is lost
             raise
         self.place.remove()
 
@@ -259,7 +259,7 @@ def arrays_of(parts: list[Rows]) -> dict[str, Array]:
 
 
 def parts_of(source: FileSource, name: str) -> Iterator[Array]:
-    """Yield a dataset of consecutive segments, a segment at a time."""
+    """Yield a dataset of consecutive segments, one segment at a time."""
     for path in source.paths:
         with h5py.File(path, "r") as segment:
             yield segment[name][...]
@@ -272,13 +272,13 @@ def rows_in(path: Path) -> int:
 
 
 def has_restart(path: Path) -> bool:
-    """Whether a run can go on after this segment."""
+    """Return whether a run can be continued after this segment."""
     with h5py.File(path, "r") as file:
         return RESTART in file
 
 
 def last_restart(folder: Path) -> tuple[Head, dict[str, Array] | None]:
-    """Return the head of an interrupted run and its last restart record, None if it came to none.
+    """Return the head of an interrupted run and its last restart record, or None if there is no record.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Named sensors: what is measured on a motion, in Python and in the tables [sensors.NAME] of a system file."""
+"""Named sensors, which measure a motion, in Python and in the tables [sensors.NAME] of a system file."""
 
 from collections.abc import Sequence
 from typing import cast
@@ -98,12 +98,12 @@ SENSORS = {
 
 
 def measured(system: System, trajectory: Trajectory, sensors: Sequence[Sensor] | None = None) -> dict[str, Measurement]:
-    """Return what sensors measured on a motion of the system, by name; by default all sensors of the system.
+    """Return the measurements of sensors during a motion of the system, by name; by default of all its sensors.
 
     Raises
     ------
     ModelError
-        If the motion is one of another system, or a sensor names what does not exist.
+        If the motion is of another system, or a sensor refers to an object that does not exist.
     """
     names = [body.name for body in system.bodies]
     if names != list(trajectory.body_names):
@@ -118,17 +118,17 @@ def measured(system: System, trajectory: Trajectory, sensors: Sequence[Sensor] |
 
 
 def sensors_of(system: System) -> tuple[Sensor, ...]:
-    """Return the sensors that a system carries: it knows their names only."""
+    """Return the sensors of a system, for which it stores a general type."""
     return cast(tuple[Sensor, ...], system.sensors)
 
 
 def sensor_of(system: System, name: str) -> Sensor:
-    """Return a sensor of the system, or the joint coordinate "joint.coordinate" or "element.output" as one.
+    """Return a sensor of the system by name, or a sensor for "joint.coordinate" or "element.output".
 
     Raises
     ------
     ModelError
-        With the nearest name if there is none.
+        If there is none; the message has the nearest name.
     """
     joint, _, coordinate = name.rpartition(".")
     for each in system.joints:
@@ -145,12 +145,12 @@ def sensor_of(system: System, name: str) -> Sensor:
 
 
 def measurement_of(system: System, trajectory: Trajectory, name: str) -> Measurement:
-    """Return what "sensor", "joint.coordinate" or one column of them, "sensor.column", measured on a motion.
+    """Return the measurement of "sensor", "joint.coordinate", or one of their columns, "sensor.column".
 
     Raises
     ------
     ModelError
-        With the nearest name if there is no such sensor or coordinate, or the sensor has no such column.
+        If there is no such sensor, coordinate or column; the message has the nearest name.
     """
     owner, _, column = name.rpartition(".")
     names = [sensor.name for sensor in system.sensors]

@@ -1,4 +1,4 @@
-"""Sensors of what acts on bodies: the whole force on an interface, springs along their line, recovery rows."""
+"""Sensors of loads on bodies: the total force on an interface, springs along their line, recovery rows."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -32,14 +32,15 @@ from floatframe.system import System
 __all__ = ["INTERFACE_AXES", "InterfaceForceSensor", "RecoverySensor", "SpringSensor"]
 
 INTERFACE_AXES = ("ground", "body")
-NOTHING = 1e-12  #: of the largest wrench: rounding
+NOTHING = 1e-12  #: relative to the largest wrench; smaller values are rounding errors
 
 
 def interface_loads(system: System, trajectory: Trajectory, body: FlexibleBody) -> Array:
-    """Return force and moment on each interface at its point, axes of the body frame, (n_interfaces, n_t, 6).
+    """Return force and moment on each interface, at its point, in axes of the body frame, (n_interfaces, n_t, 6).
 
-    Point forces are those that acted, as the motion has them on record, switched by events or led from outside. Motions
-    of older files have no record: their forces are those of the system, off while events have them off.
+    Point forces are taken as recorded in the motion, including the effect of events and of external programs. Motions
+    of older files have no record; for these, the forces of the system are evaluated, and are zero while events have
+    switched them off.
     """
     i = list(trajectory.body_names).index(body.name)
     wrenches, loads = loads_on_interfaces(system, i)
@@ -68,7 +69,7 @@ def interface_loads(system: System, trajectory: Trajectory, body: FlexibleBody) 
 def require_loads(
     system: System, trajectory: Trajectory, kind: type[PointForce | BodyLoad], names: tuple[str, ...]
 ) -> list[tuple[int, str]]:
-    """Return number and name of forces on record that a program beside the system led, which come after its own.
+    """Return number and name of the recorded forces that were driven by an external program; they follow the others.
 
     Raises
     ------
@@ -85,7 +86,7 @@ def require_loads(
 
 
 def led_interface(system: System, body: FlexibleBody, i: int, name: str) -> int:
-    """Return the interface of body i on which an input of the system acts as a force on record, -1 for none."""
+    """Return the interface of body i on which an input of the system acts as a recorded force; -1 for none."""
     for channel in system.inputs:
         ends = {f"inputs.{channel.name}": "marker", f"inputs.{channel.name}.against": "relative_to"}
         marker = getattr(channel, ends[name], None) if name in ends else None
@@ -98,12 +99,12 @@ def led_interface(system: System, body: FlexibleBody, i: int, name: str) -> int:
 
 
 def events_of(system: System) -> tuple[Any, ...]:
-    """Return the events of a system and of its elements, whose names alone it knows."""
+    """Return the events of a system and of its elements, for which it stores a general type."""
     return (*system.events, *(event for each in system.elements for event in each.events()))
 
 
 def happened(trajectory: Trajectory) -> Sequence[Mapping[str, Any]]:
-    """Return the events that have happened in a motion."""
+    """Return the events that have occurred in a motion."""
     return trajectory.head.summary.get("events", ())
 
 
@@ -114,7 +115,7 @@ def in_file(body: FlexibleBody, load: Load) -> Load:
 
 
 def interface_load_rows(small: SmallMotions, body: FlexibleBody) -> list[Rows]:
-    """Return the change of force and moment on each interface, ground axes, six rows each."""
+    """Return the change of force and moment on each interface in ground axes, six rows each."""
     wrenches, loads = loads_on_interfaces(small.system, small.compiled.body_names.index(body.name))
     zero = small.by_motion(np.zeros((6, small.n_x)))
     found = [zero for _ in body.reduced.interfaces]
@@ -132,7 +133,7 @@ def interface_load_rows(small: SmallMotions, body: FlexibleBody) -> list[Rows]:
                 own = interface_names(body).index(push.interface)
                 found[own] = found[own] + small.by_motion(x)
     for load in loads:
-        if load.force.is_follower:  # it turns with its marker
+        if load.force.is_follower:  # it rotates with its marker
             six = small.now.source.read("load")[0, load.number]
             place = small.place(find_marker(small.system, f"force {load.force.name!r}", load.force.marker))
             turned = [place.turned.turned(-tilde(part)) for part in (six[:3], six[3:])]
@@ -143,15 +144,15 @@ def interface_load_rows(small: SmallMotions, body: FlexibleBody) -> list[Rows]:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class InterfaceForceSensor:
-    """The whole force and moment on a flexible body through an interface: of joints, springs and point forces there.
+    """The total force and moment on a flexible body at an interface, from joints, springs and point forces.
 
-    The moment is about the point of the interface. Forces there that are inputs of a linearised system count as well.
+    The moment is about the point of the interface. Inputs of a linearised system that act there are included.
     """
 
     name: str
     body: str
     interface: str
-    axes: str = "ground"  #: or "body", those of the body frame
+    axes: str = "ground"  #: "ground", or "body" for those of the body frame
 
     def __post_init__(self) -> None:
         if self.axes not in INTERFACE_AXES:
@@ -159,7 +160,7 @@ class InterfaceForceSensor:
             raise ModelError(f"sensor {self.name!r}: axes: expected one of {choices}, got {self.axes!r}")
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
-        """Return force and moment over time: components and sizes."""
+        """Return force and moment over time, as components and magnitudes."""
         body, k = self.place(system)
         require_same_modes(trajectory, body.name, body.reduced)
         six = interface_loads(system, trajectory, body)[k]
@@ -175,7 +176,7 @@ class InterfaceForceSensor:
         return Measurement(self.name, trajectory.t, columns, units)
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return force and moment by wrenches; in body axes Rᵀ (dF + F × theta)."""
+        """Return force and moment as functions of the wrenches; in body axes Rᵀ (dF + F × theta)."""
         body, k = self.place(small.system)
         rows, frame = interface_load_rows(small, body)[k], small.frame_place(body.name)
         now = self.measure(small.system, small.now).columns
@@ -194,7 +195,7 @@ class InterfaceForceSensor:
         )
 
     def place(self, system: System) -> tuple[FlexibleBody, int]:
-        """Return the body and the number of the interface; `ModelError` with the nearest name if it is not there."""
+        """Return the body and the index of the interface; `ModelError` with the nearest name if it does not exist."""
         body = flexible_body(system, self.name, self.body)
         names = [interface.name for interface in body.reduced.interfaces]
         if self.interface not in names:
@@ -208,7 +209,7 @@ class InterfaceForceSensor:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class SpringSensor:
-    """A spring-damper along its line: length, its rate, and the tension, negative where it pushes."""
+    """A spring-damper along its line: length, its rate, and the tension, negative in compression."""
 
     name: str
     of: str  #: name of the spring-damper
@@ -224,7 +225,7 @@ class SpringSensor:
         return Measurement(self.name, trajectory.t, columns, self.units(system))
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return all columns: along the line d, e · d(r_B - r_A) and e · dF, since F is along e."""
+        """Return all columns: along the line direction e of d, e · d(r_B - r_A) and e · dF, because F is along e."""
         a, b = (small.place(end, self.of) for end in self.ends(small.system))
         d = b.position - a.position
         length = float(np.linalg.norm(d))
@@ -253,20 +254,20 @@ class SpringSensor:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class RecoverySensor:
-    """Rows of a recovery table of a flexible body: motions, stresses and forces with their residual static parts.
+    """Rows of a recovery table of a flexible body: motions, stresses and forces, including residual static parts.
 
-    y = D_0 z + D_1 z' + D_2 z'' + L p, see `cms.reduced_body.recovery_table`: z' and z'' are velocities and
-    accelerations of the body frame in its axes and the rates of q, p gravity, spin, the loads on interfaces and load
-    cases. Places in the moving body count from its frame: z begins with zeros.
+    y = D_0 z + D_1 z' + D_2 z'' + L p, see `cms.reduced_body.recovery_table`. z' and z'' are velocities and
+    accelerations of the body frame in its axes and the rates of q. p contains gravity, spin, the loads on interfaces
+    and load cases. Positions are relative to the moving body frame, so z begins with zeros.
     """
 
     name: str
     body: str
     table: str  #: name of the recovery table in the modal file
-    rows: Sequence[str] = ()  #: labels or their beginnings; none: all rows
+    rows: Sequence[str] = ()  #: labels of rows or their beginnings; none: all rows
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
-        """Return the rows over time, by their labels."""
+        """Return the rows over time, by label."""
         body, table, rows = self.found(system)
         require_same_modes(trajectory, body.name, body.reduced)
         motion = trajectory.body(body.name)
@@ -279,11 +280,11 @@ class RecoverySensor:
         return Measurement(self.name, trajectory.t, columns, {table.labels[row]: table.units[row] for row in rows})
 
     def places_and_rates(self, small: SmallMotions, z: Rows) -> tuple[Rows, Rows]:
-        """Return what stands for z and z' in the rows: places count from the frame, velocities from rest."""
+        """Return the values of z and z' in the rows: positions relative to the frame, velocities relative to rest."""
         return small.by_motion(np.concatenate([np.zeros((6, small.n_x)), z.x[6:]])), z.rate
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the rows by small motions and wrenches about a state at rest."""
+        """Return the rows as functions of small motions and wrenches about a state at rest."""
         body, table, rows = self.found(small.system)
         units = {table.labels[row]: table.units[row] for row in rows}
         if small.is_turning:
@@ -318,7 +319,7 @@ class RecoverySensor:
         return LinearColumns({table.labels[row]: y[k] for k, row in enumerate(rows)}, units, {})
 
     def found(self, system: System) -> tuple[FlexibleBody, RecoveryTable, IntArray]:
-        """Return the body, its table and which rows; `ModelError` with the nearest name if they are not there."""
+        """Return the body, its table and the selected rows; `ModelError` with the nearest name if one is missing."""
         body = flexible_body(system, self.name, self.body)
         tables = body.reduced.recovery
         if self.table not in tables:
@@ -335,7 +336,7 @@ class RecoverySensor:
             raise ModelError(f"sensor {self.name!r}: {error}") from error
 
     def loads(self, system: System, trajectory: Trajectory, body: FlexibleBody, table: RecoveryTable) -> Array:
-        """Return the amplitudes of the loads over time, (n_t, n_loads); `ModelError` for one that a run has not."""
+        """Return the amplitudes of the loads over time, (n_t, n_loads); `ModelError` if a run does not have one."""
         motion = trajectory.body(body.name)
         R, omega = rotation_matrix(motion.p), motion.omega_B
         on_interfaces = interface_loads(system, trajectory, body)
@@ -358,14 +359,14 @@ class RecoverySensor:
 
 
 def load_cases(system: System, trajectory: Trajectory) -> Array:
-    """Return the factors by which the load cases of a system acted, (n_t, n_cases), as `interface_loads` has forces."""
+    """Return the factors of the load cases of a system, (n_t, n_cases), recorded like forces (`interface_loads`)."""
     if trajectory.head.load_cases is not None:
         require_loads(system, trajectory, BodyLoad, trajectory.head.load_cases)
         return trajectory.source.read("load_case")
     factors = []
     for force in system.forces:
         if isinstance(force, BodyLoad):
-            assert isinstance(force.amplitude, TimeFunction)  # a load case makes one of a number
+            assert isinstance(force.amplitude, TimeFunction)  # ensured by the load case, which converts numbers
             acts = ~times_off(events_of(system), happened(trajectory), trajectory.t, force.name)
             factors.append(acts * np.array([force.amplitude(t) for t in trajectory.t]))
     return np.array(factors).reshape(-1, len(trajectory.t)).T
@@ -375,7 +376,7 @@ SIX = ("fx", "fy", "fz", "mx", "my", "mz")
 
 
 def named(body: object) -> str:
-    """Return the name of a body given by itself or by its name."""
+    """Return the name of a body, given as the body or its name."""
     return body if isinstance(body, str) else str(getattr(body, "name", ""))
 
 
@@ -385,11 +386,11 @@ def interface_names(body: FlexibleBody) -> list[str]:
 
 
 def axis_of(component: str) -> int:
-    """Return the number of the axis x, y or z."""
+    """Return the index of the axis x, y or z."""
     return "xyz".index(component)
 
 
 def gravity_of(system: System) -> Array:
-    """Return the acceleration of free fall, ground axes, (3,)."""
+    """Return the gravity vector, in ground axes, (3,)."""
     fall = [force.acceleration for force in system.forces if isinstance(force, Gravity)]
     return np.sum([np.zeros(3), *fall], axis=0)

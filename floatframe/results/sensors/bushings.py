@@ -1,8 +1,8 @@
 """The sensor of a bushing: its six deformations and their rates, in the axes in which it acts.
 
-The formulas are those of the force (`floatframe/kernels/connections/bushing.py`): with A, B the axes of the markers, d
-the distance of their points, theta the rotation vector of A^T B, turns counted, t = |theta|, and C the axes of A turned
-by a share of theta,
+The formulas are those of the force (`floatframe/kernels/connections/bushing.py`). A, B are the axes of the markers, d
+the vector between their points, theta the rotation vector of A^T B with full turns counted, t = |theta|, and C the axes
+of A rotated by a share of theta:
 
     e = C^T d,  e' = C^T d' + e × gamma,  theta' = S u,   u = C^T (omega_B - omega_A)
     gamma = C^T ((1 - share) omega_A + share omega_B) - tau theta × u
@@ -35,21 +35,22 @@ from floatframe.system import System
 
 __all__ = ["BushingSensor"]
 
-SERIES_BELOW = 1e-2  #: t² below which alpha, beta, tau are series
+SERIES_BELOW = 1e-2  #: t² below which alpha, beta, tau are evaluated by series
 NAMES = (*DEFORMATIONS, *(f"{name} rate" for name in DEFORMATIONS))
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class BushingSensor:
-    """Deformations x, y, z, rx, ry, rz of a bushing and their rates, as its stiffness and damping see them."""
+    """Deformations x, y, z, rx, ry, rz of a bushing and their rates, as used by its stiffness and damping."""
 
     name: str
     of: str  #: name of the bushing
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return deformations and rates over time."""
-        from scipy.spatial.transform import Rotation  # late: what moves a system does without scipy.spatial
+        # imported late, because motions are computed without scipy.spatial
+        from scipy.spatial.transform import Rotation
 
         ends, share = self.ends(system), AXES[self.bushing(system).axes]
         a, b = (end_motion(system, trajectory, end) for end in ends)
@@ -69,8 +70,9 @@ class BushingSensor:
         return Measurement(self.name, trajectory.t, dict(zip(NAMES, columns, strict=True)), self.units(system))
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return de = Cᵀ dd + e × dc and dtheta = S u, rates as theirs."""
-        from scipy.spatial.transform import Rotation  # late: what moves a system does without scipy.spatial
+        """Return de = Cᵀ dd + e × dc and dtheta = S u; the rows of the rates are their derivatives."""
+        # imported late, because motions are computed without scipy.spatial
+        from scipy.spatial.transform import Rotation
 
         share = AXES[self.bushing(small.system).axes]
         a, b = (small.place(end, self.of) for end in self.ends(small.system))
@@ -105,7 +107,7 @@ class BushingSensor:
 
 
 def counted(trajectory: Trajectory, angles: list[CountedAngle], theta: Array) -> Array:
-    """Return rotation vectors with the turns that the run has counted, (n_t, 3); as they are if it has not."""
+    """Return rotation vectors with the turns that the run has counted, (n_t, 3); unchanged if it has not."""
     known = list(trajectory.head.angles or ())
     first = next((k for k, each in enumerate(known) if each.is_same(angles[0])), None)
     if first is None:
@@ -114,7 +116,7 @@ def counted(trajectory: Trajectory, angles: list[CountedAngle], theta: Array) ->
 
 
 def scalars(t2: Array, share: float) -> tuple[Array, Array, Array]:
-    """Return alpha, beta, tau of t², (n,) each; series for small ones, to t⁶."""
+    """Return alpha, beta, tau of t², (n,) each; for small t² from series up to t⁶."""
     near = t2 < SERIES_BELOW
     t = np.sqrt(np.where(near, 1.0, t2))
     if share != 0.5:

@@ -1,6 +1,6 @@
 """Channels: named scalars as inputs (a force, a torque) and outputs (a motion, a stress) of a linearised system.
 
-As outputs they are sensors of one column, named "value".
+As outputs, they are sensors with one column, named "value".
 """
 
 from dataclasses import dataclass, field
@@ -28,7 +28,7 @@ __all__ = ["QUANTITIES", "RATES", "VALUE", "Channel", "CoordinateChannel", "Stre
 
 QUANTITIES = ("translation", "rotation")
 RATES = ("displacement", "velocity", "acceleration")
-VALUE = "value"  #: the name of the one column
+VALUE = "value"  #: name of the only column
 
 
 @frozen_copies
@@ -36,18 +36,18 @@ VALUE = "value"  #: the name of the one column
 class Channel:
     """The motion of a marker along a direction: displacement [m] from the start, or rotation [rad] about it.
 
-    On a flexible body the marker is an interface, or a position in mesh axes: the kept node nearest to it.
+    On a flexible body, the marker is an interface, or the kept node nearest to a position in mesh axes.
 
-    As an input it is the force [N], or moment [N m], that does work on it. With `relative_to`, the motion against
-    that marker, and the opposite force on it.
+    As an input, it is the force [N], or moment [N m], that does work on this motion. With `relative_to`, the motion is
+    relative to that marker, on which the opposite force acts.
     """
 
     name: str
     marker: Marker
     direction: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))  #: ground axes, (3,)
-    quantity: str = "translation"  #: or "rotation"
+    quantity: str = "translation"  #: "translation" or "rotation"
     relative_to: Marker | None = None
-    rate: int = 0  #: as an output: 0 displacement, 1 velocity, 2 acceleration, seen from the turning system
+    rate: int = 0  #: for outputs: 0 displacement, 1 velocity, 2 acceleration, relative to the rotating system
 
     def __post_init__(self) -> None:
         where = f"channel {self.name!r}"
@@ -58,12 +58,13 @@ class Channel:
 
     @property
     def markers(self) -> list[tuple[float, Marker]]:
-        """The marker, and the one against which it is seen, with their signs."""
+        """The marker, and the marker to which it is relative, with their signs."""
         return [(sign, each) for sign, each in ((1.0, self.marker), (-1.0, self.relative_to)) if each is not None]
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
-        """Return the motion along the direction over time; displacements and rotations since the first time."""
-        from scipy.spatial.transform import Rotation  # late: what moves a system does without scipy.spatial
+        """Return the motion along the direction over time; displacements and rotations start at zero."""
+        # imported late, because motions are computed without scipy.spatial
+        from scipy.spatial.transform import Rotation
 
         total = np.zeros(len(trajectory.t))
         for sign, marker in self.markers:
@@ -82,7 +83,7 @@ class Channel:
         return Measurement(self.name, trajectory.t, {VALUE: total}, {VALUE: self.units(system.units)})
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the motion along the direction by small motions, seen from the turning system."""
+        """Return the motion along the direction as a function of small motions, relative to the rotating system."""
         rows = small.by_motion(np.zeros((1, small.n_x)))
         for sign, marker in self.markers:
             place = self.place(small, marker)
@@ -94,7 +95,7 @@ class Channel:
         return scalar_columns({VALUE: rows}, {VALUE: self.units(small.system.units)})
 
     def place(self, small: SmallMotions, marker: Marker) -> SmallPlace:
-        """Return how a marker of the channel moves; `ModelError` for the rotation of a node that keeps none."""
+        """Return the linearised motion of a marker; `ModelError` for the rotation of a node without kept rotation."""
         where = f"channel {self.name!r}: marker"
         if self.quantity == "rotation":
             require_turning(small.system, where, marker)
@@ -112,18 +113,18 @@ class Channel:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class CoordinateChannel:
-    """A joint coordinate; as an input the force or torque along it."""
+    """A joint coordinate; as an input, the force or torque along it."""
 
     name: str
     joint: str
     coordinate: str
-    rate: int = 0  #: as an output: 0 value, 1 its rate, 2 its second rate
+    rate: int = 0  #: for outputs: 0 value, 1 first rate, 2 second rate
 
     def __post_init__(self) -> None:
         require_rate(f"channel {self.name!r}", self.rate)
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
-        """Return the coordinate or its rate over time; its second rate by none: results hold it for bodies only."""
+        """Return the coordinate or its rate over time; not the second rate, which results contain only for bodies."""
         if self.rate == 2:
             raise ModelError(
                 f"channel {self.name!r}: a second rate of a joint coordinate is no part of results over time; take "
@@ -134,7 +135,7 @@ class CoordinateChannel:
         return Measurement(self.name, trajectory.t, {VALUE: value}, {VALUE: self.units(system.units)})
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the coordinate by small motions."""
+        """Return the coordinate as a function of small motions."""
         rows = small.joint_coordinate(self.joint, self.coordinate, f"channel {self.name!r}")
         for _ in range(self.rate):
             rows = rows.rate
@@ -142,7 +143,7 @@ class CoordinateChannel:
 
     @property
     def is_angle(self) -> bool:
-        """Whether the coordinate is an angle; distances and places along axes are not."""
+        """Whether the coordinate is an angle, and not a distance or a position along an axis."""
         return self.coordinate.startswith("angle")
 
     def units(self, units: Units) -> str:
@@ -162,7 +163,7 @@ class StressChannel:
     name: str
     body: str
     component: str  #: xx, yy, zz, yz, xz or xy
-    position: Array  #: mesh axes; the kept node nearest to it is taken, (3,) [m]
+    position: Array  #: mesh axes; the nearest kept node is used, (3,) [m]
 
     def __post_init__(self) -> None:
         where = f"channel {self.name!r}"
@@ -183,7 +184,7 @@ class StressChannel:
         return Measurement(self.name, found.t, {VALUE: found.columns[self.component]}, {VALUE: found.units["xx"]})
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the component by small motions."""
+        """Return the component as a function of small motions."""
         found = self.sensor.linear(small)
         return scalar_columns({VALUE: found.columns[self.component]}, {VALUE: found.units[self.component]})
 

@@ -41,7 +41,7 @@ class CouplerSensor:
         return Measurement(self.name, trajectory.t, columns, units)
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return all columns: they are unknowns beside the wrenches."""
+        """Return all columns, which are unknowns like the wrenches."""
         model = small.compiled.model
         k = self.coupler_names(small.system).index(self.of)
         columns: dict[str, Rows] = {}
@@ -53,7 +53,7 @@ class CouplerSensor:
         return scalar_columns(columns, dict(self.measure(small.system, small.now).units))
 
     def coupler_names(self, system: System) -> list[str]:
-        """Return the names of the couplers; `ModelError` with the nearest one if the sensor's is not among them."""
+        """Return the names of the couplers; `ModelError` with the nearest one if that of the sensor does not exist."""
         names = [coupler.name for coupler in system.couplers]
         if self.of not in names:
             raise ModelError(f"sensor {self.name!r}: no coupler {quoted(self.of)}{nearest(self.of, names)}")
@@ -63,13 +63,13 @@ class CouplerSensor:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ControlSensor:
-    """A user force: its coordinates, their rates, its forces along them, its states, all by their names."""
+    """A user force: its coordinates, their rates, the forces along them, and its states, all by name."""
 
     name: str
     of: str  #: name of the user force
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
-        """Return the columns "phi", "phi_dot", "phi force", ..., and states by their names (without unit)."""
+        """Return the columns "phi", "phi_dot", "phi force", ..., and states by name (without unit)."""
         forces, k = self.user_forces(system)
         found = user_force_motion(system, trajectory, self.of)
         columns: dict[str, Array] = {}
@@ -85,7 +85,7 @@ class ControlSensor:
         return Measurement(self.name, trajectory.t, columns, units)
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return all columns: they are unknowns beside the wrenches. States are none: see `linearize`."""
+        """Return all columns except states, which are not linear here (see `linearize`); they are unknowns."""
         model = small.compiled.model
         forces, u = self.user_forces(small.system)
         k, acting = len(small.system.couplers) + u, list(forces[u].forces)
@@ -98,7 +98,7 @@ class ControlSensor:
         return scalar_columns(columns, dict(self.measure(small.system, small.now).units))
 
     def user_forces(self, system: System) -> tuple[list[UserForce], int]:
-        """Return the user forces and which is that of the sensor; `ModelError` with the nearest name if none is."""
+        """Return the user forces and the index of the sensor's one; `ModelError` with the nearest name otherwise."""
         forces = [force for force in system.forces if isinstance(force, UserForce)]
         names = [force.name for force in forces]
         if self.of not in names:
@@ -107,7 +107,7 @@ class ControlSensor:
 
 
 def angles_of(system: System, k: int) -> list[bool]:
-    """Return which coordinates of coupler or user force number k are angles."""
+    """Return whether each coordinate of coupler or user force number k is an angle."""
     model = compiled_system(system).model
     rows = model.coordinates.row[model.elements.coordinate0[k] : model.elements.coordinate0[k + 1]]
     return [kind_of(code).is_angle for code in model.rows.kind[rows]]

@@ -1,4 +1,4 @@
-"""What small motions do to the outputs of an element: derivatives of its law."""
+"""Outputs of an element as functions of small motions, from derivatives of its law."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ __all__ = ["output_rows"]
 
 
 def output_rows(placed: PlacedLaw, small: SmallMotions) -> Rows:
-    """Return the outputs of an element by small motions, a row each."""
+    """Return the outputs of an element as functions of small motions, one row each."""
     model, work = small.compiled.model, small.work
     c, n = placed.connection, len(placed.markers)
     first = int(model.connections.a[c])

@@ -22,9 +22,9 @@ __all__ = ["ElementSensor"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ElementSensor:
-    """A public element: its outputs, states and multipliers by their names, or one of them.
+    """Outputs, states and multipliers of a public element, by name, or one of them.
 
-    A name that is both an output and a state is the state.
+    If an output and a state have the same name, the state is measured.
     """
 
     name: str
@@ -32,14 +32,14 @@ class ElementSensor:
     output: str | None = None  #: name of an output, state or multiplier; default: all
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
-        """Return a column for each output, state and multiplier, or the one that is asked for."""
+        """Return a column for each output, state and multiplier, or the requested one."""
         units = self.units_of(self.placed(system))
         found = element_motion(system, trajectory, self.of)
         columns: dict[str, Array] = {**found.outputs, **found.states, **found.multipliers}
         return Measurement(self.name, trajectory.t, {name: columns[name] for name in units}, units)
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return all columns: outputs by the derivatives of the law, states and multipliers as unknowns."""
+        """Return all columns: outputs from derivatives of the law; states and multipliers are unknowns."""
         placed = self.placed(small.system)
         units = self.units_of(placed)
         law = placed.law
@@ -51,7 +51,7 @@ class ElementSensor:
         return LinearColumns({name: columns[name] for name in units}, units, {})
 
     def placed(self, system: System) -> PlacedLaw:
-        """Return the element; `ModelError` with the nearest name if it is not there."""
+        """Return the element; `ModelError` with the nearest name if it does not exist."""
         laws = compiled_system(system).laws
         names = [each.element.name for each in laws]
         if self.of not in names:
@@ -59,7 +59,7 @@ class ElementSensor:
         return laws[names.index(self.of)]
 
     def units_of(self, placed: PlacedLaw) -> dict[str, str]:
-        """Return the units of what it measures by name; `ModelError` with the nearest name if there is no such."""
+        """Return the units of its columns, by name; `ModelError` with the nearest name if there is no such column."""
         law = placed.law
         units = dict(zip(law.outputs, law.output_units, strict=True))
         units |= dict(zip(law.states, law.state_units, strict=True))

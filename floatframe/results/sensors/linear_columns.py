@@ -1,4 +1,4 @@
-"""Columns of linear outputs by the names of those that are measured over time."""
+"""Columns of linear outputs, with the same names as those measured over time."""
 
 import numpy as np
 
@@ -11,9 +11,9 @@ NO_SIZE = "its size has no slope where the vector is zero"
 
 
 def vector_linear(rows: Rows, value: Array, unit: str, *, prefix: str = "", least: float = 0.0) -> LinearColumns:
-    """Return the columns x, y, z and size of a vector, see `vector_columns`: three rows, its value now, (3,).
+    """Return the columns x, y, z and size of a vector, see `vector_columns`, from three rows and its value now, (3,).
 
-    least: what counts as zero beside rounding; the size of such a vector is not linear.
+    least: magnitude below which the vector counts as zero; its size is then not linear.
     """
     columns = {f"{prefix}{axis}": rows[k] for k, axis in enumerate("xyz")}
     units = dict.fromkeys((*columns, f"{prefix}size"), unit)

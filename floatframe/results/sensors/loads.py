@@ -1,4 +1,4 @@
-"""Sensors of what joints carry and do, of energies and momenta, and of modal coordinates."""
+"""Sensors of joint loads and coordinates, of energies and momenta, and of modal coordinates."""
 
 from dataclasses import dataclass
 
@@ -28,7 +28,7 @@ from floatframe.system import System
 __all__ = ["AXES", "CoordinateSensor", "EnergySensor", "ModeSensor", "MomentumSensor", "ReactionSensor"]
 
 AXES = ("ground", "marker")
-NOTHING = 1e-12  #: of the largest wrench: rounding
+NOTHING = 1e-12  #: relative to the largest wrench; smaller values are rounding errors
 ENERGIES = (*Energies.__dataclass_fields__, "total", "balance")
 
 
@@ -38,15 +38,15 @@ class ReactionSensor:
     """Force and moment that a joint or spring-damper exerts on its marker A, in ground axes or its own."""
 
     name: str
-    of: str  #: a joint or spring-damper
-    axes: str = "ground"  #: or "marker"
+    of: str  #: name of a joint or spring-damper
+    axes: str = "ground"  #: "ground" or "marker"
 
     def __post_init__(self) -> None:
         if self.axes not in AXES:
             raise ModelError(f"sensor {self.name!r}: axes: expected one of {', '.join(AXES)}, got {self.axes!r}")
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
-        """Return force and moment over time: components and sizes."""
+        """Return force and moment over time, as components and magnitudes."""
         self.require_connection(list(trajectory.connection_names))
         reaction = trajectory.reaction(self.of)
         vectors = {"force ": reaction.force, "moment ": reaction.moment}
@@ -62,7 +62,7 @@ class ReactionSensor:
         return Measurement(self.name, trajectory.t, columns, units)
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return force and moment by small motions and wrenches: in marker axes Aᵀ (dF + F × theta_A)."""
+        """Return force and moment as functions of small motions and wrenches; in marker axes Aᵀ (dF + F × theta_A)."""
         self.require_connection(list(small.now.connection_names))
         own, reaction = small.wrench(self.of), small.now.reaction(self.of)
         found = []
@@ -122,7 +122,7 @@ class CoordinateSensor:
         )
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return value and rate by small motions, and the force by wrenches besides."""
+        """Return value and rate as functions of small motions; the force also as a function of wrenches."""
         value = small.joint_coordinate(self.joint, self.coordinate, f"sensor {self.name!r}")
         force = force_rows(small, self.joint, self.coordinate)
         units, columns = dict(self.measure(small.system, small.now).units), {"value": value, "rate": value.rate}
@@ -144,7 +144,7 @@ class EnergySensor:
         return Measurement(self.name, trajectory.t, columns, dict.fromkeys(columns, unit_words(system.units, "energy")))
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return no column: energies are of second order."""
+        """Return no linear column, because energies are of second order."""
         return LinearColumns(
             {},
             dict.fromkeys(ENERGIES, unit_words(small.system.units, "energy")),
@@ -168,7 +168,7 @@ class MomentumSensor:
         return Measurement(self.name, trajectory.t, linear[0] | angular[0], linear[1] | angular[1])
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return both by small motions about a state at rest: Σ R m v and Σ R j + r × R m v of M u = (m v, j, ...)."""
+        """Return both by small motions about a state of rest: Σ R m v and Σ R j + r × R m v, M u = (m v, j, ...)."""
         found = self.measure(small.system, small.now)
         if small.is_turning:
             why = dict.fromkeys(found.columns, "the momentum of a system that turns: linearise it at rest")
@@ -188,11 +188,11 @@ class MomentumSensor:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ModeSensor:
-    """A modal coordinate of a flexible body and its strain energy."""
+    """A modal coordinate of a flexible body, and its rate."""
 
     name: str
     body: str
-    mode: int  #: from 1
+    mode: int  #: number of the mode, from 1
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return the coordinate and its rate over time."""
@@ -204,7 +204,7 @@ class ModeSensor:
         return Measurement(self.name, trajectory.t, columns, {"q": unit, "q_dot": f"{unit}/{system.units.time_symbol}"})
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the coordinate and its rate by small motions."""
+        """Return the coordinate and its rate as functions of small motions."""
         self.require_mode(flexible_body(small.system, self.name, self.body).reduced.n_q)
         row = small.coordinates(self.body)[self.mode - 1]
         return scalar_columns({"q": row, "q_dot": row.rate}, dict(self.measure(small.system, small.now).units))

@@ -1,4 +1,4 @@
-"""What a sensor measured: named columns over time, each with its unit."""
+"""The measurement of a sensor: named columns over time, each with its unit."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,13 +15,13 @@ __all__ = ["Measurement", "unit_words", "vector_columns"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """Columns over time by name, such as x, y, z, size."""
+    """Columns over time, by name, such as x, y, z, size."""
 
     sensor: str
     t: Array  #: (n_t,) [s]
     columns: Mapping[str, Array]  #: each (n_t,)
     units: Mapping[str, str]  #: of each column, in the symbols of the system
-    places: tuple[str, ...] = ()  #: where on the motion it measured, in words, as far as the motion decides it
+    places: tuple[str, ...] = ()  #: descriptions of the measured points, if they depend on the motion
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "columns", FrozenMapping(dict(self.columns)))
@@ -29,7 +29,7 @@ class Measurement:
 
     @property
     def headers(self) -> tuple[str, ...]:
-        """Names of the columns for tables: sensor, column, unit."""
+        """Names of the columns for tables, with sensor, column and unit."""
         return tuple(f"{self.sensor} {name} [{self.units[name]}]".replace("  ", " ") for name in self.columns)
 
 

@@ -1,6 +1,6 @@
-"""Sensors of places: position, velocity, acceleration and rotation of markers, angles, elastic displacement.
+"""Sensors of points: position, velocity, acceleration and rotation of markers, angles, elastic displacement.
 
-A place on a flexible body is an interface, a kept node by its number or position (as the mesh was drawn), or the mean
+A point on a flexible body is an interface, a kept node (by number, or by position as the mesh was drawn), or the mean
 of the nodes of an element or set.
 """
 
@@ -47,9 +47,9 @@ __all__ = [
     "small_place",
 ]
 
-STILL = 1e-12  #: of a length or angle, beside the size of the system: rounding
+STILL = 1e-12  #: relative to the size of the system; smaller lengths and angles are rounding errors
 
-TURNING = ("rotation-vector", "angular-velocity")  #: quantities of the axes of a place
+TURNING = ("rotation-vector", "angular-velocity")  #: quantities of the axes of a point
 PLACE_QUANTITIES = {
     "position": "length",
     "velocity": "speed",
@@ -60,12 +60,12 @@ PLACE_QUANTITIES = {
 
 
 def place_motion(system: System, trajectory: Trajectory, where: str, marker: Marker) -> PlaceMotion:
-    """Return the motion of a marker; on a flexible body a position or number stands for a kept node.
+    """Return the motion of a marker; on a flexible body, a position or number refers to a kept node.
 
     Raises
     ------
     ModelError
-        If the marker names what does not exist.
+        If the marker refers to an object that does not exist.
     """
     if is_at_node(system, marker):
         body, found = found_nodes(system, where, marker)
@@ -74,14 +74,14 @@ def place_motion(system: System, trajectory: Trajectory, where: str, marker: Mar
 
 
 def small_place(small: SmallMotions, where: str, marker: Marker) -> SmallPlace:
-    """Return the place of a marker and how it moves; on a flexible body a position or number stands for a kept node.
+    """Return the point of a marker with its linearised motion; on a flexible body, positions refer to kept nodes.
 
-    A node whose rotation is not kept turns with the frame of its body's file.
+    A node whose rotation is not kept rotates with the frame of its body's file.
 
     Raises
     ------
     ModelError
-        If the marker names what does not exist.
+        If the marker refers to an object that does not exist.
     """
     if not is_at_node(small.system, marker):
         return small.place(find_marker(small.system, where, marker))
@@ -95,22 +95,22 @@ def small_place(small: SmallMotions, where: str, marker: Marker) -> SmallPlace:
 
 
 def is_at_node(system: System, marker: Marker) -> bool:
-    """Whether a marker stands for kept nodes of a flexible body, with the axes of its frame."""
+    """Return whether a marker refers to kept nodes of a flexible body, with the axes of its frame."""
     name = body_name(marker.body)
     body = next((each for each in system.bodies if each.name == name), None)
     return isinstance(body, FlexibleBody) and marker.address is not None
 
 
 def found_nodes(system: System, where: str, marker: Marker) -> tuple[FlexibleBody, FoundNodes]:
-    """Return the flexible body of a marker and its kept nodes that are meant; `ModelError` if there are none."""
+    """Return the flexible body of a marker and the kept nodes it refers to; `ModelError` if there are none."""
     body = system.body(body_name(marker.body))
-    assert isinstance(body, FlexibleBody)  # `is_at_node`
+    assert isinstance(body, FlexibleBody)  # ensured by `is_at_node`
     assert marker.address is not None
     return body, found_at(body, where, marker.address)
 
 
 def found_at(body: FlexibleBody, where: str, address: Address, *, of_stress: bool = False) -> FoundNodes:
-    """Return the kept nodes that an address means; `ModelError` with the nearest ones if there are none."""
+    """Return the kept nodes at an address; `ModelError` with the nearest ones if there are none."""
     try:
         return address.find(body.reduced, where, of_stress=of_stress, body=body.name)
     except BodyError as error:
@@ -118,14 +118,14 @@ def found_at(body: FlexibleBody, where: str, address: Address, *, of_stress: boo
 
 
 def node_marker(system: System, where: str, marker: Marker) -> MarkerData:
-    """Return the marker at kept nodes of a flexible body, as the engine has the body: with its mean axes."""
+    """Return the marker at kept nodes of a flexible body, in the frame of the engine (mean axes)."""
     body, found = found_nodes(system, where, marker)
     shape = node_shape(body.moved, found.rows, is_stiffened=body.is_stiffened)
     return MarkerData(find_body(system, where, body.name), shape)
 
 
 def require_turning(system: System, where: str, marker: Marker) -> None:
-    """Raise `ModelError` if a marker is at a node whose rotation is not kept: it would show that of the frame."""
+    """Raise `ModelError` if a marker is at a node without kept rotation, where it would show that of the frame."""
     if not is_at_node(system, marker):
         return
     body, found = found_nodes(system, where, marker)
@@ -138,7 +138,7 @@ def require_turning(system: System, where: str, marker: Marker) -> None:
 
 
 def frame_marker(system: System, where: str, marker: Marker) -> MarkerData:
-    """Return a marker with the axes of the file's frame of a flexible body, undeformed, as the engine has the body."""
+    """Return a marker with the undeformed axes of the file's frame of a flexible body, in the engine's frame."""
     name = body_name(marker.body)
     body = system.body(name)
     assert isinstance(body, FlexibleBody)
@@ -152,7 +152,7 @@ def nearest_node(body: FlexibleBody, position: Array, *, where: str = "place", t
     Raises
     ------
     ModelError
-        If it is farther away than the tolerance, of the size of the body.
+        If its distance exceeds the tolerance, which is relative to the size of the body.
     """
     return int(found_at(body, where, Address(position=position, tolerance=tolerance)).rows[0])
 
@@ -162,7 +162,7 @@ def nearest_node(body: FlexibleBody, position: Array, *, where: str = "place", t
 class PlaceSensor:
     """Position, velocity, acceleration, rotation vector or angular velocity of a marker.
 
-    In ground axes; with `relative_to` as that marker sees it: in its axes, from its point, its own motion taken away.
+    In ground axes; with `relative_to`, relative to that marker and in its axes, with its own motion subtracted.
     """
 
     name: str
@@ -193,7 +193,7 @@ class PlaceSensor:
         return Measurement(self.name, trajectory.t, columns, units)
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return x, y, z and size by small motions, in axes that turn with the steady motion."""
+        """Return x, y, z and size as functions of small motions, in axes that rotate with the steady motion."""
         where = f"sensor {self.name!r}"
         value = self.measure(small.system, small.now).columns
         if self.relative_to is None:
@@ -215,7 +215,7 @@ class PlaceSensor:
 
 
 def absolute_rows(small: SmallMotions, place: SmallPlace, quantity: str) -> Rows:
-    """Return three rows of a quantity of a place, in axes that turn with the steady motion."""
+    """Return three rows of a quantity of a point, in axes that rotate with the steady motion."""
     if quantity == "rotation-vector":
         return place.turned.turned(inverse_left_jacobian(place.axes))
     if quantity == "angular-velocity":
@@ -227,12 +227,12 @@ def absolute_rows(small: SmallMotions, place: SmallPlace, quantity: str) -> Rows
 
 
 def inverse_left_jacobian(A: Array) -> Array:
-    """Return the change of the rotation vector of a matrix by a small rotation before it, (3, 3)."""
+    """Return the derivative of the rotation vector of a matrix by a small rotation multiplied from the left, (3, 3)."""
     return np.asarray(np.linalg.inv(left_jacobian(rotation_log(A))), dtype=float)
 
 
 def relative_rows(place: SmallPlace, other: SmallPlace, quantity: str) -> Rows:
-    """Return three rows of a quantity of a place as another place sees it, which it does not move against now.
+    """Return three rows of a quantity of a point relative to another point; both have no relative motion now.
 
     d(Aᵀ (p - p_o)) = Aᵀ (dp - dp_o + (p - p_o) × theta_o)
     """
@@ -248,8 +248,8 @@ def relative_rows(place: SmallPlace, other: SmallPlace, quantity: str) -> Rows:
 
 
 def absolute(place: PlaceMotion, quantity: str) -> Array:
-    """Return a quantity of a place in ground axes, (n_t, 3)."""
-    from scipy.spatial.transform import Rotation  # late: what moves a system does without scipy.spatial
+    """Return a quantity of a point in ground axes, (n_t, 3)."""
+    from scipy.spatial.transform import Rotation  # imported late, because motions are computed without scipy.spatial
 
     if quantity == "rotation-vector":
         return np.asarray(Rotation.from_matrix(place.axes).as_rotvec())
@@ -264,8 +264,8 @@ def absolute(place: PlaceMotion, quantity: str) -> Array:
 
 
 def relative(place: PlaceMotion, other: PlaceMotion, quantity: str) -> Array:
-    """Return a quantity of a place as another place sees it, in the axes of that, (n_t, 3)."""
-    from scipy.spatial.transform import Rotation  # late: what moves a system does without scipy.spatial
+    """Return a quantity of a point relative to another point, in the axes of the latter, (n_t, 3)."""
+    from scipy.spatial.transform import Rotation  # imported late, because motions are computed without scipy.spatial
 
     d = place.position - other.position
     if quantity == "position":
@@ -277,7 +277,7 @@ def relative(place: PlaceMotion, other: PlaceMotion, quantity: str) -> Array:
     elif quantity == "rotation-vector":
         turned = np.einsum("tba,tbc->tac", other.axes, place.axes)
         return np.asarray(Rotation.from_matrix(turned).as_rotvec())
-    else:  # acceleration: of the point against the axes that turn
+    else:  # acceleration of the point relative to the rotating axes
         alpha = np.zeros_like(d) if other.alpha is None else other.alpha
         slip = place.velocity - other.velocity - np.cross(other.omega, d)
         seen = (
@@ -293,10 +293,10 @@ def relative(place: PlaceMotion, other: PlaceMotion, quantity: str) -> Array:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class AngleSensor:
-    """The angle by which marker B has turned against marker A about an axis of A, with all its turns.
+    """The rotation angle of marker B relative to marker A about an axis of A, counted through full turns.
 
-    A run counts the turns of the sensors that its system has, step by step; a sensor made later goes by the rates at
-    the outputs, and refuses where these are too far apart.
+    A run counts the turns for the sensors of its system in every step. A sensor defined later follows the rates at the
+    outputs, and raises an error if these are too far apart.
     """
 
     name: str
@@ -318,7 +318,7 @@ class AngleSensor:
         return Measurement(self.name, trajectory.t, {"angle": angle}, {"angle": "rad"})
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the angle by small motions: C (Y · dD) - S (X · dD) over C² + S², dD = (theta_B - theta_A) × D."""
+        """Return the angle by small motions: (C (Y · dD) - S (X · dD)) / (C² + S²), dD = (theta_B - theta_A) × D."""
         a, b = (
             small_place(small, f"sensor {self.name!r}: {key}", marker)
             for key, marker in (("marker_a", self.marker_a), ("marker_b", self.marker_b))
@@ -330,7 +330,7 @@ class AngleSensor:
         return scalar_columns({"angle": (b.turned - a.turned).turned(across)}, {"angle": "rad"})
 
     def counted_angle(self, system: System) -> CountedAngle:
-        """Return the angle as a run counts its turns: that of the bodies, undeformed."""
+        """Return the angle whose turns a run counts, for the undeformed bodies."""
         ends = [
             frame_marker(system, where, marker) if is_at_node(system, marker) else find_marker(system, where, marker)
             for marker, where in (
@@ -345,7 +345,7 @@ class AngleSensor:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class DisplacementSensor:
-    """Elastic displacement of an interface or node of a flexible body, in axes of its frame B, all modes included."""
+    """Elastic displacement of an interface or node of a flexible body, in axes of its frame B, from all modes."""
 
     name: str
     marker: Marker  #: an interface, or a kept node by number or position
@@ -358,7 +358,7 @@ class DisplacementSensor:
         return Measurement(self.name, trajectory.t, columns, units)
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return x, y, z and size by small motions."""
+        """Return x, y, z and size as functions of small motions."""
         body, shape = self.shape_of(small.system)
         q = small.now.body(body.name).q[0]
         rows = small.coordinates(body.name).turned(shape.shapes(q)[:3])
@@ -371,9 +371,9 @@ class DisplacementSensor:
         if is_at_node(system, self.marker):
             body, found = found_nodes(system, where, self.marker)
             return body, node_shape(body.reduced, found.rows, is_stiffened=False)
-        find_marker(system, where, self.marker)  # names an unknown body or interface
+        find_marker(system, where, self.marker)  # raises for an unknown body or interface
         of_system = next((each for each in system.bodies if each.name == name), None)
         if not isinstance(of_system, FlexibleBody):
             raise ModelError(f"sensor {self.name!r}: body {name!r} is not flexible; it has no elastic displacement")
-        assert self.marker.interface is not None  # so it is found
+        assert self.marker.interface is not None  # ensured by `find_marker`
         return of_system, interface_shape(of_system.reduced, self.marker.interface, is_stiffened=of_system.is_stiffened)

@@ -1,4 +1,4 @@
-"""Sensors of stress and strain on flexible bodies, from the stress modes of their files, static modes included."""
+"""Sensors of stress and strain on flexible bodies, from all stress modes of their files, including static modes."""
 
 from dataclasses import dataclass
 
@@ -29,9 +29,9 @@ from floatframe.system import System
 __all__ = ["ElongationSensor", "StrainGauge", "StressSensor", "VonMisesSensor", "address_of"]
 
 UNLOADED = "von Mises' stress has no slope where there is no stress"
-#: von Mises' stress is the root of sᵀ P s, s = xx, yy, zz, yz, xz, xy; this is the block of the first three
+#: the von Mises stress is the root of sᵀ P s, s = xx, yy, zz, yz, xz, xy; this is the block of the first three
 MISES = np.array([[1, -0.5, -0.5], [-0.5, 1, -0.5], [-0.5, -0.5, 1]])
-ROUNDING = 1e-12  #: of a stress beside those of which it is the sum
+ROUNDING = 1e-12  #: relative to the terms of the sum; smaller stresses are rounding errors
 
 
 def flexible_body(system: System, sensor: str, name: str) -> FlexibleBody:
@@ -67,7 +67,7 @@ def modes_at(
 
 
 def address_of(sensor: "StressSensor | StrainGauge | VonMisesSensor") -> Address | None:
-    """Return where a sensor measures on the surface; None: at a stress point, or all over.
+    """Return the address on the surface at which a sensor measures; None: a stress point, or the whole body.
 
     Raises
     ------
@@ -92,14 +92,14 @@ def require_one_place(sensor: "StressSensor | StrainGauge") -> None:
 
 
 def with_position(sensor: "StressSensor | StrainGauge") -> None:
-    """Check and freeze the position of a sensor, where it has one."""
+    """Validate and freeze the position of a sensor, if it has one."""
     if sensor.position is not None:
         position = array_of_shape(f"sensor {sensor.name!r}: position", sensor.position, (3,))
         object.__setattr__(sensor, "position", position)
 
 
 def von_mises_rows(modes: Array, q: Array, coordinates: Rows) -> Rows | None:
-    """Return the row of von Mises' stress about a stress modes @ q, (6,), or None where that is zero."""
+    """Return the row of the von Mises stress about the stress modes @ q, (6,); None if that stress is zero."""
     stress = modes @ q
     value = float(von_mises(stress[None])[0])
     if value <= ROUNDING * float(np.linalg.norm(modes) * np.linalg.norm(q)):
@@ -111,27 +111,27 @@ def von_mises_rows(modes: Array, q: Array, coordinates: Rows) -> Rows | None:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class StressSensor:
-    """Stress at a node or stress point: six components in axes of the body frame, and von Mises'.
+    """Stress at a node or stress point: six components in axes of the body frame, and the von Mises stress.
 
-    Where several points are meant (an element, a set, the skin round a node of a beam or shell), it is the one of them
-    that has the largest von Mises stress of the motion.
+    If several points are meant (an element, a set, the skin around a node of a beam or shell), the one with the largest
+    von Mises stress during the motion is measured.
     """
 
     name: str
     body: str
-    position: Array | None = None  #: mesh axes; the kept node there, (3,) [m]
-    point: str | None = None  #: or a stress point of the file by its name
-    node: int | str | None = None  #: or a node by the user's number
-    element: int | str | None = None  #: or an element on the surface by its number
-    set: str | None = None  #: or a set by its name
-    tolerance: float = TOLERANCE  #: how far the node may be from the position, of the size of the body
+    position: Array | None = None  #: position in mesh axes, where a kept node must be, (3,) [m]
+    point: str | None = None  #: alternatively, the name of a stress point of the file
+    node: int | str | None = None  #: alternatively, the user's number of a node
+    element: int | str | None = None  #: alternatively, the number of an element on the surface
+    set: str | None = None  #: alternatively, the name of a set
+    tolerance: float = TOLERANCE  #: largest distance of the node from the position, relative to the size of the body
 
     def __post_init__(self) -> None:
         with_position(self)
         require_one_place(self)
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
-        """Return the components and von Mises' stress over time."""
+        """Return the components and the von Mises stress over time."""
         body = flexible_body(system, self.name, self.body)
         require_same_modes(trajectory, self.body, body.reduced)
         modes, places = self.modes_of(body, trajectory)
@@ -142,7 +142,7 @@ class StressSensor:
         return Measurement(self.name, trajectory.t, columns, units, places)
 
     def modes_of(self, body: FlexibleBody, trajectory: Trajectory) -> tuple[Array, tuple[str, ...]]:
-        """Return the stress modes of the place, (6, n_q), and words for it; of several the worst of a motion."""
+        """Return stress modes, (6, n_q), and description of the point; of several points, that of largest stress."""
         address = address_of(self)
         if address is None:
             return modes_at(body, self.name, None, self.point), ()
@@ -155,7 +155,7 @@ class StressSensor:
         return np.asarray(modes[row]), (f"{found.words()}; measured at node {body.reduced.node_name(row)}",)
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the components by small motions, and von Mises' stress where there is a stress."""
+        """Return the components as functions of small motions, and the von Mises stress if the stress is not zero."""
         body = flexible_body(small.system, self.name, self.body)
         (modes, _), q = self.modes_of(body, small.now), small.coordinates(self.body)
         rows = q.turned(modes)
@@ -170,13 +170,13 @@ class StressSensor:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class VonMisesSensor:
-    """The largest von Mises stress of a body, or of one place on it, over its kept nodes, and at which node it is."""
+    """The largest von Mises stress of a body, or of a part of it, over its kept nodes, and the node of this stress."""
 
     name: str
     body: str
-    node: int | str | None = None  #: only at this node, by the user's number
-    element: int | str | None = None  #: only at this element on the surface
-    set: str | None = None  #: only at the nodes of this set
+    node: int | str | None = None  #: restricts it to this node, by the user's number
+    element: int | str | None = None  #: restricts it to this element on the surface
+    set: str | None = None  #: restricts it to the nodes of this set
     tolerance: float = TOLERANCE
 
     def __post_init__(self) -> None:
@@ -185,8 +185,8 @@ class VonMisesSensor:
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return the largest stress over time, and the number of its node in the user's mesh.
 
-        Without numbers (an older file) the column says that it holds the index in the model; where instances have the
-        same numbers, a further column counts the instance.
+        If there are no numbers (an older file), the column is named as the index in the model. If instances have equal
+        numbers, a further column contains the index of the instance.
         """
         body = flexible_body(system, self.name, self.body)
         reduced, address = body.reduced, address_of(self)
@@ -208,7 +208,7 @@ class VonMisesSensor:
         return Measurement(self.name, trajectory.t, columns, units, (*((found.words(),) if found else ()), *words))
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return von Mises' stress by small motions at the node where it is largest now."""
+        """Return the von Mises stress as a function of small motions, at the node where it is largest now."""
         body = flexible_body(small.system, self.name, self.body)
         units = dict(self.measure(small.system, small.now).units)
         address = address_of(self)
@@ -223,7 +223,7 @@ class VonMisesSensor:
 
 
 def node_words(reduced: ReducedBody, row: int) -> str:
-    """Say name and place of a kept node, in mesh axes."""
+    """Return name and position (mesh axes) of a kept node, as text."""
     x = reduced.frame.origin + reduced.frame.axes @ reduced.nodes[row]
     return f"node {reduced.node_name(row)} at [{', '.join(f'{value:.6g}' for value in x)}]"
 
@@ -231,7 +231,7 @@ def node_words(reduced: ReducedBody, row: int) -> str:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class StrainGauge:
-    """Strain along a direction at a node, from its stress by Hooke's law of an isotropic material.
+    """Strain along a direction at a node, computed from its stress by Hooke's law of an isotropic material.
 
     epsilon = ((1 + nu) d·sigma d - nu tr(sigma)) / E
     """
@@ -241,10 +241,10 @@ class StrainGauge:
     direction: Array  #: mesh axes, (3,)
     young: float  #: [Pa]
     poisson: float
-    position: Array | None = None  #: mesh axes; the kept node there, (3,) [m]
-    point: str | None = None  #: or a stress point of the file by its name
-    node: int | str | None = None  #: or a node by the user's number
-    tolerance: float = TOLERANCE  #: how far the node may be from the position, of the size of the body
+    position: Array | None = None  #: position in mesh axes, where a kept node must be, (3,) [m]
+    point: str | None = None  #: alternatively, the name of a stress point of the file
+    node: int | str | None = None  #: alternatively, the user's number of a node
+    tolerance: float = TOLERANCE  #: largest distance of the node from the position, relative to the size of the body
 
     def __post_init__(self) -> None:
         where = f"sensor {self.name!r}"
@@ -262,14 +262,14 @@ class StrainGauge:
         return Measurement(self.name, trajectory.t, {"strain": strain}, {"strain": "-"})
 
     def strain_modes(self, body: FlexibleBody) -> Array:
-        """Return the strain by the modal coordinates, (n_q,)."""
+        """Return the strain per modal coordinate, (n_q,)."""
         modes = modes_at(body, self.name, None, self.point, address=address_of(self))
         x, y, z = self.direction @ body.reduced.frame.axes
         along = np.array([x * x, y * y, z * z, 2 * y * z, 2 * x * z, 2 * x * y]) @ modes
         return np.asarray(((1 + self.poisson) * along - self.poisson * modes[:3].sum(axis=0)) / self.young)
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the strain by small motions."""
+        """Return the strain as a function of small motions."""
         body = flexible_body(small.system, self.name, self.body)
         row = small.coordinates(self.body).turned(self.strain_modes(body))
         return scalar_columns({"strain": row}, {"strain": "-"})
@@ -278,18 +278,20 @@ class StrainGauge:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ElongationSensor:
-    """Change of the distance between two nodes of a body over that distance: an extensometer; needs no stress modes.
+    """An extensometer: change of the distance between two nodes, divided by the distance; needs no stress modes.
 
-    To first order, as the strains of the body are: e · (u_b - u_a) / |d| along the undeformed line d = |d| e. A turn of
-    the place by theta moves b across the line, by |d| theta, and back along it by |d| theta²/2, which displacements of
-    first order lack and quadratic modes have; the distance of displaced nodes would count it as strain.
+    It is of first order, like the strains of the body: e · (u_b - u_a) / |d| along the undeformed line d = |d| e. A
+    local rotation by theta moves b by |d| theta across the line, and back along it by |d| theta²/2. First-order
+    displacements lack the latter part, quadratic modes contain it; the distance of the displaced nodes would count it
+    as strain.
     """
 
     name: str
     body: str
-    position_a: Array | Address  #: mesh axes, (3,) [m]: the kept node there; or its address, such as a number
+    #: position in mesh axes, (3,) [m], where a kept node must be, or an address such as a node number
+    position_a: Array | Address
     position_b: Array | Address
-    tolerance: float = TOLERANCE  #: how far nodes may be from positions, of the size of the body
+    tolerance: float = TOLERANCE  #: largest distance of nodes from positions, relative to the size of the body
 
     def __post_init__(self) -> None:
         for key in ("position_a", "position_b"):
@@ -298,7 +300,7 @@ class ElongationSensor:
                 object.__setattr__(self, key, array_of_shape(f"sensor {self.name!r}: {key}", given, (3,)))
 
     def ends(self, body: FlexibleBody) -> tuple[FoundNodes, FoundNodes]:
-        """Return the kept nodes at both ends; of an element or set the mean of its nodes."""
+        """Return the kept nodes at both ends; for an element or set, the mean of its nodes is used."""
         a, b = (
             found_at(
                 body,
@@ -318,7 +320,7 @@ class ElongationSensor:
         return Measurement(self.name, trajectory.t, {"strain": strain}, {"strain": "-"})
 
     def line(self, body: FlexibleBody) -> tuple[Array, Array]:
-        """Return the line from node to node, undeformed, (3,), and its change by the modal coordinates, (3, n_q)."""
+        """Return the undeformed line from node to node, (3,), and its derivative by the modal coordinates, (3, n_q)."""
         reduced: ReducedBody = body.reduced
         a, b = (each.rows for each in self.ends(body))
         if np.array_equal(a, b):
@@ -327,7 +329,7 @@ class ElongationSensor:
         return np.asarray(reduced.nodes[b].mean(axis=0) - reduced.nodes[a].mean(axis=0)), by_q
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the strain by small motions."""
+        """Return the strain as a function of small motions."""
         body = flexible_body(small.system, self.name, self.body)
         d, by_q = self.line(body)
         row = small.coordinates(self.body).turned(d @ by_q / (d @ d))

@@ -1,4 +1,4 @@
-"""Which places the sensors of a system take, in words: what was asked for, the node that stands for it, how far off."""
+"""Descriptions of the points that sensors use: the requested place, the node used for it, and their distance."""
 
 from floatframe.bodies.markers import Marker
 from floatframe.results.sensors import (
@@ -20,19 +20,19 @@ __all__ = ["taken_places"]
 
 
 def taken_places(system: System) -> dict[str, tuple[str, ...]]:
-    """Return the places on flexible bodies that sensors take which name no interface, by sensor; none of the others.
+    """Return, by sensor, the points on flexible bodies that are not interfaces; sensors without any are omitted.
 
     Raises
     ------
     ModelError
-        If a sensor names a node, element or set that is not kept, or no kept node is at its position.
+        If a sensor refers to a node, element or set that is not kept, or no kept node is at its position.
     """
     found = {sensor.name: places_of(system, sensor) for sensor in sensors_of(system)}
     return {name: words for name, words in found.items() if words}
 
 
 def places_of(system: System, sensor: Sensor) -> tuple[str, ...]:
-    """Return the places of one sensor in words."""
+    """Return descriptions of the points of a sensor."""
     where = f"sensor {sensor.name!r}"
     if isinstance(sensor, StressSensor | StrainGauge | VonMisesSensor):
         body, address = flexible_body(system, sensor.name, sensor.body), address_of(sensor)
