@@ -1,6 +1,7 @@
 """`cms split`: the job of one body becomes jobs of its parts, and a system that joins them."""
 
 import json
+import logging
 import os
 import re
 from collections.abc import Mapping
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from fe_models.meshes.split import Cut
 
 __all__ = ["SplitRequest", "direction_of", "places_of", "split_job"]
+
+log = logging.getLogger(__name__)
 
 CUT_KINDS = ("rigid", "distributing")
 COORDINATE = 1e-9  #: largest difference between coordinates of the same node, relative to the mesh size
@@ -84,6 +87,7 @@ def split_job(request: SplitRequest) -> list[Path]:
     split = split_mesh(mesh, request.n, at=request.at, axis=request.axis)
     names_of_cuts = [cut.name for cut in split.cuts]
     homes = homes_of(job, mesh, split.parts, names_of_cuts)
+    stiff = stiffness_damping(job)
     files: dict[Path, str] = {}
     for k, part in enumerate(split.parts):
         document = tomlkit.parse(request.job.read_text(encoding="utf-8-sig"))
@@ -93,12 +97,54 @@ def split_job(request: SplitRequest) -> list[Path]:
             cuts=[split.cuts[j] for j in (k - 1, k) if 0 <= j < len(split.cuts)],
             inside=[name for name, home in homes.items() if home == k],
         )  # fmt: skip
+        if stiff is not None:
+            table = tomlkit.table()
+            table.add(tomlkit.comment(stiff.words))
+            table["beta"] = stiff.beta
+            document["damping"] = table
         files[folder / f"part_{k + 1}.toml"] = tomlkit.dumps(document)
     files[folder / "system.toml"] = system_text(job, len(split.parts))
+    if stiff is not None:
+        log.warning("damping: %s", stiff.words)
     folder.mkdir(parents=True, exist_ok=True)
     for path, text in files.items():
         replace_file(path, text.encode())
     return list(files)
+
+
+@dataclass(frozen=True)
+class StiffnessDamping:
+    """Damping of the parts in the place of ratios of the modes of the whole."""
+
+    beta: float  #: D = beta K, in the unit of time of the job
+    words: str
+
+
+def stiffness_damping(job: Job) -> StiffnessDamping | None:
+    """Return D = beta K with the ratio of the first elastic mode of the whole; None where the job has no ratios.
+
+    Ratios belong to modes of one body. Those of a part lie far above the first ones of the whole, which would keep a
+    small fraction of their damping. D = beta K is the same in parts and in one piece.
+    """
+    from cms.jobs.reduce_job import reduce_job
+    from cms.reduced_basis.damping import PerModeDamping, RayleighDamping, damping_ratios
+
+    damping = None if job.damping is None else job.damping.damping
+    if damping is None or isinstance(damping, RayleighDamping):
+        return None
+    whole = reduce_job(job.model_copy(update={"damping": None}))
+    omega = 2 * np.pi * float(np.asarray(whole.free_frequencies)[0])
+    if isinstance(damping, PerModeDamping):
+        ratio = damping.ratios[0]
+    else:
+        ratio = float(damping_ratios(damping, np.ones(1), np.array([omega**2]), whole.units.time)[0])
+    hertz = omega / (2 * np.pi * whole.units.time)
+    words = (
+        f"ratios belong to modes of one body: in the parts they became stiffness damping; the first elastic mode of "
+        f"{job.body.name!r} in one piece, {hertz:.4g} Hz, keeps its ratio {ratio:g}, others get one in proportion to "
+        "their frequency"
+    )
+    return StiffnessDamping(float(2 * ratio / omega), words)
 
 
 def mesh_of(job: Job) -> Any:

@@ -145,6 +145,29 @@ def test_a_beam_of_stiffened_parts_spins_up_as_the_whole_one(beam):
     assert_allclose(tips[1], tips[0], rtol=0, atol=2e-4)
 
 
+@pytest.mark.parametrize(
+    "table", ["ratio = 0.03", "ratios = [0.03, 0.5]", "ramp = [[2000, 0.03]]\nabove = 0.2", "beta = 1e-5"]
+)
+def test_the_first_mode_keeps_its_damping_in_parts(beam, caplog, table):
+    """In one piece D = beta K has the same modes: ratio beta omega / 2, of which the first is what was asked for."""
+    job = beam(n_modes=8)
+    text = job.read_text()
+    text = text[: text.index("[masses.bob]")] + text[text.index("[load_cases") :]
+    job.write_text(text + f"\n[damping]\n{table}\n")
+    files = split_job(SplitRequest(job, 3))
+    system = reduced_parts(files)
+    modes = system_modes(linearize(system, static_equilibrium(system)))
+    elastic = np.asarray(modes.frequencies) > 1.0
+    f, zeta = np.asarray(modes.frequencies)[elastic], np.asarray(modes.damping_ratios)[elastic]
+    whole = reduce_job(read_job(job))
+    first = float(whole.free_frequencies[0])
+    wanted = 0.03 if table != "beta = 1e-5" else np.pi * 1e-5 * first
+    assert_allclose(zeta[:4], wanted * f[:4] / first, rtol=2e-2)
+    told = any("ratios belong to modes of one body" in record.getMessage() for record in caplog.records)
+    assert told == (table != "beta = 1e-5")
+    assert ("keeps its ratio 0.03" in files[0].read_text()) == told
+
+
 SOLID = """
 [body]
 mesh = "{mesh}"
