@@ -1,4 +1,4 @@
-"""The command line `floatframe`: compute a motion, look at it, plot and animate it."""
+"""The command line `floatframe`, which computes, analyses, plots and animates motions."""
 
 __all__ = ["main"]
 

@@ -1,4 +1,4 @@
-"""`python -m floatframe.cli` is the command `floatframe`, where its script is not on the path."""
+"""`python -m floatframe.cli` is equivalent to the command `floatframe`, if its script is not on the path."""
 
 from floatframe.cli import main
 

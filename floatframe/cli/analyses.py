@@ -1,4 +1,4 @@
-"""The commands that analyse a system without its motion: static, eig, campbell."""
+"""The commands that analyse a system without a motion: static, eig, campbell."""
 
 import json as json_module
 from pathlib import Path
@@ -52,7 +52,7 @@ def static_command(system: SystemArgument, formulation: Formulation = None, json
     rest = static_equilibrium(model, formulation=form)
     try:
         is_stable = system_modes(linearize(model, rest, formulation=form)).is_stable
-    except ModelError:  # nothing can move
+    except ModelError:  # there are no degrees of freedom
         is_stable = True
     record = equilibrium_record(model, rest) | {"is_stable": is_stable}
     if json:
@@ -183,10 +183,10 @@ def campbell_command(
         list[str], typer.Option("--out", "-m", help="A name of [outputs] or [sensors], sensor.column; repeatable.")
     ] = [],  # noqa: B006
 ) -> None:
-    """Campbell diagram: frequencies of a steadily turning system over its speed, and what its outputs show there.
+    """Campbell diagram: frequencies of a steadily rotating system over its speed, with the steady values of outputs.
 
-    Outputs are those of the table [outputs] of the system, unless named: their steady values at the speeds, such as
-    bearing forces, are printed, are columns of a .csv and panels below the diagram.
+    Outputs are those of the table [outputs] of the system, unless named. Their steady values at the speeds, such as
+    bearing forces, are printed, and written as columns of a .csv or as panels below the diagram.
 
     Example: floatframe campbell rotor.toml --speeds 0:200:21 --axis z -o rotor.png
 
@@ -236,7 +236,7 @@ def campbell_command(
 
 
 def print_steady(locus: "Locus", time: str) -> None:
-    """Print the steady values of outputs: at the first and the last speed, and the largest in size with its speed."""
+    """Print the steady values of outputs at the first and last speed, and the value of largest magnitude."""
     rows = []
     for name, unit, values in zip(locus.outputs, locus.output_units, locus.steady.T, strict=True):
         k = int(abs(values).argmax())
@@ -252,7 +252,7 @@ def print_steady(locus: "Locus", time: str) -> None:
 def draw_mode_film(
     model: "System", about: "Equilibrium", modes: "SystemModes", k: int, path: Path, color: "BodyColor"
 ) -> None:
-    """Draw a mode into a film, or a picture where the name of the file ends like one."""
+    """Draw a mode into a film, or into a picture if the file name has the ending of one."""
     from floatframe.pictures.mode_film import animate_mode, draw_mode
 
     with stages(remaining=True) as clock, clock(f"film of mode {k}") as advance:
@@ -269,7 +269,7 @@ def read(path: Path) -> "System":
 
 
 def read_in_formulation(path: Path, formulation: str | None) -> "tuple[System, str]":
-    """Return the system of a file and the formulation that is asked for, else that of its table [run], or absolute."""
+    """Return the system of a file, and the requested formulation, else that of its table [run], else absolute."""
     from floatframe.system_file.read_system import read_system
     from floatframe.system_file.run_section import formulation_of
 
@@ -282,7 +282,7 @@ def read_in_formulation(path: Path, formulation: str | None) -> "tuple[System, s
 
 
 def tell_left_out(system: "System") -> None:
-    """Tell which bodies came without geometric stiffness because nobody asked for one so large."""
+    """Report bodies whose geometric stiffness was omitted because it would have been very large."""
     from floatframe.bodies.flexible_body import FlexibleBody
 
     for body in system.bodies:
@@ -349,7 +349,7 @@ def speed_range(text: str) -> Any:
 
 
 def equilibrium_record(system: "System", rest: "Equilibrium") -> dict[str, Any]:
-    """Return an equilibrium in plain types: places of the bodies, reactions in ground axes, what sensors measure."""
+    """Return an equilibrium in plain types: positions of the bodies, reactions in ground axes, measurements."""
     import numpy as np
 
     from floatframe.analyses.snapshot import snapshot
@@ -373,7 +373,7 @@ def equilibrium_record(system: "System", rest: "Equilibrium") -> dict[str, Any]:
         )
     reactions = []
     for c, name in enumerate(names):
-        if model.connections.law[c] == ELEMENT:  # whose unknowns are its own: sensors show them
+        if model.connections.law[c] == ELEMENT:  # the unknowns of an element are its own; sensors show them
             continue
         w = rest.w[model.connections.w0[c] : model.connections.w0[c + 1]]
         reactions.append(
@@ -395,7 +395,7 @@ def equilibrium_record(system: "System", rest: "Equilibrium") -> dict[str, Any]:
 
 
 def damping_words(mode: dict[str, Any]) -> str:
-    """Return the damping ratio of a mode in percent, or what else it does."""
+    """Return the damping ratio of a mode in percent, or its behaviour if it does not oscillate."""
     ratio = mode["damping_ratio"]
     if ratio < -1e-9:
         return f"grows, {mode['eigenvalue'][0]:.4g} /s"
@@ -405,6 +405,6 @@ def damping_words(mode: dict[str, Any]) -> str:
 
 
 def moving_words(mode: dict[str, Any]) -> str:
-    """Say which bodies carry the kinetic energy of a mode."""
+    """Return the bodies that carry the kinetic energy of a mode, as text."""
     shares = sorted(mode["energy_shares"].items(), key=lambda item: -item[1])
     return ", ".join(f"{name} {100 * share:.0f} %" for name, share in shares[:3] if share >= 0.005)

@@ -1,4 +1,4 @@
-"""The commands of `floatframe`; each imports what it needs when it runs, so that --help answers at once."""
+"""The commands of `floatframe`; each imports its modules when it runs, so that --help responds at once."""
 
 import time
 from pathlib import Path
@@ -58,7 +58,7 @@ def run_command(
 ) -> None:
     """Compute the motion of a system.
 
-    Without -o the results stand beside the system file: swing.toml gives swing.h5.
+    Without -o, the results are written next to the system file: swing.toml gives swing.h5.
 
     Example: floatframe run swing.toml -o swing.h5
     """
@@ -98,9 +98,9 @@ def resume_command(
     system: Annotated[Path, typer.Argument(help="System file (TOML) of the run that was interrupted.")],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Results file the run was to write.")] = None,
 ) -> None:
-    """Go on with a run that was interrupted or killed, to the motion it would have become.
+    """Continue a run that was interrupted or killed; the motion is that of an uninterrupted run.
 
-    Without -o the results stand beside the system file: swing.toml gives swing.h5.
+    Without -o, the results are next to the system file: swing.toml gives swing.h5.
 
     Example: floatframe resume swing.toml -o swing.h5
     """
@@ -119,7 +119,7 @@ def resume_command(
 
 
 def compute(name: str, path: Path, run: "Callable[[Callable[[Progress], None]], Trajectory]") -> None:
-    """Run a motion with a progress bar; print what it is, or where the part of it is that an interruption left."""
+    """Run a motion with a progress bar; print a summary, or the location of the partial results if interrupted."""
     from floatframe.results.results_file import segments_folder
 
     try:
@@ -141,7 +141,7 @@ def compute(name: str, path: Path, run: "Callable[[Callable[[Progress], None]], 
 
 
 def load_kernels(clock: "Stages") -> None:
-    """Load the compiled code; say so while it is compiled, which happens once after an installation."""
+    """Load the compiled code; report if it is being compiled, which happens once after an installation."""
     began = time.perf_counter()
     with clock("compiled code (made at first use)"):
         from floatframe.kernels.compiler.choice import words
@@ -156,7 +156,7 @@ def load_kernels(clock: "Stages") -> None:
 
 
 def print_run(trajectory: "Trajectory") -> None:
-    """Print what a motion is, what it took, and how good it is."""
+    """Print a summary of a motion, its cost and its accuracy."""
     from floatframe.cli.record import run_record
 
     record = run_record(trajectory, known_system(trajectory))
@@ -231,7 +231,7 @@ def print_run(trajectory: "Trajectory") -> None:
 
 
 def known_system(trajectory: "Trajectory") -> "System | None":
-    """Return the system of a motion from the file its results name; None, with a note, where that cannot be read."""
+    """Return the system of a motion from the file its results name; None, with a note, if that cannot be read."""
     from cms.errors import CmsError
     from floatframe.errors import FloatframeError
     from floatframe.system_file.recorded_system import recorded_system
@@ -244,13 +244,13 @@ def known_system(trajectory: "Trajectory") -> "System | None":
 
 
 def body_words(body: dict[str, Any]) -> str:
-    """Return name, number of modes and whether it is stiffened."""
+    """Return name, number of modes and stiffening of a body, as text."""
     stiffened = ", stiffened" if body["is_stiffened"] else ""
     return f"{body['name']} ({body['n_modes']} modes{stiffened})"
 
 
 def step_words(run: dict[str, Any], second: str) -> str:
-    """Return the step size, or what stands for it where the step is controlled."""
+    """Return the step size, or the tolerances if the step is controlled, as text."""
     if run.get("error_tolerance") is not None:
         return f"as the error allows, up to {run['h']:.6g} {second}"
     return f"{run['h']:.6g} {second}"
@@ -281,9 +281,9 @@ def info_command(
     file: Annotated[Path, typer.Argument(help="A results file (.h5), a system file (.toml) or a robot (.urdf).")],
     json: Annotated[bool, typer.Option("--json", help="Write the same record as JSON, for other programs.")] = False,
 ) -> None:
-    """Show what is in a results file: system, run, energy balance, drift of the joints.
+    """Show the contents of a results file: system, run, energy balance, constraint errors of the joints.
 
-    Of a system file it tells the mobility, of a robot its links and joints.
+    For a system file, its mobility is shown; for a robot, its links and joints.
 
     Example: floatframe info swing.h5 --json
     """
@@ -308,7 +308,7 @@ def info_command(
 
 
 def print_mobility(path: Path, *, as_json: bool) -> None:
-    """Print the mobility of a system file: counted, true, and constraints that repeat others."""
+    """Print the mobility of a system file: by count and true, and redundant constraints."""
     from floatframe.bodies.flexible_body import FlexibleBody
     from floatframe.start.initial import mobility
     from floatframe.system_file.read_system import read_system
@@ -369,7 +369,7 @@ def plot_command(
 ) -> None:
     """Plot the motion: positions, energies, elastic displacement, reactions, energy error, joint drift, sensors.
 
-    Without -o the picture stands beside the results: swing.h5 gives swing.png.
+    Without -o, the picture is written next to the results: swing.h5 gives swing.png.
 
     Example: floatframe plot swing.h5 -o swing.png
 
@@ -431,9 +431,9 @@ def animate_command(
     fps: Annotated[float, typer.Option(help="Frames a second.")] = 25.0,
     color: Annotated[str, typer.Option(help="Colour of flexible bodies: displacement or von-mises.")] = "displacement",
 ) -> None:
-    """Draw the motion into a film: deformed bodies, coloured by elastic displacement or stress; needs no display.
+    """Make a film of the motion: deformed bodies, coloured by elastic displacement or stress; needs no display.
 
-    Without -o the film stands beside the results: swing.h5 gives swing.gif.
+    Without -o, the film is written next to the results: swing.h5 gives swing.gif.
 
     Example: floatframe animate swing.h5 -o swing.mp4
 
@@ -454,7 +454,7 @@ def animate_command(
     )
     bodies: dict[str, ReducedBody | RigidBody] = {**bodies_of(trajectory)}
     system = known_system(trajectory)
-    if system is not None:  # boxes of the inertia of rigid bodies, instead of cubes
+    if system is not None:  # boxes with the inertia of rigid bodies, instead of cubes
         bodies |= {body.name: body for body in system.bodies if isinstance(body, RigidBody)}
     with stages(remaining=True) as clock, clock("film") as advance:
         animate(
@@ -479,7 +479,7 @@ def export_command(
 ) -> None:
     """Write a motion for other programs: a table with all sensors, or deformed surfaces with stress for ParaView.
 
-    Without -o a table stands beside the results: swing.h5 gives swing.csv.
+    Without -o, a table is written next to the results: swing.h5 gives swing.csv.
 
     Example: floatframe export swing.h5 -o swing.csv
 

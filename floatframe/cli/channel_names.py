@@ -12,12 +12,12 @@ DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 
 
 def chosen(system: "System", texts: list[str], default: Any) -> Any:
-    """Return the channels named on the command line, or those of the system."""
+    """Return the channels named on the command line, else those of the system."""
     return tuple(channel_of(system, text) for text in texts) if texts else tuple(default)
 
 
 def channel_of(system: "System", text: str) -> "AnyInput | AnyOutput":
-    """Return a channel by the name of an input or output, "joint.coordinate" or "body/interface:component"."""
+    """Return a channel by name: an input or output, "joint.coordinate" or "body/interface:component"."""
     import numpy as np
 
     from fe_models.foundation.words import nearest
@@ -56,7 +56,7 @@ def channel_of(system: "System", text: str) -> "AnyInput | AnyOutput":
 
 
 def drivers(system: "System") -> "dict[str, AnyInput]":
-    """Return forces.NAME.amplitude, forces.NAME.motor and joints.NAME.COORDINATE (a drive), as [fmu] names them."""
+    """Return forces.NAME.amplitude, forces.NAME.motor and joints.NAME.COORDINATE (a drive), named as in [fmu]."""
     from floatframe.analyses import DriveMotion, ForceInput
     from floatframe.analyses.linear.force_inputs import forces_with_amplitude
     from floatframe.forces import JointForce

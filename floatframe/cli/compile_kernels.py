@@ -1,8 +1,8 @@
-"""Compile kernels before they are needed: `python -m floatframe.cli.compile_kernels [part ...]`; without parts, motion.
+"""Compile kernels in advance: `python -m floatframe.cli.compile_kernels [part ...]`; without parts, those of motions.
 
-Numba compiles them once on a machine and keeps them, each part on one core; a process beside can do that while another
-core works on something else. Kernels have one signature, so that any system makes all of a part. The last line that is
-printed says what was done, as JSON: `{"compiled": true, "seconds": 12.3}`.
+Numba compiles the kernels once per machine and caches them, each part on one core. A separate process can compile while
+another core does other work. Kernels have a single signature, so any system compiles all kernels of a part. The last
+printed line reports the result as JSON: `{"compiled": true, "seconds": 12.3}`.
 """
 
 import json
@@ -26,18 +26,18 @@ def make_motion() -> None:
 
 
 def make_relative() -> None:
-    """Move it in the coordinates of joints too; these kernels come after those of the motion, which they need."""
+    """Move it also in joint coordinates; these kernels need those of the motion."""
     make_motion()
     integrate(block(), GeneralizedAlpha(), 1e-3, 1e-3, formulation="relative")
 
 
 def make_schemes() -> None:
-    """Move it by a conserving scheme, whose loop serves the variational one as well."""
+    """Move it by an energy-conserving scheme, whose loop is also that of the variational scheme."""
     integrate(block(), EnergyMomentum(), 1e-3, 1e-3)
 
 
 def make_recursion() -> None:
-    """Give its equations of motion by recursion."""
+    """Compute its equations of motion by recursion."""
     from floatframe import relative_model
 
     model = relative_model(block())
@@ -45,7 +45,7 @@ def make_recursion() -> None:
 
 
 def make_cholesky() -> None:
-    """Factorise a matrix by the fronts of this package, which serve where no other solver for large matrices is."""
+    """Factorise a matrix by the fronts of this package, which are used if no other sparse solver is installed."""
     import scipy.sparse as sp
 
     from cms.sparse_cholesky.factor import CholeskyFactor
@@ -59,7 +59,7 @@ def make_cholesky() -> None:
 
 
 def make_reduction() -> None:
-    """Reduce the shipped rod: assembly, stress and geometric stiffness of solids."""
+    """Reduce the shipped rod, with assembly, stress and geometric stiffness of solids."""
     import cms
     from cms.cli.demo import put_inputs
 
@@ -73,7 +73,7 @@ def block() -> System:
     return System([RigidBody("block", 1.0, np.eye(3))])
 
 
-#: what is compiled for itself: a word for the user, and a function that needs it
+#: separately compiled parts: a name for the user, and a function that needs the part
 PARTS: dict[str, tuple[str, Callable[[], None]]] = {
     "motion": ("motions, equilibria, linearisation", make_motion),
     "relative": ("motions in the coordinates of joints", make_relative),
@@ -85,7 +85,7 @@ PARTS: dict[str, tuple[str, Callable[[], None]]] = {
 
 
 def main(parts: Sequence[str] = ()) -> None:
-    """Make the parts, and say whether anything was compiled."""
+    """Compile the parts, and report whether anything was compiled."""
     began = time.perf_counter()
     with install_recorder("numba:compile") as recorder:
         for part in parts or ("motion",):

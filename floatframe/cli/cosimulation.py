@@ -1,4 +1,4 @@
-"""The command fmu: a system as a unit for other programs."""
+"""The command fmu: a system as an FMU for other programs."""
 
 from pathlib import Path
 from typing import Annotated
@@ -9,7 +9,7 @@ from cms.cli.console import guarded, output_path, print_table, say, stages
 
 __all__ = ["register"]
 
-MOST_ROWS = 60  #: printed
+MOST_ROWS = 60  #: largest number of printed rows
 
 
 def register(app: typer.Typer) -> None:
@@ -30,11 +30,11 @@ def fmu_command(
         list[str], typer.Option("--parameter", "-p", help="NAME=KEY.PATH of a number in the file; repeatable.")
     ] = [],  # noqa: B006
 ) -> None:
-    """Write a system as an FMU for co-simulation, which FMPy and other masters run beside their own models.
+    """Write a system as an FMU for co-simulation with FMPy and other masters.
 
-    Without -o arm.toml gives arm.fmu. Inputs, outputs and parameters are those of the table [fmu], unless named here;
-    without either: tables [inputs.NAME], constant forces and drives; all sensors; all numbers of bodies and forces.
-    It needs Python with floatframe where it runs.
+    Without -o, arm.toml gives arm.fmu. Inputs, outputs and parameters are those of the table [fmu], unless named here.
+    Without both, they are the tables [inputs.NAME], constant forces and drives; all sensors; all numbers of bodies and
+    forces. The FMU needs Python with floatframe on the machine where it runs.
 
     Example: floatframe fmu arm.toml -o arm.fmu --fmi 3
 

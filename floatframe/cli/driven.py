@@ -37,9 +37,9 @@ def kinematics_command(
 ) -> None:
     """Positions, velocities and accelerations of a fully driven system, without integrating its motion.
 
-    The prescribed motions of the file must decide where everything is; what they leave free is named. Times are those
-    of the results of a run: t_end, h and output_every of [run]. The results, crank.kinematics.h5 for crank.toml, are
-    as those of a run, for plot, animate and export.
+    The prescribed motions of the file must determine all positions; coordinates that they leave free are named. The
+    output times are those of a run: t_end, h and output_every of [run]. The results, crank.kinematics.h5 for
+    crank.toml, can be used like those of a run for plot, animate and export.
 
     Example: floatframe kinematics crank.toml
     """
@@ -62,10 +62,10 @@ def inverse_command(
     ] = "quasi-static",
     json: Json = False,
 ) -> None:
-    """Inverse dynamics: the forces and torques that drives must give along their motion, and the joint reactions.
+    """Inverse dynamics: the forces and torques that drives must exert in their motion, and the joint reactions.
 
-    Times are those of the results of a run: t_end, h and output_every of [run]. With --elastic dynamic the motion is
-    integrated as by floatframe run, vibrations included.
+    The output times are those of a run: t_end, h and output_every of [run]. With --elastic dynamic, the motion is
+    integrated as by floatframe run, including vibrations.
 
     Example: floatframe inverse crank.toml
 
@@ -107,7 +107,7 @@ def inverse_command(
 
 
 def driven_motion(file: Path, output: Path | None, suffix: str, elastic: str) -> "tuple[System, Trajectory, Path]":
-    """Compute the motion that the drives of a system file decide; return system, motion and where it was written."""
+    """Compute the motion determined by the drives of a system file; return system, motion and path of the results."""
     from fe_models.foundation.words import nearest
     from floatframe.analyses.driven.driven_motion import ELASTICITY
     from floatframe.analyses.driven.kinematics import kinematics
@@ -156,7 +156,7 @@ def coordinates_record(system: "System", motion: "Trajectory") -> dict[str, Any]
 
 
 def coordinate_record(coordinate: "CoordinateMotion", is_driven: bool, units: "Units") -> dict[str, Any]:
-    """Return the range of one coordinate and its rate; with its force if it is driven."""
+    """Return the range of a coordinate and of its rate; with its force if it is driven."""
     import numpy as np
 
     value, rate, force = coordinate.value, coordinate.rate, coordinate.force

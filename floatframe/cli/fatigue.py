@@ -31,8 +31,8 @@ def fatigue_command(
 ) -> None:
     """Damage and life on the surface of a flexible body, from results files of motions or from spectra.
 
-    Without -o a page, a table, a record and a surface stand beside the file: arm.toml gives arm.html, arm.csv, arm.json
-    and arm.vtu.
+    Without -o, a page, a table, a record and a surface are written next to the file: arm.toml gives arm.html, arm.csv,
+    arm.json and arm.vtu.
 
     Example: floatframe fatigue arm.toml
 
@@ -69,7 +69,7 @@ def fatigue_command(
 
 
 def write(made: "Assessment", record: dict[str, Any], path: Path, replace_file: Any) -> None:
-    """Write one file of a result, by its suffix."""
+    """Write a file of a result, in the format of its suffix."""
     from floatframe.fatigue.outputs import csv_of, render_fatigue, vtu_of
 
     kind = path.suffix.lower().removeprefix(".")
@@ -90,7 +90,7 @@ def write(made: "Assessment", record: dict[str, Any], path: Path, replace_file: 
 
 
 def sn_words(curve: dict[str, Any], unit: str) -> str:
-    """Return an S-N curve in a line."""
+    """Return an S-N curve as one line of text."""
     slopes = ", ".join(f"{slope:.4g}" for slope in curve["slope"])
     return (
         f"{curve['amplitude'][0]:.5g} {unit} at {curve['cycles'][0]:.4g} cycles, slopes {slopes}; given in "
@@ -99,7 +99,7 @@ def sn_words(curve: dict[str, Any], unit: str) -> str:
 
 
 def print_fatigue(record: dict[str, Any]) -> None:
-    """Print what was assumed, and the worst nodes."""
+    """Print assumptions and the worst nodes."""
     unit = record["stress_unit"]
     n_points = record["n_points"]
     rows = [

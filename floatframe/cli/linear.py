@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["register"]
 
-MOST_LEFT_OUT = 6  #: columns that are told one by one
+MOST_LEFT_OUT = 6  #: largest number of omitted columns that are listed individually
 
 Inputs = Annotated[
     list[str],
@@ -45,11 +45,11 @@ def linearize_command(
     center: Center = "0,0,0",
     formulation: Formulation = None,
 ) -> None:
-    """Linearise a system: the state space A, B, C, D with names, and M, C, K of its independent motions, into a file.
+    """Linearise a system: the state space A, B, C, D with names, and M, C, K of its independent motions, in a file.
 
-    Inputs and outputs are those of the tables [inputs] and [outputs] of the system, unless named here: sensors by their
-    names, one column of them as sensor.column; a place is written body/interface:component, with x, y, z, rx, ry, rz.
-    With --formulation relative the motions are joint coordinates and modes, less those that close loops. Without -o
+    Inputs and outputs are those of the tables [inputs] and [outputs] of the system, unless named here: sensors by name,
+    or one of their columns as sensor.column; a point as body/interface:component, with x, y, z, rx, ry, rz. With
+    --formulation relative, the motions are joint coordinates and modes, without those that close loops. Without -o,
     crane.toml gives crane.npz.
 
     Example: floatframe linearize crane.toml -o crane.mat
@@ -97,7 +97,7 @@ def response_command(
 ) -> None:
     """Frequency responses (Bode plot) of a system about its equilibrium, or about a steady rotation.
 
-    Inputs and outputs as for linearize. Without -o crane.toml gives crane.response.png.
+    Inputs and outputs as for linearize. Without -o, crane.toml gives crane.response.png.
 
     Example: floatframe response crane.toml --band 0.1:100
 
@@ -139,7 +139,7 @@ def response_command(
 
 
 def print_left_out(linear: "LinearSystem") -> None:
-    """Say which columns of sensors are not linear about the steady motion."""
+    """Print the columns of sensors that are not linear about the steady motion."""
     for name, why in list(linear.left_out.items())[:MOST_LEFT_OUT]:
         say(f"left out: {name}, not linear here: {why}")
     if len(linear.left_out) > MOST_LEFT_OUT:
@@ -147,7 +147,7 @@ def print_left_out(linear: "LinearSystem") -> None:
 
 
 def band_of(text: str, linear: "LinearSystem", seconds: float) -> tuple[float, float]:
-    """Return a band "from:to" in Hz; without, from a third of the lowest mode to three times the highest one."""
+    """Return a band "from:to" in Hz; by default from a third of the lowest to three times the highest mode."""
     from fe_models.foundation.words import shortened
     from floatframe.analyses import system_modes
     from floatframe.errors import ModelError
@@ -168,7 +168,7 @@ def band_of(text: str, linear: "LinearSystem", seconds: float) -> tuple[float, f
 
 
 def print_peaks(response: "FrequencyResponse", seconds: float) -> None:
-    """Print the greatest amplitude of each response and where it is."""
+    """Print the largest amplitude of each response and its frequency."""
     rows = []
     for o, out in enumerate(response.outputs):
         for i, name in enumerate(response.inputs):

@@ -1,4 +1,4 @@
-"""The command machine: ready machines in a folder of one's own."""
+"""The command machine: copies of ready machines."""
 
 from pathlib import Path
 from typing import Annotated
@@ -22,7 +22,7 @@ def machine_command(
         Path | None, typer.Option("--output", "-o", help="Folder to copy it into; default: its name.")
     ] = None,
 ) -> None:
-    """Copy a ready machine, its jobs and systems, into a folder of your own, or list the machines.
+    """Copy a ready machine with its jobs and systems into a folder, or list the machines.
 
     Example: floatframe machine antenna -o my_antenna
     """

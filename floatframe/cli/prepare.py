@@ -1,4 +1,4 @@
-"""The command prepare: compile all kernels after an installation, in processes beside each other."""
+"""The command prepare: compile all kernels after an installation, in parallel processes."""
 
 import json
 import os
@@ -15,7 +15,7 @@ from cms.cli.demo import environment
 __all__ = ["prepare_parts", "register"]
 
 RUN = "import sys; from floatframe.cli.compile_kernels import main; main(sys.argv[1:])"
-LATER = {"relative": "motion", "schemes": "motion"}  #: a part that needs what another compiles begins after it
+LATER = {"relative": "motion", "schemes": "motion"}  #: parts that start after another part, whose kernels they need
 
 
 def register(app: typer.Typer) -> None:
@@ -27,9 +27,9 @@ def register(app: typer.Typer) -> None:
 def prepare_command(
     workers: Annotated[int, typer.Option(min=0, help="Processes at a time; 0: one a processor.")] = 0,
 ) -> None:
-    """Compile the code of motions and reductions ahead; otherwise that happens when each is first used.
+    """Compile the code of motions and reductions in advance; otherwise it is compiled at first use.
 
-    Done once after an installation; what is ready already is left as it is.
+    This is needed once after an installation; code that is already compiled is kept.
 
     Example: floatframe prepare
     """
@@ -54,7 +54,7 @@ def prepare_command(
 
 
 def prepare_parts(parts: tuple[str, ...], workers: int) -> dict[str, dict]:
-    """Return for each part what its process said, or why it failed; at most so many processes at a time."""
+    """Return the report of the process of each part, or its error; at most `workers` processes run at a time."""
     waiting, running, done = list(parts), {}, {}  # type: ignore[var-annotated]
     try:
         while waiting or running:

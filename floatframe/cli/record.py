@@ -1,4 +1,4 @@
-"""How good a computed motion is, as one record: `floatframe run` and `floatframe info` print it."""
+"""The quality of a computed motion as a record, printed by `floatframe run` and `floatframe info`."""
 
 from dataclasses import asdict
 from typing import Any
@@ -14,9 +14,9 @@ __all__ = ["run_record"]
 
 
 def run_record(trajectory: Trajectory, system: System | None = None) -> dict[str, Any]:
-    """Return times, bodies, energies, energy balance, drift and ranges of the sensors, in plain types and its units.
+    """Return times, bodies, energies, energy balance, drift and ranges of sensors, in plain types and units of the run.
 
-    `energy_defect` is the largest |balance defect| over `energy_scale`; a drift is the largest over time.
+    `energy_defect` is the largest |balance defect| divided by `energy_scale`; a drift is the largest over time.
     """
     energies, scale = trajectory.energies, energy_scale(trajectory)
     defect = float(np.abs(balance_defect(trajectory)).max(initial=0.0))

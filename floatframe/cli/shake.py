@@ -1,4 +1,4 @@
-"""The command shake: a structure on a base that is moved."""
+"""The command shake: a structure on a moving base."""
 
 import json as json_module
 import math
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["register"]
 
 KINDS = (".html", ".json", ".csv")
-SHOWN = 14  #: outputs of a run that are printed
+SHOWN = 14  #: largest number of printed outputs of a run
 
 
 def register(app: typer.Typer) -> None:
@@ -52,7 +52,7 @@ def shake_command(
 ) -> None:
     """Shake a structure on its base: sine, random, shock, transient; loads, stresses, spectra, notches.
 
-    Without -o tower.toml gives tower.shake.html, .json and .csv. Of a modal file all other interfaces are observed.
+    Without -o, tower.toml gives tower.shake.html, .json and .csv. For a modal file, all other interfaces are observed.
 
     Example: floatframe shake tower.toml
 
@@ -129,7 +129,7 @@ def job_of_options(
     file: Path, base: str | None, q_factor: float | None, sine: str | None, rate: float | None, random: str | None,
     shock: str | None, directions: str, at: list[str],
 ) -> "ShakeJob":  # fmt: skip
-    """Return the job that options make of a modal file."""
+    """Return the shake job for a modal file, as defined by the options."""
     import cms
     from floatframe.errors import ModelError
     from floatframe.shaking.loads.levels import ACCELERATIONS
@@ -178,7 +178,7 @@ def job_of_options(
 
 
 def level(words: str, unit: str, where: str) -> "Level":
-    """Return a level of the command line: "Hz:level,Hz:level", or a file."""
+    """Return a level given on the command line: "Hz:level,Hz:level", or a file."""
     from floatframe.errors import ModelError
     from floatframe.shaking.loads.levels import Level, read_level
 
@@ -192,7 +192,7 @@ def level(words: str, unit: str, where: str) -> "Level":
 
 
 def print_result(result: "ShakeResult") -> None:
-    """Print conversions, main modes, the largest outputs of every run and the notches."""
+    """Print conversions, main modes, largest outputs of every run, and notches."""
     from floatframe.shaking.record import conversions, table_rows
 
     model, masses = result.model, result.masses

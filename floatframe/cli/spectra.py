@@ -1,4 +1,4 @@
-"""Spectra of sensors and of measured files, as pictures and tables: spectrum, and plot --as."""
+"""Spectra of sensors and of measured files, as pictures and tables: the commands spectrum and plot --as."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 __all__ = ["plot_as", "register", "sensor_signals"]
 
 PICTURES = ("png", "svg", "pdf")
-MOST_ROWS = 40  #: of the table that is printed
+MOST_ROWS = 40  #: largest number of printed rows
 
 
 def register(app: typer.Typer) -> None:
@@ -47,7 +47,7 @@ def spectrum_command(
 ) -> None:
     """Spectra of sensors of a motion, or of channels of a measured file, as a table or a picture.
 
-    Without -o the table stands beside the file: swing.h5 gives swing.psd.csv.
+    Without -o, the table is written next to the file: swing.h5 gives swing.psd.csv.
 
     Example: floatframe spectrum swing.h5 --sensor tip.z --as third-octave -o tip.json
 
@@ -67,7 +67,7 @@ def spectrum_command(
 def chosen_signals(
     file: Path, names: list[str], others: tuple[str, ...], rate: float | None
 ) -> "tuple[Signals, list[Signal | None], tuple[Path, ...]]":
-    """Return the channels chosen of a results file or a measured one, those of other names, and the files read."""
+    """Return the chosen channels of a results file or measured file, the channels named in `others`, and the files."""
     if file.suffix.lower() == ".h5" or file.is_dir():
         from floatframe.results.trajectory import read_results
 
@@ -99,7 +99,7 @@ def chosen_signals(
 
 
 def sensor_signals(trajectory: "Trajectory", names: list[str], rate: float | None = None) -> "Signals":
-    """Return what chosen sensors (all, if none are named) measured, at equidistant times; notes are printed."""
+    """Return the measurements of chosen sensors (default: all) at equidistant times; notes are printed."""
     from floatframe.errors import ResultsError
     from floatframe.results.sensor_choice import chosen_measurements
     from floatframe.results.sensors import measured
@@ -119,7 +119,7 @@ def sensor_signals(trajectory: "Trajectory", names: list[str], rate: float | Non
 def plot_as(
     trajectory: "Trajectory", names: list[str], kind: str, path: Path, *, resolution: float | None, rotation: str
 ) -> None:
-    """Draw the spectra of sensors: what plot does where a kind is asked for."""
+    """Draw the spectra of sensors, for plot --as."""
     from floatframe.signals.analysis import SpectrumRequest
 
     turning = sensor_signals(trajectory, [rotation])[1] if rotation else None
@@ -128,7 +128,7 @@ def plot_as(
 
 
 def write_spectra(signals: "Signals", kind: str, request: "SpectrumRequest", path: Path, *, title: str) -> None:
-    """Write spectra of all channels as picture, table or record, and print what they are."""
+    """Write spectra of all channels as picture, table or record, and print a summary."""
     import io
     import json
 

@@ -1,4 +1,4 @@
-"""The command that writes pages: view."""
+"""The command view, which writes pages."""
 
 from pathlib import Path
 from typing import Annotated
@@ -40,8 +40,9 @@ def view_command(
 ) -> None:
     """Write a motion, or the modes or equilibrium of a system, as one page, turned while it plays; needs no network.
 
-    The page opens in every browser, on a phone too: the machine in 3D with slider, speed, colours by displacement or
-    stress and named views, its plots beside it. Without -o it stands beside the file: swing.h5 gives swing.html.
+    The page opens in every browser, also on a phone. It shows the machine in 3D with slider, speed, colours by
+    displacement or stress, named views, and plots. Without -o, it is written next to the file: swing.h5 gives
+    swing.html.
 
     Example: floatframe view swing.h5 -o motion.html
 
@@ -88,7 +89,7 @@ def view_command(
 
 
 def page_path(output: Path | None, file: Path, inputs: tuple[Path | str, ...]) -> Path:
-    """Return where the page is written."""
+    """Return the path of the page."""
     from floatframe.errors import ResultsError
 
     path: Path = output_path(output, file.with_suffix(".html"), ResultsError, overwrite_of=inputs)

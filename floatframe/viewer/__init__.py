@@ -1,5 +1,6 @@
-"""One page that shows a motion, modes or an equilibrium in 3D, with its plots, without a network.
+"""A single page, which works offline, that shows a motion, modes or an equilibrium in 3D with plots.
 
-`view` writes it: `cast` (what bodies, joints and forces look like), `surface` (flexible bodies, thinned to a budget),
-`timeline` (which rows), `curves` (plots), `packing` (numbers as text) make a record that the programs in `data` draw.
+`view` writes it. `cast` (appearance of bodies, joints and forces), `surface` (flexible bodies, thinned to a budget),
+`timeline` (selection of rows), `curves` (plots) and `packing` (numbers as text) make a record, which the programs in
+`data` draw.
 """

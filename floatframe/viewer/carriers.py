@@ -1,4 +1,4 @@
-"""What carries the pieces of a drawing: bodies, markers, interfaces; where they are in their bodies over the rows."""
+"""Carriers of the pieces of a drawing (bodies, markers, interfaces), and their positions in their bodies over time."""
 
 from dataclasses import dataclass, field
 
@@ -16,36 +16,36 @@ from floatframe.system import System
 
 __all__ = ["GROUND_CARRIER", "Carrier", "Carriers"]
 
-GROUND_CARRIER = 0  #: number of the first carrier, the ground
+GROUND_CARRIER = 0  #: index of the first carrier, the ground
 
 
 @dataclass(frozen=True, eq=False)
 class Carrier:
-    """A place with axes in a body: rho = position + d, axes = exp(theta) axes, (d, theta) its motion in the body."""
+    """A point with axes in a body: rho = position + d, axes = exp(theta) axes; (d, theta) is its motion in the body."""
 
-    body: int  #: number, -1 for the ground
+    body: int  #: index; -1 for the ground
     position: Array  #: undeformed, body frame, (3,) [m]
     axes: Array  #: undeformed, columns, (3, 3)
-    motion: Array | None = None  #: (d, theta) in the shown rows, (n, 6); None: it does not move in its body
-    psi: Array | None = None  #: of (d, theta) by the modal coordinates, (6, n_q); None: it does not move
+    motion: Array | None = None  #: (d, theta) in the shown rows, (n, 6); None: at rest in its body
+    psi: Array | None = None  #: derivative of (d, theta) by the modal coordinates, (6, n_q); None: at rest in its body
 
 
 @dataclass
 class Carriers:
-    """All carriers of a drawing, each once."""
+    """All carriers of a drawing, without repetition."""
 
     trajectory: Trajectory
     rows: IntArray  #: the rows shown
     system: System | None
     found: list[Carrier] = field(default_factory=lambda: [Carrier(-1, np.zeros(3), np.eye(3))])
-    numbers: dict[object, int] = field(default_factory=dict)  #: of what has been asked for
+    numbers: dict[object, int] = field(default_factory=dict)  #: indices of the carriers requested so far
 
     def of_body(self, body: int) -> int:
-        """Return the number of the carrier that is the frame of a body."""
+        """Return the index of the carrier that is the frame of a body."""
         return self.of_shape(body, MarkerShape(np.zeros(3), np.eye(3)))
 
     def of_shape(self, body: int, shape: MarkerShape) -> int:
-        """Return the number of a marker in the frame of its file."""
+        """Return the index of a marker in the frame of its file."""
         if shape.psi is None and body < 0 and not shape.position.any() and np.array_equal(shape.triad, np.eye(3)):
             return GROUND_CARRIER
         key = (body, shape.position.tobytes(), shape.triad.tobytes(), shape.psi is None)
@@ -58,8 +58,8 @@ class Carriers:
         return self.numbers[key]
 
     def of_marker(self, given: object, end: MarkerData) -> int:
-        """Return the number of a marker of a joint or force, as given and as found in its body."""
-        assert self.system is not None  # it has the joint
+        """Return the index of a marker of a joint or force, from its description and its data."""
+        assert self.system is not None  # ensured, because it contains the joint
         body = self.system.bodies[end.body] if end.body >= 0 else None
         if isinstance(body, FlexibleBody) and body.mean_axes is not None:
             if isinstance(given, Marker) and given.interface is not None:
@@ -70,7 +70,7 @@ class Carriers:
         return self.of_shape(end.body, end.shape)
 
     def followed(self, end: MarkerData) -> int:
-        """Return the number of a marker that is known in the frame of the engine alone, by its motion."""
+        """Return the index of a marker known only in the frame of the engine, from its motion."""
         assert self.system is not None
         key = ("followed", end.body, end.shape.position.tobytes(), end.shape.triad.tobytes())
         if key not in self.numbers:
@@ -84,6 +84,6 @@ class Carriers:
         return self.numbers[key]
 
     def add(self, key: object, carrier: Carrier) -> None:
-        """Keep a carrier."""
+        """Store a carrier."""
         self.numbers[key] = len(self.found)
         self.found.append(carrier)

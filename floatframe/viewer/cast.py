@@ -1,4 +1,4 @@
-"""What a page shows besides flexible surfaces: pieces on their carriers, parts stretched between two, arrows."""
+"""The contents of a page besides flexible surfaces: pieces on carriers, parts stretched between carriers, arrows."""
 
 from dataclasses import dataclass, field, replace
 
@@ -17,7 +17,7 @@ from floatframe.viewer.carriers import GROUND_CARRIER, Carriers
 
 __all__ = ["Between", "Cast", "Force", "Placed", "bodies_cast", "scene_cast"]
 
-CUBE = 0.04  #: half edge of a body of which nothing is known, by the size of the scene
+CUBE = 0.04  #: half edge of the cube for an unknown body, divided by the size of the scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,12 +26,12 @@ class Placed:
 
     piece: Piece
     carrier: int
-    kind: str = "body"  #: what it is one of: "body", "scene", "joint", "force"
+    kind: str = "body"  #: its group: "body", "scene", "joint" or "force"
 
 
 @dataclass(frozen=True, eq=False)
 class Between:
-    """A part between two carriers."""
+    """A part stretched between two carriers."""
 
     parts: tuple[StretchedPiece, ...]
     first: int
@@ -48,20 +48,20 @@ class Force:
     carrier: int
     color: str = "#c2452d"
     at: Array | None = None  #: its start in ground axes, (n, 3) [m]; None: the carrier
-    is_of_element: bool = False  #: whether the element asked for it
+    is_of_element: bool = False  #: whether an element requested it
 
 
 @dataclass
 class Cast:
-    """All of it."""
+    """All drawn objects besides flexible surfaces."""
 
     carriers: Carriers
     placed: list[Placed] = field(default_factory=list)
     between: list[Between] = field(default_factory=list)
     forces: list[Force] = field(default_factory=list)
-    #: flat grounds without an end: upwards, height along it, distance of grid lines (None: any)
+    #: infinite ground planes: upward direction, height along it, spacing of grid lines (None: automatic)
     planes: list[tuple[Array, float, float | None]] = field(default_factory=list)
-    on_ground: set[object] = field(default_factory=set)  #: what elements have drawn there already
+    on_ground: set[object] = field(default_factory=set)  #: ground shapes that elements have already drawn
 
     def add_plane(self, plane: Plane, position: Array, axes: Array) -> None:
         """Add a flat ground."""
@@ -70,19 +70,19 @@ class Cast:
 
     @property
     def has_ground(self) -> bool:
-        """Whether something is there to stand on."""
+        """Return whether there is a ground."""
         return bool(self.planes) or any(each.piece.is_ground for each in self.placed)
 
 
 def bodies_cast(cast: Cast, bodies: dict[str, RigidBody | FlexibleBody | None], size: float) -> None:
-    """Add the shapes of bodies; the box of its inertia, or a cube, for a rigid one without.
+    """Add the shapes of bodies; for rigid bodies without shapes, the box of the inertia, or a cube.
 
     Parameters
     ----------
     bodies
-        By name; None: nothing is known of it.
+        Bodies by name; None: unknown.
     size
-        A length by which what has no size of its own is measured [m].
+        Length that scales objects without a size of their own [m].
     """
     carriers = cast.carriers
     trajectory, rows = carriers.trajectory, carriers.rows
@@ -108,7 +108,7 @@ def bodies_cast(cast: Cast, bodies: dict[str, RigidBody | FlexibleBody | None], 
 
 
 def scene_cast(cast: Cast) -> None:
-    """Add what stands around."""
+    """Add the surroundings."""
     system = cast.carriers.system
     for shape in () if system is None else system.scene:
         geometry = getattr(shape, "geometry", shape)

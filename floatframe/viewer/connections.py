@@ -1,4 +1,4 @@
-"""What a page shows of joints, forces and elements: small solids on their markers, springs, arrows of their loads."""
+"""Drawings of joints, forces and elements in a page: small solids on markers, springs, arrows of loads."""
 
 from dataclasses import replace
 
@@ -29,7 +29,8 @@ from floatframe.viewer.cast import Between, Cast, Force, Placed
 
 __all__ = ["connections_cast", "distance", "joint_pieces"]
 
-SIZE, FEW = 0.012, 4  #: of a joint, by the size of the scene, up to so many bodies; of more they are smaller
+#: size of a joint, divided by the size of the scene, up to so many bodies; smaller for more bodies
+SIZE, FEW = 0.012, 4
 GROUND_COLOR = "#7b8790"
 Z = np.array([0.0, 0.0, 1.0])
 
@@ -40,9 +41,9 @@ def connections_cast(cast: Cast, size: float, up: Array) -> None:
     Parameters
     ----------
     size
-        Length by which they are measured: that of the scene [m].
+        Size of the scene, which scales them [m].
     up
-        What is up, ground axes, (3,): where supports on the ground stand.
+        Upward direction in ground axes, (3,), for supports on the ground.
     """
     carriers = cast.carriers
     system = carriers.system
@@ -89,7 +90,7 @@ def connections_cast(cast: Cast, size: float, up: Array) -> None:
 
 
 def load(cast: Cast, name: str, carrier: int) -> None:
-    """Add the arrow of what a joint or force exerts on its marker A, if results have it."""
+    """Add the arrow of the load of a joint or force on its marker A, if the results contain it."""
     trajectory = cast.carriers.trajectory
     if name not in trajectory.connection_names:
         return
@@ -99,7 +100,7 @@ def load(cast: Cast, name: str, carrier: int) -> None:
 
 
 def distance(cast: Cast, first: int, second: int) -> float:
-    """Return the distance of two carriers in the first row shown [m]."""
+    """Return the distance of two carriers in the first shown row [m]."""
     trajectory, row = cast.carriers.trajectory, cast.carriers.rows[:1]
     places = []
     for k in (first, second):
@@ -122,7 +123,7 @@ def springs(force: SpringDamper, a: int, b: int, radius: float, cast: Cast) -> l
 
 
 def joint_pieces(kind: str, axis: Array, g: float) -> list[Piece]:
-    """Return the solids of a joint of some class, in the axes of its marker A, by a length g."""
+    """Return the solids of a joint of a class, in the axes of its marker A, scaled by a length g."""
     axis = np.asarray(axis, dtype=float)
     if kind in RINGS:
         found = [Cylinder(0.9 * g, 2.2 * g, axis=axis).pieces()[0], Cylinder(0.4 * g, 3.0 * g, axis=axis).pieces()[0]]
@@ -143,7 +144,7 @@ def joint_pieces(kind: str, axis: Array, g: float) -> list[Piece]:
 
 
 def support(up: Array, g: float) -> Piece:
-    """Return a foot below a place on the ground."""
+    """Return a foot below a point on the ground."""
     axis = up / np.linalg.norm(up)
     cone = Cylinder(1.9 * g, 2.2 * g, axis=axis, end_radius=0.5 * g).pieces()[0]
     return replace(shifted(cone, -1.3 * g * axis, np.eye(3)), color=GROUND_COLOR)

@@ -1,4 +1,4 @@
-"""The plots beside a motion: what sensors measured, and what every motion has."""
+"""The plots of a page: measurements of sensors, and quantities of every motion."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,22 +14,22 @@ from floatframe.results.trajectory import Trajectory
 
 __all__ = ["Panel", "motion_panels", "sensor_panels"]
 
-MOST_CURVES, MOST_PANELS = 6, 14  #: in a panel, and of sensors
-SEEN = 1e-4  #: of the largest curve of a panel, below which another would lie on zero
+MOST_CURVES, MOST_PANELS = 6, 14  #: in a panel; for sensors
+SEEN = 1e-4  #: relative to the largest curve of a panel; smaller curves would coincide with zero
 
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """Curves over time that share an axis."""
+    """Curves over time with a common axis."""
 
     title: str
     unit: str
     curves: Mapping[str, Array]  #: name -> values in the rows of the plots, (n,)
-    n_all: int = 0  #: curves there are, where only the largest are shown
+    n_all: int = 0  #: number of curves before the selection of the largest
 
 
 def sensor_panels(measurements: Sequence[Measurement], rows: IntArray) -> list[Panel]:
-    """Return a panel for each unit of each sensor; components that stay zero are left out."""
+    """Return a panel for each unit of each sensor, without components that stay zero."""
     found = []
     for measurement in measurements:
         for unit, columns in panels_of(measurement):

@@ -1,4 +1,4 @@
-"""The vibration modes of a system as one page: choose one, and all bodies swing about their equilibrium."""
+"""A page with the vibration modes of a system: for a chosen mode, all bodies oscillate about their equilibrium."""
 
 import os
 from dataclasses import replace
@@ -30,7 +30,7 @@ from floatframe.viewer.record import Shown, colors_record, stage_record
 
 __all__ = ["view_modes"]
 
-SPEED = 0.5  #: periods a second at first
+SPEED = 0.5  #: initial speed in periods per second
 
 
 def view_modes(
@@ -43,28 +43,28 @@ def view_modes(
     color: str = "displacement",
     largest: float = LARGEST,
 ) -> Page:
-    """Write vibration modes of a system as one page that works offline.
+    """Write vibration modes of a system as a single page that works offline.
 
     Parameters
     ----------
     system, about
-        The system and the equilibrium (or steady rotation) of which the modes are.
+        The system and the equilibrium (or steady rotation) to which the modes belong.
     modes
-        As `system_modes(linearize(system, about))` returns them.
+        Modes from `system_modes(linearize(system, about))`.
     path
-        Ends in .html.
+        File whose name ends in .html.
     n_modes
-        How many, by ascending frequency.
+        Number of modes, in order of frequency.
     color
-        By what bodies are coloured at first: "displacement" (how far a point of a flexible body swings) or
-        "von-mises"; both by the largest one, since a mode has no size of its own.
+        Initial colour: "displacement" (amplitude of the points of a flexible body) or "von-mises". Both are divided by
+        their largest value, because the amplitude of a mode is arbitrary.
     largest
-        Megabytes that the page may have.
+        Largest size of the page in megabytes.
 
     Raises
     ------
     ResultsError
-        If there is no mode, stress is asked for and there is none, or the page cannot be so small.
+        If there is no mode, if stress is requested but not available, or if the page cannot be that small.
     """
     require_color(color)
     shapes = modes.shapes[:, : max(n_modes, 0)]
@@ -128,7 +128,7 @@ def view_modes(
 
 
 def mode_colors(system: System, has_stress: bool) -> list[dict[str, Any]]:
-    """Return what surfaces may be coloured by: how far a node swings, its body included, and stress."""
+    """Return the quantities for colours: amplitude of a node including its body's motion, and stress."""
     found = colors_record(system.units, 1.0, 1.0 if has_stress else None)
     return [{**each, "title": "displacement"} if each["key"] == "displacement" else each for each in found]
 
@@ -140,14 +140,14 @@ def parts_of(rest: Any, shapes: Array) -> list[Array]:
 
 
 def at_rest(surface: FlexibleSurface) -> FlexibleSurface:
-    """Return the surface with the amplitudes of the first row alone."""
+    """Return the surface with only the amplitudes of the first row."""
     return replace(surface, amplitudes=surface.amplitudes[:1])
 
 
 def factor_of(
     size: float, parts: list[Array], k: int, surfaces: list[FlexibleSurface], elastic: dict[int, Array]
 ) -> float:
-    """Return by what a mode is multiplied to be drawn: its farthest point swings by a share of the machine."""
+    """Return the factor of a mode as drawn, which moves its farthest point by a fraction of the machine's size."""
     n = len(parts[0])
     farthest, turn = 0.0, 0.0
     own = {each.body: each for each in surfaces}
@@ -164,7 +164,7 @@ def factor_of(
 
 
 def mode_record(system: System, modes: SystemModes, k: int) -> dict[str, Any]:
-    """Return the words of a mode."""
+    """Return the texts of a mode."""
     ratio = float(modes.damping_ratios[k])
     frequency = float(modes.frequencies[k])
     damping = "grows" if ratio < -1e-9 else f"damping {100 * ratio:.3g} %" if ratio > 1e-9 and frequency > 0 else ""

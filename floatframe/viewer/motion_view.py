@@ -1,4 +1,4 @@
-"""A motion, or an equilibrium, as one page."""
+"""A page with a motion or an equilibrium."""
 
 import logging
 import os
@@ -39,19 +39,20 @@ __all__ = ["LARGEST", "Page", "bytes_for_numbers", "require_color", "source_reco
 
 log = logging.getLogger(__name__)
 
-LARGEST = 10.0  #: MB of a page
-PLOTTED = 1200  #: rows of the plots
-SHARE_OF_ROWS = 0.4  #: of the numbers of a page that the rows of the motion may take; the surfaces get the rest
-VISIBLE, DRAWN = 0.02, 0.06  #: as in films: from which share of a body deformation is seen, to which it is enlarged
+LARGEST = 10.0  #: largest size of a page [MB]
+PLOTTED = 1200  #: number of rows of the plots
+SHARE_OF_ROWS = 0.4  #: fraction of the numbers of a page for the rows of the motion; the rest is for surfaces
+#: as in films: fraction of a body's size from which deformation is visible; fraction to which it is magnified
+VISIBLE, DRAWN = 0.02, 0.06
 
 
 @dataclass(frozen=True)
 class Page:
-    """A page that has been written."""
+    """A written page."""
 
     path: Path
     size: int  #: bytes
-    notes: tuple[str, ...]  #: what it leaves out, as it says itself
+    notes: tuple[str, ...]  #: omissions, as listed in the page
 
 
 def view(
@@ -64,29 +65,29 @@ def view(
     magnification: float | None = None,
     largest: float = LARGEST,
 ) -> Page:
-    """Write a motion or an equilibrium as one page that works offline: in 3D, turned while it plays, with its plots.
+    """Write a motion or an equilibrium as a single page that works offline, in 3D with plots.
 
     Parameters
     ----------
     motion
         A motion, the path of a results file, or an equilibrium of the system.
     path
-        Ends in .html.
+        File whose name ends in .html.
     system
-        Its system; None: as the system file says that the results name.
+        Its system; None: from the system file that the results name.
     sensors
-        What is plotted, as `floatframe plot --sensor` takes it; none: all sensors, positions, loads and energies.
+        Sensors to plot, as for `floatframe plot --sensor`; none: all sensors, positions, loads and energies.
     color
-        By what flexible bodies are coloured at first: "displacement" or "von-mises".
+        Initial colour of flexible bodies: "displacement" or "von-mises".
     magnification
-        How many times larger elastic displacement is drawn at first; None: 1, or so that it is seen.
+        Initial factor of the elastic displacement as drawn; None: 1, or a larger one that makes it visible.
     largest
-        Megabytes that the page may have: surfaces are thinned and rows left out until it fits.
+        Largest size of the page in megabytes; surfaces are thinned and rows omitted until it fits.
 
     Raises
     ------
     ResultsError
-        If a body does not fit the motion, stress is asked for and there is none, or the page cannot be so small.
+        If a body does not match the motion, stress is requested but not available, or the page cannot be that small.
     """
     require_color(color)
     trajectory = motion_of(motion, system)
@@ -131,13 +132,13 @@ def view(
 
 
 def require_color(color: str) -> None:
-    """Raise `ResultsError` unless bodies can be coloured so."""
+    """Raise `ResultsError` unless bodies can be coloured by this quantity."""
     if color not in BODY_COLORS:
         raise ResultsError(f"view: color: expected one of {', '.join(BODY_COLORS)}, got {color!r}")
 
 
 def motion_of(motion: Trajectory | Equilibrium | str | os.PathLike[str], system: System | None) -> Trajectory:
-    """Return what is shown as a motion."""
+    """Return the shown motion; an equilibrium becomes a motion with one time."""
     if isinstance(motion, Trajectory):
         return motion
     if isinstance(motion, Equilibrium):
@@ -148,7 +149,7 @@ def motion_of(motion: Trajectory | Equilibrium | str | os.PathLike[str], system:
 
 
 def known_system(trajectory: Trajectory) -> System | None:
-    """Return the system of a motion from the file its results name, where it still is what it was."""
+    """Return the system of a motion from the file its results name, if that is unchanged."""
     try:
         return recorded_system(trajectory)
     except ResultsError as error:
@@ -157,7 +158,7 @@ def known_system(trajectory: Trajectory) -> System | None:
 
 
 def bodies_in(trajectory: Trajectory, system: System | None) -> dict[str, RigidBody | FlexibleBody | None]:
-    """Return the bodies of a motion by name, as the system has them; modal files must be those of the run."""
+    """Return the bodies of a motion, by name, from the system; modal files must be those of the run."""
     if system is None:
         return dict.fromkeys(trajectory.body_names)
     names = tuple(body.name for body in system.bodies)
@@ -175,7 +176,7 @@ def bodies_in(trajectory: Trajectory, system: System | None) -> dict[str, RigidB
 
 
 def loose_bodies(trajectory: Trajectory, system: System | None) -> Mapping[str, ReducedBody]:
-    """Return the reduced bodies of a motion of which no system is known, read from their modal files."""
+    """Return the reduced bodies of a motion without a known system, read from their modal files."""
     if system is not None:
         return {}
     try:
@@ -187,12 +188,12 @@ def loose_bodies(trajectory: Trajectory, system: System | None) -> Mapping[str, 
 
 
 def bytes_for_numbers(largest: float) -> float:
-    """Return the bytes of numbers that fit into a page of so many megabytes, as text and without compression.
+    """Return the bytes of numbers that fit into a page of a size in megabytes, as text without compression.
 
     Raises
     ------
     ResultsError
-        If the page would be too small for the programs in it.
+        If the page would be too small for its programs.
     """
     left = 1e6 * largest - fixed_size()
     if not np.isfinite(largest) or left < 3e5:
@@ -204,14 +205,14 @@ def bytes_for_numbers(largest: float) -> float:
 
 
 def bytes_of_row(trajectory: Trajectory, system: System | None) -> float:
-    """Return about how many bytes a row of a motion takes."""
+    """Return the approximate number of bytes of a row of a motion."""
     n_modes = sum(entry.n_q for entry in trajectory.head.bodies)
     n_markers = 0 if system is None else 2 * (len(system.joints) + len(system.forces))
     return 4 + 28 * len(trajectory.head.bodies) + 2 * n_modes + (12 * n_markers if n_modes else 6 * n_markers)
 
 
 def surfaces_of(shown: Shown, n_bytes: float) -> list[FlexibleSurface]:
-    """Return the surfaces of all flexible bodies within so many bytes."""
+    """Return the surfaces of all flexible bodies within a number of bytes."""
     trajectory = shown.trajectory
     most = nodes_within(max(n_bytes, 0.0), shown.reduced, with_stress=True)
     return [
@@ -253,7 +254,7 @@ def panel_record(block: Block, panels: Sequence[Panel]) -> list[dict[str, Any]]:
 
 
 def colors_of(units: Units, surfaces: Sequence[FlexibleSurface]) -> list[dict[str, Any]]:
-    """Return what surfaces may be coloured by."""
+    """Return the quantities by which surfaces can be coloured."""
     if not surfaces:
         return []
     stresses = [each.largest_stress for each in surfaces if each.stress is not None]
@@ -261,19 +262,19 @@ def colors_of(units: Units, surfaces: Sequence[FlexibleSurface]) -> list[dict[st
 
 
 def magnification_of(surfaces: Sequence[FlexibleSurface], reduced: Mapping[str, ReducedBody]) -> float:
-    """Return 1 where deformation is seen as it is, else the round number that draws it at 2.4 to 6 % of a body."""
+    """Return 1 if the deformation is visible as it is, else the round number that makes it 2.4 to 6 % of a body."""
     sizes = [diagonal(body) for body in reduced.values() if len(body.surface)]
     share = max((s.largest_displacement / size for s, size in zip(surfaces, sizes, strict=True)), default=1.0)
     return 1.0 if share >= VISIBLE or share == 0 else round_below(DRAWN / share)
 
 
 def speed_of(trajectory: Trajectory) -> float:
-    """Return the seconds of motion in a second of the page at first, as films have it."""
+    """Return the initial seconds of motion per second of the page, as in films."""
     return film_times(trajectory.t * trajectory.units.time, fps=25.0, speed=None).speed
 
 
 def facts_of(shown: Shown, motion: object) -> list[str]:
-    """Return what is shown, in words."""
+    """Return a description of the shown motion."""
     trajectory = shown.trajectory
     flexible = [entry for entry in trajectory.head.bodies if entry.n_q]
     count = len(trajectory.body_names)
@@ -290,7 +291,7 @@ def facts_of(shown: Shown, motion: object) -> list[str]:
 
 
 def notes_of(shown: Shown, kept: Timeline, surfaces: Sequence[FlexibleSurface]) -> list[str]:
-    """Return what the page leaves out or draws otherwise, in words."""
+    """Return the omissions of the page as text."""
     trajectory, notes = shown.trajectory, []
     n, n_all = len(kept.rows), len(trajectory.t)
     if n < n_all:
@@ -313,7 +314,7 @@ def notes_of(shown: Shown, kept: Timeline, surfaces: Sequence[FlexibleSurface]) 
 
 
 def surface_notes(names: Sequence[str], surfaces: Sequence[FlexibleSurface]) -> list[str]:
-    """Return what is shown of flexible surfaces, in words."""
+    """Return a description of the shown flexible surfaces."""
     notes = []
     for each in surfaces:
         shown, whole = len(each.surface.rows), each.surface.n_nodes
@@ -328,7 +329,7 @@ def surface_notes(names: Sequence[str], surfaces: Sequence[FlexibleSurface]) -> 
 
 
 def source_record(trajectory: Trajectory) -> list[tuple[str, str]]:
-    """Return where the motion came from."""
+    """Return the origin of the motion."""
     run = trajectory.head.run
     found = [("program", f"floatframe {run.get('floatframe', '')}")]
     if run.get("integrator") and run.get("h") and run["integrator"] != "Snapshot":

@@ -1,6 +1,6 @@
-"""Arrays as text inside a page: one block of bytes, compressed, and where each array lies in it.
+"""Arrays as text inside a page: one compressed block of bytes, and the location of each array in it.
 
-quantised     value = offset + scale * n, n whole numbers of 16 bit; scale and offset one, or one each along an axis
+quantised     value = offset + scale * n, with 16 bit integers n; one scale and offset, or one for each index of an axis
 split         of 16 bit: all low bytes, then all high bytes, which compress better than pairs
 text          base64 of the zlib stream (RFC 1950) of the block; numbers little-endian
 """
@@ -18,35 +18,35 @@ from fe_models.foundation.arrays import Array, IntArray
 __all__ = ["Block", "Packed"]
 
 TOP = 32767  #: of whole numbers of 16 bit
-LEVEL = 6  #: of the compression: 9 takes five times as long for 1 %
+LEVEL = 6  #: compression level; 9 takes five times as long for 1 %
 
-Packed = dict[str, Any]  #: at, type, shape, and of quantised numbers scale, offset, each: where it lies, what it means
+Packed = dict[str, Any]  #: at, type and shape (location and meaning); scale, offset and each for quantised numbers
 
 
 @dataclass
 class Block:
-    """Arrays one after the other; grows as they are added."""
+    """Consecutive arrays; the block grows as arrays are added."""
 
     parts: list[bytes] = field(default_factory=list)
     size: int = 0  #: bytes so far
-    places: dict[bytes, int] = field(default_factory=dict)  #: of arrays, by the digest of their bytes
+    places: dict[bytes, int] = field(default_factory=dict)  #: location of each array, by the digest of its bytes
 
     def real(self, values: Array) -> Packed:
-        """Add numbers in 32 bit."""
+        """Add numbers as 32 bit floats."""
         return self.add(np.asarray(values), "f4")
 
     def whole(self, values: IntArray) -> Packed:
-        """Add whole numbers from 0, in 16 bit where they fit."""
+        """Add integers from 0, with 16 bit if they fit."""
         values = np.asarray(values)
         return self.add(values, "u2" if values.max(initial=0) < 65536 else "u4")
 
     def quantised(self, values: Array, *, each: int | None = None, centred: bool = False) -> Packed:
-        """Add numbers in 16 bit.
+        """Add numbers quantised to 16 bit.
 
         Parameters
         ----------
         each
-            Axis whose every index has a scale of its own; None: one for all.
+            Axis with a separate scale for each index; None: one scale for all.
         centred
             Whether the offset is 0, so that 0 stays exactly 0.
         """
@@ -63,7 +63,7 @@ class Block:
         return {**packed, **numbers, "each": 0 if each is None else each % values.ndim}
 
     def add(self, values: Array | IntArray, kind: str) -> Packed:
-        """Add an array as numbers of a kind: f4, u2, u4 or i2; what is there already is not added again."""
+        """Add an array as numbers of a type: f4, u2, u4 or i2; an array already present is not added again."""
         packed = np.ascontiguousarray(values, dtype=f"<{kind}")
         raw = packed.tobytes()
         if packed.itemsize == 2:
@@ -78,5 +78,5 @@ class Block:
         return {"at": self.places[key], "type": kind, "shape": list(packed.shape)}
 
     def text(self) -> str:
-        """Return all of it as text."""
+        """Return the block as text."""
         return base64.b64encode(zlib.compress(b"".join(self.parts), LEVEL)).decode("ascii")

@@ -1,4 +1,4 @@
-"""The page around a record: one HTML file with everything inside."""
+"""The page around a record: a single HTML file that contains everything."""
 
 import json
 from importlib.resources import files
@@ -16,7 +16,7 @@ STYLES = ("uplot.min.css", "view.css")
 
 
 def page_of(record: dict[str, Any], block: Block) -> str:
-    """Return the page of a record, and of the numbers it names."""
+    """Return the page with a record and its numbers."""
     head = json.dumps(record, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     styles = report_asset("page.css") + "".join(asset(name) for name in STYLES)
     scripts = "".join(f"<script>{asset(name)}</script>\n" for name in (*LIBRARIES, *OWN_PARTS))
@@ -32,11 +32,11 @@ def page_of(record: dict[str, Any], block: Block) -> str:
 
 
 def fixed_size() -> int:
-    """Return the bytes of a page that shows nothing."""
+    """Return the size in bytes of an empty page."""
     names = (*LIBRARIES, *OWN_PARTS, *STYLES, "LICENSES.txt", "view.html")
     return sum(len(asset(name)) for name in names) + len(report_asset("page.css"))
 
 
 def asset(name: str) -> str:
-    """Return a file that is shipped with the viewer."""
+    """Return a file shipped with the viewer."""
     return (files("floatframe.viewer") / "data" / name).read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The record of a page: what is shown, where its numbers lie, and the words around it."""
+"""The record of a page: shown objects, locations of their numbers, and texts."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -29,28 +29,28 @@ from floatframe.viewer.surface import broken_at_edges
 __all__ = ["FORMAT", "VERSION", "Shown", "Stage", "colors_record", "stage_record"]
 
 FORMAT, VERSION = "floatframe-view", 1
-MOST_FORCES = 40  #: arrows of joints and springs
-TRAVELS = 2.5  #: sizes of the machine that it goes before the camera follows it
+MOST_FORCES = 40  #: largest number of arrows of joints and springs
+TRAVELS = 2.5  #: number of machine sizes that the machine must travel for the camera to follow it
 
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What is shown of which motion."""
+    """The shown motion and bodies."""
 
     trajectory: Trajectory
     system: System | None
-    bodies: dict[str, RigidBody | FlexibleBody | None]  #: all, by name; None: nothing is known of it
-    reduced: dict[str, ReducedBody]  #: of those that are flexible
+    bodies: dict[str, RigidBody | FlexibleBody | None]  #: all bodies, by name; None: unknown
+    reduced: dict[str, ReducedBody]  #: of the flexible bodies
     rows: IntArray  #: of the trajectory
 
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """How large the machine is, where it goes, and how it stands."""
+    """Size, range of motion and orientation of the machine."""
 
-    low: Array  #: of the box it stays in, ground axes, (3,) [m]
+    low: Array  #: of the box in which it stays, ground axes, (3,) [m]
     high: Array
-    size: float  #: of the machine: diagonal of its box in the first row [m]
+    size: float  #: size of the machine, the diagonal of its box in the first row [m]
     center: Array  #: of that box, (3,) [m]
     half: Array  #: half of its edges, (3,) [m]
     up: Array  #: (3,)
@@ -59,7 +59,7 @@ class Stage:
 
 
 def stage_of(shown: Shown, cast: Cast) -> Stage:
-    """Return how large the machine is and where it goes."""
+    """Return size and range of motion of the machine."""
     trajectory, rows = shown.trajectory, shown.rows
     lows, highs, first, sample = [], [], [], []
     travel, masses = [], []
@@ -92,7 +92,7 @@ def stage_of(shown: Shown, cast: Cast) -> Stage:
 
 
 def stage_record(shown: Shown, surfaces: list[FlexibleSurface], block: Block) -> tuple[dict[str, Any], Cast]:
-    """Return bodies, carriers, pieces, arrows, ground and views of a page, and what they were made of."""
+    """Return bodies, carriers, pieces, arrows, ground and views of a page, and the cast from which they were made."""
     trajectory, rows = shown.trajectory, shown.rows
     cast = Cast(Carriers(trajectory, rows, shown.system))
     bodies_cast(cast, shown.bodies, scale_of(shown))
@@ -159,7 +159,7 @@ def stage_record(shown: Shown, surfaces: list[FlexibleSurface], block: Block) ->
 
 
 def scale_of(shown: Shown) -> float:
-    """Return a length by which what has no size of its own is measured [m]."""
+    """Return the length that scales objects without a size of their own [m]."""
     sizes = [diagonal(body) for body in shown.reduced.values()]
     places = np.concatenate([shown.trajectory.body(name).r[shown.rows[:1]] for name in shown.trajectory.body_names])
     sizes.append(float(np.linalg.norm(np.ptp(places, axis=0))))
@@ -195,7 +195,7 @@ def surface_record(block: Block, each: FlexibleSurface) -> dict[str, Any]:
 
 
 def piece_record(block: Block, piece: Piece, **more: Any) -> dict[str, Any]:
-    """Return a piece, its nodes split where its surface is sharp."""
+    """Return a piece; its nodes are split at sharp edges."""
     corner, triangles = np.zeros(0, np.int64), np.asarray(piece.triangles)
     if len(triangles):
         corner, triangles = broken_at_edges(piece.nodes, triangles)
@@ -213,7 +213,7 @@ def piece_record(block: Block, piece: Piece, **more: Any) -> dict[str, Any]:
 
 
 def strongest(cast: Cast) -> list[Any]:
-    """Return the arrows: those of elements, and of joints and springs the strongest."""
+    """Return the arrows: those of elements, and the strongest ones of joints and springs."""
     own = [force for force in cast.forces if force.is_of_element]
     others = [force for force in cast.forces if not force.is_of_element]
     others.sort(key=lambda force: -float(np.abs(force.values).max(initial=0.0)))
@@ -227,7 +227,7 @@ def trails(cast: Cast, n_bodies: int) -> list[int]:
 
 
 def ground_record(cast: Cast, stage: Stage) -> dict[str, Any] | None:
-    """Return the flat ground: as the scene has it, or below all that moves where there is none; None: uneven ground."""
+    """Return the flat ground: that of the scene, or one below everything that moves; None: uneven ground."""
     up = stage.up / np.linalg.norm(stage.up)
     step = round_below(stage.size / 2)
     for normal, level, own in cast.planes[:1]:
@@ -240,7 +240,7 @@ def ground_record(cast: Cast, stage: Stage) -> dict[str, Any] | None:
 
 
 def colors_record(units: Units, displacement: float, stress: float | None) -> list[dict[str, Any]]:
-    """Return what bodies may be coloured by: name, unit, factor to it, largest value."""
+    """Return the quantities for colours: name, unit, factor to it, largest value."""
     found = []
     for key, largest in (("displacement", displacement), ("von-mises", stress)):
         if largest is not None:

@@ -1,4 +1,4 @@
-"""Surfaces as a page shows them: thinned to a number of nodes, with normals that break at sharp edges."""
+"""Surfaces as shown in a page: thinned to a number of nodes, with normals that are split at sharp edges."""
 
 from dataclasses import dataclass
 
@@ -12,16 +12,16 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["ShownSurface", "shown_surface"]
 
-FEATURE_ANGLE = 35.0  #: degrees between triangles above which thinning keeps an edge
-TRIES = 6  #: of thinning, since it removes fewer triangles than it is asked for
-ENOUGH = 1.15  #: nodes by those wanted at which it stops
+FEATURE_ANGLE = 35.0  #: angle between triangles above which thinning keeps an edge [degrees]
+TRIES = 6  #: attempts of thinning, because each removes fewer triangles than requested
+ENOUGH = 1.15  #: ratio of nodes to desired nodes at which thinning stops
 
 
 @dataclass(frozen=True, eq=False)
 class ShownSurface:
-    """A surface of some nodes of a body."""
+    """A surface of selected nodes of a body."""
 
-    rows: IntArray  #: of the nodes of the body that are shown, (n,)
+    rows: IntArray  #: of the shown nodes of the body, (n,)
     corner: IntArray  #: for each corner point with a normal of its own the shown node it lies on, (n_corners,)
     triangles: IntArray  #: of corner points, (n_triangles, 3)
     edges: IntArray  #: sharp edges, of shown nodes, (n_edges, 2)

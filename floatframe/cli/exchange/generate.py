@@ -1,4 +1,4 @@
-"""The command generate: the equations of one system as code."""
+"""The command generate: the equations of a system as code."""
 
 import json as json_module
 from pathlib import Path
@@ -10,7 +10,7 @@ from cms.cli.console import guarded, print_table, say
 
 __all__ = ["register"]
 
-MOST_ROWS = 60  #: printed
+MOST_ROWS = 60  #: largest number of printed rows
 
 
 def register(app: typer.Typer) -> None:
@@ -46,10 +46,10 @@ def generate_command(
     fmi: Annotated[int, typer.Option("--fmi", help="With --fmu: version of FMI, 2 or 3.")] = 2,
     step: Annotated[float, typer.Option("--step", help="With --fmu: longest step in co-simulation [s].")] = 1e-3,
 ) -> None:
-    """Write the equations of one system as code, its numbers in it: forces, mass matrix, accelerations, derivatives.
+    """Write the equations of a system as code with its numbers: forces, mass matrix, accelerations, derivatives.
 
-    With --fmu they become a unit for other programs, for model exchange and co-simulation: forces along the joints in,
-    positions and rates out. It is compiled by cc, or by what CC names.
+    With --fmu, they become an FMU for model exchange and co-simulation: inputs are the forces along the joints, outputs
+    are positions and rates. It is compiled by cc, or by the compiler in the environment variable CC.
 
     Example: floatframe generate robot.toml --what inverse --what mass --language c -o robot_code
 
@@ -109,7 +109,7 @@ def generate_command(
 
 
 def write_unit(system: Path, fmu: Path, fmi: int, step: float, parameters: list[str]) -> None:
-    """Write a system as an FMU of generated C, and say what is in it."""
+    """Write a system as an FMU of generated C, and report its contents."""
     from floatframe.generation.units.generated_unit import generate_fmu
     from floatframe.system_file.read_system import read_system
 

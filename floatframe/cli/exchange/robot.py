@@ -1,4 +1,4 @@
-"""The commands import and urdf: robots in and out, and what info says of one."""
+"""The commands import and urdf for robots, and the output of info for a robot."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -39,7 +39,7 @@ def import_command(
         list[str], typer.Option(help="LINK.JOINT=NAME, the interface of a flexible link at a joint; may be repeated.")
     ] = [],  # noqa: B006
 ) -> None:
-    """Write the system file of a robot, with its surfaces and modal files beside it.
+    """Write the system file of a robot, with its surfaces and modal files next to it.
 
     Example: floatframe import arm.urdf -o arm --at elbow=0.5
     """
@@ -96,9 +96,9 @@ def urdf_command(
     effort: Annotated[float | None, typer.Option(help="Largest force or torque of joints with limits.")] = None,
     velocity: Annotated[float | None, typer.Option(help="Largest speed of joints with limits.")] = None,
 ) -> None:
-    """Write a system as a robot, its surfaces beside it; what URDF cannot say is listed.
+    """Write a system as a robot, with its surfaces next to it; features that URDF does not support are listed.
 
-    Stops become limits, of which URDF asks for effort and velocity too.
+    Stops become limits, for which URDF also requires effort and velocity.
 
     Example: floatframe urdf arm.toml -o arm.urdf --effort 100 --velocity 2
     """
@@ -173,7 +173,7 @@ def print_robot(path: Path, *, as_json: bool) -> None:
 
 
 def robot_record(robot: "Robot") -> dict[str, Any]:
-    """Return what `info` says of a robot; moments that no body can have are marked by a note."""
+    """Return the record of a robot for `info`; moments of inertia that no body can have are marked by a note."""
     import numpy as np
 
     from floatframe.importers.robot import MeshFile

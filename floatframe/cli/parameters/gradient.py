@@ -105,7 +105,7 @@ def record_of(found: "Sensitivities") -> dict[str, Any]:
 
 
 def csv_of(found: "Sensitivities") -> str:
-    """Return a row an output and parameter, with 17 digits."""
+    """Return one row per output and parameter, with 17 digits."""
     import csv
     import io
 

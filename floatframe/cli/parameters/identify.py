@@ -50,10 +50,10 @@ def identify_command(
 ) -> None:
     """Find the inertial parameters of a robot from a measured motion: base parameters with their deviations.
 
-    Columns of the data are the positions of all coordinates by their names in results (joint1/angle), their torques
-    (joint1/angle torque) or the reactions at the base (base F_x to base M_z), or both; rates and accelerations
-    (joint1/angle rate, joint1/angle acceleration) if they were measured. Where joints close loops: the positions and
-    torques of as many coordinates as move independently.
+    Columns of the data are the positions of all coordinates, named as in results (joint1/angle), and their torques
+    (joint1/angle torque) or the reactions at the base (base F_x to base M_z), or both. Rates and accelerations
+    (joint1/angle rate, joint1/angle acceleration) may be included if they were measured. If joints close loops, the
+    positions and torques of an independent set of coordinates are needed.
 
     Example: floatframe identify robot.toml measured.csv --cutoff 10 -o report.html
     """
@@ -122,7 +122,7 @@ def identify_command(
 
 
 def motion_table(motion: "ExcitingMotion", form: "LinearForm") -> str:
-    """Return positions of one period at 100 instants of the fastest harmonic, as a table."""
+    """Return the positions of one period, at 100 times per period of the fastest harmonic, as a table."""
     import numpy as np
 
     n = 100 * ((motion.coefficients.shape[1] - 1) // 2)
@@ -134,7 +134,7 @@ def motion_table(motion: "ExcitingMotion", form: "LinearForm") -> str:
 
 
 def print_estimate(record: dict[str, Any]) -> None:
-    """Print combinations, channels, and what is doubtful."""
+    """Print parameter combinations, channels, and doubtful results."""
     rows = [
         (each["name"], f"{each['value']:.5g}", f"{each['deviation']:.2g}", each["unit"], each["verdict"])
         for each in record["parameters"]

@@ -39,9 +39,9 @@ def optimize_command(
 ) -> None:
     """Find the best values of parameters of a system: fits to tables, peaks, frequencies, damping, within limits.
 
-    Every evaluation is kept in a journal (study.toml: study.journal): after an interruption the same command goes on.
-    An evaluation that fails is a row with its reason. Without -o the history stands beside the design file as a
-    table and a picture: study.csv and study.png.
+    Every evaluation is recorded in a journal (study.toml: study.journal); after an interruption, the same command
+    continues. A failed evaluation is a row with its reason. Without -o, the history is written next to the design file
+    as a table and a picture: study.csv and study.png.
 
     Example: floatframe optimize study.toml -o history.csv -o history.png -o best.toml
 
@@ -74,7 +74,7 @@ def optimize_command(
             from floatframe.kernels.entry import prepare
 
             with clock("compiled code (made at first use)"):
-                prepare()  # once, before many processes want it
+                prepare()  # once, before many processes need it
         with clock(f"{described.method}"):
             result = optimize(described, workers=tasks, journal=kept)
     record = optimization_record(result)
@@ -118,7 +118,7 @@ def print_optimum(result: "OptimizationResult") -> None:
 
 
 def bound_of(parameter: Any, result: "OptimizationResult") -> str:
-    """Say if a parameter lies at a bound."""
+    """Return a note if a parameter is at a bound."""
     near = 1e-6 * (parameter.upper - parameter.lower)
     value = result.values[parameter.name]
     if value - parameter.lower < near:
@@ -127,7 +127,7 @@ def bound_of(parameter: Any, result: "OptimizationResult") -> str:
 
 
 def row_record(result: "OptimizationResult", row: "Evaluated") -> dict[str, Any]:
-    """Return a row of the history in plain types; what a failed evaluation lacks is null."""
+    """Return a row of the history in plain types; values missing in a failed evaluation are null."""
     from floatframe.optimization.optimize import numbers_by_name
 
     is_failed = bool(row.evaluation.error)
@@ -156,7 +156,7 @@ def optimization_record(result: "OptimizationResult") -> dict[str, Any]:
 
 
 def best_system(result: "OptimizationResult") -> str:
-    """Return the system file with the best values of the parameters, its comments and order kept."""
+    """Return the system file with the best values of the parameters; comments and order are kept."""
     import tomlkit
 
     from fe_models.foundation.toml_file import holder_of
@@ -174,7 +174,7 @@ def best_system(result: "OptimizationResult") -> str:
 
 
 def csv_of(result: "OptimizationResult") -> str:
-    """Return the history as comma-separated values, with 17 digits; empty cells and a reason where it failed."""
+    """Return the history as comma-separated values with 17 digits; a failure has empty cells and a reason."""
     import csv
     import io
 

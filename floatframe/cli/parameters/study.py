@@ -1,4 +1,4 @@
-"""The command study: descriptions of a flexible body beside a reference."""
+"""The command study: models of a flexible body compared with a reference."""
 
 import json as json_module
 from pathlib import Path
@@ -28,10 +28,11 @@ def study_command(
         list[Path] | None, typer.Option("--output", "-o", help="A .csv, .json, .png, .svg or .pdf file; repeatable.")
     ] = None,
 ) -> None:
-    """Run a mechanism with many descriptions of its flexible body: mode sets, frames, modes, stiffening, parts.
+    """Run a mechanism with many models of its flexible body: mode sets, frames, modes, stiffening, parts.
 
-    Error against a reference beside cost, and what fails first. A case that fails is a row with its reason. Without -o
-    a table and a picture stand beside the file: blade.toml gives blade.csv and blade.png.
+    The result contains error against a reference, cost, and the first limit that is exceeded. A failed case is a row
+    with its reason. Without -o, a table and a picture are written next to the file: blade.toml gives blade.csv and
+    blade.png.
 
     Example: floatframe study blade.toml -o blade.csv -o blade.pdf
     """
@@ -88,7 +89,7 @@ def csv_text(result: "LaboratoryResult") -> str:
 
 
 def print_result(result: "LaboratoryResult") -> None:
-    """Print one row a case."""
+    """Print one row per case."""
     rows = []
     for r in result.cases:
         if r.failure:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 __all__ = ["register"]
 
 KINDS = ("csv", "json", "png", "svg", "pdf")
-MOST_ROWS = 60  #: printed
+MOST_ROWS = 60  #: largest number of printed rows
 
 
 def register(app: typer.Typer) -> None:
@@ -34,10 +34,10 @@ def sweep_command(
     workers: Workers = None,
     json: Annotated[bool, typer.Option("--json", help="Write the table as JSON, for other programs.")] = False,
 ) -> None:
-    """Vary parameters of a system: one run, equilibrium or set of modes for every point, by parallel workers.
+    """Vary parameters of a system: a run, an equilibrium or a set of modes for every point, by parallel workers.
 
-    A point that fails is a row with its reason; the others go on. Every point is kept in a journal (study.toml:
-    study.journal): after an interruption the same command goes on. Without -o a table stands beside the study:
+    A failed point is a row with its reason; the others continue. Every point is recorded in a journal (study.toml:
+    study.journal); after an interruption, the same command continues. Without -o, a table is written next to the study:
     study.toml gives study.csv.
 
     Example: floatframe sweep study.toml -o study.csv -o study.png
@@ -69,7 +69,7 @@ def sweep_command(
             from floatframe.kernels.entry import prepare
 
             with clock("compiled code (made at first use)"):
-                prepare()  # once, before many processes want it
+                prepare()  # once, before many processes need it
         with clock(f"{n} points") as advance:
             table = run_study(described, workers=tasks, journal=kept, progress=lambda done, all_: advance(done / all_))
     record = study_record(table)
@@ -95,14 +95,14 @@ def sweep_command(
 
 
 def headers(table: "StudyTable") -> list[str]:
-    """Return the names of the columns: parameters, outputs with their units."""
+    """Return the names of the columns: parameters, and outputs with their units."""
     study = table.study
     named = [f"{o.name} [{unit}]" if unit else o.name for o, unit in zip(study.outputs, table.units, strict=True)]
     return [parameter.name for parameter in study.parameters] + named
 
 
 def print_study(table: "StudyTable") -> None:
-    """Print the table, and why points failed."""
+    """Print the table, and the reasons of failed points."""
     from floatframe.studies.study_plots import shown
 
     rows = [
@@ -127,7 +127,7 @@ def print_study(table: "StudyTable") -> None:
 
 
 def study_record(table: "StudyTable") -> dict[str, Any]:
-    """Return a study in plain types; numbers of points that failed are null."""
+    """Return a study in plain types; values of failed points are null."""
     study = table.study
     return {
         "system": study.system,
@@ -151,7 +151,7 @@ def study_record(table: "StudyTable") -> dict[str, Any]:
 
 
 def csv_of(table: "StudyTable") -> str:
-    """Return a study as comma-separated values, with 17 digits; empty cells and a reason where a point failed."""
+    """Return a study as comma-separated values with 17 digits; a failed point has empty cells and a reason."""
     import csv
     import io
 
