@@ -1,6 +1,7 @@
 """Files of matrices over the interfaces: what other programs' readers, or readers by documentation, find in them."""
 
 import re
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import cms
 from cms.errors import ExportError
 from cms.exporters.interface_model import interface_model
+from fe_models.body.fe_body import Interface
 from fe_models.body.load_cases import LoadCase
 from tests.bodies import bar, with_interfaces
 from tests.cms.exporters.small_bodies import RUBBER
@@ -232,3 +234,31 @@ def test_a_user_element_of_abaqus_holds_dofs_and_triangles(reduced, model, tmp_p
         [line.split(", ") for line in text.partition("*NODE\n")[2].split("*")[0].splitlines()], dtype=float
     )
     assert_array_equal(places[:2, 1:], [node.position for node in model.nodes])
+
+
+def test_comments_of_bulk_data_hold_the_whole_header_in_72_columns(reduced, tmp_path):
+    """Nastran reads 72 columns of a comment; what a header says beyond them goes on in the next line."""
+    long = "x".join(str(k) for k in range(60))
+    body = replace(reduced, provenance={**reduced.provenance, "made of": long})
+    export(body, tmp_path, "bar.pch", "nastran-dmig")
+    lines = (tmp_path / "bar.pch").read_text().splitlines()
+    comments = [line for line in lines if line.startswith("$")]
+    assert max(len(line) for line in lines) <= 72
+    assert all(line.startswith("$ ") for line in comments)
+    assert f"made of: {long}" in "".join(line[2:] for line in comments)
+    assert "".join(line[2:] for line in comments).count(long) == 1
+    assert comments[-1] == "$ case control: K2GG = KAAX, M2GG = MAAX, B2GG = BAAX, P2G = PAX"
+
+
+def test_grids_of_bulk_data_hold_the_components_that_the_body_lacks(tmp_path):
+    """A point of three translations is held in its rotations, one of six in nothing: fields 7 of GRID."""
+    body = bar(nx=4, material=RUBBER)
+    right = next(interface for interface in body.interfaces if interface.name == "right")
+    one = Interface("corner", "nodes", right.nodes[:1], body.nodes[right.nodes[0]])
+    left = next(interface for interface in body.interfaces if interface.name == "left")
+    coupled = cms.couple(with_interfaces(body, left, one))
+    made = cms.reduce(coupled, cms.craig_bampton(coupled, n_modes=2), geometric=False)
+    export(made, tmp_path, "bar.pch", "nastran-dmig")
+    lines = (tmp_path / "bar.pch").read_text().splitlines()
+    grids = [k for k, line in enumerate(lines) if line.startswith("GRID*")]
+    assert [lines[k + 1][40:56].strip() for k in grids] == ["", "456"]
