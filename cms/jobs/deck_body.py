@@ -34,11 +34,13 @@ def body_of_deck(job: Job, path: Path, stages: Stages, on_report: Callable[[Any]
     """Read the deck, make a body of each kind of elements, join them, and add loads and interfaces."""
     from fe_models.assemblies.join import join
     from fe_models.importers.decks.read_deck import read_deck
+    from fe_models.importers.raw_mesh import LINES
     from fe_models.importers.shell_cells import with_centres
+    from fe_models.meshes.mesh import FACE_TYPES
 
     with stages("read deck"):
-        raw = read_deck(path).mesh
-        raw = with_centres(raw)
+        deck = read_deck(path)
+        raw = with_centres(deck.mesh)
         numbers = raw.node_numbers
         # rows of the deck serve as the node numbers of the parts
         raw = replace(raw, node_numbers=np.arange(len(raw.nodes)))
@@ -51,7 +53,7 @@ def body_of_deck(job: Job, path: Path, stages: Stages, on_report: Callable[[Any]
         record |= {f"file {name}": digest for name, digest in raw.included.items()}
         numbering = joined.body.numbering.with_instances(raw.instances, raw.instance_step)
         body = replace(joined.body, provenance=record, numbering=numbering)
-        _require_used_groups(job, raw, joined)
+        _require_used_groups(job, raw, joined, naming=FACE_TYPES + LINES if deck.is_plain_mesh else ())
         body = body.with_load_cases(*_load_cases(job, raw, joined, meshes))
         return body.with_interfaces(
             *[
@@ -443,8 +445,11 @@ def _require_group(raw: "RawMesh", where: str, group: str) -> None:
         raise JobError(f'{where} = "{group}": the deck has no such group of cells{nearest(group, groups)}')
 
 
-def _require_used_groups(job: Job, raw: "RawMesh", joined: "Joined") -> None:
-    """Raise `JobError` if cells of the deck are in no table, because their mass would be lost silently."""
+def _require_used_groups(job: Job, raw: "RawMesh", joined: "Joined", *, naming: tuple[str, ...]) -> None:
+    """Raise `JobError` if cells of the deck are in no table, because their mass would be lost silently.
+
+    naming: kinds of cells that only name edges and faces where they lie on the body.
+    """
     tables = [*(t.cells for t in job.solids.values()), *(t.cells for t in job.shells.values())]
     groups = {
         group
@@ -455,7 +460,7 @@ def _require_used_groups(job: Job, raw: "RawMesh", joined: "Joined") -> None:
         return
     faces = {group for table in job.load_cases.values() for group in table.faces or ()}
     for block in raw.blocks:
-        if set(block.groups) & faces:
+        if set(block.groups) & faces or (block.kind in naming and (joined.place[block.nodes] >= 0).all()):
             continue
         inside = np.zeros(len(block.nodes), dtype=bool)
         for group in groups & set(block.groups):

@@ -18,8 +18,9 @@ from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.words import nearest, quoted
 from fe_models.importers.abaqus_deck import DeckBlock, mesh_blocks
 from fe_models.importers.raw_mesh import RawBlock, RawMesh
+from fe_models.meshes.mesh import SOLID_TYPES
 
-__all__ = ["DeckMesh", "deck_mesh", "raw_mesh_of", "read_abaqus"]
+__all__ = ["DeckMesh", "deck_mesh", "naming_note", "raw_mesh_of", "read_abaqus"]
 
 _SOLIDS = {4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron", 10: "tetra10", 15: "wedge15", 20: "hexahedron20"}
 _SOLID = re.compile(r"C3D(\d+)[A-Z]*$")
@@ -153,7 +154,19 @@ def read_abaqus(path: Path, data: bytes) -> RawMesh:
     where = f"mesh {path}"
     included: dict[str, str] = {}
     blocks, notes = mesh_blocks(where, data.decode("utf-8", "replace"), path.parent, included)
-    return replace(raw_mesh_of(deck_mesh(where, blocks), notes), included=included)
+    mesh = deck_mesh(where, blocks)
+    return replace(raw_mesh_of(mesh, [*notes, *naming_note(mesh)]), included=included)
+
+
+def naming_note(mesh: DeckMesh) -> list[str]:
+    """Return a line about the elements of lines and faces beside solids: in a mesh they only name edges and faces."""
+    counts: dict[str, int] = {}
+    if any(kind in SOLID_TYPES for _, kind, _ in mesh.elements):
+        for name, kind, table in mesh.elements:
+            if kind not in SOLID_TYPES:
+                counts[name] = counts.get(name, 0) + len(table)
+    listed = ", ".join(f"{count} {name}" for name, count in counts.items())
+    return [f"elements that name edges and faces, and are no part of the body: {listed}"] if counts else []
 
 
 def deck_mesh(where: str, blocks: list[DeckBlock]) -> DeckMesh:

@@ -12,7 +12,7 @@ from fe_models.importers.node_order import require_node_order
 from fe_models.meshes.boundary import first_of_equal_rows
 from fe_models.meshes.mesh import FACE_TYPES, SOLID_TYPES, Mesh
 
-__all__ = ["RawBlock", "RawMesh", "chosen_cells", "collect_cells", "mesh_from_raw", "require_nodes"]
+__all__ = ["LINES", "RawBlock", "RawMesh", "chosen_cells", "collect_cells", "mesh_from_raw", "require_nodes"]
 
 LINES = ("vertex", "line", "line3", "line4")  #: cells below two dimensions: they select nodes
 

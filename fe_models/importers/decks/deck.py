@@ -202,3 +202,4 @@ class Deck:
     loads: tuple[Load, ...] = ()
     rods: tuple[RodSection, ...] = ()
     plane: int | None = None  #: axis across the plane in which the deck holds all of its points; None: space
+    is_plain_mesh: bool = False  #: nodes, elements and their sets alone, such as a mesher writes

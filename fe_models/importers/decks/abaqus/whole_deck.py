@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from fe_models.errors import MeshError
-from fe_models.importers.abaqus import deck_mesh, raw_mesh_of
+from fe_models.importers.abaqus import deck_mesh, naming_note, raw_mesh_of
 from fe_models.importers.abaqus_deck import DeckBlock, deck_blocks, refuse_unread
 from fe_models.importers.decks.abaqus.assembly import flat_assembly
 from fe_models.importers.decks.abaqus.couplings import equations_in_basic_axes, read_coupling
@@ -113,8 +113,13 @@ def read_abaqus_deck(path: Path, data: bytes, *, program: str = "calculix") -> D
             if isinstance(error, MeshError):
                 raise
             raise MeshError(f"{here}: cannot be understood ({error}); first line below: {block.lines[:1]}") from error
+    is_plain = {block.keyword for block in blocks} <= {*_MESH, "SURFACE"}
+    if is_plain:
+        for note in naming_note(mesh):
+            draft.ledger.note("*ELEMENT", note)
+        draft.sectioned += [table[:, 0] for _, _, table in mesh.elements]
     deck = _finished(path, draft)
-    return replace(deck, mesh=replace(deck.mesh, included=included))
+    return replace(deck, mesh=replace(deck.mesh, included=included), is_plain_mesh=is_plain)
 
 
 def _take(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
