@@ -156,7 +156,7 @@ def _placed(block: DeckBlock, instance: str, offset: int, R: Array, t: Array) ->
             x = R @ np.array([float(word or 0) for word in [*words[1:4], "0", "0", "0"][:3]]) + t
             lines.append(", ".join([words[0], *(repr(float(value)) for value in x)]))
         return replace(block, parameters=parameters, lines=lines)
-    if block.keyword == "SPRING" and not np.array_equal(R, np.eye(3)):
+    if block.keyword in ("SPRING", "DASHPOT") and not np.array_equal(R, np.eye(3)):
         parameters = parameters | {TURNED: " ".join(repr(float(x)) for x in R.ravel())}
     if block.keyword == "EQUATION":
         turned = {} if np.array_equal(R, np.eye(3)) else {TURNED: " ".join(repr(float(x)) for x in R.ravel())}

@@ -27,7 +27,9 @@ from fe_models.importers.decks.deck import (
 from fe_models.importers.decks.ledger import Ledger
 from fe_models.importers.raw_mesh import RawBlock
 
-__all__ = ["Draft", "PointElements"]
+__all__ = ["GROUNDED", "Draft", "PointElements"]
+
+GROUNDED = "grounded"  #: name of the interfaces at springs and dashpots to the ground
 
 COMPONENTS = "123456"
 AXES_DIGITS = 7  #: to which the axes of nodes that are held together are the same
@@ -224,7 +226,7 @@ class Draft:
             label = group if group not in {s.name for s in supports} else f"{group}_{letters}"
             rows = [(x, y, z) for x, y, z in self.transformed[nodes[0]].tolist()] if axes else []
             triad = (rows[0], rows[1], rows[2]) if rows else None
-            supports.append(Support(label, group, components, axes=triad))
+            supports.append(Support(label, group, components, names == (GROUNDED,), triad))
         return supports
 
     @staticmethod

@@ -1,9 +1,96 @@
-"""Keywords of Abaqus and CalculiX that say nothing about mass, stiffness or constraints of a body.
+"""Keywords of Abaqus and CalculiX: the parameters of those that are read, and those that say nothing about a body.
 
-A keyword that is neither read nor on this list is refused by name: it may belong to the body.
+`PARAMETERS` lists the parameters of every keyword that is read, in the symbols of
+`fe_models.importers.decks.field_table`; one that is not there is refused by name, as is a keyword on neither list: it
+may belong to the body.
 """
 
-__all__ = ["HARMLESS"]
+from fe_models.importers.abaqus_deck import DeckBlock
+from fe_models.importers.decks.abaqus.assembly import TURNED
+from fe_models.importers.decks.field_table import TableField, has_default, parse_fields
+from fe_models.importers.decks.ledger import Ledger
+
+__all__ = ["HARMLESS", "PARAMETERS", "check_parameters", "parameters_of"]
+
+_LOAD = "OP~; AMPLITUDE~; TIME DELAY~; LOAD CASE~; FOLLOWER~; REGION TYPE~; SUBMODEL~; STEP~; DATA SET~; "
+_LOAD += "REAL~; IMAGINARY~; CYCLIC MODE~; CONSTANT RESULTANT~; REF NODE~; ORIENTATION!; SECTOR!; USER!"
+_BEAM = "ELSET; MATERIAL; SECTION; OFFSET1; OFFSET2; POISSON~; TEMPERATURE~; ROTARY INERTIA=EXACT; LUMPED!; "
+_BEAM += "NODAL THICKNESS!"
+PARAMETERS = {
+    "NODE": "NSET; INPUT; SYSTEM=R",
+    "ELEMENT": "TYPE; ELSET; INPUT; OFFSET!; SOLID ELEMENT NUMBERING~",
+    "NSET": "NSET; ELSET; GENERATE; INSTANCE; INTERNAL~; UNSORTED~; FREQUENCY~",
+    "ELSET": "ELSET; GENERATE; INSTANCE; INTERNAL~",
+    "SURFACE": "NAME; TYPE; INTERNAL~; NO OFFSET~; NO THICK~; SCALE THICK~; COMBINE!; CROP!; TRIM=NO; REGION TYPE!; "
+    "FILLET RADIUS~; MAX RATIO~; PROPERTY~; DEFINITION=COORDINATES",
+    "SYSTEM": "",
+    "MATERIAL": "NAME; RTOL~; STRAIN RATE REGULARIZATION~; SRATE FACTOR~; SRATE TYPE~; UNDEFINED~",
+    "ELASTIC": "TYPE; DEPENDENCIES=0; MODULI=LONGTERM; COMPRESSION FACTOR!; TENSION FACTOR!; USER!",
+    "DENSITY": "DEPENDENCIES=0; PORE FLUID!",
+    "DAMPING": "ALPHA^; BETA^; COMPOSITE^; STRUCTURAL^; ALPHA TABULAR^; BETA TABULAR^; DEPENDENCIES~",
+    "SOLID SECTION": "ELSET; MATERIAL; ORIENTATION; COMPOSITE!; SYMMETRIC!; STACK DIRECTION!; ORDER!; REF NODE!; NODAL "
+    "THICKNESS!; LAYUP~; CONTROLS~; OFFSET=0; STRETCH~",
+    "SHELL SECTION": "ELSET; MATERIAL; ORIENTATION; COMPOSITE; SYMMETRIC; OFFSET; DENSITY; NODAL THICKNESS; SECTION "
+    "INTEGRATION~; POISSON~; TEMPERATURE~; THICKNESS MODULUS~; CONTROLS~; LAYUP~; SHELL THICKNESS!; "
+    "NON STRUCTURAL MASS!; STACK DIRECTION=3; MEMBRANE ONLY!; BENDING ONLY!; ORDER!; REF NODE!",
+    "BEAM SECTION": _BEAM,
+    "BEAM GENERAL SECTION": f"{_BEAM}; DENSITY!; TAPER!; ZERO~; DEPENDENCIES!; FIBER!; LINEAR!; NONLINEAR!",
+    "MASS": "ELSET; TYPE; ORIENTATION!; ALPHA^; COMPOSITE^",
+    "SPRING": "ELSET; NONLINEAR; ORIENTATION; DEPENDENCIES=0; COMPLEX STIFFNESS!; RTOL~",
+    "DASHPOT": "ELSET; NONLINEAR!; ORIENTATION; DEPENDENCIES=0; RTOL~",
+    "NODAL THICKNESS": "INPUT; GENERATE!",
+    "ORIENTATION": "NAME; SYSTEM; DEFINITION; LOCAL DIRECTIONS=0",
+    "TRANSFORM": "NSET; TYPE",
+    "NORMAL": "TYPE~",
+    "EQUATION": "INPUT; REMOVE; REMOVE ALL",
+    "MPC": "INPUT; MODE!; USER!",
+    "RIGID BODY": "NSET; ELSET; REF NODE; ROT NODE; ISOTHERMAL~; POSITION=INPUT; TIE NSET!; PIN NSET!; ANALYTICAL "
+    "SURFACE!; DENSITY!; OFFSET!; THICKNESS!; NODAL THICKNESS!",
+    "COUPLING": "CONSTRAINT NAME; REF NODE; SURFACE; ORIENTATION; INFLUENCE RADIUS; ADJUST!",
+    "KINEMATIC": "",
+    "DISTRIBUTING": "WEIGHTING METHOD; COUPLING=CONTINUUM; ROTATIONAL COUPLING=CONTINUUM",
+    "DISTRIBUTING COUPLING": "ELSET; WEIGHTING METHOD=UNIFORM",
+    "TIE": "NAME~; POSITION TOLERANCE; ADJUST~; TYPE~; NO THICKNESS~; CYCLIC SYMMETRY; MULTISTAGE; NO ROTATION!; "
+    "CONSTRAINT RATIO!; FLUIDCYCLIC!; FLUIDPERIODIC!; SPOS!; SNEG!; SLIP!",
+    "BOUNDARY": "OP~; AMPLITUDE~; FIXED~; TYPE~; LOAD CASE~; STEP~; BLOCKING~; REAL~; IMAGINARY~; BASE NAME~; "
+    "MASS FLOW~; PRESSURE~; TEMPERATURE~; SUBMODEL~; DATA SET~; TIME DELAY~; USER~; REGION TYPE~; "
+    "SHELL THICKNESS~; SCALE~; INC~; ABSOLUTE EXTERIOR TOLERANCE~; EXTERIOR TOLERANCE~; INTERSECTION ONLY~; PHANTOM!",
+    "CLOAD": _LOAD,
+    "DLOAD": _LOAD,
+    "DSLOAD": _LOAD,
+    "GRAVITY": _LOAD,
+}  #: keyword -> its parameters, blanks in their names may be left out
+PARAMETERS |= {"PART": "NAME; INTERNAL~", "END PART": "", "ASSEMBLY": "NAME", "END ASSEMBLY": "", "END INSTANCE": ""}
+PARAMETERS |= {"INSTANCE": "NAME; PART; DEPENDENT~; LIBRARY!; INSTANCE!", "INCLUDE": "INPUT; PASSWORD!"}
+
+
+def parameters_of(keyword: str) -> tuple[TableField, ...]:
+    """Return the parameters of a keyword that `PARAMETERS` lists."""
+    return parse_fields(word.strip() for word in PARAMETERS[keyword].split(";") if word.strip())
+
+
+def check_parameters(block: DeckBlock, ledger: Ledger) -> None:
+    """Put into the ledger the parameters of a keyword that are not taken over.
+
+    (1) one that is not listed is refused
+    (2) one that is listed with a default is refused where it has another value
+    (3) damping is left out and named
+    """
+    if block.keyword not in PARAMETERS:
+        return
+    known = {item.name.replace(" ", ""): item for item in parameters_of(block.keyword)}
+    for name, value in block.parameters.items():
+        item = known.get(name.replace(" ", ""))
+        here = f"*{block.keyword}, {name}"
+        if item is None and name and name != TURNED and not name.isdigit():
+            ledger.refuse(here, "this parameter is not known here", line=block.line_number)
+        elif item is not None and item.use == "default" and not has_default(value, item.default):
+            what = f"{name} = {value}" if value else name
+            ledger.refuse(here, f"{what}: this parameter is not taken over", line=block.line_number)
+        elif item is not None and item.use == "left out":
+            why = f"damping {name} = {value} is left out: give the job a table [damping]"
+            ledger.note(f"*{block.keyword}", why, line=block.line_number)
+
 
 HARMLESS = frozenset(
     " ".join(keyword.split())
@@ -11,6 +98,7 @@ HARMLESS = frozenset(
     STATIC; DYNAMIC; FREQUENCY; BUCKLE; COMPLEX FREQUENCY; STEADY STATE DYNAMICS; MODAL DYNAMIC; RANDOM
     RESPONSE; RESPONSE SPECTRUM; HEAT TRANSFER; COUPLED TEMPERATURE-DISPLACEMENT; UNCOUPLED
     TEMPERATURE-DISPLACEMENT; VISCO; DIRECT CYCLIC; SUBSTRUCTURE GENERATE; MATRIX GENERATE; MATRIX OUTPUT;
+    SUBSTRUCTURE MATRIX OUTPUT;
     GREEN; SENSITIVITY; FEASIBLE DIRECTION; ROBUST DESIGN; ELECTROMAGNETICS; GEOSTATIC; ANNEAL; INERTIA RELIEF;
     MODAL FILE; OUTPUT; NODE OUTPUT; ELEMENT OUTPUT; CONTACT OUTPUT; ENERGY OUTPUT; MODAL OUTPUT; RADIATION
     OUTPUT; SURFACE OUTPUT; INTEGRATED OUTPUT; INTEGRATED OUTPUT SECTION; NODE FILE; EL FILE; ELEMENT FILE;

@@ -45,6 +45,9 @@ def _elastic(block: DeckBlock, draft: Draft) -> None:
         return
     n_lines = -(-n // 8)
     values = [value for line in block.lines[:n_lines] for value in numbers(line)]
+    if n == 2 and len(values) == 1:
+        draft.ledger.note("*ELASTIC", "no Poisson's ratio: 0, as the programs take it", line=block.line_number)
+        values.append(0.0)
     if len(values) < n:
         raise ValueError(f"expected {n} constants, got {len(values)}")
     if len(block.lines) > n_lines:

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.components import MOTION_COMPONENTS
 from fe_models.importers.abaqus_deck import DeckBlock
 from fe_models.importers.decks.abaqus.assembly import TURNED
-from fe_models.importers.decks.abaqus.draft import Draft, PointElements
+from fe_models.importers.decks.abaqus.draft import GROUNDED, Draft, PointElements
 from fe_models.importers.decks.abaqus.elements import PLANE, SOLID_RULES
 from fe_models.importers.decks.abaqus.layups import layers_of_block
 from fe_models.importers.decks.abaqus.materials import numbers, read_orientation, read_transform
@@ -21,6 +22,7 @@ __all__ = ["ellipses_in_numbers", "read_section"]
 
 _SHELLS = ("triangle", "triangle6", "quad", "quad8", "quad9")
 _LINES = ("line", "line3")
+ALONG = 1e-9  #: part of a vector across a line, below which it is along it
 
 
 def read_section(here: str, block: DeckBlock, draft: Draft) -> None:
@@ -32,7 +34,7 @@ def read_section(here: str, block: DeckBlock, draft: Draft) -> None:
         "BEAM GENERAL SECTION": _beam_section,
         "MASS": _masses,
         "SPRING": _springs,
-        "DASHPOT": _dashpots,
+        "DASHPOT": _springs,
     }
     if block.keyword in makers:
         makers[block.keyword](here, block, draft)
@@ -248,50 +250,74 @@ def _masses(here: str, block: DeckBlock, draft: Draft) -> None:
 
 
 def _springs(here: str, block: DeckBlock, draft: Draft) -> None:
+    """Take springs and dashpots: along the line of two nodes (A), of one component of one node (1) or of two (2)."""
     of_set = draft.points_of(block.parameters.get("ELSET", ""))
     if of_set is None:
         return
-    n = len(of_set.rows)
+    n, is_axial = len(of_set.rows), of_set.kind.endswith("A")
     if "NONLINEAR" in block.parameters:
-        draft.ledger.refuse("*SPRING, NONLINEAR", "springs here are linear", count=n, line=block.line_number)
+        draft.ledger.refuse(f"*{block.keyword}, NONLINEAR", "springs here are linear", count=n, line=block.line_number)
         return
-    if len(block.lines) > (1 if of_set.kind == "SPRINGA" and numbers(block.lines[0])[0] else 2):
-        draft.ledger.note("*SPRING", "of several temperatures the first line is taken", line=block.line_number)
-    if of_set.kind == "SPRINGA":
-        k = numbers(block.lines[1 if len(block.lines) > 1 and not numbers(block.lines[0])[0] else 0])[0]
+    if len(block.lines) > (1 if is_axial and numbers(block.lines[0])[0] else 2):
+        why = "of several temperatures the first line is taken"
+        draft.ledger.note(f"*{block.keyword}", why, line=block.line_number)
+    if is_axial:
+        value = numbers(block.lines[1 if len(block.lines) > 1 and not numbers(block.lines[0])[0] else 0])[0]
         for row in of_set.rows.values():
-            draft.springs.append(_axial(here, draft, row, k))
-    elif of_set.kind == "SPRING1":
-        why = "a spring to the ground; put it between bodies in the system file"
-        draft.ledger.refuse(of_set.kind, why, count=n)
+            draft.springs.append(_axial(here, draft, row, value, is_damper=block.keyword == "DASHPOT"))
+    elif of_set.kind.endswith("1"):
+        _to_ground(block, draft, of_set)
     else:
         _component_springs(here, block, draft, of_set)
 
 
+def _to_ground(block: DeckBlock, draft: Draft, of_set: PointElements) -> None:
+    """Note a spring or dashpot to the ground: a body is free here, and gets an interface where it would be attached."""
+    component = int(numbers(block.lines[0])[0]) - 1
+    if not 0 <= component < 6 or "ORIENTATION" in block.parameters:
+        why = "along axes of its own (ORIENTATION), or of another component than 1 to 6"
+        draft.ledger.refuse(of_set.kind, why, line=block.line_number)
+        return
+    value = numbers(block.lines[1])[0]
+    for (node,) in of_set.rows.values():
+        why = (
+            f"ties {MOTION_COMPONENTS[component]} of node {node} to the ground with {value:g}; the body is free here: "
+            "put it into the system file"
+        )
+        draft.ledger.note(of_set.kind, why, line=block.line_number)
+        draft.held.setdefault(node, {}).setdefault(GROUNDED, set()).add(component)
+
+
 def _component_springs(here: str, block: DeckBlock, draft: Draft, of_set: PointElements) -> None:
-    """Take SPRING2 between the same component of two nodes at one place; others would turn the body by their force."""
+    """Take springs between the same component of two nodes, whose forces balance.
+
+    Two forces along an axis balance on one line only: the nodes are at one place, or apart along this axis. Two moments
+    always do.
+    """
     first, second = (int(number) for number in (numbers(block.lines[0]) * 2)[:2])
-    k = numbers(block.lines[1])[0]
+    value = numbers(block.lines[1])[0]
     turn = block.parameters.get(TURNED)
-    axes = None if turn is None else np.array(turn.split(), dtype=float).reshape(3, 3).T
-    triad = None if axes is None else tuple((float(x), float(y), float(z)) for x, y, z in axes)
+    axes = np.eye(3) if turn is None else np.array(turn.split(), dtype=float).reshape(3, 3).T
+    rows = [(float(x), float(y), float(z)) for x, y, z in axes]
     for row in of_set.rows.values():
         ends = draft.mesh.coordinates[draft.mesh.rows_of(np.array(row))]
-        if first != second or not 1 <= first <= 6 or np.abs(ends[1] - ends[0]).max() > 0:
-            why = "between nodes at different places, or between different components"
-            draft.ledger.refuse("SPRING2", why, line=block.line_number)
+        apart, e = ends[1] - ends[0], axes[(first - 1) % 3]
+        across = np.abs(apart - (apart @ e) * e).max() if first <= 3 else 0.0
+        if first != second or not 1 <= first <= 6 or across > ALONG * np.abs(apart).max():
+            why = "between different components, or between nodes apart across the direction: the forces do not balance"
+            draft.ledger.refuse(of_set.kind, why, line=block.line_number)
         elif "ORIENTATION" in block.parameters or draft.transformed.keys() & set(row):
-            draft.ledger.refuse("SPRING2", "along axes of its own (ORIENTATION, *TRANSFORM)", line=block.line_number)
+            draft.ledger.refuse(of_set.kind, "along axes of its own (ORIENTATION, *TRANSFORM)", line=block.line_number)
         else:
-            along = [0.0] * 6
-            along[first - 1] = k
+            six, none = tuple(value if k == first - 1 else 0.0 for k in range(6)), (0.0,) * 6
+            stiffness, damping = (none, six) if block.keyword == "DASHPOT" else (six, None)
             names = [draft.node_group(here, [number]) for number in row]
-            rows = None if triad is None else (triad[0], triad[1], triad[2])
-            draft.springs.append(DeckSpring((names[0], names[1]), tuple(along), triad=rows))
+            triad = None if turn is None else (rows[0], rows[1], rows[2])
+            draft.springs.append(DeckSpring((names[0], names[1]), stiffness, damping, triad))
 
 
-def _axial(here: str, draft: Draft, row: tuple[int, ...], k: float) -> DeckSpring:
-    """Return a spring along the line of its nodes."""
+def _axial(here: str, draft: Draft, row: tuple[int, ...], value: float, *, is_damper: bool) -> DeckSpring:
+    """Return a spring or damper along the line of its nodes."""
     ends = draft.mesh.coordinates[draft.mesh.rows_of(np.array(row))]
     x = ends[1] - ends[0]
     x = x / np.linalg.norm(x)
@@ -300,11 +326,6 @@ def _axial(here: str, draft: Draft, row: tuple[int, ...], k: float) -> DeckSprin
     rows = (x, y, np.cross(x, y))
     triad = tuple((float(axis[0]), float(axis[1]), float(axis[2])) for axis in rows)
     names = tuple(draft.node_group(here, [number]) for number in row)
-    return DeckSpring((names[0], names[1]), (k, 0.0, 0.0, 0.0, 0.0, 0.0), triad=(triad[0], triad[1], triad[2]))
-
-
-def _dashpots(here: str, block: DeckBlock, draft: Draft) -> None:
-    of_set = draft.points_of(block.parameters.get("ELSET", ""))
-    if of_set is not None:
-        why = "dampers stand in the system file, or in [damping]"
-        draft.ledger.note(of_set.kind, why, count=len(of_set.rows), line=block.line_number)
+    six, none = (value, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0,) * 6
+    stiffness, damping = (none, six) if is_damper else (six, None)
+    return DeckSpring((names[0], names[1]), stiffness, damping, (triad[0], triad[1], triad[2]))

@@ -12,7 +12,7 @@ from fe_models.importers.decks.abaqus.assembly import flat_assembly
 from fe_models.importers.decks.abaqus.couplings import equations_in_basic_axes, read_coupling
 from fe_models.importers.decks.abaqus.draft import Draft
 from fe_models.importers.decks.abaqus.elements import read_element
-from fe_models.importers.decks.abaqus.keywords import HARMLESS
+from fe_models.importers.decks.abaqus.keywords import HARMLESS, PARAMETERS, check_parameters
 from fe_models.importers.decks.abaqus.layups import layups_in_axes
 from fe_models.importers.decks.abaqus.loads import read_boundary, read_load
 from fe_models.importers.decks.abaqus.materials import materials_in_axes, read_material
@@ -61,6 +61,8 @@ _NONLINEAR = {
     "NONSTRUCTURAL MASS": "mass that is not at nodes",
     "FLUID SECTION": "fluid elements",
 }  #: keyword -> why it cannot be taken over: these carry mass, stiffness or constraints
+#: keyword without blanks, which CalculiX lets one leave out -> keyword
+_SQUEEZED = {name.replace(" ", ""): name for name in (*PARAMETERS, *HARMLESS, *_NONLINEAR)}
 _FIRST = ("ELEMENT", "TRANSFORM", "SURFACE")  #: read before the others, which may stand above them
 _SILENT = ("STEP", "END STEP", "ENDSTEP", "NO ANALYSIS")
 
@@ -85,6 +87,7 @@ def read_abaqus_deck(path: Path, data: bytes, *, program: str = "calculix") -> D
         raise MeshError(f"{where}: unknown program {program!r}; expected one of {', '.join(PROGRAMS)}")
     included: dict[str, str] = {}
     blocks = deck_blocks(where, data.decode("utf-8", "replace"), path.parent, included)
+    blocks = [replace(block, keyword=_SQUEEZED.get(block.keyword.replace(" ", ""), block.keyword)) for block in blocks]
     refuse_unread(where, blocks)
     flat = flat_assembly(where, blocks)
     blocks, notes = flat.blocks, flat.notes
@@ -100,6 +103,7 @@ def read_abaqus_deck(path: Path, data: bytes, *, program: str = "calculix") -> D
     step, steps = 0, ""
     for block in sorted(blocks, key=lambda block: block.keyword not in _FIRST):
         here = f"{where}, {block.place}: *{block.keyword}"
+        check_parameters(block, draft.ledger)
         try:
             if block.keyword == "STEP":
                 step += 1

@@ -9,6 +9,7 @@ import numpy as np
 
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.importers.decks.ansys.command_fields import COMMANDS, HARMLESS, check_columns, check_command
 from fe_models.importers.decks.deck import Deck, DeckMaterial, Load, SolidSection, Support
 from fe_models.importers.decks.ledger import Ledger
 from fe_models.importers.raw_mesh import RawBlock, RawMesh
@@ -35,16 +36,6 @@ KEYOPTS: dict[int, dict[int, dict[int, str]]] = {
     187: {},
 }
 OUTPUT_KEYOPTS = (4, 5, 8, 9, 10, 15)  #: output, layers, boundary layers of waves: they change no mass or stiffness
-#: commands that say nothing about the body: structure of the file, loads and controls of an analysis
-HARMLESS = frozenset(
-    "ACEL ACELL ANTYPE AUTOTS BF BFE BFBLOCK BFEBLOCK BFUNIF CGLOC CGOMEGA CGOMGA CLOCAL CLWRITE CM CMDELE CMGRP "
-    "CMOMEGA CMSEL CNVTOL CRPLIM CS CSCIR CSDELE CSYS DCGOMG DELTIM DOF DOMEGA DSYS EBLOCK EMODIF EPLOT EQSLV "
-    "ERESX ERNORM ESEL ESYS ETCONTROL EXPASS EXTOPT FINI FINISH FREQ HARFRQ HROPT IC ICROTB INISTATE IRLF KBC "
-    "KUSE LOCAL LSCLEAR LSWRITE LVSCALE MAT MODCONTROL MODOPT MPTEMP MPTRES MXPAND N NBLOCK NCNV NEQIT NLGEOM "
-    "NLHIST NROPT NSEL NSUBST NUMOFF OMEGA OUTPR OUTRES PRED PSTRES QRDOPT RESCONTROL REAL SAVE SECNUM SHPP "
-    "SOLCONTROL SOLUTION SOLVE SSTIF SYNCHRO TIME TIMINT TINTP TOFFST TREF TRNOPT TUNIF TYPE USRCAL VSWEEP".split()
-)
-DAMPING = ("ALPHAD", "BETAD", "DMPRAT", "DMPSTR", "DMPSTRUCT", "MDAMP")
 DAMPING_LABELS = ("DMPR", "DMPS", "ALPD", "BETD")
 ISOTROPIC = ("EX", "PRXY", "NUXY", "DENS")
 ORTHOTROPIC = ("EY", "EZ", "PRXZ", "PRYZ", "NUXZ", "NUYZ", "GXY", "GXZ", "GYZ")
@@ -91,6 +82,8 @@ def read_cdb_deck(path: Path, data: bytes) -> Deck:
         words = [word.strip() for word in line.split(",")]
         name, here = words[0].upper(), f"{where}, line {number}: {words[0].upper()}"
         try:
+            if name in COMMANDS:
+                check_command(name, words, draft.ledger, number)
             if name in ("NBLOCK", "EBLOCK", "CMBLOCK"):
                 {"NBLOCK": _nodes, "EBLOCK": _elements, "CMBLOCK": _component}[name](here, words, lines, draft)
             else:
@@ -126,7 +119,7 @@ def _nodes(here: str, words: list[str], lines: Iterator[tuple[int, str]], draft:
 
 def _elements(here: str, words: list[str], lines: Iterator[tuple[int, str]], draft: _Draft) -> None:
     """Eleven columns and eight nodes on a line, further nodes on the next."""
-    if words[1] != "19":
+    if words[1] != "19":  # another layout
         raise MeshError(f"{here}: expected 19 columns (EBLOCK,19,SOLID), got {words[1]}")
     _, width, _ = _format(here, next(lines)[1])
     for _, line in lines:
@@ -139,6 +132,7 @@ def _elements(here: str, words: list[str], lines: Iterator[tuple[int, str]], dra
         while len(row) < COLUMNS + n:
             _, more = next(lines)
             row += [int(more[k : k + width]) for k in range(0, len(more.rstrip()), width)]
+        check_columns(row, draft.ledger)
         draft.elements.append(row[: COLUMNS + n])
     raise MeshError(f"{here}: the block does not end (-1); the file is truncated")
 
@@ -168,17 +162,8 @@ def _command(name: str, words: list[str], draft: _Draft, line: int) -> None:
         table |= {int(words[5]) + k: float(word) for k, word in enumerate(words[6:]) if word}
     elif name == "MP" and len(words) > 3:
         draft.constants.setdefault(int(words[2]), {})[words[1].upper()] = {1: float(words[3])}
-        if any(float(word) for word in words[4:] if word):
-            draft.ledger.refuse("MP", f"{words[1]} is a polynomial of the temperature", line=line)
     elif name in ("KEYOP", "KEYOPT") and len(words) > 3 and words[1].isdigit():
         draft.keyopts.setdefault(int(words[1]), {})[int(words[2])] = int(float(words[3] or 0))
-    elif name in DAMPING:
-        if len(words) > 1 and any(float(word) for word in words[1:] if _is_number(word)):
-            why = f"damping ({', '.join(words[1:])}) is left out: give the job a table [damping]"
-            draft.ledger.note(name, why, line=line)
-    elif name == "LUMPM":
-        if len(words) > 1 and words[1].upper() not in ("", "0", "OFF"):
-            draft.ledger.refuse(name, "lumped mass: here it is consistent", line=line)
     elif name == "SFE" and len(words) > 3 and words[3].upper() == "PRES":
         draft.ledger.note(name, "pressure on faces: no load case of a deck has it", line=line)
     elif name == "D" and words[1].isdigit():
@@ -188,16 +173,13 @@ def _command(name: str, words: list[str], draft: _Draft, line: int) -> None:
         draft.forces.setdefault(int(words[1]), np.zeros(6))[_FORCES[words[2].upper()]] += float(words[3])
     elif name in HARMLESS:
         draft.ledger.note(name, "belongs to the analysis, not to the body", line=line)
-    elif not name.startswith(("/", "*", "_", "(", "-")) and name.isalnum() and not name[0].isdigit():
+    elif (
+        name not in COMMANDS
+        and not name.startswith(("/", "*", "_", "(", "-"))
+        and name.isalnum()
+        and not name[0].isdigit()
+    ):
         draft.ledger.refuse(name, "this command is not known here", line=line)
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
 
 
 def _deck(path: Path, draft: _Draft) -> Deck:

@@ -1,26 +1,17 @@
 """The cards of Nastran that a whole deck may hold: what is read of each field, and which cards do not touch the body.
 
-`CARDS` lists every card that is read, field by field in the order of the Quick Reference Guide:
-
-    NAME        read
-    NAME=value  refused unless it is blank or has this value, the default
-    NAME!       refused unless it is blank
-    NAME~       says nothing about mass, stiffness or damping: stress recovery, thermal expansion, strength
-    NAME^       structural damping or the like, which is left out and named in the ledger
-    -           blank in every deck
-    ...         the fields before it repeat, or the reader takes the rest itself
+`CARDS` lists every card that is read, field by field in the order of the Quick Reference Guide, in the symbols of
+`fe_models.importers.decks.field_table`.
 
 `HARMLESS` lists the cards that belong to an analysis: loads, modes, aerodynamics, optimisation, output. A card in
 neither is refused by name: it may carry mass or stiffness.
 """
 
-import re
-from dataclasses import dataclass
-
 from fe_models.importers.bulk_data.cards import real_of
+from fe_models.importers.decks.field_table import TableField, has_default, parse_fields
 from fe_models.importers.decks.nastran.model import NastranModel
 
-__all__ = ["CARDS", "CardField", "check_cards", "fields_of"]
+__all__ = ["CARDS", "check_cards", "fields_of"]
 
 _SHELL_3 = "EID PID G1 G2 G3 THETA ZOFFS - - TFLAG=0 T1 T2 T3"
 _SHELL_4 = "EID PID G1 G2 G3 G4 THETA ZOFFS - TFLAG=0 T1 T2 T3 T4"
@@ -118,30 +109,11 @@ NOMINAL = {
     "PDAMPT": "the constant damping of its PDAMP is taken",
     "MDLPRM": "parameters of the program are not looked at",
 }
-SYMBOLS = re.compile(r"(?P<name>[^=!~^]+)(?P<kind>[=!~^]?)(?P<default>.*)")
 
 
-@dataclass(frozen=True)
-class CardField:
-    """One field of a card in `CARDS`."""
-
-    number: int  #: of the field, from 1
-    name: str
-    use: str  #: "read", "default", "blank", "harmless" or "left out"
-    default: str = ""  #: value that says nothing, for "default"
-
-
-def fields_of(name: str) -> tuple[CardField, ...]:
+def fields_of(name: str) -> tuple[TableField, ...]:
     """Return the fields of a card that `CARDS` lists, without those the reader takes as a repeating rest."""
-    found = []
-    for number, word in enumerate(CARDS[name].split(), start=1):
-        if word == "...":
-            break
-        match = SYMBOLS.fullmatch(word)
-        assert match is not None  # the table is ours
-        kind = {"": "read", "=": "default", "!": "default", "~": "harmless", "^": "left out"}[match["kind"]]
-        found.append(CardField(number, match["name"], "blank" if word == "-" else kind, match["default"]))
-    return tuple(found)
+    return parse_fields(CARDS[name].split())
 
 
 def check_cards(model: NastranModel) -> None:
@@ -170,7 +142,7 @@ def check_cards(model: NastranModel) -> None:
         for card in cards:
             for item in watched:
                 word = card.text(item.number)
-                if not word or _is_same(word, item.default):
+                if not word or has_default(word, item.default):
                     continue
                 if item.use == "default":
                     model.ledger.refuse(name, f"{item.name} = {word}: this field is not taken over")
@@ -178,15 +150,3 @@ def check_cards(model: NastranModel) -> None:
                     model.ledger.note(
                         name, f"structural damping {item.name} = {word} is left out: give the job a table [damping]"
                     )
-
-
-def _is_same(word: str, default: str) -> bool:
-    """Whether a field has its default, as text or as a number."""
-    if not default:
-        return False
-    if word.upper() == default:
-        return True
-    try:
-        return real_of(word) == real_of(default)
-    except ValueError:
-        return False

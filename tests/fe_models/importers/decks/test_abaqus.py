@@ -462,8 +462,9 @@ SPRING2 = "*ELEMENT, TYPE=SPRING2, ELSET=coil\n5, 7, 40\n"
     [
         ("1, 1, 1", "5, 5", ""),
         ("1, 1, 1", "2", ""),
-        ("1, 1, 1.5", "2, 2", "1 SPRING2 .*: between nodes at different places"),
-        ("1, 1, 1", "2, 3", "1 SPRING2 .*or between different components"),
+        ("1, 1, 1.5", "3, 3", ""),
+        ("1, 1, 1.5", "2, 2", "1 SPRING2 .*nodes apart across the direction"),
+        ("1, 1, 1", "2, 3", "1 SPRING2 .*: between different components"),
     ],
 )
 def test_springs_between_components_join_nodes_at_one_place(tmp_path, place, components, words):

@@ -1,0 +1,12 @@
+"""The page of the fields of decks is written from the tables that drive the readers."""
+
+from fe_models.importers.decks.field_pages import field_tables
+from tests.root import ROOT
+
+AGAIN = "write it again: python -m fe_models.importers.decks.field_pages"
+
+
+def test_the_page_of_deck_fields_is_that_of_the_tables():
+    page = (ROOT / "docs" / "deck_fields.md").read_text(encoding="utf-8")
+    table = page.partition("<!-- fields -->\n")[2].partition("<!-- end of fields -->")[0]
+    assert table.strip() == field_tables(), AGAIN
