@@ -3,7 +3,7 @@
 from fe_models.importers.decks.field_pages import field_tables
 from tests.root import ROOT
 
-AGAIN = "write it again: python -m fe_models.importers.decks.field_pages"
+AGAIN = "write it again: fe_models.importers.decks.field_pages.field_tables()"
 
 
 def test_the_page_of_deck_fields_is_that_of_the_tables():

@@ -21,7 +21,3 @@ def field_tables() -> str:
         ("ANSYS", "command", ansys),
     ]
     return "\n\n".join(f"## {title}\n\n{markdown_table(what, fields)}" for title, what, fields in sections)
-
-
-if __name__ == "__main__":
-    print(field_tables())
