@@ -36,9 +36,10 @@ SPREAD = ("-n", str(min(n_processors, MOST_WORKERS)), "--dist", "loadfile")
 LINT = ("lint", "ruff", "check", ".")
 TYPES = ("types", "mypy")
 KERNELS = ("kernels", "floatframe.cli.compile_kernels", "relative", "schemes")  # else by each worker
-#: the same motions with kernels compiled by plain numba, as with a numba that the lean compiler does not know
+#: the same motions with kernels compiled by plain numba, as with a numba that the lean compiler does not know; one test
+#: compiles them all, minutes beside other checks
 PLAIN = (
-    "kernels by plain numba", "pytest", "-q", "-m", "not long", "tests/floatframe/kernels",
+    "kernels by plain numba", "pytest", "-q", "-o", "timeout=3600", "-m", "not long", "tests/floatframe/kernels",
     "tests/floatframe/integrators/test_pendulum.py",
 )  # fmt: skip
 #: files that take more than ten seconds of a processor, the longest first: begun last, one would keep a worker alone
