@@ -250,7 +250,7 @@ def body_words(body: dict[str, Any]) -> str:
 
 
 def step_words(run: dict[str, Any], second: str) -> str:
-    """Return the step size, or the tolerances if the step is controlled, as text."""
+    """Return the step size as text; if the error controls the step, its upper limit."""
     if run.get("error_tolerance") is not None:
         return f"as the error allows, up to {run['h']:.6g} {second}"
     return f"{run['h']:.6g} {second}"

@@ -67,7 +67,7 @@ def spectrum_command(
 def chosen_signals(
     file: Path, names: list[str], others: tuple[str, ...], rate: float | None
 ) -> "tuple[Signals, list[Signal | None], tuple[Path, ...]]":
-    """Return the chosen channels of a results file or measured file, the channels named in `others`, and the files."""
+    """Return the chosen channels of a results file or measured file, the channels `others`, and the files read."""
     if file.suffix.lower() == ".h5" or file.is_dir():
         from floatframe.results.trajectory import read_results
 

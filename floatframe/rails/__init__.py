@@ -1,6 +1,6 @@
-"""Wheel on rail: profiles, where they touch, the normal force and the creep forces, tracks and their irregularities.
+"""Wheel-rail contact: profiles, contact geometry, normal and creep forces, tracks and their irregularities.
 
-Profiles from standards, cones and points; Hertz's ellipse; Kalker's, Polach's and FASTSIM's creep forces; equivalent
+Profiles from standards, cones and points; Hertz's ellipse; creep forces by Kalker, Polach and FASTSIM; equivalent
 conicity; the elements `rails.wheelset` and `rails.wheel-on-rail` (docs/rails.md).
 """
 
@@ -56,7 +56,7 @@ __all__ = [
     "wheelset_at",
 ]
 
-#: elements by their names in system files
+#: elements, by their names in system files
 ELEMENTS = {
     "wheelset": "floatframe.rails.wheelset:Wheelset",
     "wheel-on-rail": "floatframe.rails.wheelset:WheelOnRail",

@@ -1,4 +1,4 @@
-"""From wheels, track and laws to the numbers that the compiled law reads."""
+"""The data of the compiled law, from wheels, track and contact laws."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,29 +19,29 @@ from floatframe.rails.track import Track
 __all__ = ["ContactLaws", "Wheel", "law_numbers", "output_names", "shift_off_the_rail"]
 
 PARTS = ("tread", "flange")
-N_OPTIONS = 5  #: of a law of creep
+N_OPTIONS = 5  #: number of options of a creep law
 
 
 @dataclass(frozen=True)
 class ContactLaws:
-    """How wheel and rail press and rub.
+    """The laws of normal and creep forces between wheel and rail.
 
     Raises
     ------
     ModelError
-        If a law is unknown or a number impossible.
+        If a law is unknown, or a number is out of its range.
     """
 
-    normal: str = "hertz"  #: by the depth of penetration, or "constraint": the treads are held on the rails
+    normal: str = "hertz"  #: "hertz": from the penetration; "constraint": the treads are constrained to the rails
     creep: str = "fastsim"  #: kalker, kalker-saturated, polach or fastsim
     friction: float = 0.3  #: mu
     shear_modulus: float = 8.2e10  #: G of wheel and rail [Pa]
     poisson: float = 0.28
     smoothing: float = 2e-5  #: eps of the quasi-elastic contact [m]
-    damping: float = 0.0  #: N = K d^(3/2) (1 + damping d_dot) [s/m]
-    low_speed: float = 0.05  #: v_0: creepages are over sqrt(v² + v_0²) [m/s]
-    strips: int = 12  #: FASTSIM: cells along and strips across
-    polach: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 0.0)  #: k_A, k_S, A and B [s/m] of its friction
+    damping: float = 0.0  #: in N = K d^(3/2) (1 + damping d_dot) [s/m]
+    low_speed: float = 0.05  #: v_0: creepages are divided by sqrt(v² + v_0²) [m/s]
+    strips: int = 12  #: number of FASTSIM cells along, and of strips across
+    polach: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 0.0)  #: k_A, k_S, and A and B [s/m] of its friction law
 
     def __post_init__(self) -> None:
         where = "contact of wheel and rail"
@@ -65,7 +65,7 @@ class ContactLaws:
 
 
 class Wheel(NamedTuple):
-    """One wheel: its side of the track, and where it is on the axle."""
+    """A wheel: its side of the track, and its position on the axle."""
 
     side: int  #: +1 on the left rail, -1 on the right one
     arm: float  #: from the marker to its running circle along the axle, to the left [m]
@@ -74,9 +74,10 @@ class Wheel(NamedTuple):
 
 @lru_cache(maxsize=32)
 def shift_off_the_rail(pair: Pair) -> float:
-    """Return the outward shift at which a wheel counts as off the track [m].
+    """Return the outward shift from which a wheel counts as derailed [m].
 
-    With a flange: where it has climbed to within 8 mm of its height; without: where its middle leaves the head.
+    With a flange: if it has climbed to within 8 mm of its height; without: if the middle of the wheel leaves the rail
+    head.
     """
     if not pair.has_flange:
         return float(pair.head.y[-1] - pair.offset)
@@ -87,14 +88,14 @@ def shift_off_the_rail(pair: Pair) -> float:
 
 
 def grid_of(pair: Pair) -> TableGrid:
-    """Return the grid of the table of a pair: to where the wheel is off the rail."""
+    """Return the grid of the table of a pair, up to the shift at which the wheel is derailed."""
     most = shift_off_the_rail(pair) + 0.002
     least = -max(0.03, most)
     return TableGrid(v=(least, most, int(np.ceil((most - least) / 2e-4)) + 1))
 
 
 def law_numbers(wheels: Sequence[Wheel], track: Track, laws: ContactLaws, spin_inertia: float = 0.0) -> Array:
-    """Return the numbers of the law `wheels_on_rails`: head, wheels, cells of the track, irregularities, tables."""
+    """Return the data of the law `wheels_on_rails`: head, wheels, cells of the track, irregularities, tables."""
     cells = track.cells
     n_head, n_wheel = 21, 6
     cells_at = n_head + n_wheel * len(wheels)
@@ -145,7 +146,7 @@ def law_numbers(wheels: Sequence[Wheel], track: Track, laws: ContactLaws, spin_i
 
 
 def n_parts_of(wheels: Sequence[Wheel]) -> int:
-    """Return how many parts the wheels have; all the same."""
+    """Return the number of contact parts of a wheel, which is the same for all wheels."""
     found = {len(PARTS) if each.pair.has_flange else 1 for each in wheels}
     if len(found) > 1:
         raise ModelError("wheels of an axle: expected both with a flange or both without one")

@@ -1,9 +1,10 @@
-"""Rolling radius difference, equivalent conicity, Klingel's wavelength: the kinematics of a free wheelset.
+"""Rolling radius difference, equivalent conicity and Klingel's wavelength: the kinematics of a free wheelset.
 
-A wheelset that rolls slowly without slip has y'' + delta_r(y)/(r_0 e_0) = 0, where y is the lateral shift at the height
-of the rails (the axle, which rolls as it shifts, moves by r_0 phi less), e_0 the distance of the contact points and
-primes are derivatives along the track. A conical one, delta_r = 2 lam y, has waves of 2 pi sqrt(r_0 e_0/(2 lam)). The
-equivalent conicity of an amplitude is that of the cone whose wave is as long (the definition of UIC 519 and EN 15302).
+A wheelset that rolls slowly without slip satisfies y'' + delta_r(y)/(r_0 e_0) = 0. y is the lateral shift at the height
+of the rails (that of the axle, which also rolls, is smaller by r_0 phi), e_0 the distance of the contact points, and
+primes are derivatives along the track. For a conical wheelset, delta_r = 2 lam y, the wavelength is 2 pi sqrt(r_0
+e_0/(2 lam)). The equivalent conicity for an amplitude is that of the cone with the same wavelength (definition of UIC
+519 and EN 15302).
 """
 
 import numpy as np
@@ -20,18 +21,18 @@ __all__ = ["equivalent_conicity", "harmonic_conicity", "klingel_wavelength", "ro
 
 
 def klingel_wavelength(conicity: float, radius: float, running_circles: float) -> float:
-    """Return 2 pi sqrt(r_0 e_0/(2 lam)) [m], e_0 the distance of the running circles (Klingel 1883)."""
+    """Return 2 pi sqrt(r_0 e_0/(2 lam)) [m], with the distance e_0 of the running circles (Klingel 1883)."""
     for name, value in (("conicity", conicity), ("radius", radius), ("running_circles", running_circles)):
         number(f"klingel_wavelength: {name}", value, above=0.0)
     return float(2 * np.pi * np.sqrt(radius * running_circles / (2 * conicity)))
 
 
 def wheelset_at(pair: Pair, y: Array, *, smoothing: float | None = None) -> tuple[Array, Array, Array]:
-    """Return rolling radii on the left and right and the roll of a wheelset shifted by y to the left, each (n,).
+    """Return left and right rolling radii and the roll of a wheelset shifted by y to the left, (n,) each.
 
-    y is the shift at the height of the rails: that of the axle is y - r_0 phi.
-    Both wheels touch: the roll phi (left side up) is the one at which h_left = h_right + e_0 phi. With `smoothing` the
-    contact is quasi-elastic, without it that of rigid bodies.
+    y is the shift at the height of the rails; that of the axle is y - r_0 phi. Both wheels are in contact: the roll phi
+    (left side up) satisfies h_left = h_right + e_0 phi. With `smoothing`, the contact is quasi-elastic, otherwise that
+    of rigid bodies.
     """
     y = np.atleast_1d(np.asarray(y, dtype=float))
     left, right, rolls = np.empty_like(y), np.empty_like(y), np.empty_like(y)
@@ -64,7 +65,7 @@ def wheelset_at(pair: Pair, y: Array, *, smoothing: float | None = None) -> tupl
 
 
 def rolling_radius_difference(pair: Pair, y: Array, *, smoothing: float | None = None) -> Array:
-    """Return r_left - r_right [m] over the shift y to the left at the height of the rails [m], (n,)."""
+    """Return r_left - r_right [m] for a shift y to the left at the height of the rails [m], (n,)."""
     left, right, _ = wheelset_at(pair, y, smoothing=smoothing)
     return left - right
 
@@ -72,7 +73,7 @@ def rolling_radius_difference(pair: Pair, y: Array, *, smoothing: float | None =
 def equivalent_conicity(
     pair: Pair, amplitude: float, *, difference: tuple[Array, Array] | None = None, smoothing: float | None = None
 ) -> float:
-    """Return the conicity of the cone whose wave is as long, from the non-linear wave of this amplitude.
+    """Return the conicity of the cone with the same wavelength as the non-linear wave of this amplitude.
 
     Energy of y'' = -f(y), f = delta_r/(r_0 e_0): y'²/2 + U(y) = U(a); wavelength = 2 int dy/sqrt(2 (U(a) - U(y)))
     between the turning points; lam = (2 pi/wavelength)² r_0 e_0/2.
@@ -80,18 +81,18 @@ def equivalent_conicity(
     Parameters
     ----------
     pair
-        Wheel and rail, alike on both sides.
+        Wheel and rail, equal on both sides.
     amplitude
-        Half the distance of the turning points [m]; 3 mm is the usual one.
+        Half the distance between the turning points [m]; usually 3 mm.
     difference
-        y and delta_r as measured, (n,) each, instead of those of the pair.
+        Measured y and delta_r, (n,) each, instead of those of the pair.
     smoothing
-        Of a quasi-elastic contact [m]; None: rigid.
+        Smoothing of a quasi-elastic contact [m]; None: rigid contact.
 
     Raises
     ------
     ModelError
-        If the wheelset is not brought back (delta_r does not rise through zero).
+        If there is no restoring effect (delta_r does not rise through zero).
     """
     amplitude = number("equivalent_conicity: amplitude", amplitude, above=0.0)
     if amplitude > 0.02:
@@ -102,7 +103,7 @@ def equivalent_conicity(
     else:
         y, delta = (np.asarray(each, dtype=float) for each in difference)
     scale = pair.radius * pair.running_circles
-    # small kinks of rigid contact: the potential is the integral of straight pieces, smooth enough for its spline
+    # rigid contact has small kinks; the potential is integrated piecewise linearly, smooth enough for its spline
     fine = np.linspace(y[0], y[-1], 20 * len(y))
     f = np.interp(fine, y, delta) / scale
     U = CubicSpline(fine, np.concatenate([[0.0], np.cumsum(0.5 * (f[1:] + f[:-1]) * np.diff(fine))]))
@@ -126,20 +127,20 @@ def equivalent_conicity(
     middle = left + amplitude
 
     def integrand(angle: float) -> float:
-        # y = middle + a sin(angle) takes the roots out of the ends
+        # y = middle + a sin(angle) removes the roots at the ends
         height = top - float(U(middle + amplitude * np.sin(angle)))
         return amplitude * np.cos(angle) / np.sqrt(2 * height) if height > 0 else 0.0
 
     half, _ = quad(integrand, -np.pi / 2 + 1e-4, np.pi / 2 - 1e-4, limit=200, epsrel=1e-6)
-    # the two ends left out, where the integrand is a/sqrt(a |f|), are nearly constant
+    # the two ends are added as constants: the integrand there is nearly a/sqrt(a |f|)
     half += 1e-4 * (integrand(-np.pi / 2 + 1e-4) + integrand(np.pi / 2 - 1e-4))
     return float((np.pi / half) ** 2 * scale / 2)
 
 
 def harmonic_conicity(pair: Pair, amplitude: float, *, smoothing: float | None = None, points: int = 90) -> float:
-    """Return the conicity by harmonic linearisation: (1/(2 pi a)) int delta_r(a sin t) sin t dt over one period.
+    """Return the conicity from harmonic linearisation: (1/(2 pi a)) int delta_r(a sin t) sin t dt over one period.
 
-    The first harmonic of delta_r = 2 lam y along a sine: nearly the equivalent conicity, found without a search.
+    It is obtained from the first harmonic of delta_r = 2 lam y along a sine, and is close to the equivalent conicity.
     """
     amplitude = number("harmonic_conicity: amplitude", amplitude, above=0.0)
     t = 2 * np.pi * (np.arange(points) + 0.5) / points

@@ -1,15 +1,15 @@
-"""Where a wheel touches a rail: points of rigid bodies, and the quasi-elastic contact, which is smooth.
+"""The contact between wheel and rail: contact points of rigid bodies, and the smooth quasi-elastic contact.
 
-The place of a wheel against its rail is u, the outward shift of the wheel, the roll phi (outer side up), the yaw psi,
-and the height h of its centre over the nominal radius. A rail does not change along the track, so that of the circle
-of the wheel at s only the point matters whose normal is square to the rail (Wang's line of contact, see
-docs/rails.md): the wheel becomes a curve (x, y, z)(s) against the profile Z(y) of the rail, and its depth in it is
-p(s) = Z(y(s) + u + offset) - z(s) - h.
+The position of a wheel relative to its rail is given by u, the outward shift of the wheel, the roll phi (outer side
+up), the yaw psi, and the height h of its centre above the nominal radius. A rail does not change along the track. Of
+the circle of the wheel at s, therefore, only the point matters whose normal is perpendicular to the rail (Wang's line
+of contact, see docs/rails.md). The wheel is reduced to a curve (x, y, z)(s) that faces the profile Z(y) of the rail,
+and its penetration is p(s) = Z(y(s) + u + offset) - z(s) - h.
 
-- rigid: the local maxima of p that reach the highest one within a tolerance;
-- quasi-elastic: q = eps log( int w exp(p/eps) dy / L ), the maximum rounded off over heights of eps. Its gradient is
-  the mean of slopes and levers under the weights exp(p/eps), so that forces along it have a potential, and no contact
-  ever jumps.
+- rigid: the local maxima of p within a tolerance of the highest one;
+- quasi-elastic: q = eps log( int w exp(p/eps) dy / L ), a smoothed maximum over heights of about eps. Its gradient is
+  the mean of slopes and levers with the weights exp(p/eps). Forces along it therefore have a potential, and the contact
+  never jumps.
 """
 
 from dataclasses import dataclass, field
@@ -28,28 +28,28 @@ from floatframe.rails.standard_profiles import GAUGE_DEPTH, inclined, rail_60e1,
 
 __all__ = ["ContactPoint", "Pair", "QuasiElastic", "quasi_elastic", "rigid_contacts", "wheel_curve"]
 
-STEP = 1e-4  #: of s on the wheel in a search [m]
-FLANK = (0.35, 0.7)  #: slopes between which a wheel goes over from tread to flange
-TYPICAL_RADIUS = 0.5  #: of relative curvature, for the constant L of the quasi-elastic depth [m]
+STEP = 1e-4  #: step of s on the wheel in the search [m]
+FLANK = (0.35, 0.7)  #: range of slopes in which the tread blends into the flange
+TYPICAL_RADIUS = 0.5  #: typical radius of relative curvature, for the constant L of the quasi-elastic depth [m]
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """A wheel on its rail: profiles, radius, and how far apart wheels and rails are.
+    """A wheel on its rail: profiles, radius, and distances of wheels and rails.
 
     Raises
     ------
     ModelError
-        If the flange does not fit between the rails (gauge, distance of the wheels), or numbers are not metres.
+        If the flange does not fit between the rails (gauge, distance of the wheels), or values are not in metres.
     """
 
     wheel: Profile = field(default_factory=wheel_s1002)
-    rail: Profile = field(default_factory=rail_60e1)  #: upright; it is turned by the inclination here
+    rail: Profile = field(default_factory=rail_60e1)  #: upright profile; it is inclined by `inclination`
     radius: float = 0.46  #: nominal radius r_0 of the wheel, at y = 0 of its profile [m]
-    running_circles: float = 1.5  #: distance of the running circles of the two wheels [m]
-    gauge: float = 1.435  #: distance of the rails, 14 mm below their top [m]
-    inclination: float = 1 / 40  #: of the rails, a tangent
+    running_circles: float = 1.5  #: distance between the running circles of the two wheels [m]
+    gauge: float = 1.435  #: distance between the rails, 14 mm below their top [m]
+    inclination: float = 1 / 40  #: inclination of the rails, as a tangent
 
     def __post_init__(self) -> None:
         for name in ("radius", "running_circles", "gauge"):
@@ -73,7 +73,7 @@ class Pair:
 
     @cached_property
     def content(self) -> tuple[bytes | float, ...]:
-        """What makes a pair the same as another one, whose tables serve for both."""
+        """Key by which equal pairs are recognised, so that they share tables."""
         shapes = (self.wheel.y, self.wheel.z, self.rail.y, self.rail.z)
         numbers = (self.radius, self.running_circles, self.gauge, self.inclination)
         return (*(sha256(values.tobytes()).digest() for values in shapes), *numbers)
@@ -86,12 +86,12 @@ class Pair:
 
     @cached_property
     def head(self) -> Profile:
-        """The rail as it stands in the track, turned inward."""
+        """The rail as installed in the track, inclined inward."""
         return inclined(self.rail, self.inclination)
 
     @cached_property
     def gauge_point(self) -> float:
-        """Place of the gauge face on the head, the innermost within 14 mm below its top, y < 0 [m]."""
+        """Position y of the gauge face on the head, the innermost point within 14 mm below its top, y < 0 [m]."""
         y, z, _ = turned(self.rail, self.inclination)
         inner = slice(0, int(np.argmax(z)) + 1)
         y, z = y[inner], z[inner]
@@ -104,17 +104,17 @@ class Pair:
 
     @cached_property
     def offset(self) -> float:
-        """What is added to a place on a centred wheel, y(s), to have it on the head of the rail [m]."""
+        """Offset from y(s) on a centred wheel to the position on the head of the rail [m]."""
         return 0.5 * self.running_circles - (0.5 * self.gauge - self.gauge_point)
 
     @cached_property
     def has_flange(self) -> bool:
-        """Whether the wheel has a flange, 15 mm high or more."""
+        """Whether the wheel has a flange with a height of 15 mm or more."""
         return bool(self.wheel.z.max() > 0.015)
 
     @cached_property
     def flange_clearance(self) -> float:
-        """Shift of a wheel until its flange, 10 mm below the running circle, is at the gauge face [m]."""
+        """Shift of a wheel until its flange, 10 mm below the running circle, touches the gauge face [m]."""
         y, F = self.wheel.y, self.wheel.z
         flank = np.flatnonzero((F >= 0.010) & (y < 0))
         if not len(flank):
@@ -123,12 +123,12 @@ class Pair:
 
     @cached_property
     def typical_width(self) -> float:
-        """L of the quasi-elastic depth without its factor sqrt(eps) [m^(1/2)]."""
+        """L of the quasi-elastic depth, without its factor sqrt(eps) [m^(1/2)]."""
         return float(np.sqrt(2 * np.pi * TYPICAL_RADIUS))
 
 
 class Curve(NamedTuple):
-    """Points of a wheel that may touch a straight rail, from its centre: x forward, y outward, z up."""
+    """Points of a wheel that can touch a straight rail, from its centre: x forward, y outward, z up."""
 
     s: Array
     x: Array
@@ -137,11 +137,11 @@ class Curve(NamedTuple):
 
 
 def wheel_curve(pair: Pair, roll: float = 0.0, yaw: float = 0.0, s: Array | None = None) -> Curve:
-    """Return the points of a wheel whose normal is square to the direction of the rail, s increasing.
+    """Return the points of a wheel whose normal is perpendicular to the rail direction, for increasing s.
 
-    With the axle a = (-sin psi cos phi, cos psi cos phi, sin phi), f = (cos psi, sin psi, 0), d = a's upward normal in
-    the plane of both, and R(s) = r_0 + F(s), the surface is s a + R (sin t f - cos t d), its normal sin t f - cos t d
-    - R' a. It has no x component where f_x sin t - d_x cos t = R' a_x.
+    a = (-sin psi cos phi, cos psi cos phi, sin phi) is the axle, f = (cos psi, sin psi, 0), d the upward normal of a in
+    the plane of both, and R(s) = r_0 + F(s). The surface is s a + R (sin t f - cos t d), with the normal sin t f - cos
+    t d - R' a. This has no x component if f_x sin t - d_x cos t = R' a_x.
     """
     s = np.arange(pair.wheel.y[0], pair.wheel.y[-1], STEP) if s is None else s
     R, R_s = pair.radius + pair.wheel.spline(s), pair.wheel.spline(s, 1)
@@ -155,36 +155,36 @@ def wheel_curve(pair: Pair, roll: float = 0.0, yaw: float = 0.0, s: Array | None
 
 
 class ContactPoint(NamedTuple):
-    """A point of contact of rigid bodies."""
+    """A contact point of rigid bodies."""
 
-    s: float  #: on the wheel, from the running circle [m]
-    y: float  #: on the head of the rail [m]
-    x: float  #: ahead of the centre of the wheel [m]
+    s: float  #: position on the wheel, from the running circle [m]
+    y: float  #: position on the head of the rail [m]
+    x: float  #: ahead of the wheel centre [m]
     radius: float  #: rolling radius r_0 + F(s) [m]
-    angle: float  #: between the plane of contact and the track, positive where the rail rises outward [rad]
-    height: float  #: h at which the wheel touches there [m]
+    angle: float  #: angle of the contact plane to the track, positive if the rail rises outward [rad]
+    height: float  #: h at which the wheel touches at this point [m]
 
 
 def rigid_contacts(
     pair: Pair, u: float, *, roll: float = 0.0, yaw: float = 0.0, tolerance: float = 1e-6
 ) -> list[ContactPoint]:
-    """Return where a rigid wheel touches the rail: the deepest point first, then others within `tolerance` of it.
+    """Return the contact points of a rigid wheel: the deepest one first, then others within `tolerance` of it.
 
-    Every local maximum of the depth is refined by a parabola through its three points (STEP apart).
+    Every local maximum of the depth is refined by a parabola through three points with distance STEP.
 
     Parameters
     ----------
     pair
         Wheel and rail.
     u, roll, yaw
-        Outward shift [m], roll [rad] and yaw [rad] of the wheel against the rail.
+        Outward shift [m], roll [rad] and yaw [rad] of the wheel relative to the rail.
     tolerance
-        Of the height [m].
+        Tolerance of the height [m].
 
     Raises
     ------
     ModelError
-        If the wheel is not above the rail at all.
+        If no part of the wheel is above the rail.
     """
     curve = wheel_curve(pair, roll, yaw)
     y = curve.y + u + pair.offset
@@ -214,21 +214,21 @@ def rigid_contacts(
 
 
 class QuasiElastic(NamedTuple):
-    """The quasi-elastic contact of one part of the wheel: weighted means, see the module docstring."""
+    """The quasi-elastic contact of a part of the wheel: weighted means, see the module docstring."""
 
     q: Array  #: depth at h = 0 [m]
-    slope: Array  #: dq/du = mean of Z': tangent of the angle of contact, positive where the rail rises outward
+    slope: Array  #: dq/du, mean of Z': tangent of the contact angle, positive if the rail rises outward
     x: Array  #: point of contact from the centre of the wheel, forward [m]
-    y: Array  #: outward [m]: its lever makes the moment about the track's direction that of dq/dphi
+    y: Array  #: outward [m]: the lever by which the moment about the direction of the track is that of dq/dphi
     z: Array  #: upward [m], near -radius
     radius: Array  #: rolling radius [m]
-    bend: Array  #: curvature of p across, in the plane of contact: eps/variance [1/m]
+    bend: Array  #: curvature of p in the lateral direction, in the contact plane: eps/variance [1/m]
 
 
 def quasi_elastic(
     pair: Pair, u: Array, *, roll: float = 0.0, yaw: float = 0.0, smoothing: float = 2e-5, part: str = "all"
 ) -> QuasiElastic:
-    """Return the quasi-elastic contact for shifts u, (n,), of one roll and yaw.
+    """Return the quasi-elastic contact for shifts u, (n,), with the same roll and yaw.
 
     Parameters
     ----------
@@ -237,13 +237,12 @@ def quasi_elastic(
     u
         Outward shifts [m], (n,).
     roll, yaw
-        [rad].
+        Roll and yaw [rad].
     smoothing
-        eps [m].
+        Smoothing height eps [m].
     part
-        "all" of the wheel, its "tread" or its "flange": shares of one, which go over smoothly where the slope of the
-        profile
-        is between 0.35 and 0.7.
+        "all" of the wheel, its "tread" or its "flange", with weights whose sum is one and which blend smoothly where
+        the slope of the profile is between 0.35 and 0.7.
     """
     curve = wheel_curve(pair, roll, yaw)
     u = np.asarray(u, dtype=float)
@@ -254,7 +253,7 @@ def quasi_elastic(
     y = y0 + u[:, None] + pair.offset
     p = pair.head.height(y) - (z + pair.radius)
     best = p.max(axis=1, keepdims=True)
-    best = np.where(np.isfinite(best), best, -1.0)  # off the rail: as deep as nothing ever is
+    best = np.where(np.isfinite(best), best, -1.0)  # off the rail: a depth below any real one
     weights = measure * np.exp((p - best) / smoothing)
     total = weights.sum(axis=1)
     width = pair.typical_width * np.sqrt(smoothing)
@@ -269,7 +268,7 @@ def quasi_elastic(
     q = best[:, 0] + smoothing * np.log(total / width)
     slope, z_mean = mean(slopes), mean(z)
     lever = mean(y0 + slopes * z) - slope * z_mean
-    # spread along the plane of contact
+    # spread in the contact plane
     mean_y = mean(y0)
     cos = 1 / np.sqrt(1 + slope**2)
     variance = np.maximum(mean(y0**2) - mean_y**2, 0.0) + STEP**2 / 12
@@ -279,12 +278,12 @@ def quasi_elastic(
 
 
 def part_of_wheel(wheel: Profile, s: Array, part: str) -> Array:
-    """Share of a part at the places s of a wheel: tread and flange are one together."""
+    """Return the weight of a part at positions s of a wheel; the weights of tread and flange add to one."""
     if part == "all":
         return np.ones_like(s)
     steep = np.clip((-wheel.slope(s) - FLANK[0]) / (FLANK[1] - FLANK[0]), 0.0, 1.0)
     flange = steep * steep * (3 - 2 * steep)
-    # beyond the steepest place of the flank, the tip and the back of the flange belong to it
+    # beyond the steepest point of the flank, tip and back belong to the flange
     tip = int(np.argmax(wheel.z))
     if wheel.z[tip] > 0.015:
         last = s[len(s) - 1 - np.argmax((flange >= 1)[::-1])] if (flange >= 1).any() else wheel.y[tip]

@@ -1,8 +1,9 @@
-"""Contact over shift, roll and yaw as a table: what a wheel needs in every step, found once per pair of profiles.
+"""Tables of the contact over shift, roll and yaw, which are computed once for each pair of profiles.
 
-Each part of the wheel (tread, flange) has for every v, phi and sin(psi) the quasi-elastic contact, Hertz's ellipse and
-Kalker's coefficients; v = u + r_0 sin(phi) is the shift of the wheel where it meets the rail, so that a roll only
-tilts the profile. Over v and phi they are cubic B-splines, over sin² psi a parabola: twice differentiable in all.
+For each part of the wheel (tread, flange), the table contains quasi-elastic contact, Hertz's ellipse and Kalker's
+coefficients as functions of v, phi and sin(psi). v = u + r_0 sin(phi) is the shift of the wheel at the height of the
+rail, so that a roll only tilts the profile. Interpolation is by cubic B-splines over v and phi and by a parabola over
+sin² psi, twice differentiable in all variables.
 """
 
 from dataclasses import dataclass
@@ -21,16 +22,17 @@ from floatframe.rails.splines import coefficients, even_coefficients
 
 __all__ = ["FIELDS", "LEAST_BEND", "ContactTable", "Steel", "TableGrid", "contact_table", "numbers_of_table"]
 
-#: of each part: depth at h = 0, dq/du, lever x over sin psi, levers y and z, rolling radius; logarithms, since splines
-#: through numbers that jump do not stay positive, of Hertz's stiffness, a and b of one newton, Kalker's coefficients
+#: for each part: depth at h = 0, dq/du, lever x divided by sin psi, levers y and z, rolling radius; logarithms of
+#: Hertz's stiffness, of a and b for 1 N, and of Kalker's coefficients (splines of the values themselves could become
+#: negative at jumps)
 FIELDS = ("q", "slope", "x", "y", "z", "radius", "stiffness", "a_1", "b_1", "c11", "c22", "c23", "c33")
 
-LEAST_BEND = 0.05  #: curvature below which a contact is not taken to be flatter [1/m]
-FAR = 0.003  #: height of a part above the rail from which on the table goes on unchanged [m]
+LEAST_BEND = 0.05  #: least curvature of a contact [1/m]
+FAR = 0.003  #: height of a part above the rail beyond which the table is constant [m]
 
 
 class Steel(NamedTuple):
-    """Of wheel and rail alike."""
+    """Material of wheel and rail."""
 
     shear_modulus: float = 8.2e10  #: G [Pa]
     poisson: float = 0.28
@@ -38,11 +40,11 @@ class Steel(NamedTuple):
 
 @dataclass(frozen=True)
 class TableGrid:
-    """Where the table is known; beyond, the values at its edge hold."""
+    """The grid of the table; beyond it, the values at its edge are used."""
 
     v: tuple[float, float, int] = (-0.03, 0.015, 226)  #: least, largest [m], number of points
     roll: tuple[float, float, int] = (-0.012, 0.012, 7)  #: [rad]
-    yaw: tuple[float, int] = (0.04, 6)  #: largest [rad], number of points from zero on
+    yaw: tuple[float, int] = (0.04, 6)  #: largest [rad], number of points from zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,12 +59,12 @@ def contact_table(
     pair: Pair, *, parts: tuple[str, ...] = ("tread", "flange"), smoothing: float = 2e-5, steel: Steel | None = None,
     grid: TableGrid | None = None,
 ) -> ContactTable:  # fmt: skip
-    """Return the table of a wheel on its rail; of equal arguments the one made before.
+    """Return the table of a wheel on its rail; equal arguments return the same table.
 
     Raises
     ------
     ModelError
-        If the smoothing is no height of micrometres.
+        If the smoothing is not in the range of micrometres.
     """
     smoothing = number("contact_table: smoothing", smoothing, above=0.0)
     if not 1e-7 <= smoothing <= 1e-3:
@@ -72,7 +74,7 @@ def contact_table(
 
 @lru_cache(maxsize=32)
 def made_once(pair: Pair, parts: tuple[str, ...], smoothing: float, steel: Steel, grid: TableGrid) -> ContactTable:
-    """Return the table, made when it is first asked for."""
+    """Return the table, which is computed at the first request."""
     v, roll = np.linspace(*grid.v), np.linspace(*grid.roll)
     sines = np.linspace(0.0, np.sin(grid.yaw[0]), grid.yaw[1])
     values = np.empty((len(parts), len(v), len(roll), grid.yaw[1], len(FIELDS)))
@@ -80,7 +82,7 @@ def made_once(pair: Pair, parts: tuple[str, ...], smoothing: float, steel: Steel
     for k, part in enumerate(parts):
         for i, phi in enumerate(roll):
             for j, sine in enumerate(sines):
-                yaw = float(np.arcsin(sine)) if sine else 1e-6  # x over sin psi has a limit at zero
+                yaw = float(np.arcsin(sine)) if sine else 1e-6  # x divided by sin psi has a limit at zero
                 u = v - pair.radius * np.sin(phi)
                 found = near_the_rail(quasi_elastic(pair, u, roll=float(phi), yaw=yaw, smoothing=smoothing, part=part))
                 cos = 1 / np.sqrt(1 + found.slope**2)
@@ -94,7 +96,7 @@ def made_once(pair: Pair, parts: tuple[str, ...], smoothing: float, steel: Steel
 
 
 def near_the_rail(found: QuasiElastic) -> QuasiElastic:
-    """Return a contact that goes on unchanged where the part is more than `FAR` above the rail, or beside it."""
+    """Return a contact that is constant if the part is more than `FAR` above the rail, or beside it."""
     near = np.flatnonzero(found.q > -FAR)
     if not len(near):
         raise ModelError(
@@ -105,7 +107,7 @@ def near_the_rail(found: QuasiElastic) -> QuasiElastic:
 
 
 def numbers_of_table(table: ContactTable) -> Array:
-    """Return the table as the law reads it: sizes, then coefficients, (n_v + 2, n_roll + 2, n_yaw + 2, all fields)."""
+    """Return the data of the law: sizes, then coefficients, (n_v + 2, n_roll + 2, n_yaw + 2, all fields)."""
     (v_0, v_1, n_v), (r_0, r_1, n_r) = table.grid.v, table.grid.roll
     c = even_coefficients(coefficients(coefficients(table.values, 1), 2), 3)
     c = np.moveaxis(c, 0, 3)  # parts beside fields

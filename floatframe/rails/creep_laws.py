@@ -1,11 +1,11 @@
 """Creep forces of an elliptic contact: linear, linear with saturation, Polach, FASTSIM.
 
-Each is a function law(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options) -> (F_x, F_y, M) on the wheel:
-xi, eta longitudinal and lateral creepage, the velocity of the wheel's surface against the rail over the speed of
-rolling; phi the spin [rad/m]; N the normal force [N]; a (rolling direction), b the semi-axes [m]; Kalker's
-coefficients; G [Pa]; mu the coefficient of friction; `options` what a law has besides. x points in the direction of
-rolling, z away from the rail. Numbers may be float64 or complex128 (a step along the imaginary axis gives
-derivatives): comparisons look at real parts.
+Each is a function law(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options) -> (F_x, F_y, M) on the wheel. xi and
+eta are longitudinal and lateral creepage, the velocity of the wheel surface relative to the rail divided by the rolling
+speed; phi the spin [rad/m]; N the normal force [N]; a (rolling direction) and b the semi-axes [m]; then Kalker's
+coefficients; G [Pa]; mu the friction coefficient; `options` further parameters of a law. x points in the rolling
+direction, z away from the rail. Numbers may be float64 or complex128 (a step along the imaginary axis gives
+derivatives); comparisons use real parts.
 """
 
 import numba
@@ -13,12 +13,12 @@ import numpy as np
 
 __all__ = ["creep_force", "fastsim", "fastsim_of_flexibilities", "linear_creep", "polach", "saturated_creep"]
 
-SMALL = 1e-8  #: creepage below which Polach's direction is rounded off
+SMALL = 1e-8  #: creepage below which the direction in Polach's law is smoothed
 
 
 @numba.njit(cache=True)
 def linear_creep(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options):
-    """Return Kalker's linear forces, whatever friction there is."""
+    """Return Kalker's linear forces, without a friction limit."""
     c2 = a * b
     c = np.sqrt(c2)
     return (
@@ -30,7 +30,7 @@ def linear_creep(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options):
 
 @numba.njit(cache=True)
 def saturated_creep(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options):
-    """Return the linear forces, their resultant F bent to mu N (e - e²/3 + e³/27), e = F/(mu N) up to 3 (Shen 1983)."""
+    """Return the linear forces, with resultant F limited to mu N (e - e²/3 + e³/27), e = F/(mu N) <= 3 (Shen 1983)."""
     fx, fy, m = linear_creep(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options)
     e2 = (fx * fx + fy * fy) / (mu * mu * N * N)
     if e2.real < 1e-20:
@@ -42,7 +42,7 @@ def saturated_creep(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options):
 
 @numba.njit(cache=True)
 def polach(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options, V):
-    """Return Polach's forces (1999, 2005); options = (k_A, k_S, A, B), V the speed of rolling.
+    """Return Polach's forces (1999, 2005); options = (k_A, k_S, A, B), V the rolling speed.
 
     (1)  friction falls with the slip speed w = V |creepage|: mu (A + (1 - A) exp(-B w))
     (2)  eta_c = eta + phi a where that is larger than eta, else eta;  nu_c = |(xi, eta_c)|
@@ -81,12 +81,12 @@ def polach(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options, V):
 def fastsim_of_flexibilities(xi, eta, phi, N, a, b, L1, L2, L3, mu, m_x, m_y):
     """Return the forces of Kalker's simplified theory (1982) with flexibilities L1, L2, L3 [m³/N].
 
-    The surface displacement is L times the traction of its place. In each of m_y strips from the leading edge,
-    u = x/a from +sqrt(1 - v²), v = y/b:
+    The surface displacement is L times the local traction. In each of m_y strips, from the leading edge, u = x/a
+    decreases from sqrt(1 - v²), v = y/b:
 
-    (1)  dt_x = (xi/L1 - phi b v/L3) a du,  dt_y = (eta/L2 + phi a u/L3) a du  while there is no slip
-    (2)  where |t| would exceed the bound mu p, p = 2 N (1 - u² - v²)/(pi a b), it is cut down to it
-    (3)  force = sum of t over cells of equal width in their strip, tractions at their middle
+    (1)  dt_x = (xi/L1 - phi b v/L3) a du,  dt_y = (eta/L2 + phi a u/L3) a du  without slip
+    (2)  if |t| exceeds the bound mu p, p = 2 N (1 - u² - v²)/(pi a b), it is reduced to the bound
+    (3)  force = sum of t over cells of equal width in their strip, with the tractions at their middle
     """
     fx = 0 * (xi + N)
     fy = 0 * (xi + N)
@@ -128,7 +128,7 @@ def fastsim_of_flexibilities(xi, eta, phi, N, a, b, L1, L2, L3, mu, m_x, m_y):
 
 @numba.njit(cache=True)
 def fastsim(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options):
-    """Return FASTSIM's forces, flexibilities from the linear coefficients; options = (cells along, strips).
+    """Return FASTSIM's forces with flexibilities from the linear coefficients; options = (cells along, strips).
 
     L1 = 8 a/(3 G C11), L2 = 8 a/(3 G C22), L3 = pi a sqrt(a/b)/(4 G C23): forces at vanishing creepage are the linear
     ones.
@@ -141,7 +141,7 @@ def fastsim(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options):
 
 @numba.njit(cache=True)
 def creep_force(law, xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options, V):
-    """Return (F_x, F_y, M) at a speed V of rolling, by the law of a number of `creep_names.CREEP_LAWS`."""
+    """Return (F_x, F_y, M) at a rolling speed V, by the law with a number in `creep_names.CREEP_LAWS`."""
     if law == 0:
         return linear_creep(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options)
     if law == 1:

@@ -22,16 +22,16 @@ __all__ = ["Ellipse", "ellipse"]
 
 
 class Ellipse(NamedTuple):
-    """What does not depend on the load N: semi-axes are a_1 N^(1/3) and b_1 N^(1/3), N = stiffness approach^(3/2)."""
+    """The load-independent ellipse: semi-axes are a_1 N^(1/3) and b_1 N^(1/3), and N = stiffness approach^(3/2)."""
 
-    a_1: Array  #: of the semi-axis in the direction of rolling [m/N^(1/3)]
-    b_1: Array  #: of the lateral one [m/N^(1/3)]
+    a_1: Array  #: for the semi-axis in the rolling direction [m/N^(1/3)]
+    b_1: Array  #: for the lateral semi-axis [m/N^(1/3)]
     stiffness: Array  #: [N/m^(3/2)]
     ratio: Array  #: a/b
 
 
 def curvature_ratio(k: Array) -> Array:
-    """C_L/C_S of an ellipse whose axes are as k = short/long, (1)."""
+    """Return C_L/C_S of an ellipse with the axis ratio k = short/long, equation (1)."""
     m = 1 - np.asarray(k) ** 2
     K, E = ellipk(m), ellipe(m)
     near = m < 1e-6  # both differences vanish like m
@@ -42,7 +42,7 @@ def curvature_ratio(k: Array) -> Array:
 
 @cache
 def axis_ratios() -> tuple[Array, Array]:
-    """Logarithms of k and of the ratio of curvatures, both increasing: the curve that is inverted."""
+    """Return logarithms of k and of the ratio of curvatures, both increasing: the curve to be inverted."""
     log_k = np.linspace(np.log(1e-6), 0.0, 4001)
     return log_k, np.log(curvature_ratio(np.exp(log_k)))
 
@@ -62,7 +62,7 @@ def ellipse(A: Array, B: Array, modulus: float) -> Ellipse:
     wanted = np.log(low / high)
     log_k, log_ratio = axis_ratios()
     x = np.interp(wanted, log_ratio, log_k)
-    for _ in range(3):  # Newton on the exact curve, with the slope of the table
+    for _ in range(3):  # Newton's method on the exact curve, with the slope of the table
         step = 1e-4
         slope = (
             np.log(curvature_ratio(np.exp(np.minimum(x + step, 0)))) - np.log(curvature_ratio(np.exp(x - step)))
@@ -73,6 +73,6 @@ def ellipse(A: Array, B: Array, modulus: float) -> Ellipse:
     long_1 = (3 * ellipe(m) / (2 * np.pi * k**2 * (low + high) * modulus)) ** (1 / 3)
     short_1 = k * long_1
     stiffness = (2 * np.pi * modulus * long_1 / (3 * ellipk(m))) ** 1.5
-    rolling_is_short = A >= B  # the stiffer curvature has the shorter axis
+    rolling_is_short = A >= B  # the larger curvature has the shorter axis
     a_1, b_1 = np.where(rolling_is_short, short_1, long_1), np.where(rolling_is_short, long_1, short_1)
     return Ellipse(a_1, b_1, stiffness, a_1 / b_1)

@@ -1,7 +1,8 @@
-"""What rails deviate from their track: tables over the arc length, random ones of a spectrum, a short defect.
+"""Irregularities of the rails: tables over the arc length, random ones from a spectrum, a short defect.
 
-Four signals, each over the arc length: lateral (to the left) and vertical (upward) of the left and of the right rail.
-Spectra are one-sided over the angular wavenumber Omega [rad/m]: the variance is the integral over Omega > 0.
+There are four signals as functions of the arc length: lateral (to the left) and vertical (upward) deviations of the
+left and of the right rail. Spectra are one-sided over the angular wavenumber Omega [rad/m]: the variance is the
+integral over Omega > 0.
 """
 
 from dataclasses import dataclass
@@ -16,13 +17,13 @@ from floatframe.errors import ModelError
 
 __all__ = ["SPECTRA", "Irregularities", "TrackSpectrum", "random_irregularities", "wheel_envelope"]
 
-HALF_BASE = 0.75  #: half of the distance between the rails, by which cross level becomes a roll [m]
+HALF_BASE = 0.75  #: half the distance between the rails, by which cross level is converted to roll [m]
 MOST = 0.2  #: largest deviation of a rail [m]
 
 
 @dataclass(frozen=True)
 class TrackSpectrum:
-    """Spectra of alignment (lateral), profile (vertical) and cross level (roll), rational in W².
+    """Spectra of alignment (lateral), profile (vertical) and cross level (roll), rational functions of W².
 
     S_lateral = A_l W_c² / D(W), S_vertical = A_v W_c² / D(W), D = (W² + W_r²)(W² + W_c²), [m²/(rad/m)];
     S_roll = roll_factor A_v W_c² W²/(D (W² + W_s²)) with W_r in D, [rad²/(rad/m)].
@@ -31,12 +32,12 @@ class TrackSpectrum:
     lateral: float  #: A_l [m rad]
     vertical: float  #: A_v [m rad]
     w_c: float  #: [rad/m]
-    w_r: float  #: [rad/m]; 0: unbounded towards long waves
+    w_r: float  #: [rad/m]; 0: no limit for long waves
     w_s: float  #: [rad/m]
-    roll_factor: float  #: 1/b² of the half base b [1/m²]
+    roll_factor: float  #: 1/b² with the half base b [1/m²]
 
     def densities(self, W: Array) -> tuple[Array, Array, Array]:
-        """Lateral, vertical and roll at W [rad/m]."""
+        """Return the lateral, vertical and roll densities at W [rad/m]."""
         common = self.w_c**2 / ((W**2 + self.w_r**2) * (W**2 + self.w_c**2))
         return (
             self.lateral * common,
@@ -46,15 +47,15 @@ class TrackSpectrum:
 
 
 def fra(vertical: float, lateral: float, w_s: float) -> TrackSpectrum:
-    """Return the spectrum of a class of the FRA: numbers in cm² rad/m; S = 0.25 A W_c²/(W² (W² + W_c²)).
+    """Return the spectrum of an FRA class, from numbers in cm² rad/m; S = 0.25 A W_c²/(W² (W² + W_c²)).
 
-    Cross level, 4 · 0.25 A_v W_c²/((W² + W_c²)(W² + W_s²)) cm²/(rad/m) as the difference of height of the two rails
-    over 1.5 m, is a roll of that over (1.5 m)².
+    The cross level, 4 · 0.25 A_v W_c²/((W² + W_c²)(W² + W_s²)) cm²/(rad/m), is the difference in height of the two
+    rails over 1.5 m. Divided by (1.5 m)², it is the spectrum of the roll.
     """
     return TrackSpectrum(0.25e-4 * lateral, 0.25e-4 * vertical, 0.8245, 0.0, w_s, 4 / (2 * HALF_BASE) ** 2)
 
 
-#: by name: ERRI B176 (low and high level of disturbance), classes 1 (worst) to 6 of the FRA
+#: by name: ERRI B176 (low and high disturbance), FRA classes 1 (worst) to 6
 SPECTRA = {
     "erri-low": TrackSpectrum(2.119e-7, 4.032e-7, 0.8246, 0.0206, 0.4380, 1 / HALF_BASE**2),
     "erri-high": TrackSpectrum(6.125e-7, 1.080e-6, 0.8246, 0.0206, 0.4380, 1 / HALF_BASE**2),
@@ -70,12 +71,12 @@ SPECTRA = {
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Irregularities:
-    """Deviations of the two rails at equally spaced places; zero before the first and after the last.
+    """Deviations of the two rails at equally spaced positions; zero before the first and after the last.
 
     Raises
     ------
     ModelError
-        If lengths differ, places are not equally spaced, or a deviation looks like millimetres.
+        If lengths differ, positions are not equally spaced, or a deviation seems to be in millimetres.
     """
 
     s: Array  #: (n,), equally spaced [m]
@@ -113,7 +114,7 @@ class Irregularities:
             object.__setattr__(self, name, array)
 
     def __add__(self, other: "Irregularities") -> "Irregularities":
-        """Both together, at the places of the finer one over what both cover."""
+        """Return the sum of both, at the positions of the finer one, over the union of their ranges."""
         step = min(self.s[1] - self.s[0], other.s[1] - other.s[0])
         low, high = min(self.s[0], other.s[0]), max(self.s[-1], other.s[-1])
         s = low + step * np.arange(round((high - low) / step) + 1)
@@ -124,7 +125,7 @@ class Irregularities:
         return Irregularities(s, *sums)
 
     def seen_by_wheels(self, radius: float) -> "Irregularities":
-        """Return the deviations with vertical ones as a wheel follows them, see `wheel_envelope`."""
+        """Return the deviations with vertical ones filtered by the wheel, see `wheel_envelope`."""
         step = float(self.s[1] - self.s[0])
         return Irregularities(
             self.s,
@@ -136,7 +137,7 @@ class Irregularities:
 
     @classmethod
     def from_table(cls, table: Any, where: str = "irregularities") -> "Irregularities":
-        """Return those of a table of a system file: s and signals, or spectrum, length, seed, ..."""
+        """Return the deviations of a table of a system file: s and signals, or spectrum, length, seed, ..."""
         if not isinstance(table, dict):
             raise ModelError(f"{where}: expected a table, got {table!r}")
         if "spectrum" in table:
@@ -161,27 +162,27 @@ def random_irregularities(
     spectrum: str | TrackSpectrum, length: float, *, seed: int = 0, start: float = 0.0, longest: float = 100.0,
     shortest: float = 1.0, spacing: float = 0.2, fade: float = 20.0,
 ) -> Irregularities:  # fmt: skip
-    """Return a random track of a spectrum: waves of equally spaced wavenumbers with random phases.
+    """Return a random track with a spectrum: waves with equally spaced wavenumbers and random phases.
 
-    z(s) = sum_k sqrt(2 S(W_k) dW) cos(W_k s + phase_k), for alignment, profile and cross level with phases of their
-    own, summed by an inverse Fourier transform over twice the length.
+    z(s) = sum_k sqrt(2 S(W_k) dW) cos(W_k s + phase_k), with separate phases for alignment, profile and cross level,
+    summed by an inverse Fourier transform over twice the length.
 
     Parameters
     ----------
     spectrum
-        A name of `SPECTRA` or a spectrum.
+        A name in `SPECTRA`, or a spectrum.
     length
-        [m].
+        Length of the track [m].
     seed
-        Of the phases: the same seed is the same track.
+        Seed of the phases; the same seed gives the same track.
     start
-        Where it begins [m].
+        Position of the beginning [m].
     longest, shortest
-        Wavelengths that are in it [m].
+        Range of wavelengths [m].
     spacing
-        Of the table [m], at most a quarter of the shortest wave.
+        Spacing of the table [m], at most a quarter of the shortest wavelength.
     fade
-        Length over which it rises from zero at its beginning and falls to it at its end [m].
+        Length over which the deviations rise from zero at the beginning and fall to zero at the end [m].
     """
     if isinstance(spectrum, str):
         if spectrum not in SPECTRA:
@@ -229,18 +230,18 @@ def random_irregularities(
 
 
 def wheel_envelope(z: Array, spacing: float, radius: float) -> Array:
-    """Return the height at which a wheel is carried by a rail of heights z: what its centre does, less its radius.
+    """Return the height of a wheel on a rail with heights z: the height of its centre minus its radius.
 
-    e(s) = max over x of z(s + x) - (r - sqrt(r² - x²)): short dents are bridged, edges become arcs of the wheel.
+    e(s) = max over x of z(s + x) - (r - sqrt(r² - x²)); short dents are bridged, and edges become arcs of the wheel.
 
     Parameters
     ----------
     z
         Heights of the rail [m], (n,), equally spaced.
     spacing
-        [m].
+        Spacing of the heights [m].
     radius
-        r of the wheel [m].
+        Radius r of the wheel [m].
     """
     z = np.asarray(z, dtype=float)
     reach = float(np.ptp(z))

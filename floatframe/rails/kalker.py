@@ -1,8 +1,8 @@
 """Kalker's coefficients of linear creep, interpolated in his table over a/b and Poisson's ratio.
 
-Between rows the coefficients are interpolated linearly in g = min(a/b, b/a), between Poisson's ratios their
-reciprocals by a parabola (they are nearly linear in nu); beyond the table, g < 0.1, his asymptotes are used, scaled so
-that they join the table at g = 0.1. C32 = -C23 (Kalker 1990, Table E3).
+Between rows, the coefficients are interpolated linearly in g = min(a/b, b/a). Between Poisson's ratios, their
+reciprocals, which are nearly linear in nu, are interpolated by a parabola. Beyond the table, g < 0.1, Kalker's
+asymptotes are used, scaled to be continuous at g = 0.1. C32 = -C23 (Kalker 1990, Table E3).
 """
 
 import numpy as np
@@ -42,7 +42,7 @@ LONG = np.array([
 
 
 def asymptotes(g: Array, nu: float, narrow: bool) -> Array:
-    """Return C11, C22, C23, C33 of a very slender ellipse, (4, n), as their leading terms in g (Kalker 1990)."""
+    """Return C11, C22, C23, C33 of a very slender ellipse, (4, n), by their leading terms in g (Kalker 1990)."""
     if narrow:
         L = np.log(16 / g**2)
         c11 = np.full_like(g, np.pi**2 / 4 / (1 - nu))
@@ -61,7 +61,7 @@ def asymptotes(g: Array, nu: float, narrow: bool) -> Array:
 
 
 def kalker_coefficients(ratio: Array, nu: float) -> Array:
-    """Return C11, C22, C23, C33, (4, n), of ellipses with a/b = `ratio`, a in the direction of rolling.
+    """Return C11, C22, C23, C33, (4, n), of ellipses with a/b = `ratio`, a in the rolling direction.
 
     F_x = -a b G C11 xi, F_y = -a b G (C22 eta + sqrt(a b) C23 phi), M = a b G sqrt(a b) (C23 eta - sqrt(a b) C33 phi),
     for two bodies of the same material with shear modulus G.
@@ -69,14 +69,14 @@ def kalker_coefficients(ratio: Array, nu: float) -> Array:
     Parameters
     ----------
     ratio
-        a/b, above zero, any shape.
+        a/b, above zero, an array of any shape.
     nu
         Poisson's ratio, 0 to 1/2.
 
     Raises
     ------
     ModelError
-        If nu lies elsewhere.
+        If nu is out of this range.
     """
     if not 0.0 <= nu <= 0.5:
         raise ModelError(f"kalker_coefficients: Poisson's ratio: expected 0 to 0.5, got {nu:g}")

@@ -1,16 +1,16 @@
-"""The law of wheels on rails: from the motion of a marker and the numbers of the element to its wrench, compiled.
+"""The compiled law of wheels on rails, from the motion of a marker and the data of the element to its wrench.
 
-For each wheel, with side = +1 on the left and -1 on the right, outward = side · left:
+For each wheel, with side = +1 on the left and -1 on the right, and outward = side · left:
 
-(1)  W = r + side c A_y, the centre of the wheel on its axle; place s on the track, axes t, n, b there
+(1)  W = r + side c A_y, the centre of the wheel on its axle; position s on the track, with axes t, n, b
 (2)  u = side (W - o)·n - half the distance of the running circles - side δy(s),  h = (W - o)·b - r_0 - δz(s),
      sin(roll) = a·b and sin(yaw) = -a·t of the outward axle a; v = u + r_0 sin(roll), the shift at the rail
 (3)  contact of each part from the table; depth d = (q - h) cos(angle)
 (4)  N = K d^(3/2) (1 + damping d_dot) where d > 0, or from the multiplier of 0 = h - q
-(5)  at P = W + x t + side y n + z b: creepages of v + omega x (P - r), creep forces by the law chosen
-(6)  force N (b cos - outward sin) + F_x t + F_y e_y, moment about the marker of the force at P and M about the normal
-(7)  with a spin inertia I the body of the marker does not turn with the wheels: Omega, their angular velocity about the
-     axle, is a state, I Omega' = M·a, and the body bears the rest of the moment, less omega × I Omega a
+(5)  at P = W + x t + side y n + z b: creepages of v + omega x (P - r), creep forces by the selected law
+(6)  force N (b cos - outward sin) + F_x t + F_y e_y; moment of the force at P about the marker, and M about the normal
+(7)  with a spin inertia I, the body of the marker does not rotate with the wheels: their angular velocity Omega about
+    the axle is a state, I Omega' = M·a, and the body receives the remaining moment minus omega × I Omega a
 """
 
 import numba
@@ -21,7 +21,7 @@ from floatframe.rails.splines import basis, basis_slopes, cell
 
 __all__ = ["CONTACT_OUTPUTS", "HEAD", "WHEEL_HEAD", "WHEEL_OUTPUTS", "wheels_on_rails"]
 
-#: numbers at the beginning of the data
+#: parameters at the beginning of the data
 HEAD = (
     "n_wheels", "n_parts", "creep", "option_0", "option_1", "option_2", "option_3", "option_4", "shear_modulus",
     "friction",
@@ -29,16 +29,16 @@ HEAD = (
     "irregular_step", "irregular_n",
     "spin_inertia",
 )  # fmt: skip
-#: then for each wheel
+#: parameters of each wheel
 WHEEL_HEAD = ("side", "arm", "half", "radius", "table_at", "u_off")
-LIFTED = 0.025  #: height of a tread above its rail at which the wheel counts as off the track [m]
+LIFTED = 0.025  #: height of a tread above its rail from which the wheel counts as derailed [m]
 N_HEAD, N_WHEEL, N_FIELDS, N_CELL = len(HEAD), len(WHEEL_HEAD), 13, 8
 
-#: outputs of each wheel: name, unit
+#: outputs of each wheel, with units
 WHEEL_OUTPUTS = (
     ("shift", "m"), ("N", "N"), ("Q", "N"), ("Y", "N"), ("Y_over_Q", "1"), ("wear", "N"), ("s", "m"), ("off", "m"),
 )  # fmt: skip
-#: outputs of each part of a wheel in contact
+#: outputs of each contact part of a wheel
 CONTACT_OUTPUTS = (
     ("N", "N"), ("angle", "rad"), ("radius", "m"), ("a", "m"), ("b", "m"), ("xi", "1"), ("eta", "1"), ("spin", "1/m"),
     ("Fx", "N"), ("Fy", "N"), ("M", "N m"), ("depth", "m"),
@@ -49,13 +49,13 @@ GAUSS_W = np.polynomial.legendre.leggauss(4)[1]
 
 @numba.njit(cache=True)
 def along_cell(data, at, x, y):
-    """Return how far a point is ahead of the beginning of a cell, along its tangent there."""
+    """Return the distance of a point ahead of the beginning of a cell, along the tangent there."""
     return (x - data[at + 1]) * np.cos(data[at + 3]) + (y - data[at + 2]) * np.sin(data[at + 3])
 
 
 @numba.njit(cache=True)
 def place_on_track(data, x, y):
-    """Return s, origin (x, y), heading, cant angle and its slope, curvature of the track beside a point."""
+    """Return s, origin (x, y), heading, cant angle and its slope, and curvature of the track next to a point."""
     cells, n = int(data[14]), int(data[15])
     best, near = 1e300, 0
     for i in range(n):
@@ -72,7 +72,8 @@ def place_on_track(data, x, y):
     ox = 0 * d
     oy = 0 * d
     psi = 0 * d + psi_0
-    for _ in range(4):  # (point - origin)·t = 0 by Newton; quadratic, from an error of curvature times offset
+    # solves (point - origin)·t = 0 by Newton's method; quadratic convergence from an error of curvature times offset
+    for _ in range(4):
         ox = 0 * d + data[at + 1]
         oy = 0 * d + data[at + 2]
         for i in range(4):
@@ -91,7 +92,7 @@ def place_on_track(data, x, y):
         k = k_0 + slope * d
         step = ahead / (1 - k * beside)
         d = d + step
-        # the origin of the next round, so that the last step is in it
+        # includes the last step in the origin
         ox, oy = ox + step * c, oy + step * s
     psi = psi_0 + k_0 * d + 0.5 * slope * d * d
     return data[at] + d, ox, oy, psi, data[at + 6] + data[at + 7] * d, k_0 + slope * d
@@ -99,7 +100,7 @@ def place_on_track(data, x, y):
 
 @numba.njit(cache=True)
 def deviation(data, signal, s):
-    """Return a deviation of the rails at s and its slope: signals left y, left z, right y, right z."""
+    """Return a deviation of the rails at s and its slope, for the signals left y, left z, right y, right z."""
     at, n = int(data[16]), int(data[19])
     if n == 0:
         return 0 * s, 0 * s
@@ -116,7 +117,7 @@ def deviation(data, signal, s):
 
 @numba.njit(cache=True)
 def contact_fields(data, table, part, v, roll, sine, field):
-    """Write the fields of one part at a shift v = u + r_0 roll, sine of the roll, sine of the yaw."""
+    """Write the fields of one part at a shift v = u + r_0 roll, a sine of the roll and a sine of the yaw."""
     n_v, n_r, n_y, n_f = int(data[table]), int(data[table + 3]), int(data[table + 6]), int(data[table + 8])
     if sine.real < 0:
         sine = -sine
@@ -154,7 +155,7 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, seen):
     zero = 0 * (rx + vx + (lam[0] if is_constraint else 0.0))
     inertia = data[20]
     spin_rate = zero
-    if inertia > 0:  # the body does not turn with the wheels: their angular velocity about the axle is a state
+    if inertia > 0:  # the body does not rotate with the wheels, whose angular velocity about the axle is a state
         spin_rate = z[0]
         more = spin_rate - (wx_ * ax + wy_ * ay + wz_ * az)
         ox_, oy_, oz_ = wx_ + more * ax, wy_ + more * ay, wz_ + more * az
@@ -184,7 +185,7 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, seen):
         signal = 0 if side > 0 else 2
         off_y, slope_y = deviation(data, signal, s)
         off_z, slope_z = deviation(data, signal + 1, s)
-        stretch = 1 / (1 - k * beside)  # ds by way along the rail
+        stretch = 1 / (1 - k * beside)  # ds divided by the path along the rail
         slope_y, slope_z = slope_y * stretch, slope_z * stretch
         u = side * (beside - off_y) - half
         h = dx * bx + dy * by + dz * bz - radius - off_z
@@ -208,7 +209,7 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, seen):
             depth = (field[0] - h) * cos
             if part == 0:
                 lift = h - field[0]
-            # the point of contact, from the marker
+            # the contact point, relative to the marker
             x_c, y_c, z_c = field[2] * sine, side * field[3], field[4]
             px = arm * ax + x_c * c + y_c * nx + z_c * bx
             py = arm * ay + x_c * sn + y_c * ny + z_c * by
@@ -216,7 +217,7 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, seen):
             ux = vx + oy_ * pz - oz_ * py
             uy = vy + oz_ * px - ox_ * pz
             uz = vz + ox_ * py - oy_ * px
-            # normal of the contact (into the wheel) and the direction across
+            # normal of the contact (into the wheel) and the transverse direction
             mx, my, mz = bx * cos - side * nx * sin, by * cos - side * ny * sin, bz * cos - side * nz * sin
             ex, ey, ez = nx * cos + side * bx * sin, ny * cos + side * by * sin, nz * cos + side * bz * sin
             N = zero
@@ -236,7 +237,8 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, seen):
             seen[out + 2] = field[5]
             seen[out + 11] = depth
             if N.real <= 0:
-                if is_constraint and part == 0:  # a wheel held on its rail is pulled too: no creep forces then
+                # a constrained wheel can also be pulled; there are no creep forces then
+                if is_constraint and part == 0:
                     wrench[0, 0] += N * mx
                     wrench[0, 1] += N * my
                     wrench[0, 2] += N * mz
@@ -271,7 +273,7 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, seen):
                 V,
             )
             fx, fy = ahead * fx, ahead * fy
-            # normal force along the rail where the rail itself is not straight
+            # component of the normal force along the rail due to irregularities
             up = N * cos
             ft = fx + up * (side * slope * slope_y - slope_z)
             force_x = N * mx + ft * c + fy * ex
@@ -313,7 +315,7 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, seen):
         if off.real > worst.real:
             worst = off
     last = int(data[0]) * (n_w_out + n_parts * n_c_out)
-    if inertia > 0:  # I Omega' a + omega x I Omega a is the wheels' share of the moment
+    if inertia > 0:  # I Omega' a + omega x I Omega a is the part of the moment taken by the wheels
         about = wrench[0, 3] * ax + wrench[0, 4] * ay + wrench[0, 5] * az
         z_dot[0] = about / inertia
         momentum = inertia * spin_rate

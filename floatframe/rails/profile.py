@@ -1,9 +1,8 @@
-"""A profile of a wheel or of a rail: a height over the lateral coordinate, checked, with slope and curvature.
+"""The profile of a wheel or a rail: a validated height over the lateral coordinate, with slope and curvature.
 
-Coordinates are the same for both sides of the track: y outward, towards the field, away from the centre of the track.
-The profile of a wheel is what its radius adds to the nominal one (positive towards the rail, so that a flange is at y
-< 0 with values near +28 mm), over the distance from the running circle. That of a rail is the height over its top,
-positive upward.
+Coordinates are the same for both sides of the track: y points outward, away from the centre of the track. The profile
+of a wheel is the increase of its radius relative to the nominal one, over the distance from the running circle; a
+flange is at y < 0, with values of about +28 mm. The profile of a rail is its height above its top, positive upward.
 """
 
 from dataclasses import dataclass, field
@@ -19,26 +18,26 @@ from floatframe.errors import ModelError
 
 __all__ = ["Profile", "profile_of_points"]
 
-WIDTHS = {"wheel": (0.04, 0.25), "rail": (0.02, 0.25)}  #: what profiles measure across [m]
+WIDTHS = {"wheel": (0.04, 0.25), "rail": (0.02, 0.25)}  #: range of the widths of profiles [m]
 MOST_HEIGHT = 0.08  #: largest height of a profile [m]
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """Height z over the lateral coordinate y of a wheel or of a rail, a cubic spline through dense points.
+    """Height z of a wheel or a rail over the lateral coordinate y, as a cubic spline through dense points.
 
     Raises
     ------
     ModelError
-        If the points go back (not a function of y), are not numbers, or look like millimetres.
+        If the points go back (z is not a function of y), are not numbers, or seem to be in millimetres.
     """
 
     kind: str  #: "wheel" or "rail"
     y: Array  #: (n,) outward [m], increasing
-    z: Array  #: (n,) [m]: of a wheel what the radius grows by, of a rail the height over its top
+    z: Array  #: (n,) [m]: for a wheel the increase of the radius, for a rail the height above its top
     name: str = "points"  #: in messages
-    inclination: float = field(default=0.0, kw_only=True)  #: by which a rail was turned inward [rad]
+    inclination: float = field(default=0.0, kw_only=True)  #: angle by which a rail was inclined inward [rad]
 
     def __post_init__(self) -> None:
         where = f"profile {self.name!r}"
@@ -51,27 +50,27 @@ class Profile:
 
     @cached_property
     def spline(self) -> CubicSpline:
-        """The curve through the points."""
+        """The spline through the points."""
         return CubicSpline(self.y, self.z, bc_type="natural")
 
     def height(self, y: Array) -> Array:
-        """Z at y [m]; beyond the ends the profile stops: -infinity."""
+        """Return z at y [m]; -infinity beyond the ends of the profile."""
         y = np.asarray(y, dtype=float)
         inside = (y >= self.y[0]) & (y <= self.y[-1])
         return np.where(inside, self.spline(np.clip(y, self.y[0], self.y[-1])), -np.inf)
 
     def slope(self, y: Array) -> Array:
-        """dz/dy at y."""
+        """Return dz/dy at y."""
         return self.spline(np.asarray(y, dtype=float), 1)
 
     def curvature(self, y: Array) -> Array:
-        """Z'' (1 + z'²)^(-3/2) at y [1/m]."""
+        """Return z'' (1 + z'²)^(-3/2) at y [1/m]."""
         y = np.asarray(y, dtype=float)
         return self.spline(y, 2) * (1 + self.spline(y, 1) ** 2) ** -1.5
 
 
 def checked_points(where: str, kind: str, y: Any, z: Any) -> tuple[Array, Array]:
-    """Return y and z as increasing arrays, or raise with what is wrong with them."""
+    """Return y and z as increasing arrays; raise an error that describes invalid points."""
     try:
         y, z = np.array(y, dtype=float), np.array(z, dtype=float)
     except (TypeError, ValueError):
@@ -107,10 +106,10 @@ def checked_points(where: str, kind: str, y: Any, z: Any) -> tuple[Array, Array]
 def profile_of_points(
     kind: str, y: Array, z: Array, *, name: str = "points", noise: float | None = None, spacing: float = 2e-4
 ) -> Profile:
-    """Return a measured profile, smoothed.
+    """Return a smoothed measured profile.
 
     The smoothing spline minimises sum (z_i - f(y_i))² + lam int f''² dy. With `noise`, the standard deviation of the
-    measured heights, lam is the one whose residual has this size; without, generalised cross-validation chooses it.
+    measured heights, lam is chosen such that the residual has this size; otherwise by generalised cross-validation.
 
     Parameters
     ----------
@@ -119,18 +118,18 @@ def profile_of_points(
     y, z
         Points [m], y strictly monotonic.
     name
-        In messages.
+        Name in messages.
     noise
-        Standard deviation of z [m]; 0: through the points.
+        Standard deviation of z [m]; 0: interpolation of the points.
     spacing
-        Of the points the smooth curve is kept at [m].
+        Spacing of the points that represent the smooth curve [m].
     """
     where = f"profile {name!r}"
     y, z = checked_points(where, kind, y, z)
     if noise is not None and not (np.isfinite(noise) and noise >= 0):
         raise ModelError(f"{where}: noise: expected a number >= 0 [m], got {noise}")
     grid = np.linspace(y[0], y[-1], max(5, int(np.ceil((y[-1] - y[0]) / spacing)) + 1))
-    # millimetres: the normal equations of the smoothing spline are better scaled in them
+    # in millimetres, in which the normal equations of the smoothing spline are better scaled
     if noise == 0:
         smooth = CubicSpline(y * 1e3, z * 1e3, bc_type="natural")(grid * 1e3)
     elif noise is None:
@@ -141,7 +140,7 @@ def profile_of_points(
 
 
 def smoothed_to_noise(y: Array, z: Array, noise: float) -> Any:
-    """Return the smoothing spline whose residual is `noise`: it grows with lam, bisected in its logarithm."""
+    """Return the smoothing spline with residual `noise`; the residual grows with lam, whose logarithm is bisected."""
     low, high = -12.0, 8.0
     for _ in range(50):
         middle = 0.5 * (low + high)

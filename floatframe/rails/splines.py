@@ -1,4 +1,4 @@
-"""Uniform cubic B-splines: coefficients in NumPy, values in compiled code, for float64 and complex128 arguments."""
+"""Uniform cubic B-splines: coefficients in NumPy, values in compiled code for float64 and complex128 arguments."""
 
 import numba
 import numpy as np
@@ -10,16 +10,17 @@ __all__ = ["basis", "basis_slopes", "cell", "coefficients", "even_coefficients"]
 
 
 def even_coefficients(values: Array, axis: int = 0) -> Array:
-    """Return the coefficients through values at 0, h, 2 h, ... of an even function: c_(-1) = c_1 at the beginning."""
+    """Return the coefficients for values at 0, h, 2 h, ... of an even function: c_(-1) = c_1 at the beginning."""
     y = np.moveaxis(np.asarray(values, dtype=float), axis, 0)
     both = coefficients(np.concatenate([y[:0:-1], y]))
     return np.moveaxis(both[len(y) - 1 :], 0, axis)
 
 
 def coefficients(values: Array, axis: int = 0) -> Array:
-    """Return the n + 2 coefficients along an axis of the cubic B-spline through n >= 3 equally spaced values.
+    """Return the n + 2 coefficients, along an axis, of the cubic B-spline through n >= 3 equally spaced values.
 
-    (c_(i-1) + 4 c_i + c_(i+1))/6 = y_i, and no second derivative at the ends: c_(-1) - 2 c_0 + c_1 = 0, so c_0 = y_0.
+    (c_(i-1) + 4 c_i + c_(i+1))/6 = y_i; the second derivative is zero at the ends: c_(-1) - 2 c_0 + c_1 = 0, so c_0 =
+    y_0.
     """
     y = np.moveaxis(np.asarray(values, dtype=float), axis, 0)
     n, shape = len(y), y.shape[1:]
@@ -39,7 +40,7 @@ def coefficients(values: Array, axis: int = 0) -> Array:
 
 @numba.njit(cache=True)
 def cell(x, start, step, n):
-    """Return the interval i of n points and the place t in it, 0 to 1; beyond the ends the value at the end."""
+    """Return the interval i of n points and the position t in it, 0 to 1; clamped beyond the ends."""
     place = (x - start) / step
     if place.real <= 0.0:
         return 0, 0 * place

@@ -1,4 +1,4 @@
-"""Profiles of standards: the wheel S1002, the rail 60E1 (UIC 60), cones, and a rail inclined and set to gauge."""
+"""Standard profiles: the wheel S1002, the rail 60E1 (UIC 60), cones, and inclined rails."""
 
 from dataclasses import replace
 
@@ -11,20 +11,20 @@ from floatframe.rails.profile import Profile
 
 __all__ = ["GAUGE_DEPTH", "PROFILES", "cone", "inclined", "rail_60e1", "s1002", "turned", "wheel_s1002"]
 
-GAUGE_DEPTH = 0.014  #: below the top of the rails, where the gauge is measured [m]
-SPACING = 1e-4  #: of the points that stand for a curve [m]
-STEEPEST = 15.0  #: slope up to which the side of a rail is part of the head that wheels are searched on
+GAUGE_DEPTH = 0.014  #: depth below the top of the rails at which the gauge is measured [m]
+SPACING = 1e-4  #: spacing of the points that represent a curve [m]
+STEEPEST = 15.0  #: steepest slope up to which the side of a rail belongs to the head in the contact search
 
 #: S1002, y from the running circle outward and F downward, in mm: bounds between sections H to A, then the sections
 S1002_BOUNDS = (-70.0, -62.764705882, -49.662510381, -39.764473993, -38.426669071, -35.0, -26.0, 32.15796, 60.0)
-#: (height of the centre, radius, place of the centre, side) of the circles H, G, F and D
+#: (height of the centre, radius, y of the centre, side) of the circles H, G, F and D
 S1002_CIRCLES = {
     0: (9.519259302, 20.5, -49.5, 1.0),
     1: (16.0, 12.0, -55.0, 1.0),
     2: (8.834924130, 20.0, -58.558326413, 1.0),
     4: (16.446, 13.0, -26.210665, -1.0),
 }
-#: polynomials of the sections E, C, B and A, coefficients of y^0, y^1, ...
+#: polynomials of the sections E, C, B and A, as coefficients of y^0, y^1, ...
 S1002_POLYNOMIALS = {
     3: (-93.576667419, -2.747477419),
     5: (
@@ -58,7 +58,7 @@ def s1002(y: Array) -> Array:
     Raises
     ------
     ModelError
-        If a y lies beyond -70 to 60 mm.
+        If y is out of the range -70 to 60 mm.
     """
     y = np.asarray(y, dtype=float)
     if y.min() < S1002_BOUNDS[0] or y.max() > S1002_BOUNDS[-1]:
@@ -81,14 +81,14 @@ def wheel_s1002() -> Profile:
 
 
 def cone(conicity: float, *, flange: bool = True) -> Profile:
-    """Return a conical wheel, F = -conicity y, with the flange of S1002 joined to it by a fillet, or none.
+    """Return a conical wheel, F = -conicity y, optionally with the flange of S1002 joined by a fillet.
 
     Parameters
     ----------
     conicity
-        Tangent of the half angle of the cone: 1/20 and 1/40 are usual.
+        Tangent of the half angle of the cone; 1/20 and 1/40 are usual.
     flange
-        If not, the cone goes on to y = -60 mm.
+        If false, the cone continues to y = -60 mm.
     """
     conicity = number("cone: conicity", conicity)
     if not -0.5 < conicity < 0.5:
@@ -97,7 +97,7 @@ def cone(conicity: float, *, flange: bool = True) -> Profile:
         y = np.linspace(-60.0, 60.0, 1 + round(0.12 / SPACING))
         return Profile("wheel", y * 1e-3, -conicity * y * 1e-3, f"cone {conicity:g}")
     y = np.linspace(-68.8, 60.0, 1 + round(128.8e-3 / SPACING))
-    # a fillet of 13 mm, as S1002 has one, tangent to the flank of its flange, F = start - steep y, and to the cone
+    # a fillet of 13 mm as in S1002, tangent to the flank of its flange, F = start - steep y, and to the cone
     steep, start, radius = 2.747477419, -93.576667419, 13.0
     up_flank, up_cone = np.hypot(1.0, steep), np.hypot(1.0, conicity)
     centre = (start + radius * (up_flank - up_cone)) / (steep - conicity)
@@ -116,21 +116,21 @@ def cone(conicity: float, *, flange: bool = True) -> Profile:
 def rail_60e1() -> Profile:
     """Return the head of the rail 60E1 (UIC 60), upright.
 
-    Circles of 300 mm, 80 mm and 13 mm, tangent to each other, the first over a width of 20.456 mm, the second to one of
-    52.053 mm, then a side of 1 : 20. The head that follows is 72.0 mm wide, as the standard (EN 13674-1) has it.
+    Circles of 300 mm, 80 mm and 13 mm are tangent to each other, the first over a width of 20.456 mm, the second up to
+    52.053 mm, followed by a side of 1 : 20. The resulting head is 72.0 mm wide, as in the standard (EN 13674-1).
     """
     return head_of_circles(20.456, 52.053, "60E1")
 
 
 def head_of_circles(width_1: float, width_2: float, name: str) -> Profile:
-    """Return a head of circles of 300, 80 and 13 mm that change at these widths [mm], with sides of 1 : 20."""
+    """Return a head of circles of 300, 80 and 13 mm that meet at these widths [mm], with sides of 1 : 20."""
     half_1, half_2, side = width_1 / 2, width_2 / 2, 1 / 20
     angle_1 = np.arcsin(half_1 / 300.0)
     centre_2, low_2 = half_1 - 80.0 * np.sin(angle_1), -300.0 + (300.0 - 80.0) * np.cos(angle_1)
     angle_2 = np.arcsin((half_2 - centre_2) / 80.0)
     centre_3, low_3 = half_2 - 13.0 * np.sin(angle_2), low_2 + (80.0 - 13.0) * np.cos(angle_2)
     angle_3 = np.arctan2(1.0, side)
-    # points equally spaced along the curve: the sides are steep
+    # points equally spaced along the curve, because the sides are steep
     arcs = [
         (300.0, 0.0, -300.0, np.linspace(0.0, angle_1, 104)),
         (80.0, centre_2, low_2, np.linspace(angle_1, angle_2, 170)[1:]),
@@ -144,10 +144,10 @@ def head_of_circles(width_1: float, width_2: float, name: str) -> Profile:
 
 
 def inclined(rail: Profile, inclination: float) -> Profile:
-    """Return a rail turned inward by an angle whose tangent is `inclination` (1/40, 1/20), its highest point at z = 0.
+    """Return a rail rotated inward by an angle whose tangent is `inclination` (1/40, 1/20), its highest point at z = 0.
 
-    A rail turned so is higher on its outer side than before: heights there become z + inclination y. What has become
-    undercut, or steeper than STEEPEST, is cut away.
+    The outer side of an inclined rail is higher than before: heights become about z + inclination y. Parts that are
+    then undercut, or steeper than STEEPEST, are removed.
     """
     y, z, angle = turned(rail, inclination)
     top = int(np.argmax(z))
@@ -158,18 +158,18 @@ def inclined(rail: Profile, inclination: float) -> Profile:
 
 
 def turned(rail: Profile, inclination: float) -> tuple[Array, Array, float]:
-    """Return the points of a rail turned inward, with the top at z = 0, sides and all, and the angle [rad]."""
+    """Return all points of a rail rotated inward, including its sides, with the top at z = 0, and the angle [rad]."""
     angle = float(np.arctan(number("inclination of the rail", inclination)))
     if abs(angle) > 0.2:
         raise ModelError(f"inclination of the rail: expected a tangent such as 0.025 (1/40), got {inclination:g}")
     c, s = np.cos(angle), np.sin(angle)
     y, z = c * rail.y - s * rail.z, s * rail.y + c * rail.z
-    # the top between the points: where the upright profile falls outward as steeply as the rail was turned
+    # the top, between the points, where the upright profile falls outward with the slope of the inclination
     top = int(np.clip(np.argmax(z), 1, len(z) - 2))
     bend = z[top - 1] - 2 * z[top] + z[top + 1]
     rise = -((z[top + 1] - z[top - 1]) ** 2) / (8 * bend) if bend < 0 else 0.0
     return y, z - (z[top] + max(rise, 0.0)), angle
 
 
-#: names of the system file
+#: names in the system file
 PROFILES = {"s1002": wheel_s1002, "60e1": rail_60e1, "uic60": rail_60e1}

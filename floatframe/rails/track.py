@@ -1,9 +1,9 @@
-"""A track fixed in the ground: its centre line over the arc length, cant, irregularities of each rail.
+"""A track fixed to the ground: its centre line over the arc length, cant, and irregularities of each rail.
 
-Straights, circles and clothoids (curvature linear in the arc length) follow each other; a curve to the left is
-positive. The axes of the track at s are t forward, n to the left, b upward, turned about t by the cant: in a curve to
-the left the left rail is lower. The centre line stays at one height. Before its beginning and beyond its end the track
-is straight.
+Straights, circles and clothoids (curvature linear in the arc length) are connected in sequence; curvature to the left
+is positive. The axes of the track at s are t forward, n to the left and b upward, rotated about t by the cant: in a
+curve to the left, the left rail is lower. The centre line stays at a constant height. Before its beginning and beyond
+its end, the track is straight.
 """
 
 from collections.abc import Sequence
@@ -21,18 +21,19 @@ from floatframe.rails.irregularities import Irregularities
 
 __all__ = ["Segment", "Track", "TrackFrame", "curve"]
 
-MOST_TURN = 0.1  #: of one cell of the centre line [rad]
-MOST_LENGTH = 25.0  #: of one cell [m]
+MOST_TURN = 0.1  #: largest change of direction in a cell of the centre line [rad]
+MOST_LENGTH = 25.0  #: largest length of a cell [m]
 GAUSS = np.polynomial.legendre.leggauss(5)
 
 
 @dataclass(frozen=True)
 class Segment:
-    """A piece of track whose curvature and cant go linearly from beginning to end."""
+    """A piece of track whose curvature and cant change linearly from beginning to end."""
 
     length: float  #: [m]
     curvature: tuple[float, float] = (0.0, 0.0)  #: at beginning and end, 1/R, positive to the left [1/m]
-    cant: tuple[float, float] = (0.0, 0.0)  #: how much higher the right rail is, over 1.5 m [m]
+    #: height of the right rail above the left one, over 1.5 m, at beginning and end [m]
+    cant: tuple[float, float] = (0.0, 0.0)
 
 
 def curve(
@@ -44,20 +45,20 @@ def curve(
     before: float = 20.0,
     after: float = 50.0,
 ) -> tuple[Segment, ...]:
-    """Return straight, clothoid, circle, clothoid and straight: a curve to the left, or, R < 0, to the right.
+    """Return straight, clothoid, circle, clothoid and straight: a curve to the left, or to the right for R < 0.
 
     Parameters
     ----------
     radius
-        R of the circle [m], negative to the right.
+        R of the circle [m], negative for a curve to the right.
     length
-        Of the circle [m].
+        Length of the circle [m].
     transition
         Length of each clothoid [m].
     cant
-        Of the circle, the outer rail higher [m].
+        Cant of the circle, with the outer rail higher [m].
     before, after
-        Lengths of the straights [m].
+        Lengths of the straight pieces [m].
     """
     radius = number("curve: radius", radius)
     if abs(radius) < 20:
@@ -73,9 +74,9 @@ def curve(
 
 
 class TrackFrame(NamedTuple):
-    """The track at one place."""
+    """The track at one position."""
 
-    origin: Array  #: of the centre line, between the tops of the rails, ground axes [m]
+    origin: Array  #: point of the centre line, between the tops of the rails, in ground axes [m]
     axes: Array  #: t, n, b as columns, (3, 3)
     curvature: float  #: [1/m]
 
@@ -83,14 +84,14 @@ class TrackFrame(NamedTuple):
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Track:
-    """Segments one after the other from a point and a direction of the ground, x there; and what rails deviate."""
+    """Consecutive segments from a point of the ground in a given direction, with irregularities of the rails."""
 
-    segments: Sequence[Segment] = ()  #: none: straight for ever
+    segments: Sequence[Segment] = ()  #: none: an infinite straight track
     irregularities: Irregularities | None = None
     start: Array = field(
         default_factory=lambda: np.zeros(3)
     )  #: of the centre line, height of the tops of the rails [m]
-    heading: float = 0.0  #: from the x axis of the ground to the left [rad]
+    heading: float = 0.0  #: direction relative to the x axis of the ground, to the left [rad]
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "start", array_of_shape("track: start", self.start, (3,)))
@@ -115,12 +116,12 @@ class Track:
 
     @property
     def length(self) -> float:
-        """Of all segments [m]."""
+        """Length of all segments [m]."""
         return float(sum(each.length for each in self.segments))
 
     @cached_property
     def cells(self) -> Array:
-        """Pieces of constant change of curvature and cant, (n, 8): s, x, y, heading, k, k', cant angle, its slope."""
+        """Pieces with linear curvature and cant, (n, 8): s, x, y, heading, k, k', cant angle, its slope."""
         s, x, y, heading = 0.0, float(self.start[0]), float(self.start[1]), self.heading
         rows = [
             [-MOST_LENGTH, x - MOST_LENGTH * np.cos(heading), y - MOST_LENGTH * np.sin(heading), heading, 0, 0, 0, 0]

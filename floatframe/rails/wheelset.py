@@ -1,4 +1,4 @@
-"""The elements `rails.wheelset`, two wheels on one axle, and `rails.wheel-on-rail`, one wheel that turns by itself."""
+"""The elements `rails.wheelset`, two wheels on one axle, and `rails.wheel-on-rail`, one independent wheel."""
 
 import math
 from collections.abc import Mapping
@@ -41,20 +41,22 @@ LAW_KEYS = (
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Wheelset(Element):
-    """Two wheels that turn with one axle, on the rails of a track that is fixed in the ground.
+    """Two wheels that rotate with one axle, on the rails of a track fixed to the ground.
 
-    The marker is at the middle of the axle, on the body that turns; its y axis is the axle and points to the left, so
+    The marker is at the middle of the axle, on the rotating body. Its y axis is the axle and points to the left, so
     that the wheelset rolls forward with a positive angular velocity about it. The tops of the rails are at the height
     of `track.start`.
     """
 
     name: str
-    marker: Marker  #: middle of the axle, y axis along it to the left, on the turning body
-    pair: Pair = field(default_factory=Pair)  #: wheel and rail, alike on both sides
+    marker: Marker  #: at the middle of the axle, with the y axis along it to the left, on the rotating body
+    pair: Pair = field(default_factory=Pair)  #: wheel and rail, equal on both sides
     track: Track = field(default_factory=Track)
     laws: ContactLaws = field(default_factory=ContactLaws)
-    spin_inertia: float = 0.0  #: above 0: of what turns about the axle [kg m²], on a body that does not turn with it
-    spin: float = 0.0  #: angular velocity at the start then, a state [rad/s]
+    #: if above 0: inertia about the axle of the rotating parts [kg m²]; the body of the marker then does not rotate
+    #: with them
+    spin_inertia: float = 0.0
+    spin: float = 0.0  #: in this case, their initial angular velocity, a state [rad/s]
 
     def __post_init__(self) -> None:
         require_spin(self)
@@ -65,7 +67,7 @@ class Wheelset(Element):
         return law_of_wheels(self, placed, (Wheel(1, half, self.pair), Wheel(-1, -half, self.pair)))
 
     def drawn(self) -> tuple[Drawn, ...]:
-        """Show wheels; the track belongs into the scene, once for all of its wheels."""
+        """Return the drawn wheels; the track belongs to the scene, where it is drawn once for all wheels."""
         half = 0.5 * self.pair.running_circles
         return tuple(wheel_shape(self.pair, side, side * half) for side in (1, -1))
 
@@ -80,18 +82,20 @@ class Wheelset(Element):
 class WheelOnRail(Element):
     """One wheel on its rail: an independently rotating wheel, or one side of a wheelset with different profiles.
 
-    The marker is at the middle of the running circle, on the body that turns; its y axis is the axle and points to the
+    The marker is at the middle of the running circle, on the rotating body. Its y axis is the axle and points to the
     left of the track, on both sides.
     """
 
     name: str
-    marker: Marker  #: middle of the running circle, y axis along the axle to the left, on the turning body
-    side: str = "left"  #: of the track, or "right"
+    #: at the middle of the running circle, with the y axis along the axle to the left, on the rotating body
+    marker: Marker
+    side: str = "left"  #: side of the track, "left" or "right"
     pair: Pair = field(default_factory=Pair)
     track: Track = field(default_factory=Track)
     laws: ContactLaws = field(default_factory=ContactLaws)
-    spin_inertia: float = 0.0  #: above 0: of the wheel about its axle [kg m²], on a body that does not turn with it
-    spin: float = 0.0  #: angular velocity at the start then, a state [rad/s]
+    #: if above 0: inertia of the wheel about its axle [kg m²]; the body of the marker then does not rotate with it
+    spin_inertia: float = 0.0
+    spin: float = 0.0  #: in this case, its initial angular velocity, a state [rad/s]
 
     def __post_init__(self) -> None:
         require_spin(self)
@@ -103,7 +107,7 @@ class WheelOnRail(Element):
         return law_of_wheels(self, placed, (Wheel(SIDES[self.side], 0.0, self.pair),))
 
     def drawn(self) -> tuple[Drawn, ...]:
-        """Show the wheel."""
+        """Return the drawn wheel."""
         return (wheel_shape(self.pair, SIDES[self.side], 0.0),)
 
     @classmethod
@@ -119,10 +123,10 @@ def law_of_wheels(element: Wheelset | WheelOnRail, placed: Placed, wheels: tuple
     Raises
     ------
     ModelError
-        If the marker is on the ground, its axle does not lie across the track, a wheel is placed off its rail, or the
-        system is not in metres, kilograms and seconds.
+        If the marker is on the ground, its axle is not transverse to the track, a wheel is assembled off its rail, or
+        the system is not in metres, kilograms and seconds.
     """
-    from floatframe.rails.law import CONTACT_OUTPUTS, WHEEL_OUTPUTS, wheels_on_rails  # numba: slow to import
+    from floatframe.rails.law import CONTACT_OUTPUTS, WHEEL_OUTPUTS, wheels_on_rails  # numba is slow to import
 
     where = f"element {element.name!r}"
     if placed.units.name != "m-kg-s":
@@ -155,7 +159,7 @@ def law_of_wheels(element: Wheelset | WheelOnRail, placed: Placed, wheels: tuple
 
 
 def require_spin(element: Wheelset | WheelOnRail) -> None:
-    """Raise unless inertia and speed of the spin are numbers."""
+    """Raise `ModelError` unless inertia and speed of the spin are numbers."""
     number(f"element {element.name!r}: spin_inertia", element.spin_inertia, at_least=0.0)
     number(f"element {element.name!r}: spin", element.spin)
 
@@ -163,7 +167,7 @@ def require_spin(element: Wheelset | WheelOnRail) -> None:
 def require_on_track(
     where: str, element: Wheelset | WheelOnRail, placed: Placed, wheels: tuple[Wheel, ...]
 ) -> None:  # fmt: skip
-    """Raise unless every wheel, as placed, is above its rail with its axle across the track."""
+    """Raise `ModelError` unless every assembled wheel is above its rail, with its axle transverse to the track."""
     axle = placed.A[0][:, 1]
     for each in wheels:
         W = placed.r[0] + each.arm * axle
@@ -187,7 +191,7 @@ def require_on_track(
 
 
 def nearest_frame(track: Track, point: Any) -> Any:
-    """Return the frame of the track beside a point: the nearest of its cells, then Newton's method."""
+    """Return the frame of the track next to a point, by Newton's method from the nearest cell."""
     cells = track.cells
     s = float(cells[np.argmin((cells[:, 1] - point[0]) ** 2 + (cells[:, 2] - point[1]) ** 2), 0])
     for _ in range(30):
@@ -201,7 +205,7 @@ def nearest_frame(track: Track, point: Any) -> Any:
 
 
 def wheel_shape(pair: Pair, side: int, arm: float) -> Drawn:
-    """Return a wheel as it looks, in the axes of the marker: the flange is on its inner side."""
+    """Return the drawn shape of a wheel in the axes of the marker; the flange is on its inner side."""
     shape = RailWheel(pair.radius, flange_side=-side if pair.has_flange else 0)
     return Drawn(Shape(shape, position=np.array([0.0, arm, 0.0])), 0)
 
@@ -209,7 +213,7 @@ def wheel_shape(pair: Pair, side: int, arm: float) -> Drawn:
 def track_shape(
     track: Track, length: float, *, start: float = 0.0, gauge: float = 1.5, spacing: float = 1.0
 ) -> DrawnTrack:
-    """Return how a track looks from `start` over `length` [m], for the scene of a system."""
+    """Return the drawn shape of a track from `start` over `length` [m], for the scene of a system."""
     s = np.linspace(start, start + length, max(2, int(np.ceil(length / spacing)) + 1))
     frames = [track.frame(float(each)) for each in s]
     points = np.array([frame.origin for frame in frames])
@@ -218,7 +222,7 @@ def track_shape(
 
 
 def common_fields(name: str, table: Mapping[str, Any], read: Any, own: tuple[str, ...]) -> dict[str, Any]:
-    """Return marker, pair, track and laws of a table; ModelError naming the key that is wrong."""
+    """Return marker, pair, track and laws of a table; `ModelError` that names a wrong key."""
     known = (*own, "marker", "spin_inertia", "spin", "wheel", "rail", "track", *PAIR_KEYS, *LAW_KEYS)
     for key in table:
         if key not in known:
@@ -274,7 +278,7 @@ def profile_of_table(where: str, kind: str, value: Any, read: Any) -> Profile:
 
 
 def refuse_others(where: str, table: Mapping[str, Any], known: tuple[str, ...]) -> None:
-    """Raise if a table has other keys."""
+    """Raise `ModelError` if a table has unknown keys."""
     for key in table:
         if key not in known:
             raise ModelError(f"{where}: unknown key {quoted(key)}; choose among {', '.join(known)}")
@@ -286,9 +290,9 @@ def height_on_rails(element: Wheelset | WheelOnRail, load: float = 0.0) -> float
     Parameters
     ----------
     element
-        With its profiles and laws.
+        The element, with its profiles and laws.
     load
-        Vertical, on each wheel [N]; zero, or with treads held on the rails: the wheels just touch.
+        Vertical load on each wheel [N]; with zero, or with treads constrained to the rails, the wheels just touch.
     """
     laws = element.laws
     part = "tread" if element.pair.has_flange else "all"

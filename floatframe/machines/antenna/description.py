@@ -50,7 +50,7 @@ class Antenna:
     play: HingePlay | None = None  #: of the petal hinges; friction is then that of their pins
     petal_modes: int = 6  #: vibration modes beside the static ones
     strut_modes: int = 2
-    stiff_struts: bool = True  #: whether geometric stiffness of the struts counts
+    stiff_struts: bool = True  #: whether the geometric stiffness of the struts is used
 
     @property
     def travel(self) -> tuple[float, float]:

@@ -104,7 +104,7 @@ class RoadCar:
     mount_damping: float = 4.0e3  #: [N s/m]
     bump_gap: float = 0.055  #: travel of the spring to its bump stop [m]
     rebound_gap: float = 0.055
-    cockpit: Point = (-0.05, 0.0, 0.24)  #: where roll, side-slip and acceleration are measured
+    cockpit: Point = (-0.05, 0.0, 0.24)  #: point where roll, side-slip and acceleration are measured
 
     def axle(self, name: str) -> Axle:
         """Return the axle "front" or "rear"."""

@@ -1,4 +1,4 @@
-"""What is read off the road car: its motion over time, its mass."""
+"""Evaluation of the road car: its motion over time, and its mass."""
 
 from dataclasses import dataclass
 
@@ -18,22 +18,22 @@ __all__ = ["Driven", "body_twist_stiffness", "car_mass", "driven"]
 
 @dataclass(frozen=True, eq=False)
 class Driven:
-    """The car over time, seen at its cockpit."""
+    """Motion of the car over time, measured at its cockpit."""
 
     t: Array  #: (n_t,) [s]
-    place: Array  #: along and across the road, (n_t, 2) [m]
+    place: Array  #: position along and across the road, (n_t, 2) [m]
     speed: Array  #: (n_t,) [m/s]
     yaw_rate: Array  #: (n_t,) [rad/s]
     roll: Array  #: (n_t,) [rad]
     side_slip: Array  #: (n_t,) [rad]
-    lateral_acceleration: Array  #: across the car, level, (n_t,) [m/s²]
+    lateral_acceleration: Array  #: horizontal and across the car, (n_t,) [m/s²]
     loads: Array  #: F_z of front left, front right, rear left, rear right, (n_t, 4) [N]
     pressures: Array  #: of the left and the right line, (n_t, 2) [Pa]; none without hydraulics, (n_t, 0)
     error: Array  #: of the path, (n_t,) [m]; none without a driver, (0,)
 
 
 def driven(system: System, motion: Trajectory) -> Driven:
-    """Return what a motion of the car shows."""
+    """Return the quantities of a motion of the car."""
     seen = element_motion(system, motion, "seen").outputs
     names = [element.name for element in system.elements]
     lines = []
@@ -57,7 +57,7 @@ def driven(system: System, motion: Trajectory) -> Driven:
 
 
 def car_mass(car: RoadCar, system: System) -> CarMass:
-    """Return mass and centre of mass of a car as placed."""
+    """Return mass and centre of mass of an assembled car."""
     mass, first = 0.0, np.zeros(3)
     for body in system.bodies:
         if isinstance(body, FlexibleBody):
@@ -71,7 +71,7 @@ def car_mass(car: RoadCar, system: System) -> CarMass:
 
 
 def body_twist_stiffness(body: ReducedBody) -> float:
-    """Return the torque about x between the towers of both axles over the turn of one against the other [N m/rad]."""
+    """Return the torque about x between the towers of both axles, divided by their relative rotation [N m/rad]."""
     turns = []
     for axle in ("front", "rear"):
         left, right = (body.interface(f"{axle}_tower_{side}") for side in ("left", "right"))

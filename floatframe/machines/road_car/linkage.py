@@ -1,13 +1,13 @@
-"""Where a double wishbone suspension is: circles and spheres, by themselves, beside the joints of the system.
+"""The position of a double wishbone suspension from circles and spheres, independently of the joints of the system.
 
-Of a corner whose body stands still:
+For a corner whose body is at rest:
 
-    (1) the lower ball turns about the hinge of its wishbone by an angle phi
-    (2) the upper ball lies on its circle, at the length of the upright from the lower one:  A cos psi + B sin psi = C
-    (3) the outer end of the rod lies on three spheres, about both balls and the inner end of the rod
-    (4) balls and rod end are three points of the upright, which carry wheel centre and axle
+    (1) the lower ball rotates about the hinge of its wishbone by an angle phi
+    (2) the upper ball lies on its circle, at the length of the upright from the lower ball:  A cos psi + B sin psi = C
+    (3) the outer end of the rod lies on three spheres, around both balls and the inner end of the rod
+    (4) balls and rod end are three points of the upright, to which wheel centre and axle are fixed
 
-`Linkage.at` takes phi; `Linkage.lifted` finds phi for a height of the wheel centre.
+`Linkage.at` uses phi; `Linkage.lifted` finds phi for a height of the wheel centre.
 """
 
 from dataclasses import dataclass
@@ -21,15 +21,15 @@ from floatframe.machines.road_car.description import Axle, RoadCar
 __all__ = ["CornerPlace", "Linkage", "spring_preload"]
 
 
-MOST = 0.45  #: turn of a lower wishbone that is looked at [rad]
+MOST = 0.45  #: largest rotation of a lower wishbone that is considered [rad]
 
 
 @dataclass(frozen=True, eq=False)
 class CornerPlace:
-    """A corner in one position, axes of the body."""
+    """A corner in one position, in axes of the body."""
 
     centre: Array  #: of the wheel, (3,) [m]
-    R: Array  #: of the upright against its design position, (3, 3)
+    R: Array  #: rotation of the upright relative to its design position, (3, 3)
     seat: Array  #: lower end of the spring, (3,) [m]
     jack: Array  #: lower end of the cylinder, (3,) [m]
     lower_angle: float  #: of the lower wishbone about its hinge, from front to rear [rad]
@@ -48,19 +48,19 @@ class CornerPlace:
 
     @property
     def inclination(self) -> float:
-        """Angle of the wheel about x, positive where its top leans to the right [rad]."""
+        """Angle of the wheel about x, positive if its top leans to the right [rad]."""
         return float(np.arcsin(self.axle[2]))
 
 
 def turned(point: Array, origin: Array, axis: Array, angle: float) -> Array:
-    """Return a point turned about a line (Rodrigues), (3,)."""
+    """Return a point rotated about a line (Rodrigues), (3,)."""
     d = point - origin
     c, s = np.cos(angle), np.sin(angle)
     return np.asarray(origin + c * d + s * np.cross(axis, d) + (1 - c) * (axis @ d) * axis)
 
 
 def frame(a: Array, b: Array, c: Array) -> Array:
-    """Return axes of a triangle: along a-b, in its plane, normal, as columns, (3, 3)."""
+    """Return the axes of a triangle as columns, (3, 3): along a-b, in its plane, normal to it."""
     x = (b - a) / np.linalg.norm(b - a)
     z = np.cross(x, c - a)
     z /= np.linalg.norm(z)
@@ -68,7 +68,7 @@ def frame(a: Array, b: Array, c: Array) -> Array:
 
 
 class Linkage:
-    """The corner of an axle on a side (1: left, -1: right), its rod moved by `rack` along y."""
+    """The corner of an axle on a side (1: left, -1: right), with its rod moved by `rack` along y."""
 
     def __init__(self, axle: Axle, side: int, rack: float = 0.0) -> None:
         self.p = {name: axle.point(name, side) for name in POINTS}
@@ -77,7 +77,7 @@ class Linkage:
         self.rest = frame(self.p["lower_ball"], self.p["upper_ball"], self.p["rod_outer"])
 
     def at(self, phi: float) -> CornerPlace:
-        """Return the corner with the lower wishbone turned by phi [rad] about its hinge, from front to rear."""
+        """Return the corner with the lower wishbone rotated by phi [rad] about its hinge axis, front to rear."""
         p = self.p
         hinge = p["lower_rear"] - p["lower_front"]
         hinge /= np.linalg.norm(hinge)
@@ -97,7 +97,7 @@ class Linkage:
         return self.at(brentq(lambda phi: self.at(phi).centre[2] - height, -MOST, MOST, xtol=1e-14, rtol=1e-14))
 
     def _upper_ball(self, low: Array) -> Array:
-        """(2): on its circle, on the side where it is at design height."""
+        """Return the upper ball by (2): on its circle, on the same side as at design height."""
         p = self.p
         axis = p["upper_rear"] - p["upper_front"]
         axis /= np.linalg.norm(axis)
@@ -113,7 +113,7 @@ class Linkage:
         return np.asarray(foot + np.cos(psi) * e + np.sin(psi) * f)
 
     def _rod_end(self, low: Array, up: Array) -> Array:
-        """(3): three spheres meet in two points; the one on the side where it is at design height."""
+        """Return the rod end by (3): of the two common points of three spheres, that on the side of the design height."""
         p = self.p
         r = [np.linalg.norm(p["rod_outer"] - p[name]) for name in ("lower_ball", "upper_ball", "rod_inner")]
         u = up - low
@@ -139,7 +139,7 @@ POINTS = (
 
 
 def spring_preload(car: RoadCar, name: str, support: str) -> float:
-    """Return the force that presses a spring of an axle at design height [N]: without oil it carries its part too."""
+    """Return the compression force of a spring at design height [N]; without oil it also carries the oil's part."""
     axle, c = car.axle(name), car.control
     if support == "hydraulic":
         return axle.preload

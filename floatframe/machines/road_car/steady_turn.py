@@ -1,17 +1,17 @@
-"""A steady turn of the car by four wheels, the linkage and the springs: an independent second road.
+"""A steady turn of the car from four wheels, the linkage and the springs, as an independent check.
 
-Unknown are side velocity v, yaw rate r, roll phi, lift w and pitch theta (nose down) of the body at the speed u. Of
-each wheel, at (x, y) from the centre of mass of the car,
+The unknowns are lateral velocity v, yaw rate r, and roll phi, lift w and pitch theta (nose down) of the body, at the
+speed u. For each wheel, at (x, y) from the centre of mass of the car:
 
-    (1) travel against the body z = -(w + y phi - x theta) and less what the tyre gives way; steer and inclination are
-        those of the linkage there, and phi more
-    (2) slip angle atan2(v + r x, u - r y) - steer, side force and aligning moment by the tyre
-    (3) load by virtual work on a wheel that moves against the body, in axes of the body: forces of the contact along
-        its way, weight and inertia of the unsprung mass along that of the wheel centre, against the force of the post
+    (1) travel relative to the body z = -(w + y phi - x theta) minus the deflection of the tyre; steer and inclination
+        are those of the linkage at this travel, plus phi for the inclination
+    (2) slip angle atan2(v + r x, u - r y) - steer; lateral force and aligning moment from the tyre
+    (3) load from virtual work on a wheel that moves relative to the body, in axes of the body: contact forces along its
+        path, and weight and inertia of the unsprung mass along that of the wheel centre, balance the force of the post
 
-and the car has (4) sum F_y = m u r, (5) no moment about z, (6) sum F_z = m g, (7) no moment about x and y. Wheels roll
-against the moment M_y of their tyres; the rear ones share what drives alike, without slip. Their spin turns with the
-car and takes a moment about x.
+and for the car: (4) sum F_y = m u r, (5) no moment about z, (6) sum F_z = m g, (7) no moment about x and y. Wheels roll
+against the moment M_y of their tyres; the rear wheels share the driving force equally, without slip. The rotation of
+their spin with the car requires a moment about x.
 """
 
 from collections.abc import Callable
@@ -28,17 +28,17 @@ from floatframe.machines.road_car.linkage import CornerPlace, Linkage
 __all__ = ["CarMass", "SteadyTurn", "steady_turn"]
 
 G, RADIUS = 9.81, 0.302  #: gravity [m/s²], loaded radius of a tyre [m]
-#: load [N], slip angle, inclination [rad], on the left or not: F_y [N], M_x, M_y, M_z [N m] in axes of the contact
+#: from load [N], slip angle and inclination [rad], left or not, to F_y [N], M_x, M_y, M_z [N m] in axes of the contact
 Tyre = Callable[[float, float, float, bool], tuple[float, float, float, float]]
 
 
 @dataclass(frozen=True)
 class CarMass:
-    """Mass of the whole car and its place in axes of the car."""
+    """Mass of the whole car, and its position in axes of the car."""
 
     mass: float  #: [kg]
     x: float  #: of the centre of mass [m]
-    height: float  #: over the ground [m]
+    height: float  #: above the ground [m]
     tyre_stiffness: float = 2.1e5  #: vertical, about the static load [N/m]
 
 
@@ -52,13 +52,13 @@ class SteadyTurn:
     loads: Array  #: front left, front right, rear left, rear right, (4,) [N]
 
     def transfer(self, axle: str) -> float:
-        """Return the load of the right wheel of an axle less that of its left one [N]."""
+        """Return the load of the right wheel of an axle minus that of its left wheel [N]."""
         k = 0 if axle == "front" else 2
         return float(self.loads[k + 1] - self.loads[k])
 
 
 def contact(place: CornerPlace) -> Array:
-    """Return where the wheel touches the ground below it, axes of the body, (3,) [m]."""
+    """Return the point where the wheel touches the ground below it, in axes of the body, (3,) [m]."""
     down = place.axle * place.axle[2] - np.array([0.0, 0.0, 1.0])
     return np.asarray(place.centre + RADIUS * down / np.linalg.norm(down))
 
@@ -69,12 +69,12 @@ def vector_of(R: Array) -> Array:
 
 
 def steady_turn(car: RoadCar, mass: CarMass, tyre: Tyre, speed: float, rack: float, support: str) -> SteadyTurn:
-    """Return the turn at a speed [m/s] with the rack drawn by `rack` to the right [m].
+    """Return the turn at a speed [m/s], with the rack displaced by `rack` to the right [m].
 
     Raises
     ------
     ArithmeticError
-        If there is no such turn, as beyond the grip of the tyres.
+        If there is no such turn, for example beyond the grip of the tyres.
     """
     posts, m, h = CarOnPosts(car, support), mass.mass, mass.height
     unsprung = car.wheel + car.upright + 0.5 * (car.lower_arm + car.upper_arm)
@@ -98,7 +98,7 @@ def steady_turn(car: RoadCar, mass: CarMass, tyre: Tyre, speed: float, rack: flo
             rolling = moment[k, 1] / RADIUS
             a, b = np.cos(here.steer), np.sin(here.steer)
             force[k] = rolling * a - F_y * b, rolling * b + F_y * a, now[k]
-        force[2:, 0] -= 0.5 * (m * v * r + force[:, 0].sum())  # both rear wheels drive alike
+        force[2:, 0] -= 0.5 * (m * v * r + force[:, 0].sum())  # both rear wheels drive equally
         for k, (low, here, high) in enumerate(places):
             foot = contact(here) - here.centre
             way = (high.centre + high.R @ here.R.T @ foot - low.centre - low.R @ here.R.T @ foot) / 2e-4
@@ -132,7 +132,7 @@ def steady_turn(car: RoadCar, mass: CarMass, tyre: Tyre, speed: float, rack: flo
             ]
         )
 
-    rate = speed * 7.7 * rack / 3.0  # near it the equations are nearly linear
+    rate = speed * 7.7 * rack / 3.0  # a nearly linear case as initial guess
     moved = -0.5 * m * speed * rate * h / (2 * y)
     start = np.concatenate([[0.0, rate, 0.011 * speed * rate, 0.0, 0.0], moved])
     answer, _, found, words = fsolve(defects, start, full_output=True, xtol=1e-10)

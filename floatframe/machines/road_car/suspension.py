@@ -1,8 +1,8 @@
-"""An axle as tables of a system file: subframe, wishbones, uprights, wheels, springs, bars, tyres.
+"""The tables of an axle for a system file: subframe, wishbones, uprights, wheels, springs, bars, tyres.
 
-Every body but the wheels has the axes of the car: a point of the suspension is the same three numbers on both bodies
-that meet there. A corner has one degree of freedom and no constraint too many: two hinges (5 rows each), two ball
-joints (3 each) and a rod (1) hold 17 of the 18 freedoms of both wishbones and the upright.
+Every body except the wheels has the axes of the car, so that a point of the suspension has the same coordinates on both
+bodies connected there. A corner has one degree of freedom and no redundant constraint: two hinges (5 rows each), two
+ball joints (3 each) and a rod (1) constrain 17 of the 18 degrees of freedom of both wishbones and the upright.
 """
 
 from collections.abc import Sequence
@@ -17,12 +17,12 @@ __all__ = ["Tables", "axle_tables", "rounded"]
 
 Tables = dict[str, dict[str, Any]]
 
-STOP_WAY = (0.0, 0.01, 0.02, 0.04)  #: into a bump stop [m]
-STOP_FORCE = (0.0, 700.0, 2400.0, 9000.0)  #: of it [N]
+STOP_WAY = (0.0, 0.01, 0.02, 0.04)  #: compression of a bump stop [m]
+STOP_FORCE = (0.0, 700.0, 2400.0, 9000.0)  #: force of the bump stop [N]
 
 
 def rounded(values: Sequence[float] | Array) -> list[float]:
-    """Return numbers with no more digits than a file needs."""
+    """Return numbers rounded to the digits needed in a file."""
     return [float(f"{float(v):.10g}") + 0.0 for v in np.asarray(values, dtype=float)]
 
 
@@ -43,7 +43,7 @@ def tube(points: Sequence[Array], radius: float = 0.014, color: str = "dark") ->
 
 
 def axle_tables(car: RoadCar, name: str, *, has_bar: bool, has_wheels: bool = True) -> Tables:
-    """Return the tables of the axle "front" or "rear", its wheels and tyres where they are wanted."""
+    """Return the tables of the axle "front" or "rear", optionally with wheels and tyres."""
     axle = car.axle(name)
     tables: Tables = {"bodies": {}, "joints": {}, "forces": {}, "elements": {}}
     add_subframe(car, name, tables)
@@ -66,7 +66,7 @@ def axle_tables(car: RoadCar, name: str, *, has_bar: bool, has_wheels: bool = Tr
 
 
 def add_subframe(car: RoadCar, name: str, tables: Tables) -> None:
-    """Add the subframe on its four mounts, of the front axle with the rack."""
+    """Add the subframe on its four mounts; that of the front axle has the rack."""
     axle, speed = car.axle(name), 0.0
     middle = 0.5 * (axle.point("lower_front", 1) + axle.point("lower_rear", 1)) * (1, 0, 1)
     body = solid(car.subframe, (1.6, 1.2, 2.4), middle, speed)
