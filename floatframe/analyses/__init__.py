@@ -1,4 +1,4 @@
-"""Analyses of a system besides its motion: equilibrium, driven motion, linearisation, system modes, responses."""
+"""Analyses of a system other than a run: equilibrium, driven motion, linearisation, system modes, responses."""
 
 from floatframe.analyses.driven.driven_motion import frozen_bodies, quasi_static_bodies
 from floatframe.analyses.driven.inverse_dynamics import InverseDynamics, drive_forces, inverse_dynamics, with_motors

@@ -1,4 +1,4 @@
-"""Whether the law of an element is what the engine takes it for: shapes, numbers, derivatives, balance."""
+"""Validation of the law of an element: array sizes, values, derivatives and balance of its forces."""
 
 from dataclasses import dataclass
 
@@ -24,36 +24,36 @@ from floatframe.system import System
 
 __all__ = ["ElementCheck", "check_element"]
 
-N_SAMPLES = 3  #: motions at which it is tried, the first as placed
-NEAR = 1e-3  #: of the size of the system, or rad: how far from it the others are
-MOVING = 0.1  #: of the size of the system in a unit of time, or rad: their velocities
-DERIVATIVE = 1e-5  #: of the largest in its row: difference of derivatives that is told
-ROUNDING = 1e-9  #: of values
+N_SAMPLES = 3  #: number of motions at which it is evaluated, the first as assembled
+NEAR = 1e-3  #: distance of the others from it, relative to the size of the system, or in rad
+MOVING = 0.1  #: their velocities, in system sizes per unit of time, or in rad per unit of time
+DERIVATIVE = 1e-5  #: difference of derivatives, relative to the largest in the row, from which it is reported
+ROUNDING = 1e-9  #: relative to the values
 AXES = "xyz"
 
 
 @dataclass(frozen=True)
 class ElementCheck:
-    """What was found on an element."""
+    """The findings on an element."""
 
     name: str
-    findings: tuple[str, ...]  #: what is wrong, a sentence each
-    derivative_error: float  #: largest difference from differences, relative to the largest of its row
+    findings: tuple[str, ...]  #: description of each fault, one sentence each
+    derivative_error: float  #: largest difference from finite differences, relative to the largest entry of the row
 
     @property
     def is_good(self) -> bool:
-        """Whether nothing was found."""
+        """Whether there are no findings."""
         return not self.findings
 
 
 def check_element(system: System, name: str, state: State | None = None) -> ElementCheck:
-    """Try the law of an element at a state (default: as placed) and two motions near it.
+    """Check the law of an element at a state (default: as assembled) and two motions near it.
 
-    (1) in Python, in arrays of the very sizes, the function stays within them and raises nothing
-    (2) all it writes are numbers, the same each time, and the same as compiled
-    (3) it writes no part of a wrench that `acts` leaves out, and opposite forces where it says so
-    (4) the derivatives that the engine takes are those of its values
-    (5) what holds a position depends on places and the time alone, what holds a velocity not on multipliers
+    (1) in Python, with arrays of the exact sizes, the function stays within them and raises no error
+    (2) all outputs are finite numbers, reproducible, and equal to those of the compiled function
+    (3) components of wrenches excluded by `acts` are zero, and forces are opposite if so declared
+    (4) the derivatives used by the engine agree with finite differences
+    (5) position constraints depend only on positions and time, velocity constraints not on multipliers
 
     Raises
     ------
@@ -62,7 +62,7 @@ def check_element(system: System, name: str, state: State | None = None) -> Elem
     """
     placed = placed_law(system, name, "check_element")
     findings = told_in_python(placed, placed_inputs(system, placed), "as placed")
-    if findings:  # compiled, it might write into what is not its own
+    if findings:  # the compiled function might write outside its arrays
         return ElementCheck(name, tuple(findings), np.inf)
     try:
         samples = sample_inputs(system, placed, state)
@@ -86,7 +86,7 @@ def check_element(system: System, name: str, state: State | None = None) -> Elem
 
 
 def values_of(placed: PlacedLaw, inputs: Array) -> Array:
-    """Return all that the law writes, as the engine calls it."""
+    """Return all outputs of the law, called as by the engine."""
     n_all = placed.n_out + len(placed.law.outputs)
     values = called_law(placed.value.address, placed.head, np.asarray(placed.law.data), inputs[None], n_all)[0]
     raise_errors_of([placed.value])
@@ -94,7 +94,7 @@ def values_of(placed: PlacedLaw, inputs: Array) -> Array:
 
 
 def placed_inputs(system: System, placed: PlacedLaw) -> Array:
-    """Return the inputs of the law with its markers as placed, at rest, (n,)."""
+    """Return the inputs of the law with its markers as assembled and at rest, (n,)."""
     compiled = compiled_system(system)
     n_q = np.asarray(compiled.model.bodies.n_q)
     parts = [np.zeros(1)]
@@ -134,7 +134,7 @@ def sample_inputs(system: System, placed: PlacedLaw, state: State | None) -> lis
 
 
 def told_in_python(placed: PlacedLaw, inputs: Array, where: str) -> list[str]:
-    """(1), (2): return what the function does in Python that it should not."""
+    """Return faults of the function in Python, checks (1) and (2)."""
     law, n = placed.law, len(placed.markers)
     function = getattr(law.function, "py_func", law.function)
     results = []
@@ -169,11 +169,11 @@ def told_in_python(placed: PlacedLaw, inputs: Array, where: str) -> list[str]:
 
 
 def balance(placed: PlacedLaw, values: Array, where: str) -> list[str]:
-    """(3): return what is wrong with the wrenches."""
+    """Return faults of the wrenches, check (3)."""
     law, n = placed.law, len(placed.markers)
     wrench = values[: 6 * n].reshape(n, 6)
     found = []
-    assert law.acts is not None  # since the element was compiled
+    assert law.acts is not None  # ensured by the compilation of the element
     for m, (marker, acts) in enumerate(zip(placed.markers, law.acts, strict=True)):
         lost = [k for k in range(6) if k not in ACTS[acts] and wrench[m, k] != 0.0]
         if lost and marker.body >= 0:
@@ -186,7 +186,7 @@ def balance(placed: PlacedLaw, values: Array, where: str) -> list[str]:
 
 
 def own_slopes(placed: PlacedLaw, inputs: Array) -> Array:
-    """Return the derivatives that the engine takes, (n_out, n_columns)."""
+    """Return the derivatives used by the engine, (n_out, n_columns)."""
     n_columns = placed.columns_of_marker * len(placed.markers) + len(placed.states) + len(placed.multipliers)
     address = placed.slopes.address
     data = np.concatenate([placed.law.data, placed.sizes])
@@ -196,13 +196,13 @@ def own_slopes(placed: PlacedLaw, inputs: Array) -> Array:
 
 
 def differences(placed: PlacedLaw, inputs: Array) -> Array:
-    """Return the same by differences; markers on the ground do not move."""
+    """Return the same from finite differences; markers on the ground do not move."""
     slopes = difference_slopes(placed.value.address, placed.head, placed.law.data, inputs, placed.sizes)
     return without_ground(placed, slopes[: placed.n_out])
 
 
 def without_ground(placed: PlacedLaw, slopes: Array) -> Array:
-    """Return derivatives without those by markers on the ground, for which nobody asks."""
+    """Return derivatives without those by markers on the ground, which are not needed."""
     for m, marker in enumerate(placed.markers):
         if marker.body < 0:
             slopes[:, placed.columns_of_marker * m : placed.columns_of_marker * (m + 1)] = 0.0
@@ -210,7 +210,7 @@ def without_ground(placed: PlacedLaw, slopes: Array) -> Array:
 
 
 def relative_error(n: int, own: Array, other: Array) -> Array:
-    """Return the differences of derivatives, relative to the largest of their row, above rounding of all wrenches."""
+    """Return differences of derivatives relative to the largest in their row, above rounding of all wrenches."""
     scale = np.maximum(np.abs(own), np.abs(other)).max(axis=1, initial=0.0, keepdims=True)
     of_wrenches = scale[: 6 * n]
     of_wrenches[:] = np.maximum(of_wrenches, ROUNDING / DERIVATIVE * of_wrenches.max(initial=0.0))
@@ -219,7 +219,7 @@ def relative_error(n: int, own: Array, other: Array) -> Array:
 
 
 def wrong_slopes(placed: PlacedLaw, own: Array, other: Array, where: str) -> list[str]:
-    """(4): return the worst derivative, if it is wrong."""
+    """Return the worst derivative if it is wrong, check (4)."""
     error = relative_error(len(placed.markers), own, other)
     error = np.where(np.isfinite(own), error, np.inf)
     if error.max(initial=0.0) <= DERIVATIVE:
@@ -236,7 +236,7 @@ def wrong_slopes(placed: PlacedLaw, own: Array, other: Array, where: str) -> lis
 
 
 def wrong_dependence(placed: PlacedLaw, slopes: Array, where: str) -> list[str]:
-    """(5): return what is held but depends on what it may not."""
+    """Return constraints with forbidden dependences, check (5)."""
     found = []
     n, n_z, per = len(placed.markers), len(placed.states), placed.columns_of_marker
     for j, holds in enumerate(placed.law.holds):
@@ -257,7 +257,7 @@ def wrong_dependence(placed: PlacedLaw, slopes: Array, where: str) -> list[str]:
 
 
 def row_name(placed: PlacedLaw, k: int) -> str:
-    """Return what the law writes at a place, in words."""
+    """Return the name of an output of the law, as text."""
     n, law = len(placed.markers), placed.law
     if k < 6 * n:
         return f"{'force' if k % 6 < 3 else 'moment'} {AXES[k % 3]} on marker {k // 6 + 1}"
@@ -266,7 +266,7 @@ def row_name(placed: PlacedLaw, k: int) -> str:
 
 
 def column_name(placed: PlacedLaw, k: int) -> str:
-    """Return a variation in words."""
+    """Return the name of a variation, as text."""
     n, law, per = len(placed.markers), placed.law, placed.columns_of_marker
     if k < per * n:
         kinds = ("position", "rotation", "velocity", "angular velocity", "acceleration", "angular acceleration")

@@ -1,16 +1,18 @@
-"""Equilibrium: at rest, or in a steady rotation about an axis fixed in space.
+"""Equilibrium at rest, or in a steady rotation about an axis fixed in space.
 
-A flow that ends in the equilibrium, made implicit with growing steps (pseudo-transient continuation):
+The solution is followed along a flow that ends in the equilibrium, with growing implicit steps (pseudo-transient
+continuation):
 
-    (1) at a state x:  residual f(x) of the bodies, gaps g(x) of the joints, at the velocities of the steady motion
-    (2) (W/tau + K) dx - Jᵀ dw = -f,   G dx = -g          W: mass with modal stiffness, K: whole tangent
-    (3) tau grows as f falls: small tau follows the flow downhill, large tau is Newton's method
+    (1) at a state x:  residual f(x) of the bodies, constraint errors g(x) of the joints, at the velocities of the
+        steady motion
+    (2) (W/tau + K) dx - Jᵀ dw = -f,   G dx = -g          W: mass and modal stiffness, K: complete tangent
+    (3) tau grows as f decreases: small tau follows the flow downhill, large tau is Newton's method
     (4) states z of elements follow their rates by implicit steps of sqrt(tau), z_new = z + sqrt(tau) g(z_new)
 
-Motions that cost nothing (a wheel on its hinge) stay where they are, since W/tau holds them. Where the flow loses its
-way, as along beams of stiff bushings that bend and twist, it is left (`Progress`), and loads that grow lead to the
-equilibrium (`led_equilibrium`). Where elements have states, as a controller with an observer has, the flow need not
-lead to an equilibrium even if the motion does, for it leaves velocities out: Newton's method alone is tried then.
+Motions without resistance (a wheel on its hinge) do not change, because W/tau restrains them. If the flow fails, for
+example for beams of stiff bushings that bend and twist, it is abandoned (`Progress`), and increasing loads lead to the
+equilibrium (`led_equilibrium`). If elements have states, such as a controller with an observer, the flow need not
+converge to an equilibrium even if the motion does, because it ignores velocities; Newton's method alone is then tried.
 """
 
 import logging
@@ -67,19 +69,21 @@ __all__ = ["Equilibrium", "static_equilibrium", "steady_rotation"]
 
 log = logging.getLogger(__name__)
 
-LARGEST_TURN = 0.5  #: rad, and part of the size of the system, in one step
-FASTEST_GROWTH, LEAST_GROWTH = 30.0, 2.0  #: of tau in one step, while the residual falls or stands
-STANDING = 0.9  #: last residual by this one, below which it rises: tau shrinks with it
-STANDING_SPRINGS = 1e-9  #: other forces by those of springs as placed, below which springs alone move the system
-ROUNDING = 32 * np.finfo(float).eps  #: of a position or rotation, as springs see it
-STANDSTILL = 1e-200  #: of the first residual, below which it is as good as zero
-LONG_STEP = 1e4  #: step of states by the first one at which states that stand are at rest
-LONGEST_STEP = 1e10  #: of them, in units of time
-SLOWER = 1e-6  #: part of its speed by which a rotation that is steady may slow in a turn
-HELD = 1e-6  #: rate of what a joint holds, by that of the rotation and its reach, above which it does not allow it
-CLOSED = 1e-10  #: largest gap of a joint, relative to the size of the system
-#: steps in which forces out of balance, gaps or changes of states have to fall to half their least: of all equilibria
-#: of the tests those of a free body that spins and of a beam far above buckling took most, 28 and 29
+LARGEST_TURN = 0.5  #: in one step: rotation [rad], and translation relative to the size of the system
+FASTEST_GROWTH, LEAST_GROWTH = 30.0, 2.0  #: factors of tau in one step, while the residual decreases or stagnates
+#: ratio of the last residual to the present one below which the residual counts as increasing, and tau is reduced
+STANDING = 0.9
+#: ratio of other forces to those of springs as assembled below which only springs move the system
+STANDING_SPRINGS = 1e-9
+ROUNDING = 32 * np.finfo(float).eps  #: relative rounding error of a position or rotation, as it affects springs
+STANDSTILL = 1e-200  #: relative to the first residual; smaller ones are taken as zero
+LONG_STEP = 1e4  #: step of states relative to the first step from which states that do not change are at rest
+LONGEST_STEP = 1e10  #: longest step of states, in units of time
+SLOWER = 1e-6  #: largest relative loss of speed per revolution in a steady rotation
+HELD = 1e-6  #: rate of a joint constraint, relative to that of the rotation, above which the joint does not allow it
+CLOSED = 1e-10  #: largest constraint error of a joint, relative to the size of the system
+#: steps in which unbalanced forces, constraint errors or changes of states have to fall to half their least value. Of
+#: all equilibria of the tests, a free spinning body and a beam far above buckling needed most, 28 and 29
 PATIENCE = 40
 
 
@@ -89,31 +93,31 @@ class Equilibrium:
 
     state: State  #: with the velocities of the steady rotation, zero at rest
     u_dot: Array  #: accelerations of the steady rotation, zero at rest, (n_u,)
-    w: Array  #: wrenches of joints and spring-dampers on their markers A, ground axes, (n_w,)
-    omega: Array  #: angular velocity of the steady rotation, ground axes, (3,) [rad/s]; zero at rest
-    residual: float  #: largest force out of balance, relative to the forces at work
+    w: Array  #: wrenches of joints and spring-dampers on their markers A, in ground axes, (n_w,)
+    omega: Array  #: angular velocity of the steady rotation in ground axes, (3,) [rad/s]; zero at rest
+    residual: float  #: largest unbalanced force, relative to the acting forces
     n_iterations: int
-    validity: tuple[ValidityNote, ...] = ()  #: bodies that are out of the range of their frame, as for a motion
-    t: float = 0.0  #: time of all functions of time [s]
+    validity: tuple[ValidityNote, ...] = ()  #: notes on bodies beyond the linear range of their frame, as for a motion
+    t: float = 0.0  #: time at which all functions of time are evaluated [s]
 
 
 @dataclass(eq=False)
 class StatesAtRest:
-    """States of elements on their way to rest (4), and the unknowns of their equations; those of user forces stay."""
+    """States of elements approaching rest, step (4), and the unknowns of their equations; not those of user forces."""
 
-    solved: IntArray  #: numbers of the states of elements among all states
-    rows: IntArray  #: of their values
+    solved: IntArray  #: indices of the states of elements among all states
+    rows: IntArray  #: rows of their values
     equations: IntArray  #: rows of multipliers that hold nothing
-    sizes: Array  #: typical, of states and these multipliers
-    own: NDArray[np.bool_]  #: which rows belong to them, (n_w,)
-    names: tuple[str, ...]  #: of states and these multipliers, with their elements
-    change: Array = field(default_factory=lambda: np.full(1, np.inf))  #: last one of each, relative to its size
+    sizes: Array  #: typical magnitudes of states and these multipliers
+    own: NDArray[np.bool_]  #: whether each row belongs to them, (n_w,)
+    names: tuple[str, ...]  #: names of states and these multipliers, with their elements
+    change: Array = field(default_factory=lambda: np.full(1, np.inf))  #: last change of each, relative to its magnitude
     first_step: float = 0.0
     last_step: float = 0.0
 
     @classmethod
     def of(cls, compiled: CompiledSystem) -> "StatesAtRest":
-        """Return those of a system."""
+        """Return the states of a system."""
         model = compiled.model
         solved = np.arange(int(model.laws.state0[0]), len(model.states.row))
         rows, equations = model.states.row[solved], model.laws.equation
@@ -138,19 +142,19 @@ class StatesAtRest:
         self.first_step, self.last_step = self.first_step or step, step
 
     def follow(self, w: Array, dw: Array) -> None:
-        """Take note of a step."""
+        """Record a step."""
         at = np.concatenate([self.rows, self.equations])
         self.change = np.abs(dw[at]) / np.maximum(self.sizes, np.abs(w[at]))
 
     def are_at_rest(self, tolerance: float) -> bool:
-        """Whether a long step has changed nothing."""
+        """Return whether a long step has changed nothing."""
         if not len(self.sizes):
             return True
         is_long = self.last_step >= min(LONG_STEP * self.first_step, LONGEST_STEP) > 0
         return is_long and float(self.change.max()) <= tolerance
 
     def words(self, tolerance: float) -> str:
-        """Return which state does not come to rest, in words, empty if all do."""
+        """Return a description of a state that does not come to rest; empty if all do."""
         if not len(self.sizes) or self.change.max() <= tolerance:
             return ""
         return f"; state {self.names[int(self.change.argmax())]!r} of an element does not come to rest"
@@ -158,13 +162,14 @@ class StatesAtRest:
 
 @dataclass(eq=False)
 class Progress:
-    """The least that was seen of what falls on the way to an equilibrium, and when it last fell to half."""
+    """The least values of the decreasing quantities on the way to an equilibrium, and when they last fell to half."""
 
-    least: Array = field(default_factory=lambda: np.full(3, np.inf))  #: of forces, gaps and changes of states
+    #: least forces, constraint errors and changes of states
+    least: Array = field(default_factory=lambda: np.full(3, np.inf))
     iteration: int = 0
 
     def has_ended(self, iteration: int, values: tuple[float, float, float]) -> bool:
-        """Take note of what stands after an iteration: whether none has fallen to half its least for long."""
+        """Record the values after an iteration; return whether none has fallen to half its least value for too long."""
         falls = np.array(values) < 0.5 * self.least
         if falls.any():
             self.least[falls] = np.array(values)[falls]
@@ -174,11 +179,11 @@ class Progress:
 
 @dataclass(frozen=True, eq=False)
 class Lost:
-    """Where the flow has ended without an equilibrium."""
+    """The end of the flow without an equilibrium."""
 
     iteration: int
-    has_stood: bool  #: for as long as it may
-    error: float  #: forces out of balance by those at work
+    has_stood: bool  #: whether it has stagnated for the allowed number of steps
+    error: float  #: unbalanced forces divided by the acting forces
     state: State
     W: tuple[Array, ...]
     forces: Array
@@ -192,17 +197,17 @@ def static_equilibrium(
     max_iterations: int = 200,
     formulation: str = "absolute",
 ) -> Equilibrium:
-    """Return the equilibrium at rest near a state (default: the bodies as placed), under all forces of the system.
+    """Return the equilibrium at rest near a state (default: the assembled bodies), under all forces of the system.
 
-    formulation: "absolute", or "relative": along the coordinates of joints, those of the tree closed to rounding.
+    formulation: "absolute", or "relative" for joint coordinates, in which the joints of the tree are satisfied exactly.
 
     Raises
     ------
     ConvergenceError
-        If there is no equilibrium near by: something is free to fall, or the way there is too far. It is told when
-        the search makes no more progress; the message has what was tried.
+        If there is no equilibrium nearby, because a part is free to fall, or it is too far away. The error is raised
+        when the search makes no more progress; the message describes the attempts.
     ModelError
-        If the joints cannot be closed, or some constraints repeat others.
+        If the joint constraints cannot be satisfied, or some constraints are redundant.
     """
     return steady_rotation(
         system, (0.0, 0.0, 0.0), state=state, tolerance=tolerance, max_iterations=max_iterations,
@@ -220,32 +225,32 @@ def steady_rotation(
     max_iterations: int = 200,
     formulation: str = "absolute",
 ) -> Equilibrium:
-    """Return the state in which the whole system turns like a rigid body about an axis fixed in space.
+    """Return the state in which the whole system rotates like a rigid body about an axis fixed in space.
 
     Parameters
     ----------
     system
-        Its joints to the ground must allow the rotation, and its forces must turn with it.
+        The system; its joints to the ground must allow the rotation, and its forces must rotate with it.
     omega
-        Angular velocity, ground axes, (3,) [rad/s].
+        Angular velocity in ground axes, (3,) [rad/s].
     center
-        A point of the axis, ground axes, (3,) [m].
+        A point of the axis in ground axes, (3,) [m].
     state
-        Where to begin; its velocities do not matter. Default: the bodies as placed.
+        Initial guess; its velocities are ignored. Default: the assembled bodies.
     tolerance
-        Largest force out of balance, relative to the forces at work.
+        Largest unbalanced force, relative to the acting forces.
     max_iterations
-        Steps towards the equilibrium at most; fewer where they lead no nearer.
+        Largest number of steps; fewer are made if there is no progress.
     formulation
-        "absolute", or "relative": along the coordinates of joints, those of the tree closed to rounding.
+        "absolute", or "relative" for joint coordinates, in which the joints of the tree are satisfied exactly.
 
     Raises
     ------
     ConvergenceError
         If no such motion is found.
     ModelError
-        If there is no such formulation, the joints cannot be closed or do not allow the rotation, or some constraints
-        repeat others.
+        If there is no such formulation, the joint constraints cannot be satisfied or do not allow the rotation, or some
+        constraints are redundant.
     """
     omega = array_of_shape("steady_rotation: omega", omega, (3,))
     center = array_of_shape("steady_rotation: center", center, (3,))
@@ -271,7 +276,7 @@ def steady_rotation(
     holds = held_rows(model)
 
     def followed(state: State, w: Array, *, by_newton: bool = False, runs_down: bool = False) -> "Equilibrium | Lost":
-        """Follow the flow from a state, or Newton's method alone; runs_down: forces may slow the rotation a little."""
+        """Follow the flow from a state, or Newton's method alone; with `runs_down`, forces may slow the rotation."""
         tau, last, progress, has_stood = np.inf if by_newton else 0.0, np.inf, Progress(), False
         for iteration in range(max_iterations + 1):
             state, u_dot = turning(compiled, state, omega, center)
@@ -289,13 +294,14 @@ def steady_rotation(
                 forces, slows = without_slowing(compiled, work, W, parts, forces)
             size = size_of(W, forces)
             scale_of_forces = forces_at_work(compiled, work, parts, W)
-            if not np.isfinite(size + scale_of_forces):  # a stiffened body beyond the second order
+            # a stiffened body beyond the validity of its second-order terms
+            if not np.isfinite(size + scale_of_forces):
                 error = np.inf
                 break
             noise = rounding_of(compiled, parts, state)
             is_nothing = scale_of_forces <= size_of(
                 W, abs(parts.J).T @ np.where(holds, 0.0, noise)
-            )  # springs relax to none
+            )  # springs relax to zero force
             error = 0.0 if is_nothing else size / scale_of_forces
             is_closed = np.abs(gaps[holds]).max(initial=0.0) <= CLOSED * max(compiled.length, 1.0)
             told = tolerance * np.abs(w[~states.own]).max(initial=0.0) + noise
@@ -316,16 +322,18 @@ def steady_rotation(
                 at_first = size if size > STANDING_SPRINGS * size_of(W, pulled) else size_of(W, pulled)
                 tau = 0.1 * compiled.length / max(at_first / np.sqrt(_total_mass(W)), STANDSTILL)
             elif not by_newton:
-                fall = last / max(size, np.finfo(float).tiny) if error > tolerance else np.inf  # below, it is rounding
+                # below the tolerance, it is rounding
+                fall = last / max(size, np.finfo(float).tiny) if error > tolerance else np.inf
                 tau *= min(max(fall, LEAST_GROWTH), FASTEST_GROWTH) if fall > STANDING else max(fall, 0.1)
             last = size
             ds = None
             if flow is not None:
                 ds, moved, dw = flow.step(work, state, u_dot, w, tau)
-            if ds is None or not np.abs(moved).max() > ROUNDING:  # so little is noise of coordinates: bodies one by one
+            # smaller changes are noise of the coordinates; refine body by body
+            if ds is None or not np.abs(moved).max() > ROUNDING:
                 try:
                     y, dw = solve(tuple(k + m / tau for k, m in zip(K, W, strict=True)), parts, -forces, -gaps)
-                except RuntimeError:  # exactly singular: something is free to move
+                except RuntimeError:  # exactly singular: a part is free to move
                     if not by_newton:
                         raise
                     break
@@ -377,10 +385,11 @@ def steady_rotation(
 def without_slowing(
     compiled: CompiledSystem, work: Work, W: tuple[Array, ...], parts: Linearized, forces: Array
 ) -> tuple[Array, float]:
-    """Return forces out of balance without those that slow the rotation, and the rate of it, by the speed [1/s].
+    """Return unbalanced forces without those that slow the rotation, and the relative rate of slowing [1/s].
 
-    A rotor that spins freely runs down by what its bearings damp, and no steady motion balances that. With s the
-    velocities of the rotation, forces f = f' + c M s, f'·s = 0, slow it by the rate c. As they are where it is held.
+    A freely spinning rotor is slowed by the damping of its bearings, which no steady motion balances. With s the
+    velocities of the rotation, forces f = f' + c M s, f'·s = 0, slow it at the rate c. They are returned unchanged if
+    the rotation is prescribed.
     """
     s, momentum, first = work.state.u.copy(), np.zeros_like(forces), 0
     for i, block in enumerate(W):
@@ -397,12 +406,12 @@ def without_slowing(
 
 
 def is_driven_turn(model: Model) -> NDArray[np.bool_]:
-    """Return which rows prescribe an angle, (n_w,)."""
+    """Return whether each row prescribes an angle, (n_w,)."""
     return np.asarray((model.rows.motion >= 0) & ~is_held_length(model.rows.kind))
 
 
 def words_of(led: Led, is_stable: bool) -> str:
-    """Return in words where loads that grow have led, empty if they were not tried."""
+    """Return a description of where increasing loads have led; empty if they were not tried."""
     if led.n_solves == 0:
         return ""
     if led.p == 1.0 and not is_stable:
@@ -413,7 +422,7 @@ def words_of(led: Led, is_stable: bool) -> str:
 def led_by_loads(
     compiled: CompiledSystem, work: Work, omega: Array, center: Array, state: State, w: Array
 ) -> tuple[Led, bool]:
-    """Return where loads lead that grow, and whether that is near a stable equilibrium of the system."""
+    """Return where increasing loads lead, and whether that is near a stable equilibrium of the system."""
     model, resting = compiled.model, compiled.resting_model
     if len(state.u) + len(w) > LARGEST:
         return Led(state, w, 0.0, 0), False
@@ -434,7 +443,7 @@ def led_by_loads(
         def way(out_of_balance: Array, open_by: Array) -> tuple[Array, Array]:
             try:
                 y, dw = solve(K, parts, -out_of_balance, -open_by)
-            except RuntimeError:  # exactly singular: something is free to move
+            except RuntimeError:  # exactly singular: a part is free to move
                 return np.full(len(forces), np.inf), gaps
             return in_ground_axes(model, state, y), dw
 
@@ -451,9 +460,9 @@ def led_by_loads(
 
 
 def wrenches_by_law(model: Model, parts: Linearized, gaps: Array, others: NDArray[np.bool_]) -> Array:
-    """Return the change of wrenches to the laws of springs, bushings and the like at this place, (n_w,).
+    """Return the change of wrenches to those of the laws of springs, bushings etc. at this state, (n_w,).
 
-    Of connections that hold nothing and have no states alone; their rows V dw = -g have no other unknown.
+    Only for connections without constraints and states, whose rows V dw = -g have no other unknowns.
     """
     change, w0 = np.zeros(len(gaps)), model.connections.w0
     for first, last in pairwise(w0.tolist()):
@@ -467,7 +476,7 @@ def wrenches_by_law(model: Model, parts: Linearized, gaps: Array, others: NDArra
 
 
 def notes_at(system: System, work: Work, state: State, u_dot: Array, w: Array) -> tuple[ValidityNote, ...]:
-    """Return, and log, which bodies are out of the range of their frame in a state of the engine."""
+    """Return, and log, notes on bodies beyond the linear range of their frame in a state of the engine."""
     watch = ValidityWatch(system)
     rows, _ = observed_state(compiled_system(system), work, state, u_dot, w, 0.0)
     for note in watch.observe(rows):
@@ -487,7 +496,7 @@ def turning(compiled: CompiledSystem, state: State, omega: Array, center: Array)
 
 
 def _tangent(model: Model, work: Work, omega: Array) -> tuple[Linearized, tuple[Array, ...]]:
-    """Return rows and wrenches, and of each body the derivative of the residual along the steady rotations."""
+    """Return rows and wrenches, and for each body the derivative of the residual along steady rotations."""
     parts = linearized(model, work, 0.0, 0.0, 1.0)
     if not work.state.u.any():
         return parts, parts.H
@@ -503,7 +512,7 @@ def _tangent(model: Model, work: Work, omega: Array) -> tuple[Linearized, tuple[
 
 
 def size_of(W: tuple[Array, ...], forces: Array) -> float:
-    """Return the length of forces in the norm of W⁻¹: for one mass, force by the root of its mass; nan without one."""
+    """Return the norm of forces with W⁻¹; for one mass, force divided by the root of the mass; nan without mass."""
     total, first = 0.0, 0
     for block in W:
         f = forces[first : first + len(block)]
@@ -513,7 +522,7 @@ def size_of(W: tuple[Array, ...], forces: Array) -> float:
 
 
 def forces_at_work(compiled: CompiledSystem, work: Work, parts: Linearized, W: tuple[Array, ...]) -> float:
-    """Return the length of the forces of joints, springs, weight and deformation, in the norm of the residual."""
+    """Return the norm of the forces of joints, springs, weight and deformation, as for the residual."""
     bodies, residual = compiled.model.bodies, work.bodies.residual
     reactions = parts.J.T @ work.state.w if len(work.state.w) else np.zeros_like(residual)
     elastic = np.zeros_like(residual)
@@ -524,7 +533,7 @@ def forces_at_work(compiled: CompiledSystem, work: Work, parts: Linearized, W: t
 
 
 def rounding_of(compiled: CompiledSystem, parts: Linearized, state: State) -> Array:
-    """Return what the rounding of positions alone leaves of the rows, (n_w,): much where a spring is stiff."""
+    """Return the residual of the rows due to rounding of positions, (n_w,); it is large for stiff springs."""
     reach = np.ones(len(state.u))
     for i, u0 in enumerate(compiled.model.bodies.u0[:-1]):
         reach[u0 : u0 + 3] = compiled.length + np.abs(state.r[i]).max()
@@ -553,7 +562,7 @@ def worst_body(compiled: CompiledSystem, W: tuple[Array, ...], forces: Array) ->
 
 
 def _require_rotation(compiled: CompiledSystem, work: Work, omega: Array) -> None:
-    """Raise `ModelError` naming the joint that the rotation would open."""
+    """Raise `ModelError` that names the joint which the rotation would violate."""
     from floatframe.kernels.entry import rates_of_constraints
 
     if not omega.any() or not len(work.state.w):

@@ -1,1 +1,1 @@
-"""Fully driven systems: motion from joints and drives alone, and the forces that make it."""
+"""Fully driven systems: their motion, which joints and drives determine completely, and the forces it requires."""

@@ -1,4 +1,4 @@
-"""What is left free by joints and drives, and how far a driven system is from singular positions."""
+"""Degrees of freedom that joints and drives leave free, and the distance of a driven system from singular positions."""
 
 import numpy as np
 import scipy.linalg as la
@@ -17,15 +17,15 @@ from floatframe.system import System
 
 __all__ = ["SingularityGuard", "free_coordinates"]
 
-SINGULAR = 1e-6  #: smallest singular value of the scaled constraints, of length one each, of a singular position
-FREE = 1e-7  #: the same of a motion that no constraint resists
-TOLD = 1e-6  #: part of a motion from which a coordinate or a body takes part in it
+SINGULAR = 1e-6  #: smallest singular value of the scaled constraint rows (length one each) at a singular position
+FREE = 1e-7  #: the same for a motion that no constraint resists
+TOLD = 1e-6  #: fraction of a motion from which a coordinate or body is reported as part of it
 
 
 def free_coordinates(system: System, state: State, *, t: float = 0.0) -> tuple[str, ...]:
-    """Return what is free to move at a state with closed joints: joint coordinates, as few as tell it, or bodies.
+    """Return the free motions at a state that satisfies the joints: a minimal set of joint coordinates, or bodies.
 
-    Flexible bodies count as rigid.
+    Flexible bodies are treated as rigid.
     """
     compiled = compiled_system(system)
     work = new_work(compiled.model)
@@ -63,27 +63,27 @@ def free_coordinates(system: System, state: State, *, t: float = 0.0) -> tuple[s
 
 
 def rigid_scale(compiled: CompiledSystem) -> Array:
-    """Return the length of translations and one for rotations, (6 n_b,): unknowns by it have one unit."""
+    """Return scale lengths of translations, and 1 for rotations, (6 n_b,), which give all unknowns the same unit."""
     return np.tile(np.repeat([compiled.length, 1.0], 3), len(compiled.body_names))
 
 
 def scaled_rows(compiled: CompiledSystem, G: Array) -> Array:
-    """Return held rows by motions of the body frames, (n_held, 6 n_b), in one unit, each of length one."""
+    """Return constraint rows by motions of the body frames, (n_held, 6 n_b), in one unit, scaled to length one."""
     return unit_rows(G * rigid_scale(compiled))
 
 
 class SingularityGuard:
-    """Watches the smallest singular value of the constraints, and the sign of their determinant, from time to time."""
+    """Monitors the smallest singular value of the constraints, and the sign of their determinant, during a motion."""
 
     def __init__(self, compiled: CompiledSystem, now: Instant) -> None:
         """Begin at an instant; `ConvergenceError` if it is singular."""
         self.compiled = compiled
-        self.kept = np.logical_not(dependent_rows(scaled_rows(compiled, now.G)))  #: rows that do not repeat others
+        self.kept = np.logical_not(dependent_rows(scaled_rows(compiled, now.G)))  #: linearly independent rows
         self.sign = 0.0
         self.check(now, now.t)
 
     def check(self, now: Instant, last_t: float) -> None:
-        """Raise `ConvergenceError` at a singular position, or if one was passed since the last time."""
+        """Raise `ConvergenceError` at a singular position, or if one was passed since the previous time."""
         G = scaled_rows(self.compiled, now.G)[self.kept]
         left, values, _ = la.svd(G)
         is_square = G.shape[0] == G.shape[1]

@@ -1,19 +1,20 @@
-"""One instant of a fully driven system: place, velocities and accelerations from joints and drives alone.
+"""One instant of a fully driven system: positions, velocities and accelerations determined by joints and drives.
 
-Unknowns are the motions of the body frames; modal coordinates stand still (q' = q'' = 0). With G the columns of the
-constraint rows for them, M the masses, P, V as in joints/rows/kinds.py:
+The unknowns are the motions of the body frames; the rates of modal coordinates are zero (q' = q'' = 0). G are the
+columns of the constraint rows for these unknowns, M the masses, and P, V as in joints/rows/kinds.py:
 
     (1) positions       G dx = -g                     Newton, until g = 0
     (2) velocities      G u = -dg/dt
     (3) accelerations   G u_dot = -d(G)/dt u - ...
     (4) wrenches        M u_dot - Jᵀ w = f
 
-each as one system with M, which is unique where the drives leave nothing free. Elastic bodies are frozen as they were
-placed, or deform quasi-statically: the modes balance joints, loads and the inertia of the rigid motion,
+Each is solved as one system with M, which has a unique solution if the drives leave nothing free. Elastic bodies either
+keep their assembled shape, or deform quasi-statically, with modes that balance joints, loads and the inertia of the
+rigid motion,
 
     (5) K* q + inertia(q, u, u_dot) = Psiᵀ w + loads
 
-by Newton's method with the whole tangent, the motion (1)-(4) made anew for every q.
+by Newton's method with the complete tangent, where (1)-(4) are solved again for every q.
 """
 
 from collections.abc import Callable
@@ -33,22 +34,22 @@ from floatframe.state import State
 
 __all__ = ["ELASTICITY", "Elasticity", "Instant", "frozen_bodies", "quasi_static_bodies", "rigid_columns"]
 
-CLOSED = 1e-12  #: largest gap, relative to the size of the system
-ACCEPTED = 1e-9  #: the same where rounding allows no less
+CLOSED = 1e-12  #: largest constraint error, relative to the size of the system
+ACCEPTED = 1e-9  #: the same, if rounding allows no smaller one
 MOST_ITERATIONS = 30
-SETTLED = 1e-11  #: last change of q relative to its size
-LEAST_SHAPE = 1e-14  #: of the size of the system: a deformation that is none, where all loads vanish
+SETTLED = 1e-11  #: last change of q, relative to its magnitude
+LEAST_SHAPE = 1e-14  #: relative to the size of the system; a smaller deformation is taken as zero, if all loads vanish
 
 
 @dataclass(frozen=True, eq=False)
 class Instant:
-    """Motion of all bodies at one time."""
+    """Motion of all bodies at a time."""
 
     t: float
     state: State
     u_dot: Array  #: (n_u,)
-    w: Array  #: wrenches of the connections on their markers A, ground axes, (n_w,)
-    G: Array  #: held rows by the motions of the body frames, (n_held, 6 n_b)
+    w: Array  #: wrenches of the connections on their markers A, in ground axes, (n_w,)
+    G: Array  #: constraint rows by the motions of the body frames, (n_held, 6 n_b)
     n_iterations: int = 0
 
 
@@ -56,7 +57,7 @@ Elasticity = Callable[[CompiledSystem, Work, State, float], Instant]  #: (compil
 
 
 def rigid_columns(compiled: CompiledSystem) -> np.ndarray:
-    """Return which unknowns are motions of body frames, (n_u,) bool; the others are modes."""
+    """Return whether each unknown is a motion of a body frame, (n_u,) bool; the others are modes."""
     model = compiled.model
     rigid = np.zeros(int(model.bodies.u0[-1]), dtype=bool)
     for u0 in model.bodies.u0[:-1]:
@@ -65,13 +66,13 @@ def rigid_columns(compiled: CompiledSystem) -> np.ndarray:
 
 
 def frozen_bodies(compiled: CompiledSystem, work: Work, state: State, t: float) -> Instant:
-    """(1)-(4): return the motion with all modes as they are in the state."""
+    """Return the motion with constant modal coordinates, by steps (1)-(4)."""
     from floatframe.kernels.entry import rates_of_constraints
 
     model, rigid = compiled.model, rigid_columns(compiled)
     work.state.time[...] = t
     state, equations, n = closed(compiled, work, state, rigid, t)
-    # velocities: the rate at rest is that of the drives
+    # velocities: the rate of the rows at rest is that of the drives
     state = State(state.r, state.p, state.q, np.zeros_like(state.u))
     set_iterate(work, state)
     rate, _ = rates_of_constraints(model, work)
@@ -80,7 +81,7 @@ def frozen_bodies(compiled: CompiledSystem, work: Work, state: State, t: float) 
     u = np.zeros_like(state.u)
     u[rigid] = y
     state = State(state.r, state.p, state.q, in_ground_axes(model, state, u))
-    # accelerations and wrenches; friction by the normal force is not linear in them
+    # accelerations and wrenches; friction due to the normal force is not linear in them
     w = np.zeros(len(work.state.w))
     for _ in range(MOST_ITERATIONS):
         set_iterate(work, state, w=w)
@@ -97,7 +98,7 @@ def frozen_bodies(compiled: CompiledSystem, work: Work, state: State, t: float) 
 
 
 def quasi_static_bodies(compiled: CompiledSystem, work: Work, state: State, t: float) -> Instant:
-    """(1)-(5): return the motion with modes that balance their loads at every instant."""
+    """Return the motion with modes that balance their loads at every instant, by steps (1)-(5)."""
     model, rigid = compiled.model, rigid_columns(compiled)
     now = frozen_bodies(compiled, work, state, t)
     if rigid.all():
@@ -129,7 +130,7 @@ ELASTICITY: dict[str, Elasticity] = {"frozen": frozen_bodies, "quasi-static": qu
 
 @dataclass(frozen=True, eq=False)
 class RigidEquations:
-    """M y - Jᵀ w = forces, G y + V w = rows for the motions of the body frames, dense."""
+    """M y - Jᵀ w = forces, G y + V w = rows for the motions of the body frames, as dense matrices."""
 
     M: Array  #: (6 n_b, 6 n_b)
     J: Array  #: (n_w, 6 n_b)
@@ -144,7 +145,7 @@ class RigidEquations:
 
 
 def rigid_equations(compiled: CompiledSystem, work: Work) -> RigidEquations:
-    """Evaluate at the iterate in `work` and return the equations of the body frames."""
+    """Evaluate the iterate in `work`, and return the equations of the body frames."""
     from floatframe.kernels.entry import evaluate_and_linearize
 
     model = compiled.model
@@ -177,7 +178,7 @@ def rigid_equations(compiled: CompiledSystem, work: Work) -> RigidEquations:
 def closed(
     compiled: CompiledSystem, work: Work, state: State, rigid: np.ndarray, t: float
 ) -> tuple[State, RigidEquations, int]:
-    """(1): return the state with joints closed and drives followed, the equations at it, the iterations it took."""
+    """Return the state that satisfies joints and drives by step (1), the equations at it, and the iterations."""
     model = compiled.model
     holds = is_held(model.rows.kind)
     scale = np.where(is_held_length(model.rows.kind), compiled.length, 1.0)

@@ -1,11 +1,11 @@
-"""Inverse dynamics: what drives must give along a prescribed motion, and the reactions that go with it.
+"""Inverse dynamics: the forces of drives that produce a prescribed motion, and the corresponding reactions.
 
-    inverse = inverse_dynamics(system, np.linspace(0, 2, 401))       # a system whose drives decide its motion
+    inverse = inverse_dynamics(system, np.linspace(0, 2, 401))       # a fully driven system
     inverse.drives["main.angle"].force                               # torque over time
     integrate(with_motors(system, inverse.drives), GeneralizedAlpha(), 2.0, 1e-3, state=inverse.motion.state(0))
 
-The last line gives the motion back: motors with these forces in the place of the drives. Where bodies vibrate on the
-way, `drive_forces(system, integrate(system, ...))` has the drive forces with the vibrations.
+The last line reproduces the motion, with motors that exert these forces instead of the drives. If bodies vibrate in the
+motion, `drive_forces(system, integrate(system, ...))` returns the drive forces including vibrations.
 """
 
 import os
@@ -30,9 +30,9 @@ __all__ = ["InverseDynamics", "drive_forces", "inverse_dynamics", "with_motors"]
 
 @dataclass(frozen=True, eq=False)
 class InverseDynamics:
-    """A prescribed motion with the forces it takes."""
+    """A prescribed motion and the forces it requires."""
 
-    motion: Trajectory  #: with the reactions of all joints
+    motion: Trajectory  #: includes the reactions of all joints
     drives: Mapping[str, CoordinateMotion]  #: value, rate and force of the driven coordinates, by "joint.coordinate"
 
 
@@ -52,20 +52,20 @@ def inverse_dynamics(
     system, times, state, output, progress
         As for `kinematics`.
     elasticity
-        `quasi_static_bodies`: flexible bodies deform under loads and inertia, without vibrations; `frozen_bodies`:
-        they keep their shape.
+        `quasi_static_bodies`: flexible bodies deform under loads and inertia, without vibrations; `frozen_bodies`: they
+        keep their assembled shape.
 
     Raises
     ------
     ModelError, ConvergenceError
-        As `kinematics`.
+        As for `kinematics`.
     """
     motion = kinematics(system, times, elasticity=elasticity, state=state, output=output, progress=progress)
     return InverseDynamics(motion, drive_forces(system, motion))
 
 
 def drive_forces(system: System, motion: Trajectory) -> dict[str, CoordinateMotion]:
-    """Return value, rate and force of all driven coordinates over any motion of the system, by "joint.coordinate"."""
+    """Return value, rate and force of all driven coordinates during any motion of the system, by "joint.coordinate"."""
     found = {}
     for name in driven_coordinates(system):
         joint, _, coordinate = name.rpartition(".")
@@ -74,7 +74,7 @@ def drive_forces(system: System, motion: Trajectory) -> dict[str, CoordinateMoti
 
 
 def with_motors(system: System, drives: Mapping[str, CoordinateMotion]) -> System:
-    """Return the system with motors that give the forces over time (cubic splines) in the place of these drives.
+    """Return the system with motors instead of these drives; their forces are cubic splines over time.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def with_motors(system: System, drives: Mapping[str, CoordinateMotion]) -> Syste
 
 
 def released(joint: Any, drives: Mapping[str, CoordinateMotion]) -> Any:
-    """Return a joint without its prescribed motions that are among the drives."""
+    """Return a joint without those of its prescribed motions that are among the drives."""
     motions = getattr(joint, "motions", None)
     if not motions:
         return joint

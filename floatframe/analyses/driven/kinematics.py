@@ -1,7 +1,7 @@
-"""Kinematic analysis of a fully driven system, and its inverse dynamics: motion, reactions and drive forces over time.
+"""Kinematic analysis and inverse dynamics of a fully driven system: motion, reactions and drive forces over time.
 
-Nothing is integrated: every instant follows from joints and drives alone (`driven_motion`), so that there is no step
-size to choose, and times may be as far apart as the next position can be found from the last one.
+Nothing is integrated: every instant follows from joints and drives (`driven_motion`). There is no step size to choose,
+and times may be as far apart as Newton's method can find the next position from the previous one.
 """
 
 import os
@@ -36,14 +36,14 @@ from floatframe.system import System
 
 __all__ = ["Kinematics", "kinematics"]
 
-LARGEST_TURN = 0.25  #: rad that a body turns between two positions; longer ways are made in several
-MOST_PARTS = 2000  #: into which the way from one time to the next is cut
-ROWS_KEPT = 200  #: rows of results between writes
+LARGEST_TURN = 0.25  #: largest rotation of a body between two positions; longer paths are divided [rad]
+MOST_PARTS = 2000  #: largest number of parts between two times
+ROWS_KEPT = 200  #: number of rows of results between writes
 
 
 @dataclass(frozen=True)
 class Kinematics:
-    """What stands in the place of the integrator in the record of a run."""
+    """Replaces the integrator in the record of a run."""
 
     elasticity: str  #: name of the treatment of flexible bodies in `ELASTICITY`
 
@@ -57,32 +57,32 @@ def kinematics(
     output: str | os.PathLike[str] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Trajectory:
-    """Return the motion of a fully driven system at given times, with the reactions and drive forces that it takes.
+    """Return the motion of a fully driven system at given times, with its reactions and drive forces.
 
     Parameters
     ----------
     system
-        Its joints and prescribed motions must leave no body free to move.
+        The system; its joints and prescribed motions must leave no body free to move.
     times
-        Rising, two at least, (n_t,) [s].
+        Increasing, at least two, (n_t,) [s].
     elasticity
-        `frozen_bodies`: flexible bodies keep the shape they were placed in. `quasi_static_bodies`: they deform under
-        their loads and the inertia of the rigid motion, without vibrations (velocities and accelerations of the modes
-        are left out).
+        `frozen_bodies`: flexible bodies keep their assembled shape. `quasi_static_bodies`: they deform under their
+        loads and the inertia of the rigid motion, without vibrations (velocities and accelerations of the modes are
+        neglected).
     state
-        Where to look for the first position; the bodies as placed by default.
+        Initial guess of the first position; by default the assembled bodies.
     output
-        Results file; None keeps the motion in memory.
+        Results file; with None, the motion is kept in memory.
     progress
-        Called with the numbers of times done and of all times.
+        Called with the number of times completed and the total number.
 
     Raises
     ------
     ModelError
-        If coordinates are free (they are named), drives conflict, or constraints repeat others.
+        If coordinates are free (the message names them), drives conflict, or constraints are redundant.
     ConvergenceError
-        At a singular position, between times on both sides of one, and where a drive goes out of reach. It carries the
-        motion so far.
+        At a singular position, between times on both sides of one, or if a drive is out of reach. The error has the
+        motion computed so far.
     """
     t = np.asarray(times, dtype=float)
     if t.ndim != 1 or len(t) < 2 or not np.isfinite(t).all() or (np.diff(t) <= 0).any():
@@ -99,11 +99,11 @@ def kinematics(
     head = replace(head, angles=compiled.angles)
     carry = Carry(now.state, now.u_dot, now.u_dot, 0.0, now.w, np.zeros(2), np.zeros(2))
     carry = with_angles(system, float(t[0]), carry)
-    with ExitStack() as held:  # the place of the results, until the end of the work
+    with ExitStack() as held:  # the place of the results, until the end of the analysis
         place = None if output is None else held.enter_context(ResultsPlace(output, inputs=system.files))
         writer = None if place is None else ResultsWriter(place, head)
         kept: list[Rows] = []
-        power, done = np.zeros((2, 2)), np.zeros(2)  # powers at the last two times, work up to now
+        power, done = np.zeros((2, 2)), np.zeros(2)  # powers at the last two times, work so far
         try:
             for k, time in enumerate(t):
                 if k:
@@ -143,7 +143,7 @@ def kinematics(
 
 
 def first_instant(system: System, work: Work, state: State, t: float, elasticity: Elasticity) -> Instant:
-    """Return the motion at the first time; `ModelError` unless the drives decide all of it."""
+    """Return the motion at the first time; `ModelError` unless the drives determine it completely."""
     compiled = compiled_system(system)
     own = [each for each in compiled.laws if each.law.states or each.law.multipliers]
     if own:
@@ -163,7 +163,7 @@ def first_instant(system: System, work: Work, state: State, t: float, elasticity
             f"kinematics: joint {compiled.owners[rolling[0]]!r} rolls: it holds velocities, and where that leads "
             "follows by integration only; integrate the motion"
         )
-    shapes = state.q  # those that bodies were placed in: closing joints with modes may bend them
+    shapes = state.q  # assembled shapes, because closing joints with modes may bend bodies
     state = assembled(compiled, work, state)
     conflict = conflict_of_drives(compiled, work, state)
     if conflict:
@@ -191,7 +191,7 @@ def first_instant(system: System, work: Work, state: State, t: float, elasticity
 def moved_on(
     compiled: CompiledSystem, work: Work, now: Instant, t: float, elasticity: Elasticity, guard: SingularityGuard
 ) -> Instant:
-    """Return the motion at time t, reached from the last one in parts in which no body turns far."""
+    """Return the motion at time t, reached from the previous one in parts in which no body rotates far."""
     model = compiled.model
     begin, done, n = now.t, 0.0, now.n_iterations
     parts = 0
