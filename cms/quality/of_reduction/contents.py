@@ -53,7 +53,7 @@ PROBES = 12  #: combinations of more modes
 FEW_NODES = 20  #: up to which quadratic modes are compared node by node
 NODE_PROBES = 8  #: combinations of the forces at more nodes
 NEGLIGIBLE = 1e-3  #: of the size that a field could have, below which its own size does not count
-ROUGH = 1e5  #: times the limit, for geometric stiffness that went over to or from a Buckens frame
+ROUGH = 1e5  #: times the limit, for geometric stiffness that went over from another frame
 STRESS = (1.0, -1.0, -2.0)  #: exponents of mass, length and time
 CONVERTED = "frame converted from"  #: provenance of a file that was carried to another frame
 #: provenance that has to be that of the model and its mode set; paths, versions and solvers may differ
@@ -580,21 +580,19 @@ def compare_geometric(case: Case) -> Iterator[Compared]:
     unit = np.abs(np.asarray(made.interfaces)[:, :3]).max(initial=0.0)  # of a unit force
     force = {"translation": m, "rotation": m * L, "spin": m * L, "interfaces": 1.0}
     by_axis = np.array([1.0, 1, 1, L, L, L])[:, None, None]
-    # how followers turn spread loads is not on record: what they make of loads in another frame is not exact
-    carried_from = case.reduced.provenance.get(CONVERTED, "")
-    is_carried = bool(carried_from)
-    is_exact = not is_carried or "buckens" not in (carried_from, case.reduced.frame.kind)
+    # how followers turn loads is not on record, nor the quadrature of their cells: in another frame it is not exact
+    is_carried = CONVERTED in case.reduced.provenance
     for name in UNIT_LOADS:
         kind = by_axis if name == "interfaces" else 1.0
         words = f"load {case.axes_words} {case.axes_words}"
         words = f"interface {words}" if name == "interfaces" else words
         for part, at_least in ((None, unit), ("turned", shape)):
-            if part == "turned" and (own.turned is None or made.turned is None or not is_exact):
+            if part == "turned" and (own.turned is None or made.turned is None):
                 continue
             source, target = (own, made) if part is None else (own.turned, made.turned)
             a, b = (np.asarray(getattr(x, name)) / kind for x in (source, target))
             size = max(np.abs(b).max(initial=0.0), NEGLIGIBLE * at_least * force[name])
-            size = size if is_exact else size * ROUGH
+            size = size * ROUGH if is_carried else size
             yield apart(f"geometric.{f'{part}.' if part else ''}{name}", a, b, size, axes=words)
     if own.spread is not None and made.spread is not None:
         for name, at_least in (("K", unit), ("turned", shape), ("turned_rigid", L)):
