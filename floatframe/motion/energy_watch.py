@@ -7,7 +7,7 @@ distance from the origin, velocities that close joints to that over the step.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -22,6 +22,7 @@ __all__ = ["EnergyWatch"]
 
 ENERGY_LIMIT = 0.05  #: gain over the energy that moves about, above which a run tells
 ENERGY_STOP = 0.5  #: and above which it stops
+WAITING, MOST_WAITING = 8, 400  #: rows wait for others, up to this part of those before and so many
 ROUNDING = 8 * np.finfo(float).eps  #: of a number
 
 
@@ -39,21 +40,40 @@ class EnergyWatch:
     unsure: float = 0.0  #: of it, by the sum of the work
     scale: float = 0.0  #: largest energy that moves about
     noise: float = 0.0  #: of the energy, by rounding
+    waiting: list[Rows] = field(default_factory=list)  #: rows that are not judged yet
     note: ValidityNote | None = None
     is_beyond: bool = False  #: whether the run has to stop
 
     def observe(self, system: System, rows: Rows, *, is_switched: bool, is_last: bool = False) -> ValidityNote | None:
         """Take rows of results; return a note that is new with them. is_switched: something else acts in them.
 
-        The first steps, in which little moves yet, are judged at the end of a run alone (is_last).
+        The first steps, in which little moves yet, are judged at the end of a run alone (is_last). Rows are judged
+        together: a look at a few costs as much as one at many.
         """
-        if len(rows.t) == 0:
+        note = self.flush(system) if is_switched else None
+        if len(rows.t):
+            self.waiting.append(rows)
+        n = sum(len(each.t) for each in self.waiting)
+        if n == 0 or (not (is_switched or is_last) and n < min(MOST_WAITING, self.n_seen // WAITING)):
+            return note
+        rows, self.waiting = joined(self.waiting), []
+        return self.judge(system, rows, is_switched=is_switched, is_last=is_last) or note
+
+    def flush(self, system: System) -> ValidityNote | None:
+        """Judge the rows that wait; return a note that is new with them."""
+        if not self.waiting:
             return None
+        rows, self.waiting = joined(self.waiting), []
+        return self.judge(system, rows, is_switched=False, is_last=False)
+
+    def judge(self, system: System, rows: Rows, *, is_switched: bool, is_last: bool) -> ValidityNote | None:
+        """Take rows of results; return a note that is new with them."""
         d = rows.diagnostics
         energy = d[:, KINETIC] + d[:, STRAIN] + d[:, SPRINGS] + d[:, GRAVITATION]
         now = np.stack([energy, d[:, WORK_GIVEN], d[:, WORK_TAKEN]], axis=1)
-        self.measure(d)
-        self.noise = max(self.noise, rounding_energy(system, rows, self.h))
+        scales = self.measured(d)
+        noises = np.maximum(self.noise, np.maximum.accumulate(rounding_energies(system, rows, self.h)))
+        self.scale, self.noise = float(scales[-1]), float(noises[-1])
         last, self.last = self.last, now[-1]
         number = self.n_seen + 1 + np.arange(len(rows.t))
         self.n_seen += 0 if last is None else len(rows.t)
@@ -70,7 +90,7 @@ class EnergyWatch:
         gains = self.gain + np.cumsum(steps[:, 0] - work[:, 0] + work[:, 1])
         unsure = self.unsure + np.cumsum(swing.sum(axis=1))
         self.gain, self.unsure = float(gains[-1]), float(unsure[-1])
-        share = (gains - unsure - self.noise) / self.scale if self.scale > 0.0 else np.zeros(len(gains))
+        share = np.where(scales > 0.0, (gains - unsure - noises) / np.where(scales > 0.0, scales, 1.0), 0.0)
         is_judged = number * self.every >= FIRST_VERDICT
         is_judged[-1] = is_judged[-1] or is_last
         share = np.where(is_judged, share, 0.0)
@@ -93,7 +113,7 @@ class EnergyWatch:
         return self.note
 
     def record(self) -> dict[str, Array]:
-        """Return what is needed to go on, by name."""
+        """Return what is needed to go on, by name; no rows may wait."""
         if self.last is None or self.potential is None:
             return {}
         change = np.full(2, np.nan) if self.change is None else self.change
@@ -111,24 +131,28 @@ class EnergyWatch:
         self.change = None if np.isnan(change).any() else change
         self.note = next((note for note in notes if note.kind == "energy"), None)
 
-    def measure(self, d: Array) -> None:
-        """Take rows into the largest energy that moves about."""
-        ends = np.array([d[:, GRAVITATION].min(), d[:, GRAVITATION].max()])
+    def measured(self, d: Array) -> Array:
+        """Return the largest energy that has moved about at the times of rows, (n_t,)."""
+        low, high = np.minimum.accumulate(d[:, GRAVITATION]), np.maximum.accumulate(d[:, GRAVITATION])
         if self.potential is not None:
-            ends = np.array([min(ends[0], self.potential[0]), max(ends[1], self.potential[1])])
-        self.potential = ends
-        parts = np.abs(d[:, [KINETIC, STRAIN, SPRINGS, WORK_GIVEN, WORK_TAKEN]])
-        self.scale = max(self.scale, float(parts.max()), float(ends[1] - ends[0]))
+            low, high = np.minimum(low, self.potential[0]), np.maximum(high, self.potential[1])
+        self.potential = np.array([low[-1], high[-1]])
+        parts = np.abs(d[:, [KINETIC, STRAIN, SPRINGS, WORK_GIVEN, WORK_TAKEN]]).max(axis=1)
+        return np.maximum(self.scale, np.maximum(np.maximum.accumulate(parts), high - low))
 
 
-def rounding_energy(system: System, rows: Rows, h: float) -> float:
-    """Return by how much rounding may change the energy of rows in steps of size h."""
+def joined(parts: list[Rows]) -> Rows:
+    """Return rows one after the other."""
+    return parts[0] if len(parts) == 1 else Rows(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+
+def rounding_energies(system: System, rows: Rows, h: float) -> Array:
+    """Return by how much rounding may change the energy of rows in steps of size h, (n_t,)."""
     model = compiled_system(system).model
     mass = model.body_types.mass[model.bodies.kind]
-    v = np.abs(rows.u[:, model.bodies.u0[:-1, None] + np.arange(3)]).max(axis=(0, 2))
-    slip = ROUNDING * np.abs(rows.r).max(axis=(0, 2)) / h
-    fall = ROUNDING * np.abs(rows.diagnostics[:, GRAVITATION]).max()
-    return float((mass * slip * (v + slip)).sum() + fall)
+    v = np.abs(rows.u[:, model.bodies.u0[:-1, None] + np.arange(3)]).max(axis=2)
+    slip = ROUNDING / h * np.abs(rows.r).max(axis=2)
+    return np.asarray((slip * (v + slip)) @ mass + ROUNDING * np.abs(rows.diagnostics[:, GRAVITATION]))
 
 
 def kinetic_energies(system: System, u: Array) -> Array:

@@ -300,13 +300,14 @@ class Run:
 
     def record(self, carry: Carry, n_done: int) -> dict[str, np.ndarray]:
         """Return what is needed to go on from here."""
+        self.tell(self.energy.flush(self.system))
         events = {} if self.events is None else self.events.record()
         watches = self.steps.record() | self.energy.record()
         return restart_record(carry, n_done) | {"seconds": np.array(self.seconds)} | events | watches
 
     def record_where_due(self, carry: Carry, n_done: int) -> dict[str, np.ndarray] | None:
         """Return what is needed to go on from here, None where a run does not go on."""
-        return self.record(carry, n_done) if n_done % RESTART_STEPS == 0 else None
+        return self.record(carry, n_done) if self.writer is not None and n_done % RESTART_STEPS == 0 else None
 
     def summary(self, carry: Carry) -> dict[str, Any]:
         """Return what the run took, and its events."""

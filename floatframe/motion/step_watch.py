@@ -7,8 +7,8 @@ For methods of second order, with steps of one size and with steps that an error
     along the motion included
 (2) where that is above the limit, or the long steps fail, a companion in halves of the steps takes all of them again,
     and goes on instead: it differs by 3/4 of the error, and alone decides what is told
-(3) the companion goes along for `BESIDE` steps, or the first `SHARE` of a long run; in a run of more than `BESIDE` less
-    far where the error, drawn out to the end of the run, is far below the limit
+(3) the companion goes along for `BESIDE` steps. In a run of more than these it begins after the first of them, without
+    a start of its own, and ends where the error, drawn out to the end of the run, is far below the limit
 (4) afterwards windows of `WINDOW` steps, farther and farther apart, are taken again in halves from the same memory, and
     the errors of the steps are summed; between two windows a step has the mean of theirs
 (5) errors of place are measured by the farthest way of a body from its start, rotations likewise, or by the way over
@@ -27,8 +27,10 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import FloatframeError, ResultsError
-from floatframe.integrators.carry import Carry, Integrator
+from floatframe.integrators.carry import Carry, Integrator, has_divided_steps
+from floatframe.integrators.generalized_alpha import GeneralizedAlpha
 from floatframe.integrators.ida import Ida
+from floatframe.integrators.relative import RelativeGeneralizedAlpha
 from floatframe.integrators.relative_ode import RelativeOde
 from floatframe.kernels.work import Work, new_work
 from floatframe.motion.restart import RESTART_STEPS
@@ -41,15 +43,16 @@ __all__ = ["FIRST_VERDICT", "WATCHES", "StepWatch", "has_second_order", "has_ste
 #: what is done with what is found: end a run half of whose energy comes from its steps; tell alone; do not look for it
 WATCHES = ("stop", "tell", "off")
 BESIDE = 400  #: steps beside which a companion goes
-SHARE = 0.05  #: or of the steps of the run, where that is more
 CALM_STEPS = 200  #: after so many steps a companion may stop, in runs of more than `BESIDE`
 CALM = 0.1  #: of the limit, below which the error drawn out to the end of the run is far below it
 FIRST_CHECK = 4  #: steps before a companion is compared, and at least between two comparisons
 CHECKS = 8  #: and this part of the steps that it has gone
+FEW_CHECKS = 48  #: steps between two comparisons in runs of more than `BESIDE`
 WINDOW = 4  #: steps that are taken again in halves, an even number
-FARTHEST = 4092  #: most steps between two windows
+FARTHEST = 16380  #: most steps between two windows
 FIRST_VERDICT = 20  #: steps before which a motion has gone too short a way to measure errors by
 STEP_LIMIT = 0.03  #: estimated error of the motion above which a run tells
+SHORT_LIMIT = 0.01  #: the same of a run of less steps than that: it may be a piece of a motion in which errors add up
 LEAST_WAY = 1e-7  #: of the length of the system: shorter ones are rest
 LEAST_TURN = 1e-6  #: rad, likewise
 FULL_TURN = 3.0  #: rad: a body that turns so far is measured by a whole turn
@@ -75,11 +78,13 @@ class Companion:
     peak: Array  #: largest error, of place and rotation, (n_b, 2)
 
     @classmethod
-    def begun(cls, integrator: Integrator, carry: Carry, start: int, ratio: float) -> "Companion":
-        """Begin from a memory after step `start`."""
+    def begun(cls, integrator: Integrator, carry: Carry, start: int, ratio: float, h: float = 0.0) -> "Companion":
+        """Begin from a memory after step `start`; h: of fixed steps, which become longer as divided ones do."""
         none = np.zeros((len(carry.state.r), 2, 3))
-        method = integrator_of(integrator, ratio)
-        return cls(method, carry, start, ratio, start, carry, none, start, none, lengths(none))
+        method, begin = integrator_of(integrator, ratio), carry
+        if h and carry.h and isinstance(method, GeneralizedAlpha | RelativeGeneralizedAlpha) and method.h_min is None:
+            method, begin = replace(method, h_min=h), replace(carry, h_next=ratio * h)  # no start of its own
+        return cls(method, carry, start, ratio, start, begin, none, start, none, lengths(none))
 
     def follow(self, system: System, work: Work, end: Carry, last: int, t0: float, h: float) -> bool:
         """Go on to the step after which the run has memory `end`; return whether its steps succeed."""
@@ -133,9 +138,14 @@ class StepWatch:
         self.begun, self.total, self.turn = state, np.zeros((n, 2, 2)), np.zeros(n)
 
     @property
-    def most_beside(self) -> int:
-        """Steps beside which companions go."""
-        return max(BESIDE, int(SHARE * self.n_total))
+    def limit(self) -> float:
+        """Estimated error above which the run tells."""
+        return STEP_LIMIT if self.n_total >= FIRST_VERDICT else SHORT_LIMIT
+
+    @property
+    def is_long(self) -> bool:
+        """Whether companions go beside a part of the run alone."""
+        return self.n_total > BESIDE
 
     @property
     def has_companion(self) -> bool:
@@ -152,7 +162,11 @@ class StepWatch:
         """Return how many steps may be taken at once after n_done: to a comparison, half a window, or the next one."""
         if self.has_companion:
             gone = 0 if self.companion is None else n_done - self.companion.start
-            return 1 if gone % 2 else max(FIRST_CHECK, gone // CHECKS // 2 * 2)
+            if gone % 2:
+                return 1
+            if self.is_long:
+                return FIRST_CHECK if n_done == 0 else FEW_CHECKS
+            return max(FIRST_CHECK, gone // CHECKS // 2 * 2)
         if self.is_window(n_done):
             return WINDOW // 2
         return min(most, self.next - n_done) if self.is_on and n_done < self.next else most
@@ -163,6 +177,8 @@ class StepWatch:
         """Take steps that led from one memory to another; return a note that is new with them."""
         last = first + n_steps
         if self.has_companion:
+            if self.is_long and begin.h == 0.0:
+                return None
             return self.accompany(system, begin, end, t0, h, first, last)
         if not self.is_window(first):
             return None
@@ -184,13 +200,14 @@ class StepWatch:
         if self.companion is None:
             self.catch_up(first, self.rate)
             work.solver.c_k[...] = 0.0
-            self.companion = Companion.begun(self.integrator, begin, first, DOUBLES)
+            is_fixed = not has_divided_steps(compiled_system(system).model) and has_steps_of_one_size(self.integrator)
+            self.companion = Companion.begun(self.integrator, begin, first, DOUBLES, h if is_fixed else 0.0)
         other = self.companion
         if (last - other.start) % 2 == 0:
             self.measure(begin.state, end.state, h * (last - first))
             self.turn = np.maximum(self.turn, turns_in_a_step(system, end.state, h))
             is_good = other.follow(system, work, end, last, t0, h)
-            if other.ratio == DOUBLES and not (is_good and self.share(system, other).max() < SCREEN * STEP_LIMIT):
+            if other.ratio == DOUBLES and not (is_good and self.share(system, other).max() < SCREEN * self.limit):
                 other = Companion.begun(self.integrator, other.begin, other.start, HALVES)
                 work.solver.c_k[...] = 0.0
                 is_good = other.follow(system, work, end, last, t0, h)
@@ -199,11 +216,11 @@ class StepWatch:
                 self.companion, self.is_calm, self.next = None, True, last
                 return None
         t = t0 + last * h
-        is_judged = last >= max(FIRST_VERDICT, min(self.n_total, self.most_beside) // 2)
+        is_judged = last >= max(FIRST_VERDICT, min(self.n_total, BESIDE) // 2)
         note = self.judged(system, t, h) if is_judged else None
         largest = float(self.share(system, other).max())
-        is_over = self.spent + last - other.start >= self.most_beside or self.note is not None
-        is_calm = last >= CALM_STEPS and self.n_total > BESIDE and largest * self.n_total / last < CALM * STEP_LIMIT
+        is_over = self.spent + last - other.start >= BESIDE or self.note is not None
+        is_calm = last >= CALM_STEPS and self.is_long and largest * self.n_total / last < CALM * self.limit
         if is_over or is_calm or last % RESTART_STEPS == 0:
             self.leave(h)
         if is_over or is_calm:
@@ -303,22 +320,22 @@ class StepWatch:
             return None
         share = self.share(system, companion)
         i = int(np.argmax(share.max(axis=1)))
-        largest = float(share[i].max())
-        if not largest > STEP_LIMIT:
+        largest, limit = float(share[i].max()), self.limit
+        if not largest > limit:
             return None
         if self.note is not None:
             if largest > self.note.largest:
                 self.note = replace(self.note, largest=largest, t_largest=t)
             return None
         turn = f"it turns by up to {self.turn[i]:.2g} rad in a step; " if self.turn[i] > 0.1 else ""
-        finer = h * np.sqrt(AIM * STEP_LIMIT / largest)
+        finer = h * np.sqrt(AIM * limit / largest)
         advice = f"take a step of about {finer:.1g}"
         tolerance = getattr(self.integrator, "error_tolerance", None)
         if tolerance is not None:
-            finer = tolerance * (AIM * STEP_LIMIT / largest) ** 1.5
+            finer = tolerance * (AIM * limit / largest) ** 1.5
             advice = f"take an error_tolerance of about {finer:.1g}"
         self.note = ValidityNote(
-            compiled_system(system).body_names[i], "steps", STEP_LIMIT, largest, t, t, advice=turn + advice
+            compiled_system(system).body_names[i], "steps", limit, largest, t, t, advice=turn + advice
         )
         return self.note
 
