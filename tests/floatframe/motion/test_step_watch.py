@@ -126,7 +126,7 @@ PLACE = np.array([30.0, -20.0, 10.0])
 
 
 @pytest.mark.parametrize(
-    ("first", "h", "formulation"), [(0.3, 0.02, "absolute"), (0.3, 0.02, "relative"), (1.0, 0.01, "absolute")]
+    ("first", "h", "formulation"), [(0.3, 0.02, "absolute"), (0.3, 0.02, "relative"), (1.0, 0.02, "absolute")]
 )
 def test_errors_that_the_motion_magnifies_are_told(first, h, formulation):
     """Sums of the errors of single steps, which know no growth, stay below the limit in some of these."""
