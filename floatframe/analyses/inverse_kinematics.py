@@ -1,14 +1,15 @@
-"""Inverse kinematics: joint coordinates that bring markers to places and turns, in trees and loops, within limits.
+"""Inverse kinematics: joint coordinates that bring markers to given positions and orientations, within limits.
 
-Unknown are small motions of all bodies (modes at rest) that the joints allow. With errors e of the targets, their rows
-J, the held rows G of joints and couplers, and the rows X of the joint coordinates x, in one iteration
+The unknowns are small motions of all bodies (without modes) that the joints allow. With the errors e of the targets,
+their rows J, the constraint rows G of joints and couplers, and the rows X of the joint coordinates x, one iteration
+consists of
 
     (1) N, a basis of the motions with G y = 0
-    (2) a by least |J N a - e|² + mu |a|² with lower <= x + X N a <= upper (Lawson and Hanson's least distance)
-    (3) bodies moved by N a, joints closed again, and coordinates that a limit was passed by brought back to it; mu
-        falls where the errors did, and rises where they did not
+    (2) a from least |J N a - e|² + mu |a|² with lower <= x + X N a <= upper (least distance of Lawson and Hanson)
+    (3) the bodies are moved by N a, joint constraints are restored, and coordinates beyond a limit are brought back to
+        it; mu decreases if the errors did, and increases otherwise
 
-Where the targets are out of reach, it ends where no allowed motion lessens the errors: the nearest place, told apart.
+If the targets are out of reach, the search ends where no allowed motion reduces the errors, and reports this.
 """
 
 from collections.abc import Mapping, Sequence
@@ -41,33 +42,33 @@ from floatframe.system import System
 
 __all__ = ["ReachedPose", "Target", "inverse_kinematics"]
 
-FREE = 1e-9  #: singular value of the held rows, of one unit, of a motion that they allow
-MOST_TURN = 0.5  #: rad, and part of the size of the system: in one iteration
-WITHIN = 1e-12  #: by which a coordinate may be beyond its limit [rad or m]
-MOST_RETURNS = 10  #: of a coordinate to its limit, each by Newton's method
-NO_WAY = 1e-11  #: size of an iteration that is no way any more
+FREE = 1e-9  #: singular value of the scaled constraint rows below which a motion is allowed
+MOST_TURN = 0.5  #: in one iteration: rotation [rad], and translation relative to the size of the system
+WITHIN = 1e-12  #: amount by which a coordinate may be beyond its limit [rad or m]
+MOST_RETURNS = 10  #: largest number of Newton iterations to bring a coordinate back to its limit
+NO_WAY = 1e-11  #: size of an iteration below which the search has ended
 
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """Where a marker is to be, how it is to be turned, or both; in ground axes."""
+    """Desired position or orientation of a marker, or both, in ground axes."""
 
     marker: Marker
-    position: Array | Sequence[float] | None = None  #: (3,) [m]; None: anywhere
-    rotation: Array | None = None  #: its axes as columns, (3, 3); None: turned in any way
-    weight: float = 1.0  #: beside other targets, above zero
+    position: Array | Sequence[float] | None = None  #: (3,) [m]; None: any position
+    rotation: Array | None = None  #: axes as columns, (3, 3); None: any orientation
+    weight: float = 1.0  #: relative to other targets, above zero
 
 
 @dataclass(frozen=True, eq=False)
 class ReachedPose:
-    """What inverse kinematics found."""
+    """The result of inverse kinematics."""
 
     state: State  #: of the system, at rest
     coordinates: Mapping[str, float]  #: of all joints, by "joint.coordinate"
-    position_error: float  #: largest distance from a target [m]
-    rotation_error: float  #: largest turn from a target [rad]
+    position_error: float  #: largest distance from a target position [m]
+    rotation_error: float  #: largest rotation from a target orientation [rad]
     is_reached: bool  #: whether all targets are met within the tolerance
-    at_limits: tuple[str, ...]  #: coordinates that stand at a limit
+    at_limits: tuple[str, ...]  #: coordinates that are at a limit
     n_iterations: int
 
 
@@ -79,28 +80,28 @@ def inverse_kinematics(
     tolerance: float = 1e-10,
     max_iterations: int = 200,
 ) -> ReachedPose:
-    """Return the pose near the placed one in which markers are where they are to be, or as near as joints allow.
+    """Return the pose near the assembled one in which markers reach their targets, or are as near as joints allow.
 
-    Bodies keep the deformation they are placed in; prescribed motions stay at t = 0. Another way to bend an elbow is
-    another start: place the bodies there.
+    Bodies keep their initial deformation; prescribed motions are evaluated at t = 0. Another solution, such as the
+    other bend of an elbow, is found from another initial position of the bodies.
 
     Parameters
     ----------
     system
-        Placed where the search begins, within the limits.
+        The system; the search begins at its assembled position, which must be within the limits.
     targets
         One or more.
     limits
-        By "joint.coordinate": lower and upper, None for none [rad or m]. Those of stops of the system count too.
+        Lower and upper limit by "joint.coordinate", None for no limit [rad or m]. Stops of the system are also limits.
     tolerance
-        Of the errors: turns [rad], distances by the size of the system.
+        Tolerance of the errors: rotations [rad], distances relative to the size of the system.
     max_iterations
-        After which the search ends, not reached.
+        Largest number of iterations, after which the target is not reached.
 
     Raises
     ------
     ModelError
-        If there is no target, a coordinate does not exist, or the placed one is beyond its limits.
+        If there is no target, a coordinate does not exist, or the assembled position is beyond its limits.
     """
     goals = [targets] if isinstance(targets, Target) else list(targets)
     if not goals:
@@ -110,7 +111,7 @@ def inverse_kinematics(
 
 
 class Search:
-    """One search: its targets and limits."""
+    """A search, with its targets and limits."""
 
     def __init__(self, system: System, goals: list[Target], limits: dict[str, tuple[float | None, float | None]]):
         where = "inverse_kinematics"
@@ -159,7 +160,7 @@ class Search:
             )
 
     def values(self, state: State, before: Mapping[str, float]) -> dict[str, float]:
-        """Return all joint coordinates at a state; angles go on from those before."""
+        """Return all joint coordinates at a state; angles are counted on from those before."""
         found: dict[str, float] = {}
         placed = self.compiled.placed
         for joint in self.system.joints:
@@ -178,11 +179,11 @@ class Search:
         return found
 
     def limited(self, values: Mapping[str, float]) -> Array:
-        """Return the coordinates that have limits, (n,)."""
+        """Return the values of the coordinates that have limits, (n,)."""
         return np.array([values[name] for name in self.names])
 
     def errors(self, state: State) -> tuple[Array, float, float]:
-        """Return weighted errors, distances by the size of the system; the largest distance and the largest turn."""
+        """Return weighted errors (distances relative to the system size), largest distance, and largest rotation."""
         parts, far, turned = [], 0.0, 0.0
         for at, r, R, weight in self.goals:
             x, A = marker_pose(at, state, self.n_q)
@@ -196,12 +197,12 @@ class Search:
         return np.concatenate(parts), far, turned
 
     def rows(self, state: State) -> tuple[Array, Array, Array]:
-        """(1): return N, J N and X N at a state."""
+        """Return N, J N and X N at a state, step (1)."""
         compiled, work, length = self.compiled, self.work, self.compiled.length
         model = compiled.model
         set_iterate(work, state)
         G = linearized(model, work, 1.0, 0.0, 0.0).G.toarray()[is_held(model.rows.kind)]
-        unit = np.zeros(G.shape[1])  # a length for translations, one for rotations, zero for modes
+        unit = np.zeros(G.shape[1])  # a length for translations, 1 for rotations, 0 for modes
         unit[self.rigid] = np.tile(np.repeat([length, 1.0], 3), len(compiled.body_names))
         scaled = (G * unit)[:, self.rigid]
         size = np.linalg.norm(scaled, axis=1, keepdims=True)
@@ -223,7 +224,7 @@ class Search:
         return N, np.concatenate(J), X
 
     def within(self, state: State, before: Mapping[str, float]) -> State:
-        """(3): return the state with coordinates beyond a limit brought back to it, joints closed."""
+        """Return the state with coordinates brought back to their limits and restored joint constraints, step (3)."""
         model = self.compiled.model
         for _ in range(MOST_RETURNS):
             x = self.limited(self.values(state, before))
@@ -236,7 +237,7 @@ class Search:
         return state
 
     def run(self, tolerance: float, most: int) -> ReachedPose:
-        """Return the pose found."""
+        """Return the resulting pose."""
         compiled = self.compiled
         state, values, mu = self.state, self.values(self.state, {}), 1e-3
         error, far, turned = self.errors(state)
@@ -255,7 +256,7 @@ class Search:
             tried = displaced(compiled.model, state, in_ground_axes(compiled.model, state, y))
             try:
                 tried = self.within(assembled(compiled, self.work, tried), values)  # (3)
-            except ModelError:  # too far for the joints to close
+            except ModelError:  # too far for the joint constraints to be satisfied
                 mu = max(10 * mu, 1e-6)
                 continue
             found, new_far, new_turned = self.errors(tried)
@@ -281,8 +282,8 @@ class Search:
 def least_within(A: Array, e: Array, mu: float, X: Array, lower: Array, upper: Array) -> Array:
     """Return a with least |A a - e|² + mu |a|² and lower <= X a <= upper, (n,), by Lawson and Hanson's least distance.
 
-    With H = AᵀA + mu 1 = L Lᵀ and z = Lᵀ a - L⁻¹ Aᵀ e it is the shortest z with C z >= d, found by nonnegative least
-    squares. Bounds that a = 0 breaks by rounding are taken as met by it.
+    With H = AᵀA + mu 1 = L Lᵀ and z = Lᵀ a - L⁻¹ Aᵀ e, it is the shortest z with C z >= d, found by nonnegative least
+    squares. Bounds that a = 0 violates only by rounding are taken as satisfied.
     """
     H = A.T @ A
     H[np.diag_indices_from(H)] += max(mu, 1e-14 * max(float(np.trace(H)), 1e-300))

@@ -1,12 +1,13 @@
-"""Towards an equilibrium by loads that grow: for those whose flow (`equilibrium`) loses its way.
+"""Equilibrium by increasing loads, for systems in which the flow of `equilibrium` fails.
 
-At a state x0 forces f0 are out of balance, and rows g0 open. The equilibria of
+At a state x0, the forces f0 are unbalanced, and the rows have errors g0. The equilibria of
 
     (1) f(x, w) = (1 - p) f0,   g(x, w) = (1 - p) g0
 
-lead from x0 at p = 0 to that of the system at p = 1. Each is found by Newton's method from the one before, roughly on
-the way; p takes longer steps while that is quick, and half as long ones where it is not. (Newton homotopy, [1]_.) Where
-p hardly grows any more, as where the way turns back, it is given up.
+form a path from x0 at p = 0 to the equilibrium of the system at p = 1. Each is found by Newton's method from the
+previous one, with a rough tolerance on the way. The steps of p are doubled if this is quick, and halved if it is not
+(Newton homotopy, [1]_). If p hardly increases any more, for example because the path turns back, the search is
+abandoned.
 
 .. [1] Allgower & Georg 1990.
 """
@@ -25,34 +26,36 @@ from floatframe.state import State
 __all__ = ["LARGEST", "Balance", "Led", "is_left_by_none", "led_equilibrium"]
 
 FIRST, LEAST = 0.25, 1e-3  #: steps of p
-QUICK, MOST = 4, 8  #: iterations of one p: after so few the next step is twice as long; after so many it is given up
-SHRUNK = 0.5  #: an iteration by the one before the last, above which one p is given up
-AFTER_FAILURE = 2  #: steps of p after a failure that are not followed by a longer one
-LONGEST = 0.3  #: rad, and part of the size of the system, in one iteration
-SETTLED = 1e-7  #: the same, of an iteration after which the last equilibrium is taken as found
-ROUGH, OF_FIRST = 1e-2, 0.1  #: of one on the way, and by the first iteration of its p: what is left goes with the next
-PATIENCE, ADVANCE = 40, 0.02  #: solves in which p has to grow by so much
+QUICK, MOST = 4, 8  #: iterations for one p: after at most QUICK, the next step is doubled; after MOST, it is abandoned
+SHRUNK = 0.5  #: ratio of the last two iterations above which one p is abandoned
+AFTER_FAILURE = 2  #: number of steps of p after a failure that are not lengthened
+LONGEST = 0.3  #: in one iteration: rotation [rad], and translation relative to the size of the system
+SETTLED = 1e-7  #: the same, for the iteration after which the last equilibrium is accepted
+#: the same on the way, absolute and relative to the first iteration of a p; the rest is left to the next p
+ROUGH, OF_FIRST = 1e-2, 0.1
+PATIENCE, ADVANCE = 40, 0.02  #: number of solves in which p has to increase by ADVANCE
 MOST_SOLVES = 300
-LARGEST = 4000  #: unknowns up to which this is tried: whether the flow leaves an equilibrium takes dense eigenvalues
-LEAVING = 1e-9  #: of the fastest rate of the flow, below which one is rounding
+LARGEST = 4000  #: largest number of unknowns for this method, because the check of the flow needs dense eigenvalues
+LEAVING = 1e-9  #: relative to the fastest rate of the flow; smaller rates are rounding errors
 
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """What is out of balance at a state and wrenches, and the way Newton's method goes from there."""
+    """Unbalanced forces and constraint errors at a state and wrenches, and the Newton step from there."""
 
     forces: Array  #: f, (n_u,)
     gaps: Array  #: g, (n_w,)
-    way: Callable[[Array, Array], tuple[Array, Array]]  #: of forces and gaps to take off: (n_u,) in ground axes, (n_w,)
+    #: from forces and errors to be removed to the step: (n_u,) in ground axes, (n_w,)
+    way: Callable[[Array, Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True, eq=False)
 class Led:
-    """Where loads that grow have led."""
+    """The end of the path of increasing loads."""
 
     state: State
     w: Array  #: wrenches, (n_w,)
-    p: float  #: part of the loads that is balanced there; 1: near an equilibrium of the system
+    p: float  #: fraction of the loads that is balanced there; 1: near an equilibrium of the system
     n_solves: int
 
 
@@ -63,24 +66,24 @@ def led_equilibrium(
     displaced: Callable[[State, Array], State],
     length_of: Callable[[Array], float],
 ) -> Led:
-    """Return how far the loads have led, and the state and wrenches there; p = 0 if they did not begin to.
+    """Return the largest fraction of the loads reached, with its state and wrenches; p = 0 if none was reached.
 
     Parameters
     ----------
     state, w
-        Where to begin.
+        Initial state and wrenches.
     balance
-        What is out of balance at a state; None where that is no number.
+        Unbalanced forces at a state; None if they are not finite.
     displaced
-        The state after a way, (n_u,) in ground axes.
+        The state after a step, (n_u,) in ground axes.
     length_of
-        Largest translation of a way by the size of the system, or rotation [rad].
+        Largest translation of a step relative to the size of the system, or rotation [rad].
     """
     begun = balance(state, w)
     if begun is None:
         return Led(state, w, 0.0, 0)
     p, step, n_solves, waiting = 0.0, FIRST, 0, 0
-    seen = [(0, 0.0)]  #: solves and p, the first one more than `PATIENCE` solves ago or at the begin
+    seen = [(0, 0.0)]  #: solves and p; the first entry is more than `PATIENCE` solves ago, or the beginning
     while p < 1.0:
         target = min(1.0, p + step)
         x, y, at = state, w, begun if p == 0.0 else balance(state, w)
@@ -112,18 +115,18 @@ def led_equilibrium(
 
 
 def is_left_by_none(parts: Linearized, K: tuple[Array, ...], W: tuple[Array, ...]) -> bool:
-    """Whether the flow W dx/dtau = -f, with all joints closed, leads back to an equilibrium from all places near by.
+    """Return whether the flow W dx/dtau = -f, with satisfied joints, returns to an equilibrium from all nearby states.
 
-    Loads that grow go along branches which the flow leaves, such as a beam that stays straight beyond its buckling. The
-    rates are the eigenvalues of [[K, -Jᵀ], [G, V]] over [[W, 0], [0, 0]]; one below zero leads away. It is for systems
-    of up to `LARGEST` unknowns.
+    Increasing loads follow branches which the flow leaves, such as a beam that stays straight beyond its buckling load.
+    The rates are the eigenvalues of [[K, -Jᵀ], [G, V]] relative to [[W, 0], [0, 0]]; a rate below zero leads away. Only
+    for systems with at most `LARGEST` unknowns.
     """
     n_u, n_w = parts.J.shape[1], parts.J.shape[0]
     A = sp.block_array([[sp.block_diag(K), -parts.J.T], [parts.G, parts.V]]).toarray() if n_w else la.block_diag(*K)
     B = np.zeros_like(A)
     B[:n_u, :n_u] = la.block_diag(*W)
-    try:  # the largest of 1/rate: 0 where joints hold, and one over a negative rate is negative
+    try:  # eigenvalues 1/rate: 0 for constraints; a negative rate has a negative inverse
         inverse = np.linalg.eigvals(np.linalg.solve(A, B)).real
-    except np.linalg.LinAlgError:  # singular, or no numbers
+    except np.linalg.LinAlgError:  # singular, or not finite
         return False
     return bool(inverse.min() >= -LEAVING * np.abs(inverse).max())

@@ -1,4 +1,4 @@
-"""Inputs and outputs of a linearised system: what acts on it, and which columns of sensors are observed."""
+"""Inputs and outputs of a linearised system: loads and motions that act on it, and observed columns of sensors."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ __all__ = [
 
 
 class AnyOutput(Protocol):
-    """A sensor: what it measures over time, and what it sees of small motions."""
+    """A sensor, with its measurement over time and its linearisation."""
 
     @property
     def name(self) -> str:
@@ -42,7 +42,7 @@ class AnyOutput(Protocol):
         """Return named columns over time."""
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the same columns by small motions, as far as they are linear."""
+        """Return the same columns as functions of small motions, as far as they are linear."""
 
 
 AnyInput = Channel | CoordinateChannel | DriveMotion | BaseMotion | ParameterInput | ForceInput
@@ -54,7 +54,7 @@ class Column:
 
     sensor: AnyOutput
     column: str  #: such as "force x"
-    name: str = ""  #: default: "sensor.column"
+    name: str = ""  #: name of the output; default: "sensor.column"
 
     def __post_init__(self) -> None:
         if not self.name:
@@ -67,7 +67,7 @@ class Column:
         return Measurement(self.name, found.t, {VALUE: found.columns[self.column]}, {VALUE: found.units[self.column]})
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return the column by small motions; `ModelError` where it is not linear."""
+        """Return the column as a function of small motions; `ModelError` if it is not linear."""
         found = self.sensor.linear(small)
         self.require([*found.columns, *found.not_linear])
         if self.column in found.not_linear:
@@ -84,22 +84,22 @@ class Column:
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """Outputs by small motions."""
+    """Outputs as functions of small motions."""
 
     names: tuple[str, ...]
     units: tuple[str, ...]
-    rows: Rows  #: a row an output
-    values: Array  #: in the steady motion, (n_outputs,)
-    left_out: dict[str, str]  #: columns that are not linear about it, and why
+    rows: Rows  #: one row for each output
+    values: Array  #: values in the steady motion, (n_outputs,)
+    left_out: dict[str, str]  #: columns that are not linear about it, with the reasons
 
 
 def observed(small: SmallMotions, outputs: Iterable[AnyOutput]) -> Observed:
-    """Return the columns of outputs by small motions; a sensor of one column goes by its own name.
+    """Return the columns of outputs as functions of small motions; a sensor with one column keeps its own name.
 
     Raises
     ------
     ModelError
-        If an output names what does not exist, a column asked for is not linear, or two outputs have one name.
+        If an output refers to an unknown object, a requested column is not linear, or two outputs have the same name.
     """
     names: list[str] = []
     units: list[str] = []
@@ -122,17 +122,17 @@ def observed(small: SmallMotions, outputs: Iterable[AnyOutput]) -> Observed:
 
 
 def inputs_of(carried: Iterable[Named]) -> tuple[AnyInput, ...]:
-    """Return the inputs that a system carries: it knows their names only."""
+    """Return the inputs of a system, for which it stores a general type."""
     return cast(tuple[AnyInput, ...], tuple(carried))
 
 
 def outputs_of(carried: Iterable[Named]) -> tuple[AnyOutput, ...]:
-    """Return the outputs that a system carries: it knows their names only."""
+    """Return the outputs of a system, for which it stores a general type."""
     return cast(tuple[AnyOutput, ...], tuple(carried))
 
 
 def require_input(channel: Any) -> None:
-    """Raise `ModelError` unless a channel can act."""
+    """Raise `ModelError` unless a channel can be an input."""
     if isinstance(channel, StressChannel):
         raise ModelError(f"linearize: channel {channel.name!r} is a stress: expected a force or torque as an input")
     if not isinstance(channel, AnyInput):

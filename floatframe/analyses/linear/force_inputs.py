@@ -1,6 +1,6 @@
 """Amplitudes of point forces and load cases, and motors of joints, as inputs of a linearised system.
 
-Equations are linear in such an amplitude, so that its column is the difference of what they leave with it one larger:
+The equations are linear in such an amplitude a, so its column is the difference of their residuals for a + 1 and a:
 
     residual(a + 1) - residual(a) = -F,   rows(a + 1) - rows(a) = E
 """
@@ -29,7 +29,8 @@ from floatframe.system import System
 
 __all__ = ["ForceInput", "force_column", "force_input_unit", "forces_of_amplitude", "forces_with_amplitude"]
 
-WITH_AMPLITUDE = {PointForce: "amplitude", BodyLoad: "amplitude", JointForce: "motor"}  #: kind of force -> its function
+#: type of force -> name of its function of time
+WITH_AMPLITUDE = {PointForce: "amplitude", BodyLoad: "amplitude", JointForce: "motor"}
 
 
 @frozen_copies
@@ -37,24 +38,24 @@ WITH_AMPLITUDE = {PointForce: "amplitude", BodyLoad: "amplitude", JointForce: "m
 class ForceInput:
     """A force of the system as an input: the change of its amplitude, or of the motor of a joint force.
 
-    Of a point force or load case the input is a factor; of a joint force it is the force or torque itself.
+    For a point force or load case, the input is a factor; for a joint force, it is the force or torque itself.
     """
 
     name: str
     force: str  #: name of a point force, a load case (`BodyLoad`) or a `JointForce`
 
     def force_units(self, units: Units) -> str:
-        """Return its unit, as far as it is known without the system."""
+        """Return its unit, if it is known without the system."""
         return "1"
 
 
 def forces_with_amplitude(system: System) -> dict[str, Any]:
-    """Return name -> force of those whose amplitude or motor can be an input."""
+    """Return the forces, by name, whose amplitude or motor can be an input."""
     return {force.name: force for force in system.forces if isinstance(force, PointForce | BodyLoad | JointForce)}
 
 
 def force_of(system: System, channel: ForceInput) -> Any:
-    """Return the force that is meant; `ModelError` with the nearest name if there is none."""
+    """Return the force of the input; `ModelError` with the nearest name if there is none."""
     known = forces_with_amplitude(system)
     if channel.force not in known:
         names = [force.name for force in system.forces if hasattr(force, "name")]
@@ -77,7 +78,7 @@ def force_input_unit(system: System, channel: ForceInput) -> str:
 
 
 def force_column(small: SmallMotions, channel: ForceInput) -> tuple[Array, Array]:
-    """Return forces on the bodies, (n_u,), and the part in the rows, (n_w,), of the input."""
+    """Return forces on the bodies, (n_u,), and the column in the rows, (n_w,), of the input."""
     force = force_of(small.system, channel)
     key = WITH_AMPLITUDE[type(force)]
     given = getattr(force, key)
@@ -96,7 +97,7 @@ def force_column(small: SmallMotions, channel: ForceInput) -> tuple[Array, Array
 
 
 def forces_of_amplitude(system: System, now: Trajectory, channel: ForceInput) -> tuple[InputForce, ...]:
-    """Return what the input does at an interface of a flexible body, or that it is a load case of one."""
+    """Return the loads of the input on interfaces of a flexible body, or that it is a load case of the body."""
     force = force_of(system, channel)
     if isinstance(force, BodyLoad):
         return (InputForce(body_name(force.body), "", np.zeros(6), force.load_case),)
@@ -111,7 +112,7 @@ def forces_of_amplitude(system: System, now: Trajectory, channel: ForceInput) ->
             one = replace(load, force=replace(force, amplitude=None))
             six = amplitudes(one, np.zeros(1), R)[0]
             interface = system.bodies[i].reduced.interfaces[load.interface]  # type: ignore[union-attr]
-            # a follower turns with its marker, and that with the interface
+            # a follower force rotates with its marker, which rotates with the interface
             turn = interface.Psi[3:] @ now.body(name).q[0] if force.is_follower else np.zeros(3)
             turned = R[0] @ rotation_matrix(euler_parameters_of_rotation_vector(turn))
             found.append(InputForce(name, interface.name, np.concatenate([turned @ six[:3], turned @ six[3:]])))

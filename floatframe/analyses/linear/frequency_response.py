@@ -1,4 +1,4 @@
-"""Frequency responses of a linearised system: amplitude and phase of every output over every input."""
+"""Frequency responses of a linearised system: amplitude and phase of every output divided by every input."""
 
 from dataclasses import dataclass
 
@@ -11,9 +11,9 @@ from floatframe.errors import ModelError
 
 __all__ = ["FrequencyResponse", "frequency_response", "resolved_frequencies"]
 
-AROUND = 12.0  #: half-widths of a resonance that get points of their own
-POINTS_AROUND = 40  #: even: none at its middle, where an undamped response is infinite
-LEAST_DAMPING = 1e-4  #: of a resonance, for its width: an undamped one is infinitely thin
+AROUND = 12.0  #: range around a resonance with additional points, in half-widths
+POINTS_AROUND = 40  #: even, so that none is at the middle, where an undamped response is infinite
+LEAST_DAMPING = 1e-4  #: least damping used for the width of a resonance, because an undamped one has zero width
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +24,7 @@ class FrequencyResponse:
     values: Array  #: (n_f, n_outputs, n_inputs), complex
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    units: tuple[tuple[str, ...], ...]  #: of each output over each input
+    units: tuple[tuple[str, ...], ...]  #: of each output divided by each input
 
     @property
     def amplitudes(self) -> Array:
@@ -33,7 +33,7 @@ class FrequencyResponse:
 
     @property
     def phases(self) -> Array:
-        """Phase of y over s, followed over the frequency from -180 to 180 at its start, same shape [degrees]."""
+        """Phase of y/s, continuous over the frequency, starting between -180 and 180, same shape [degrees]."""
         return np.degrees(np.unwrap(np.angle(self.values), axis=0))
 
 
@@ -43,14 +43,15 @@ def frequency_response(linear: LinearSystem, frequencies: Array) -> FrequencyRes
     Parameters
     ----------
     linear
-        With inputs and outputs.
+        The linearised system, with inputs and outputs.
     frequencies
-        Ascending, (n_f,) [1/unit of time of the system]; `resolved_frequencies` makes ones that show the resonances.
+        Ascending, (n_f,) [1/unit of time of the system]; `resolved_frequencies` returns frequencies that resolve
+        resonances.
 
     Raises
     ------
     ModelError
-        If there is no input or output, or frequencies are negative or not in order.
+        If there is no input or output, or frequencies are negative or not ascending.
     """
     f = np.asarray(frequencies, dtype=float)
     if f.ndim != 1 or not len(f) or not np.isfinite(f).all() or f[0] < 0 or (np.diff(f) <= 0).any():
@@ -69,7 +70,7 @@ def frequency_response(linear: LinearSystem, frequencies: Array) -> FrequencyRes
 
 
 def resolved_frequencies(linear: LinearSystem, first: float, last: float, *, n: int = 400) -> Array:
-    """Return frequencies evenly spaced in their logarithm, with more around each resonance between them, (n_f,).
+    """Return logarithmically spaced frequencies with additional ones around each resonance in the band, (n_f,).
 
     Raises
     ------

@@ -1,15 +1,16 @@
-"""Velocities that are held (rolling without slip) in the equations of small motions.
+"""Velocity constraints (rolling without slip) in the equations of small motions.
 
-With xi = N z, in which what joints hold of positions is fulfilled, rows that hold velocities say
+With xi = N z, which satisfies the position constraints, the velocity constraints are
 
     A z' + B z = 0,   A = G_v N,   B = (G_x + G_v Omega) N
 
-of first order. With A = U diag(sigma) Tᵀ and A S = 0, z = S y + T eta: eta is how far the system has come along what it
-may not slip. It stands among the states, and only the y, along which it rolls, have accelerations:
+of first order. With A = U diag(sigma) Tᵀ and A S = 0, z = S y + T eta. eta is the displacement of the system in the
+directions in which it may not slip. It is a state; only y, the directions in which the system rolls, have
+accelerations:
 
     eta' = -E y - F eta,   [E F] = diag(1/sigma) Uᵀ B [S T],   eta'' = -E y' + F E y + F F eta
 
-put into M z'' + C z' + K z = F, and Sᵀ before it, in which the forces Aᵀ lam that hold the velocities drop out.
+This is inserted into M z'' + C z' + K z = F, which is multiplied by Sᵀ, so that the constraint forces Aᵀ lam vanish.
 """
 
 from dataclasses import dataclass
@@ -23,12 +24,12 @@ from floatframe.errors import ModelError
 
 __all__ = ["Rolling", "rolled", "rolling"]
 
-RANK = 1e-10  #: singular value of the scaled rows below which one repeats others
+RANK = 1e-10  #: singular value of the scaled rows below which a row is redundant
 
 
 @dataclass(frozen=True, eq=False)
 class Rolling:
-    """How a system with held velocities may move."""
+    """The motions that velocity constraints allow."""
 
     S: Array  #: (n_z, n_y)
     T: Array  #: (n_z, n_eta)
@@ -36,17 +37,17 @@ class Rolling:
     by_eta: Array  #: F, (n_eta, n_eta)
 
     def places(self, n_states: int) -> Array:
-        """Return (z, states) by (y, eta, states)."""
+        """Return the matrix from (y, eta, states) to (z, states)."""
         return la.block_diag(np.hstack([self.S, self.T]), np.eye(n_states))
 
 
 def rolling(parts: Tangents, Omega: Array, N: Array, inputs: Inputs) -> Rolling | None:
-    """Return how held velocities split motions N z; None if there are none.
+    """Return the split of motions N z by velocity constraints; None if there are none.
 
     Raises
     ------
     ModelError
-        If an input moves what rolls, or held velocities depend on states or wrenches.
+        If an input moves a rolling part, or velocity constraints depend on states or wrenches.
     """
     rows = parts.rolls
     if not rows.any():

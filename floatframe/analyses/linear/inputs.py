@@ -1,12 +1,12 @@
 """Inputs of a linearised system: forces along channels, motions of drives and bases, parameters of user forces.
 
-Each enters the equations of `system_matrices` in its own way, s its value:
+With the value s of the input, each type enters the equations of `system_matrices` in its own way:
 
     force along y = J xi          F = Jᵀ, along a free joint coordinate E = 1 in the row of its joint
-    drive, g(x, f(t)) = 0         E = ∂g/∂f, the rate of the row for f = t while nothing moves
-    base, a rigid motion s of markers on the ground: E, E' = the rows by their places and by their velocities
+    drive, g(x, f(t)) = 0         E = ∂g/∂f, the rate of the row for f = t at rest
+    base, a rigid motion s of markers on the ground: E, E' = derivatives of the rows by their positions and velocities
     parameter p of Q = f(x, v, p)   E = -∂f/∂p
-    amplitude of a force, motor     F, E by what one more of it changes (`force_inputs`)
+    amplitude of a force, motor     F, E from a unit change (`force_inputs`)
 """
 
 from collections.abc import Sequence
@@ -51,12 +51,12 @@ __all__ = [
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class DriveMotion:
-    """The prescribed motion of a joint coordinate as an input: its change about the steady value, or a rate of it."""
+    """The prescribed motion of a joint coordinate as an input: its change about the steady value, or its rates."""
 
     name: str
     joint: str
     coordinate: str
-    rate: int = 2  #: the input is 0 the value, 1 its rate, 2 its second rate
+    rate: int = 2  #: quantity of the input: 0 the value, 1 its rate, 2 its second rate
 
     def __post_init__(self) -> None:
         require_input_rate(f"input {self.name!r}", self.rate)
@@ -69,18 +69,18 @@ class DriveMotion:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class BaseMotion:
-    """A motion of the base on which a system stands: of the ground side of its joints, springs and bushings.
+    """A motion of the base of a system, the ground side of its joints, springs and bushings.
 
-    Several bases are several inputs, each with its `joints`; coordinates of a joint that couplers and user forces take
-    go with it. All else of the ground stays where it is: gravity, and places against which sensors measure.
+    Several bases are several inputs, each with its `joints`; coordinates of these joints in couplers and user forces
+    are included. All other parts of the ground stay at rest: gravity, and the reference of sensors.
     """
 
     name: str
     direction: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))  #: ground axes, (3,)
-    quantity: str = "translation"  #: or "rotation", about the direction
-    about: Array = field(default_factory=lambda: np.zeros(3))  #: a point of the axis of a rotation, (3,) [m]
-    joints: Sequence[str] | None = None  #: joints, springs, bushings, couplers, user forces that move; None: all
-    rate: int = 2  #: the input is 0 the displacement, 1 the velocity, 2 the acceleration
+    quantity: str = "translation"  #: "translation", or "rotation" about the direction
+    about: Array = field(default_factory=lambda: np.zeros(3))  #: a point on the axis of a rotation, (3,) [m]
+    joints: Sequence[str] | None = None  #: moving joints, springs, bushings, couplers, user forces; None: all
+    rate: int = 2  #: quantity of the input: 0 the displacement, 1 the velocity, 2 the acceleration
 
     def __post_init__(self) -> None:
         where = f"input {self.name!r}"
@@ -100,14 +100,14 @@ class BaseMotion:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ParameterInput:
-    """A parameter of the expressions of a user force as an input: its change about the value it has."""
+    """A parameter of the expressions of a user force as an input: its change about its value."""
 
     name: str
     force: str  #: name of the user force
     parameter: str
 
     def force_units(self, units: Units) -> str:
-        """Return its unit: that of the parameter, which nobody says."""
+        """Return its unit, that of the parameter, which is unknown."""
         return "1"
 
 
@@ -118,17 +118,17 @@ def require_input_rate(where: str, rate: int) -> None:
 
 
 def input_rate(channel: Any) -> int:
-    """Return which rate of its motion an input is; 0 for forces."""
+    """Return the order of the derivative that is the input; 0 for forces."""
     return channel.rate if isinstance(channel, DriveMotion | BaseMotion) else 0
 
 
 def base_columns(system: System, inputs: Sequence[Any]) -> tuple[BaseColumn, ...]:
-    """Return what each input moves of the ground: of some connections, or nothing."""
+    """Return the motion of the ground for each input: of some connections, or none."""
     return tuple(base_column(system, each) if isinstance(each, BaseMotion) else BaseColumn() for each in inputs)
 
 
 def interface_forces(system: System, now: Trajectory, inputs: Sequence[Any]) -> tuple[tuple[InputForce, ...], ...]:
-    """Return what each input does at interfaces of flexible bodies, in a steady motion."""
+    """Return the loads of each input on interfaces of flexible bodies, in a steady motion."""
     found = []
     for channel in inputs:
         if isinstance(channel, ForceInput):
@@ -146,7 +146,7 @@ def interface_forces(system: System, now: Trajectory, inputs: Sequence[Any]) -> 
 
 
 def base_column(system: System, base: BaseMotion) -> BaseColumn:
-    """Return what a base moves; `ModelError` if it names what does not stand on the ground, or nothing does."""
+    """Return the motion of a base; `ModelError` if it refers to an object that is not on the ground, or to none."""
     compiled = compiled_system(system)
     model, names = compiled.model, compiled.connection_names
     on_ground = {
@@ -165,12 +165,12 @@ def base_column(system: System, base: BaseMotion) -> BaseColumn:
 
 
 def input_columns(small: SmallMotions, channels: Sequence[Any]) -> Inputs:
-    """Return how inputs enter the equations, a column each.
+    """Return the columns of inputs in the equations.
 
     Raises
     ------
     ModelError
-        If an input names what does not exist, or a base moves under a system that turns.
+        If an input refers to an unknown object, or a base moves under a rotating system.
     """
     columns = [column_of(small, k, channel) for k, channel in enumerate(channels)]
     empty = [np.zeros((small.n_u, 0)), np.zeros((small.n_w, 0)), np.zeros((small.n_w, 0))]
@@ -179,7 +179,7 @@ def input_columns(small: SmallMotions, channels: Sequence[Any]) -> Inputs:
 
 
 def column_of(small: SmallMotions, k: int, channel: Any) -> tuple[Array, Array, Array]:
-    """Return the column of input k: forces on bodies, (n_u,), and its part and that of its rate in the rows, (n_w,)."""
+    """Return the column of input k: body forces, (n_u,), and columns of input and its rate in the rows, (n_w,)."""
     F, E, E_rate = np.zeros(small.n_u), np.zeros(small.n_w), np.zeros(small.n_w)
     if isinstance(channel, DriveMotion):
         E = drive_rows(small, channel)
@@ -197,9 +197,9 @@ def column_of(small: SmallMotions, k: int, channel: Any) -> tuple[Array, Array, 
 
 
 def free_row(small: SmallMotions, channel: CoordinateChannel) -> int | None:
-    """Return the row that says what acts along a free coordinate, force + Q = 0; None where none does, as in screws.
+    """Return the row of the force along a free coordinate, force + Q = 0; None if there is none, as in screws.
 
-    A force there is one of the joint, so that its reaction holds it, as that of a `JointForce`.
+    A force in this row is an internal force of the joint, like that of a `JointForce`.
     """
     rows = small.compiled.model.rows.kind
     for k, own in enumerate(zip(small.compiled.owners, small.compiled.coordinates, strict=True)):
@@ -210,7 +210,7 @@ def free_row(small: SmallMotions, channel: CoordinateChannel) -> int | None:
 
 
 def drive_rows(small: SmallMotions, drive: DriveMotion) -> Array:
-    """Return the rates of rows at rest while a drive moves with unit rate and all others stand still, (n_w,)."""
+    """Return the rates of rows at rest while one drive moves at unit rate and all others are at rest, (n_w,)."""
     from floatframe.kernels.entry import rates_of_constraints
 
     system = small.system
@@ -242,7 +242,7 @@ def drive_rows(small: SmallMotions, drive: DriveMotion) -> Array:
 
 
 def base_rows(small: SmallMotions, base: BaseColumn, channel: BaseMotion) -> tuple[Array, Array]:
-    """Return E and E' of a base: the rows by its markers, P of joints/rows/kinds.py."""
+    """Return E and E' of a base from the rows by its markers, P of joints/rows/kinds.py."""
     from floatframe.kernels.entry import evaluate_and_linearize
 
     if small.is_turning:
@@ -252,7 +252,7 @@ def base_rows(small: SmallMotions, base: BaseColumn, channel: BaseMotion) -> tup
         )
     model, work = small.compiled.model, small.work
     head = np.array(model.laws.head)
-    head[:, 6] = -1  # elements tell the derivatives by their markers on the ground too
+    head[:, 6] = -1  # elements also return the derivatives by their markers on the ground
     evaluate_and_linearize(model._replace(laws=model.laws._replace(head=head)), work, 0.0, 0.0, 1.0)
     E, E_rate = np.zeros(small.n_w), np.zeros(small.n_w)
     for m in moved_markers(small, base):
@@ -271,7 +271,7 @@ def base_rows(small: SmallMotions, base: BaseColumn, channel: BaseMotion) -> tup
 
 
 def moved_markers(small: SmallMotions, base: BaseColumn) -> list[int]:
-    """Return the markers on the ground that a base moves; coordinates of joints in couplers go with their joints."""
+    """Return the markers on the ground that a base moves; coordinates of joints in couplers move with their joints."""
     model, names = small.compiled.model, small.compiled.connection_names
     owners = [names[c] if c >= 0 else "" for c in model.markers.connection]
     user_forces = [force for force in small.system.forces if isinstance(force, UserForce)]
@@ -284,7 +284,7 @@ def moved_markers(small: SmallMotions, base: BaseColumn) -> list[int]:
 
 
 def parameter_rows(small: SmallMotions, channel: ParameterInput) -> Array:
-    """Return -∂f/∂p in the rows of a user force, (n_w,): f by the value of a state that takes the place of p."""
+    """Return -∂f/∂p in the rows of a user force, (n_w,), from the derivative by a state that replaces p."""
     forces = [force for force in small.system.forces if isinstance(force, UserForce)]
     names = [force.name for force in forces]
     if channel.force not in names:

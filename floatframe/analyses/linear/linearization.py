@@ -1,19 +1,19 @@
-"""Linearisation of a system about an equilibrium or a steady motion, in coordinates that fulfil the joints.
+"""Linearisation of a system about an equilibrium or a steady motion, in coordinates that satisfy the joints.
 
-With N a basis of the motions the joints allow (G N = 0) and the matrices of `tangents`:
+With N a basis of the motions allowed by the joints (G N = 0), and the matrices of `tangents`:
 
     xi = N z,  nu = N z_dot + Omega N z
     M_z = Nᵀ M N,  C_z = Nᵀ (C N + M (Omega + Omega') N),  K_z = Nᵀ (K + C Omega + M Omega' Omega) N
 
-N does not change in time, because nothing does in axes that turn with the system; `steadiness` sees to that. Velocities
-that are held take some of the motions away, see `held_velocities`. Inputs s enter as forces, or move what joints hold:
-G Y + E = 0, and xi = N z + Y s with the Y that needs no force besides, the quasi-static shape, where K_z is regular:
+N is constant in time, because nothing changes in axes that rotate with the system; `steadiness` ensures this. Velocity
+constraints remove some of the motions, see `held_velocities`. Inputs s are forces, or move constraints, G Y + E = 0.
+Then xi = N z + Y s, where Y needs no additional force (the quasi-static shape) if K_z is regular:
 
     M_z z'' + C_z z' + K_z z = B s + B_rate s' + B_acceleration s''
     y = L z + L_rate z' + L_acceleration z'' + D s + D_rate s' + D_acceleration s''
 
-Outputs see wrenches too, which follow from both (`system_matrices`). States of elements and user forces come after the
-motions in z, with first-order equations: ones in C, none in M.
+Outputs also depend on wrenches, which follow from z and s (`system_matrices`). States of elements and user forces
+follow the motions in z. Their equations are of first order, with ones in C and zeros in M.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -67,16 +67,17 @@ if TYPE_CHECKING:
 
 __all__ = ["LinearSystem", "NamedMotions", "linearize"]
 
-RANK = 1e-10  #: singular value of the scaled rows below which one repeats others
-NOISE = 1e-10  #: of the largest of a motion, that is rounding
-STEADY = 1e-6  #: of its size, that a state which stands is from its rest, or moves in a unit of time
+RANK = 1e-10  #: singular value of the scaled rows below which a row is redundant
+NOISE = 1e-10  #: relative to the largest component of a motion; smaller ones are rounding errors
+#: largest distance of a state from rest, or its change per unit of time, relative to its size, in a steady motion
+STEADY = 1e-6
 TINY = float(np.finfo(float).tiny)
 MASSLESS = 1e-12  #: eigenvalue of the scaled mass matrix below which a motion has no mass
 
 
 @dataclass(frozen=True, eq=False)
 class NamedMotions:
-    """Motions that have a name, as rows over the independent motions z."""
+    """Motions with names, as rows over the independent motions z."""
 
     names: tuple[str, ...]
     units: tuple[str, ...]
@@ -86,13 +87,13 @@ class NamedMotions:
 
 
 def empty() -> Array:
-    """Return what stands for a matrix of zeros until its size is known."""
+    """Return the placeholder of a matrix of zeros whose size is not yet known."""
     return np.zeros((0, 0))
 
 
 @dataclass(frozen=True, eq=False)
 class LinearSystem:
-    """Small motions z about a steady one, inputs s and outputs y; n_s inputs.
+    """Small motions z about a steady motion, with n_s inputs s, and outputs y.
 
     M z'' + C z' + K z = B s + B_rate s' + B_acceleration s''
     y = L z + L_rate z' + L_acceleration z'' + D s + D_rate s' + D_acceleration s''
@@ -104,7 +105,7 @@ class LinearSystem:
     K: Array  #: with geometric, centrifugal and circulatory terms, (n_z, n_z)
     B: Array  #: (n_z, n_s)
     L: Array  #: (n_outputs, n_z)
-    N: Array  #: motions of the bodies (translation and rotation in body axes, modes) by z, (n_u, n_z)
+    N: Array  #: motions of the bodies (translation and rotation in body axes, modes) per z, (n_u, n_z)
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     body_names: tuple[str, ...]
@@ -116,18 +117,19 @@ class LinearSystem:
     D: Array = field(default_factory=empty)  #: (n_outputs, n_s)
     D_rate: Array = field(default_factory=empty)  #: (n_outputs, n_s)
     D_acceleration: Array = field(default_factory=empty)  #: (n_outputs, n_s)
-    Y: Array = field(default_factory=empty)  #: motions of the bodies by s beside those of z, (n_u, n_s)
-    input_rates: tuple[int, ...] = ()  #: r: the input is the r-th derivative of s; 0 for forces
+    Y: Array = field(default_factory=empty)  #: motions of the bodies per s, in addition to those of z, (n_u, n_s)
+    input_rates: tuple[int, ...] = ()  #: r, if the input is the r-th derivative of s; 0 for forces
     input_units: tuple[str, ...] = ()  #: of the inputs
     output_units: tuple[str, ...] = ()
     output_values: Array = field(default_factory=empty)  #: outputs in the steady motion, (n_outputs,)
-    left_out: Mapping[str, str] = field(default_factory=dict)  #: columns of outputs that are not linear here, and why
-    motions: NamedMotions | None = None  #: of which states can be made, see `state_space`
-    #: ways of held velocities, states of elements and user forces, the last of z: their rows of C are those of a unit
-    #: matrix, of M by z'' alone
+    #: columns of outputs that are not linear here, with the reasons
+    left_out: Mapping[str, str] = field(default_factory=dict)
+    motions: NamedMotions | None = None  #: motions that can become states, see `state_space`
+    #: displacements along velocity constraints, and states of elements and user forces, the last entries of z: their
+    #: rows of C are those of a unit matrix, and their rows of M depend only on z''
     states: tuple[str, ...] = ()
     state_units: tuple[str, ...] = ()
-    coordinates: tuple[str, ...] = ()  #: names of z, in relative coordinates without held velocities; else empty
+    coordinates: tuple[str, ...] = ()  #: names of z, for relative coordinates without velocity constraints; else empty
 
     def __post_init__(self) -> None:
         n_z, n_s, n_y = self.M.shape[0], len(self.inputs), len(self.outputs)
@@ -143,21 +145,21 @@ class LinearSystem:
 
     @property
     def n_z(self) -> int:
-        """Number of independent motions (the mobility, with the modes of flexible bodies), without states."""
+        """Number of independent motions (the mobility, including modes of flexible bodies), without states."""
         return int(self.M.shape[0]) - len(self.states)
 
     def bodies(self) -> Iterator[tuple[slice, Array]]:
-        """Yield for each body its rows of N and its mass matrix."""
+        """Yield the rows of N and the mass matrix of each body."""
         first = 0
         for mass in self.body_masses:
             yield slice(first, first + len(mass)), mass
             first += len(mass)
 
     def with_mass(self) -> tuple["LinearSystem", Array]:
-        """Return the system without its massless motions, which follow the others statically, and z by its motions.
+        """Return the system without its massless motions, which follow the others statically, and z per its motions.
 
-        What outputs see of these with inputs goes into D, D_rate and D_acceleration; third rates of inputs are left
-        out, and damping along motions without mass.
+        The direct effect of inputs on outputs through these motions is added to D, D_rate and D_acceleration. Third
+        rates of inputs, and damping along massless motions, are neglected.
         """
         dynamic, static = self.motions_with_and_without_mass()
         if not static.shape[1]:
@@ -177,45 +179,45 @@ class LinearSystem:
         return replace(self, **parts, Y=self.Y + self.N @ by_input[0], motions=motions, coordinates=()), T
 
     def motions_with_and_without_mass(self) -> tuple[Array, Array]:
-        """Return bases of z: motions with mass (orthonormal by it) and states, and motions without mass."""
+        """Return bases of z: motions with mass (orthonormal with respect to it) with states, and massless motions."""
         n, n_states = self.n_z, len(self.states)
         M = self.M[:n, :n]
         scale = 1 / np.sqrt(np.maximum(np.diag(M), np.finfo(float).tiny))
         values, vectors = la.eigh(scale[:, None] * M * scale)
         is_massive = values > MASSLESS
         static = scale[:, None] * vectors[:, ~is_massive]
-        # scaled so that a massless motion of tiny diagonal mass does not spoil the others
+        # scaled so that a massless motion with a tiny diagonal mass does not degrade the others
         static /= np.linalg.norm(static, axis=0)
         dynamic = la.block_diag(scale[:, None] * vectors[:, is_massive], np.eye(n_states))
         return dynamic, np.pad(static, ((0, n_states), (0, 0)))
 
     def feedthrough(self) -> Array:
-        """Return the part of outputs that follows inputs at once, D of the state space, (n_outputs, n_inputs).
+        """Return the direct effect of inputs on outputs, D of the state space, (n_outputs, n_inputs).
 
-        Velocities of motions without mass would be derivatives of the inputs, which a state space cannot hold: they
-        are left out.
+        Velocities of massless motions would be derivatives of the inputs, which a state space cannot contain; they are
+        neglected.
         """
         return np.asarray(self.state_space().D)
 
     def kept_inputs(self) -> list[tuple[int, int]]:
-        """Return (input, r) of each derivative of s that a state space needs as a state, with the input above it."""
+        """Return (input, r) for each derivative of s that a state space needs as a state, with its input."""
         return [(k, r) for k, rate in enumerate(self.input_rates) for r in range(rate) if self.sees_input(k, rate - 1)]
 
     def sees_input(self, k: int, most: int) -> bool:
-        """Return whether anything depends on a derivative of s of input k up to one, zero if that is below zero."""
+        """Return whether the equations depend on a derivative of s of input k up to order `most`; False below zero."""
         parts = [(self.B, self.D), (self.B_rate, self.D_rate), (self.B_acceleration, self.D_acceleration)]
         return any(part[:, k].any() for pair in parts[: most + 1] for part in pair)
 
     def state_space(self) -> "StateSpace":
         """Return A, B, C, D over (z, z_dot) of the motions with mass, then the states, as `scipy.signal.StateSpace`.
 
-        An input that is a velocity or acceleration adds what is below it as states (see `kept_inputs`), where anything
-        depends on that.
+        An input that is a velocity or acceleration adds its integrals as states (see `kept_inputs`), if the equations
+        depend on them.
 
         Raises
         ------
         ModelError
-            If an input is a displacement or velocity on whose derivative the motion depends.
+            If an input is a displacement or velocity, and the motion depends on its derivatives.
         """
         from scipy.signal import StateSpace
 
@@ -224,7 +226,7 @@ class LinearSystem:
         n, n_s, kept, m = system.n_z, len(system.inputs), system.kept_inputs(), len(system.states)
         factor = la.cho_factor(system.M[:n, :n])
         n_x = 2 * n + m + len(kept)
-        # s, s', s'' over the state x and the inputs u
+        # s, s', s'' as functions of the state x and the inputs u
         by_x, by_u = np.zeros((3, n_s, n_x)), np.zeros((3, n_s, n_s))
         for k, rate in enumerate(system.input_rates):
             by_u[rate, k, k] = 1.0
@@ -255,7 +257,7 @@ class LinearSystem:
         return StateSpace(A, B, C, D)
 
     def require_states(self) -> None:
-        """Raise `ModelError` if a motion that is an input would have to be differentiated for the equations."""
+        """Raise `ModelError` if the equations would require a derivative of a motion that is an input."""
         for k, rate in enumerate(self.input_rates):
             above = (self.B_rate, self.B_acceleration)[rate:] if rate < 2 else ()
             is_force = rate == 0 and not self.Y[:, k].any()
@@ -269,8 +271,8 @@ class LinearSystem:
     def response(self, frequencies: Array) -> Array:
         """Return the frequency response y/s at frequencies [Hz], (n_frequencies, n_outputs, n_inputs), complex.
 
-        At frequency zero a constant velocity or acceleration has an endless displacement: infinite where an output
-        depends on that.
+        At frequency zero, a constant velocity or acceleration has an unlimited displacement; the response is infinite
+        if an output depends on it.
         """
         H = np.empty((len(frequencies), len(self.outputs), len(self.inputs)), complex)
         rates = np.array(self.input_rates, dtype=int)
@@ -285,14 +287,14 @@ class LinearSystem:
                 )
                 H[k] = (self.L + s * self.L_rate + s**2 * self.L_acceleration) @ z
                 H[k] += self.D + s * self.D_rate + s**2 * self.D_acceleration
-            except np.linalg.LinAlgError:  # an undamped resonance, met exactly
+            except np.linalg.LinAlgError:  # an undamped resonance exactly at this frequency
                 H[k] = np.inf
             if rates.any():
                 H[k] /= s**rates
         return H
 
     def response_at_rest(self) -> Array:
-        """Return the response at frequency zero, where inputs are rates: the term of s^r of the series of y in s."""
+        """Return the response at frequency zero if inputs are rates: the coefficient of s^r in the series of y."""
         by_order: list[Array] = []
         z: list[Array] = []
         for order, (B, D) in enumerate(zip((self.B, self.B_rate, self.B_acceleration),
@@ -334,12 +336,12 @@ def linearize(
     system
         The system.
     about
-        As `static_equilibrium`, `steady_rotation` or `steady_motion` return it; the equilibrium at rest by default.
+        Result of `static_equilibrium`, `steady_rotation` or `steady_motion`; by default the equilibrium at rest.
     inputs
         Channels (forces along them), `DriveMotion`, `BaseMotion`, `ParameterInput`. None: those of the system.
     outputs
-        Sensors (an output for each column that is linear here, see `LinearSystem.left_out`), columns of them (`Column`)
-        and channels; directions turn with a steady rotation. None: those of the system.
+        Sensors (one output for each linear column, see `LinearSystem.left_out`), their columns (`Column`) and channels;
+        directions rotate with a steady rotation. None: those of the system.
     formulation
         "relative": z are the coordinates of the joints of the tree and the modes, less those that close its loops, and
         have names, `LinearSystem.coordinates`. "absolute": z are any independent motions.
