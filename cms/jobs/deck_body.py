@@ -423,7 +423,8 @@ def _placed(joined: "Joined", nodes: IntArray, where: str) -> IntArray:
 def _group(raw: "RawMesh", where: str, group: str | int) -> IntArray:
     """Return the rows of a group of nodes, or the row of the node with a number."""
     if isinstance(group, int):
-        found = np.flatnonzero(np.asarray(raw.node_numbers) == group) if raw.node_numbers is not None else np.zeros(0)
+        numbers = np.zeros(0, np.int64) if raw.node_numbers is None else np.asarray(raw.node_numbers)
+        found: IntArray = np.flatnonzero(numbers == group).astype(np.int64)
         if len(found) != 1:
             raise JobError(f"{where} = {group}: the deck has {len(found)} nodes with this number; expected one")
         return found
