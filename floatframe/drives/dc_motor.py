@@ -91,7 +91,7 @@ class DcMotor(Element):
             assert isinstance(self.voltage, TimeFunction)  # ensured by __post_init__
             supply = function_numbers(self.voltage)
         else:
-            supply = self.controller.numbers
+            supply = self.controller.numbers(1 / placed.units.time)
             if self.controlled == "angle":
                 states.append(("counted angle", "rad", 0.0))
             value = self.current if self.controlled == "current" else 0.0

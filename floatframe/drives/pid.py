@@ -16,7 +16,9 @@ __all__ = ["ANTI_WINDUP", "Pid", "pid_law", "target_of"]
 
 ANTI_WINDUP = ("none", "clamping", "back-calculation")
 NONE, CLAMPING, BACK_CALCULATION = range(3)
-BAND = 1e-3  #: width, relative to the range between the limits, over which clamping sets in
+#: width over which clamping sets in, relative to the range between the limits, to one limit, or, if that is 0, to
+#: kp e and what ki e adds in a second
+BAND = 1e-3
 PROPORTIONAL, INTEGRAL, DERIVATIVE, FILTER, LOW, HIGH, MODE, TRACKING, WIDTH, TARGET = range(10)
 
 
@@ -80,15 +82,15 @@ class Pid:
         starts = {"integral": (output, self.integral), "filtered error": (seen, self.target(0.0) - value)}
         return [(name, *starts[name]) for name in self.states]
 
-    @property
-    def numbers(self) -> list[float]:
-        """Data of `pid_law`."""
+    def numbers(self, second: float) -> list[float]:
+        """Return the data of `pid_law`; a second in the units of the system."""
         assert isinstance(self.target, TimeFunction)  # ensured by __post_init__
         huge = np.finfo(float).max
         limits = [-huge if self.lower is None else self.lower, huge if self.upper is None else self.upper]
         mode = ANTI_WINDUP.index(self.anti_windup) if self.lower is not None or self.upper is not None else NONE
         ends = [end for end in (self.lower, self.upper) if end is not None]
-        width = BAND * (max(ends) - min(ends) if len(ends) == 2 else abs(ends[0]) if ends and ends[0] != 0 else 1.0)
+        size = max(ends) - min(ends) if len(ends) == 2 else abs(ends[0]) if ends else 0.0
+        width = BAND * size if size > 0.0 else -BAND * (abs(self.kp) + abs(self.ki) * second)  # below 0: times |e|
         times = [self.filter_time or 0.0, *limits, mode, self.tracking_time or 0.0, width]
         return [self.kp, self.ki, self.kd, *times, *function_numbers(self.target)]
 
@@ -98,7 +100,7 @@ def margin(x, band):
     """Return 0 for x <= 0 and 1 for x >= band, smooth in between."""
     if x.real <= 0.0:
         return 0.0 * x
-    if x.real >= band:
+    if x.real >= band.real:
         return 0.0 * x + 1.0
     y = x / band
     return y * y * (3.0 - 2.0 * y)
@@ -134,6 +136,8 @@ def pid_law(t, value, data, at, z, z_dot, first):
         rate = ki * e
         if data[at + MODE] == CLAMPING:
             width = data[at + WIDTH]
+            if width < 0.0:
+                width = -width * (e if e.real > 0.0 else -e)
             rate = rate * (margin(high - u, width) if rate.real > 0.0 else margin(u - low, width))
         elif data[at + MODE] == BACK_CALCULATION:
             rate = rate + (limited - u) / data[at + TRACKING]

@@ -62,7 +62,7 @@ class PidDrive(Element):
         outputs = [(self.controlled, UNITS[mode]), acting, ("power in", "W"), ("error", UNITS[mode])]
         return ElementLaw(
             function=pid_drive_law,
-            data=[mode, self.time_constant, *shaft, *self.controller.numbers],
+            data=[mode, self.time_constant, *shaft, *self.controller.numbers(1 / placed.units.time)],
             states=[name for name, _, _ in states],
             start=[start for _, _, start in states],
             state_units=in_units(placed.units, [unit for _, unit, _ in states]),

@@ -95,7 +95,7 @@ class TorqueMap(Element):
             assert isinstance(self.throttle, TimeFunction)  # ensured by __post_init__
             supply = function_numbers(self.throttle)
         else:
-            supply = self.controller.numbers
+            supply = self.controller.numbers(1 / placed.units.time)
         at_efficiency = at + len(torque)
         head = [self.ratio, self.time_constant, 0.0 if self.controller is None else 1.0, *self.axis]
         head += [at, at_efficiency if efficiency else 0, at_efficiency + len(efficiency), 0, 0]

@@ -97,6 +97,8 @@ def segment_length(n_t: int, n_segment: int | None, overlap: float, averages: in
     if not 0 <= overlap < 1:
         raise SignalError(f"{where}: overlap = {overlap:g}: expected a number of 0 up to 1, that not included")
     n = n_segment if n_segment is not None else int(n_t / (1 + (averages - 1) * (1 - overlap)))
+    while n_segment is None and n > LEAST_SAMPLES and number_of_segments(n_t, n, overlap) < averages:
+        n -= 1  # an odd one overlaps by half a sample less
     if not LEAST_SAMPLES <= n <= n_t:
         raise SignalError(
             f"{where}: a segment of {n} samples: expected {LEAST_SAMPLES} up to the {n_t} samples of the record; take "

@@ -75,6 +75,22 @@ def test_controllers_that_do_not_wind_up_overshoot_less():
     assert followed < 0.7 * wound
 
 
+@pytest.mark.parametrize(("kp", "ki"), [(4.0, 20.0), (0.0, 20.0)])
+def test_the_only_limit_may_be_zero_in_a_system_of_any_size(kp, ki):
+    """A drive that cannot pull: a body and gains of a millionth do the same; the integral stops at the limit."""
+    found = []
+    for size in (1.0, 1e-6):
+        pid = Pid(harmonic(1.0, 2.0), size * kp, size * ki, lower=0.0)
+        rotor = RigidBody("rotor", mass=2.0 * size, inertia=size * np.diag([0.3, 0.3, J]))
+        system = System(
+            [rotor], [RevoluteJoint("hinge", A, B, axis=(0, 0, 1))], elements=[PidDrive("pid", A, B, pid, "speed")]
+        )
+        found.append(outputs(system, "pid", 1.0, 1e-3))
+    assert_allclose(found[1].outputs["speed"], found[0].outputs["speed"], rtol=0, atol=1e-6)
+    assert found[0].outputs["torque"].min() == 0.0 if kp else found[0].states["integral"].min() > -1e-3
+    assert found[0].outputs["torque"].max() > 0.5
+
+
 @pytest.mark.parametrize("anti_windup", ["none", "back-calculation"])
 def test_a_controlled_speed_is_that_of_an_independent_model(anti_windup):
     kp, ki, most, tracking = 4.0, 20.0, 2.0, 0.05

@@ -184,3 +184,10 @@ def test_eight_segments_fill_the_record_unless_their_length_is_given(overlap):
     density = psd(noise(round(n + 7 * (1 - overlap) * n)), RATE, overlap=overlap)
     assert density.n_averages == 8
     assert_allclose(density.resolution, RATE / n, rtol=1e-12, atol=0)
+
+
+@pytest.mark.parametrize("overlap", [0.0, 0.25, 0.5, 0.75])
+def test_eight_segments_fit_into_records_of_any_length(overlap):
+    """Odd segments overlap by half a sample less than asked for: seven of them fitted in every other record."""
+    for n_t in range(300, 340):
+        assert psd(noise(n_t), RATE, overlap=overlap).n_averages == 8
