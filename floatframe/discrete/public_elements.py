@@ -29,6 +29,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.compiling.callbacks.law_functions import called_law
+from floatframe.compiling.coordinate_elements import LEAST_SIZE
 from floatframe.discrete.constraints import Span
 from floatframe.discrete.markers import Load, MarkerStep
 from floatframe.discrete.rotation import cayley
@@ -43,7 +44,7 @@ WAY = 1 / 64  #: of the step, on which the gradient of the potential is taken
 FIRST = (-1 / 60, 9 / 60, -45 / 60, 0.0, 45 / 60, -9 / 60, 1 / 60)
 LEAST = 1e-6  #: of the length of the law: motions below it are none
 BALANCED = 1e-9  #: sum of wrenches over that of their sizes
-STEP = 1e-5  #: of the differences by which derivatives are taken
+STEP = 1e-5  #: of the differences by which derivatives are taken, by the sizes of the inputs
 
 
 Place = tuple[Array, Array]  #: position and axes of a marker
@@ -114,13 +115,24 @@ class Motion:
 
         values = at(np.real(flat))
         if np.iscomplexobj(flat):
-            size = np.abs(np.imag(flat)).max(axis=1, initial=0.0)
+            size = np.abs(np.imag(flat) / self.sizes(np.real(flat))).max(axis=1, initial=0.0)
             moved = np.flatnonzero(size > 0)
             way = STEP * np.imag(flat[moved]) / size[moved, None]
             change = at(np.real(flat[moved]) + way) - at(np.real(flat[moved]) - way)
             values = values.astype(complex)
             values[moved] += 1j * change * (0.5 * size[moved] / STEP)[:, None]
         return values.reshape(*inputs.shape[:-1], -1)
+
+    def sizes(self, inputs: Array) -> Array:
+        """Return sizes of the inputs, (n, n_in), by which differences are taken; nothing takes those by the time."""
+        laws, i = self.model.laws, self.i
+        n, _, n_z, n_lam, _, n_data = (int(each) for each in self.head[:6])
+        known = laws.data[laws.data0[i] + n_data : laws.data0[i + 1]]
+        marker = np.repeat([known[0], 1.0, known[1], known[2]], [3, 9, 3, 3])
+        own, here = known[len(known) - n_z - n_lam :], np.abs(inputs[:, inputs.shape[1] - n_z - n_lam :])
+        unknowns = np.where(own > 0.0, own, np.maximum(here, LEAST_SIZE))
+        places = np.concatenate([[1.0], *[marker] * n])
+        return np.hstack([np.broadcast_to(places, (len(inputs), len(places))), unknowns])
 
     def wrenches(self, outputs: Array) -> Array:
         """Return the wrenches of what the law gives, (..., n, 6)."""

@@ -37,7 +37,7 @@ BINARY: dict[int, Callable[[float, float], float]] = {
     ex.DIVIDE: lambda x, y: x / y, ex.POWER: lambda x, y: x**y, ex.ATAN2: math.atan2,
     ex.LESS: lambda x, y: float(x < y), ex.MIN: min, ex.MAX: max,
 }  # fmt: skip
-STEP = 1e-5  #: of the differences by which derivatives are taken
+STEP = 1e-5  #: of the differences by which derivatives are taken, by the sizes of the inputs
 
 
 def tape_at(model: Model, f: int, inputs: Array) -> float:
@@ -74,17 +74,25 @@ def values_at(model: Model, u: int, inputs: Array) -> Array:
 
 def user_values(model: Model, u: int, inputs: Array) -> Array:
     """Return forces and rates of states, (..., n_out), with their derivatives along imaginary parts."""
-    flat = inputs.reshape(-1, inputs.shape[-1])
+    flat, sizes = inputs.reshape(-1, inputs.shape[-1]), sizes_of_inputs(model, u)
     out = []
     for x in flat:
         value = values_at(model, u, np.real(x))
-        size = np.abs(np.imag(x)).max(initial=0.0)
+        size = np.abs(np.imag(x) / sizes).max(initial=0.0)
         if size > 0:
             way = STEP * np.imag(x) / size
             change = values_at(model, u, np.real(x) + way) - values_at(model, u, np.real(x) - way)
             value = value + 1j * change * (0.5 * size / STEP)
         out.append(value)
     return np.array(out).reshape(*inputs.shape[:-1], -1)
+
+
+def sizes_of_inputs(model: Model, u: int) -> Array:
+    """Return sizes of t, x, v, z of user force u, (n_in,), by which differences are taken; nothing takes those by t."""
+    i = u + len(model.elements.core) - len(model.users.n_states)
+    x = slice(int(model.elements.coordinate0[i]), int(model.elements.coordinate0[i + 1]))
+    z = model.states.size[model.users.state0[u] : model.users.state0[u + 1]]
+    return np.concatenate([[1.0], model.coordinates.size[x], model.coordinates.speed[x], z])
 
 
 def state_rows(model: Model, c: int) -> tuple[int, ...]:

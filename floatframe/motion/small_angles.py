@@ -46,7 +46,8 @@ def angle_measures(system: System) -> Iterator[tuple[str, str, Measure]]:
     for placed in compiled.laws:
         element = placed.element
         if isinstance(element, Bearing) and (element.tilt_stiffness > 0.0 or element.tilt_damping > 0.0):
-            yield f"elements.{element.name}", "tilt", partial(apart_from_sine, element, *placed.markers)
+            a, b = placed.markers
+            yield f"elements.{element.name}", "tilt", partial(apart_from_sine, element, a, b)
 
 
 def apart_from_cardan(a: MarkerData, b: MarkerData, k: int, rows: Rows) -> Array:
