@@ -283,7 +283,7 @@ class Pump:
     marker_a: Marker  #: on the housing
     marker_b: Marker  #: on the shaft
     displacement: float  #: volume per radian [m³]
-    axis: Array = (0.0, 0.0, 1.0)  # in axes of marker a, (3,)
+    axis: Array = (0.0, 0.0, 1.0)  # type: ignore[assignment]  #: in axes of marker a, (3,)
     leakage: float = 0.0  #: leakage from a to b, flow divided by pressure difference [m³/(s Pa)]
     drag: float = 0.0  #: drag torque divided by speed [N m s]
 
