@@ -80,3 +80,18 @@ def test_elements_are_called_as_the_user_does():
     assert group.groups["braces"].tolist() == [0, 2]
     nameless = replace(body, numbering=type(body.numbering)(sets=(NamedSet("x", "nodes", np.array([0]), 1),)))
     assert element_groups(nameless)[0].names == ("0", "1", "2")
+
+
+def test_beams_on_a_shell_know_which_nodes_of_the_body_are_theirs():
+    """Behind the nodes and the skin of the shell: places that the groups name are those of their own models."""
+    mesh = replace(fm.flat_plate(1.0, 0.5, 2, 1), lines=np.array([[0, 1], [1, 2]]), line_sets={"rib": np.arange(2)})
+    bar = fm.BeamProperty(fm.Rectangle(0.02, 0.03), STEEL)
+    body = fm.shell_body(
+        mesh, fm.ShellProperty(T, STEEL), name="p", units=unit_system("m-kg-s"), stiffeners={"rib": bar}
+    )
+    groups = element_groups(body)
+    beams = next(group for group in groups if group.quantity == "beam force")
+    own = beams.source.nodes
+    assert beams.first_node >= len(mesh.nodes)
+    assert_allclose(body.nodes[beams.first_node : beams.first_node + len(own)], own, rtol=0, atol=1e-15)
+    assert next(group for group in groups if group.quantity == "shell resultant").first_node == 0
