@@ -11,6 +11,8 @@ from fe_models.foundation.errors import BodyError
 
 __all__ = ["eliminate_dofs"]
 
+ROUNDING = 1e-14  #: part of the sum of the magnitudes of its terms below which an entry of a sum is rounding
+
 
 def eliminate_dofs(body: FEBody, slaves: IntArray, T_s: sp.sparray) -> FEBody:
     """Substitute u_slaves = T_s u in M, K, D and the load cases, as Tᵀ A T, and return the new body.
@@ -21,9 +23,9 @@ def eliminate_dofs(body: FEBody, slaves: IntArray, T_s: sp.sparray) -> FEBody:
     ----------
     body
         Any body.
-    Dofs to eliminate, (n_slaves,).
+    slaves
         Dofs that leave, (n_slaves,).
-    Rows over all dofs of the body, zero in the columns of the slaves, (n_slaves, n_dof).
+    T_s
         Over all dofs of the body, zero in the columns of the slaves, (n_slaves, n_dof).
 
     Raises
@@ -51,7 +53,7 @@ def eliminate_dofs(body: FEBody, slaves: IntArray, T_s: sp.sparray) -> FEBody:
         body,
         M=T.T @ body.M @ T,
         K=T.T @ body.K @ T,
-        D=None if body.D is None else T.T @ body.D @ T,
+        D=None if body.D is None else _congruent(body.D, T),
         dofs=body.dofs[keep],
         interfaces=tuple(
             interface if interface.dofs is None else replace(interface, dofs=new_index[interface.dofs])
@@ -60,3 +62,12 @@ def eliminate_dofs(body: FEBody, slaves: IntArray, T_s: sp.sparray) -> FEBody:
         recovery=Recovery(sp.csr_array(before.matrix @ T), before.dofs),
         load_cases=tuple(replace(case, f=T.T @ case.f) for case in body.load_cases),
     )
+
+
+def _congruent(D: sp.csc_array, T: sp.csr_array) -> sp.csc_array:
+    """Return Tᵀ D T without entries that are rounding of larger terms: a damper between linked dofs leaves nothing."""
+    made = sp.csc_array(T.T @ D @ T)
+    terms = sp.csc_array(abs(T).T @ abs(D) @ abs(T))
+    made = sp.csc_array(made.multiply(abs(made) > ROUNDING * terms))
+    made.eliminate_zeros()
+    return made
