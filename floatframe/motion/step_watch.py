@@ -7,8 +7,8 @@ For methods of second order, with steps of one size and with steps that an error
     along the motion included
 (2) where that is above the limit, or the long steps fail, a companion in halves of the steps takes all of them again,
     and goes on instead: it differs by 3/4 of the error, and alone decides what is told
-(3) the companion goes along for `BESIDE` steps. In a run of more than these it begins after the first of them, without
-    a start of its own, and ends where the error, drawn out to the end of the run, is far below the limit
+(3) the companion goes along for `BESIDE` steps. In a run of more than `LONG` it begins after the first of them, without
+    a start of its own, and ends where the error, drawn out to the end of the run by its square, is far below the limit
 (4) afterwards windows of `WINDOW` steps, farther and farther apart, are taken again in halves from the same memory, and
     the errors of the steps are summed; between two windows a step has the mean of theirs
 (5) errors of place are measured by the farthest way of a body from its start, rotations likewise, or by the way over
@@ -43,11 +43,12 @@ __all__ = ["FIRST_VERDICT", "WATCHES", "StepWatch", "has_second_order", "has_ste
 #: what is done with what is found: end a run half of whose energy comes from its steps; tell alone; do not look for it
 WATCHES = ("stop", "tell", "off")
 BESIDE = 400  #: steps beside which a companion goes
-CALM_STEPS = 200  #: after so many steps a companion may stop, in runs of more than `BESIDE`
-CALM = 0.1  #: of the limit, below which the error drawn out to the end of the run is far below it
+LONG = 1000  #: steps of a run above which it may do with less
+CALM_STEPS = 200  #: after so many steps a companion may stop, in runs of more than `LONG`
+CALM = 0.03  #: of the limit, below which the error drawn out to the end of the run is far below it
 FIRST_CHECK = 4  #: steps before a companion is compared, and at least between two comparisons
 CHECKS = 8  #: and this part of the steps that it has gone
-FEW_CHECKS = 48  #: steps between two comparisons in runs of more than `BESIDE`
+FEW_CHECKS = 48  #: most steps between two comparisons in runs of more than `LONG`
 WINDOW = 4  #: steps that are taken again in halves, an even number
 FARTHEST = 16380  #: most steps between two windows
 FIRST_VERDICT = 20  #: steps before which a motion has gone too short a way to measure errors by
@@ -145,7 +146,7 @@ class StepWatch:
     @property
     def is_long(self) -> bool:
         """Whether companions go beside a part of the run alone."""
-        return self.n_total > BESIDE
+        return self.n_total > LONG
 
     @property
     def has_companion(self) -> bool:
@@ -165,7 +166,7 @@ class StepWatch:
             if gone % 2:
                 return 1
             if self.is_long:
-                return FIRST_CHECK if n_done == 0 else FEW_CHECKS
+                return min(max(FIRST_CHECK, gone), FEW_CHECKS)
             return max(FIRST_CHECK, gone // CHECKS // 2 * 2)
         if self.is_window(n_done):
             return WINDOW // 2
@@ -220,7 +221,7 @@ class StepWatch:
         note = self.judged(system, t, h) if is_judged else None
         largest = float(self.share(system, other).max())
         is_over = self.spent + last - other.start >= BESIDE or self.note is not None
-        is_calm = last >= CALM_STEPS and self.is_long and largest * self.n_total / last < CALM * self.limit
+        is_calm = last >= CALM_STEPS and self.is_long and largest * (self.n_total / last) ** 2 < CALM * self.limit
         if is_over or is_calm or last % RESTART_STEPS == 0:
             self.leave(h)
         if is_over or is_calm:
