@@ -75,10 +75,9 @@ def test_on_a_rigid_line_it_is_the_point_on_a_line_and_the_prismatic_joint(is_al
     along = np.array([1.0, 0, 0])
     known = PrismaticJoint("slide", at, on, axis=along) if is_aligned else PointOnLine("slide", at, on, axis=along)
     sliding = SlidingJoint("slide", at, on, line=FURTHER, is_aligned=is_aligned)
+    method = GeneralizedAlpha(0.9, stabilized=False)  # stabilised steps differ by 2e-8, as their factors are kept
     motions = [
-        integrate(
-            System([flexible, block], [hinge, joint], [Gravity((0, -9.81, 0))], UNITS), GeneralizedAlpha(0.9), 0.5, 1e-3
-        )
+        integrate(System([flexible, block], [hinge, joint], [Gravity((0, -9.81, 0))], UNITS), method, 0.5, 1e-3)
         for joint in (known, sliding)
     ]
     expected, found = (motion.body("slider") for motion in motions)
