@@ -203,7 +203,8 @@ def test_velocities_that_are_held_roll_a_disc_as_the_built_in_joint_does():
     start = [consistent_state(system) for system in (joint, element)]
     assert_allclose(start[1].state.u, start[0].state.u, rtol=0, atol=1e-10)
     assert_allclose(start[1].u_dot, start[0].u_dot, rtol=0, atol=1e-8)
-    motions = [integrate(system, METHOD, 0.5, 1e-3) for system in (joint, element)]
+    plain = GeneralizedAlpha(0.9, 1e-11, stabilized=False)  # rates of positions that elements hold are not held
+    motions = [integrate(system, plain, 0.5, 1e-3) for system in (joint, element)]
     assert_allclose(motions[1].body("disc").r, motions[0].body("disc").r, rtol=0, atol=1e-9)
     assert_allclose(motions[1].body("disc").p, motions[0].body("disc").p, rtol=0, atol=1e-9)
     force = motions[0].reaction("rim").force
