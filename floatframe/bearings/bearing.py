@@ -13,6 +13,7 @@ rotate with the rotor would drive it. The skew-symmetric part of K has no energy
 is counted as loss.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,6 +94,22 @@ class Bearing(Element):
         return [*np.ravel(self.stiffness), *np.ravel(self.damping), self.axial_stiffness, self.axial_damping,
                 self.tilt_stiffness, self.tilt_damping]  # fmt: skip
 
+    @property
+    def resists_tilt(self) -> bool:
+        """Whether a tilt of the shaft gives a moment."""
+        return self.tilt_stiffness > 0.0 or self.tilt_damping > 0.0
+
+    def small_angles(self) -> Callable[[Array], Array] | None:
+        """Return the relative difference between the tilt and its sine, which the moment follows."""
+        return self.tilt_beyond_sine if self.resists_tilt else None
+
+    def tilt_beyond_sine(self, A: Array) -> Array:
+        """Return 1 - sin(tilt)/tilt of the shaft, (n_t,), from the axes of both markers, (n_t, 2, 3, 3)."""
+        e, s = A[:, 0] @ self.axis, A[:, 1] @ np.asarray(self.shaft_axis)
+        sine = np.linalg.norm(np.cross(e, s), axis=1)
+        tilt = np.arctan2(sine, np.sum(e * s, axis=1))
+        return np.asarray((1.0 - sine / np.where(tilt > 0.0, tilt, 1.0)) * (tilt > 0.0))
+
     def law(self, placed: Placed) -> ElementLaw:
         """Return the law of the bearing."""
         assert self.x_axis is not None
@@ -106,14 +123,13 @@ class Bearing(Element):
                 "the axes of marker_a, and shaft_axis in those of marker_b"
             )
         y_axis = np.cross(self.axis, self.x_axis)
-        tilts = self.tilt_stiffness > 0.0 or self.tilt_damping > 0.0
         return ElementLaw(
             function=bearing_law,
             data=[*self.coefficients, *self.x_axis, *y_axis, *self.axis, *self.shaft_axis],
             outputs=tuple(OUTPUTS),
             output_units=in_units(placed.units, list(OUTPUTS.values())),
             tangent="complex",
-            acts=("wrench", "wrench" if tilts else "force"),
+            acts=("wrench", "wrench" if self.resists_tilt else "force"),
             is_opposite=True,
             energy="energy",
             power_lost="power lost",

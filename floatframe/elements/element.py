@@ -219,6 +219,14 @@ class Element:
         """
         return ()
 
+    def small_angles(self) -> Callable[[Array], Array] | None:
+        """Return how far its angles are beyond small ones, as a function of motion; by default none: any size is meant.
+
+        The function takes the axes of the markers in ground axes, (n_t, n, 3, 3), and returns the relative difference
+        between an angle and what the law takes for it, (n_t,).
+        """
+        return None
+
     def drawn(self) -> Sequence[Drawn | Stretched | Arrow]:
         """Return the shapes, fixed to its markers, by which it is drawn in films and pages; by default none."""
         return ()

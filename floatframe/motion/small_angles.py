@@ -1,11 +1,11 @@
-"""Whether the rotations of bushings and the tilts of bearings stay where small angles are meant.
+"""Whether the rotations of bushings and of public elements stay where small angles are meant.
 
 A bushing with stiffness, damping or preload about its axes takes the components of the rotation vector theta of its
 marker B against A. Cardan angles, which its coefficients may have been measured in, differ from them by about half the
 products of two components: next to nothing about one axis, however far it turns, and ever more about two. Next to a
 full turn a small tilt has a large component.
 
-The moment of a bearing against its tilt is that of the sine; the angle is larger.
+Public elements say themselves how far their angles are beyond small ones (`Element.small_angles`).
 """
 
 from collections.abc import Callable, Iterator
@@ -14,14 +14,13 @@ from functools import partial
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.bearings import Bearing
 from floatframe.compiling.counted_angles import first_angles
 from floatframe.compiling.markers import MarkerData
 from floatframe.compiling.pair_forces import bushing_markers
 from floatframe.compiling.system import compiled_system
 from floatframe.forces import Bushing
 from floatframe.kernels.memory import Rows
-from floatframe.rotations import cross, dot, rotation_log, rotation_matrix, turned
+from floatframe.rotations import rotation_log, rotation_matrix
 from floatframe.system import System
 
 __all__ = ["ANGLES_LIMIT", "angle_measures"]
@@ -44,10 +43,9 @@ def angle_measures(system: System) -> Iterator[tuple[str, str, Measure]]:
             a, b = bushing_markers(system, bushing, compiled.placed)
             yield f"forces.{bushing.name}", "angles", partial(apart_from_cardan, a, b, k)
     for placed in compiled.laws:
-        element = placed.element
-        if isinstance(element, Bearing) and (element.tilt_stiffness > 0.0 or element.tilt_damping > 0.0):
-            a, b = placed.markers
-            yield f"elements.{element.name}", "tilt", partial(apart_from_sine, element, a, b)
+        beyond = placed.element.small_angles()
+        if beyond is not None:
+            yield f"elements.{placed.element.name}", "tilt", partial(of_element, beyond, tuple(placed.markers))
 
 
 def apart_from_cardan(a: MarkerData, b: MarkerData, k: int, rows: Rows) -> Array:
@@ -66,12 +64,9 @@ def apart_from_cardan(a: MarkerData, b: MarkerData, k: int, rows: Rows) -> Array
     return np.asarray(0.5 * products / np.where(angle > 0.0, angle, 1.0))
 
 
-def apart_from_sine(element: Bearing, a: MarkerData, b: MarkerData, rows: Rows) -> Array:
-    """Return by which part of it the tilt of a shaft is more than its sine, (n_t,)."""
-    e, s = turned(axes_of(a, rows), element.axis), turned(axes_of(b, rows), np.asarray(element.shaft_axis))
-    sine = np.linalg.norm(cross(e, s), axis=1)
-    tilt = np.arctan2(sine, dot(e, s))
-    return np.asarray(1.0 - sine / np.where(tilt > 0.0, tilt, 1.0)) * (tilt > 0.0)
+def of_element(beyond: Callable[[Array], Array], markers: tuple[MarkerData, ...], rows: Rows) -> Array:
+    """Return what an element says of its angles (`Element.small_angles`), (n_t,)."""
+    return beyond(np.stack([axes_of(marker, rows) for marker in markers], axis=1))
 
 
 def axes_of(marker: MarkerData, rows: Rows) -> Array:
