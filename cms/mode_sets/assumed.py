@@ -78,7 +78,7 @@ def assumed_modes(
     References
     ----------
     .. [1] The field with its contraction solves the equations of a prismatic bar in tension and in pure bending exactly
-    (Saint-Venant), see docs/theory.md.
+       (Saint-Venant), see docs/theory.md.
     """
     body = body_of(body)
     body.require_coupled()

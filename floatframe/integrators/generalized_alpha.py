@@ -96,7 +96,7 @@ class GeneralizedAlpha:
     #: alpha_m, alpha_f, beta, gamma in place of those that follow from rho_inf (see `newmark`, `hht`)
     parameters: tuple[float, float, float, float] | None = None
     #: hold velocities of joints as well as positions, and take the spin of axisymmetric bodies by itself; False: the
-    #: equations of [2]_ as they are, whose steps sensitivities differentiate
+    #: equations of reference 2 as they are, whose steps sensitivities differentiate
     stabilized: bool = True
 
     def __post_init__(self) -> None:
