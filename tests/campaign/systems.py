@@ -78,7 +78,7 @@ output_every = 2
 MOST_STEPS = 5000  #: of a run in the campaign; longer ones are only read (`floatframe info`)
 #: of forces, over the largest of them: the tolerance of Newton's method is in it, whose last correction of the
 #: velocities of joints comes after the last residual (1.7e-6 here at the default tolerance, 5e-8 at 1e-12)
-BALANCE = 3e-6
+BALANCE = 2e-6
 GAP = 1e-7  #: of joints, over the size of the system
 KNOWN = {
     "bodies": {"mass", "inertia", "center_of_mass", "position", "rotation_vector"},
