@@ -15,7 +15,7 @@ import numpy as np
 
 import cms
 import floatframe as ff
-from floatframe.compiling.system import compiled_system
+from floatframe.engine.compiling.system import compiled_system
 from floatframe.machines import copy_machine
 from floatframe.machines.antenna import FINE, pointing
 

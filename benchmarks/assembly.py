@@ -29,7 +29,7 @@ def box(million_dofs):
 
 
 def own(mesh):
-    from fe_models.solids.assembly import assemble, expand_scalar_mass
+    from fe_models.elements.solids.assembly import assemble, expand_scalar_mass
     from tests.bodies import STEEL
 
     properties = np.array([[STEEL.lam, STEEL.mu, STEEL.rho]])

@@ -26,7 +26,7 @@ SETTINGS = {0: 1, 1: 2, 7: 0, 34: 1, 39: 0}  #: iparm: own values, METIS, no ref
 
 def library():
     """Return MKL with its cluster solver on Open MPI, sequential; the parts need the names of each other."""
-    from cms.solvers.pardiso import installed_mkl
+    from cms.linear_algebra.solvers.pardiso import installed_mkl
 
     folder = Path(installed_mkl()).parent
     parts = [next(folder.glob(f"libmkl_{name}.so*")) for name in LIBRARIES]
@@ -73,10 +73,10 @@ def cluster_here(ranks):
 
 
 def main():
-    from cms.solvers.factorization import lower_triangle
-    from cms.solvers.petsc.factor import PetscFactor
-    from fe_models.body.nearby import nearby_order
-    from fe_models.body.submatrix import principal_block
+    from cms.linear_algebra.solvers.factorization import lower_triangle
+    from cms.linear_algebra.solvers.petsc.factor import PetscFactor
+    from fe_models.body.couplings.nearby import nearby_order
+    from fe_models.body.couplings.submatrix import principal_block
     from fe_models.foundation.ranks.mpi import MpiRanks
 
     ranks = MpiRanks()

@@ -34,9 +34,9 @@ from floatframe import (
     Variational,
     integrate,
 )
-from floatframe.mechanisms import four_bar
-from tests.floatframe.bodies.test_free_body import spinning
+from floatframe.components.mechanisms import four_bar
 from tests.floatframe.integrators.test_pendulum import pendulum
+from tests.floatframe.model.bodies.test_free_body import spinning
 
 H = 0.005
 GIVEN = "generalized-alpha"

@@ -26,8 +26,8 @@ BARS = {"48k": (160, 9, 9), "149k": (220, 14, 14)}
 
 
 def make(elements, folder):
+    from fe_models.elements.solids.body import solid_body
     from fe_models.foundation.units import unit_system
-    from fe_models.solids.body import solid_body
     from tests.bodies import STEEL, box_mesh
 
     mesh = box_mesh(*elements, 1.0, 0.05, 0.05, "hexahedron")
@@ -40,10 +40,10 @@ def make(elements, folder):
 
 def own(folder):
     # libraries are loaded before the clock starts, as they are on the other side
-    import cms.families.families
-    import cms.reduced_basis.finishing  # noqa: F401
+    import cms.modes.families.families
+    import cms.reduction.basis.finishing  # noqa: F401
     from cms import NodalFrame, couple, craig_bampton, reduce
-    from cms.solvers.pardiso import mkl_runtime
+    from cms.linear_algebra.solvers.pardiso import mkl_runtime
     from fe_models.body.fe_body import FEBody, Interface
 
     K, M, nodes, left, right = load(folder)

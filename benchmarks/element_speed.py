@@ -13,10 +13,10 @@ import numpy as np
 from numba import njit
 
 from floatframe import GROUND, Element, ElementLaw, GeneralizedAlpha, Gravity, Marker, RigidBody, SpringDamper, System
-from floatframe.compiling.system import compiled_system
-from floatframe.elements import Placed
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.kernels.work import new_work
 from floatframe.integrators.carry import Integrator
-from floatframe.kernels.work import new_work
+from floatframe.model.elements import Placed
 
 N_BODIES, N_STEPS, H, TURNS = 20, 2000, 1e-4, 7
 STIFFNESS, DAMPING = 200.0, 1.0

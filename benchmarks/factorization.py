@@ -13,11 +13,11 @@ import time
 
 import numpy as np
 
-import cms.solvers.pardiso as pardiso
+import cms.linear_algebra.solvers.pardiso as pardiso
 from benchmarks.eigen import DEFAULT_SIZE, clamped_rod
-from cms.solvers.factorization import lower_triangle
-from cms.solvers.pardiso import PardisoFactor
-from cms.solvers.superlu import SuperLuFactor
+from cms.linear_algebra.solvers.factorization import lower_triangle
+from cms.linear_algebra.solvers.pardiso import PardisoFactor
+from cms.linear_algebra.solvers.superlu import SuperLuFactor
 
 SMALL = 5.6  #: mm: about 20 thousand dofs
 WIDTHS = (1, 8, 16, 60)

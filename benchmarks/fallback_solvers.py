@@ -29,11 +29,11 @@ def one(name, path):
     import scipy.sparse as sp
 
     from benchmarks.large_solid import solid
-    from cms.solvers import superlu
-    from cms.solvers.factorization import lower_triangle
-    from cms.solvers.registry import SOLVERS
-    from cms.sparse_cholesky.factor import CholeskyFactor
-    from fe_models.body.submatrix import principal_block
+    from cms.linear_algebra.solvers import superlu
+    from cms.linear_algebra.solvers.factorization import lower_triangle
+    from cms.linear_algebra.solvers.registry import SOLVERS
+    from cms.linear_algebra.sparse_cholesky.factor import CholeskyFactor
+    from fe_models.body.couplings.submatrix import principal_block
 
     *_, (_, body) = solid(Path(path))
     lower = lower_triangle(principal_block(body.K, body.i))
@@ -68,9 +68,9 @@ def blocks(million, name):
     import scipy.sparse as sp
 
     from benchmarks import large_solid
-    from cms.solvers.factorization import lower_triangle
-    from cms.solvers.registry import SOLVERS
-    from fe_models.body.submatrix import principal_block
+    from cms.linear_algebra.solvers.factorization import lower_triangle
+    from cms.linear_algebra.solvers.registry import SOLVERS
+    from fe_models.body.couplings.submatrix import principal_block
 
     *_, (_, body) = large_solid.solid(large_solid.mesh_file(million))
     lower = lower_triangle(principal_block(body.K, body.i))

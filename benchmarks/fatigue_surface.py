@@ -18,10 +18,10 @@ import numpy as np
 import scipy.signal
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from floatframe.fatigue.history_damage import count_histories
-from floatframe.fatigue.load_blocks import LoadBlock
-from floatframe.fatigue.mean_stress import MeanStress
-from floatframe.fatigue.sn_curve import basquin_curve
+from floatframe.durability.fatigue.history_damage import count_histories
+from floatframe.durability.fatigue.load_blocks import LoadBlock
+from floatframe.durability.fatigue.mean_stress import MeanStress
+from floatframe.durability.fatigue.sn_curve import basquin_curve
 
 
 def history(n_times: int, n_modes: int, rng: np.random.Generator) -> np.ndarray:

@@ -18,9 +18,7 @@ from scipy.special import ellipj, ellipk
 
 from benchmarks.field_beams import Describe, exact, marker_of, parts, path, segments, superelements
 from floatframe import GeneralizedAlpha, System, Trajectory, integrate, snapshot, static_equilibrium
-from floatframe.errors import FloatframeError
-from floatframe.functions.time_functions import TimeFunction, cycloidal_spin_up
-from floatframe.mechanisms import (
+from floatframe.components.mechanisms import (
     andrews_mechanism,
     bricard_mechanism,
     buckling_beam,
@@ -31,7 +29,7 @@ from floatframe.mechanisms import (
     point_pendulum,
     unbalanced_shaft,
 )
-from floatframe.mechanisms.beam_benchmarks import (
+from floatframe.components.mechanisms.beam_benchmarks import (
     BUCKLING_LINES,
     FOUR_BAR_LINES,
     PRINCETON_LINE,
@@ -39,6 +37,8 @@ from floatframe.mechanisms.beam_benchmarks import (
     crank_turn,
     shaft_turn,
 )
+from floatframe.errors import FloatframeError
+from floatframe.model.functions.time_functions import TimeFunction, cycloidal_spin_up
 from floatframe.results.energy_balance import balance_defect
 from floatframe.results.place_motion import point_motion
 from tests.references.cosserat_rod import Section, cantilever, four_bar

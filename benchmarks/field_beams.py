@@ -10,8 +10,8 @@ import cms
 import fe_models as fm
 from fe_models.body.beam_line import BeamLine
 from floatframe import System, Trajectory, corotational, exact_beams, finite_segments, floating_parts
-from floatframe.bodies.markers import Marker
-from floatframe.flexible_parts import FlexiblePart, PartMaker
+from floatframe.components.flexible_parts import FlexiblePart, PartMaker
+from floatframe.model.bodies.markers import Marker
 from floatframe.results.place_motion import interface_motion, point_motion
 
 Describe = Callable[[BeamLine], PartMaker]

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from floatframe.mechanisms.beam_benchmarks import PRINCETON_LINE
+from floatframe.components.mechanisms.beam_benchmarks import PRINCETON_LINE
 
 
 def draw(found: dict, folder: Path) -> None:

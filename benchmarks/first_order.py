@@ -7,9 +7,9 @@ import time
 
 import numpy as np
 
-from fe_models.reports.first_order import first_order_error
+from fe_models.checks.first_order import first_order_error
 from tests.bodies import box_mesh
-from tests.fe_models.reports.test_first_order import free_frequencies
+from tests.fe_models.checks.test_first_order import free_frequencies
 
 SIZE = (1.0, 0.1, 0.05)
 

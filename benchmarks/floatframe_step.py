@@ -15,12 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-from floatframe.compiling.system import compiled_system
+from floatframe.engine.compiling.system import compiled_system
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from floatframe import GROUND, FlexibleBody, GeneralizedAlpha, Gravity, Marker, RevoluteJoint, System
-from floatframe.kernels.work import new_work
+from floatframe.engine.kernels.work import new_work
 from tests.floatframe.point_masses import random_point_masses, stiffened_body
 
 H = 1e-3

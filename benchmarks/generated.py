@@ -22,21 +22,21 @@ import numpy as np
 
 import floatframe as ff
 from benchmarks.recursive import compiled, moving, shortest
-from floatframe.generation.generate import GeneratedCode
+from floatframe.design.generation.generate import GeneratedCode
+from floatframe.engine.tree.recursion.entry import FORWARD, INVERSE, MASS, TANGENTS
+from floatframe.engine.tree.topology import tree_of
+from floatframe.files.system_file.read_system import read_system
 from floatframe.machines.road_car import RoadCar
 from floatframe.machines.road_car.systems import base, written
-from floatframe.relative.recursion.entry import FORWARD, INVERSE, MASS, TANGENTS
-from floatframe.relative.topology import tree_of
-from floatframe.system_file.read_system import read_system
-from tests.floatframe.generation.flexible_systems import (
+from tests.floatframe.design.generation.flexible_systems import (
     bent_motion,
     dense_body,
     flexible_in_the_middle,
     pendulum,
     two_link_arm,
 )
-from tests.floatframe.generation.sympy_count import sympy_operations
-from tests.floatframe.identification.robots import six_axes
+from tests.floatframe.design.generation.sympy_count import sympy_operations
+from tests.floatframe.design.identification.robots import six_axes
 
 TASKS = {"inverse": INVERSE, "mass": MASS, "forward": FORWARD, "jacobian": TANGENTS}
 LOOP = """

@@ -24,9 +24,9 @@ def measured(million):
     """Return the body, the reduced body, stages, time of the line and time added, geometric stiffness of some kinds."""
     import cms
     import fe_models
-    from cms.reduced_basis.frames import TisserandFrame, frame_condition
-    from cms.second_order.geometric_reduction import reduced_geometric_stiffness, stiffness_of_states
-    from cms.second_order.unit_states import states_of
+    from cms.reduction.basis.frames import TisserandFrame, frame_condition
+    from cms.reduction.geometric_stiffness.geometric_reduction import reduced_geometric_stiffness, stiffness_of_states
+    from cms.reduction.geometric_stiffness.unit_states import states_of
 
     path = rod_file(million, SIZES[million])
     warm_up()
@@ -43,7 +43,7 @@ def measured(million):
         reduced = cms.reduce(families, modes, geometric=False)
         clock("reduce")
         line = clock.total()
-        from cms.reduced_basis.finishing import finish
+        from cms.reduction.basis.finishing import finish
 
         condition = frame_condition(body, TisserandFrame())
         Phi = finish(body, modes, condition).Phi

@@ -10,7 +10,7 @@ import sys
 import numpy as np
 
 import floatframe as ff
-from tests.floatframe.identification.robots import KUKA_LIKE, six_axes
+from tests.floatframe.design.identification.robots import KUKA_LIKE, six_axes
 
 TORQUE_NOISE = np.array([8.0, 12.0, 6.0, 2.0, 1.5, 1.0])  #: [N m]
 BASE_NOISE = np.array([20.0, 20.0, 30.0, 15.0, 15.0, 10.0])  #: [N, N m]

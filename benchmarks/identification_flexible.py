@@ -12,7 +12,7 @@ import sys
 import numpy as np
 
 import floatframe as ff
-from tests.floatframe.identification.flexible_arm import NOISE, OUTPUTS, TRUTH, arm, link
+from tests.floatframe.design.identification.flexible_arm import NOISE, OUTPUTS, TRUTH, arm, link
 
 T_END, DISTANCE, STEP = 2.0, 0.01, 0.0025
 SETS = {

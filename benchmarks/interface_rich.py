@@ -117,9 +117,9 @@ def bare(size):
     """One factorisation of K_II, one solve of as many columns as there are boundary dofs, in blocks of 60."""
     from cms.jobs.body_of_job import job_body
     from cms.jobs.job import read_job
-    from cms.solvers.factorization import lower_triangle
-    from cms.solvers.pardiso import PardisoFactor
-    from fe_models.body.submatrix import principal_block
+    from cms.linear_algebra.solvers.factorization import lower_triangle
+    from cms.linear_algebra.solvers.pardiso import PardisoFactor
+    from fe_models.body.couplings.submatrix import principal_block
     from fe_models.foundation.stages import Stages
 
     with tempfile.TemporaryDirectory(dir=OUT) as folder:

@@ -80,9 +80,9 @@ def line(path):
 
 def bare(path):
     """One factorisation of K_II, one solve of 60 columns."""
-    from cms.solvers.factorization import lower_triangle
-    from cms.solvers.pardiso import PardisoFactor
-    from fe_models.body.submatrix import principal_block
+    from cms.linear_algebra.solvers.factorization import lower_triangle
+    from cms.linear_algebra.solvers.pardiso import PardisoFactor
+    from fe_models.body.couplings.submatrix import principal_block
 
     *_, (_, body) = solid(path)
     lower = lower_triangle(principal_block(body.K, body.i))

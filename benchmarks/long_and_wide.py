@@ -23,10 +23,10 @@ import numpy as np
 
 from benchmarks.relative_coordinates import beam
 from floatframe import GeneralizedAlpha, Gravity, Marker, RigidBody, SphericalJoint, System, integrate
-from floatframe.compiling.system import compiled_system
-from floatframe.kernels.memory import new_rows
-from floatframe.kernels.work import new_work
-from floatframe.mechanisms import chain
+from floatframe.components.mechanisms import chain
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.kernels.memory import new_rows
+from floatframe.engine.kernels.work import new_work
 
 H = 1e-3  #: [s] of a step of the wide systems
 LONG_H, PERIOD = 1e-5, 1e-4  #: [s] of a step of the long run, and between its results

@@ -19,9 +19,9 @@ import numpy as np
 
 import cms
 import floatframe as ff
-from floatframe.compiling.system import compiled_system
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.files.system_file.read_system import read_system
 from floatframe.machines import copy_machine
-from floatframe.system_file.read_system import read_system
 
 #: machine, its jobs, one of its systems, seconds of motion
 RUNS = (

@@ -51,7 +51,7 @@ class Watched:
     """Stages that note the largest resident size of each."""
 
     def __init__(self):
-        from cms.memory.size import resident_bytes
+        from cms.linear_algebra.memory.size import resident_bytes
         from fe_models.foundation.stages import Stages
 
         self.peaks, self._resident, self._stage = {}, resident_bytes, "start"
@@ -74,7 +74,7 @@ class Watched:
 def run(job, budget, folder):
     """Reduce and write in this process; the record of it."""
     import cms
-    from cms.memory import budget as forecasts
+    from cms.linear_algebra.memory import budget as forecasts
 
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     made = []

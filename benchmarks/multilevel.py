@@ -32,9 +32,9 @@ def body_of(kind, n):
     """Return a coupled body."""
     import cms
     import fe_models as fm
-    from fe_models.solids.body import solid_body
+    from fe_models.elements.solids.body import solid_body
     from tests.bodies import STEEL, box_mesh
-    from tests.cms.substructures.shells import between, panel
+    from tests.cms.linear_algebra.substructures.shells import between, panel
     from tests.fe_models.small_shells import SI
 
     if kind == "shell":
@@ -115,7 +115,7 @@ def table(cases):
 def errors():
     """Print the largest error for several cutoff factors, without a step of inverse iteration and as delivered."""
     import cms
-    from cms.substructures import modes
+    from cms.linear_algebra.substructures import modes
 
     cms_modes, most = cms.multilevel, modes.MOST_STEPS
     for kind, n, n_modes in BODIES:

@@ -3,7 +3,7 @@
 import time
 
 import floatframe as ff
-from floatframe.mechanisms import slider_crank
+from floatframe.components.mechanisms import slider_crank
 
 CALLS = 300
 

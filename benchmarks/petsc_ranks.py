@@ -65,9 +65,9 @@ class Stages:
 
 def factored(body, solver, stage):
     """The factor of K_II, after a solve of 60 columns."""
-    from cms.solvers.factorization import factorize
-    from fe_models.body.nearby import nearby_order
-    from fe_models.body.submatrix import principal_block
+    from cms.linear_algebra.solvers.factorization import factorize
+    from fe_models.body.couplings.nearby import nearby_order
+    from fe_models.body.couplings.submatrix import principal_block
 
     with stage("factor"):
         K_ii = principal_block(body.K, nearby_order(body.K, body.dofs, body.i))
@@ -111,7 +111,7 @@ def measured(million, what, solver, ranks):
 
 def figures(short):
     """Return what the watch keeps: of two ranks beside one."""
-    from cms.solvers.petsc.libraries import missing_petsc
+    from cms.linear_algebra.solvers.petsc.libraries import missing_petsc
 
     if missing := missing_petsc():
         raise RuntimeError(missing)

@@ -20,13 +20,13 @@ from typing import Any
 import numpy as np
 
 import cms
+from cms.body.modal_file.file import write
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
 from cms.jobs.reduce_job import reduce_job
-from cms.modal_file.file import write
 from fe_models.parts import engine_body_mesh
-from floatframe.laboratory.body_errors import BodyErrors
-from floatframe.laboratory.body_study import SetError, lean_body
+from floatframe.design.laboratory.body_errors import BodyErrors
+from floatframe.design.laboratory.body_study import SetError, lean_body
 from floatframe.machines.railway_engine.mode_sets import MORE_SETS, SETS, engine_study
 from floatframe.machines.railway_engine.write_files import CASES, write_railway_engine
 
@@ -102,7 +102,7 @@ def main() -> None:
         return
     if not given.draw:
         run(given.size)
-    from floatframe.laboratory.body_figures import error_figure
+    from floatframe.design.laboratory.body_figures import error_figure
 
     found = results()
     print("| loading | set | modes | coordinates | displacement | energy | force | stress |\n" + "|---" * 8 + "|")

@@ -10,7 +10,7 @@ import time
 import numpy as np
 
 import floatframe as ff
-from floatframe import rails
+from floatframe.components import rails
 from floatframe.machines.bogie import RailVehicle, in_circle, steady_motion_of, vehicle
 from floatframe.machines.bogie.running import lateral_modes
 from floatframe.machines.bogie.unstable_branch import bracket_of_unstable_cycle, hunted

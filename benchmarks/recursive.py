@@ -12,8 +12,8 @@ import scipy.linalg as la
 
 import cms
 import floatframe as ff
-from floatframe.mechanisms import chain
-from floatframe.relative.recursion.entry import FORWARD, INVERSE, MASS, TANGENTS
+from floatframe.components.mechanisms import chain
+from floatframe.engine.tree.recursion.entry import FORWARD, INVERSE, MASS, TANGENTS
 
 TASKS = {"inverse dynamics": INVERSE, "mass matrix": MASS, "forward dynamics": FORWARD, "derivatives": TANGENTS}
 ROUNDS = 5
@@ -74,7 +74,7 @@ def pairs_of_times(branching: float) -> dict[str, tuple[float, float]]:
     """Return our time and Pinocchio's of each task for a tree of 30 bodies on hinges [µs]."""
     import pinocchio as pin
 
-    from tests.floatframe.relative.random_trees import PinocchioTree, random_state, random_tree, system_of
+    from tests.floatframe.engine.tree.random_trees import PinocchioTree, random_state, random_tree, system_of
 
     empty = pin.Model()
     nothing, none = empty.createData(), np.zeros(0)

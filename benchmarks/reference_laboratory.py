@@ -11,12 +11,12 @@ from importlib.resources import files
 from pathlib import Path
 
 import floatframe as ff
+from cms.body.modal_file.file import write
 from cms.jobs.reduce_job import reduce_job
-from cms.modal_file.file import write
 from fe_models.parts import shipped_mesh
-from floatframe.laboratory.figures import convergence_figure
+from floatframe.design.laboratory.figures import convergence_figure
+from floatframe.files.system_file.read_system import read_system
 from floatframe.results.sensors import ReactionSensor
-from floatframe.system_file.read_system import read_system
 
 SETS = {
     "craig-bampton": (0, 2, 5, 10, 20, 40, 60, 80, 100),

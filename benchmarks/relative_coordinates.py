@@ -15,11 +15,11 @@ import numpy as np
 import cms
 import fe_models as fm
 from floatframe import GeneralizedAlpha, System
-from floatframe.compiling.system import compiled_system
+from floatframe.components.mechanisms import chain
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.kernels.work import new_work
 from floatframe.errors import FloatframeError
 from floatframe.integrators import in_formulation
-from floatframe.kernels.work import new_work
-from floatframe.mechanisms import chain
 
 FORMULATIONS = ("absolute", "relative")
 

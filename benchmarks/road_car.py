@@ -15,6 +15,7 @@ import numpy as np
 
 import cms
 import floatframe as ff
+from floatframe.components.wheels import read_tyre_file, shipped_tyre
 from floatframe.machines.road_car import CarOnPosts, Linkage, RoadCar, body_files
 from floatframe.machines.road_car.closed_forms import MODES, roll_control_stiffness
 from floatframe.machines.road_car.description import CORNERS
@@ -29,8 +30,7 @@ from floatframe.machines.road_car.systems import (
     steady_circle,
     twisted_road,
 )
-from floatframe.wheels import read_tyre_file, shipped_tyre
-from tests.floatframe.wheels.magic_formula_oracle import version_61
+from tests.floatframe.components.wheels.magic_formula_oracle import version_61
 
 CAR = RoadCar()
 TYRE = read_tyre_file(shipped_tyre("passenger_car_61"))

@@ -3,13 +3,13 @@
 import numpy as np
 from pyyeti import ode, srs
 
-from floatframe.shaking.loads.levels import Level
-from floatframe.shaking.loads.pulses import damped_sines, pulse, synthesised
-from floatframe.shaking.loads.random_vibration import RandomTest, random_runs
-from floatframe.shaking.loads.sine import SineTest, sweep_envelope
-from floatframe.shaking.responses.response_spectrum import octave_frequencies, shock_response_spectrum
-from floatframe.shaking.responses.time_steps import oscillator
-from tests.floatframe.shaking.single_mass import ACCELERATION, masses
+from floatframe.durability.shaking.loads.levels import Level
+from floatframe.durability.shaking.loads.pulses import damped_sines, pulse, synthesised
+from floatframe.durability.shaking.loads.random_vibration import RandomTest, random_runs
+from floatframe.durability.shaking.loads.sine import SineTest, sweep_envelope
+from floatframe.durability.shaking.responses.response_spectrum import octave_frequencies, shock_response_spectrum
+from floatframe.durability.shaking.responses.time_steps import oscillator
+from tests.floatframe.durability.shaking.single_mass import ACCELERATION, masses
 
 G = 9.80665
 

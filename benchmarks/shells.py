@@ -14,10 +14,10 @@ import numpy as np
 
 import cms
 import fe_models as fm
-from fe_models.beams.torsion import rectangle_torsion_constant
-from fe_models.shells import elements
-from tests.fe_models.shells import test_benchmarks as cases
-from tests.fe_models.shells import test_stiffeners as ribs
+from fe_models.elements.beams.torsion import rectangle_torsion_constant
+from fe_models.elements.shells import elements
+from tests.fe_models.elements.shells import test_benchmarks as cases
+from tests.fe_models.elements.shells import test_stiffeners as ribs
 from tests.fe_models.small_shells import KINDS, SI, STEEL, frequencies, of_nodes, plate, solved
 
 

@@ -16,9 +16,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import cms
+from floatframe.components.mechanisms import rotating_blade
 from floatframe.errors import ConvergenceError
-from floatframe.mechanisms import rotating_blade
-from tests.floatframe.compiling import test_spinning_beams as beams
+from tests.floatframe.engine.compiling import test_spinning_beams as beams
 from tests.references.rotating_beam import cantilever_frequencies
 
 

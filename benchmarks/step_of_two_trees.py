@@ -31,7 +31,7 @@ for line in sys.stdin:
 COMPILE = """
 import sys, time
 sys.path.insert(0, sys.argv[1])
-from floatframe.kernels.entry import prepare
+from floatframe.engine.kernels.entry import prepare
 start = time.process_time()
 assert prepare()
 print(time.process_time() - start)

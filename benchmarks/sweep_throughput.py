@@ -19,11 +19,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 
-from cms.fleets.fleet import reduce_fleet
+from cms.jobs.fleets.fleet import reduce_fleet
 from fe_models.foundation.threads import bounded_threads
-from floatframe.kernels.entry import prepare
-from floatframe.studies.study import StudyPoint, run_study
-from floatframe.studies.study_file import read_study
+from floatframe.design.studies.study import StudyPoint, run_study
+from floatframe.design.studies.study_file import read_study
+from floatframe.engine.kernels.entry import prepare
 
 PACKAGES = Path(__file__).parents[1]
 STUDY = """

@@ -12,8 +12,8 @@ import numpy as np
 from scipy.optimize import minimize
 
 import floatframe as ff
-from floatframe.gradients.paths import value_at, with_value
-from floatframe.mechanisms import slider_crank
+from floatframe.components.mechanisms import slider_crank
+from floatframe.design.gradients.paths import value_at, with_value
 
 RUN = {"t_end": 0.24, "h": 4e-3}
 PATHS = (

@@ -84,10 +84,10 @@ def counts(cases):
     """Return operations, iterations and factorisations of a step of each case; in a process without compiled code."""
     from benchmarks.floatframe_step import H, chain, counts_of
     from floatframe import GeneralizedAlpha
-    from floatframe.compiling.system import compiled_system
-    from floatframe.kernels import entry
-    from floatframe.kernels.records import filled
-    from floatframe.kernels.work import new_work
+    from floatframe.engine.compiling.system import compiled_system
+    from floatframe.engine.kernels import entry
+    from floatframe.engine.kernels.records import filled
+    from floatframe.engine.kernels.work import new_work
 
     def call(model, work, memory, rows, **order):
         records = model, work, memory, rows, filled(entry.Order(), **(entry.NOTHING._asdict() | order))

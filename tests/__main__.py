@@ -6,7 +6,7 @@
     python -m tests --external   # beside other programs; those that are not there are skipped, visibly
     python -m tests --campaign   # seeded bad inputs, kills, random motions and bodies
     python -m tests --changed    # lint, and tests that guard what changed since main (or --changed HEAD~3)
-    python -m tests --guards cms/solvers/eigen.py    # which tests guard a module
+    python -m tests --guards cms/linear_algebra/solvers/eigen.py    # which tests guard a module
 
 A group is a row of stages. The checks of a stage run side by side, each as its own process, and each report is printed
 as a whole when its check ends; the first stage in which one fails ends the run. The last line says how long the group
@@ -39,21 +39,24 @@ KERNELS = ("kernels", "floatframe.cli.compile_kernels", "relative", "schemes")  
 #: the same motions with kernels compiled by plain numba, as with a numba that the lean compiler does not know; one test
 #: compiles them all, minutes beside other checks
 PLAIN = (
-    "kernels by plain numba", "pytest", "-q", "-o", "timeout=3600", "-m", "not long", "tests/floatframe/kernels",
+    "kernels by plain numba", "pytest", "-q", "-o", "timeout=3600", "-m", "not long", "tests/floatframe/engine/kernels",
     "tests/floatframe/integrators/test_pendulum.py",
 )  # fmt: skip
 #: files that take more than ten seconds of a processor, the longest first: begun last, one would keep a worker alone
 SLOWEST = tuple(
     f"tests/{name}.py"
     for name in (
-        "floatframe/discrete/test_every_element", "floatframe/generation/units/test_generated_unit",
-        "floatframe/discrete/test_every_part", "floatframe/discrete/test_connections",
-        "floatframe/discrete/test_every_force", "floatframe/motion/test_jumps_of_laws",
-        "floatframe/motion/test_wrong_motions_are_told", "floatframe/optimization/test_optimization",
-        "floatframe/gradients/test_sensitivities", "floatframe/general_position/test_every_part_in_other_units",
-        "floatframe/elements/test_element_faults", "fe_models/shells/test_geometric", "pipeline/test_line",
-        "floatframe/cli/test_commands", "floatframe/laboratory/test_laboratory", "floatframe/generation/test_generate",
-        "floatframe/cosimulation/test_fmu", "pipeline/test_split_line", "floatframe/clearances/test_clearances",
+        "floatframe/engine/structure_preserving/test_every_element",
+        "floatframe/design/generation/units/test_generated_unit",
+        "floatframe/engine/structure_preserving/test_every_part",
+        "floatframe/engine/structure_preserving/test_connections",
+        "floatframe/engine/structure_preserving/test_every_force", "floatframe/simulation/test_jumps_of_laws",
+        "floatframe/simulation/test_wrong_motions_are_told", "floatframe/design/optimization/test_optimization",
+        "floatframe/design/gradients/test_sensitivities", "floatframe/general_position/test_every_part_in_other_units",
+        "floatframe/model/elements/test_element_faults", "fe_models/elements/shells/test_geometric",
+        "pipeline/test_line", "floatframe/cli/test_commands", "floatframe/design/laboratory/test_laboratory",
+        "floatframe/design/generation/test_generate", "floatframe/files/cosimulation/test_fmu",
+        "pipeline/test_split_line", "floatframe/components/clearances/test_clearances",
     )
 )  # fmt: skip
 TESTS = (
@@ -131,7 +134,7 @@ def run(group: Group) -> int:
 def tell_guards(words: list[str]) -> int:
     """Print the test files that guard some modules, by how many imports lie between, nearest first."""
     if not words:
-        print("python -m tests --guards: expected files or modules, such as cms/solvers/eigen.py or cms.solvers.eigen")
+        print("python -m tests --guards: expected files or modules, such as fe_models/body/weld.py")
         return 2
     from tests.import_graph import guards, modules, named_modules
 

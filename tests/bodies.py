@@ -7,7 +7,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_models.body.fe_body import FEBody, Interface
-from fe_models.material import Material
+from fe_models.body.material import Material
 from fe_models.meshes.cell_shapes import CELL_SHAPES, shape_values
 from fe_models.meshes.mesh import Mesh
 
@@ -65,8 +65,8 @@ def bar(
     nx=8, ny=1, nz=1, length=1.0, width=0.05, height=0.04, kind="hexahedron20", material=STEEL, ranks=None
 ) -> FEBody:
     """A free bar along x with rigid interfaces "left" and "right", still to be coupled, at its end faces."""
+    from fe_models.elements.solids.body import solid_body
     from fe_models.foundation.units import unit_system
-    from fe_models.solids.body import solid_body
 
     mesh = box_mesh(nx, ny, nz, length, width, height, kind)
     ends = [

@@ -3,9 +3,9 @@
 import numpy as np
 
 import cms
-from cms.importers.superelement import RecoveryRows, Superelement
+from cms.exchange.importers.superelement import RecoveryRows, Superelement
 from fe_models.body.fe_body import FEBody
-from fe_models.importers.matrices.foreign_matrices import SCALAR
+from fe_models.files.matrices.foreign_matrices import SCALAR
 
 FIRST = 101  #: number of the first node
 

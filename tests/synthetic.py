@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from cms.reduced_body.invariants import moments_from_gram
-from cms.reduced_body.nodal_sums import NodalSums
-from cms.reduced_body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
-from cms.reduced_body.source_columns import source_columns
-from cms.reduced_body.stress import PointStress
+from cms.body.invariants import moments_from_gram
+from cms.body.nodal_sums import NodalSums
+from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
+from cms.body.source_columns import source_columns
+from cms.body.stress import PointStress
 from fe_models.body.load_cases import ReducedLoadCase
 from fe_models.foundation.units import unit_system
 

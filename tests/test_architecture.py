@@ -90,13 +90,43 @@ def test_no_module_imports_itself_by_way_of_others():
 
 
 def test_no_room_imports_itself_by_way_of_others():
-    """A module that stands above rooms, such as cms/reduction.py, is a place of its own."""
+    """A module that stands above rooms, such as cms/reduction/reduction.py, is a place of its own."""
     above = {path.parent for path in modules().values() if [f for f in path.parent.glob("*/__init__.py")]}
     place = {name: name if path.parent in above else str(path.parent) for name, path in modules().items()}
     arrows: dict[str, set[str]] = {}
     for name, others in graph().items():
         arrows.setdefault(place[name], set()).update({place[other] for other in others} - {place[name]})
     assert circles(arrows) == []
+
+
+#: wings of each package: one imports itself and those before it; modules beside them are errors and names for all
+WINGS = {
+    "fe_models": ("foundation", "meshes", "body", "elements", "assembly", "checks", "files", "parts"),
+    "cms": ("linear_algebra", "body", "modes", "reduction", "assessment", "exchange", "jobs", "cli"),
+    "floatframe": (
+        "model", "components", "engine", "integrators", "results", "simulation", "analyses", "files", "pictures",
+        "design", "durability", "machines", "cli",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_wings_import_those_before_them(package):
+    wings = WINGS[package]
+    assert {path.parent.name for path in (ROOT / package).glob("*/__init__.py")} == set(wings)
+
+    def rank(name: str) -> int:
+        parts = name.split(".")
+        return wings.index(parts[1]) if len(parts) > 1 and parts[1] in wings else -1
+
+    upward = {
+        name: wrong
+        for name, names in graph().items()
+        if name.startswith(f"{package}.")
+        and rank(name) >= 0
+        and (wrong := sorted(n for n in names if n.startswith(f"{package}.") and rank(n) > rank(name)))
+    }
+    assert upward == {}
 
 
 def test_the_foundation_imports_nothing_of_ours_but_itself():
@@ -161,7 +191,7 @@ def test_output_of_the_core_goes_through_the_command_line():
 
 
 #: what stays of the house when numba is there: kernels are compiled on import, the worker is the entry of a process
-NOT_ALONE = ("floatframe.kernels", "cms.rendering.worker")
+NOT_ALONE = ("floatframe.engine.kernels", "cms.assessment.rendering.worker")
 
 
 @pytest.mark.long

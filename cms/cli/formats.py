@@ -6,10 +6,10 @@ from dataclasses import asdict
 import typer
 
 from cms.cli.console import print_table
-from cms.exporters.formats import FORMATS as EXPORTED
-from cms.importers.formats import FORMATS as REDUCED
+from cms.exchange.exporters.formats import FORMATS as EXPORTED
+from cms.exchange.importers.formats import FORMATS as REDUCED
+from fe_models.files.formats import FORMATS as MODELS
 from fe_models.foundation.formats import FileFormat
-from fe_models.importers.formats import FORMATS as MODELS
 
 __all__ = ["FORMATS", "list_formats", "markdown_tables"]
 

@@ -11,9 +11,9 @@ from cms.errors import JobError, ModalFileError
 from fe_models.foundation.words import nearest
 
 if TYPE_CHECKING:
-    from cms.reduced_basis.damping import Damping
-    from cms.reduced_basis.frames import Frame
-    from cms.reduced_body.reduced_body import ReducedBody
+    from cms.body.reduced_body import ReducedBody
+    from cms.reduction.basis.damping import Damping
+    from cms.reduction.basis.frames import Frame
 
 __all__ = ["FrameRequest", "frame_of", "numbers", "run_frame"]
 
@@ -41,8 +41,8 @@ def run_frame(request: FrameRequest) -> "ReducedBody":
     CmsError
         If the frame is unknown, the file lacks data that it needs, or the output cannot be written.
     """
-    from cms.frame_conversion import convert_frame
-    from cms.modal_file.file import convert_units, read, write
+    from cms.body.modal_file.file import convert_units, read, write
+    from cms.reduction.frame_conversion import convert_frame
 
     frame = frame_of(request)
     default = request.file.with_name(f"{request.file.stem}_{request.to}.h5")
@@ -70,7 +70,7 @@ def frame_of(request: FrameRequest) -> "Frame":
     JobError
         If it is unknown, or an option does not belong to it or cannot be read.
     """
-    from cms.reduced_basis.frames import FRAMES, NodalFrame
+    from cms.reduction.basis.frames import FRAMES, NodalFrame
 
     if request.to not in FRAMES:
         raise JobError(f"--to {request.to}: unknown frame{nearest(request.to, FRAMES)}")
@@ -90,7 +90,7 @@ def frame_of(request: FrameRequest) -> "Frame":
 
 def damping_of(request: FrameRequest) -> "Damping | None":
     """Return the damping that replaces that of the file; None if none is requested."""
-    from cms.reduced_basis.damping import ModalDamping
+    from cms.reduction.basis.damping import ModalDamping
 
     return None if request.ratio is None else ModalDamping(request.ratio)
 

@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from cms.cli.console import output_path, print_table, say
-from cms.quality.errors import QualityError
-from cms.quality.of_reduction.frf import POINTS, compare_responses, frequency_grid, resonance_grid
-from cms.quality.reference.port_model import (
+from cms.assessment.quality.errors import QualityError
+from cms.assessment.quality.of_reduction.frf import POINTS, compare_responses, frequency_grid, resonance_grid
+from cms.assessment.quality.reference.port_model import (
     FrequencyResponse,
     PortModel,
     file_resonances,
@@ -18,7 +17,8 @@ from cms.quality.reference.port_model import (
     modal_response,
     resonances,
 )
-from cms.reduced_body.reduced_body import ReducedBody
+from cms.body.reduced_body import ReducedBody
+from cms.cli.console import output_path, print_table, say
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.components import MOTION_COMPONENTS
 from fe_models.foundation.paths import replace_file
@@ -48,7 +48,7 @@ class FrfRequest:
 
 def run_frf(request: FrfRequest) -> None:
     """Compute the response with points around all resonances, print its peaks, and write the requested files."""
-    from cms.modal_file.file import read
+    from cms.body.modal_file.file import read
 
     frequencies = parse_band(request.band)
     pairs = tuple(parse_component(text) for text in request.components or MOTION_COMPONENTS[:3])
@@ -120,13 +120,13 @@ def checked_output(path: Path, request: FrfRequest) -> Path:
 
 def full_model(request: FrfRequest, reduced: ReducedBody, highest: float) -> tuple[PortModel, float]:
     """Return the full model of a job at the two interfaces, valid up to a frequency [Hz], and its time unit [s]."""
+    from cms.assessment.quality.reduction_check import require_same_units
+    from cms.assessment.quality.reference.ports import Ports
+    from cms.assessment.quality.reference.reference_response import reference_response
     from cms.cli.console import stages
-    from cms.families.families import Families
     from cms.jobs.body_of_job import coupled_body, uncoupled_body
     from cms.jobs.job import read_job
-    from cms.quality.reduction_check import require_same_units
-    from cms.quality.reference.ports import Ports
-    from cms.quality.reference.reference_response import reference_response
+    from cms.modes.families.families import Families
 
     assert request.job is not None
     job = read_job(request.job)
@@ -150,7 +150,7 @@ def print_peaks(
     pairs: tuple[tuple[int, int], ...],
 ) -> None:
     """Print the largest peaks of each component, and the error relative to the full model."""
-    from cms.quality.of_reduction.frf import peaks
+    from cms.assessment.quality.of_reduction.frf import peaks
 
     unit = response_unit
     rows = []
@@ -228,7 +228,7 @@ def draw(
     pairs: tuple[tuple[int, int], ...],
 ) -> None:
     """Draw magnitude and phase of each component."""
-    from cms.quality.plots import frf_figure
+    from cms.assessment.quality.plots import frf_figure
 
     curves = {"reduced": own} if full is None else {"full model": full, "reduced": own}
     units = [response_unit(reduced, motion, force, request) for motion, force in pairs]

@@ -9,7 +9,7 @@ from cms.cli.arguments import ModalFile
 from cms.cli.console import guarded, print_table, say, vector_words
 
 if TYPE_CHECKING:
-    from cms.reduced_body.reduced_body import ReducedBody
+    from cms.body.reduced_body import ReducedBody
 
 __all__ = ["info_command", "info_record", "print_body"]
 
@@ -20,8 +20,8 @@ def info_record(file: Path, units: str | None = None, mass_at: str | None = None
     """Return the content of a modal file as JSON, with the effective masses at an interface if one is named."""
     import json
 
-    from cms.modal_file.file import digest, read
-    from cms.quality.body_record import body_record, effective_mass_record
+    from cms.assessment.quality.body_record import body_record, effective_mass_record
+    from cms.body.modal_file.file import digest, read
 
     body = read(file, units=units)
     more = {} if mass_at is None else {"effective_mass": effective_mass_record(body, mass_at)}
@@ -30,8 +30,8 @@ def info_record(file: Path, units: str | None = None, mass_at: str | None = None
 
 def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
     """Print mass properties, modes and interfaces of a body, and its provenance if `everything`."""
-    from cms.quality.body_record import body_record, body_size
-    from cms.quality.of_body.unit_hints import unit_texts
+    from cms.assessment.quality.body_record import body_record, body_size
+    from cms.assessment.quality.of_body.unit_hints import unit_texts
 
     record = body_record(body)
     length, mass, inertia = (
@@ -200,7 +200,7 @@ def info_command(
     if json:
         typer.echo(info_record(file, units, mass_at))
         return
-    from cms.modal_file.file import digest, read
+    from cms.body.modal_file.file import digest, read
 
     body = read(file, units=units)
     if mass_at is not None:
@@ -212,7 +212,7 @@ def info_command(
 
 def print_effective_mass(body: "ReducedBody", at: str) -> None:
     """Print the share of every mode in mass and inertia, and cumulative sums, while an interface is driven."""
-    from cms.quality.of_body.effective_mass import DIRECTIONS, effective_mass_at
+    from cms.assessment.quality.of_body.effective_mass import DIRECTIONS, effective_mass_at
 
     found = effective_mass_at(body, at)
     shares, sums = 100 * found.share, 100 * found.cumulative

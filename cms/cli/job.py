@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cms.cli.console import output_path, print_table, say
-from cms.decks.job_text import JobRequest, job_text
 from cms.errors import JobError
+from cms.jobs.decks.job_text import JobRequest, job_text
 from fe_models.foundation.units import UNIT_SYSTEMS
 from fe_models.foundation.words import nearest, quoted
 
@@ -27,7 +27,7 @@ class DeckRequest:
 
 def write_job(request: DeckRequest) -> None:
     """Read the deck, print what is not converted, and write the job."""
-    from fe_models.importers.decks.read_deck import read_deck
+    from fe_models.files.decks.read_deck import read_deck
 
     if request.units is None or request.units not in UNIT_SYSTEMS:
         what = "missing; a deck does not say its units" if request.units is None else f"unknown {quoted(request.units)}"

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import typer
 
+from cms.assessment.quality.body_record import body_record
+from cms.body.reduced_body import ReducedBody
 from cms.cli.console import print_table, say, stages
-from cms.mode_set import ModeSet
-from cms.quality.body_record import body_record
-from cms.reduced_body.reduced_body import ReducedBody
+from cms.modes.mode_set import ModeSet
 
 __all__ = ["list_modes", "mode_record"]
 
@@ -27,7 +27,7 @@ def list_modes(path: Path, *, as_json: bool) -> None:
     from cms.jobs.job import read_job
     from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
     from cms.jobs.parts_of_job import frame_of
-    from cms.reduction import reduce
+    from cms.reduction.reduction import reduce
 
     job = read_job(path)
     with stages() as clock:

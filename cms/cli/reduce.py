@@ -13,8 +13,8 @@ from cms.cli.console import USER_ERROR, guarded, output_path, print_error, print
 from cms.cli.info import print_body
 
 if TYPE_CHECKING:
+    from cms.body.reduced_body import ReducedBody
     from cms.jobs.job import Job
-    from cms.reduced_body.reduced_body import ReducedBody
     from fe_models.foundation.stages import Stages
 
 __all__ = ["Fleet", "reduce_and_write", "reduce_and_write_fleet", "reduce_command"]
@@ -22,8 +22,8 @@ __all__ = ["Fleet", "reduce_and_write", "reduce_and_write_fleet", "reduce_comman
 
 def reduce_and_write(job: "Job", path: Path, solver: str | None = None, memory: str | None = None) -> "ReducedBody":
     """Run a job, write its modal file, and print a summary."""
+    from cms.body.modal_file.file import write
     from cms.jobs.reduce_job import reduce_job
-    from cms.modal_file.file import write
 
     reports: list[Any] = []
     try:
@@ -82,7 +82,7 @@ def reduce_and_write_fleet(fleet: Fleet) -> None:
         If a job failed.
     """
     from cms.errors import JobError
-    from cms.fleets.fleet import reduce_fleet
+    from cms.jobs.fleets.fleet import reduce_fleet
 
     made = [job.with_suffix(".h5") for job in fleet.jobs]
     if fleet.output is not None and fleet.output.is_dir():
@@ -142,7 +142,7 @@ def reduce_command(
     """
     from cms.cli.ranks import on_ranks, one_job_of_ranks
     from cms.errors import JobError
-    from cms.fleets.inputs import inputs_of
+    from cms.jobs.fleets.inputs import inputs_of
     from cms.jobs.job import read_job
     from fe_models.foundation.ranks.ranks import started_ranks
 

@@ -127,7 +127,7 @@ def stiffness_damping(job: Job) -> StiffnessDamping | None:
     small fraction of their damping. D = beta K is the same in parts and in one piece.
     """
     from cms.jobs.reduce_job import reduce_job
-    from cms.reduced_basis.damping import PerModeDamping, RayleighDamping, damping_ratios
+    from cms.reduction.basis.damping import PerModeDamping, RayleighDamping, damping_ratios
 
     damping = None if job.damping is None else job.damping.damping
     if damping is None or isinstance(damping, RayleighDamping):

@@ -29,9 +29,9 @@ def view_command(
 
     Example: cms view rod.h5 --mode 3 --animate m3.gif
     """
-    from cms.modal_file.file import read
-    from cms.rendering import SceneError
-    from cms.report.view import animate_mode, view_mode
+    from cms.assessment.rendering import SceneError
+    from cms.assessment.report.view import animate_mode, view_mode
+    from cms.body.modal_file.file import read
 
     picture = output
     if output is None and animate is None:

@@ -12,7 +12,7 @@ from fe_models.body.fe_body import Interface
 from fe_models.foundation.words import nearest
 
 if TYPE_CHECKING:
-    from fe_models.beams.beam_property import BeamProperty
+    from fe_models.elements.beams.beam_property import BeamProperty
     from fe_models.meshes.line_mesh import LineMesh
     from fe_models.meshes.shell_mesh import ShellMesh
 
@@ -30,8 +30,8 @@ GENERAL_KEYS = {
 
 def frame_mesh(job: Job) -> "LineMesh":
     """Read the lines of the job: two tables, or the groups of its mesh that have sections."""
-    from fe_models.importers.read_mesh import read_line_mesh
-    from fe_models.importers.tables import read_tables
+    from fe_models.files.read_mesh import read_line_mesh
+    from fe_models.files.tables import read_tables
 
     if job.body.nodes is not None and job.body.lines is not None:
         return read_tables(job.body.nodes, job.body.lines)
@@ -43,7 +43,7 @@ def frame_mesh(job: Job) -> "LineMesh":
 
 def properties_of(job: Job) -> "dict[str, BeamProperty]":
     """Return section, material and beam theory for each group of lines."""
-    from fe_models.beams.beam_property import BeamProperty
+    from fe_models.elements.beams.beam_property import BeamProperty
 
     made: dict[str, BeamProperty] = {}
     for section in job.sections.values():
@@ -64,7 +64,7 @@ def properties_of(job: Job) -> "dict[str, BeamProperty]":
 
 def shape_of(section: BeamSection) -> Any:
     """Return the cross-section of a table."""
-    from fe_models.beams.sections import SECTIONS
+    from fe_models.elements.beams.sections import SECTIONS
 
     given = {GENERAL_KEYS.get(key, key): value for key, value in section.dimensions.items()}
     if "outline" in given:
@@ -74,7 +74,7 @@ def shape_of(section: BeamSection) -> Any:
 
 def attachments_of(job: Job, mesh: "LineMesh | ShellMesh") -> tuple[list[Any], list[Any], list[Any]]:
     """Return point masses, springs and rigid links of the job on this mesh."""
-    from fe_models.beams.attachments import PointMass, RigidLink, Spring
+    from fe_models.elements.beams.attachments import PointMass, RigidLink, Spring
 
     masses = [
         PointMass(
@@ -135,7 +135,7 @@ def nodes_named(mesh: "LineMesh | ShellMesh", where: str, group: str) -> np.ndar
 def frame_interface(name: str, section: Any, mesh: "LineMesh") -> Interface:
     """Return one interface on the lines: its selection, kind, reference point and axes."""
     from cms.jobs.parts_of_job import selection_of
-    from fe_models.beams.interfaces import line_interface
+    from fe_models.elements.beams.interfaces import line_interface
 
     chosen = selection_of(section.selection, getattr(section, section.selection))
     # the job lists axes as rows; here they are columns

@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 from cms.errors import JobError
 from cms.jobs.job import Job
-from fe_models.body.coupling_on_ranks import spread_body
+from fe_models.body.couplings.coupling_on_ranks import spread_body
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.ranks.ranks import Ranks
 from fe_models.foundation.stages import Stages
 from fe_models.foundation.units import unit_system
 
 if TYPE_CHECKING:
+    from fe_models.checks.first_order import FirstOrderError
     from fe_models.meshes.mesh import Mesh
-    from fe_models.reports.first_order import FirstOrderError
 from cms.jobs.mesh_of_job import is_cad, solid_mesh_of
 from cms.jobs.parts_of_job import interfaces_of, load_cases_of, materials_of, part_of_mesh
 
@@ -50,15 +50,15 @@ def job_body(
 def coupled_body(job: Job, body: FEBody) -> FEBody:
     """Couple the interfaces of the body of a job, and make it planar if the job says so."""
     from cms.jobs.beam_tables import PLANES
-    from cms.second_order.centrifugal import CENTRIFUGAL, centrifugal_loads
-    from fe_models.body.couplings import couple
+    from cms.modes.centrifugal import CENTRIFUGAL, centrifugal_loads
+    from fe_models.body.couplings.couplings import couple
 
     if CENTRIFUGAL in (job.reduction.extra or ()):
         # before coupling, because rigid interfaces eliminate the dofs on which these loads act
         body = body.with_load_cases(*centrifugal_loads(body))
     if job.body.plane is None:
         return couple(body)
-    from fe_models.planar import planar
+    from fe_models.assembly.planar import planar
 
     return planar(couple(body), normal=PLANES[job.body.plane])
 
@@ -77,7 +77,7 @@ def uncoupled_body(
     body = keep_nodes(made_body(job, stages, on_report, mesh, ranks), job.body.keep)
     if not job.body.stress_points:
         return body
-    from fe_models.recovery.element_points import element_points
+    from fe_models.elements.recovery.element_points import element_points
 
     if job.reduction.stress is False:
         raise JobError("body.stress_points: with reduction.stress = false no stress is kept; remove one of them")
@@ -123,8 +123,8 @@ def checked_mesh(
     job: Job, stages: Stages, on_report: Callable[[Any], None] | None
 ) -> "tuple[Mesh, FirstOrderError | None]":
     """Read and check the solid mesh of a job; return it without unused nodes, and its first-order error."""
+    from fe_models.checks.mesh_report import report_mesh
     from fe_models.meshes.unused_nodes import drop_unused_nodes
-    from fe_models.reports.mesh_report import report_mesh
 
     with stages("mesh" if is_cad(job) else "read mesh"):
         mesh = part_of_mesh(job, solid_mesh_of(job))
@@ -151,7 +151,7 @@ def body_of_mesh(
     ranks: Ranks | None = None,
 ) -> FEBody:
     """Read and check the mesh, unless it is given, and assemble it with the materials and interfaces of the job."""
-    from fe_models.solids.body import solid_body
+    from fe_models.elements.solids.body import solid_body
 
     units, first_order = unit_system(job.body.units), None
     if mesh is None:

@@ -4,7 +4,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from cms.reduced_basis.damping import (
+from cms.reduction.basis.damping import (
     CUSTOMARY_STEPS,
     Damping,
     ModalDamping,

@@ -11,18 +11,18 @@ from cms.errors import JobError
 from cms.jobs.job import InterfaceSection, Job
 from cms.jobs.tables.material_table import isotropic_of, material_of
 from fe_models.body.fe_body import FEBody, Interface
-from fe_models.body.numbering import Numbering
 from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.digest import file_digest
 from fe_models.foundation.stages import Stages
 from fe_models.foundation.units import unit_system
 from fe_models.foundation.words import nearest
+from fe_models.meshes.numbering import Numbering
 
 if TYPE_CHECKING:
-    from fe_models.assemblies.constraints import Constraint
-    from fe_models.assemblies.join import Joined, Part
-    from fe_models.importers.raw_mesh import RawMesh
-    from fe_models.material import AnyMaterial
+    from fe_models.assembly.constraints import Constraint
+    from fe_models.assembly.join import Joined, Part
+    from fe_models.body.material import AnyMaterial
+    from fe_models.meshes.cells.raw_mesh import RawMesh
     from fe_models.meshes.mesh import Mesh
 
 __all__ = ["body_of_deck"]
@@ -32,10 +32,10 @@ NO_NODES = np.zeros(0, dtype=np.int64)
 
 def body_of_deck(job: Job, path: Path, stages: Stages, on_report: Callable[[Any], None] | None) -> FEBody:
     """Read the deck, make a body of each kind of elements, join them, and add loads and interfaces."""
-    from fe_models.assemblies.join import join
-    from fe_models.importers.decks.read_deck import read_deck
-    from fe_models.importers.raw_mesh import LINES
-    from fe_models.importers.shell_cells import with_centres
+    from fe_models.assembly.join import join
+    from fe_models.files.decks.read_deck import read_deck
+    from fe_models.meshes.cells.raw_mesh import LINES
+    from fe_models.meshes.cells.shell_cells import with_centres
     from fe_models.meshes.mesh import FACE_TYPES
 
     with stages("read deck"):
@@ -69,7 +69,7 @@ def _parts(
     job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], None] | None
 ) -> "tuple[list[Part], list[Mesh]]":
     """Return the bodies of solids, shells, lines and attachments at single nodes; and the meshes of the solids."""
-    from fe_models.assemblies.join import Part
+    from fe_models.assembly.join import Part
 
     parts: list[Part] = []
     meshes = []
@@ -89,11 +89,11 @@ def _solids(
     job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], None] | None
 ) -> "Iterable[tuple[FEBody, Mesh]]":
     """Yield one body for each formulation of the solids, and its mesh."""
-    from fe_models.importers.raw_mesh import chosen_cells, mesh_from_raw
+    from fe_models.checks.mesh_report import report_mesh
+    from fe_models.elements.solids.body import solid_body
+    from fe_models.meshes.cells.raw_mesh import chosen_cells, mesh_from_raw
     from fe_models.meshes.mesh import SOLID_TYPES
     from fe_models.meshes.unused_nodes import drop_unused_nodes
-    from fe_models.reports.mesh_report import report_mesh
-    from fe_models.solids.body import solid_body
 
     materials = _materials(job)
     rules: dict[tuple[str, str], dict[str, AnyMaterial]] = {}
@@ -137,12 +137,12 @@ def _is_linked(job: Job) -> bool:
 def _shells(job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], None] | None) -> "Iterable[Part]":
     """Yield a body of the shells, or several if shells lie on the same nodes."""
     from cms.jobs.shell_body import shell_properties_of
-    from fe_models.assemblies.join import Part
-    from fe_models.importers.raw_mesh import chosen_cells
-    from fe_models.importers.shell_cells import SHELL_TYPES, shell_mesh_from_raw
-    from fe_models.reports.shell_report import report_shell
-    from fe_models.shells.body import shell_body
-    from fe_models.shells.quality import WARP_LIMIT
+    from fe_models.assembly.join import Part
+    from fe_models.checks.shell_report import report_shell
+    from fe_models.elements.shells.body import shell_body
+    from fe_models.elements.shells.quality import WARP_LIMIT
+    from fe_models.meshes.cells.raw_mesh import chosen_cells
+    from fe_models.meshes.cells.shell_cells import SHELL_TYPES, shell_mesh_from_raw
 
     properties = shell_properties_of(job) if job.shells else {}
     layers = _layers(raw, "shells.cells", SHELL_TYPES, properties)
@@ -169,7 +169,7 @@ def _layers(
     raw: "RawMesh", where: str, kinds: tuple[str, ...], properties: Mapping[str, Any]
 ) -> list[tuple[str, ...] | None]:
     """Split the groups into parts without two cells on the same nodes; None: all cells."""
-    from fe_models.importers.cells_apart import groups_apart
+    from fe_models.meshes.cells.cells_apart import groups_apart
 
     if "all" in properties:
         return [None]
@@ -186,11 +186,11 @@ def _names(name: str, layers: list[Any]) -> list[str]:
 def _lines(job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], None] | None) -> "Iterable[Part]":
     """Yield a body of the beams, or several if beams lie on the same nodes."""
     from cms.jobs.attachments_of_job import properties_of
-    from fe_models.assemblies.join import Part
-    from fe_models.beams.body import beam_body
-    from fe_models.importers.line_cells import line_mesh_from_raw
-    from fe_models.importers.raw_mesh import chosen_cells
-    from fe_models.reports.frame_report import report_frame
+    from fe_models.assembly.join import Part
+    from fe_models.checks.frame_report import report_frame
+    from fe_models.elements.beams.body import beam_body
+    from fe_models.meshes.cells.line_cells import line_mesh_from_raw
+    from fe_models.meshes.cells.raw_mesh import chosen_cells
 
     properties = properties_of(job) if job.sections else {}
     layers = _layers(raw, "sections.lines", ("line", "line3"), properties)
@@ -209,10 +209,10 @@ def _lines(job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], None
 
 def _rods(job: Job, path: Path, raw: "RawMesh") -> "Iterable[Part]":
     """Yield a body of the rods, or several if rods lie on the same nodes."""
-    from fe_models.assemblies.join import Part
-    from fe_models.assemblies.rods import Rod, rod_body
-    from fe_models.importers.line_cells import line_mesh_from_raw
-    from fe_models.importers.raw_mesh import chosen_cells
+    from fe_models.assembly.join import Part
+    from fe_models.assembly.rods import Rod, rod_body
+    from fe_models.meshes.cells.line_cells import line_mesh_from_raw
+    from fe_models.meshes.cells.raw_mesh import chosen_cells
 
     rods: dict[str, Rod] = {}
     for table in job.rods.values():
@@ -230,9 +230,9 @@ def _rods(job: Job, path: Path, raw: "RawMesh") -> "Iterable[Part]":
 
 def _attached(job: Job, raw: "RawMesh") -> "Part | None":
     """Return point masses and springs as a body that has only their nodes."""
-    from fe_models.assemblies.join import Part
-    from fe_models.beams.attachments import PointMass, Spring
-    from fe_models.beams.body import beam_body
+    from fe_models.assembly.join import Part
+    from fe_models.elements.beams.attachments import PointMass, Spring
+    from fe_models.elements.beams.body import beam_body
     from fe_models.meshes.line_mesh import LineMesh
 
     if not job.masses and not job.springs:
@@ -326,7 +326,7 @@ def _mean_interface(
 
 
 def _constraints(job: Job, raw: "RawMesh", *, besides: set[str]) -> "list[Constraint]":
-    from fe_models.assemblies.constraints import MeanMotion, NodeEquation, RigidNodes
+    from fe_models.assembly.constraints import MeanMotion, NodeEquation, RigidNodes
 
     made: list[Constraint] = []
     for name, link in job.links.items():
@@ -352,7 +352,7 @@ def _constraints(job: Job, raw: "RawMesh", *, besides: set[str]) -> "list[Constr
 
 def _load_cases(job: Job, raw: "RawMesh", joined: "Joined", meshes: "list[Mesh]") -> "list[Any]":
     from cms.jobs.parts_of_job import load_case_of
-    from fe_models import loads
+    from fe_models.body import loads
 
     body, made = joined.body, []
     for name, table in job.load_cases.items():
@@ -377,7 +377,7 @@ def _load_cases(job: Job, raw: "RawMesh", joined: "Joined", meshes: "list[Mesh]"
 
 def _pressure(body: FEBody, joined: "Joined", mesh: "Mesh", name: str, table: Any) -> Any:
     """Return the load case of a pressure on faces of one of the solids."""
-    from fe_models.loads import nodal_load, pressure_load
+    from fe_models.body.loads import nodal_load, pressure_load
     from fe_models.meshes.selections import FaceGroup
 
     dofs = np.stack([np.repeat(np.arange(len(mesh.nodes)), 3), np.tile(np.arange(3), len(mesh.nodes))], axis=1)

@@ -30,8 +30,8 @@ def body_of_frame(
         Interfaces to use instead of those of the job; load cases are then left to the caller too.
     """
     from cms.jobs.parts_of_job import load_cases_of, part_of_mesh
-    from fe_models.beams.body import beam_body
-    from fe_models.reports.frame_report import report_frame
+    from fe_models.checks.frame_report import report_frame
+    from fe_models.elements.beams.body import beam_body
 
     units = unit_system(job.body.units)
     with stages("read lines"):

@@ -27,10 +27,10 @@ def body_of_matrices(job: Job, stages: Stages, on_report: Callable[[Any], None] 
     """
     if job.body.brings_interfaces:
         return body_with_its_interfaces(job, stages)
-    from fe_models.importers.matrices.body import body_from_foreign, nodes_of, with_geometry
-    from fe_models.importers.matrices.matrix_report import MatrixReport
-    from fe_models.importers.matrices.read_matrices import read_matrices
-    from fe_models.importers.read_mesh import read_geometry
+    from fe_models.files.matrices.body import body_from_foreign, nodes_of, with_geometry
+    from fe_models.files.matrices.matrix_report import MatrixReport
+    from fe_models.files.matrices.read_matrices import read_matrices
+    from fe_models.files.read_mesh import read_geometry
 
     if job.body.matrices is None:
         raise JobError("job: expected matrices, got none")
@@ -55,7 +55,7 @@ def body_with_its_interfaces(job: Job, stages: Stages) -> FEBody:
     """Read a body of bare matrices whose file contains the interfaces."""
     from pathlib import Path
 
-    from fe_models.matrices import body_from_npz
+    from fe_models.files.matrices.given import body_from_npz
 
     with stages("read matrices"):
         body = body_from_npz(
@@ -68,11 +68,11 @@ def body_with_its_interfaces(job: Job, stages: Stages) -> FEBody:
 
 def interfaces_on(job: Job, geometry: "Mesh | NodeCloud") -> tuple[Interface, ...]:
     """Return the interfaces of the job, on a solid mesh or on nodes of unknown elements."""
-    from fe_models.beams.interfaces import node_interface
+    from fe_models.elements.beams.interfaces import node_interface
+    from fe_models.elements.solids.interfaces import check_overlap
     from fe_models.meshes.boundary import facet_weights
     from fe_models.meshes.mesh import Mesh
     from fe_models.meshes.selections import selected_facets
-    from fe_models.solids.interfaces import check_overlap
 
     if isinstance(geometry, Mesh):
         return interfaces_of(job, geometry)

@@ -18,13 +18,13 @@ def is_cad(job: Job) -> bool:
 
 def solid_mesh_of(job: Job) -> "Mesh":
     """Return the complete solid mesh; faces that interfaces and loads select are groups."""
-    from fe_models.importers import read_mesh
+    from fe_models.files import read_mesh
 
     if job.body.mesh is None:
         raise JobError("job: expected a mesh, got none")
     if job.mesh_size is None:
         return read_mesh(job.body.mesh)
-    from fe_models.importers.cad.cad_mesh import MeshSize, mesh_cad
+    from fe_models.files.cad.cad_mesh import MeshSize, mesh_cad
 
     size = MeshSize(**job.mesh_size.model_dump())
     chosen = [table.faces for table in job.interfaces.values()] + [table.faces for table in job.load_cases.values()]

@@ -26,10 +26,10 @@ def body_of_mixed(job: Job, stages: Stages, solid: FEBody, solid_mesh: Any, on_r
         Mesh of the solid, for selections.
     """
     from cms.jobs.parts_of_job import interface_of, selection_of
-    from fe_models.beams.interfaces import NodeIndices, line_interface
-    from fe_models.body.couplings import couple
-    from fe_models.solids import interfaces as on_solid
-    from fe_models.weld import weld
+    from fe_models.body.couplings.couplings import couple
+    from fe_models.body.weld import weld
+    from fe_models.elements.beams.interfaces import NodeIndices, line_interface
+    from fe_models.elements.solids import interfaces as on_solid
 
     lines = frame_mesh(job)
     makers = {"rigid": on_solid.rigid_interface, "distributing": on_solid.distributing_interface}

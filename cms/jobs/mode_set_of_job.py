@@ -5,16 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from cms.families.families import Families
-from cms.families.interface_loads import InterfaceLoad, condensed_load
-from cms.families.sharing import families_of
 from cms.jobs.job import Job
 from cms.jobs.reduction_table import AUTO, LoadSection, NeighbourSection, ReductionSection, mode_set_options
-from cms.mode_set import ModeSet
-from cms.mode_sets import MODE_SETS
-from cms.mode_sets.characteristic_modes import with_characteristic_modes
-from cms.mode_sets.extra_columns import EXTRA_COLUMNS
-from cms.solvers.mode_count import ModeCount
+from cms.linear_algebra.solvers.mode_count import ModeCount
+from cms.modes.families.families import Families
+from cms.modes.families.interface_loads import InterfaceLoad, condensed_load
+from cms.modes.families.sharing import families_of
+from cms.modes.mode_set import ModeSet
+from cms.modes.mode_sets import MODE_SETS
+from cms.modes.mode_sets.characteristic_modes import with_characteristic_modes
+from cms.modes.mode_sets.extra_columns import EXTRA_COLUMNS
 from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.foundation.arrays import Array
 
@@ -49,7 +49,7 @@ def job_mode_set(body: FEBody | Families, reduction: ReductionSection) -> ModeSe
 
         if reduction.n_modes != AUTO:
             return added(MODE_SETS[reduction.set](families, **options))
-        from cms.compare.mode_selection import select_modes
+        from cms.assessment.compare.mode_selection import select_modes
 
         has_additions = reduction.extra or reduction.interface_modes is not None or reduction.interface_cutoff
         return select_modes(

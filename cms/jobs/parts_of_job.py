@@ -11,8 +11,8 @@ from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.load_cases import LoadCase
 
 if TYPE_CHECKING:
-    from cms.reduced_basis.frames import Frame, HeldFrame
-    from fe_models.material import AnyMaterial
+    from cms.reduction.basis.frames import Frame, HeldFrame
+    from fe_models.body.material import AnyMaterial
     from fe_models.meshes.line_mesh import LineMesh
     from fe_models.meshes.mesh import Mesh
     from fe_models.meshes.node_cloud import NodeCloud
@@ -43,7 +43,7 @@ def materials_of(job: Job) -> "AnyMaterial | dict[str, AnyMaterial]":
 
 def interfaces_of(job: Job, mesh: "Mesh") -> tuple[Interface, ...]:
     """Return the interfaces of the job on this mesh; no two may share a node."""
-    from fe_models.solids.interfaces import check_overlap
+    from fe_models.elements.solids.interfaces import check_overlap
 
     interfaces = tuple(interface_of(name, section, mesh) for name, section in job.interfaces.items())
     check_overlap(interfaces, numbers=mesh.node_numbers)
@@ -52,7 +52,7 @@ def interfaces_of(job: Job, mesh: "Mesh") -> tuple[Interface, ...]:
 
 def interface_of(name: str, section: InterfaceSection, mesh: "Mesh") -> Interface:
     """Return one interface: its selection, kind, reference point and axes."""
-    from fe_models.solids import interfaces
+    from fe_models.elements.solids import interfaces
 
     makers = {
         "rigid": interfaces.rigid_interface,
@@ -97,7 +97,7 @@ def load_case_of(
     name: str, section: LoadCaseSection, body: FEBody, mesh: "Mesh | LineMesh | ShellMesh | NodeCloud | None"
 ) -> LoadCase:
     """Return one load case; the job has already checked that its keys fit its kind."""
-    from fe_models import loads
+    from fe_models.body import loads
 
     if section.acceleration is not None:
         return loads.gravity_load(body, name, section.acceleration)
@@ -114,7 +114,7 @@ def load_case_of(
 
 def frame_of(job: Job, *, held: bool = False) -> "Frame | HeldFrame":
     """Return the body frame of the job; a held body has the ground as its frame, and no other may be requested."""
-    from cms.reduced_basis.frames import HeldFrame
+    from cms.reduction.basis.frames import HeldFrame
 
     reduction = job.reduction
     if held:
@@ -130,7 +130,7 @@ def frame_of(job: Job, *, held: bool = False) -> "Frame | HeldFrame":
 
 def moving_frame_of(job: Job) -> "Frame":
     """Return the body frame of the job for a free body."""
-    from cms.reduced_basis.frames import FRAMES, NodalFrame
+    from cms.reduction.basis.frames import FRAMES, NodalFrame
 
     reduction = job.reduction
     if reduction.frame == "nodal":

@@ -6,24 +6,24 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cms.body.reduced_body import ReducedBody
 from cms.errors import MemoryBudgetError
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import Job, read_job
 from cms.jobs.parts_of_job import frame_of, moving_frame_of
-from cms.memory.budget import ReductionShape, columns_within, solver_within
-from cms.memory.size import memory_bytes, resident_bytes
-from cms.reduced_body.reduced_body import ReducedBody
-from cms.solvers.registry import solver_of
+from cms.linear_algebra.memory.budget import ReductionShape, columns_within, solver_within
+from cms.linear_algebra.memory.size import memory_bytes, resident_bytes
+from cms.linear_algebra.solvers.registry import solver_of
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.ranks.mpi import all_ranks
 from fe_models.foundation.solver import Solver
 from fe_models.foundation.stages import Stages
 
 if TYPE_CHECKING:
-    from cms.families.families import Families
-    from cms.mode_set import ModeSet
-    from cms.quality.of_reduction.contents import ReductionOptions
-    from cms.second_order.unit_states import UnitStates
+    from cms.assessment.quality.of_reduction.contents import ReductionOptions
+    from cms.modes.families.families import Families
+    from cms.modes.mode_set import ModeSet
+    from cms.reduction.geometric_stiffness.unit_states import UnitStates
 
 __all__ = ["reduce_job", "reduction_options"]
 
@@ -55,8 +55,8 @@ def reduce_job(
     stages
         Receives durations and progress of the stages; None: neither is reported.
     solver
-        Name of the solver (`cms.solvers.registry`); overrides the solver of the job. Default: the fastest installed
-        solver.
+        Name of the solver (`cms.linear_algebra.solvers.registry`); overrides the solver of the job. Default: the
+        fastest installed solver.
     memory
         Largest memory of the process, such as "8GB" or a number of bytes. Above it, the factor goes to disk; a job that
         still does not fit fails before the factorisation. Overrides the value of the job. Default: no limit.
@@ -73,7 +73,7 @@ def reduce_job(
     >>> body = cms.reduce_job("rod.toml")                                          # doctest: +SKIP
     >>> cms.write(body, "rod.h5")                                                  # doctest: +SKIP
     """
-    from cms.families.families import Families
+    from cms.modes.families.families import Families
 
     job = job if isinstance(job, Job) else read_job(Path(job))
     stages = stages or Stages()
@@ -111,8 +111,12 @@ def announce_stiffness(job: Job, body: FEBody) -> None:
     BodyError
         If it is requested, but the elements do not know it, an interface is unknown, or the memory does not suffice.
     """
-    from cms.second_order import room_for_stiffness as room
-    from cms.second_order.unit_states import has_geometric_stiffness, loaded_interfaces, require_geometric_stiffness
+    from cms.reduction.geometric_stiffness import room_for_stiffness as room
+    from cms.reduction.geometric_stiffness.unit_states import (
+        has_geometric_stiffness,
+        loaded_interfaces,
+        require_geometric_stiffness,
+    )
 
     asked, n_modes = job.reduction.geometric_stiffness, expected_columns(job, body)
     if asked in (None, False) and not job.reduction.quadratic_modes:
@@ -137,11 +141,11 @@ def reduced(
     job: Job, source: "FEBody | Families", stages: Stages, modes: "ModeSet", states: "UnitStates | None"
 ) -> ReducedBody:
     """Reduce the body of a job to its modes."""
-    from cms.families.sharing import body_of
     from cms.jobs.tables.recovery_section import requests_of
-    from cms.reduction import reduce
-    from cms.second_order.room_for_stiffness import left_out_words, makes_stiffness
-    from cms.second_order.unit_states import has_geometric_stiffness
+    from cms.modes.families.sharing import body_of
+    from cms.reduction.geometric_stiffness.room_for_stiffness import left_out_words, makes_stiffness
+    from cms.reduction.geometric_stiffness.unit_states import has_geometric_stiffness
+    from cms.reduction.reduction import reduce
 
     is_made = states is not None or makes_stiffness(
         job.reduction.geometric_stiffness, body_of(source), len(modes.labels)
@@ -167,7 +171,7 @@ def with_own_factorisation(
     job: Job, coupled: FEBody, solver: Solver, stages: Stages, to_disk: bool
 ) -> "tuple[ModeSet, UnitStates | None]":
     """Make all results that need the factorisation, and free it, because the reduction needs the memory."""
-    from cms.families.families import Families
+    from cms.modes.families.families import Families
 
     announce = not reduces_interfaces(job)
     with Families(coupled, announce=announce, solver=solver, to_disk=to_disk) as families:
@@ -180,8 +184,8 @@ def modes_and_states(job: Job, families: "Families", stages: Stages) -> "tuple[M
     The states are for the geometric stiffness; None if it is left out or unknown.
     """
     from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
-    from cms.second_order.room_for_stiffness import makes_stiffness
-    from cms.second_order.unit_states import unit_states
+    from cms.reduction.geometric_stiffness.room_for_stiffness import makes_stiffness
+    from cms.reduction.geometric_stiffness.unit_states import unit_states
 
     with stages(f"mode set {job.reduction.set}"):
         modes = job_mode_set(families, reduction_of(job, families.body))
@@ -206,7 +210,7 @@ def reduces_interfaces(job: Job) -> bool:
 
 def expected_columns(job: Job, body: FEBody) -> int:
     """Return a lower bound of the number of columns of the mode set of a job, before the set is made."""
-    from cms.families.interface_cost import few_columns
+    from cms.modes.families.interface_cost import few_columns
 
     found = len(body.b)
     if reduces_interfaces(job):
@@ -224,8 +228,8 @@ def reduction_options(job: Job, body: FEBody) -> "ReductionOptions":
     body
         The coupled body of the job.
     """
+    from cms.assessment.quality.of_reduction.contents import ReductionOptions
     from cms.jobs.tables.recovery_section import requests_of
-    from cms.quality.of_reduction.contents import ReductionOptions
 
     asked = job.reduction.geometric_stiffness
     is_made = asked is True or bool(job.reduction.quadratic_modes)

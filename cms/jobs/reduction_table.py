@@ -7,13 +7,13 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, StringConstraints, ValidationInfo, field_validator, model_validator
 
-from cms.memory.size import memory_bytes
-from cms.mode_sets import MODE_SETS
-from cms.mode_sets.axis_functions import AXIS_FUNCTIONS
-from cms.mode_sets.extra_columns import EXTRA_COLUMNS
-from cms.mode_sets.given_columns import OVER
-from cms.solvers.mode_count import ModeCount
-from cms.solvers.registry import SOLVERS
+from cms.linear_algebra.memory.size import memory_bytes
+from cms.linear_algebra.solvers.mode_count import ModeCount
+from cms.linear_algebra.solvers.registry import SOLVERS
+from cms.modes.mode_sets import MODE_SETS
+from cms.modes.mode_sets.axis_functions import AXIS_FUNCTIONS
+from cms.modes.mode_sets.extra_columns import EXTRA_COLUMNS
+from cms.modes.mode_sets.given_columns import OVER
 from fe_models.foundation.components import MOTION_COMPONENTS
 from fe_models.foundation.paths import near_file
 from fe_models.foundation.tasks.task_map import WorkerError
@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 FRAMES = ("nodal", "tisserand", "buckens")
-#: names of `cms.compare.mode_selection`, whose import would slow down every command
+#: names of `cms.assessment.compare.mode_selection`, whose import would slow down every command
 MEASURE_NAMES = ("frequency", "frf")
 SET_OPTIONS = (
     "n_modes", "cutoff", "verify", "free", "loads", "neighbours", "n_blocks", "shifts", "tolerance", "band",

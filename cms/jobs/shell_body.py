@@ -13,8 +13,8 @@ from fe_models.foundation.stages import Stages
 from fe_models.foundation.units import unit_system
 
 if TYPE_CHECKING:
+    from fe_models.elements.shells.shell_property import AnyShellProperty
     from fe_models.meshes.shell_mesh import ShellMesh
-    from fe_models.shells.shell_property import AnyShellProperty
 
 __all__ = ["body_of_shell", "shell_interface_of", "shell_mesh"]
 
@@ -23,9 +23,9 @@ def body_of_shell(job: Job, stages: Stages, on_report: Callable[[Any], None] | N
     """Read and check the mesh, and make the body with the thicknesses, stiffeners and attachments of the job."""
     from cms.jobs.attachments_of_job import attachments_of, properties_of
     from cms.jobs.parts_of_job import load_cases_of, part_of_mesh
-    from fe_models.reports.shell_report import report_shell
-    from fe_models.shells.body import shell_body
-    from fe_models.shells.quality import WARP_LIMIT
+    from fe_models.checks.shell_report import report_shell
+    from fe_models.elements.shells.body import shell_body
+    from fe_models.elements.shells.quality import WARP_LIMIT
 
     units = unit_system(job.body.units)
     with stages("read mesh"):
@@ -62,7 +62,7 @@ def shell_mesh(job: Job) -> "ShellMesh":
 
     If the job accepts that others are left out, only the cells of the groups that it names are read.
     """
-    from fe_models.importers.read_mesh import read_shell_mesh
+    from fe_models.files.read_mesh import read_shell_mesh
 
     groups = [group for shell in job.shells.values() for group in shell.cells]
     lines = [group for section in job.sections.values() for group in section.lines]
@@ -72,7 +72,7 @@ def shell_mesh(job: Job) -> "ShellMesh":
 
 def shell_properties_of(job: Job) -> "dict[str, AnyShellProperty]":
     """Return thickness and material, or layers, for each group of cells."""
-    from fe_models.shells.shell_property import ShellProperty
+    from fe_models.elements.shells.shell_property import ShellProperty
 
     made: dict[str, AnyShellProperty] = {}
     for shell in job.shells.values():
@@ -92,7 +92,7 @@ def shell_properties_of(job: Job) -> "dict[str, AnyShellProperty]":
 
 
 def _laminate_of(job: Job, shell: ShellSection) -> "AnyShellProperty":
-    from fe_models.shells.shell_property import LaminateProperty, Layer, symmetric
+    from fe_models.elements.shells.shell_property import LaminateProperty, Layer, symmetric
 
     layers = []
     for layer in shell.layers:
@@ -109,7 +109,7 @@ def _laminate_of(job: Job, shell: ShellSection) -> "AnyShellProperty":
 def shell_interface_of(name: str, section: InterfaceSection, mesh: "ShellMesh") -> Interface:
     """Return one interface on the shell: its selection, kind, reference point and axes."""
     from cms.jobs.parts_of_job import selection_of
-    from fe_models.shells.interfaces import shell_interface
+    from fe_models.elements.shells.interfaces import shell_interface
 
     chosen = selection_of(section.selection, getattr(section, section.selection))
     # the job lists axes as rows; here they are columns

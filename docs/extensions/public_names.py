@@ -23,8 +23,9 @@ def public_names(package: str) -> dict[str, str]:
     rooms = {}
     for node in tree.body:
         if isinstance(node, ast.ImportFrom) and node.module:
-            head = node.module.split(".")[0]
-            room = head if (ROOT / package / head).is_dir() else ""
+            room = node.module
+            while room and not (ROOT / package / room.replace(".", "/")).is_dir():
+                room = room.rpartition(".")[0]
             rooms |= {alias.asname or alias.name: room for alias in node.names}
     return rooms
 
@@ -48,7 +49,10 @@ def further_modules(package: str) -> list[str]:
 
 
 #: reached by module path, with an `__all__` of their own
-FURTHER = ("fe_models.parts", "floatframe.drives", "floatframe.hydraulics", "floatframe.mechanisms")
+FURTHER = (
+    "fe_models.parts", "floatframe.components.drives", "floatframe.components.hydraulics",
+    "floatframe.components.mechanisms",
+)  # fmt: skip
 
 
 def write_pages(app: Sphinx) -> None:

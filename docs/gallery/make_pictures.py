@@ -22,13 +22,13 @@ from scipy.spatial.transform import Rotation
 import cms
 import fe_models as fm
 import floatframe as ff
-from cms.rendering import Lines, Surface, render_animation
-from floatframe import mechanisms
-from floatframe.functions.time_functions import cycloidal_spin_up
+from cms.assessment.rendering import Lines, Surface, render_animation
+from floatframe.components import mechanisms
+from floatframe.files.system_file.read_system import read_system
+from floatframe.model.functions.time_functions import cycloidal_spin_up
 from floatframe.pictures.animation import animate, motion_scene
 from floatframe.pictures.film_times import film_times
 from floatframe.results.results_file import MemorySource
-from floatframe.system_file.read_system import read_system
 
 HERE = Path(__file__).resolve().parent
 NOTEBOOKS = HERE.parents[1] / "notebooks"
@@ -147,7 +147,7 @@ def chain() -> tuple[ff.System, float, float]:
 
 def bogie() -> None:
     """The railway vehicle hunts at 80 m/s, seen by one who runs along: what moves sideways drawn 20 times larger."""
-    from floatframe import rails
+    from floatframe.components import rails
     from floatframe.machines import copy_machine
     from floatframe.machines.bogie import RailVehicle, flexible_frames, vehicle
     from floatframe.machines.bogie.running import blown
@@ -312,9 +312,9 @@ def road_car_study(journal: Path | None = None) -> None:
     """The study of the road car's suspension: its history, and the lane change before and after; minutes."""
     import matplotlib.pyplot as plt
 
+    from floatframe.design.optimization.history_plots import plot_history
     from floatframe.machines import copy_machine
     from floatframe.machines.road_car.figures import driven
-    from floatframe.optimization.history_plots import plot_history
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

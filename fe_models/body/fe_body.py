@@ -10,7 +10,6 @@ import scipy.sparse as sp
 
 from fe_models.body.load_cases import LoadCase, check_load_cases
 from fe_models.body.mass_loads import MassLoads
-from fe_models.body.numbering import Numbering
 from fe_models.foundation.arrays import (
     Array,
     IntArray,
@@ -27,6 +26,7 @@ from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
 from fe_models.foundation.tall.on_disk import in_memory, is_on_disk, release, row_slices, zeros_like
 from fe_models.foundation.units import Units, unit_system
 from fe_models.foundation.words import nearest, quoted
+from fe_models.meshes.numbering import Numbering
 
 __all__ = ["INTERFACE_KINDS", "MULTIPLIER", "ElementModel", "FEBody", "Interface", "Recovery", "StressPointModel"]
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from fe_models.body.fe_body import FEBody
-from fe_models.body.numbering import NONE, node_place
 from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.errors import BodyError
+from fe_models.meshes.numbering import NONE, node_place
 
 __all__ = ["TOLERANCE", "keep_nodes"]
 

@@ -1,7 +1,7 @@
 """Protocol of a solver for large sparse symmetric systems: factorise once, then solve for many columns.
 
-Higher packages keep the solvers by name (`cms.solvers.registry`). Code that factorises takes a `Solver` and keeps a
-`Factor`.
+Higher packages keep the solvers by name (`cms.linear_algebra.solvers.registry`). Code that factorises takes a `Solver`
+and keeps a `Factor`.
 """
 
 from collections.abc import Callable

@@ -9,7 +9,7 @@ from types import ModuleType
 import numpy as np
 
 from fe_models.errors import MeshError
-from fe_models.importers.cad.gmsh_model import gmsh_model
+from fe_models.files.cad.gmsh_model import gmsh_model
 
 __all__ = ["PartMesh", "cylinder_faces", "mesh_and_write", "part_model"]
 

@@ -5,22 +5,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.compiling.callbacks import raise_errors_of
-from floatframe.compiling.callbacks.law_functions import called_law
-from floatframe.compiling.callbacks.law_slopes import difference_slopes
-from floatframe.compiling.markers import marker_pose
-from floatframe.compiling.public_elements import PlacedLaw
-from floatframe.compiling.system import compiled_system
-from floatframe.elements.element import ACTS
+from floatframe.engine.compiling.callbacks import raise_errors_of
+from floatframe.engine.compiling.callbacks.law_functions import called_law
+from floatframe.engine.compiling.callbacks.law_slopes import difference_slopes
+from floatframe.engine.compiling.markers import marker_pose
+from floatframe.engine.compiling.public_elements import PlacedLaw
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.initial_conditions.initial import consistent_motion
+from floatframe.engine.initial_conditions.newton_equations import linearized, set_iterate
+from floatframe.engine.kernels.work import new_work
 from floatframe.errors import ModelError
-from floatframe.joints.rows import POSITION, VELOCITY
-from floatframe.kernels.work import new_work
+from floatframe.model.elements.element import ACTS
+from floatframe.model.joints.rows import POSITION, VELOCITY
+from floatframe.model.rotations import rotation_exp
+from floatframe.model.state import State
+from floatframe.model.system import System
 from floatframe.results.element_motion import placed_law
-from floatframe.rotations import rotation_exp
-from floatframe.start.initial import consistent_motion
-from floatframe.start.newton_equations import linearized, set_iterate
-from floatframe.state import State
-from floatframe.system import System
 
 __all__ = ["ElementCheck", "check_element"]
 

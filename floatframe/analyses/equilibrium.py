@@ -28,21 +28,10 @@ from floatframe.analyses.led_equilibrium import LARGEST, Balance, Led, is_left_b
 from floatframe.analyses.observed_state import observed_state
 from floatframe.analyses.relative.tree_flow import tree_flow
 from floatframe.analyses.system_matrices import held_rows, turning_matrices
-from floatframe.checked_values import array_of_shape
-from floatframe.compiling.callbacks import raise_errors_of
-from floatframe.compiling.file_frames import motion_of_file
-from floatframe.compiling.system import CompiledSystem, compiled_system
-from floatframe.errors import ConvergenceError, ModelError
-from floatframe.joints.rows import is_held_length, is_held_velocity
-from floatframe.kernels.model import STIFFNESS, Model
-from floatframe.kernels.work import Work, new_work
-from floatframe.motion.stop_events import require_off_stops
-from floatframe.motion.validity_watch import ValidityWatch
-from floatframe.relative.formulation import is_relative
-from floatframe.relative.topology import tree_of
-from floatframe.results.validity import ValidityNote
-from floatframe.rotations import rotation_matrix
-from floatframe.start.initial import (
+from floatframe.engine.compiling.callbacks import raise_errors_of
+from floatframe.engine.compiling.file_frames import motion_of_file
+from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.initial_conditions.initial import (
     assembled,
     checked,
     known_of,
@@ -50,8 +39,8 @@ from floatframe.start.initial import (
     require_numbers,
     start_unknowns,
 )
-from floatframe.start.mass_positivity import indefinite_mass_words, indefinite_masses
-from floatframe.start.newton_equations import (
+from floatframe.engine.initial_conditions.mass_positivity import indefinite_mass_words, indefinite_masses
+from floatframe.engine.initial_conditions.newton_equations import (
     Linearized,
     displaced,
     in_ground_axes,
@@ -61,9 +50,20 @@ from floatframe.start.newton_equations import (
     solve,
     with_modal_weight,
 )
-from floatframe.start.placement import require_placed_near
-from floatframe.state import State
-from floatframe.system import System
+from floatframe.engine.initial_conditions.placement import require_placed_near
+from floatframe.engine.kernels.model import STIFFNESS, Model
+from floatframe.engine.kernels.work import Work, new_work
+from floatframe.engine.tree.formulation import is_relative
+from floatframe.engine.tree.topology import tree_of
+from floatframe.errors import ConvergenceError, ModelError
+from floatframe.model.checked_values import array_of_shape
+from floatframe.model.joints.rows import is_held_length, is_held_velocity
+from floatframe.model.rotations import rotation_matrix
+from floatframe.model.state import State
+from floatframe.model.system import System
+from floatframe.results.validity import ValidityNote
+from floatframe.simulation.stop_events import require_off_stops
+from floatframe.simulation.validity_watch import ValidityWatch
 
 __all__ = ["Equilibrium", "static_equilibrium", "steady_rotation"]
 
@@ -563,7 +563,7 @@ def worst_body(compiled: CompiledSystem, W: tuple[Array, ...], forces: Array) ->
 
 def _require_rotation(compiled: CompiledSystem, work: Work, omega: Array) -> None:
     """Raise `ModelError` that names the joint which the rotation would violate."""
-    from floatframe.kernels.entry import rates_of_constraints
+    from floatframe.engine.kernels.entry import rates_of_constraints
 
     if not omega.any() or not len(work.state.w):
         return

@@ -22,23 +22,23 @@ from scipy.optimize import nnls
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.driven.driven_motion import rigid_columns
-from floatframe.bodies.coordinates import JointCoordinate
-from floatframe.bodies.markers import Marker
-from floatframe.checked_values import array_of_shape, number, rotation_of
-from floatframe.compiling.file_frames import state_of_file
-from floatframe.compiling.markers import MarkerData, find_marker, joint_markers, marker_pose, n_q_of
-from floatframe.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.compiling.file_frames import state_of_file
+from floatframe.engine.compiling.markers import MarkerData, find_marker, joint_markers, marker_pose, n_q_of
+from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.initial_conditions.initial import assembled
+from floatframe.engine.initial_conditions.newton_equations import displaced, in_ground_axes, linearized, set_iterate
+from floatframe.engine.kernels.work import Work, new_work
 from floatframe.errors import ModelError
-from floatframe.joints import SlidingJoint
-from floatframe.joints.rows import RelativePlace, is_held
-from floatframe.kernels.work import Work, new_work
-from floatframe.rotations import rotation_log
-from floatframe.small_motions.joint_rates import coordinate_rows
-from floatframe.small_motions.marker_jacobian import marker_jacobian
-from floatframe.start.initial import assembled
-from floatframe.start.newton_equations import displaced, in_ground_axes, linearized, set_iterate
-from floatframe.state import State
-from floatframe.system import System
+from floatframe.model.bodies.coordinates import JointCoordinate
+from floatframe.model.bodies.markers import Marker
+from floatframe.model.checked_values import array_of_shape, number, rotation_of
+from floatframe.model.joints import SlidingJoint
+from floatframe.model.joints.rows import RelativePlace, is_held
+from floatframe.model.rotations import rotation_log
+from floatframe.model.state import State
+from floatframe.model.system import System
+from floatframe.results.small_motions.joint_rates import coordinate_rows
+from floatframe.results.small_motions.marker_jacobian import marker_jacobian
 
 __all__ = ["ReachedPose", "Target", "inverse_kinematics"]
 

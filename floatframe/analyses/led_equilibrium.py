@@ -20,8 +20,8 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from fe_models.foundation.arrays import Array
-from floatframe.start.newton_equations import Linearized
-from floatframe.state import State
+from floatframe.engine.initial_conditions.newton_equations import Linearized
+from floatframe.model.state import State
 
 __all__ = ["LARGEST", "Balance", "Led", "is_left_by_none", "led_equilibrium"]
 

@@ -3,10 +3,10 @@
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.compiling.system import CompiledSystem
-from floatframe.kernels.memory import Rows, memory_at
-from floatframe.kernels.work import Work
-from floatframe.state import State
+from floatframe.engine.compiling.system import CompiledSystem
+from floatframe.engine.kernels.memory import Rows, memory_at
+from floatframe.engine.kernels.work import Work
+from floatframe.model.state import State
 
 __all__ = ["observed_state"]
 
@@ -15,7 +15,7 @@ def observed_state(
     compiled: CompiledSystem, work: Work, state: State, u_dot: Array, w: Array, t: float
 ) -> tuple[Rows, Array]:
     """Return the row of results of a state of the engine and the power of loads and dampers at it, (2,)."""
-    from floatframe.kernels.entry import observe_state
+    from floatframe.engine.kernels.entry import observe_state
 
     work.state.time[...] = t
     memory = memory_at(state, u_dot, w)

@@ -8,15 +8,15 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.analyses.equilibrium import Equilibrium
 from floatframe.analyses.observed_state import observed_state
-from floatframe.compiling.file_frames import motion_of_engine, rows_of_file
-from floatframe.compiling.system import compiled_system
-from floatframe.kernels.memory import Rows
-from floatframe.kernels.work import new_work
-from floatframe.motion.integration import head_of, joint_rows
+from floatframe.engine.compiling.file_frames import motion_of_engine, rows_of_file
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.kernels.memory import Rows
+from floatframe.engine.kernels.work import new_work
+from floatframe.model.state import State
+from floatframe.model.system import System
 from floatframe.results.results_file import MemorySource
 from floatframe.results.trajectory import Trajectory
-from floatframe.state import State
-from floatframe.system import System
+from floatframe.simulation.integration import head_of, joint_rows
 
 __all__ = ["snapshot", "states_as_motion"]
 

@@ -34,12 +34,12 @@ import scipy.linalg as la
 from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array, IntArray
+from floatframe.engine.initial_conditions.newton_equations import linearized
+from floatframe.engine.kernels.model import Model
+from floatframe.engine.kernels.work import Work
 from floatframe.errors import ModelError
-from floatframe.joints.rows import is_held, is_held_position, is_held_velocity
-from floatframe.kernels.model import Model
-from floatframe.kernels.work import Work
-from floatframe.rotations import tilde
-from floatframe.start.newton_equations import linearized
+from floatframe.model.joints.rows import is_held, is_held_position, is_held_velocity
+from floatframe.model.rotations import tilde
 
 __all__ = ["Inputs", "Tangents", "Wrenches", "held_rows", "settled", "tangents", "turning_matrices"]
 

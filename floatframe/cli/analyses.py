@@ -11,8 +11,8 @@ from cms.cli.console import guarded, output_path, print_table, say, stages, vect
 if TYPE_CHECKING:
     from floatframe.analyses import Equilibrium, LinearSystem, Locus, SystemModes
     from floatframe.analyses.linear.channels import AnyInput, AnyOutput
+    from floatframe.model.system import System
     from floatframe.pictures.body_colors import BodyColor
-    from floatframe.system import System
 
 __all__ = ["register"]
 
@@ -45,7 +45,7 @@ def static_command(system: SystemArgument, formulation: Formulation = None, json
     Example: floatframe static crane.toml
     """
     from floatframe.analyses import linearize, static_equilibrium, system_modes
-    from floatframe.compiling.system import compiled_system
+    from floatframe.engine.compiling.system import compiled_system
     from floatframe.errors import ModelError
 
     model, form = read_in_formulation(system, formulation)
@@ -270,8 +270,8 @@ def read(path: Path) -> "System":
 
 def read_in_formulation(path: Path, formulation: str | None) -> "tuple[System, str]":
     """Return the system of a file, and the requested formulation, else that of its table [run], else absolute."""
-    from floatframe.system_file.read_system import read_system
-    from floatframe.system_file.run_section import formulation_of
+    from floatframe.files.system_file.read_system import read_system
+    from floatframe.files.system_file.run_section import formulation_of
 
     system, run = read_system(path)
     tell_left_out(system)
@@ -283,7 +283,7 @@ def read_in_formulation(path: Path, formulation: str | None) -> "tuple[System, s
 
 def tell_left_out(system: "System") -> None:
     """Report bodies whose geometric stiffness was omitted because it would have been very large."""
-    from floatframe.bodies.flexible_body import FlexibleBody
+    from floatframe.model.bodies.flexible_body import FlexibleBody
 
     for body in system.bodies:
         if isinstance(body, FlexibleBody) and body.stiffening == "auto":
@@ -306,7 +306,7 @@ def linearized(
 
     from floatframe.analyses import linearize, steady_rotation
     from floatframe.analyses.steady.turning_drives import turning_with
-    from floatframe.checked_values import unit_vector
+    from floatframe.model.checked_values import unit_vector
 
     omega = speed * np.asarray(unit_vector("--axis", vector(axis, "--axis")))
     system = turning_with(system, omega)
@@ -353,10 +353,10 @@ def equilibrium_record(system: "System", rest: "Equilibrium") -> dict[str, Any]:
     import numpy as np
 
     from floatframe.analyses.snapshot import snapshot
-    from floatframe.compiling.system import compiled_system
-    from floatframe.kernels.model import ELEMENT
+    from floatframe.engine.compiling.system import compiled_system
+    from floatframe.engine.kernels.model import ELEMENT
+    from floatframe.model.rotations import rotation_log, rotation_matrix
     from floatframe.results.sensors import measured
-    from floatframe.rotations import rotation_log, rotation_matrix
 
     model, names = compiled_system(system).model, compiled_system(system).connection_names
     bodies = []

@@ -25,11 +25,11 @@ from floatframe.cli.parameters import gradient, identify, optimize, study, sweep
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cms.reduced_body.reduced_body import ReducedBody
+    from cms.body.reduced_body import ReducedBody
     from fe_models.foundation.stages import Stages
-    from floatframe.motion.integration import Progress
+    from floatframe.model.system import System
     from floatframe.results.trajectory import Trajectory
-    from floatframe.system import System
+    from floatframe.simulation.integration import Progress
 
 __all__ = ["app"]
 
@@ -62,12 +62,12 @@ def run_command(
 
     Example: floatframe run swing.toml -o swing.h5
     """
-    from floatframe.cosimulation.coupled_motion import co_simulate
     from floatframe.errors import ResultsError
+    from floatframe.files.cosimulation.coupled_motion import co_simulate
+    from floatframe.files.system_file.read_system import read_system
+    from floatframe.files.system_file.run_section import required_run
     from floatframe.integrators import in_formulation
-    from floatframe.motion.integration import integrate
-    from floatframe.system_file.read_system import read_system
-    from floatframe.system_file.run_section import required_run
+    from floatframe.simulation.integration import integrate
 
     model, given = read_system(system)
     analyses.tell_left_out(model)
@@ -105,8 +105,8 @@ def resume_command(
     Example: floatframe resume swing.toml -o swing.h5
     """
     from floatframe.errors import ResultsError
-    from floatframe.motion.integration import resume
-    from floatframe.system_file.read_system import read_system
+    from floatframe.files.system_file.read_system import read_system
+    from floatframe.simulation.integration import resume
 
     if system.suffix in (".h5", ".segments"):
         raise ResultsError(
@@ -144,8 +144,8 @@ def load_kernels(clock: "Stages") -> None:
     """Load the compiled code; report if it is being compiled, which happens once after an installation."""
     began = time.perf_counter()
     with clock("compiled code (made at first use)"):
-        from floatframe.kernels.compiler.choice import words
-        from floatframe.kernels.entry import prepare
+        from floatframe.engine.kernels.compiler.choice import words
+        from floatframe.engine.kernels.entry import prepare
 
         is_new = prepare()
     if is_new:
@@ -234,7 +234,7 @@ def known_system(trajectory: "Trajectory") -> "System | None":
     """Return the system of a motion from the file its results name; None, with a note, if that cannot be read."""
     from cms.errors import CmsError
     from floatframe.errors import FloatframeError
-    from floatframe.system_file.recorded_system import recorded_system
+    from floatframe.files.system_file.recorded_system import recorded_system
 
     try:
         return recorded_system(trajectory)
@@ -309,9 +309,9 @@ def info_command(
 
 def print_mobility(path: Path, *, as_json: bool) -> None:
     """Print the mobility of a system file: by count and true, and redundant constraints."""
-    from floatframe.bodies.flexible_body import FlexibleBody
-    from floatframe.start.initial import mobility
-    from floatframe.system_file.read_system import read_system
+    from floatframe.engine.initial_conditions.initial import mobility
+    from floatframe.files.system_file.read_system import read_system
+    from floatframe.model.bodies.flexible_body import FlexibleBody
 
     system, _ = read_system(path)
     found = mobility(system)
@@ -440,8 +440,8 @@ def animate_command(
     Example: floatframe animate swing.h5 --color von-mises
     """
     from fe_models.foundation.words import nearest
-    from floatframe.bodies.rigid_body import RigidBody
     from floatframe.errors import ResultsError
+    from floatframe.model.bodies.rigid_body import RigidBody
     from floatframe.pictures.animation import animate, bodies_of
     from floatframe.pictures.body_colors import BODY_COLORS
     from floatframe.results.trajectory import read_results
@@ -488,11 +488,11 @@ def export_command(
     Example: floatframe export swing.h5 --sensor "wheel*" -o drive.rsp
     """
     from floatframe.errors import ResultsError
+    from floatframe.files.signals.rpc_file import write_rpc
     from floatframe.pictures.animation import bodies_of
     from floatframe.results.export import export_csv, export_vtk
     from floatframe.results.sensor_choice import chosen_measurements
     from floatframe.results.trajectory import read_results
-    from floatframe.signals.rpc_file import write_rpc
 
     trajectory = read_results(file)
     path = output_path(output, file.with_suffix(".csv"), ResultsError, overwrite_of=(file, *trajectory.files))

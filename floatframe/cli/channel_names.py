@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from floatframe.analyses.linear.channels import AnyInput, AnyOutput
-    from floatframe.system import System
+    from floatframe.model.system import System
 
 __all__ = ["channel_of", "chosen"]
 
@@ -22,8 +22,8 @@ def channel_of(system: "System", text: str) -> "AnyInput | AnyOutput":
 
     from fe_models.foundation.words import nearest
     from floatframe.analyses.linear.channels import AnyInput, AnyOutput, Column, inputs_of, outputs_of
-    from floatframe.bodies.markers import Marker
     from floatframe.errors import ModelError
+    from floatframe.model.bodies.markers import Marker
     from floatframe.results.sensors import sensors_of
     from floatframe.results.sensors.channels import Channel, CoordinateChannel
 
@@ -59,7 +59,7 @@ def drivers(system: "System") -> "dict[str, AnyInput]":
     """Return forces.NAME.amplitude, forces.NAME.motor and joints.NAME.COORDINATE (a drive), named as in [fmu]."""
     from floatframe.analyses import DriveMotion, ForceInput
     from floatframe.analyses.linear.force_inputs import forces_with_amplitude
-    from floatframe.forces import JointForce
+    from floatframe.model.forces import JointForce
 
     found: dict[str, AnyInput] = {}
     for name, force in forces_with_amplitude(system).items():

@@ -48,7 +48,7 @@ def make_cholesky() -> None:
     """Factorise a matrix by the fronts of this package, which are used if no other sparse solver is installed."""
     import scipy.sparse as sp
 
-    from cms.sparse_cholesky.factor import CholeskyFactor
+    from cms.linear_algebra.sparse_cholesky.factor import CholeskyFactor
 
     line = sp.diags_array([-1.0, 2.1, -1.0], offsets=[-1, 0, 1], shape=(12, 12))
     lower = sp.csc_array(sp.tril(sp.kronsum(sp.kronsum(line, line), line)))

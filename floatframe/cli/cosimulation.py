@@ -40,9 +40,9 @@ def fmu_command(
 
     Example: floatframe fmu arm.toml --input forces.motor.motor --out hinge.angle --parameter m=bodies.arm.mass
     """
-    from floatframe.cosimulation.archive import write_fmu
+    from floatframe.engine.kernels.entry import prepare
     from floatframe.errors import ModelError
-    from floatframe.kernels.entry import prepare
+    from floatframe.files.cosimulation.archive import write_fmu
 
     path = output_path(output, system.with_suffix(".fmu"), ModelError, overwrite_of=(system,))
     if path.suffix.lower() != ".fmu":

@@ -10,9 +10,9 @@ from cms.cli.console import guarded, output_path, print_table, say, stages
 
 if TYPE_CHECKING:
     from fe_models.foundation.units import Units
+    from floatframe.model.system import System
     from floatframe.results.joint_coordinates import CoordinateMotion
     from floatframe.results.trajectory import Trajectory
-    from floatframe.system import System
 
 __all__ = ["register"]
 
@@ -112,9 +112,9 @@ def driven_motion(file: Path, output: Path | None, suffix: str, elastic: str) ->
     from floatframe.analyses.driven.driven_motion import ELASTICITY
     from floatframe.analyses.driven.kinematics import kinematics
     from floatframe.errors import ModelError, ResultsError
-    from floatframe.motion.integration import integrate
-    from floatframe.system_file.read_system import read_system
-    from floatframe.system_file.run_section import required_run
+    from floatframe.files.system_file.read_system import read_system
+    from floatframe.files.system_file.run_section import required_run
+    from floatframe.simulation.integration import integrate
 
     choices = [*ELASTICITY, *(["dynamic"] if suffix == ".inverse.h5" else [])]
     if elastic not in choices:
@@ -139,7 +139,7 @@ def driven_motion(file: Path, output: Path | None, suffix: str, elastic: str) ->
 def coordinates_record(system: "System", motion: "Trajectory") -> dict[str, Any]:
     """Return ranges of all joint coordinates, and forces of the driven ones, in plain types."""
     from floatframe.results.joint_coordinates import joint_coordinates
-    from floatframe.small_motions.joint_rates import driven_coordinates
+    from floatframe.results.small_motions.joint_rates import driven_coordinates
 
     driven = driven_coordinates(system)
     return {

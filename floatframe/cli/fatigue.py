@@ -9,7 +9,7 @@ import typer
 from cms.cli.console import guarded, output_path, print_table, say, stages
 
 if TYPE_CHECKING:
-    from floatframe.fatigue.assessment import Assessment
+    from floatframe.durability.fatigue.assessment import Assessment
 
 __all__ = ["register"]
 
@@ -40,10 +40,10 @@ def fatigue_command(
     """
     from fe_models.foundation.paths import replace_file
     from fe_models.foundation.toml_file import files_named
+    from floatframe.durability.fatigue.assessment import assess
+    from floatframe.durability.fatigue.fatigue_file import read_fatigue
+    from floatframe.durability.fatigue.outputs import fatigue_record
     from floatframe.errors import FatigueError
-    from floatframe.fatigue.assessment import assess
-    from floatframe.fatigue.fatigue_file import read_fatigue
-    from floatframe.fatigue.outputs import fatigue_record
 
     given = read_fatigue(file)
     inputs = (file, *files_named(given))
@@ -70,7 +70,7 @@ def fatigue_command(
 
 def write(made: "Assessment", record: dict[str, Any], path: Path, replace_file: Any) -> None:
     """Write a file of a result, in the format of its suffix."""
-    from floatframe.fatigue.outputs import csv_of, render_fatigue, vtu_of
+    from floatframe.durability.fatigue.outputs import csv_of, render_fatigue, vtu_of
 
     kind = path.suffix.lower().removeprefix(".")
     if kind == "png":
@@ -78,7 +78,7 @@ def write(made: "Assessment", record: dict[str, Any], path: Path, replace_file: 
         if drawing.note:
             typer.echo(f"note: {drawing.note}", err=True)
     elif kind == "html":
-        from floatframe.fatigue.report import fatigue_html
+        from floatframe.durability.fatigue.report import fatigue_html
 
         replace_file(path, fatigue_html(made).encode())
     elif kind == "vtu":

@@ -34,8 +34,8 @@ def prepare_command(
     Example: floatframe prepare
     """
     from floatframe.cli.compile_kernels import PARTS
+    from floatframe.engine.kernels.compiler.choice import words
     from floatframe.errors import FloatframeError
-    from floatframe.kernels.compiler.choice import words
 
     began = time.perf_counter()
     with stages() as clock, clock("compile"):

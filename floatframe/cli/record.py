@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from floatframe.model.system import System
 from floatframe.results.energy_balance import balance_defect, energy_scale
 from floatframe.results.sensors import measured
 from floatframe.results.trajectory import Trajectory
-from floatframe.system import System
 
 __all__ = ["run_record"]
 

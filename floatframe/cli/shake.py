@@ -10,8 +10,8 @@ import typer
 from cms.cli.console import guarded, output_path, print_table, say, stages
 
 if TYPE_CHECKING:
-    from floatframe.shaking.loads.levels import Level
-    from floatframe.shaking.shake import ShakeJob, ShakeResult
+    from floatframe.durability.shaking.loads.levels import Level
+    from floatframe.durability.shaking.shake import ShakeJob, ShakeResult
 
 __all__ = ["register"]
 
@@ -60,15 +60,15 @@ def shake_command(
     20:0.01,80:0.04,350:0.04,2000:0.007
     """
     from fe_models.foundation.paths import replace_file
+    from floatframe.durability.shaking.light_record import light_record
+    from floatframe.durability.shaking.page import shake_html
+    from floatframe.durability.shaking.record import shake_csv, shake_record
+    from floatframe.durability.shaking.shake import shake
     from floatframe.errors import ModelError
-    from floatframe.shaking.light_record import light_record
-    from floatframe.shaking.page import shake_html
-    from floatframe.shaking.record import shake_csv, shake_record
-    from floatframe.shaking.shake import shake
 
     given = {"--base": base, "--Q": q_factor, "--sine": sine, "--rate": rate, "--random": random, "--shock": shock}
     if file.suffix == ".toml":
-        from floatframe.shaking.shake_file import read_shake
+        from floatframe.durability.shaking.shake_file import read_shake
 
         named = [key for key, value in given.items() if value is not None] + ["--at"] * bool(at)
         if named:
@@ -131,16 +131,16 @@ def job_of_options(
 ) -> "ShakeJob":  # fmt: skip
     """Return the shake job for a modal file, as defined by the options."""
     import cms
+    from floatframe.durability.shaking.loads.levels import ACCELERATIONS
+    from floatframe.durability.shaking.loads.pulses import pulse
+    from floatframe.durability.shaking.loads.random_vibration import RandomTest
+    from floatframe.durability.shaking.loads.shock import TimeTest
+    from floatframe.durability.shaking.loads.sine import SineTest
+    from floatframe.durability.shaking.shake import ShakeJob
+    from floatframe.durability.shaking.structure.body import bases_of_body
+    from floatframe.durability.shaking.structure.damping import Damping
+    from floatframe.durability.shaking.structure.places import Observed
     from floatframe.errors import ModelError
-    from floatframe.shaking.loads.levels import ACCELERATIONS
-    from floatframe.shaking.loads.pulses import pulse
-    from floatframe.shaking.loads.random_vibration import RandomTest
-    from floatframe.shaking.loads.shock import TimeTest
-    from floatframe.shaking.loads.sine import SineTest
-    from floatframe.shaking.shake import ShakeJob
-    from floatframe.shaking.structure.body import bases_of_body
-    from floatframe.shaking.structure.damping import Damping
-    from floatframe.shaking.structure.places import Observed
 
     body = cms.read(file)
     wanted = tuple(part.strip() for part in directions.split(","))
@@ -179,8 +179,8 @@ def job_of_options(
 
 def level(words: str, unit: str, where: str) -> "Level":
     """Return a level given on the command line: "Hz:level,Hz:level", or a file."""
+    from floatframe.durability.shaking.loads.levels import Level, read_level
     from floatframe.errors import ModelError
-    from floatframe.shaking.loads.levels import Level, read_level
 
     if ":" not in words or Path(words).is_file():
         return read_level(Path(words), unit, where)
@@ -193,7 +193,7 @@ def level(words: str, unit: str, where: str) -> "Level":
 
 def print_result(result: "ShakeResult") -> None:
     """Print conversions, main modes, largest outputs of every run, and notches."""
-    from floatframe.shaking.record import conversions, table_rows
+    from floatframe.durability.shaking.record import conversions, table_rows
 
     model, masses = result.model, result.masses
     for line in conversions(model):

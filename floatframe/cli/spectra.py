@@ -8,9 +8,9 @@ import typer
 from cms.cli.console import guarded, output_path, print_table, say
 
 if TYPE_CHECKING:
+    from floatframe.files.signals.analysis import SpectrumRequest
+    from floatframe.files.signals.signals import Signal, Signals
     from floatframe.results.trajectory import Trajectory
-    from floatframe.signals.analysis import SpectrumRequest
-    from floatframe.signals.signals import Signal, Signals
 
 __all__ = ["plot_as", "register", "sensor_signals"]
 
@@ -56,7 +56,7 @@ def spectrum_command(
     Example: floatframe spectrum road.rsp -s "FL*" --as psd --resolution 0.5
     """
     from floatframe.errors import ResultsError
-    from floatframe.signals.analysis import SpectrumRequest
+    from floatframe.files.signals.analysis import SpectrumRequest
 
     signals, extra, inputs = chosen_signals(file, sensors, (rotation, input_name), rate)
     path = output_path(output, file.with_suffix(f".{kind}.csv"), ResultsError, overwrite_of=inputs)
@@ -82,8 +82,8 @@ def chosen_signals(
 
     from fe_models.foundation.words import nearest, quoted
     from floatframe.errors import SignalError
-    from floatframe.signals.of_sensors import even_signals
-    from floatframe.signals.read_signals import read_signals
+    from floatframe.files.signals.of_sensors import even_signals
+    from floatframe.files.signals.read_signals import read_signals
 
     whole = even_signals(read_signals(file), rate)
     for note in whole.notes:
@@ -101,10 +101,10 @@ def chosen_signals(
 def sensor_signals(trajectory: "Trajectory", names: list[str], rate: float | None = None) -> "Signals":
     """Return the measurements of chosen sensors (default: all) at equidistant times; notes are printed."""
     from floatframe.errors import ResultsError
+    from floatframe.files.signals.of_sensors import even_signals, signals_of
+    from floatframe.files.system_file.recorded_system import recorded_system
     from floatframe.results.sensor_choice import chosen_measurements
     from floatframe.results.sensors import measured
-    from floatframe.signals.of_sensors import even_signals, signals_of
-    from floatframe.system_file.recorded_system import recorded_system
 
     system = recorded_system(trajectory)
     if system is None:
@@ -120,7 +120,7 @@ def plot_as(
     trajectory: "Trajectory", names: list[str], kind: str, path: Path, *, resolution: float | None, rotation: str
 ) -> None:
     """Draw the spectra of sensors, for plot --as."""
-    from floatframe.signals.analysis import SpectrumRequest
+    from floatframe.files.signals.analysis import SpectrumRequest
 
     turning = sensor_signals(trajectory, [rotation])[1] if rotation else None
     request = SpectrumRequest(resolution=resolution, rotation=turning)
@@ -134,10 +134,10 @@ def write_spectra(signals: "Signals", kind: str, request: "SpectrumRequest", pat
 
     from fe_models.foundation.paths import replace_file
     from floatframe.errors import ResultsError
+    from floatframe.files.signals.analysis import spectra_of
+    from floatframe.files.signals.spectra import Spectrum
+    from floatframe.files.signals.spectral_tables import spectral_csv, spectral_record
     from floatframe.pictures.spectrum_plots import plot_spectra
-    from floatframe.signals.analysis import spectra_of
-    from floatframe.signals.spectra import Spectrum
-    from floatframe.signals.spectral_tables import spectral_csv, spectral_record
 
     ending = path.suffix.lower().removeprefix(".")
     if ending not in (*PICTURES, "csv", "json"):

@@ -51,9 +51,9 @@ def view_command(
     Example: floatframe view crane.toml -o modes.html
     """
     from floatframe.errors import ModelError, ResultsError
+    from floatframe.pictures.viewer.modes_view import view_modes
+    from floatframe.pictures.viewer.motion_view import require_color, view
     from floatframe.results.trajectory import read_results
-    from floatframe.viewer.modes_view import view_modes
-    from floatframe.viewer.motion_view import require_color, view
 
     require_color(color)
     if file.suffix.lower() in (".npz", ".mat"):

@@ -6,16 +6,16 @@ from typing import Protocol
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.compiling.file_frames import state_of_file
-from floatframe.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.compiling.file_frames import state_of_file
+from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.initial_conditions.newton_equations import displaced
+from floatframe.engine.kernels.memory import Memory, Rows, memory_at
+from floatframe.engine.kernels.model import Model
+from floatframe.engine.kernels.work import Work, new_work
 from floatframe.errors import ConvergenceError
-from floatframe.kernels.memory import Memory, Rows, memory_at
-from floatframe.kernels.model import Model
-from floatframe.kernels.work import Work, new_work
-from floatframe.rotations import continued_rotation, rotation_log
-from floatframe.start.newton_equations import displaced
-from floatframe.state import State
-from floatframe.system import System
+from floatframe.model.rotations import continued_rotation, rotation_log
+from floatframe.model.state import State
+from floatframe.model.system import System
 
 __all__ = [
     "LEAST_STEP",
@@ -217,7 +217,7 @@ def with_angles(system: System, t: float, carry: Carry, before: Carry | None = N
 
 def turned_on(system: System, carry: Carry, h: float) -> Carry:
     """Return the memory with its angles counted on by a step of size h to its state; none if none are counted."""
-    from floatframe.kernels.entry import count_angles
+    from floatframe.engine.kernels.entry import count_angles
 
     if not len(carry.angle):
         return carry
@@ -289,7 +289,7 @@ def observed_unless_stopped(system: System, t: float, carry: Carry, work: Work) 
 
 def observed(system: System, t: float, carry: Carry, work: Work) -> tuple[Array, Rows]:
     """Return the power, (2,), and the results at the carried state."""
-    from floatframe.kernels.entry import observe_state
+    from floatframe.engine.kernels.entry import observe_state
 
     memory = memory_of(carry)
     rows = observe_state(compiled_system(system).model, work, memory, t)

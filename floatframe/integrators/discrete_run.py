@@ -5,11 +5,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.compiling.system import CompiledSystem, compiled_system
-from floatframe.discrete.bodies import Placed
-from floatframe.discrete.compiled import kept_of
-from floatframe.discrete.constraints import Span
-from floatframe.discrete.system import DiscreteSystem, discrete_system
+from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.initial_conditions.initial import (
+    consistent_motion,
+    solve_accelerations,
+    with_compatible_velocities,
+)
+from floatframe.engine.kernels.entry import Outcome
+from floatframe.engine.kernels.memory import Rows, new_rows
+from floatframe.engine.kernels.work import Work
+from floatframe.engine.structure_preserving.bodies import Placed
+from floatframe.engine.structure_preserving.compiled import kept_of
+from floatframe.engine.structure_preserving.constraints import Span
+from floatframe.engine.structure_preserving.system import DiscreteSystem, discrete_system
 from floatframe.errors import ModelError
 from floatframe.integrators.carry import (
     LEAST_STEP,
@@ -24,12 +32,8 @@ from floatframe.integrators.carry import (
     with_angles,
     words_of_contact,
 )
-from floatframe.kernels.entry import Outcome
-from floatframe.kernels.memory import Rows, new_rows
-from floatframe.kernels.work import Work
-from floatframe.start.initial import consistent_motion, solve_accelerations, with_compatible_velocities
-from floatframe.state import State
-from floatframe.system import System
+from floatframe.model.state import State
+from floatframe.model.system import System
 
 __all__ = ["DiscreteScheme", "StepResult", "check_options"]
 
@@ -102,8 +106,8 @@ class DiscreteScheme:
         self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
     ) -> tuple[Carry, Rows, int, Failure | None]:
         """Advance by n_steps of size h, the first of them number `first` from t0; see `carry.Integrator`."""
-        from floatframe.discrete.kernels.entry import advance_discrete_steps
-        from floatframe.discrete.kernels.newton import NO_ACCELERATION
+        from floatframe.engine.structure_preserving.kernels.entry import advance_discrete_steps
+        from floatframe.engine.structure_preserving.kernels.newton import NO_ACCELERATION
 
         compiled = compiled_system(system)
         model = compiled.model
@@ -140,7 +144,13 @@ def explained(
     compiled: CompiledSystem, work: Work, outcome: Outcome, max_iterations: int, least: float
 ) -> Failure | None:
     """Say why a step failed; None if none did."""
-    from floatframe.discrete.kernels.newton import CONVERGED, NO_ACCELERATION, SINGULAR, STOPPED, UNRESOLVED
+    from floatframe.engine.structure_preserving.kernels.newton import (
+        CONVERGED,
+        NO_ACCELERATION,
+        SINGULAR,
+        STOPPED,
+        UNRESOLVED,
+    )
 
     if outcome.status == CONVERGED:
         return None

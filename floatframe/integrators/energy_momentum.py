@@ -5,15 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.discrete.bodies import BodyStep, CentralBody, Placed, moved, step_of
-from floatframe.discrete.compiled import Filter, filter_of
-from floatframe.discrete.constraints import Span
-from floatframe.discrete.kernels.records import CONSERVING
-from floatframe.discrete.newton import remembered, solve_step, work_of
-from floatframe.discrete.system import DiscreteSystem
+from floatframe.engine.structure_preserving.bodies import BodyStep, CentralBody, Placed, moved, step_of
+from floatframe.engine.structure_preserving.compiled import Filter, filter_of
+from floatframe.engine.structure_preserving.constraints import Span
+from floatframe.engine.structure_preserving.kernels.records import CONSERVING
+from floatframe.engine.structure_preserving.newton import remembered, solve_step, work_of
+from floatframe.engine.structure_preserving.system import DiscreteSystem
 from floatframe.errors import ModelError
 from floatframe.integrators.discrete_run import DiscreteScheme, StepResult, check_options
-from floatframe.rotations import cross, turned
+from floatframe.model.rotations import cross, turned
 
 __all__ = ["EnergyDecaying", "EnergyMomentum"]
 

@@ -7,7 +7,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array
-from floatframe.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.initial_conditions.constraint_words import open_joints
+from floatframe.engine.initial_conditions.initial import (
+    ConsistentState,
+    consistent_motion,
+    solve_accelerations,
+    work_from,
+)
+from floatframe.engine.initial_conditions.newton_equations import displaced, modal_diagonals
+from floatframe.engine.initial_conditions.step_filter import (
+    Beginning,
+    StepFilter,
+    beginning_of,
+    closing_velocities,
+    spin_of,
+    step_filter,
+)
+from floatframe.engine.kernels.memory import Rows, new_rows
+from floatframe.engine.kernels.model import COUPLER, JOINT, MASS, Model
+from floatframe.engine.kernels.work import Work
 from floatframe.errors import ModelError
 from floatframe.integrators.carry import (
     LEAST_STEP,
@@ -22,23 +41,9 @@ from floatframe.integrators.carry import (
     with_angles,
     words_of_contact,
 )
-from floatframe.joints.rows import is_held_position
-from floatframe.kernels.memory import Rows, new_rows
-from floatframe.kernels.model import COUPLER, JOINT, MASS, Model
-from floatframe.kernels.work import Work
-from floatframe.start.constraint_words import open_joints
-from floatframe.start.initial import ConsistentState, consistent_motion, solve_accelerations, work_from
-from floatframe.start.newton_equations import displaced, modal_diagonals
-from floatframe.start.step_filter import (
-    Beginning,
-    StepFilter,
-    beginning_of,
-    closing_velocities,
-    spin_of,
-    step_filter,
-)
-from floatframe.state import State
-from floatframe.system import System
+from floatframe.model.joints.rows import is_held_position
+from floatframe.model.state import State
+from floatframe.model.system import System
 
 __all__ = ["GeneralizedAlpha", "hht", "newmark", "trapezoidal"]
 
@@ -177,7 +182,7 @@ class GeneralizedAlpha:
 
         `work` holds the factors of the last Newton matrix, which serve until they are too old.
         """
-        from floatframe.kernels.entry import advance_steps
+        from floatframe.engine.kernels.entry import advance_steps
 
         compiled = compiled_system(system)
         carry = self.prepared(system, carry, h, t0 + first * h)
@@ -273,7 +278,7 @@ class GeneralizedAlpha:
 
     def explain(self, system: System, work: Work, outcome: tuple, least: float) -> Failure:
         """Say why a step failed."""
-        from floatframe.kernels.generalized_alpha import (
+        from floatframe.engine.kernels.generalized_alpha import (
             INACCURATE,
             MOST_TURN,
             SINGULAR_BODY,

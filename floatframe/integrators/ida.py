@@ -5,7 +5,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.initial_conditions.initial import (
+    assembled,
+    consistent_motion,
+    solve_accelerations,
+    with_compatible_velocities,
+)
+from floatframe.engine.kernels.memory import WORK_GIVEN, WORK_TAKEN, Rows, new_rows
+from floatframe.engine.kernels.model import COUPLER, USER_FORCE
+from floatframe.engine.kernels.work import Work, new_work
 from floatframe.errors import FloatframeError, ModelError
 from floatframe.integrators.carry import (
     Carry,
@@ -19,13 +28,9 @@ from floatframe.integrators.carry import (
     with_angles,
 )
 from floatframe.integrators.remembered_contacts import require_no_remembered_contacts
-from floatframe.kernels.memory import WORK_GIVEN, WORK_TAKEN, Rows, new_rows
-from floatframe.kernels.model import COUPLER, USER_FORCE
-from floatframe.kernels.work import Work, new_work
-from floatframe.rotations import euler_parameter_rates
-from floatframe.start.initial import assembled, consistent_motion, solve_accelerations, with_compatible_velocities
-from floatframe.state import State
-from floatframe.system import System
+from floatframe.model.rotations import euler_parameter_rates
+from floatframe.model.state import State
+from floatframe.model.system import System
 
 __all__ = ["Ida"]
 

@@ -6,23 +6,23 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.initial_conditions.initial import work_from
+from floatframe.engine.initial_conditions.newton_equations import displaced, set_iterate
+from floatframe.engine.initial_conditions.step_filter import Beginning
+from floatframe.engine.kernels.memory import Rows, new_rows
+from floatframe.engine.kernels.model import Model
+from floatframe.engine.kernels.work import Work, new_work
+from floatframe.engine.tree.formulation import is_relative
+from floatframe.engine.tree.kernels.tree import JointWork, TangentWork, Tree, new_joint_work, new_tangent_work
+from floatframe.engine.tree.topology import tree_of
 from floatframe.errors import ModelError
 from floatframe.integrators.carry import Carry, Failure, Integrator, carry_of, memory_of, one_step_of, started_anew
 from floatframe.integrators.generalized_alpha import LONGER, GeneralizedAlpha
 from floatframe.integrators.relative_ode import RelativeOde
-from floatframe.joints.rows import is_held_position
-from floatframe.kernels.memory import Rows, new_rows
-from floatframe.kernels.model import Model
-from floatframe.kernels.work import Work, new_work
-from floatframe.relative.formulation import is_relative
-from floatframe.relative.kernels.tree import JointWork, TangentWork, Tree, new_joint_work, new_tangent_work
-from floatframe.relative.topology import tree_of
-from floatframe.start.initial import work_from
-from floatframe.start.newton_equations import displaced, set_iterate
-from floatframe.start.step_filter import Beginning
-from floatframe.state import State
-from floatframe.system import System
+from floatframe.model.joints.rows import is_held_position
+from floatframe.model.state import State
+from floatframe.model.system import System
 
 __all__ = ["RelativeGeneralizedAlpha", "in_formulation"]
 
@@ -90,7 +90,7 @@ class RelativeGeneralizedAlpha:
 
     def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
         """Return the results at the carried state; the carry learns the power at it."""
-        from floatframe.relative.kernels.entry import observe_tree
+        from floatframe.engine.tree.kernels.entry import observe_tree
 
         model, tree = compiled_system(system).model, tree_of(system).tree
         memory = memory_of(carry)
@@ -101,7 +101,7 @@ class RelativeGeneralizedAlpha:
         self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
     ) -> tuple[Carry, Rows, int, Failure | None]:
         """Advance by n_steps of size h, the first of them number `first` from t0; see `carry.Integrator`."""
-        from floatframe.relative.kernels.entry import advance_tree_steps
+        from floatframe.engine.tree.kernels.entry import advance_tree_steps
 
         compiled, tree = compiled_system(system), tree_of(system).tree
         model, kept = compiled.model, kept_of(work, compiled.model, tree)
@@ -149,7 +149,7 @@ class RelativeGeneralizedAlpha:
 
     def explain(self, system: System, work: Work, outcome: tuple, h: float) -> Failure | None:
         """Say why a step failed; None if none did."""
-        from floatframe.relative.kernels.steps import SINGULAR
+        from floatframe.engine.tree.kernels.steps import SINGULAR
 
         if outcome[0] == 0:
             return None
@@ -215,7 +215,7 @@ def kept_of(work: Work, model: Model, tree: Tree) -> Kept:
 
 def joint_iterate(compiled: CompiledSystem, tree: Tree, state: State, u_dot: Array) -> tuple[Work, JointWork]:
     """Return working arrays with the motion of the joints at a state."""
-    from floatframe.relative.kernels.entry import motion_of_joints
+    from floatframe.engine.tree.kernels.entry import motion_of_joints
 
     work, joints = new_work(compiled.model), new_joint_work(compiled.model, tree)
     set_iterate(work, state, u_dot)
@@ -254,7 +254,7 @@ def shifted(
 
     G ds = -g(after)/h with the matrix of a step, M + gamma h D + beta h² K, as (3) of `start.step_filter`.
     """
-    from floatframe.relative.kernels.entry import motion_of_bodies, moved, newton_matrix, projected
+    from floatframe.engine.tree.kernels.entry import motion_of_bodies, moved, newton_matrix, projected
 
     compiled, tree = compiled_system(system), tree_of(system).tree
     model = compiled.model

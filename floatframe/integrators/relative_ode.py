@@ -7,9 +7,16 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest
-from floatframe.compiling.callbacks import raise_errors_of
-from floatframe.compiling.system import CompiledSystem, compiled_system
-from floatframe.discrete.bodies import central_bodies
+from floatframe.engine.compiling.callbacks import raise_errors_of
+from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.initial_conditions.initial import consistent_motion, has_normal_friction
+from floatframe.engine.initial_conditions.newton_equations import set_iterate
+from floatframe.engine.kernels.memory import WORK_GIVEN, WORK_TAKEN, Rows, new_rows
+from floatframe.engine.kernels.work import Work, new_work
+from floatframe.engine.structure_preserving.bodies import central_bodies
+from floatframe.engine.tree.kernels.tree import new_joint_work, new_tangent_work
+from floatframe.engine.tree.partition import partition_of
+from floatframe.engine.tree.topology import SystemTree, tree_of
 from floatframe.errors import FloatframeError, ModelError
 from floatframe.integrators.carry import (
     Carry,
@@ -24,17 +31,10 @@ from floatframe.integrators.carry import (
     with_angles,
 )
 from floatframe.integrators.remembered_contacts import require_no_remembered_contacts
-from floatframe.joints.rows import is_held, is_held_length, is_held_position
-from floatframe.kernels.memory import WORK_GIVEN, WORK_TAKEN, Rows, new_rows
-from floatframe.kernels.work import Work, new_work
-from floatframe.relative.kernels.tree import new_joint_work, new_tangent_work
-from floatframe.relative.partition import partition_of
-from floatframe.relative.topology import SystemTree, tree_of
-from floatframe.rotations import euler_parameters, right_jacobian
-from floatframe.start.initial import consistent_motion, has_normal_friction
-from floatframe.start.newton_equations import set_iterate
-from floatframe.state import State
-from floatframe.system import System
+from floatframe.model.joints.rows import is_held, is_held_length, is_held_position
+from floatframe.model.rotations import euler_parameters, right_jacobian
+from floatframe.model.state import State
+from floatframe.model.system import System
 
 __all__ = ["METHODS", "RelativeOde"]
 
@@ -166,7 +166,7 @@ class Motion:
 
     def begin(self, state: State, t: float) -> None:
         """Count increments from a state, and choose the independent coordinates there."""
-        from floatframe.relative.kernels.entry import motion_of_joints
+        from floatframe.engine.tree.kernels.entry import motion_of_joints
 
         set_iterate(self.work, state)
         motion_of_joints(self.model, self.work, self.tree, self.joints)
@@ -210,7 +210,7 @@ class Motion:
 
     def constrain(self, t: float, x: Array, rates: Array, *, by_increments: bool) -> None:
         """Write what is held, its rates and C."""
-        from floatframe.relative.kernels.entry import constraints
+        from floatframe.engine.tree.kernels.entry import constraints
 
         self.put(t, x, rates)
         constraints(self.model, self.work, self.tree, self.joints, self.tangent, by_increments=by_increments)
@@ -257,7 +257,7 @@ class Motion:
 
     def accelerations(self, t: float, x: Array, rates: Array) -> Array:
         """(3): return accelerations of all unknowns; bodies and wrenches are written."""
-        from floatframe.relative.kernels.entry import accelerations
+        from floatframe.engine.tree.kernels.entry import accelerations
 
         self.n_evaluations += 1
         self.put(t, x, rates)
@@ -336,7 +336,7 @@ class Motion:
 
     def state_at(self, t: float, y: Array) -> tuple[State, Array, Array]:
         """Return state, accelerations and wrenches at a solution, reactions of the tree included."""
-        from floatframe.relative.kernels.entry import projected
+        from floatframe.engine.tree.kernels.entry import projected
 
         x, rates = self.closed_at(t, y)
         self.accelerations(t, x, rates)

@@ -1,8 +1,8 @@
 """What integrators of ordinary differential equations cannot follow: forces that depend on more than the present."""
 
-from floatframe.compiling.system import CompiledSystem
+from floatframe.engine.compiling.system import CompiledSystem
+from floatframe.engine.kernels.model import CONTACT
 from floatframe.errors import ModelError
-from floatframe.kernels.model import CONTACT
 
 __all__ = ["require_no_remembered_contacts"]
 

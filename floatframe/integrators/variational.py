@@ -5,18 +5,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.discrete.bodies import BodyStep, CentralBody, Placed, moved, still
-from floatframe.discrete.constraints import Span
-from floatframe.discrete.kernels.records import VARIATIONAL
-from floatframe.discrete.markers import Load
-from floatframe.discrete.newton import Solution, StepError, ends_of, remembered, solve_step, work_of
-from floatframe.discrete.system import DiscreteSystem
+from floatframe.engine.structure_preserving.bodies import BodyStep, CentralBody, Placed, moved, still
+from floatframe.engine.structure_preserving.constraints import Span
+from floatframe.engine.structure_preserving.kernels.records import VARIATIONAL
+from floatframe.engine.structure_preserving.markers import Load
+from floatframe.engine.structure_preserving.newton import Solution, StepError, ends_of, remembered, solve_step, work_of
+from floatframe.engine.structure_preserving.system import DiscreteSystem
 from floatframe.errors import ModelError
 from floatframe.integrators.carry import Carry
 from floatframe.integrators.discrete_run import DiscreteScheme, StepResult, check_options
-from floatframe.rotations import cross, dot, turned
-from floatframe.state import State
-from floatframe.system import System
+from floatframe.model.rotations import cross, dot, turned
+from floatframe.model.state import State
+from floatframe.model.system import System
 
 __all__ = ["Variational"]
 

@@ -6,14 +6,16 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cms.modal_file.file import digest, read
-from cms.reduced_body.reduced_body import ReducedBody, ReducedInterface
-from cms.rendering import Drawing, Lines, Scene, Surface, Triad, render_animation
-from cms.rendering.drawing import OnFrame
+from cms.assessment.rendering import Drawing, Lines, Scene, Surface, Triad, render_animation
+from cms.assessment.rendering.drawing import OnFrame
+from cms.body.modal_file.file import digest, read
+from cms.body.reduced_body import ReducedBody, ReducedInterface
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.bodies.rigid_body import RigidBody
-from floatframe.compiling.system import compiled_system
+from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import ResultsError
+from floatframe.model.bodies.rigid_body import RigidBody
+from floatframe.model.shapes import Piece
+from floatframe.model.system import Body, System
 from floatframe.pictures.body_colors import DISPLACEMENT, VON_MISES, BodyColor
 from floatframe.pictures.element_looks import dressed_bodies, element_pieces
 from floatframe.pictures.film_times import FilmTimes, film_times, round_below, speed_words, time_words
@@ -22,8 +24,6 @@ from floatframe.pictures.looks import looks_of, places_over
 from floatframe.pictures.stage import box_of, ground_grid, view_axes
 from floatframe.results.recovery import nodal_displacements
 from floatframe.results.trajectory import BodyMotion, Trajectory
-from floatframe.shapes import Piece
-from floatframe.system import Body, System
 
 __all__ = ["animate", "bodies_of", "motion_scene"]
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cms.reduced_body.reduced_body import ReducedBody
-from cms.reduced_body.stress import von_mises_of
+from cms.body.reduced_body import ReducedBody
+from cms.body.stress import von_mises_of
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.units import Units
 from floatframe.results.place_motion import stress_modes

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.bodies.markers import body_name
-from floatframe.compiling.markers import MarkerData, find_marker
-from floatframe.elements.element import Element, markers_of
+from floatframe.engine.compiling.markers import MarkerData, find_marker
 from floatframe.errors import ModelError
+from floatframe.model.bodies.markers import body_name
+from floatframe.model.elements.element import Element, markers_of
+from floatframe.model.shapes import Arrow, Drawn, Piece, Stretched
+from floatframe.model.shapes.drawn import SECOND, STRETCH, StretchedPiece
+from floatframe.model.system import System
 from floatframe.results.joint_coordinates import end_motion
 from floatframe.results.trajectory import Trajectory
-from floatframe.shapes import Arrow, Drawn, Piece, Stretched
-from floatframe.shapes.drawn import SECOND, STRETCH, StretchedPiece
-from floatframe.system import System
 
 __all__ = ["drawn_pieces", "dressed_bodies", "element_pieces", "shown_of"]
 

@@ -19,19 +19,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cms.rendering import Lines
+from cms.assessment.rendering import Lines
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.bodies.flexible_body import FlexibleBody
-from floatframe.bodies.markers import Marker, body_name
-from floatframe.compiling.markers import MarkerData, find_marker, joint_markers
-from floatframe.compiling.pair_forces import bushing_markers
-from floatframe.compiling.system import compiled_system
-from floatframe.forces import Bushing, SphereContact, SpringDamper
-from floatframe.joints.sliding import SlidingJoint
+from floatframe.engine.compiling.markers import MarkerData, find_marker, joint_markers
+from floatframe.engine.compiling.pair_forces import bushing_markers
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.bodies.markers import Marker, body_name
+from floatframe.model.forces import Bushing, SphereContact, SpringDamper
+from floatframe.model.joints.sliding import SlidingJoint
+from floatframe.model.rotations import rotation_matrix
+from floatframe.model.system import System
 from floatframe.results.joint_coordinates import end_motion
 from floatframe.results.trajectory import Trajectory
-from floatframe.rotations import rotation_matrix
-from floatframe.system import System
 
 __all__ = ["BUSHING_COLOR", "JOINT_COLOR", "SPRING_COLOR", "glyphs"]
 

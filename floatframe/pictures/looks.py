@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.bodies.flexible_body import FlexibleBody
-from floatframe.bodies.marker_shape import MarkerShape, interface_shape
-from floatframe.rotations import rotation_exp, turned
-from floatframe.shapes import Piece
-from floatframe.shapes.shape import Shape
-from floatframe.system import Body
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.bodies.marker_shape import MarkerShape, interface_shape
+from floatframe.model.rotations import rotation_exp, turned
+from floatframe.model.shapes import Piece
+from floatframe.model.shapes.shape import Shape
+from floatframe.model.system import Body
 
 __all__ = ["Look", "carrier_of", "looks_of", "places_over"]
 

@@ -5,22 +5,22 @@ from pathlib import Path
 
 import numpy as np
 
-from cms.rendering import Drawing, Lines, Scene, Surface, Triad, render_animation, render_picture
-from cms.rendering.drawing import OnFrame
+from cms.assessment.rendering import Drawing, Lines, Scene, Surface, Triad, render_animation, render_picture
+from cms.assessment.rendering.drawing import OnFrame
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.analyses.equilibrium import Equilibrium
 from floatframe.analyses.linear.system_modes import SystemModes
 from floatframe.analyses.snapshot import states_as_motion
-from floatframe.bodies.flexible_body import FlexibleBody
-from floatframe.compiling.system import compiled_system
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.initial_conditions.newton_equations import displaced, in_ground_axes
 from floatframe.errors import ModelError
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.rotations import rotation_matrix
+from floatframe.model.state import State
+from floatframe.model.system import System
 from floatframe.pictures.body_colors import DISPLACEMENT, BodyColor
 from floatframe.pictures.glyphs import glyphs
 from floatframe.pictures.stage import box_of, ground_grid, view_axes
-from floatframe.rotations import rotation_matrix
-from floatframe.start.newton_equations import displaced, in_ground_axes
-from floatframe.state import State
-from floatframe.system import System
 
 __all__ = ["animate_mode", "draw_mode", "mode_scene"]
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cms.reduced_body.reduced_body import ReducedBody
+from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from floatframe.errors import ResultsError
 from floatframe.pictures.plots import axes_for, labelled, plot_drift, plot_energies, plot_energy_balance

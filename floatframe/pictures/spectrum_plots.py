@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from floatframe.errors import ResultsError
-from floatframe.signals.octaves import nominal_frequency
-from floatframe.signals.orders import SpectralMap
-from floatframe.signals.spectra import Spectrum
-from floatframe.signals.transfer import TransferEstimate
+from floatframe.files.signals.octaves import nominal_frequency
+from floatframe.files.signals.orders import SpectralMap
+from floatframe.files.signals.spectra import Spectrum
+from floatframe.files.signals.transfer import TransferEstimate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from cms.rendering import Lines
+from cms.assessment.rendering import Lines
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.bodies.rigid_body import RigidBody
+from floatframe.model.bodies.rigid_body import RigidBody
 from floatframe.pictures.film_times import round_below
 
 __all__ = ["box_of", "ground_grid", "view_axes"]

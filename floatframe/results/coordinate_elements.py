@@ -7,11 +7,11 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
-from floatframe.compiling.system import compiled_system
+from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import ResultsError
-from floatframe.forces import UserForce
+from floatframe.model.forces import UserForce
+from floatframe.model.system import System
 from floatframe.results.trajectory import Trajectory
-from floatframe.system import System
 
 __all__ = ["CouplerMotion", "UserForceMotion", "coupler_motion", "user_force_motion"]
 

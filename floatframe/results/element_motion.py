@@ -7,18 +7,18 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
-from floatframe.bodies.flexible_body import FlexibleBody
-from floatframe.compiling.callbacks import raise_errors_of
-from floatframe.compiling.callbacks.law_functions import called_law, law_callbacks
-from floatframe.compiling.markers import MarkerData
-from floatframe.compiling.public_elements import PlacedLaw
-from floatframe.compiling.system import compiled_system
-from floatframe.elements.switched_off import law_switched_off, times_off
+from floatframe.engine.compiling.callbacks import raise_errors_of
+from floatframe.engine.compiling.callbacks.law_functions import called_law, law_callbacks
+from floatframe.engine.compiling.markers import MarkerData
+from floatframe.engine.compiling.public_elements import PlacedLaw
+from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import ResultsError
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.elements.switched_off import law_switched_off, times_off
+from floatframe.model.system import System
 from floatframe.results.coordinate_elements import unknowns
 from floatframe.results.place_motion import PlaceMotion, as_moved, shape_motion, still_place
 from floatframe.results.trajectory import Trajectory
-from floatframe.system import System
 
 __all__ = ["ElementMotion", "element_motion", "placed_law"]
 

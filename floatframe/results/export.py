@@ -7,19 +7,19 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from cms.reduced_body.reduced_body import ReducedBody
-from cms.reduced_body.stress import stress_of, von_mises
-from fe_models.body.numbering import NONE
+from cms.body.reduced_body import ReducedBody
+from cms.body.stress import stress_of, von_mises
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.paths import replace_file
+from fe_models.meshes.numbering import NONE
 from floatframe.errors import ResultsError
+from floatframe.model.rotations import rotation_matrix
+from floatframe.model.system import System
 from floatframe.results.place_motion import interface_motion
 from floatframe.results.recovery import elastic_displacements, nodal_displacements, require_same_modes
 from floatframe.results.sensors import measured, sensor_of, sensors_of
 from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.trajectory import Trajectory
-from floatframe.rotations import rotation_matrix
-from floatframe.system import System
 
 __all__ = ["export_csv", "export_vtk", "motion_table"]
 

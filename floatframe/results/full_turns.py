@@ -3,7 +3,7 @@
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.compiling.counted_angles import CountedAngle
+from floatframe.engine.compiling.counted_angles import CountedAngle
 from floatframe.errors import ResultsError
 from floatframe.results.trajectory import Trajectory
 

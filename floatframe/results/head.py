@@ -8,7 +8,7 @@ from typing import Any
 
 from fe_models.foundation.units import UNIT_SYSTEMS
 from fe_models.foundation.words import quoted
-from floatframe.compiling.counted_angles import CountedAngle, direction
+from floatframe.engine.compiling.counted_angles import CountedAngle, direction
 
 __all__ = ["BodyEntry", "Head", "head_of_text", "text_of_head"]
 

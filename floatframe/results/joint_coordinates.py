@@ -7,22 +7,22 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
-from floatframe.bodies.flexible_body import FlexibleBody
-from floatframe.compiling.counted_angles import angle_of
-from floatframe.compiling.markers import MarkerData, joint_markers, marker_pose, n_q_of
-from floatframe.compiling.system import compiled_system
+from floatframe.engine.compiling.counted_angles import angle_of
+from floatframe.engine.compiling.markers import MarkerData, joint_markers, marker_pose, n_q_of
+from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import ResultsError
-from floatframe.joints import Joint
-from floatframe.joints.rows import MOMENT, SPAN, TWIST_B, RelativePlace, RowCoordinate
-from floatframe.joints.sliding import SlidingJoint
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.joints import Joint
+from floatframe.model.joints.rows import MOMENT, SPAN, TWIST_B, RelativePlace, RowCoordinate
+from floatframe.model.joints.sliding import SlidingJoint
+from floatframe.model.rotations import cross, dot
+from floatframe.model.system import System
 from floatframe.results.full_turns import through_turns
 from floatframe.results.place_motion import PlaceMotion, as_moved, shape_motion, still_place
 from floatframe.results.sliding_place import sliding_place
+from floatframe.results.small_motions.rows import Rows
+from floatframe.results.small_motions.small_motions import SmallMotions
 from floatframe.results.trajectory import Trajectory
-from floatframe.rotations import cross, dot
-from floatframe.small_motions.rows import Rows
-from floatframe.small_motions.small_motions import SmallMotions
-from floatframe.system import System
 
 __all__ = ["CoordinateMotion", "force_rows", "joint_coordinate", "joint_coordinates"]
 

@@ -7,13 +7,14 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from cms.body.address import Address
+from cms.body.reduced_body import ReducedBody
+from cms.body.stress import stress_of, von_mises_of
 from cms.errors import BodyError
-from cms.reduced_body.address import Address
-from cms.reduced_body.reduced_body import ReducedBody
-from cms.reduced_body.stress import stress_of, von_mises_of
 from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.bodies.marker_shape import (
+from floatframe.errors import ResultsError
+from floatframe.model.bodies.marker_shape import (
     BodyFrameMotion,
     MarkerShape,
     MotionInBody,
@@ -22,12 +23,11 @@ from floatframe.bodies.marker_shape import (
     motion_in_body,
     node_shape,
 )
-from floatframe.bodies.mean_axes import FrameMotion, mean_axes
-from floatframe.errors import ResultsError
+from floatframe.model.bodies.mean_axes import FrameMotion, mean_axes
+from floatframe.model.rotations import cross, dot, rotation_matrix
 from floatframe.results.full_turns import followed_angle
 from floatframe.results.recovery import require_same_modes
 from floatframe.results.trajectory import BodyMotion, Trajectory
-from floatframe.rotations import cross, dot, rotation_matrix
 
 __all__ = [
     "PlaceMotion",
@@ -105,7 +105,7 @@ def node_motion(trajectory: Trajectory, body: str, reduced: ReducedBody, node: i
 
     Its displacement in the body is that of `nodal_displacements`: Phi q, plus ½ Σ q_k q_l g_kl for a stiffened body
     with quadratic modes. Its axes are those of the body frame, rotated by the rotation of the node if this is kept
-    (`floatframe.bodies.marker_shape.node_shape`).
+    (`floatframe.model.bodies.marker_shape.node_shape`).
 
     Raises
     ------

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from cms.reduced_body.reduced_body import ReducedBody
+from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.bodies.marker_shape import interface_shape
 from floatframe.errors import ResultsError
+from floatframe.model.bodies.marker_shape import interface_shape
+from floatframe.model.rotations import rotation_matrix, turned
 from floatframe.results.trajectory import Trajectory
-from floatframe.rotations import rotation_matrix, turned
 
 __all__ = [
     "elastic_displacements",

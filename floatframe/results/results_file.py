@@ -17,8 +17,8 @@ from fe_models.foundation.hdf5_file import as_attribute, opened, own_items, requ
 from fe_models.foundation.paths import near_file
 from fe_models.foundation.seal import Kind, altered, check_seal, newer
 from fe_models.foundation.words import quoted
+from floatframe.engine.kernels.memory import N_DRIFTS
 from floatframe.errors import ResultsError
-from floatframe.kernels.memory import N_DRIFTS
 from floatframe.results.head import Head, head_of_text
 
 __all__ = [

@@ -5,10 +5,10 @@ from fnmatch import fnmatchcase
 
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
+from floatframe.model.system import System
 from floatframe.results.sensors import measured, measurement_of, sensor_of, sensors_of
 from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.trajectory import Trajectory
-from floatframe.system import System
 
 __all__ = ["chosen_measurements"]
 

@@ -5,14 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.bodies.flexible_body import FlexibleBody
-from floatframe.bodies.marker_shape import interface_shape
-from floatframe.bodies.markers import body_name
-from floatframe.joints.sliding import SlidingJoint, line_triad
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.bodies.marker_shape import interface_shape
+from floatframe.model.bodies.markers import body_name
+from floatframe.model.joints.sliding import SlidingJoint, line_triad
+from floatframe.model.rotations import cross, dot, left_jacobian, rotation_matrix, turned
+from floatframe.model.system import System
 from floatframe.results.place_motion import PlaceMotion, as_moved
 from floatframe.results.trajectory import Trajectory
-from floatframe.rotations import cross, dot, left_jacobian, rotation_matrix, turned
-from floatframe.system import System
 
 __all__ = ["SlidingPlace", "sliding_place"]
 

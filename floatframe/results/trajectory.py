@@ -12,10 +12,10 @@ from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.units import Units, unit_system
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ResultsError
+from floatframe.model.state import State
 from floatframe.results.head import BodyEntry, Head
 from floatframe.results.results_file import ArraySource, open_results, validity_text
 from floatframe.results.validity import ValidityNote, notes_from_json
-from floatframe.state import State
 
 __all__ = ["BodyMotion", "Drift", "Energies", "Reaction", "Trajectory", "read_results"]
 

@@ -19,7 +19,7 @@ class ValidityNote:
     """A note of a run about its validity: a limit that is exceeded, and the remedy.
 
     There is one note per body and kind for the linear frame of a body ("rotation", "load", "speed" or "inertia", fields
-    of `cms.reduced_body.linear_range.Limits`); one for the steps of the run ("steps": their estimated error relative to
+    of `cms.body.linear_range.Limits`); one for the steps of the run ("steps": their estimated error relative to
     the motion); and one for its energy ("energy": the energy added by the steps, relative to the energy in motion). The
     latter two name the body most affected. There is one note for each supply, load, drive or user law that the steps do
     not resolve ("frequency", "knots" of a table, "law"), and for each bushing and bearing with large angles ("angles",

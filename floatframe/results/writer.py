@@ -23,8 +23,8 @@ from fe_models.foundation.hdf5_file import Manifest, write_sealed_file
 from fe_models.foundation.locks import FileLock, LockedError
 from fe_models.foundation.paths import is_stream, same_file
 from fe_models.foundation.seal import reason
+from floatframe.engine.kernels.memory import Rows
 from floatframe.errors import ResultsError
-from floatframe.kernels.memory import Rows
 from floatframe.results.head import Head, text_of_head
 from floatframe.results.results_file import (
     DATASETS,

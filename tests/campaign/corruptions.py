@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from cms.quality.of_reduction.fields import leaves
-from cms.reduced_body.reduced_body import ReducedBody
+from cms.assessment.quality.of_reduction.fields import leaves
+from cms.body.reduced_body import ReducedBody
 
 __all__ = ["CORRUPTIONS", "spoilt"]
 

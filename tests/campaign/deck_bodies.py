@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from tests.campaign.verdict import ACCEPTED, REFUSED, WRONG, Verdict
-from tests.cms.decks.nastran_bodies import RHO, A, E, J, arm, axes_of, bar_stiffness, body_of, released
+from tests.cms.jobs.decks.nastran_bodies import RHO, A, E, J, arm, axes_of, bar_stiffness, body_of, released
 
 __all__ = ["body_case"]
 

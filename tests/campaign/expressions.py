@@ -104,7 +104,7 @@ PLACES = ((0.7, 1.3, 2.1), (1.9, 0.4, 0.6), (0.2, 0.2, 3.0))
 def expression_case(seed: int, folder: Path) -> Verdict:
     """Compile a damaged expression, and compare its value at three places with Python's."""
     from floatframe.errors import ModelError
-    from floatframe.functions.expressions import compile_expression
+    from floatframe.model.functions.expressions import compile_expression
 
     rng = np.random.default_rng([6, seed])
     text = WHOLE[seed % len(WHOLE)]
@@ -137,7 +137,7 @@ def by_python(code: Any, place: tuple[float, ...]) -> float:
 
 def value_of_tape(tape: Any, place: tuple[float, ...]) -> float:
     """Return the value of a tape by its documented meaning, operation by operation; NaN where there is none."""
-    from floatframe.functions import expressions as codes
+    from floatframe.model.functions import expressions as codes
 
     of_code = {code: name for name, (code, _) in codes.FUNCTIONS.items()}
     arithmetic = {

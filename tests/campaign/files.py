@@ -26,8 +26,8 @@ WILD = (-1, 0, 1, 10**9, -(10**12), 2**62, 1e308, -1.5, float("nan"), float("inf
 def prepared(folder: Path) -> Path:
     """Return a folder with a modal file, a results file and the segments of an interrupted run; made once a process."""
     if not (folder / "ready").exists():
-        import floatframe.motion.integration as integration
-        from floatframe.system_file.read_system import read_system
+        import floatframe.simulation.integration as integration
+        from floatframe.files.system_file.read_system import read_system
 
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "bar.msh").write_text(FORMATS["msh"](*bar()))
@@ -94,7 +94,7 @@ def head_case(seed: int, folder: Path) -> Verdict:
 
 def resealed(source: Path, target: Path, rng: np.random.Generator, *, is_modal: bool) -> None:
     """Copy a file with one change of an attribute, a dataset or the JSON of its head, digest and seal made anew."""
-    from cms.modal_file.file import KIND as MODAL
+    from cms.body.modal_file.file import KIND as MODAL
     from fe_models.foundation.hdf5_file import Manifest, as_attribute, write_sealed_file
     from floatframe.results.results_file import KIND as RESULTS
 

@@ -22,7 +22,7 @@ from tests.root import ROOT
 
 __all__ = ["body_case", "deck_case", "matrix_case"]
 
-DATA = ROOT / "tests" / "fe_models" / "importers"
+DATA = ROOT / "tests" / "fe_models" / "files"
 INP = """\
 *HEADING
 *NODE, NSET=NALL

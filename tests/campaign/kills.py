@@ -22,7 +22,7 @@ _whole: dict[int, Any] = {}
 def system_of(number: int) -> Any:
     """Return the rigid system of the campaign, or one with a flexible body on a spherical joint."""
     if number == 0:
-        from floatframe.system_file.read_system import read_system
+        from floatframe.files.system_file.read_system import read_system
 
         path = Path(os.environ.get("TMPDIR", "/tmp")) / f"campaign-{os.getpid()}.toml"
         path.write_text(SYSTEM)
@@ -30,14 +30,14 @@ def system_of(number: int) -> Any:
             return read_system(path)[0]
         finally:
             path.unlink()
-    from tests.floatframe.motion.test_restart import swing
+    from tests.floatframe.simulation.test_restart import swing
 
     return swing()
 
 
 def kill_case(seed: int, folder: Path) -> Verdict:
     """Kill a run in a forked process, look at what it left, go on with it, and compare bit for bit."""
-    import floatframe.motion.integration as integration
+    import floatframe.simulation.integration as integration
     from floatframe import GeneralizedAlpha, integrate, read_results, resume
 
     integration.SEGMENT_SECONDS = 0.0

@@ -6,10 +6,10 @@ import numpy as np
 
 import cms
 import fe_models as fm
-from fe_models.beams.attachments import PointMass, Spring
 from fe_models.body.fe_body import FEBody, Interface
+from fe_models.body.loads import nodal_load
+from fe_models.elements.beams.attachments import PointMass, Spring
 from fe_models.foundation.units import UNIT_SYSTEMS, Units
-from fe_models.loads import nodal_load
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.mesh import Mesh
 from tests.bodies import box_mesh

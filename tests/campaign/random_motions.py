@@ -12,9 +12,9 @@ import numpy as np
 import cms
 import floatframe as ff
 from fe_models.foundation.units import Units, unit_system
-from floatframe.functions.time_functions import constant, cycloidal_spin_up, harmonic, piecewise
 from floatframe.integrators.carry import Integrator
-from floatframe.rotations import euler_parameters, rotation_exp
+from floatframe.model.functions.time_functions import constant, cycloidal_spin_up, harmonic, piecewise
+from floatframe.model.rotations import euler_parameters, rotation_exp
 
 __all__ = ["MotionCase", "random_motion"]
 

@@ -12,19 +12,19 @@ from scipy.spatial.transform import Rotation
 
 import cms
 import fe_models as fm
-from cms.mode_set import ModeSet
-from cms.mode_sets import MODE_SETS
-from cms.mode_sets.extra_columns import with_load_cases
-from cms.quality.of_reduction.contents import ReductionOptions
-from cms.recovery.request import RecoveryRequest, Rows
-from cms.reduced_basis.damping import ModalDamping, PerModeDamping, RampDamping, RayleighDamping
-from cms.reduced_body.reduced_body import ReducedBody
-from fe_models.body.couplings import couple
+from cms.assessment.quality.of_reduction.contents import ReductionOptions
+from cms.body.reduced_body import ReducedBody
+from cms.modes.mode_set import ModeSet
+from cms.modes.mode_sets import MODE_SETS
+from cms.modes.mode_sets.extra_columns import with_load_cases
+from cms.reduction.basis.damping import ModalDamping, PerModeDamping, RampDamping, RayleighDamping
+from cms.reduction.recovery.request import RecoveryRequest, Rows
+from fe_models.body.couplings.couplings import couple
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.kept_nodes import keep_nodes
 from fe_models.body.load_cases import LoadCase
+from fe_models.body.weld import weld
 from fe_models.foundation.units import unit_system
-from fe_models.weld import weld
 from tests.bodies import box_mesh, distorted
 
 __all__ = ["SoundBody", "sound_body"]

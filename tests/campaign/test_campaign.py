@@ -77,7 +77,7 @@ def test_the_plain_reading_gives_back_what_was_written(suffix):
 
 
 def test_a_tape_of_another_expression_has_another_value():
-    from floatframe.functions.expressions import compile_expression
+    from floatframe.model.functions.expressions import compile_expression
 
     one = compile_expression("f", "x - y/z", ["x", "y", "z"])
     other = compile_expression("f", "x - z/y", ["x", "y", "z"])

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 import cms
+from cms.assessment.quality.of_reduction.contents import CONTENTS
+from cms.assessment.quality.record import QualityRecord
+from cms.assessment.quality.reduction_check import check_reduction
+from cms.assessment.quality.reference.full_reference import FullReference
 from cms.errors import CmsError
-from cms.quality.of_reduction.contents import CONTENTS
-from cms.quality.record import QualityRecord
-from cms.quality.reduction_check import check_reduction
-from cms.quality.reference.full_reference import FullReference
 from fe_models.errors import FeModelsError
 from tests.campaign.corruptions import CORRUPTIONS, spoilt
 from tests.campaign.sound_bodies import SoundBody, sound_body

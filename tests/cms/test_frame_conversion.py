@@ -7,16 +7,16 @@ import pytest
 import scipy.sparse as sp
 from numpy.testing import assert_allclose
 
-from cms import reduction
+from cms.body.modal_file.file import read
 from cms.errors import BodyError
-from cms.frame_conversion import convert_frame
-from cms.modal_file.file import read
-from cms.mode_sets import craig_bampton
-from cms.reduced_basis.damping import ModalDamping, RayleighDamping
-from cms.reduced_basis.frames import BuckensFrame, NodalFrame, TisserandFrame
-from fe_models.body.couplings import couple
+from cms.modes.mode_sets import craig_bampton
+from cms.reduction import reduction
+from cms.reduction.basis.damping import ModalDamping, RayleighDamping
+from cms.reduction.basis.frames import BuckensFrame, NodalFrame, TisserandFrame
+from cms.reduction.frame_conversion import convert_frame
+from fe_models.body.couplings.couplings import couple
 from fe_models.body.fe_body import FEBody, Interface
-from fe_models.loads import gravity_load, interface_load
+from fe_models.body.loads import gravity_load, interface_load
 from tests.bodies import bar, beam, box_mesh, chain, distorted, with_interfaces
 from tests.root import ROOT
 from tests.synthetic import synthetic_reduced_body
@@ -36,14 +36,14 @@ SLACK = 1e-8  #: roundoff times the condition of M in another frame, relative to
 
 
 def reduce(*args, **options):
-    """Return the reduced body without geometric stiffness, which tests/cms/second_order carries from frame to frame."""
+    """Return the reduced body without geometric stiffness, which tests of that room carry from frame to frame."""
     return reduction.reduce(*args, **options, geometric=False)
 
 
 def uneven_bar(kinds=("rigid", "distributing")):
     """A bar of two densities with distorted cells and an interface of each kind, so that no two frames coincide."""
+    from fe_models.elements.solids.body import solid_body
     from fe_models.foundation.units import unit_system
-    from fe_models.solids.body import solid_body
     from tests.bodies import ALUMINIUM, STEEL
 
     mesh = distorted(box_mesh(6, 1, 1, 1.0, 0.08, 0.05, "hexahedron"), amount=0.3)
@@ -303,7 +303,7 @@ def test_a_body_of_point_masses_keeps_its_moments_in_sums():
 
 def test_a_file_of_version_1_is_converted_and_says_what_it_lacks():
 
-    old = read(ROOT / "tests" / "cms" / "modal_file" / "data" / "version_1.h5")
+    old = read(ROOT / "tests" / "cms" / "body" / "modal_file" / "data" / "version_1.h5")
     assert old.columns is None
     new = convert_frame(old, TisserandFrame())
     assert_allclose(new.moments.C2, 0, rtol=0, atol=1e-10)

@@ -11,18 +11,18 @@ from typer.testing import CliRunner
 
 import cms
 import floatframe as ff
+from cms.assessment.compare.compare import compare
+from cms.assessment.quality.body_check import check_body
+from cms.assessment.quality.of_body.effective_mass import effective_mass
+from cms.assessment.quality.reduction_check import check_reduction
+from cms.assessment.quality.reference.port_model import file_response
 from cms.cli.app import app
-from cms.compare.compare import compare
 from cms.errors import BodyError
-from cms.quality.body_check import check_body
-from cms.quality.of_body.effective_mass import effective_mass
-from cms.quality.reduction_check import check_reduction
-from cms.quality.reference.port_model import file_response
-from cms.reduced_basis.frames import HeldFrame, TisserandFrame
-from fe_models.body.numbering import Numbering
+from cms.reduction.basis.frames import HeldFrame, TisserandFrame
+from fe_models.files.matrices.given import body_from_matrices
 from fe_models.foundation.sealed_hdf5 import read_sealed
 from fe_models.foundation.units import unit_system
-from fe_models.matrices import body_from_matrices
+from fe_models.meshes.numbering import Numbering
 from floatframe.errors import ModelError
 from tests.bodies import STEEL, bar
 
@@ -106,7 +106,7 @@ def test_the_file_of_a_held_body_says_so_in_a_newer_version(reduced, tmp_path):
 
 
 def read_version(path):
-    from cms.modal_file.file import KIND
+    from cms.body.modal_file.file import KIND
 
     return read_sealed(path, KIND).version
 

@@ -8,13 +8,13 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import cms
-from cms.families.families import Families
-from cms.families.flexibility import BoundaryConditions
-from cms.mode_sets.craig_bampton import craig_bampton, craig_bampton_ir
-from cms.mode_sets.free_interface import rubin
-from cms.reduction import reduce
-from fe_models.body.coupling_on_ranks import spread_body
-from fe_models.body.couplings import couple
+from cms.modes.families.families import Families
+from cms.modes.families.flexibility import BoundaryConditions
+from cms.modes.mode_sets.craig_bampton import craig_bampton, craig_bampton_ir
+from cms.modes.mode_sets.free_interface import rubin
+from cms.reduction.reduction import reduce
+from fe_models.body.couplings.coupling_on_ranks import spread_body
+from fe_models.body.couplings.couplings import couple
 from fe_models.body.fe_body import Interface
 from fe_models.body.load_cases import LoadCase
 from fe_models.foundation.errors import BodyError
@@ -166,7 +166,7 @@ def shell():
 
 @pytest.mark.parametrize("make", [shell, lambda: couple(beam()), lambda: couple(bar())])
 def test_a_body_made_by_rank_0_is_reduced_on_all_ranks(make, monkeypatch):
-    monkeypatch.setattr("fe_models.body.nearby.SMALL", 0)  # in an order of its own
+    monkeypatch.setattr("fe_models.body.couplings.nearby.SMALL", 0)  # in an order of its own
     one = make()
     spread = spread_body(one, ThreadRanks(3))
     assert (spread.K.whole() != one.K).nnz == 0

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 import cms
 import fe_models
-from fe_models.importers import MESH_FORMATS
+from fe_models.files import MESH_FORMATS
 from tests.bodies import bar
 from tests.root import ROOT
 

@@ -8,9 +8,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import floatframe as ff
+from floatframe.files.system_file.read_system import read_system
 from floatframe.results.energy_balance import balance_defect, energy_scale
 from floatframe.results.sensors import measured
-from floatframe.system_file.read_system import read_system
 from tests.floatframe.orders import slope
 from tests.root import ROOT
 

@@ -49,7 +49,7 @@ def test_a_page_of_names_that_is_gone_is_removed(tmp_path):
     (tmp_path / "api" / "cms.gone.rst").write_text("old")
     public_names.write_pages(SimpleNamespace(srcdir=tmp_path))
     assert not (tmp_path / "api" / "cms.gone.rst").exists()
-    assert (tmp_path / "api" / "cms.mode_sets.rst").exists()
+    assert (tmp_path / "api" / "cms.modes.mode_sets.rst").exists()
 
 
 def test_a_formula_is_a_picture_with_its_text_and_stands_on_the_line():

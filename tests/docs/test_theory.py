@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.linalg import expm
 
 from floatframe import GeneralizedAlpha
-from floatframe.rotations import right_jacobian, rotation_exp, tilde
+from floatframe.model.rotations import right_jacobian, rotation_exp, tilde
 
 ROUNDOFF = 1e-12
 

@@ -16,12 +16,12 @@ import scipy.sparse as sp
 from scipy.linalg import eigh
 from scipy.sparse.linalg import eigsh, spsolve
 
-from cms.decks.job_text import JobRequest, job_text
 from cms.jobs.body_of_job import uncoupled_body
+from cms.jobs.decks.job_text import JobRequest, job_text
 from cms.jobs.job import read_job
+from fe_models.files.decks.read_deck import read_deck
 from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.stages import Stages
-from fe_models.importers.decks.read_deck import read_deck
 
 FOLDER = Path("/usr/share/doc/calculix-ccx-test/examples/test")
 LIST = Path(__file__).parent / "data" / "calculix_linear_decks.txt"

@@ -8,14 +8,14 @@ from dataclasses import fields
 import numpy as np
 import scipy.linalg as la
 
-from cms.families.families import Families
-from cms.families.interface_loads import point_load
-from cms.mode_sets import MODE_SETS
-from cms.reduced_basis.finishing import finish
-from cms.reduced_basis.frames import TisserandFrame, frame_condition
-from cms.reduction import reduce
-from cms.solvers.mode_count import ModeCount
-from fe_models.body.couplings import couple
+from cms.linear_algebra.solvers.mode_count import ModeCount
+from cms.modes.families.families import Families
+from cms.modes.families.interface_loads import point_load
+from cms.modes.mode_sets import MODE_SETS
+from cms.reduction.basis.finishing import finish
+from cms.reduction.basis.frames import TisserandFrame, frame_condition
+from cms.reduction.reduction import reduce
+from fe_models.body.couplings.couplings import couple
 from fe_models.foundation.ranks.mpi import all_ranks
 from fe_models.foundation.ranks.row_layout import asked
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix

@@ -16,7 +16,7 @@ def test_fixed_interface_frequencies_are_those_of_exudyn():
     pytest.importorskip("exudyn", reason="exudyn is not installed: pip install 'floatframe[bench]'")
     from exudyn.FEM import FEMinterface, HCBstaticModeSelection
 
-    from fe_models.solids.body import solid_body
+    from fe_models.elements.solids.body import solid_body
 
     mesh = box_mesh(15, 4, 4, 1.0, 0.05, 0.05, "hexahedron")
     solid = solid_body(mesh, STEEL, name="bar", units=cms.unit_system("m-kg-s"))

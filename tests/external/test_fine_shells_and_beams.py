@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from fe_models.beams.torsion import rectangle_torsion_constant
+from fe_models.elements.beams.torsion import rectangle_torsion_constant
 from tests.external.calculix import body_of, frequencies, frequencies_of_ccx, frequency_deck
 
 pytestmark = [

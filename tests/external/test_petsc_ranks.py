@@ -115,7 +115,7 @@ def test_a_body_that_cannot_be_reduced_ends_all_ranks_with_one_message(folder):
 
 FAILING = """
 import sys
-import cms.solvers.petsc.factor as factor
+import cms.linear_algebra.solvers.petsc.factor as factor
 from cms.cli import main
 from fe_models.foundation.ranks.mpi import all_ranks
 kept = factor.solved_rows

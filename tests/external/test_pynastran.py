@@ -9,9 +9,9 @@ import pytest
 import scipy.sparse as sp
 from numpy.testing import assert_allclose, assert_array_equal
 
-from cms.importers.element_rows import FORCE_ITEMS
-from fe_models.importers.nastran_matrices.op4 import read_op4
-from fe_models.importers.nastran_matrices.write_op4 import write_op4
+from cms.exchange.importers.element_rows import FORCE_ITEMS
+from fe_models.files.nastran_matrices.op4 import read_op4
+from fe_models.files.nastran_matrices.write_op4 import write_op4
 
 pytestmark = pytest.mark.external
 
@@ -63,8 +63,8 @@ np.savez(sys.argv[2], **found)
 def test_pynastran_reads_exported_superelements(tmp_path):
     """OP4 bit for bit, DMIG to the ten digits of its fields, rows sorted by their point and component."""
     import cms
-    from cms.exporters.interface_model import interface_model
-    from tests.cms.exporters.test_matrices_over_interfaces import reduced_bar
+    from cms.reduction.interface_model import interface_model
+    from tests.cms.exchange.exporters.test_matrices_over_interfaces import reduced_bar
 
     body = reduced_bar()
     model = interface_model(body)

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from fe_models.importers.cad.gmsh_model import gmsh_call, gmsh_model
+from fe_models.files.cad.gmsh_model import gmsh_call, gmsh_model
 
 __all__ = ["PLATE", "drawn", "iges_unit", "in_unit", "painted", "plate_file"]
 

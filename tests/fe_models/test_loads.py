@@ -7,15 +7,15 @@ import pytest
 from numpy.testing import assert_allclose
 
 from cms.errors import BodyError
-from cms.families.rigid_modes import geometric_rigid_modes
-from fe_models.body.couplings import couple
+from cms.modes.families.rigid_modes import geometric_rigid_modes
+from fe_models.body.couplings.couplings import couple
 from fe_models.body.load_cases import LoadCase
+from fe_models.body.loads import gravity_load, interface_load, nodal_load, pressure_load, selection_load
+from fe_models.elements.solids.body import solid_body
 from fe_models.errors import InterfaceError, LoadError
 from fe_models.foundation.units import unit_system
-from fe_models.loads import gravity_load, interface_load, nodal_load, pressure_load, selection_load
 from fe_models.meshes.mesh import Mesh
 from fe_models.meshes.selections import Box, FaceGroup, NearestNode, NodeSet, Plane
-from fe_models.solids.body import solid_body
 from tests.bodies import STEEL, bar, beam, box_mesh, distorted, with_interfaces
 
 KINDS = ["tetra", "tetra10", "hexahedron", "hexahedron20", "hexahedron27", "wedge"]

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from fe_models.body.material import Material, assign_materials
 from fe_models.errors import MaterialError
-from fe_models.material import Material, assign_materials
 from fe_models.meshes.mesh import Mesh
 from tests.bodies import ALUMINIUM, STEEL, box_mesh
 

@@ -7,8 +7,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from cms.errors import BodyError, UnitsError
 from fe_models.errors import MeshError
+from fe_models.files.matrices.given import body_from_matrices, body_from_npz, scalar_mass_of
 from fe_models.foundation.units import unit_system
-from fe_models.matrices import body_from_matrices, body_from_npz, scalar_mass_of
 from tests.bodies import bar, beam
 
 SI = unit_system("m-kg-s")

@@ -5,8 +5,8 @@ from numpy.testing import assert_allclose
 import cms
 import fe_models as fm
 from cms.errors import BodyError
-from cms.families.rigid_modes import geometric_rigid_modes
-from cms.mode_sets import MODE_SETS
+from cms.modes.families.rigid_modes import geometric_rigid_modes
+from cms.modes.mode_sets import MODE_SETS
 from tests.fe_models.small_frames import STEEL, straight
 
 ROUNDOFF = 1e-12

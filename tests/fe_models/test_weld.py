@@ -5,9 +5,9 @@ from numpy.testing import assert_allclose
 import cms
 import fe_models as fm
 from cms.errors import BodyError
-from cms.families.rigid_modes import geometric_rigid_modes
-from cms.mode_sets.mesh_field import coupled_field
-from cms.solvers.eigen import eigenmodes
+from cms.linear_algebra.solvers.eigen import eigenmodes
+from cms.modes.families.rigid_modes import geometric_rigid_modes
+from cms.modes.mode_sets.mesh_field import coupled_field
 from tests import bodies
 from tests.fe_models.small_frames import SI, STEEL, straight, supported_frequencies
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from fe_models.foundation.units import unit_system
-from floatframe.elements import ElementLaw, Placed
+from floatframe.model.elements import ElementLaw, Placed
 
 STEP = 1e-30
 

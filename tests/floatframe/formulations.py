@@ -13,16 +13,17 @@ from tests.root import ROOT
 
 #: rooms of tests/floatframe that run a system as a whole
 ROOMS = (
-    "analyses", "bearings", "bodies", "cables", "clearances", "compiling", "elements", "forces", "friction",
-    "integrators", "joints", "motion", "results", "start",
+    "analyses", "components/bearings", "components/cables", "components/clearances", "components/friction",
+    "engine/compiling", "engine/initial_conditions", "integrators", "model/bodies", "model/elements", "model/forces",
+    "model/joints", "results", "simulation",
 )  # fmt: skip
 
 #: of their files, those that every change runs again: forces in joints and by users, couplers, events, stops, sensors
 SHORT = tuple(
     f"tests/floatframe/{name}.py"
     for name in (
-        "joints/test_coordinate_coupler", "forces/test_joint_forces", "motion/test_events", "motion/test_stops",
-        "results/test_place_motion_and_export",
+        "model/joints/test_coordinate_coupler", "model/forces/test_joint_forces", "simulation/test_events",
+        "simulation/test_stops", "results/test_place_motion_and_export",
     )
 )  # fmt: skip
 
@@ -45,22 +46,22 @@ EXCEPTIONS: dict[str, str] = {
         "compares a moment that is exactly zero there, and 7e-12 here",
     "analyses/test_steady_motion.py::test_the_bicycle_weaves_and_capsizes_as_the_benchmark_says[5.0]": ZEROS,
     "analyses/test_steady_motion.py::test_the_bicycle_weaves_and_capsizes_as_the_benchmark_says[8.0]": ZEROS,
-    "bodies/test_mode_choice.py::test_recovery_rows_of_fewer_modes_are_those_of_a_motion_in_these_modes":
+    "model/bodies/test_mode_choice.py::test_recovery_rows_of_fewer_modes_are_those_of_a_motion_in_these_modes":
         "compares bit for bit, and two of 36 numbers differ in the last digit",
-    "compiling/test_spinning_beams.py::test_spin_up_bends_and_shortens_as_the_exact_beam[tangent]": SPIN_UP,
-    "compiling/test_spinning_beams.py::test_spin_up_bends_and_shortens_as_the_exact_beam[mean axis]": SPIN_UP,
-    "compiling/test_spinning_beams.py::test_spin_up_of_a_body_of_solids": SPIN_UP,
-    "elements/test_public_elements.py::test_three_multipliers_hold_a_flexible_pendulum_as_a_spherical_joint_does":
+    "engine/compiling/test_spinning_beams.py::test_spin_up_bends_and_shortens_as_the_exact_beam[tangent]": SPIN_UP,
+    "engine/compiling/test_spinning_beams.py::test_spin_up_bends_and_shortens_as_the_exact_beam[mean axis]": SPIN_UP,
+    "engine/compiling/test_spinning_beams.py::test_spin_up_of_a_body_of_solids": SPIN_UP,
+    "model/elements/test_public_elements.py::test_three_multipliers_hold_a_flexible_pendulum_as_a_spherical_joint_does":
         KINDS + "agree to 1e-11 there, to 3e-7 here",
     "integrators/test_pendulum.py::test_without_stabilisation_velocities_of_the_joint_close_to_second_order": CLOSED,
-    "joints/test_sliding.py::test_on_a_rigid_line_it_is_the_point_on_a_line_and_the_prismatic_joint[True]":
+    "model/joints/test_sliding.py::test_on_a_rigid_line_it_is_the_point_on_a_line_and_the_prismatic_joint[True]":
         KINDS + "agree to 1e-8 there, to 6e-6 here",
-    "joints/test_sliding.py::test_energy_is_kept_while_the_block_slides_on_a_beam_that_bends[True-True]":
+    "model/joints/test_sliding.py::test_energy_is_kept_while_the_block_slides_on_a_beam_that_bends[True-True]":
         "half the step leaves at most 0.35 of the drift of energy there, 0.43 here",
-    "motion/test_restart.py::test_killed_run_is_readable_and_can_be_resumed[2]": BESIDE,
-    "motion/test_stops.py::test_a_latch_between_free_flexible_bodies_keeps_momentum_and_loses_what_carnot_says":
+    "simulation/test_restart.py::test_killed_run_is_readable_and_can_be_resumed[2]": BESIDE,
+    "simulation/test_stops.py::test_a_latch_between_free_flexible_bodies_keeps_momentum_and_loses_what_carnot_says":
         "linear momentum is kept to 1e-8 there, to 1.3e-7 here",
-    "motion/test_validity.py::test_an_equilibrium_tells_a_load_near_buckling_and_the_far_bend_above_it":
+    "simulation/test_validity.py::test_an_equilibrium_tells_a_load_near_buckling_and_the_far_bend_above_it":
         "above buckling the load is told, but no far bend; why is not known",
     "results/test_results_file.py::test_steps_one_by_one_are_the_same_motion_to_the_tolerance":
         "steps one by one by the absolute method, which the test calls itself",
@@ -72,7 +73,7 @@ def take_relative() -> None:
     """Make the relative formulation that of all that is not given one."""
     from floatframe import linearize, static_equilibrium, steady_rotation
     from floatframe.integrators.generalized_alpha import GeneralizedAlpha
-    from floatframe.motion import integration
+    from floatframe.simulation import integration
 
     for function in (linearize, static_equilibrium, steady_rotation):
         function.__kwdefaults__["formulation"] = "relative"

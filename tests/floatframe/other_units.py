@@ -9,8 +9,8 @@ from dataclasses import dataclass, fields, is_dataclass, replace
 
 import numpy as np
 
-from cms.modal_file.file import convert_units
-from cms.reduced_body.reduced_body import ReducedBody
+from cms.body.modal_file.file import convert_units
+from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.units import Dimensions, Units, unit_system
 from floatframe import (
     AxialDistance,
@@ -30,16 +30,13 @@ from floatframe import (
     SpringDamper,
     System,
 )
-from floatframe.aerodynamics import LiftingSurface
-from floatframe.bearings import Bearing
-from floatframe.bodies.ground import GROUND
-from floatframe.bodies.markers import body_name
-from floatframe.cables import Cable
-from floatframe.clearances import Backlash, BallWithPlay, HingeWithPlay
-from floatframe.drives import AntiSkidBrake, DcMotor, InductionMotor, PidDrive, SpeedControl, TorqueMap
-from floatframe.friction import BristleFriction
-from floatframe.functions.time_functions import TimeFunction
-from floatframe.hydraulics import (
+from floatframe.components.aerodynamics import LiftingSurface
+from floatframe.components.bearings import Bearing
+from floatframe.components.cables import Cable
+from floatframe.components.clearances import Backlash, BallWithPlay, HingeWithPlay
+from floatframe.components.drives import AntiSkidBrake, DcMotor, InductionMotor, PidDrive, SpeedControl, TorqueMap
+from floatframe.components.friction import BristleFriction
+from floatframe.components.hydraulics import (
     Accumulator,
     CheckValve,
     Cylinder,
@@ -54,6 +51,13 @@ from floatframe.hydraulics import (
     Resistance,
     Supply,
 )
+from floatframe.components.wheels import BrushTyre, LinearTyre, MagicFormulaTyre
+from floatframe.components.wheels.roads.road import Grip
+from floatframe.components.wheels.tyre_file import TyreProperties
+from floatframe.model.bodies.ground import GROUND
+from floatframe.model.bodies.markers import body_name
+from floatframe.model.functions.time_functions import TimeFunction
+from floatframe.model.rotations import euler_parameter_product, euler_parameters, rotation_matrix
 from floatframe.results.sensors import (
     AngleSensor,
     Channel,
@@ -65,10 +69,6 @@ from floatframe.results.sensors import (
     StressSensor,
     VonMisesSensor,
 )
-from floatframe.rotations import euler_parameter_product, euler_parameters, rotation_matrix
-from floatframe.wheels import BrushTyre, LinearTyre, MagicFormulaTyre
-from floatframe.wheels.roads.road import Grip
-from floatframe.wheels.tyre_file import TyreProperties
 
 __all__ = ["FIELDS", "SI", "Other", "dimensions", "in_units"]
 
@@ -280,7 +280,7 @@ class Other:
         for cls in type(part).__mro__:
             if cls in FIELDS:
                 return FIELDS[cls]
-        return JOINT if type(part).__module__.startswith("floatframe.joints") else {}
+        return JOINT if type(part).__module__.startswith("floatframe.model.joints") else {}
 
     def changes(self, part, table):
         """Return the fields of a part that have other values."""

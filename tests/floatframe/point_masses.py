@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from cms.reduced_body.geometric_stiffness import SPIN_PAIRS, GeometricStiffness
-from cms.reduced_body.invariants import Moments
-from cms.reduced_body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
+from cms.body.geometric_stiffness import SPIN_PAIRS, GeometricStiffness
+from cms.body.invariants import Moments
+from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.units import unit_system
 

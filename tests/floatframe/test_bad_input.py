@@ -24,11 +24,11 @@ from floatframe import (
     integrate,
 )
 from floatframe.cli.app import app
-from floatframe.compiling.system import compiled_system
-from floatframe.functions.time_functions import polynomial_of_time
-from floatframe.mechanisms import slider_crank
-from floatframe.mechanisms.rods import slender_inertia
-from floatframe.motion.step_advice import step_advice
+from floatframe.components.mechanisms import slider_crank
+from floatframe.components.mechanisms.rods import slender_inertia
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.model.functions.time_functions import polynomial_of_time
+from floatframe.simulation.step_advice import step_advice
 from tests.floatframe.point_masses import random_point_masses, reduced_body
 
 CRANK = """

@@ -27,14 +27,11 @@ from floatframe import (
     ScrewJoint,
     SphereContact,
     System,
-    clearances,
-    drives,
-    hydraulics,
     integrate,
-    wheels,
 )
-from floatframe.compiling.system import compiled_system
-from floatframe.kernels.records import leaves
+from floatframe.components import clearances, drives, hydraulics, wheels
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.kernels.records import leaves
 
 UNITS = ("m-kg-s", "mm-t-s", "mm-kg-ms", "in-slinch-s")
 A, B = Marker(GROUND, position=(0.0, 0.0, 0.0)), Marker("b", position=(0.0, 0.0, 0.0))
@@ -144,7 +141,7 @@ def test_a_compiled_default_is_the_quantity_given_in_units(make, defaults, units
 
 
 #: rails refuse other units by name
-OF_SI_ALONE = ("floatframe.rails", "floatframe.machines")
+OF_SI_ALONE = ("floatframe.components.rails", "floatframe.machines")
 UNIT = re.compile(r"\[([^\]]*)\]")
 
 

@@ -5,10 +5,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from floatframe.kernels import rotation as kernels
-from floatframe.kernels.compiler.compilation import entry
-from floatframe.kernels.vector import put_matrix, vector
-from floatframe.rotations import (
+from floatframe.engine.kernels import rotation as kernels
+from floatframe.engine.kernels.compiler.compilation import entry
+from floatframe.engine.kernels.vector import put_matrix, vector
+from floatframe.model.rotations import (
     euler_parameter_rates,
     euler_parameters,
     euler_parameters_of_rotation_vector,

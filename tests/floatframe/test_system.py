@@ -21,7 +21,7 @@ from floatframe import (
     SpringDamper,
     System,
 )
-from floatframe.compiling.system import compiled_system
+from floatframe.engine.compiling.system import compiled_system
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 
 REDUCED = reduced_body(random_point_masses(2, 3), stiffness(2))
@@ -134,8 +134,8 @@ def test_placing_a_flexible_body_moves_its_mesh_whatever_its_frame():
     """The same part in a turned, shifted body frame starts at the same place with the same motion."""
     from dataclasses import replace
 
-    from cms.reduced_body.reduced_body import BodyFrame
-    from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_exp, rotation_matrix
+    from cms.body.reduced_body import BodyFrame
+    from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_exp, rotation_matrix
 
     A, o = rotation_exp(np.array([0.3, 0.2, -0.5])), np.array([0.4, -0.1, 0.2])
     turned = replace(REDUCED, frame=BodyFrame("nodal", o, A))

@@ -16,7 +16,7 @@ import floatframe
 from fe_models.foundation.copies import FrozenMapping
 from fe_models.foundation.errors import ReportedError
 from floatframe import GROUND, ConvergenceError, FlexibleBody, GeneralizedAlpha, RevoluteJoint, System, integrate
-from floatframe.mechanisms import slider_crank
+from floatframe.components.mechanisms import slider_crank
 from tests.bodies import box_mesh
 from tests.floatframe.results.test_results_file import SYSTEM
 from tests.synthetic import synthetic_reduced_body

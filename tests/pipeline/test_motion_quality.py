@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 import cms
 import floatframe as ff
-from cms.quality import QualityError, nodal_deformation_error, recovered_displacements
+from cms.assessment.quality import QualityError, nodal_deformation_error, recovered_displacements
 from tests.bodies import bar
 
 

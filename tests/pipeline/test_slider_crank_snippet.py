@@ -6,7 +6,7 @@ import numpy as np
 from numpy.testing import assert_allclose
 
 from floatframe import measured
-from floatframe.functions.time_functions import cycloidal_spin_up
+from floatframe.model.functions.time_functions import cycloidal_spin_up
 from tests.root import ROOT
 
 GUIDE = ROOT / "docs" / "user_guide.md"

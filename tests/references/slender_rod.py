@@ -13,9 +13,9 @@ import scipy.sparse as sp
 import cms
 import fe_models as fm
 from floatframe import GeneralizedAlpha, corotational, finite_segments, integrate
-from floatframe.flexible_parts import FlexiblePart
-from floatframe.functions.time_functions import TimeFunction, cycloidal_spin_up, polynomial_of_time
-from floatframe.mechanisms import slider_crank
+from floatframe.components.flexible_parts import FlexiblePart
+from floatframe.components.mechanisms import slider_crank
+from floatframe.model.functions.time_functions import TimeFunction, cycloidal_spin_up, polynomial_of_time
 from floatframe.results.place_motion import interface_motion, point_motion
 from tests.bodies import box_mesh
 from tests.references.exact_beam import ExactBeam

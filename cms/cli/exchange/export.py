@@ -31,8 +31,8 @@ def run_export(request: ExportRequest) -> None:
     CmsError
         If the format or the units are unknown or missing, the body does not fit, or the files cannot be written.
     """
-    from cms.exporters.export import WRITERS, export_body
-    from cms.exporters.formats import FORMATS
+    from cms.exchange.exporters.export import WRITERS, export_body
+    from cms.exchange.exporters.formats import FORMATS
 
     if request.to not in WRITERS:
         raise ExportError(f"--to {quoted(request.to)}: unknown format{nearest(request.to, WRITERS)}")

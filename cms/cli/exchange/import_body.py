@@ -12,10 +12,10 @@ from cms.errors import ForeignBodyError, ModalFileError
 from fe_models.foundation.units import UNIT_SYSTEMS
 
 if TYPE_CHECKING:
-    from cms.importers.inertia import Inertia
-    from cms.reduced_basis.damping import Damping
-    from cms.reduced_basis.frames import Frame
-    from cms.reduced_body.reduced_body import ReducedBody
+    from cms.body.reduced_body import ReducedBody
+    from cms.exchange.importers.inertia import Inertia
+    from cms.reduction.basis.damping import Damping
+    from cms.reduction.basis.frames import Frame
 
 __all__ = ["ImportRequest", "run_import"]
 
@@ -51,8 +51,8 @@ def run_import(request: ImportRequest) -> "ReducedBody":
     CmsError
         If no units are given, a file cannot be read, or the files do not make a body.
     """
-    from cms.importers.import_body import import_body
-    from cms.modal_file.file import write
+    from cms.body.modal_file.file import write
+    from cms.exchange.importers.import_body import import_body
 
     if request.units is None:
         raise ForeignBodyError(
@@ -120,9 +120,9 @@ def interfaces_of(words: tuple[str, ...]) -> dict[str, list[int]] | None:
 
 def inertia_of(request: ImportRequest) -> "Inertia | None":
     """Return the additional inertia data: one of full mass, nodal masses, or mesh and density."""
-    from cms.importers.inertia import MeshMass, NodalMasses, full_mass_of
-    from fe_models.importers.matrices.read_matrices import read_matrices
-    from fe_models.importers.read_mesh import read_mesh
+    from cms.exchange.importers.inertia import MeshMass, NodalMasses, full_mass_of
+    from fe_models.files.matrices.read_matrices import read_matrices
+    from fe_models.files.read_mesh import read_mesh
 
     given = [bool(request.full_mass), request.nodal_masses is not None, request.mesh is not None]
     if sum(given) > 1:
@@ -171,6 +171,6 @@ def frame_of(request: ImportRequest) -> "Frame | None":
 
 def damping_of(request: ImportRequest) -> "Damping | None":
     """Return the damping requested in addition to that of the files."""
-    from cms.reduced_basis.damping import ModalDamping
+    from cms.reduction.basis.damping import ModalDamping
 
     return None if request.damping is None else ModalDamping(request.damping)

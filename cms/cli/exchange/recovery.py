@@ -8,7 +8,7 @@ from cms.cli.console import output_path, print_table, say
 from cms.errors import JobError, RecoveryError
 
 if TYPE_CHECKING:
-    from cms.reduced_body.reduced_body import ReducedBody
+    from cms.body.reduced_body import ReducedBody
 
 __all__ = ["RecoveryCommand", "run_recovery"]
 
@@ -33,8 +33,8 @@ def run_recovery(request: RecoveryCommand) -> None:
     CmsError
         If there is no such table, a row is unknown, or the file cannot be written.
     """
-    from cms.modal_file.file import read, write
-    from cms.recovery.files import chosen, write_recovery
+    from cms.body.modal_file.file import read, write
+    from cms.reduction.recovery.files import chosen, write_recovery
 
     body = read(request.file, units=request.units)
     if request.rows is not None:
@@ -66,7 +66,7 @@ def run_recovery(request: RecoveryCommand) -> None:
 def with_rows(body: "ReducedBody", path: Path) -> "ReducedBody":
     """Return the body with the tables requested in a file, as far as it knows them without its model."""
     from cms.jobs.tables.recovery_section import RecoveryFile, requests_of
-    from cms.recovery.matrices import recovery_matrices
+    from cms.reduction.recovery.matrices import recovery_matrices
     from fe_models.foundation.toml_file import read_toml, validated
 
     sections = validated(RecoveryFile, read_toml(path, JobError), path, JobError).recovery

@@ -20,7 +20,7 @@ def run_converge(path: Path, *, ratio: float, n_modes: int, as_json: bool) -> No
         If the job is invalid, or its body is not from a CAD file.
     """
     from cms.jobs.job import read_job
-    from cms.quality.mesh_convergence import ORDER, mesh_convergence
+    from cms.jobs.studies.mesh_convergence import ORDER, mesh_convergence
     from fe_models.foundation.units import unit_system
 
     job = read_job(path)

@@ -12,9 +12,9 @@ from cms.cli.console import output_path, print_table, say, vector_words
 from cms.errors import JobError
 
 if TYPE_CHECKING:
+    from fe_models.files.cad.cad_faces import CadFace
+    from fe_models.files.cad.cad_model import CadPart
     from fe_models.foundation.arrays import Array
-    from fe_models.importers.cad.cad_faces import CadFace
-    from fe_models.importers.cad.cad_model import CadPart
 
 __all__ = ["FacesRequest", "run_faces"]
 
@@ -40,9 +40,9 @@ def run_faces(request: FacesRequest) -> None:
     JobError
         If the picture cannot be written.
     """
-    from fe_models.importers.cad.cad_model import read_cad
-    from fe_models.importers.cad.cad_surface import surface_of_cad
-    from fe_models.importers.cad.face_selectors import chosen_faces
+    from fe_models.files.cad.cad_model import read_cad
+    from fe_models.files.cad.cad_surface import surface_of_cad
+    from fe_models.files.cad.face_selectors import chosen_faces
 
     surface = None
     if request.output is None:
@@ -60,7 +60,7 @@ def run_faces(request: FacesRequest) -> None:
     else:
         show(part, faces)
     if surface is not None and request.output is not None:
-        from cms.report.face_view import draw_faces
+        from cms.assessment.report.face_view import draw_faces
 
         drawing = draw_faces(surface, request.output, chosen=chosen)
         if not request.as_json:
@@ -69,7 +69,7 @@ def run_faces(request: FacesRequest) -> None:
 
 def show(part: "CadPart", faces: "Iterable[CadFace]") -> None:
     """Print the table of faces."""
-    from fe_models.importers.cad.face_selectors import face_words
+    from fe_models.files.cad.face_selectors import face_words
 
     symbol = part.units.length_symbol
     say(f"{part.path}: {part.words}")
@@ -89,7 +89,7 @@ def show(part: "CadPart", faces: "Iterable[CadFace]") -> None:
 
 def record(part: "CadPart", faces: "Iterable[CadFace]") -> dict[str, Any]:
     """Return the record that --json prints."""
-    from fe_models.importers.cad.face_selectors import face_words
+    from fe_models.files.cad.face_selectors import face_words
 
     return {
         "file": str(part.path),

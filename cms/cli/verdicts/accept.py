@@ -25,10 +25,10 @@ class AcceptRequest:
 
 def run_accept(request: AcceptRequest) -> int:
     """Check the body, write the document, print the verdict; return exit code 1 if the body is not accepted."""
-    from cms.acceptance.accept import FullModel, accept_body
-    from cms.acceptance.write import require_suffix, write_acceptance
+    from cms.assessment.quality.errors import QualityError
     from cms.cli.job import densities_of
-    from cms.quality.errors import QualityError
+    from cms.jobs.acceptance.accept import FullModel, accept_body
+    from cms.jobs.acceptance.write import require_suffix, write_acceptance
     from fe_models.foundation.extras import extra_module
 
     if request.deck is None and (request.program or request.densities):

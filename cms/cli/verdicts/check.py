@@ -8,9 +8,9 @@ from typing import Any
 
 import typer
 
+from cms.assessment.quality.record import QualityRecord, has_failed, worst
+from cms.body.reduced_body import ReducedBody
 from cms.cli.console import print_table, say
-from cms.quality.record import QualityRecord, has_failed, worst
-from cms.reduced_body.reduced_body import ReducedBody
 
 __all__ = ["check_file", "print_records", "quality_report"]
 
@@ -19,9 +19,9 @@ WORDS = {"pass": "passes", "warn": "passes with warnings", "fail": "fails", "inf
 
 def check_file(file: Path, job: Path | None, *, band: float | None, as_json: bool) -> int:
     """Check a modal file and print the verdicts; the exit code is 1 if one fails, else 0."""
-    from cms.modal_file.file import read
-    from cms.quality.body_check import check_body
-    from cms.quality.errors import QualityError
+    from cms.assessment.quality.body_check import check_body
+    from cms.assessment.quality.errors import QualityError
+    from cms.body.modal_file.file import read
 
     if band is not None and job is None:
         raise QualityError("--band: says how far the full model is compared; give its job with --job")
@@ -38,14 +38,14 @@ def check_file(file: Path, job: Path | None, *, band: float | None, as_json: boo
 
 def check_against(reduced: ReducedBody, path: Path, band: float | None) -> tuple[QualityRecord, ...]:
     """Check a reduced body against the full model and the mode set of a job, with one factorisation."""
+    from cms.assessment.quality.reduction_check import check_reduction, require_same_units
+    from cms.assessment.quality.reference.full_reference import FullReference, usable_band
     from cms.cli.console import stages
-    from cms.families.families import Families
     from cms.jobs.body_of_job import coupled_body, uncoupled_body
     from cms.jobs.job import read_job
     from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
     from cms.jobs.reduce_job import reduction_options
-    from cms.quality.reduction_check import check_reduction, require_same_units
-    from cms.quality.reference.full_reference import FullReference, usable_band
+    from cms.modes.families.families import Families
 
     job = read_job(path)
     with stages() as clock:

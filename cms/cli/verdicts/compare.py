@@ -11,9 +11,9 @@ from cms.errors import CompareError
 from fe_models.foundation.words import nearest, quoted
 
 if TYPE_CHECKING:
-    from cms.compare.comparison import Comparison
+    from cms.assessment.compare.comparison import Comparison
+    from cms.assessment.quality.reference.transient import Snapshots
     from cms.jobs.job import Job
-    from cms.quality.reference.transient import Snapshots
     from fe_models.body.fe_body import FEBody
 
 __all__ = ["CompareRequest", "parse_load", "parse_sets", "run_compare"]
@@ -58,8 +58,8 @@ def run_compare(request: CompareRequest) -> None:
     CompareError
         If the requested comparison is impossible.
     """
-    from cms.compare.compare import compare
-    from cms.compare.mode_counts import mode_counts
+    from cms.assessment.compare.compare import compare
+    from cms.assessment.compare.mode_counts import mode_counts
     from cms.jobs.job import read_job
     from fe_models.foundation.tasks.workers import checked_workers
 
@@ -116,7 +116,7 @@ def parse_sets(text: str) -> tuple[str, ...]:
     CompareError
         If a name is unknown or repeated.
     """
-    from cms.mode_sets import MODE_SETS
+    from cms.modes.mode_sets import MODE_SETS
 
     names = [name.strip() for name in text.split(",") if name.strip()]
     if not names:
@@ -139,7 +139,7 @@ def parse_load(text: str) -> Any:
     CompareError
         If the text does not have this form.
     """
-    from cms.families.interface_loads import point_load
+    from cms.modes.families.interface_loads import point_load
 
     name, _, rest = text.partition(":")
     values: dict[str, float] = {}
@@ -218,8 +218,8 @@ def read_motion(path: Path, body: "FEBody") -> "Snapshots":
 
     import numpy as np
 
+    from cms.assessment.quality.reference.transient import Snapshots
     from cms.errors import CmsError
-    from cms.quality.reference.transient import Snapshots
 
     try:
         with np.load(BytesIO(path.read_bytes()), allow_pickle=False) as file:
@@ -243,7 +243,7 @@ def read_motion(path: Path, body: "FEBody") -> "Snapshots":
 
 def write_report(folder: Path, comparison: "Comparison", stills: int) -> list[Path]:
     """Write HTML, JSON and CSV; return their paths."""
-    from cms.report import comparison_csv, comparison_html, comparison_json
+    from cms.assessment.report import comparison_csv, comparison_html, comparison_json
     from fe_models.foundation.paths import replace_file
 
     texts = {
@@ -260,9 +260,9 @@ def write_report(folder: Path, comparison: "Comparison", stills: int) -> list[Pa
 
 def print_comparison(comparison: "Comparison") -> None:
     """Print the answer, the verdicts with their numbers, and the reasons."""
-    from cms.compare.verdicts import DECIDING
-    from cms.report.parts import MARKS
-    from cms.report.words import hertz, seconds, share
+    from cms.assessment.compare.verdicts import DECIDING
+    from cms.assessment.report.parts import MARKS
+    from cms.assessment.report.words import hertz, seconds, share
 
     full = comparison.full
     say(f"{comparison.sentence}\n")

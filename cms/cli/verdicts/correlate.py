@@ -10,8 +10,8 @@ import typer
 from cms.cli.console import output_path, print_table, say, stages
 
 if TYPE_CHECKING:
-    from cms.correlation.correlate import Correlation
-    from cms.correlation.update import Parameter, Update
+    from cms.assessment.correlation.correlate import Correlation
+    from cms.assessment.correlation.update import Parameter, Update
     from fe_models.foundation.arrays import Array
 
 __all__ = ["CorrelateRequest", "run_correlate"]
@@ -29,9 +29,9 @@ class CorrelateRequest:
 
 def run_correlate(request: CorrelateRequest) -> None:
     """Compare, update if the file has [update], print pairs and parameters, and write page and updated job."""
-    from cms.correlation.correlation_file import read_correlation, run_correlation
-    from cms.correlation.errors import CorrelationError
-    from cms.correlation.report import correlation_page
+    from cms.assessment.correlation.errors import CorrelationError
+    from cms.jobs.studies.correlation_file import read_correlation, run_correlation
+    from cms.jobs.studies.correlation_report import correlation_page
     from fe_models.foundation.paths import replace_files
 
     asked = read_correlation(request.file)
@@ -114,7 +114,7 @@ def updated_text(path: Path, parameters: "tuple[Parameter, ...]", values: "Array
     """Return the text of a job with the updated values; comments and order are kept."""
     import tomlkit
 
-    from cms.correlation.errors import CorrelationError
+    from cms.assessment.correlation.errors import CorrelationError
     from fe_models.foundation.toml_file import first_key
 
     document = tomlkit.parse(path.read_text(encoding="utf-8-sig"))

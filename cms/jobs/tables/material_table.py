@@ -9,7 +9,7 @@ from cms.jobs.beam_tables import names
 from fe_models.foundation.toml_file import Matrix3, Table, is_no_number
 
 if TYPE_CHECKING:
-    from fe_models.material import AnyMaterial, Material
+    from fe_models.body.material import AnyMaterial, Material
 
 __all__ = ["MaterialSection", "isotropic_of", "material_of"]
 
@@ -106,7 +106,7 @@ def material_of(name: str, table: MaterialSection) -> "AnyMaterial":
     MaterialError
         If some strain would have negative energy, or the axes are invalid.
     """
-    from fe_models.material import AnisotropicMaterial, Material, OrthotropicMaterial
+    from fe_models.body.material import AnisotropicMaterial, Material, OrthotropicMaterial
 
     if table.elasticity is not None:
         axes = {} if table.axes is None else {"axes": table.axes}
@@ -127,7 +127,7 @@ def isotropic_of(name: str, table: MaterialSection, what: str) -> "Material":
     JobError
         If the material is not isotropic.
     """
-    from fe_models.material import Material
+    from fe_models.body.material import Material
 
     made = material_of(name, table)
     if not isinstance(made, Material):

@@ -5,8 +5,8 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
+from fe_models.files.cad.cad_units import CAD_SUFFIXES
 from fe_models.foundation.toml_file import Table
-from fe_models.importers.cad.cad_units import CAD_SUFFIXES
 
 __all__ = ["MeshSizeSection", "check_mesh_size"]
 

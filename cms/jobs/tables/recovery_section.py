@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, model_validator
 
 from cms.errors import RecoveryError
-from cms.recovery.request import QUANTITIES, RecoveryRequest, Rows
+from cms.reduction.recovery.request import QUANTITIES, RecoveryRequest, Rows
 from fe_models.foundation.toml_file import Table, Vector3, choice
 
 __all__ = ["RecoveryFile", "RecoverySection", "requests_of"]

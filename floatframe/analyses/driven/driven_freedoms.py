@@ -5,15 +5,15 @@ import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
 from floatframe.analyses.driven.driven_motion import Instant, rigid_columns, rigid_equations
-from floatframe.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.initial_conditions.freedoms import dependent_rows, unit_rows
+from floatframe.engine.initial_conditions.newton_equations import set_iterate
+from floatframe.engine.kernels.work import new_work
 from floatframe.errors import ConvergenceError
-from floatframe.joints.rows import is_held
-from floatframe.kernels.work import new_work
-from floatframe.small_motions.joint_rates import coordinate_rows, driven_coordinates
-from floatframe.start.freedoms import dependent_rows, unit_rows
-from floatframe.start.newton_equations import set_iterate
-from floatframe.state import State
-from floatframe.system import System
+from floatframe.model.joints.rows import is_held
+from floatframe.model.state import State
+from floatframe.model.system import System
+from floatframe.results.small_motions.joint_rates import coordinate_rows, driven_coordinates
 
 __all__ = ["SingularityGuard", "free_coordinates"]
 

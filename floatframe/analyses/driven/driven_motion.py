@@ -23,14 +23,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.compiling.system import CompiledSystem
+from floatframe.engine.compiling.system import CompiledSystem
+from floatframe.engine.initial_conditions.constraint_words import open_joints
+from floatframe.engine.initial_conditions.initial import has_normal_friction
+from floatframe.engine.initial_conditions.newton_equations import (
+    displaced,
+    in_ground_axes,
+    linearized,
+    set_iterate,
+    solve,
+)
+from floatframe.engine.kernels.work import Work
 from floatframe.errors import ConvergenceError
-from floatframe.joints.rows import is_held, is_held_length
-from floatframe.kernels.work import Work
-from floatframe.start.constraint_words import open_joints
-from floatframe.start.initial import has_normal_friction
-from floatframe.start.newton_equations import displaced, in_ground_axes, linearized, set_iterate, solve
-from floatframe.state import State
+from floatframe.model.joints.rows import is_held, is_held_length
+from floatframe.model.state import State
 
 __all__ = ["ELASTICITY", "Elasticity", "Instant", "frozen_bodies", "quasi_static_bodies", "rigid_columns"]
 
@@ -67,7 +73,7 @@ def rigid_columns(compiled: CompiledSystem) -> np.ndarray:
 
 def frozen_bodies(compiled: CompiledSystem, work: Work, state: State, t: float) -> Instant:
     """Return the motion with constant modal coordinates, by steps (1)-(4)."""
-    from floatframe.kernels.entry import rates_of_constraints
+    from floatframe.engine.kernels.entry import rates_of_constraints
 
     model, rigid = compiled.model, rigid_columns(compiled)
     work.state.time[...] = t
@@ -146,7 +152,7 @@ class RigidEquations:
 
 def rigid_equations(compiled: CompiledSystem, work: Work) -> RigidEquations:
     """Evaluate the iterate in `work`, and return the equations of the body frames."""
-    from floatframe.kernels.entry import evaluate_and_linearize
+    from floatframe.engine.kernels.entry import evaluate_and_linearize
 
     model = compiled.model
     evaluate_and_linearize(model, work, 1.0, 0.0, 0.0)

@@ -17,13 +17,13 @@ from fe_models.foundation.arrays import Array
 from floatframe.analyses.driven.driven_motion import Elasticity, quasi_static_bodies
 from floatframe.analyses.driven.kinematics import kinematics
 from floatframe.errors import ModelError
-from floatframe.forces import JointForce
-from floatframe.functions.time_functions import table
+from floatframe.model.forces import JointForce
+from floatframe.model.functions.time_functions import table
+from floatframe.model.state import State
+from floatframe.model.system import System
 from floatframe.results.joint_coordinates import CoordinateMotion, joint_coordinate
+from floatframe.results.small_motions.joint_rates import driven_coordinates
 from floatframe.results.trajectory import Trajectory
-from floatframe.small_motions.joint_rates import driven_coordinates
-from floatframe.state import State
-from floatframe.system import System
 
 __all__ = ["InverseDynamics", "drive_forces", "inverse_dynamics", "with_motors"]
 

@@ -15,24 +15,24 @@ from fe_models.foundation.arrays import Array
 from floatframe.analyses.driven.driven_freedoms import SingularityGuard, free_coordinates
 from floatframe.analyses.driven.driven_motion import ELASTICITY, Elasticity, Instant, frozen_bodies
 from floatframe.analyses.observed_state import observed_state
-from floatframe.compiling.file_frames import rows_of_file
-from floatframe.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.compiling.file_frames import rows_of_file
+from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.initial_conditions.constraint_words import conflict_of_drives
+from floatframe.engine.initial_conditions.freedoms import constraint_mobility
+from floatframe.engine.initial_conditions.initial import assembled, checked
+from floatframe.engine.initial_conditions.newton_equations import displaced
+from floatframe.engine.kernels.memory import WORK_GIVEN, WORK_TAKEN, Rows
+from floatframe.engine.kernels.work import Work, new_work
 from floatframe.errors import ConvergenceError, ModelError
 from floatframe.integrators.carry import Carry, turned_on, with_angles
-from floatframe.joints.rows import is_held_velocity
-from floatframe.kernels.memory import WORK_GIVEN, WORK_TAKEN, Rows
-from floatframe.kernels.work import Work, new_work
-from floatframe.motion.integration import head_of, joint_rows
+from floatframe.model.joints.rows import is_held_velocity
+from floatframe.model.state import State
+from floatframe.model.system import System
 from floatframe.results.results_file import MemorySource
+from floatframe.results.small_motions.joint_rates import driven_coordinates
 from floatframe.results.trajectory import Trajectory, read_results
 from floatframe.results.writer import ResultsPlace, ResultsWriter
-from floatframe.small_motions.joint_rates import driven_coordinates
-from floatframe.start.constraint_words import conflict_of_drives
-from floatframe.start.freedoms import constraint_mobility
-from floatframe.start.initial import assembled, checked
-from floatframe.start.newton_equations import displaced
-from floatframe.state import State
-from floatframe.system import System
+from floatframe.simulation.integration import head_of, joint_rows
 
 __all__ = ["Kinematics", "kinematics"]
 

@@ -11,12 +11,12 @@ from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.linear.force_inputs import ForceInput, force_input_unit
 from floatframe.analyses.linear.inputs import BaseMotion, DriveMotion, ParameterInput
 from floatframe.errors import ModelError
+from floatframe.model.system import Named, System
 from floatframe.results.sensors.channels import VALUE, Channel, CoordinateChannel, StressChannel
 from floatframe.results.sensors.measurement import Measurement
+from floatframe.results.small_motions.rows import LinearColumns, Rows, joined
+from floatframe.results.small_motions.small_motions import SmallMotions
 from floatframe.results.trajectory import Trajectory
-from floatframe.small_motions.rows import LinearColumns, Rows, joined
-from floatframe.small_motions.small_motions import SmallMotions
-from floatframe.system import Named, System
 
 __all__ = [
     "AnyInput",

@@ -14,18 +14,18 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
-from floatframe.bodies.markers import body_name
-from floatframe.compiling.interface_loads import amplitudes, loads_on_interfaces
-from floatframe.compiling.system import compiled_system
+from floatframe.engine.compiling.interface_loads import amplitudes, loads_on_interfaces
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.initial_conditions.newton_equations import linearized, set_iterate
+from floatframe.engine.kernels.work import new_work
 from floatframe.errors import ModelError
-from floatframe.forces import BodyLoad, JointForce, PointForce
-from floatframe.functions.time_functions import TimeFunction, constant
-from floatframe.kernels.work import new_work
+from floatframe.model.bodies.markers import body_name
+from floatframe.model.forces import BodyLoad, JointForce, PointForce
+from floatframe.model.functions.time_functions import TimeFunction, constant
+from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_matrix
+from floatframe.model.system import System
+from floatframe.results.small_motions.small_motions import InputForce, SmallMotions
 from floatframe.results.trajectory import Trajectory
-from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_matrix
-from floatframe.small_motions.small_motions import InputForce, SmallMotions
-from floatframe.start.newton_equations import linearized, set_iterate
-from floatframe.system import System
 
 __all__ = ["ForceInput", "force_column", "force_input_unit", "forces_of_amplitude", "forces_with_amplitude"]
 

@@ -21,21 +21,21 @@ from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.linear.force_inputs import ForceInput, force_column, forces_of_amplitude
 from floatframe.analyses.system_matrices import Inputs
-from floatframe.bodies.coordinates import JointCoordinate
-from floatframe.bodies.markers import body_name
-from floatframe.checked_values import array_of_shape, unit_vector
-from floatframe.compiling.system import compiled_system
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.initial_conditions.newton_equations import linearized, set_iterate
+from floatframe.engine.kernels.work import new_work
 from floatframe.errors import ModelError
-from floatframe.forces import UserForce
-from floatframe.functions.time_functions import TimeFunction, constant, polynomial_of_time
-from floatframe.joints.rows import kind_of
-from floatframe.kernels.work import new_work
+from floatframe.model.bodies.coordinates import JointCoordinate
+from floatframe.model.bodies.markers import body_name
+from floatframe.model.checked_values import array_of_shape, unit_vector
+from floatframe.model.forces import UserForce
+from floatframe.model.functions.time_functions import TimeFunction, constant, polynomial_of_time
+from floatframe.model.joints.rows import kind_of
+from floatframe.model.state import State
+from floatframe.model.system import System
 from floatframe.results.sensors.channels import QUANTITIES, RATES, Channel, CoordinateChannel, rate_unit
+from floatframe.results.small_motions.small_motions import BaseColumn, InputForce, SmallMotions
 from floatframe.results.trajectory import Trajectory
-from floatframe.small_motions.small_motions import BaseColumn, InputForce, SmallMotions
-from floatframe.start.newton_equations import linearized, set_iterate
-from floatframe.state import State
-from floatframe.system import System
 
 __all__ = [
     "BaseMotion",
@@ -211,7 +211,7 @@ def free_row(small: SmallMotions, channel: CoordinateChannel) -> int | None:
 
 def drive_rows(small: SmallMotions, drive: DriveMotion) -> Array:
     """Return the rates of rows at rest while one drive moves at unit rate and all others are at rest, (n_w,)."""
-    from floatframe.kernels.entry import rates_of_constraints
+    from floatframe.engine.kernels.entry import rates_of_constraints
 
     system = small.system
     driven = [f"{j.name}.{c}" for j in system.joints for c in getattr(j, "motions", {})]
@@ -243,7 +243,7 @@ def drive_rows(small: SmallMotions, drive: DriveMotion) -> Array:
 
 def base_rows(small: SmallMotions, base: BaseColumn, channel: BaseMotion) -> tuple[Array, Array]:
     """Return E and E' of a base from the rows by its markers, P of joints/rows/kinds.py."""
-    from floatframe.kernels.entry import evaluate_and_linearize
+    from floatframe.engine.kernels.entry import evaluate_and_linearize
 
     if small.is_turning:
         raise ModelError(

@@ -48,19 +48,19 @@ from floatframe.analyses.relative.coordinate_basis import coordinate_basis
 from floatframe.analyses.snapshot import snapshot
 from floatframe.analyses.steady.steadiness import require_steady
 from floatframe.analyses.system_matrices import Inputs, Tangents, settled, tangents, turning_matrices
-from floatframe.bodies.flexible_body import FlexibleBody
-from floatframe.compiling.file_frames import motion_of_engine, small_motions_of_file
-from floatframe.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.compiling.file_frames import motion_of_engine, small_motions_of_file
+from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.initial_conditions.newton_equations import linearized, set_iterate
+from floatframe.engine.kernels.work import Work, new_work
+from floatframe.engine.tree.formulation import is_relative
 from floatframe.errors import ModelError
-from floatframe.forces import UserForce
-from floatframe.kernels.work import Work, new_work
-from floatframe.relative.formulation import is_relative
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.forces import UserForce
+from floatframe.model.system import System
 from floatframe.results.sensors.measurement import unit_words
-from floatframe.small_motions.joint_rates import coordinate_rows
-from floatframe.small_motions.rows import Rows, joined
-from floatframe.small_motions.small_motions import BaseColumn, SmallMotions
-from floatframe.start.newton_equations import linearized, set_iterate
-from floatframe.system import System
+from floatframe.results.small_motions.joint_rates import coordinate_rows
+from floatframe.results.small_motions.rows import Rows, joined
+from floatframe.results.small_motions.small_motions import BaseColumn, SmallMotions
 
 if TYPE_CHECKING:
     from scipy.signal import StateSpace

@@ -14,9 +14,9 @@ from floatframe.analyses.linear.linearization import LinearSystem, linearize
 from floatframe.analyses.linear.system_modes import system_modes
 from floatframe.analyses.snapshot import snapshot
 from floatframe.analyses.steady.turning_drives import turning_with
-from floatframe.checked_values import array_of_shape, unit_vector
 from floatframe.errors import ConvergenceError, ModelError
-from floatframe.system import System
+from floatframe.model.checked_values import array_of_shape, unit_vector
+from floatframe.model.system import System
 
 __all__ = ["Locus", "campbell", "root_locus"]
 

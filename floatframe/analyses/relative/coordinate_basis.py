@@ -15,14 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.compiling.system import CompiledSystem, compiled_system
-from floatframe.joints.rows import is_held_length, is_held_position
-from floatframe.relative.kernels.tree import Tree
-from floatframe.relative.topology import tree_of
-from floatframe.relative.tree_motions import coordinate_motions
+from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.tree.kernels.tree import Tree
+from floatframe.engine.tree.topology import tree_of
+from floatframe.engine.tree.tree_motions import coordinate_motions
+from floatframe.model.joints.rows import is_held_length, is_held_position
+from floatframe.model.state import State
+from floatframe.model.system import System
 from floatframe.results.sensors.measurement import unit_words
-from floatframe.state import State
-from floatframe.system import System
 
 __all__ = ["CoordinateBasis", "coordinate_basis", "coordinate_names", "dependent_coordinates"]
 

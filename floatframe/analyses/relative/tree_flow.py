@@ -18,16 +18,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.compiling.system import compiled_system
-from floatframe.joints.rows import is_held
-from floatframe.kernels.model import Model
-from floatframe.kernels.work import Work
-from floatframe.relative.kernels.tree import JointWork, Tree, new_joint_work
-from floatframe.relative.topology import tree_of
-from floatframe.rotations import euler_parameters
-from floatframe.start.newton_equations import linearized, set_iterate
-from floatframe.state import State
-from floatframe.system import System
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.initial_conditions.newton_equations import linearized, set_iterate
+from floatframe.engine.kernels.model import Model
+from floatframe.engine.kernels.work import Work
+from floatframe.engine.tree.kernels.tree import JointWork, Tree, new_joint_work
+from floatframe.engine.tree.topology import tree_of
+from floatframe.model.joints.rows import is_held
+from floatframe.model.rotations import euler_parameters
+from floatframe.model.state import State
+from floatframe.model.system import System
 
 __all__ = ["TreeFlow", "tree_flow"]
 
@@ -49,7 +49,7 @@ class TreeFlow:
 
     def wrenches(self, work: Work, state: State, u_dot: Array, w: Array) -> Array:
         """Return w with the reactions of the joints of the tree at a motion, (n_w,); arrays end at that iterate."""
-        from floatframe.relative.kernels.entry import projected
+        from floatframe.engine.tree.kernels.entry import projected
 
         set_iterate(work, state, u_dot, w)
         projected(self.model, work, self.tree, self.placed(work))
@@ -67,7 +67,7 @@ class TreeFlow:
 
     def placed(self, work: Work) -> JointWork:
         """Return the joints as the iterate in `work` has them, increments counted from there."""
-        from floatframe.relative.kernels.entry import motion_of_joints
+        from floatframe.engine.tree.kernels.entry import motion_of_joints
 
         joints = self.joints
         motion_of_joints(self.model, work, self.tree, joints)
@@ -76,7 +76,7 @@ class TreeFlow:
 
     def step(self, work: Work, state: State, u_dot: Array, w: Array, tau: float) -> tuple[Array, Array, Array]:
         """(2): return the changes of coordinates, (n_s,), of bodies, ground axes, (n_u,), and of wrenches, (n_w,)."""
-        from floatframe.relative.kernels.entry import motion_of_bodies, newton_step
+        from floatframe.engine.tree.kernels.entry import motion_of_bodies, newton_step
 
         slopes = self.slopes(work, state)
         set_iterate(work, state, u_dot, w)
@@ -115,7 +115,7 @@ class TreeFlow:
 
     def turning_step(self, work: Work, tau: float, S: Array, S_dot: Array) -> tuple[Array, Array]:
         """Return the changes of coordinates and kept wrenches in a steady rotation, by dense matrices."""
-        from floatframe.relative.kernels.entry import newton_matrix
+        from floatframe.engine.tree.kernels.entry import newton_matrix
 
         n_s = len(S)
         K, CK, M = (
@@ -133,7 +133,7 @@ class TreeFlow:
 
     def displaced(self, work: Work, state: State, ds: Array) -> State:
         """Return the state moved by ds along the coordinates, (n_s,)."""
-        from floatframe.relative.kernels.entry import moved
+        from floatframe.engine.tree.kernels.entry import moved
 
         set_iterate(work, state)
         joints, is_mode = self.placed(work), self.tree.mode >= 0

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.kernels.model import Model
-from floatframe.kernels.work import Work
-from floatframe.rotations import euler_parameters, rotation_exp, rotation_matrix
-from floatframe.state import State
+from floatframe.engine.kernels.model import Model
+from floatframe.engine.kernels.work import Work
+from floatframe.model.rotations import euler_parameters, rotation_exp, rotation_matrix
+from floatframe.model.state import State
 
 __all__ = ["Carrier", "Spin", "by_carrier", "by_spin", "carried", "moved_on", "turned_axes"]
 

@@ -23,15 +23,10 @@ from floatframe.analyses.equilibrium import CLOSED, forces_at_work, largest_moti
 from floatframe.analyses.steady.carrier import Carrier, Spin, by_carrier, by_spin, carried
 from floatframe.analyses.steady.path import Path
 from floatframe.analyses.system_matrices import turning_matrices
-from floatframe.compiling.callbacks import raise_errors_of
-from floatframe.compiling.system import CompiledSystem, compiled_system
-from floatframe.errors import ModelError
-from floatframe.joints.rows import is_held, is_held_position
-from floatframe.kernels.work import Work, new_work
-from floatframe.motion.stop_events import require_off_stops
-from floatframe.rotations import rotation_matrix, tilde
-from floatframe.start.initial import assembled, require_numbers
-from floatframe.start.newton_equations import (
+from floatframe.engine.compiling.callbacks import raise_errors_of
+from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.initial_conditions.initial import assembled, require_numbers
+from floatframe.engine.initial_conditions.newton_equations import (
     Linearized,
     displaced,
     in_ground_axes,
@@ -39,8 +34,13 @@ from floatframe.start.newton_equations import (
     set_iterate,
     with_modal_weight,
 )
-from floatframe.state import State
-from floatframe.system import System
+from floatframe.engine.kernels.work import Work, new_work
+from floatframe.errors import ModelError
+from floatframe.model.joints.rows import is_held, is_held_position
+from floatframe.model.rotations import rotation_matrix, tilde
+from floatframe.model.state import State
+from floatframe.model.system import System
+from floatframe.simulation.stop_events import require_off_stops
 
 __all__ = ["Equations", "Family", "Place", "Step", "Trial", "timed"]
 
@@ -196,7 +196,7 @@ class Equations:
 
     def evaluated(self, compiled: CompiledSystem, work: Work, trial: Trial) -> Evaluated:
         """Return (2) with its derivatives by motions."""
-        from floatframe.kernels.entry import rates_of_constraints
+        from floatframe.engine.kernels.entry import rates_of_constraints
 
         model = compiled.model
         state, u_dot = carried(model, trial.state, trial.carrier, self.spins, trial.s)

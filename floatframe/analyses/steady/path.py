@@ -8,12 +8,12 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.steady.carrier import Carrier, Spin
-from floatframe.checked_values import array_of_shape, unit_vector
-from floatframe.compiling.system import CompiledSystem
+from floatframe.engine.compiling.system import CompiledSystem
 from floatframe.errors import ModelError
-from floatframe.rotations import rotation_matrix
-from floatframe.state import State
-from floatframe.system import System
+from floatframe.model.checked_values import array_of_shape, unit_vector
+from floatframe.model.rotations import rotation_matrix
+from floatframe.model.state import State
+from floatframe.model.system import System
 
 __all__ = ["Path", "path_of", "require_body", "spins_of"]
 

@@ -18,14 +18,14 @@ from fe_models.foundation.arrays import Array
 from floatframe.analyses.equilibrium import Equilibrium, forces_at_work, size_of, worst_body
 from floatframe.analyses.steady.carrier import Carrier, moved_on, turned_axes
 from floatframe.analyses.system_matrices import Tangents, rows_of_states, tangents, turning_matrices
-from floatframe.compiling.file_frames import motion_of_engine
-from floatframe.compiling.system import CompiledSystem
+from floatframe.engine.compiling.file_frames import motion_of_engine
+from floatframe.engine.compiling.system import CompiledSystem
+from floatframe.engine.initial_conditions.newton_equations import Linearized, linearized, set_iterate, with_modal_weight
+from floatframe.engine.kernels.work import Work, new_work
 from floatframe.errors import ModelError
-from floatframe.joints.rows import is_held
-from floatframe.kernels.work import Work, new_work
-from floatframe.rotations import rotation_matrix
-from floatframe.start.newton_equations import Linearized, linearized, set_iterate, with_modal_weight
-from floatframe.state import State
+from floatframe.model.joints.rows import is_held
+from floatframe.model.rotations import rotation_matrix
+from floatframe.model.state import State
 
 __all__ = ["require_steady"]
 

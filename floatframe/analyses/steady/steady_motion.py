@@ -13,14 +13,14 @@ from floatframe.analyses.equilibrium import LARGEST_TURN, Equilibrium, largest_m
 from floatframe.analyses.steady.carrier import Carrier, carried
 from floatframe.analyses.steady.equations import Equations, Family, Place, Step, Trial, timed
 from floatframe.analyses.steady.path import path_of, require_body, spins_of
-from floatframe.checked_values import unit_vector
-from floatframe.compiling.file_frames import motion_of_file
-from floatframe.compiling.system import compiled_system
+from floatframe.engine.compiling.file_frames import motion_of_file
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.initial_conditions.initial import assembled, checked, known_of, start_unknowns
+from floatframe.engine.kernels.work import new_work
 from floatframe.errors import ConvergenceError, ModelError
-from floatframe.kernels.work import new_work
-from floatframe.start.initial import assembled, checked, known_of, start_unknowns
-from floatframe.state import State
-from floatframe.system import System
+from floatframe.model.checked_values import unit_vector
+from floatframe.model.state import State
+from floatframe.model.system import System
 
 __all__ = ["SteadyMotion", "steady_motion"]
 

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.compiling.markers import joint_markers, marker_pose, n_q_of
-from floatframe.compiling.system import compiled_system
-from floatframe.functions.time_functions import TimeFunction, polynomial_of_time
-from floatframe.joints.rows import RelativePlace
-from floatframe.joints.sliding import SlidingJoint
-from floatframe.system import System
+from floatframe.engine.compiling.markers import joint_markers, marker_pose, n_q_of
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.model.functions.time_functions import TimeFunction, polynomial_of_time
+from floatframe.model.joints.rows import RelativePlace
+from floatframe.model.joints.sliding import SlidingJoint
+from floatframe.model.system import System
 
 __all__ = ["turning_with"]
 

@@ -58,9 +58,9 @@ def generate_command(
     from dataclasses import asdict
 
     from fe_models.foundation.paths import replace_files
+    from floatframe.design.generation.generate import generate
     from floatframe.errors import ModelError
-    from floatframe.generation.generate import generate
-    from floatframe.system_file.read_system import read_system
+    from floatframe.files.system_file.read_system import read_system
 
     if fmu is not None:
         if (what, language, name, output, json) != (["inverse"], "c", None, Path(), False):
@@ -110,8 +110,8 @@ def generate_command(
 
 def write_unit(system: Path, fmu: Path, fmi: int, step: float, parameters: list[str]) -> None:
     """Write a system as an FMU of generated C, and report its contents."""
-    from floatframe.generation.units.generated_unit import generate_fmu
-    from floatframe.system_file.read_system import read_system
+    from floatframe.design.generation.units.generated_unit import generate_fmu
+    from floatframe.files.system_file.read_system import read_system
 
     described, run = read_system(system)
     stop = 1.0 if run is None else run.t_end * described.units.time

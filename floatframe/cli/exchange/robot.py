@@ -8,7 +8,7 @@ import typer
 from cms.cli.console import guarded, print_table, say
 
 if TYPE_CHECKING:
-    from floatframe.importers.robot import Robot
+    from floatframe.files.importers.robot import Robot
 
 __all__ = ["print_robot", "register"]
 
@@ -44,9 +44,9 @@ def import_command(
     Example: floatframe import arm.urdf -o arm --at elbow=0.5
     """
     from floatframe.errors import UrdfError
-    from floatframe.importers.read_urdf import read_urdf
-    from floatframe.importers.robot_system import FlexibleLink, robot_system
-    from floatframe.importers.system_tables import write_system
+    from floatframe.files.importers.read_urdf import read_urdf
+    from floatframe.files.importers.robot_system import FlexibleLink, robot_system
+    from floatframe.files.importers.system_tables import write_system
 
     found = read_urdf(robot)
     placed = {}
@@ -104,10 +104,10 @@ def urdf_command(
     """
     from fe_models.foundation.paths import replace_files
     from floatframe.errors import UrdfError
-    from floatframe.importers.robot import JointLimits
-    from floatframe.importers.system_robot import robot_of_system
-    from floatframe.importers.write_urdf import urdf_text
-    from floatframe.system_file.read_system import read_system
+    from floatframe.files.importers.robot import JointLimits
+    from floatframe.files.importers.system_robot import robot_of_system
+    from floatframe.files.importers.write_urdf import urdf_text
+    from floatframe.files.system_file.read_system import read_system
 
     model, _ = read_system(system)
     path = output or system.with_suffix(".urdf")
@@ -128,7 +128,7 @@ def urdf_command(
 
 def print_robot(path: Path, *, as_json: bool) -> None:
     """Print links and joints of a robot."""
-    from floatframe.importers.read_urdf import read_urdf
+    from floatframe.files.importers.read_urdf import read_urdf
 
     robot = read_urdf(path)
     record = robot_record(robot)
@@ -176,7 +176,7 @@ def robot_record(robot: "Robot") -> dict[str, Any]:
     """Return the record of a robot for `info`; moments of inertia that no body can have are marked by a note."""
     import numpy as np
 
-    from floatframe.importers.robot import MeshFile
+    from floatframe.files.importers.robot import MeshFile
 
     freedoms = {"fixed": 0, "planar": 3, "floating": 6}
     links = []

@@ -9,7 +9,7 @@ import typer
 from cms.cli.console import guarded, output_path, print_table, say, stages
 
 if TYPE_CHECKING:
-    from floatframe.gradients import Sensitivities
+    from floatframe.design.gradients import Sensitivities
 
 __all__ = ["register"]
 
@@ -48,9 +48,9 @@ def gradient_command(
     """
     from fe_models.foundation.paths import replace_file
     from floatframe.cli.analyses import vector
+    from floatframe.design.gradients import sensitivities
+    from floatframe.design.studies.study_file import TAKES
     from floatframe.errors import ModelError
-    from floatframe.gradients import sensitivities
-    from floatframe.studies.study_file import TAKES
 
     path = None if output is None else output_path(output, None, ModelError, overwrite_of=(system,))
     if path is not None and path.suffix.lower() not in (".csv", ".json"):

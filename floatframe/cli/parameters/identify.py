@@ -9,8 +9,8 @@ import typer
 from cms.cli.console import guarded, output_path, print_table, say, stages
 
 if TYPE_CHECKING:
-    from floatframe.identification.excitation import ExcitingMotion
-    from floatframe.identification.regressors import LinearForm
+    from floatframe.design.identification.excitation import ExcitingMotion
+    from floatframe.design.identification.regressors import LinearForm
 
 __all__ = ["register"]
 
@@ -58,14 +58,14 @@ def identify_command(
     Example: floatframe identify robot.toml measured.csv --cutoff 10 -o report.html
     """
     from fe_models.foundation.paths import replace_file
+    from floatframe.design.identification.estimation import estimate
+    from floatframe.design.identification.identify_report import identification_html, identification_record
+    from floatframe.design.identification.measured_file import measured_coordinates, read_measured
+    from floatframe.design.identification.next_motion import next_motion
+    from floatframe.design.identification.physical import real_parameters
+    from floatframe.design.identification.regressors import linear_form
     from floatframe.errors import ModelError
-    from floatframe.identification.estimation import estimate
-    from floatframe.identification.identify_report import identification_html, identification_record
-    from floatframe.identification.measured_file import measured_coordinates, read_measured
-    from floatframe.identification.next_motion import next_motion
-    from floatframe.identification.physical import real_parameters
-    from floatframe.identification.regressors import linear_form
-    from floatframe.system_file.read_system import read_system
+    from floatframe.files.system_file.read_system import read_system
 
     described = read_system(system)[0]
     inputs = tuple(path for path in (system, data, check) if path is not None)

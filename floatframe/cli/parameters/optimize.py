@@ -10,7 +10,7 @@ from cms.cli.arguments import Journal, Workers
 from cms.cli.console import guarded, output_path, print_table, say, stages
 
 if TYPE_CHECKING:
-    from floatframe.optimization.optimize import Evaluated, OptimizationResult
+    from floatframe.design.optimization.optimize import Evaluated, OptimizationResult
 
 __all__ = ["register"]
 
@@ -51,11 +51,11 @@ def optimize_command(
 
     from fe_models.foundation.paths import replace_file
     from fe_models.foundation.tasks.workers import tasks_of
+    from floatframe.design.optimization.design_file import read_design
+    from floatframe.design.optimization.history_plots import plot_history
+    from floatframe.design.optimization.optimize import optimize
     from floatframe.errors import ModelError
-    from floatframe.optimization.design_file import read_design
-    from floatframe.optimization.history_plots import plot_history
-    from floatframe.optimization.optimize import optimize
-    from floatframe.system_file.read_system import read_system
+    from floatframe.files.system_file.read_system import read_system
 
     described = read_design(design)
     inputs = (design, Path(described.study.system), *read_system(described.study.system)[0].files, *described.tables)
@@ -71,7 +71,7 @@ def optimize_command(
             )
     with stages() as clock, tasks_of(described.workers if workers is None else workers) as tasks:
         if "run" in described.analyses:
-            from floatframe.kernels.entry import prepare
+            from floatframe.engine.kernels.entry import prepare
 
             with clock("compiled code (made at first use)"):
                 prepare()  # once, before many processes need it
@@ -128,7 +128,7 @@ def bound_of(parameter: Any, result: "OptimizationResult") -> str:
 
 def row_record(result: "OptimizationResult", row: "Evaluated") -> dict[str, Any]:
     """Return a row of the history in plain types; values missing in a failed evaluation are null."""
-    from floatframe.optimization.optimize import numbers_by_name
+    from floatframe.design.optimization.optimize import numbers_by_name
 
     is_failed = bool(row.evaluation.error)
     numbers = numbers_by_name(result.design, row.evaluation)

@@ -9,7 +9,7 @@ import typer
 from cms.cli.console import USER_ERROR, guarded, output_path, print_table, say, stages
 
 if TYPE_CHECKING:
-    from floatframe.laboratory.laboratory import LaboratoryResult
+    from floatframe.design.laboratory.laboratory import LaboratoryResult
 
 __all__ = ["register"]
 
@@ -39,9 +39,9 @@ def study_command(
     import io
 
     from fe_models.foundation.paths import replace_files
+    from floatframe.design.laboratory.figures import convergence_figure
+    from floatframe.design.laboratory.laboratory_file import read_laboratory, run_laboratory
     from floatframe.errors import ModelError
-    from floatframe.laboratory.figures import convergence_figure
-    from floatframe.laboratory.laboratory_file import read_laboratory, run_laboratory
 
     asked = read_laboratory(file)
     wanted = outputs or [file.with_suffix(".csv"), file.with_suffix(".png")]

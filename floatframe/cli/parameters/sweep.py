@@ -10,7 +10,7 @@ from cms.cli.arguments import Journal, Workers
 from cms.cli.console import USER_ERROR, guarded, output_path, print_error, print_table, say, stages
 
 if TYPE_CHECKING:
-    from floatframe.studies.study import StudyTable
+    from floatframe.design.studies.study import StudyTable
 
 __all__ = ["register"]
 
@@ -48,11 +48,11 @@ def sweep_command(
 
     from fe_models.foundation.paths import replace_file
     from fe_models.foundation.tasks.workers import tasks_of
+    from floatframe.design.studies.study import run_study
+    from floatframe.design.studies.study_file import read_study
+    from floatframe.design.studies.study_plots import plot_study
     from floatframe.errors import ModelError
-    from floatframe.studies.study import run_study
-    from floatframe.studies.study_file import read_study
-    from floatframe.studies.study_plots import plot_study
-    from floatframe.system_file.read_system import read_system
+    from floatframe.files.system_file.read_system import read_system
 
     described = read_study(study)
     inputs = (study, Path(described.system), *read_system(described.system)[0].files)
@@ -66,7 +66,7 @@ def sweep_command(
     asked = described.workers if workers is None else workers
     with stages(remaining=True) as clock, tasks_of(asked, n) as tasks:
         if described.analysis == "run":
-            from floatframe.kernels.entry import prepare
+            from floatframe.engine.kernels.entry import prepare
 
             with clock("compiled code (made at first use)"):
                 prepare()  # once, before many processes need it
@@ -103,7 +103,7 @@ def headers(table: "StudyTable") -> list[str]:
 
 def print_study(table: "StudyTable") -> None:
     """Print the table, and the reasons of failed points."""
-    from floatframe.studies.study_plots import shown
+    from floatframe.design.studies.study_plots import shown
 
     rows = [
         (

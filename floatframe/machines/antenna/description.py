@@ -11,7 +11,7 @@ __all__ = ["FINE", "Antenna", "HingePlay"]
 
 @dataclass(frozen=True)
 class HingePlay:
-    """Pin and bearing of a petal hinge that has play, see `floatframe.clearances.HingeWithPlay`."""
+    """Pin and bearing of a petal hinge that has play, see `floatframe.components.clearances.HingeWithPlay`."""
 
     radial: float = 1e-4  #: [m]
     axial: float = 1e-4  #: to each side [m]

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.bodies.markers import Marker
 from floatframe.machines.antenna.description import Antenna
+from floatframe.model.bodies.markers import Marker
+from floatframe.model.system import System
 from floatframe.results.place_motion import PlaceMotion
 from floatframe.results.sensors.places import place_motion
 from floatframe.results.trajectory import Trajectory
-from floatframe.system import System
 
 __all__ = ["Pointing", "pointing"]
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from floatframe.bodies.flexible_body import FlexibleBody
+from floatframe.components.rails import ContactLaws, Pair, Segment, Track
 from floatframe.errors import ModelError
 from floatframe.machines.bogie.vehicle import RailVehicle, vehicle
-from floatframe.rails import ContactLaws, Pair, Segment, Track
-from floatframe.rotations import euler_parameters
-from floatframe.system import System
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.rotations import euler_parameters
+from floatframe.model.system import System
 
 __all__ = ["circle", "in_circle"]
 

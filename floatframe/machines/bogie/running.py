@@ -10,13 +10,13 @@ from fe_models.foundation.arrays import Array
 from floatframe.analyses.linear.linearization import LinearSystem, linearize
 from floatframe.analyses.linear.system_modes import SystemModes, system_modes
 from floatframe.analyses.steady.steady_motion import SteadyMotion, steady_motion
-from floatframe.bodies.markers import Marker
-from floatframe.bodies.rigid_body import RigidBody
 from floatframe.errors import ModelError
-from floatframe.forces import PointForce
 from floatframe.integrators import GeneralizedAlpha
-from floatframe.motion.integration import integrate
-from floatframe.system import System
+from floatframe.model.bodies.markers import Marker
+from floatframe.model.bodies.rigid_body import RigidBody
+from floatframe.model.forces import PointForce
+from floatframe.model.system import System
+from floatframe.simulation.integration import integrate
 
 __all__ = [
     "Falling",

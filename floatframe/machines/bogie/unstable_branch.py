@@ -13,14 +13,14 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.analyses.linear.linearization import linearize
 from floatframe.analyses.steady.steady_motion import SteadyMotion
-from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.errors import ConvergenceError, ModelError
 from floatframe.integrators import GeneralizedAlpha
 from floatframe.machines.bogie.running import lateral_modes, steady_motion_of
-from floatframe.motion.integration import integrate
-from floatframe.rotations import euler_parameter_product, euler_parameters_of_rotation_vector, rotation_matrix
-from floatframe.state import State
-from floatframe.system import System
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.rotations import euler_parameter_product, euler_parameters_of_rotation_vector, rotation_matrix
+from floatframe.model.state import State
+from floatframe.model.system import System
+from floatframe.simulation.integration import integrate
 
 __all__ = ["Bracket", "Hunted", "Run", "bracket_of_unstable_cycle", "hunted"]
 

@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cms.reduced_body.reduced_body import ReducedBody
-from floatframe.bodies.flexible_body import FlexibleBody
-from floatframe.bodies.markers import Marker
-from floatframe.bodies.rigid_body import RigidBody
-from floatframe.forces import Bushing, Gravity
-from floatframe.rails import ContactLaws, Pair, Track, WheelOnRail, Wheelset, height_on_rails, quasi_elastic
-from floatframe.system import System
+from cms.body.reduced_body import ReducedBody
+from floatframe.components.rails import ContactLaws, Pair, Track, WheelOnRail, Wheelset, height_on_rails, quasi_elastic
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.bodies.markers import Marker
+from floatframe.model.bodies.rigid_body import RigidBody
+from floatframe.model.forces import Bushing, Gravity
+from floatframe.model.system import System
 
 __all__ = ["NAMES", "RailVehicle", "flexible_frames", "vehicle", "vehicle_parts"]
 

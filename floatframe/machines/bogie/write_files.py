@@ -3,11 +3,11 @@
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.bodies.markers import Marker
-from floatframe.forces import Bushing
+from floatframe.components.rails import Pair, Track, Wheelset
 from floatframe.machines.bogie.frame import frame_files
 from floatframe.machines.bogie.vehicle import NAMES, RailVehicle, vehicle_parts
-from floatframe.rails import Pair, Track, Wheelset
+from floatframe.model.bodies.markers import Marker
+from floatframe.model.forces import Bushing
 
 __all__ = ["bogie_files"]
 

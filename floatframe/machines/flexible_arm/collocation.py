@@ -24,12 +24,12 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.extras import extra_module
+from floatframe.design.generation.generate import generate
+from floatframe.engine.tree.recursive import relative_model
 from floatframe.errors import ConvergenceError, ModelError
-from floatframe.functions.tables import between, linear_table
-from floatframe.functions.time_functions import TimeFunction
-from floatframe.generation.generate import generate
-from floatframe.relative.recursive import relative_model
-from floatframe.system import System
+from floatframe.model.functions.tables import between, linear_table
+from floatframe.model.functions.time_functions import TimeFunction
+from floatframe.model.system import System
 
 __all__ = ["OptimalMove", "casadi_function", "optimal_move"]
 

@@ -13,16 +13,16 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from floatframe.bodies.coordinates import JointCoordinate
+from floatframe.design.generation.graph import ADD, CONSTANT, COS, DIV, MUL, NEG, SIN, SUB, SYMBOL, Scalar, Terms, terms
+from floatframe.design.generation.links import tree_terms
+from floatframe.design.generation.recursions import inverse_dynamics, joints_of
+from floatframe.engine.tree.recursive import relative_model
 from floatframe.errors import ModelError
-from floatframe.forces import UserForce
-from floatframe.functions.time_functions import TimeFunction
-from floatframe.generation.graph import ADD, CONSTANT, COS, DIV, MUL, NEG, SIN, SUB, SYMBOL, Scalar, Terms, terms
-from floatframe.generation.links import tree_terms
-from floatframe.generation.recursions import inverse_dynamics, joints_of
 from floatframe.machines.flexible_arm.collocation import OptimalMove
-from floatframe.relative.recursive import relative_model
-from floatframe.system import System
+from floatframe.model.bodies.coordinates import JointCoordinate
+from floatframe.model.forces import UserForce
+from floatframe.model.functions.time_functions import TimeFunction
+from floatframe.model.system import System
 
 __all__ = ["computed_torque", "following", "rate_of"]
 

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 
 import cms
-from floatframe.bodies.flexible_body import FlexibleBody
-from floatframe.bodies.ground import GROUND
-from floatframe.bodies.markers import Marker
-from floatframe.bodies.mode_choice import frozen_to_rigid, with_modes
-from floatframe.joints import RevoluteJoint
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.bodies.ground import GROUND
+from floatframe.model.bodies.markers import Marker
+from floatframe.model.bodies.mode_choice import frozen_to_rigid, with_modes
+from floatframe.model.joints import RevoluteJoint
+from floatframe.model.system import System
 from floatframe.results.sensors import CoordinateSensor, PlaceSensor
-from floatframe.system import System
 
 __all__ = ["BENDING", "LENGTH", "FlexibleLinks", "arm", "links"]
 

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.forces import UserForce
-from floatframe.functions.point_to_point import quintic
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha
 from floatframe.machines.flexible_arm.collocation import OptimalMove, optimal_move
 from floatframe.machines.flexible_arm.control import computed_torque, following
 from floatframe.machines.flexible_arm.description import BENDING, LENGTH, FlexibleLinks, arm
-from floatframe.motion.integration import integrate
+from floatframe.model.forces import UserForce
+from floatframe.model.functions.point_to_point import quintic
+from floatframe.model.system import System
 from floatframe.results.coordinate_elements import user_force_motion
 from floatframe.results.sensors import measured
 from floatframe.results.trajectory import Trajectory
-from floatframe.system import System
+from floatframe.simulation.integration import integrate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cms.reduced_body.reduced_body import ReducedBody
+from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
+from floatframe.model.system import System
 from floatframe.results.element_motion import element_motion
 from floatframe.results.trajectory import Trajectory
-from floatframe.system import System
 
 __all__ = ["Turn", "torsion_stiffness", "turn_of"]
 

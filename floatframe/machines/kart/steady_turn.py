@@ -9,10 +9,10 @@ from fe_models.foundation.arrays import Array
 from floatframe.analyses.linear.linearization import linearize
 from floatframe.analyses.linear.system_modes import system_modes
 from floatframe.analyses.steady.steady_motion import SteadyMotion, steady_motion
-from floatframe.drives.speed_control import SpeedControl
+from floatframe.components.drives.speed_control import SpeedControl
 from floatframe.errors import ConvergenceError, ModelError
-from floatframe.functions.time_functions import constant
-from floatframe.system import System
+from floatframe.model.functions.time_functions import constant
+from floatframe.model.system import System
 
 __all__ = ["critical_speed_in_turn", "steady_turn", "turn_eigenvalues"]
 

@@ -10,7 +10,7 @@ from floatframe.analyses.linear.parameter_study import Locus, root_locus
 from floatframe.analyses.linear.system_modes import system_modes
 from floatframe.analyses.steady.steady_motion import steady_motion
 from floatframe.errors import ModelError
-from floatframe.system import System
+from floatframe.model.system import System
 
 __all__ = ["critical_speed", "growth", "rolling", "shimmy_locus"]
 

@@ -1,8 +1,8 @@
 """An aircraft that rolls steadily before it meets an obstacle."""
 
 from floatframe.analyses.steady.steady_motion import steady_motion
-from floatframe.state import State
-from floatframe.system import System
+from floatframe.model.state import State
+from floatframe.model.system import System
 
 __all__ = ["rolling_state"]
 

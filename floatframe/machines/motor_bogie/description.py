@@ -6,8 +6,8 @@ from math import pi
 
 import numpy as np
 
+from floatframe.components.rails import Pair, quasi_elastic
 from floatframe.machines.bogie.vehicle import GRAVITY, RailVehicle
-from floatframe.rails import Pair, quasi_elastic
 
 __all__ = ["ENDS", "MOUNTS", "SIX_STEPS", "Motor", "MotorBogie"]
 

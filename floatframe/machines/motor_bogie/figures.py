@@ -9,17 +9,17 @@ from fe_models.foundation.arrays import Array
 from floatframe.analyses.linear.channels import AnyOutput, Column
 from floatframe.analyses.linear.linearization import LinearSystem, linearize
 from floatframe.analyses.linear.system_modes import SystemModes, system_modes
-from floatframe.drives import InductionMotor
+from floatframe.components.drives import InductionMotor
 from floatframe.errors import ModelError
+from floatframe.files.signals.orders import order_cut, order_map
+from floatframe.files.signals.signals import Signal
 from floatframe.machines.motor_bogie.closed_forms import speed_of_torque, torque_lines, torque_over_speed
 from floatframe.machines.motor_bogie.description import ENDS, MotorBogie
+from floatframe.model.system import System
 from floatframe.results.element_motion import element_motion
 from floatframe.results.sensors import measured
 from floatframe.results.sensors.channels import CoordinateChannel
 from floatframe.results.trajectory import Trajectory
-from floatframe.signals.orders import order_cut, order_map
-from floatframe.signals.signals import Signal
-from floatframe.system import System
 
 __all__ = ["ModeOfBogie", "SupplyLines", "at_rest", "modes_of", "predicted_lines", "supply_lines", "supply_phase"]
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from floatframe.files.signals.orders import SpectralMap
 from floatframe.machines.motor_bogie.figures import ModeOfBogie, SupplyLines
-from floatframe.signals.orders import SpectralMap
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.bodies.markers import Marker
+from floatframe.components.rails import ContactLaws, Pair, Track, Wheelset, height_on_rails
 from floatframe.machines.bogie.frame import frame_files
 from floatframe.machines.bogie.vehicle import GRAVITY, PITCH, SIDES
 from floatframe.machines.motor_bogie.closed_forms import steady_fluxes
 from floatframe.machines.motor_bogie.description import ENDS, MOUNTS, MotorBogie
-from floatframe.rails import ContactLaws, Pair, Track, Wheelset, height_on_rails
+from floatframe.model.bodies.markers import Marker
 
 __all__ = ["SUPPLIES", "motor_bogie_file", "motor_bogie_files"]
 

@@ -8,23 +8,23 @@ import numpy as np
 import scipy.sparse as sp
 
 import cms
-from cms.families.families import Families
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
 from cms.jobs.shell_body import shell_mesh
-from cms.mode_set import ModeSet
-from cms.reduced_basis.damping import RayleighDamping
+from cms.modes.families.families import Families
+from cms.modes.mode_set import ModeSet
+from cms.reduction.basis.damping import RayleighDamping
 from fe_models.body.fe_body import FEBody
-from fe_models.shells.shell_points import shell_points
-from floatframe.bodies.markers import Marker
+from fe_models.elements.shells.shell_points import shell_points
+from floatframe.design.laboratory.body_study import Loading, SetError, body_study, full_motions, lean_body, stress_rows
+from floatframe.design.laboratory.suspended_body import SuspendedMotion
 from floatframe.errors import ModelError
-from floatframe.forces import Bushing
+from floatframe.files.system_file.read_system import read_system
+from floatframe.files.system_file.run_section import required_run
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha
-from floatframe.laboratory.body_study import Loading, SetError, body_study, full_motions, lean_body, stress_rows
-from floatframe.laboratory.suspended_body import SuspendedMotion
-from floatframe.system import System
-from floatframe.system_file.read_system import read_system
-from floatframe.system_file.run_section import required_run
+from floatframe.model.bodies.markers import Marker
+from floatframe.model.forces import Bushing
+from floatframe.model.system import System
 
 __all__ = ["FREE", "MORE_SETS", "NAME", "PLACES", "SETS", "EngineStudy", "engine_loads", "engine_study"]
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.checked_values import number
 from floatframe.errors import ModelError
+from floatframe.model.checked_values import number
 
 __all__ = ["Defect", "SCurve", "WheelPaths", "envelope", "path_table"]
 

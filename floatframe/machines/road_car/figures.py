@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cms.reduced_body.reduced_body import ReducedBody
+from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
-from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.machines.road_car.description import CORNERS, RoadCar
 from floatframe.machines.road_car.steady_turn import CarMass
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.system import System
 from floatframe.results.element_motion import element_motion
 from floatframe.results.trajectory import Trajectory
-from floatframe.system import System
 
 __all__ = ["Driven", "body_twist_stiffness", "car_mass", "driven"]
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from cms.decks.job_text import toml_text
+from cms.jobs.decks.job_text import toml_text
 from floatframe.machines.road_car.description import CORNERS, RoadCar
 from floatframe.machines.road_car.linkage import spring_preload
 from floatframe.machines.road_car.suspension import Tables, axle_tables, rounded

@@ -5,6 +5,7 @@ from typing import cast
 
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
+from floatframe.model.system import System
 from floatframe.results.sensors.body_loads import InterfaceForceSensor, RecoverySensor, SpringSensor
 from floatframe.results.sensors.bushings import BushingSensor
 from floatframe.results.sensors.channels import Channel, CoordinateChannel, StressChannel
@@ -15,7 +16,6 @@ from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.sensors.places import AngleSensor, DisplacementSensor, PlaceSensor
 from floatframe.results.sensors.stresses import ElongationSensor, StrainGauge, StressSensor, VonMisesSensor
 from floatframe.results.trajectory import Trajectory
-from floatframe.system import System
 
 __all__ = [
     "SENSORS",

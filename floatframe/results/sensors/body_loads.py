@@ -6,28 +6,28 @@ from typing import Any
 
 import numpy as np
 
+from cms.body.recovery_table import RecoveryTable
 from cms.errors import BodyError
-from cms.reduced_body.recovery_table import RecoveryTable
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.words import nearest, quoted
-from floatframe.bodies.flexible_body import FlexibleBody
-from floatframe.compiling.interface_loads import Load, amplitudes, in_body, interface_number, loads_on_interfaces
-from floatframe.compiling.markers import MarkerData, find_marker
-from floatframe.elements.switched_off import times_off
+from floatframe.engine.compiling.interface_loads import Load, amplitudes, in_body, interface_number, loads_on_interfaces
+from floatframe.engine.compiling.markers import MarkerData, find_marker
 from floatframe.errors import ModelError, ResultsError
-from floatframe.forces import BodyLoad, Gravity, PointForce, SpringDamper
-from floatframe.functions.time_functions import TimeFunction
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.elements.switched_off import times_off
+from floatframe.model.forces import BodyLoad, Gravity, PointForce, SpringDamper
+from floatframe.model.functions.time_functions import TimeFunction
+from floatframe.model.rotations import dot, rotation_matrix, tilde
+from floatframe.model.system import System
 from floatframe.results.joint_coordinates import end_motion
 from floatframe.results.recovery import require_same_modes
 from floatframe.results.sensors.linear_columns import scalar_columns, vector_linear
 from floatframe.results.sensors.measurement import Measurement, unit_words, vector_columns
 from floatframe.results.sensors.stresses import flexible_body
+from floatframe.results.small_motions.rows import LinearColumns, Rows, joined
+from floatframe.results.small_motions.small_motions import SmallMotions
 from floatframe.results.trajectory import Trajectory
-from floatframe.rotations import dot, rotation_matrix, tilde
-from floatframe.small_motions.rows import LinearColumns, Rows, joined
-from floatframe.small_motions.small_motions import SmallMotions
-from floatframe.system import System
 
 __all__ = ["INTERFACE_AXES", "InterfaceForceSensor", "RecoverySensor", "SpringSensor"]
 
@@ -256,7 +256,7 @@ class SpringSensor:
 class RecoverySensor:
     """Rows of a recovery table of a flexible body: motions, stresses and forces, including residual static parts.
 
-    y = D_0 z + D_1 z' + D_2 z'' + L p, see `cms.reduced_body.recovery_table`. z' and z'' are velocities and
+    y = D_0 z + D_1 z' + D_2 z'' + L p, see `cms.body.recovery_table`. z' and z'' are velocities and
     accelerations of the body frame in its axes and the rates of q. p contains gravity, spin, the loads on interfaces
     and load cases. Positions are relative to the moving body frame, so z begins with zeros.
     """

@@ -1,8 +1,8 @@
 """The sensor of a bushing: its six deformations and their rates, in the axes in which it acts.
 
-The formulas are those of the force (`floatframe/kernels/connections/bushing.py`). A, B are the axes of the markers, d
-the vector between their points, theta the rotation vector of A^T B with full turns counted, t = |theta|, and C the axes
-of A rotated by a share of theta:
+The formulas are those of the force (`floatframe/engine/kernels/connections/bushing.py`). A, B are the axes of the
+markers, d the vector between their points, theta the rotation vector of A^T B with full turns counted, t = |theta|, and
+C the axes of A rotated by a share of theta:
 
     e = C^T d,  e' = C^T d' + e × gamma,  theta' = S u,   u = C^T (omega_B - omega_A)
     gamma = C^T ((1 - share) omega_A + share omega_B) - tau theta × u
@@ -17,21 +17,21 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.words import nearest, quoted
-from floatframe.compiling.counted_angles import CountedAngle, rotation_of
-from floatframe.compiling.markers import MarkerData
-from floatframe.compiling.pair_forces import bushing_markers
-from floatframe.compiling.system import compiled_system
+from floatframe.engine.compiling.counted_angles import CountedAngle, rotation_of
+from floatframe.engine.compiling.markers import MarkerData
+from floatframe.engine.compiling.pair_forces import bushing_markers
+from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import ModelError
-from floatframe.forces import Bushing
-from floatframe.forces.bushing import AXES, DEFORMATIONS
+from floatframe.model.forces import Bushing
+from floatframe.model.forces.bushing import AXES, DEFORMATIONS
+from floatframe.model.rotations import continued_rotation, tilde
+from floatframe.model.system import System
 from floatframe.results.joint_coordinates import end_motion
 from floatframe.results.sensors.linear_columns import scalar_columns
 from floatframe.results.sensors.measurement import Measurement, unit_words
+from floatframe.results.small_motions.rows import LinearColumns
+from floatframe.results.small_motions.small_motions import SmallMotions
 from floatframe.results.trajectory import Trajectory
-from floatframe.rotations import continued_rotation, tilde
-from floatframe.small_motions.rows import LinearColumns
-from floatframe.small_motions.small_motions import SmallMotions
-from floatframe.system import System
 
 __all__ = ["BushingSensor"]
 

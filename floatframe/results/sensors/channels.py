@@ -11,18 +11,18 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.components import STRESS_COMPONENTS
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.units import Units
-from floatframe.bodies.markers import Marker
-from floatframe.checked_values import array_of_shape, unit_vector
 from floatframe.errors import ModelError
+from floatframe.model.bodies.markers import Marker
+from floatframe.model.checked_values import array_of_shape, unit_vector
+from floatframe.model.system import System
 from floatframe.results.joint_coordinates import joint_coordinate
 from floatframe.results.sensors.linear_columns import scalar_columns
 from floatframe.results.sensors.measurement import Measurement, unit_words
 from floatframe.results.sensors.places import place_motion, require_turning, small_place
 from floatframe.results.sensors.stresses import StressSensor
+from floatframe.results.small_motions.rows import LinearColumns
+from floatframe.results.small_motions.small_motions import SmallMotions, SmallPlace
 from floatframe.results.trajectory import Trajectory
-from floatframe.small_motions.rows import LinearColumns
-from floatframe.small_motions.small_motions import SmallMotions, SmallPlace
-from floatframe.system import System
 
 __all__ = ["QUANTITIES", "RATES", "VALUE", "Channel", "CoordinateChannel", "StressChannel"]
 

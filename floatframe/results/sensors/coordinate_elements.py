@@ -5,17 +5,17 @@ from dataclasses import dataclass
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.words import nearest, quoted
-from floatframe.compiling.system import compiled_system
+from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import ModelError
-from floatframe.forces import UserForce
-from floatframe.joints.rows import kind_of
+from floatframe.model.forces import UserForce
+from floatframe.model.joints.rows import kind_of
+from floatframe.model.system import System
 from floatframe.results.coordinate_elements import coupler_motion, user_force_motion
 from floatframe.results.sensors.linear_columns import scalar_columns
 from floatframe.results.sensors.measurement import Measurement, unit_words
+from floatframe.results.small_motions.rows import LinearColumns, Rows
+from floatframe.results.small_motions.small_motions import SmallMotions
 from floatframe.results.trajectory import Trajectory
-from floatframe.small_motions.rows import LinearColumns, Rows
-from floatframe.small_motions.small_motions import SmallMotions
-from floatframe.system import System
 
 __all__ = ["ControlSensor", "CouplerSensor"]
 

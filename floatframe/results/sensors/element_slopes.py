@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from floatframe.compiling.callbacks import raise_errors_of
-from floatframe.compiling.callbacks.law_slopes import difference_slopes
-from floatframe.compiling.public_elements import PlacedLaw
-from floatframe.small_motions.rows import Rows, joined
-from floatframe.small_motions.small_motions import SmallMotions
+from floatframe.engine.compiling.callbacks import raise_errors_of
+from floatframe.engine.compiling.callbacks.law_slopes import difference_slopes
+from floatframe.engine.compiling.public_elements import PlacedLaw
+from floatframe.results.small_motions.rows import Rows, joined
+from floatframe.results.small_motions.small_motions import SmallMotions
 
 __all__ = ["output_rows"]
 

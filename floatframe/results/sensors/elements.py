@@ -5,16 +5,16 @@ from dataclasses import dataclass
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.words import nearest, quoted
-from floatframe.compiling.public_elements import PlacedLaw
-from floatframe.compiling.system import compiled_system
+from floatframe.engine.compiling.public_elements import PlacedLaw
+from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import ModelError
+from floatframe.model.system import System
 from floatframe.results.element_motion import element_motion
 from floatframe.results.sensors.element_slopes import output_rows
 from floatframe.results.sensors.measurement import Measurement
+from floatframe.results.small_motions.rows import LinearColumns
+from floatframe.results.small_motions.small_motions import SmallMotions
 from floatframe.results.trajectory import Trajectory
-from floatframe.small_motions.rows import LinearColumns
-from floatframe.small_motions.small_motions import SmallMotions
-from floatframe.system import System
 
 __all__ = ["ElementSensor"]
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.small_motions.rows import LinearColumns, Rows
+from floatframe.results.small_motions.rows import LinearColumns, Rows
 
 __all__ = ["NO_SIZE", "scalar_columns", "vector_linear"]
 

@@ -7,23 +7,23 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.words import nearest, quoted
-from floatframe.compiling.markers import MarkerData, find_marker, joint_markers
-from floatframe.compiling.pair_forces import bushing_markers
-from floatframe.compiling.system import compiled_system
+from floatframe.engine.compiling.markers import MarkerData, find_marker, joint_markers
+from floatframe.engine.compiling.pair_forces import bushing_markers
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.initial_conditions.newton_equations import linearized
 from floatframe.errors import ModelError
-from floatframe.forces import Bushing
-from floatframe.joints.rows import MOMENT
+from floatframe.model.forces import Bushing
+from floatframe.model.joints.rows import MOMENT
+from floatframe.model.rotations import tilde
+from floatframe.model.system import System
 from floatframe.results.joint_coordinates import end_motion, force_rows, joint_coordinate
 from floatframe.results.recovery import require_same_modes
 from floatframe.results.sensors.linear_columns import NO_SIZE, scalar_columns, vector_linear
 from floatframe.results.sensors.measurement import Measurement, unit_words, vector_columns
 from floatframe.results.sensors.stresses import flexible_body
+from floatframe.results.small_motions.rows import LinearColumns
+from floatframe.results.small_motions.small_motions import SmallMotions
 from floatframe.results.trajectory import Energies, Trajectory
-from floatframe.rotations import tilde
-from floatframe.small_motions.rows import LinearColumns
-from floatframe.small_motions.small_motions import SmallMotions
-from floatframe.start.newton_equations import linearized
-from floatframe.system import System
 
 __all__ = ["AXES", "CoordinateSensor", "EnergySensor", "ModeSensor", "MomentumSensor", "ReactionSensor"]
 

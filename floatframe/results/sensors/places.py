@@ -8,29 +8,29 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from cms.body.address import Address, FoundNodes
 from cms.errors import BodyError
-from cms.reduced_body.address import Address, FoundNodes
 from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
-from floatframe.bodies.flexible_body import FlexibleBody
-from floatframe.bodies.marker_shape import MarkerShape, interface_shape, is_turning, node_shape
-from floatframe.bodies.markers import Marker, body_name
-from floatframe.checked_values import unit_vector
-from floatframe.compiling.counted_angles import CountedAngle, angle_of
-from floatframe.compiling.markers import MarkerData, find_body, find_marker
+from floatframe.engine.compiling.counted_angles import CountedAngle, angle_of
+from floatframe.engine.compiling.markers import MarkerData, find_body, find_marker
 from floatframe.errors import ModelError
-from floatframe.joints.rows import TWIST, RowCoordinate
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.bodies.marker_shape import MarkerShape, interface_shape, is_turning, node_shape
+from floatframe.model.bodies.markers import Marker, body_name
+from floatframe.model.checked_values import unit_vector
+from floatframe.model.joints.rows import TWIST, RowCoordinate
+from floatframe.model.rotations import left_jacobian, rotation_log, tilde
+from floatframe.model.system import System
 from floatframe.results.full_turns import through_turns
 from floatframe.results.joint_coordinates import end_motion
 from floatframe.results.place_motion import PlaceMotion, angle_and_rate, node_motion, normals_of_axis
 from floatframe.results.sensors.linear_columns import scalar_columns, vector_linear
 from floatframe.results.sensors.measurement import Measurement, unit_words, vector_columns
+from floatframe.results.small_motions.rows import LinearColumns, Rows
+from floatframe.results.small_motions.small_motions import SmallMotions, SmallPlace
 from floatframe.results.trajectory import Trajectory
-from floatframe.rotations import left_jacobian, rotation_log, tilde
-from floatframe.small_motions.rows import LinearColumns, Rows
-from floatframe.small_motions.small_motions import SmallMotions, SmallPlace
-from floatframe.system import System
 
 __all__ = [
     "PLACE_QUANTITIES",

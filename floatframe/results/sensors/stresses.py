@@ -4,27 +4,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cms.body.address import KINDS_OF_ADDRESS, Address, FoundNodes
+from cms.body.reduced_body import ReducedBody
+from cms.body.stress import stress_of, von_mises
 from cms.errors import BodyError
-from cms.reduced_body.address import KINDS_OF_ADDRESS, Address, FoundNodes
-from cms.reduced_body.reduced_body import ReducedBody
-from cms.reduced_body.stress import stress_of, von_mises
 from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.components import STRESS_COMPONENTS
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.words import nearest, quoted
-from floatframe.bodies.flexible_body import FlexibleBody
-from floatframe.checked_values import array_of_shape, number, unit_vector
 from floatframe.errors import ModelError
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.checked_values import array_of_shape, number, unit_vector
+from floatframe.model.system import System
 from floatframe.results.place_motion import largest_von_mises, stress_modes
 from floatframe.results.recovery import require_same_modes
 from floatframe.results.sensors.linear_columns import scalar_columns
 from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.sensors.places import found_at
+from floatframe.results.small_motions.rows import LinearColumns, Rows
+from floatframe.results.small_motions.small_motions import SmallMotions
 from floatframe.results.trajectory import Trajectory
-from floatframe.small_motions.rows import LinearColumns, Rows
-from floatframe.small_motions.small_motions import SmallMotions
-from floatframe.system import System
 
 __all__ = ["ElongationSensor", "StrainGauge", "StressSensor", "VonMisesSensor", "address_of"]
 

@@ -1,6 +1,7 @@
 """Descriptions of the points that sensors use: the requested place, the node used for it, and their distance."""
 
-from floatframe.bodies.markers import Marker
+from floatframe.model.bodies.markers import Marker
+from floatframe.model.system import System
 from floatframe.results.sensors import (
     AngleSensor,
     DisplacementSensor,
@@ -14,7 +15,6 @@ from floatframe.results.sensors import (
 )
 from floatframe.results.sensors.places import found_at, found_nodes, is_at_node
 from floatframe.results.sensors.stresses import address_of, flexible_body
-from floatframe.system import System
 
 __all__ = ["taken_places"]
 

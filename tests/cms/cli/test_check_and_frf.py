@@ -7,14 +7,14 @@ import pytest
 from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
+from cms.assessment.quality.errors import QualityError
+from cms.assessment.quality.of_reduction.frf import resonance_grid
+from cms.assessment.quality.reference.port_model import file_resonances, file_response
+from cms.body.modal_file.file import read, write
 from cms.cli.app import app
 from cms.cli.frf import parse_band, parse_component
 from cms.jobs.job import read_job
 from cms.jobs.reduce_job import reduce_job
-from cms.modal_file.file import read, write
-from cms.quality.errors import QualityError
-from cms.quality.of_reduction.frf import resonance_grid
-from cms.quality.reference.port_model import file_resonances, file_response
 from tests.bodies import box_mesh
 from tests.decks import JOB, write_deck
 

@@ -14,13 +14,13 @@ from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
 import cms
+from cms.assessment.quality.body_record import body_record, central_inertia
+from cms.body.modal_file.file import VERSION, read, write
 from cms.cli.app import app
-from cms.frame_conversion import convert_frame
 from cms.jobs.job import read_job
 from cms.jobs.reduce_job import reduce_job
-from cms.modal_file.file import VERSION, read, write
-from cms.quality.body_record import body_record, central_inertia
-from cms.reduced_basis.frames import TisserandFrame
+from cms.reduction.basis.frames import TisserandFrame
+from cms.reduction.frame_conversion import convert_frame
 from fe_models.foundation.sealed_hdf5 import Content, write_sealed
 from tests.bodies import box_mesh
 from tests.decks import JOB, write_deck
@@ -312,8 +312,8 @@ def test_view_draws_films_and_pictures_where_it_is_told(modal_file, tmp_path, mo
     def recorded(kind):
         return lambda body, mode, path, **options: (calls.append((kind, mode, options["scale"])), path.touch())
 
-    monkeypatch.setattr("cms.report.view.view_mode", recorded("picture"))
-    monkeypatch.setattr("cms.report.view.animate_mode", recorded("film"))
+    monkeypatch.setattr("cms.assessment.report.view.view_mode", recorded("picture"))
+    monkeypatch.setattr("cms.assessment.report.view.animate_mode", recorded("film"))
     assert run("view", modal_file, "-m", "3", "-a", tmp_path / "m.gif", "--scale", "0.2").exit_code == 0
     assert calls == [("film", 3, 0.2)]
     assert run("view", modal_file, "-a", tmp_path / "m.gif", "-o", tmp_path / "m.png").exit_code == 0
@@ -345,7 +345,7 @@ def test_the_demo_runs_the_whole_line_and_lists_its_files(tmp_path, monkeypatch)
     def blank(*arguments, **_):
         next(a for a in arguments if isinstance(a, Path)).touch()
 
-    for name in ("cms.report.view.view_mode", "cms.report.view.animate_mode"):
+    for name in ("cms.assessment.report.view.view_mode", "cms.assessment.report.view.animate_mode"):
         monkeypatch.setattr(name, blank)
     monkeypatch.chdir(tmp_path)
     result = run("demo")
@@ -572,7 +572,8 @@ def test_a_killed_run_leaves_the_old_file(folder):
     """Ctrl-C while the job runs, from outside."""
     (folder / "out.h5").write_bytes(b"the old file")
     before = contents(folder)
-    slow = "import cms.modal_file.file as m, time; m.write = lambda *_: (print('ready', flush=True), time.sleep(60)); "
+    slow = "import cms.body.modal_file.file as m, time\n"
+    slow += "m.write = lambda *_: (print('ready', flush=True), time.sleep(60))\n"
     program = [sys.executable, "-c", slow + PROGRAM[2]]
     with subprocess.Popen(
         [*program, "reduce", "bar.toml", "-o", "out.h5"],

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from cms.assessment.report.face_view import visible_points
 from cms.cli.app import app
-from cms.report.face_view import visible_points
 from tests.fe_models.small_solids import in_unit, painted, plate_file
 
 

@@ -8,12 +8,12 @@ from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
 from cms.cli.app import app
-from cms.families.interface_loads import condensed_load, point_load
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
 from cms.jobs.mode_set_of_job import job_mode_set
 from cms.jobs.reduce_job import reduce_job
-from cms.mode_sets import benfield_hruda, craig_bampton
+from cms.modes.families.interface_loads import condensed_load, point_load
+from cms.modes.mode_sets import benfield_hruda, craig_bampton
 from tests.bodies import box_mesh
 from tests.decks import JOB, write_deck
 

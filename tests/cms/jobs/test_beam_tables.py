@@ -8,7 +8,7 @@ from cms.jobs.beam_tables import SHAPE_KEYS, BeamSection, LinkSection, MassSecti
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
 from cms.jobs.reduce_job import reduce_job
-from fe_models.beams.sections import SECTIONS
+from fe_models.elements.beams.sections import SECTIONS
 from tests.root import ROOT
 
 DOCUMENT = ROOT / "docs" / "job_file.md"

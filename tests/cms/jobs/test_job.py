@@ -17,8 +17,8 @@ from cms.jobs.job import (
 )
 from cms.jobs.mode_set_of_job import load_of
 from cms.jobs.parts_of_job import frame_of
-from cms.reduced_basis.damping import ModalDamping, PerModeDamping, RampDamping, RayleighDamping
-from cms.reduced_basis.frames import BuckensFrame, NodalFrame
+from cms.reduction.basis.damping import ModalDamping, PerModeDamping, RampDamping, RayleighDamping
+from cms.reduction.basis.frames import BuckensFrame, NodalFrame
 from tests.root import ROOT
 
 DOCUMENT = ROOT / "docs" / "job_file.md"

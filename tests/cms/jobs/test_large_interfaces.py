@@ -9,10 +9,10 @@ import pytest
 
 from cms.cli.info import print_body
 from cms.errors import BodyError
-from cms.families import families, interface_cost
 from cms.jobs.job import read_job
 from cms.jobs.reduce_job import expected_columns, reduce_job
-from cms.second_order import room_for_stiffness
+from cms.modes.families import families, interface_cost
+from cms.reduction.geometric_stiffness import room_for_stiffness
 from tests.bodies import box_mesh
 
 JOB = """

@@ -17,7 +17,7 @@ from cms.jobs.matrices_of_job import interfaces_on
 from fe_models.errors import FeModelsError
 from fe_models.foundation.stages import Stages
 
-DATA = Path(__file__).parents[2] / "fe_models" / "importers" / "matrices" / "data" / "abaqus"
+DATA = Path(__file__).parents[2] / "fe_models" / "files" / "matrices" / "data" / "abaqus"
 JOB = """
 [body]
 matrices = {matrices}

@@ -5,11 +5,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 import cms
-from cms.decks.job_text import JobRequest, job_text
 from cms.errors import JobError
+from cms.jobs.decks.job_text import JobRequest, job_text
 from fe_models.body.fe_body import Interface
-from fe_models.importers.decks.read_deck import read_deck
-from fe_models.solids.body import solid_body
+from fe_models.elements.solids.body import solid_body
+from fe_models.files.decks.read_deck import read_deck
 from tests.bodies import STEEL, box_mesh
 
 BOX = box_mesh(3, 1, 1, 1.0, 0.1, 0.1)

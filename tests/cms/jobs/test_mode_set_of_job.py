@@ -5,17 +5,17 @@ import pytest
 from numpy.testing import assert_allclose
 from pydantic import ValidationError
 
+from cms.assessment.compare.mode_selection import MEASURES, select_modes
 from cms.cli.info import print_body
-from cms.compare.mode_selection import MEASURES, select_modes
 from cms.jobs.body_of_job import coupled_body
 from cms.jobs.job import Job, ReductionSection
 from cms.jobs.mode_set_of_job import job_mode_set
 from cms.jobs.reduction_table import MEASURE_NAMES
-from cms.mode_sets import assumed_modes, balanced_truncation, craig_bampton, krylov
-from cms.mode_sets.extra_columns import with_centrifugal, with_load_cases
-from cms.reduction import reduce
-from cms.second_order.centrifugal import centrifugal_loads
-from fe_models.body.couplings import couple
+from cms.modes.centrifugal import centrifugal_loads
+from cms.modes.mode_sets import assumed_modes, balanced_truncation, craig_bampton, krylov
+from cms.modes.mode_sets.extra_columns import with_centrifugal, with_load_cases
+from cms.reduction.reduction import reduce
+from fe_models.body.couplings.couplings import couple
 from fe_models.body.load_cases import LoadCase
 from fe_models.foundation.units import unit_system
 from tests.bodies import bar

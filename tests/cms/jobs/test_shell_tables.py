@@ -11,8 +11,8 @@ from cms.jobs.reduce_job import reduce_job
 from cms.jobs.shell_body import shell_mesh, shell_properties_of
 from cms.jobs.shell_tables import ShellSection
 from cms.jobs.tables.material_table import material_of
+from fe_models.elements.shells.shell_property import LaminateProperty, Layer
 from fe_models.errors import FeModelsError
-from fe_models.shells.shell_property import LaminateProperty, Layer
 from tests.root import ROOT
 
 DOCUMENT = ROOT / "docs" / "job_file.md"

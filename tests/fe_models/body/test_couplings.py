@@ -4,8 +4,8 @@ import scipy.sparse.linalg as spla
 from numpy.testing import assert_allclose, assert_array_equal
 
 from cms.errors import BodyError
-from cms.families.rigid_modes import geometric_rigid_modes
-from fe_models.body.couplings import couple, mean_motion
+from cms.modes.families.rigid_modes import geometric_rigid_modes
+from fe_models.body.couplings.couplings import couple, mean_motion
 from fe_models.body.fe_body import MULTIPLIER, Interface
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from tests.bodies import bar, box_mesh, with_interfaces

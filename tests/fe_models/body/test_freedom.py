@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 from fe_models.body.freedom import rigid_forces
 from fe_models.body.positive_mass import negative_mass, positive_mass
 from fe_models.errors import BodyError, MeshError
+from fe_models.files.matrices.given import body_from_matrices, body_from_npz
 from fe_models.foundation.units import unit_system
-from fe_models.matrices import body_from_matrices, body_from_npz
 from tests.bodies import bar, beam, chain
 
 SI = unit_system("m-kg-s")

@@ -6,26 +6,26 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from fe_models.beams.beam_property import BeamProperty
-from fe_models.beams.body import beam_body
-from fe_models.beams.sections import Rectangle
-from fe_models.body.couplings import couple
+from fe_models.body.couplings.couplings import couple
 from fe_models.body.fe_body import Interface
 from fe_models.body.kept_nodes import keep_nodes
-from fe_models.body.numbering import NONE, NamedSet, Numbering, numbering_side_by_side
+from fe_models.body.weld import weld
+from fe_models.elements.beams.beam_property import BeamProperty
+from fe_models.elements.beams.body import beam_body
+from fe_models.elements.beams.sections import Rectangle
+from fe_models.elements.shells.body import shell_body
+from fe_models.elements.shells.shell_property import ShellProperty
+from fe_models.elements.solids.body import solid_body
+from fe_models.elements.solids.interfaces import check_overlap
 from fe_models.errors import BodyError, InterfaceError, MeshError
+from fe_models.files.matrices.given import body_from_matrices
+from fe_models.files.tables import read_tables
 from fe_models.foundation.units import unit_system
-from fe_models.importers.tables import read_tables
-from fe_models.matrices import body_from_matrices
 from fe_models.meshes.boundary import boundary_owners, boundary_triangles
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.mesh import Mesh
+from fe_models.meshes.numbering import NONE, NamedSet, Numbering, numbering_side_by_side
 from fe_models.meshes.shell_mesh import ShellMesh
-from fe_models.shells.body import shell_body
-from fe_models.shells.shell_property import ShellProperty
-from fe_models.solids.body import solid_body
-from fe_models.solids.interfaces import check_overlap
-from fe_models.weld import weld
 from tests.bodies import STEEL, box_mesh
 
 UNITS = unit_system("m-kg-s")

@@ -8,12 +8,12 @@ from numpy.testing import assert_allclose
 from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
-from fe_models.body.couplings import mean_motion
+from fe_models.body.couplings.couplings import mean_motion
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.body.weighted_motion import characteristic_length, weighted_motion
+from fe_models.files.bulk_data.cards import read_cards
+from fe_models.files.bulk_data.coordinate_systems import read_grid_points
 from fe_models.foundation.errors import BodyError
-from fe_models.importers.bulk_data.cards import read_cards
-from fe_models.importers.bulk_data.coordinate_systems import read_grid_points
 
 DATA = Path(__file__).parent / "data"
 RNG = np.random.default_rng(5)

@@ -9,7 +9,7 @@ from cms.jobs.job import read_job
 from fe_models.foundation.toml_file import read_toml
 from fe_models.foundation.words import nearest, quoted
 from floatframe import SystemFileError, integrate
-from floatframe.system_file.read_system import read_system
+from floatframe.files.system_file.read_system import read_system
 
 RIGID = """
 [system]

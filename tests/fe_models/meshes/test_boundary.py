@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from fe_models.elements.solids.elements import reference_element
 from fe_models.meshes.boundary import (
     area_centroid,
     boundary_facets,
@@ -12,7 +13,6 @@ from fe_models.meshes.boundary import (
 )
 from fe_models.meshes.cell_shapes import CELL_SHAPES, cell_jacobians, quadrature, shape_values
 from fe_models.meshes.mesh import Mesh
-from fe_models.solids.elements import reference_element
 from tests.fe_models.small_meshes import SOLID_TYPES, faced_box
 
 ROUNDOFF = 1e-12

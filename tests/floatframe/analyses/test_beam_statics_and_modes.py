@@ -21,7 +21,7 @@ from floatframe import (
     static_equilibrium,
     system_modes,
 )
-from floatframe.rotations import euler_parameters_of_rotation_vector
+from floatframe.model.rotations import euler_parameters_of_rotation_vector
 from tests.references.exact_beam import ExactBeam
 from tests.references.planar_dynamics import Problem, equilibrium
 

@@ -41,14 +41,14 @@ from floatframe.analyses import (
     sweep,
     system_modes,
 )
-from floatframe.compiling.system import compiled_system
-from floatframe.mechanisms import slider_crank
-from floatframe.mechanisms.rods import slender_inertia
+from floatframe.components.mechanisms import slider_crank
+from floatframe.components.mechanisms.rods import slender_inertia
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.initial_conditions.newton_equations import displaced
+from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_exp, rotation_log, rotation_matrix
+from floatframe.model.state import State
 from floatframe.results.place_motion import interface_motion
 from floatframe.results.sensors import Channel, ReactionSensor, measured
-from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_exp, rotation_log, rotation_matrix
-from floatframe.start.newton_equations import displaced
-from floatframe.state import State
 from tests.bodies import bar
 from tests.floatframe.point_masses import PointMasses, random_point_masses, reduced_body, stiffness
 

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 import cms
 from fe_models.body.load_cases import ReducedLoadCase
-from fe_models.loads import gravity_load
+from fe_models.body.loads import gravity_load
 from floatframe import (
     BodyLoad,
     ForceInput,
@@ -21,8 +21,8 @@ from floatframe import (
     linearize,
     static_equilibrium,
 )
-from floatframe.functions.time_functions import constant, harmonic
-from tests.cms.second_order.test_geometric_reduction import bar_of_beams
+from floatframe.model.functions.time_functions import constant, harmonic
+from tests.cms.reduction.geometric_stiffness.test_geometric_reduction import bar_of_beams
 from tests.floatframe.analyses.test_linear_sensors import TURN, machine, sensors, values_of
 from tests.floatframe.analyses.test_recovery_sensors import held
 

@@ -23,9 +23,9 @@ from floatframe import (
     with_motors,
 )
 from floatframe.cli.app import app
-from floatframe.functions.time_functions import harmonic
-from floatframe.mechanisms import slider_crank
-from floatframe.mechanisms.rods import slender_inertia
+from floatframe.components.mechanisms import slider_crank
+from floatframe.components.mechanisms.rods import slender_inertia
+from floatframe.model.functions.time_functions import harmonic
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 from tests.floatframe.test_bad_input import CRANK, TURN
 

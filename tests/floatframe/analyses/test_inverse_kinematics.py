@@ -7,12 +7,12 @@ from scipy.optimize import minimize
 
 from floatframe import GROUND, CoordinateCoupler, Limits, Marker, ModelError, RevoluteJoint, RigidBody, System
 from floatframe.analyses.inverse_kinematics import Target, inverse_kinematics, least_within
-from floatframe.bodies.coordinates import JointCoordinate
-from floatframe.importers.read_urdf import read_urdf
-from floatframe.importers.robot_system import robot_system
-from floatframe.mechanisms import slider_crank
-from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_matrix
-from tests.floatframe.importers.random_robots import random_robot
+from floatframe.components.mechanisms import slider_crank
+from floatframe.files.importers.read_urdf import read_urdf
+from floatframe.files.importers.robot_system import robot_system
+from floatframe.model.bodies.coordinates import JointCoordinate
+from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_matrix
+from tests.floatframe.files.importers.random_robots import random_robot
 
 A, B = 0.7, 0.5
 

@@ -36,14 +36,14 @@ from floatframe import (
     steady_rotation,
 )
 from floatframe.analyses.snapshot import snapshot
-from floatframe.compiling.system import compiled_system
-from floatframe.functions.time_functions import constant, harmonic, polynomial_of_time
-from floatframe.kernels.work import new_work
-from floatframe.mechanisms import double_pendulum, four_bar, slider_crank
+from floatframe.components.mechanisms import double_pendulum, four_bar, slider_crank
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.initial_conditions.newton_equations import set_iterate
+from floatframe.engine.kernels.work import new_work
+from floatframe.model.functions.time_functions import constant, harmonic, polynomial_of_time
+from floatframe.model.rotations import rotation_matrix
 from floatframe.results.joint_coordinates import joint_coordinates
-from floatframe.rotations import rotation_matrix
-from floatframe.small_motions.joint_rates import coordinate_rows
-from floatframe.start.newton_equations import set_iterate
+from floatframe.results.small_motions.joint_rates import coordinate_rows
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 from tests.floatframe.test_bad_input import parallelogram
 

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 
 from floatframe.analyses.equilibrium import words_of
 from floatframe.analyses.led_equilibrium import Balance, Led, is_left_by_none, led_equilibrium
-from floatframe.start.newton_equations import Linearized
+from floatframe.engine.initial_conditions.newton_equations import Linearized
 
 
 def led(f, slope, x0):

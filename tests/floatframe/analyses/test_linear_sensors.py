@@ -50,10 +50,10 @@ from floatframe import (
     static_equilibrium,
     steady_rotation,
 )
-from floatframe.compiling.system import compiled_system
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.initial_conditions.newton_equations import displaced, in_ground_axes
+from floatframe.model.rotations import rotation_matrix
 from floatframe.results.sensors.places import PLACE_QUANTITIES, TURNING
-from floatframe.rotations import rotation_matrix
-from floatframe.start.newton_equations import displaced, in_ground_axes
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 
 LOADED = ("root", "axle", "stay", "mount")

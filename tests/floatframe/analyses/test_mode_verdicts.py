@@ -19,7 +19,7 @@ from floatframe import (
     steady_rotation,
     system_modes,
 )
-from floatframe.rotations import euler_parameters, rotation_exp
+from floatframe.model.rotations import euler_parameters, rotation_exp
 
 A = rotation_exp(np.array([0.4, -0.7, 0.3]))
 PLACE = np.array([3.0, -2.0, 5.0])

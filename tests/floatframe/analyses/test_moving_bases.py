@@ -33,9 +33,9 @@ from floatframe import (
     static_equilibrium,
     steady_rotation,
 )
-from floatframe.compiling.system import compiled_system
-from floatframe.functions.time_functions import constant, harmonic
-from floatframe.start.newton_equations import displaced, in_ground_axes
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.initial_conditions.newton_equations import displaced, in_ground_axes
+from floatframe.model.functions.time_functions import constant, harmonic
 from tests.floatframe.analyses.test_linear_sensors import machine, rotor, sensors
 
 F = np.array([0.0, 0.4, 1.3, 9.0, 60.0])  #: Hz, across all modes

@@ -29,7 +29,7 @@ from floatframe import (
     snapshot,
     static_equilibrium,
 )
-from tests.cms.second_order.test_geometric_reduction import bar_of_beams
+from tests.cms.reduction.geometric_stiffness.test_geometric_reduction import bar_of_beams
 from tests.floatframe.analyses.test_linear_sensors import compare
 
 

@@ -24,10 +24,10 @@ from floatframe import (
     static_equilibrium,
     steady_rotation,
 )
-from floatframe.elements.expressions import ExpressionElement
-from floatframe.functions.time_functions import polynomial_of_time
-from floatframe.gradients.paths import value_at, with_value
-from floatframe.rotations import rotation_exp
+from floatframe.design.gradients.paths import value_at, with_value
+from floatframe.model.elements.expressions import ExpressionElement
+from floatframe.model.functions.time_functions import polynomial_of_time
+from floatframe.model.rotations import rotation_exp
 
 OMEGA = 100.0  #: of the disc in its bearings
 

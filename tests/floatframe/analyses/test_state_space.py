@@ -32,9 +32,9 @@ from floatframe import (
     trapezoidal,
     write_state_space,
 )
-from floatframe.bodies.mode_choice import with_modes
-from floatframe.mechanisms import double_pendulum, pendulum
-from floatframe.rotations import euler_parameters, rotation_matrix
+from floatframe.components.mechanisms import double_pendulum, pendulum
+from floatframe.model.bodies.mode_choice import with_modes
+from floatframe.model.rotations import euler_parameters, rotation_matrix
 
 LENGTH = 1.2
 

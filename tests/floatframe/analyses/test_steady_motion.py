@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose
 from scipy.optimize import fsolve
 
 import floatframe as ff
-from floatframe import wheels
-from tests.floatframe.wheels.car import HALF_TRACK, Car
+from floatframe.components import wheels
+from tests.floatframe.components.wheels.car import HALF_TRACK, Car
 
 G = 9.81
 GRAVITY = ff.Gravity((0, 0, -G))

@@ -11,7 +11,7 @@ import pytest
 from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
-from cms.modal_file.file import write
+from cms.body.modal_file.file import write
 from floatframe.cli.app import app
 from floatframe.cli.record import run_record
 from floatframe.pictures.animation import bodies_of

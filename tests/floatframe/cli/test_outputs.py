@@ -110,7 +110,7 @@ def test_a_table_and_a_modal_file_go_into_a_pipe(folder, tmp_path):
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="this system has no /dev/full")
 @pytest.mark.parametrize("words", [
     ["floatframe.cli", "--help"], ["cms.cli", "--version"],
-    ["cms.cli", "info", str(ROOT / "tests/cms/modal_file/data/version_1.h5"), "--json"],
+    ["cms.cli", "info", str(ROOT / "tests/cms/body/modal_file/data/version_1.h5"), "--json"],
 ])  # fmt: skip
 def test_a_full_standard_output_is_one_message(words):
     with open("/dev/full", "w") as full:

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
 from floatframe.cli.app import app
-from floatframe.signals import Signals, read_signals, write_rpc
+from floatframe.files.signals import Signals, read_signals, write_rpc
 
 SPRING = """
 [system]

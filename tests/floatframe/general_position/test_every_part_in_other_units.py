@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from fe_models.foundation.units import unit_system
 from floatframe import GeneralizedAlpha, integrate
-from floatframe.rotations import rotation_matrix
-from tests.floatframe.discrete.element_parts import ELEMENT_PARTS
-from tests.floatframe.discrete.parts import PARTS
+from floatframe.model.rotations import rotation_matrix
+from tests.floatframe.engine.structure_preserving.element_parts import ELEMENT_PARTS
+from tests.floatframe.engine.structure_preserving.parts import PARTS
 from tests.floatframe.other_units import Other, in_units
 
 R = Rotation.from_rotvec([0.7, -0.4, 1.1]).as_matrix()

@@ -30,8 +30,9 @@ from floatframe import (
     UserForce,
     integrate,
 )
-from floatframe.drives import DcMotor
-from floatframe.functions.time_functions import harmonic, polynomial_of_time
+from floatframe.components.drives import DcMotor
+from floatframe.files.signals.signal_units import unit_factor
+from floatframe.model.functions.time_functions import harmonic, polynomial_of_time
 from floatframe.results.sensors import (
     AngleSensor,
     BushingSensor,
@@ -59,7 +60,6 @@ from floatframe.results.sensors import (
     measured,
 )
 from floatframe.results.sensors.places import PLACE_QUANTITIES
-from floatframe.signals.signal_units import unit_factor
 from tests.bodies import beam, with_interfaces
 from tests.floatframe.other_units import Other, in_units
 

@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-import floatframe.motion.integration as integration
+import floatframe.simulation.integration as integration
 from floatframe import (
     GROUND,
     EnergyDecaying,
@@ -30,13 +30,13 @@ from floatframe import (
     integrate,
     resume,
 )
-from floatframe.discrete.markers import mean_jacobian
-from floatframe.discrete.rotation import cayley, cayley_parameters, relative_cayley
-from floatframe.functions.time_functions import cycloidal_spin_up
-from floatframe.functions.time_functions import table as table_function
-from floatframe.joints import JOINTS
-from floatframe.mechanisms import four_bar
-from floatframe.rotations import (
+from floatframe.components.mechanisms import four_bar
+from floatframe.engine.structure_preserving.markers import mean_jacobian
+from floatframe.engine.structure_preserving.rotation import cayley, cayley_parameters, relative_cayley
+from floatframe.model.functions.time_functions import cycloidal_spin_up
+from floatframe.model.functions.time_functions import table as table_function
+from floatframe.model.joints import JOINTS
+from floatframe.model.rotations import (
     euler_parameters_of_rotation_vector,
     left_jacobian,
     right_jacobian,
@@ -44,11 +44,11 @@ from floatframe.rotations import (
     rotation_matrix,
     tilde,
 )
-from tests.floatframe.bodies.test_free_body import spinning
 from tests.floatframe.integrators.test_pendulum import errors_of, exact, pendulum  # noqa: F401
-from tests.floatframe.motion import test_restart
+from tests.floatframe.model.bodies.test_free_body import spinning
 from tests.floatframe.orders import slope
 from tests.floatframe.point_masses import PointMasses, random_point_masses, reduced_body, stiffened_body, stiffness
+from tests.floatframe.simulation import test_restart
 
 SCHEMES = {"momentum": EnergyMomentum(), "decaying": EnergyDecaying(0.5), "variational": Variational()}
 

@@ -9,9 +9,10 @@ from numba import njit
 from numpy.testing import assert_allclose
 
 import floatframe as ff
-from floatframe import GeneralizedAlpha, Gravity, Marker, RigidBody, System, clearances
-from floatframe.elements import Element, ElementLaw, GapSpring
-from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_exp
+from floatframe import GeneralizedAlpha, Gravity, Marker, RigidBody, System
+from floatframe.components import clearances
+from floatframe.model.elements import Element, ElementLaw, GapSpring
+from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_exp
 
 GROUND, BODY = Marker("ground", position=np.zeros(3)), Marker("b", position=np.zeros(3))
 OF_CONTACT = 0.01  #: relative error of a speed after a contact

@@ -17,7 +17,7 @@ from floatframe import (
     System,
     integrate,
 )
-from floatframe.mechanisms import pendulum as rigid_pendulum
+from floatframe.components.mechanisms import pendulum as rigid_pendulum
 from tests.floatframe.integrators.test_pendulum import exact, pendulum  # noqa: F401
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 

@@ -21,9 +21,9 @@ from floatframe import (
     System,
     integrate,
 )
-from floatframe.mechanisms import four_bar, slider_crank
-from tests.floatframe.bodies.test_free_body import spinning
+from floatframe.components.mechanisms import four_bar, slider_crank
 from tests.floatframe.integrators.test_pendulum import pendulum
+from tests.floatframe.model.bodies.test_free_body import spinning
 
 SMALL = 1e-3  # of the error of the integrator
 #: the same of reactions of a body that bends by half its length: what positions and velocities differ by depends on the

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 from floatframe import GROUND, FlexibleBody, GeneralizedAlpha, Gravity, Marker, SphericalJoint, System, integrate
-from floatframe.rotations import euler_parameter_rates, rotation_matrix
+from floatframe.model.rotations import euler_parameter_rates, rotation_matrix
 from tests.floatframe.orders import slope
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 

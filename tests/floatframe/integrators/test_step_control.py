@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-import floatframe.motion.integration as integration
+import floatframe.simulation.integration as integration
 from floatframe import (
     ConvergenceError,
     FlexibleBody,
@@ -23,14 +23,14 @@ from floatframe import (
     resume,
     trapezoidal,
 )
-from floatframe.functions.time_functions import cycloidal_spin_up
-from floatframe.mechanisms import slider_crank
-from floatframe.rotations import rotation_matrix
-from tests.floatframe.bodies.test_free_body import spinning
+from floatframe.components.mechanisms import slider_crank
+from floatframe.model.functions.time_functions import cycloidal_spin_up
+from floatframe.model.rotations import rotation_matrix
 from tests.floatframe.integrators.test_pendulum import exact, pendulum  # noqa: F401
-from tests.floatframe.motion import test_restart
+from tests.floatframe.model.bodies.test_free_body import spinning
 from tests.floatframe.orders import slope
 from tests.floatframe.point_masses import PointMasses, reduced_body
+from tests.floatframe.simulation import test_restart
 
 T_END = 1.0
 

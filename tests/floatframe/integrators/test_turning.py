@@ -23,7 +23,7 @@ from floatframe import (
     integrate,
     trapezoidal,
 )
-from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_exp, rotation_matrix
+from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_exp, rotation_matrix
 from tests.floatframe.orders import slope
 
 #: general position: where the system stands and how it is turned

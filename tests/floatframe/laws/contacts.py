@@ -5,11 +5,11 @@ from math import atan, exp, hypot, pi, sqrt
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from floatframe.bearings import Bearing
-from floatframe.clearances import Backlash, BallWithPlay, HingeWithPlay
-from floatframe.friction import BristleFriction
-from floatframe.wheels import BrushTyre, LinearTyre
-from floatframe.wheels.roads.road import FlatRoad, Grip
+from floatframe.components.bearings import Bearing
+from floatframe.components.clearances import Backlash, BallWithPlay, HingeWithPlay
+from floatframe.components.friction import BristleFriction
+from floatframe.components.wheels import BrushTyre, LinearTyre
+from floatframe.components.wheels.roads.road import FlatRoad, Grip
 from tests.floatframe.element_laws import marker_motion
 from tests.floatframe.laws.form import AXIS, A, B, Form, Pair, State, pair
 

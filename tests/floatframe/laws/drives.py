@@ -6,7 +6,7 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.interpolate import RegularGridInterpolator
 
-from floatframe.drives import AntiSkidBrake, DcMotor, InductionMotor, Pid, PidDrive, SpeedControl, TorqueMap
+from floatframe.components.drives import AntiSkidBrake, DcMotor, InductionMotor, Pid, PidDrive, SpeedControl, TorqueMap
 from tests.floatframe.laws.form import AXIS, TIME, A, B, Form, Pair, State, friction, on_pair, pair, wave, wave_at
 
 __all__ = ["FORMS"]

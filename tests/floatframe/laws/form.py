@@ -14,9 +14,9 @@ from numba.core.registry import CPUDispatcher as Dispatcher
 from scipy.spatial.transform import Rotation
 
 from floatframe import Marker
-from floatframe.elements import Element
-from floatframe.elements.curves import function_numbers
-from floatframe.functions.time_functions import TimeFunction
+from floatframe.model.elements import Element
+from floatframe.model.elements.curves import function_numbers
+from floatframe.model.functions.time_functions import TimeFunction
 from tests.floatframe.element_laws import evaluate, marker_motion, placed
 
 __all__ = [

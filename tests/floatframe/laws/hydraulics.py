@@ -8,8 +8,7 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.interpolate import CubicHermiteSpline
 
-from floatframe.functions.time_functions import TimeFunction
-from floatframe.hydraulics import (
+from floatframe.components.hydraulics import (
     Accumulator,
     CheckValve,
     Circuit,
@@ -28,6 +27,7 @@ from floatframe.hydraulics import (
     Tank,
     circuit_law,
 )
+from floatframe.model.functions.time_functions import TimeFunction
 from tests.floatframe.element_laws import STEP
 from tests.floatframe.laws.form import AXIS, A, B, Form, Pair, State, friction, pair, wave, wave_at
 

@@ -1,18 +1,19 @@
 """Cables and lifting surfaces in closed form; tyres of property files beside themselves.
 
-What these compute has its own oracle, `tests.floatframe.wheels.magic_formula_oracle`; here each number has to matter.
+What these compute has its own oracle, `tests.floatframe.components.wheels.magic_formula_oracle`; here each number has
+to matter.
 """
 
 from math import atan2
 
 import numpy as np
 
-from floatframe import wheels
-from floatframe.aerodynamics import LiftingSurface
-from floatframe.bodies.markers import Marker
-from floatframe.cables import Cable
-from floatframe.wheels import magic_formula as formula
-from floatframe.wheels.contact import SIGMA_X, SIGMA_Y, STIFFNESS
+from floatframe.components import wheels
+from floatframe.components.aerodynamics import LiftingSurface
+from floatframe.components.cables import Cable
+from floatframe.components.wheels import magic_formula as formula
+from floatframe.components.wheels.contact import SIGMA_X, SIGMA_Y, STIFFNESS
+from floatframe.model.bodies.markers import Marker
 from tests.floatframe.element_laws import evaluate, placed
 from tests.floatframe.laws.contacts import rolling
 from tests.floatframe.laws.form import AXIS, A, B, Form, State, pair, plain, wave, wave_at

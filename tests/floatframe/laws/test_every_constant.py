@@ -8,14 +8,13 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import floatframe
-from floatframe.aerodynamics import LiftingSurface
-from floatframe.bearings import Bearing
-from floatframe.cables import Cable
-from floatframe.clearances import Backlash, BallWithPlay, HingeWithPlay
-from floatframe.drives import AntiSkidBrake, DcMotor, InductionMotor, Pid, PidDrive, SpeedControl, TorqueMap
-from floatframe.elements.registry import element_class
-from floatframe.friction import BristleFriction
-from floatframe.hydraulics import (
+from floatframe.components.aerodynamics import LiftingSurface
+from floatframe.components.bearings import Bearing
+from floatframe.components.cables import Cable
+from floatframe.components.clearances import Backlash, BallWithPlay, HingeWithPlay
+from floatframe.components.drives import AntiSkidBrake, DcMotor, InductionMotor, Pid, PidDrive, SpeedControl, TorqueMap
+from floatframe.components.friction import BristleFriction
+from floatframe.components.hydraulics import (
     Accumulator,
     CheckValve,
     Cylinder,
@@ -27,16 +26,17 @@ from floatframe.hydraulics import (
     Pump,
     ReliefValve,
 )
-from floatframe.wheels import BrushTyre, LinearTyre, MagicFormulaTyre
+from floatframe.components.wheels import BrushTyre, LinearTyre, MagicFormulaTyre
+from floatframe.model.elements.registry import element_class
 from tests.floatframe.laws import contacts, drives, hydraulics, others
 from tests.floatframe.laws.form import CLOSE, differences, expected, silent_numbers
 
 FORMS = drives.FORMS | hydraulics.FORMS | contacts.FORMS | others.FORMS
 #: elements whose numbers are tables, with the rooms of their own oracles
 ELSEWHERE = {
-    "elements.expressions": "tests/floatframe/elements/test_expression_element.py",
-    "rails.wheelset": "tests/floatframe/rails/test_law.py",
-    "rails.wheel-on-rail": "tests/floatframe/rails/test_law.py",
+    "elements.expressions": "tests/floatframe/model/elements/test_expression_element.py",
+    "rails.wheelset": "tests/floatframe/components/rails/test_law.py",
+    "rails.wheel-on-rail": "tests/floatframe/components/rails/test_law.py",
 }
 CONTACT = {"exponent": 1.0, "damping": 0.0, "friction": 0.0, "friction_speed": 1e-3, "radius": 0.0}
 TYRE = {"friction": 1.0, "damping": 0.0, "relaxation_x": 0.0, "relaxation_y": 0.0, "rolling_resistance": 0.0,
@@ -86,7 +86,7 @@ def kinds():
     packages = [each.name for each in iter_modules(floatframe.__path__) if each.ispkg]
     return [
         f"{package}.{kind}" for package in packages
-        for kind in getattr(import_module(f"floatframe.{package}"), "ELEMENTS", {})
+        for kind in getattr(import_module(f"floatframe.components.{package}"), "ELEMENTS", {})
     ]  # fmt: skip
 
 

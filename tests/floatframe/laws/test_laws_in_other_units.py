@@ -5,8 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from fe_models.foundation.units import unit_system
-from floatframe.elements import Placed
-from floatframe.signals.signal_units import unit_factor
+from floatframe.files.signals.signal_units import unit_factor
+from floatframe.model.elements import Placed
 from tests.floatframe.element_laws import evaluate
 from tests.floatframe.laws import contacts, drives, hydraulics, others
 from tests.floatframe.laws.form import plain

@@ -7,7 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 import cms
-from floatframe import GeneralizedAlpha, ModelError, integrate, rails
+from floatframe import GeneralizedAlpha, ModelError, integrate
+from floatframe.components import rails
+from floatframe.files.system_file.read_system import read_system
 from floatframe.machines import machine_files
 from floatframe.machines.bogie import (
     RailVehicle,
@@ -21,7 +23,6 @@ from floatframe.machines.bogie import (
 )
 from floatframe.machines.bogie.comfort import weighted_rms, weighting
 from floatframe.machines.bogie.running import lateral_modes
-from floatframe.system_file.read_system import read_system
 
 DATA = RailVehicle()
 LAWS = rails.ContactLaws(creep="kalker", friction=0.4)

@@ -7,11 +7,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 import floatframe as ff
-from floatframe.functions.point_to_point import quintic
-from floatframe.functions.time_functions import harmonic
 from floatframe.machines import flexible_arm
 from floatframe.machines.flexible_arm import control, study
 from floatframe.machines.flexible_arm.collocation import SMOOTHING
+from floatframe.model.functions.point_to_point import quintic
+from floatframe.model.functions.time_functions import harmonic
 from floatframe.results.energy_balance import balance_defect, energy_scale
 
 

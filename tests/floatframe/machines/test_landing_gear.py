@@ -7,11 +7,11 @@ from scipy.integrate import cumulative_trapezoid, solve_ivp
 
 import cms
 import floatframe as ff
-from floatframe.functions.tables import monotone_table
 from floatframe.machines import copy_machine
 from floatframe.machines.landing_gear import retraction
+from floatframe.model.functions.tables import monotone_table
+from floatframe.model.rotations import rotation_matrix
 from floatframe.results.sensors import measurement_of
-from floatframe.rotations import rotation_matrix
 
 G, SINK, FORWARD, LIFT, CARRIAGE = 9.81, 2.5, 40.0, 7200.0, 1100.0
 RADIUS, TYRE, TYRE_DAMPING, FRICTION, SPIN = 0.35, 2.5e5, 300.0, 0.7, 1.5

@@ -9,9 +9,9 @@ from scipy.integrate import solve_ivp
 
 import cms
 import floatframe as ff
-from floatframe.functions.tables import monotone_table
 from floatframe.machines import copy_machine
 from floatframe.machines.landing_gear import rolling_state
+from floatframe.model.functions.tables import monotone_table
 from floatframe.results.sensors import measurement_of
 
 G, SPEED, AT, HIGH = 9.81, 20.0, 5.0, 0.03  # the bump of the file is twice as high: its nose wheel leaves the ground

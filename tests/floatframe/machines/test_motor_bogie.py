@@ -24,7 +24,7 @@ from floatframe import (
     measured,
     read_system,
 )
-from floatframe.drives import InductionMotor
+from floatframe.components.drives import InductionMotor
 from floatframe.machines import machine_files
 from floatframe.machines.motor_bogie import SIX_STEPS, Motor, MotorBogie, motor_bogie_file, motor_bogie_files
 from floatframe.machines.motor_bogie.closed_forms import (

@@ -15,17 +15,17 @@ import cms
 import floatframe as ff
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
-from cms.reduced_basis.damping import RayleighDamping
+from cms.reduction.basis.damping import RayleighDamping
+from fe_models.elements.shells.shell_points import shell_points
 from fe_models.parts import EngineBody
-from fe_models.shells.shell_points import shell_points
+from floatframe.design.laboratory.body_errors import BodyReference, without_rigid
+from floatframe.design.laboratory.body_study import Loading, body_study, lean_body, stress_rows
+from floatframe.design.laboratory.suspended_body import suspended_motion
 from floatframe.errors import ModelError
-from floatframe.laboratory.body_errors import BodyReference, without_rigid
-from floatframe.laboratory.body_study import Loading, body_study, lean_body, stress_rows
-from floatframe.laboratory.suspended_body import suspended_motion
+from floatframe.files.system_file.read_system import read_system
 from floatframe.machines.railway_engine.mode_sets import FREE, MORE_SETS, NAME, SETS
 from floatframe.machines.railway_engine.wheel_paths import Defect, SCurve, envelope
 from floatframe.machines.railway_engine.write_files import railway_engine_files, write_railway_engine
-from floatframe.system_file.read_system import read_system
 
 SHIPPED = Path(ff.__file__).parent / "machines" / "railway_engine" / "files"
 BETA = 2.6e-4

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 import cms
 import floatframe as ff
-from floatframe.elements.expressions import ExpressionElement
+from floatframe.components.wheels import read_tyre_file, shipped_tyre
 from floatframe.machines import machine_files
 from floatframe.machines.road_car import CarOnPosts, Linkage, RoadCar, body_files, road_car_files
 from floatframe.machines.road_car.closed_forms import MODES, roll_control_stiffness, transfer_shares
@@ -17,9 +17,9 @@ from floatframe.machines.road_car.description import CORNERS
 from floatframe.machines.road_car.figures import car_mass, driven
 from floatframe.machines.road_car.steady_turn import steady_turn
 from floatframe.machines.road_car.systems import ON_GROUND, car_file, lane_change, rig_file
-from floatframe.rotations import rotation_matrix
-from floatframe.wheels import read_tyre_file, shipped_tyre
-from tests.floatframe.wheels.magic_formula_oracle import version_61
+from floatframe.model.elements.expressions import ExpressionElement
+from floatframe.model.rotations import rotation_matrix
+from tests.floatframe.components.wheels.magic_formula_oracle import version_61
 
 CAR = RoadCar()
 STIFF = replace(CAR, mount_stiffness=None)  # subframes fixed to the body

@@ -5,19 +5,19 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from cms.modal_file.file import digest, write
-from cms.rendering import render
+from cms.assessment.rendering import render
+from cms.body.modal_file.file import digest, write
 from floatframe import GeneralizedAlpha, System, integrate
-from floatframe.bodies.rigid_body import RigidBody
 from floatframe.errors import ResultsError
+from floatframe.model.bodies.rigid_body import RigidBody
+from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_matrix
+from floatframe.model.shapes import Road, Wheel
 from floatframe.pictures.animation import animate, bodies_of, motion_scene, trail
 from floatframe.pictures.film_times import film_times, round_below, speed_words, time_words
 from floatframe.pictures.stage import box_of, ground_grid, view_axes
 from floatframe.results.head import BodyEntry, Head
 from floatframe.results.results_file import MemorySource
 from floatframe.results.trajectory import Trajectory
-from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_matrix
-from floatframe.shapes import Road, Wheel
 from tests.synthetic import synthetic_reduced_body
 
 TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])

@@ -3,11 +3,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from floatframe import GROUND, FlexibleBody, GeneralizedAlpha, Gravity, Marker, RevoluteJoint, RigidBody, System
-from floatframe.motion.integration import integrate
 from floatframe.pictures.overview import plot_deformation, plot_loads, plot_overview, plot_places
 from floatframe.pictures.plots import plot_drift, plot_energy_balance
 from floatframe.results.energy_balance import balance_defect, energy_scale
 from floatframe.results.recovery import elastic_displacements, interface_positions
+from floatframe.simulation.integration import integrate
 from tests.synthetic import synthetic_reduced_body
 
 

@@ -31,13 +31,13 @@ from floatframe import (
     snapshot,
     static_equilibrium,
 )
-from floatframe.compiling.file_frames import rows_of_file
-from floatframe.compiling.system import compiled_system
-from floatframe.cosimulation.unit import Unit
+from floatframe.engine.compiling.file_frames import rows_of_file
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.files.cosimulation.unit import Unit
+from floatframe.model.rotations import rotation_matrix
 from floatframe.results.results_file import MemorySource
 from floatframe.results.trajectory import Trajectory
 from floatframe.results.writer import arrays_of
-from floatframe.rotations import rotation_matrix
 from tests.floatframe.analyses.test_linear_sensors import compare
 
 L, WIDTH, E_STEEL = 1.0, 0.03, 210e9  #: m, Pa

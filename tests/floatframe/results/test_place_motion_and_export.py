@@ -21,6 +21,7 @@ from floatframe import (
     System,
     integrate,
 )
+from floatframe.model.rotations import rotation_matrix
 from floatframe.results.export import export_csv, export_vtk, motion_table
 from floatframe.results.place_motion import (
     interface_motion,
@@ -31,7 +32,6 @@ from floatframe.results.place_motion import (
     rotation_angle,
 )
 from floatframe.results.recovery import nodal_positions
-from floatframe.rotations import rotation_matrix
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 
 H = 5e-4

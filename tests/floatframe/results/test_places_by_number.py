@@ -8,16 +8,16 @@ from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
 import cms
-from fe_models.beams.beam_property import BeamProperty
-from fe_models.beams.body import beam_body
-from fe_models.beams.interfaces import NodeIndices, line_interface
-from fe_models.beams.sections import Rectangle
 from fe_models.body.fe_body import Interface
-from fe_models.body.numbering import Numbering
+from fe_models.elements.beams.beam_property import BeamProperty
+from fe_models.elements.beams.body import beam_body
+from fe_models.elements.beams.interfaces import NodeIndices, line_interface
+from fe_models.elements.beams.sections import Rectangle
+from fe_models.elements.solids.body import solid_body
 from fe_models.foundation.units import unit_system
 from fe_models.meshes.line_mesh import straight_line
 from fe_models.meshes.mesh import Mesh
-from fe_models.solids.body import solid_body
+from fe_models.meshes.numbering import Numbering
 from floatframe import (
     GROUND,
     FixedJoint,

@@ -9,8 +9,8 @@ import pytest
 from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
-from cms.modal_file.file import write
-from cms.reduced_body.stress import von_mises
+from cms.body.modal_file.file import write
+from cms.body.stress import von_mises
 from floatframe import (
     GROUND,
     FlexibleBody,
@@ -28,6 +28,8 @@ from floatframe import (
     read_results,
 )
 from floatframe.cli.app import app
+from floatframe.files.system_file.read_system import read_system
+from floatframe.model.rotations import rotation_matrix
 from floatframe.pictures.body_colors import VON_MISES
 from floatframe.results.place_motion import interface_motion, largest_von_mises, point_motion
 from floatframe.results.sensors import (
@@ -46,8 +48,6 @@ from floatframe.results.sensors import (
     measured,
     sensor_of,
 )
-from floatframe.rotations import rotation_matrix
-from floatframe.system_file.read_system import read_system
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 from tests.synthetic import synthetic_reduced_body
 

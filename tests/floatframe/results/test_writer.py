@@ -9,11 +9,11 @@ import textwrap
 import pytest
 from numpy.testing import assert_array_equal
 
-import floatframe.motion.integration as integration
+import floatframe.simulation.integration as integration
 from floatframe import GeneralizedAlpha, ResultsError, integrate, read_results, resume
 from floatframe.analyses.driven.kinematics import kinematics
-from floatframe.functions.time_functions import cycloidal_spin_up
-from floatframe.mechanisms import slider_crank
+from floatframe.components.mechanisms import slider_crank
+from floatframe.model.functions.time_functions import cycloidal_spin_up
 from tests.floatframe.results.test_results_file import SYSTEM
 from tests.root import ROOT
 
@@ -141,8 +141,8 @@ FULL = """
     import resource, sys
     from floatframe import integrate
     from tests.floatframe.results.test_results_file import SYSTEM, METHOD
-    import floatframe.motion.integration as integration
-    from floatframe.kernels.entry import prepare
+    import floatframe.simulation.integration as integration
+    from floatframe.engine.kernels.entry import prepare
     prepare()
     integration.SEGMENT_SECONDS = float(sys.argv[3])
     resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), -1))

@@ -23,18 +23,18 @@ from floatframe import (
     system_modes,
 )
 from floatframe.analyses.relative.coordinate_basis import coordinate_names, dependent_coordinates
-from floatframe.compiling.file_frames import motion_of_engine, small_motions_of_file
-from floatframe.compiling.system import compiled_system
-from floatframe.functions.time_functions import polynomial_of_time
-from floatframe.kernels.work import new_work
-from floatframe.mechanisms import double_pendulum, four_bar, rotating_blade, satellite, slider_crank
-from floatframe.relative.kernels.entry import motion_of_joints, newton_matrix
-from floatframe.relative.kernels.tree import new_joint_work
-from floatframe.relative.topology import tree_of
-from floatframe.relative.tree_motions import coordinate_motions
-from floatframe.small_motions.joint_rates import coordinate_rows
-from floatframe.start.newton_equations import linearized, set_iterate
-from tests.floatframe.relative.mechanisms import beam, falling
+from floatframe.components.mechanisms import double_pendulum, four_bar, rotating_blade, satellite, slider_crank
+from floatframe.engine.compiling.file_frames import motion_of_engine, small_motions_of_file
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.initial_conditions.newton_equations import linearized, set_iterate
+from floatframe.engine.kernels.work import new_work
+from floatframe.engine.tree.kernels.entry import motion_of_joints, newton_matrix
+from floatframe.engine.tree.kernels.tree import new_joint_work
+from floatframe.engine.tree.topology import tree_of
+from floatframe.engine.tree.tree_motions import coordinate_motions
+from floatframe.model.functions.time_functions import polynomial_of_time
+from floatframe.results.small_motions.joint_rates import coordinate_rows
+from tests.floatframe.engine.tree.mechanisms import beam, falling
 
 
 def held_satellite():

@@ -22,11 +22,11 @@ from floatframe import (
     static_equilibrium,
     steady_rotation,
 )
-from floatframe.relative.topology import tree_of
-from floatframe.rotations import euler_parameters_of_rotation_vector
+from floatframe.engine.tree.topology import tree_of
+from floatframe.model.rotations import euler_parameters_of_rotation_vector
 from tests.floatframe.analyses.relative.test_coordinate_basis import CASES
-from tests.floatframe.elements.laws import Jack
-from tests.floatframe.relative.mechanisms import MECHANISMS, falling
+from tests.floatframe.engine.tree.mechanisms import MECHANISMS, falling
+from tests.floatframe.model.elements.laws import Jack
 
 G = 9.81
 

@@ -1,0 +1,1 @@
+"""Assessment: quality of a reduced body, comparison of mode sets, correlation with tests, reports and pictures."""

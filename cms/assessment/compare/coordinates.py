@@ -1,0 +1,130 @@
+"""Small coordinates in which many subsets of one mode set are judged without touching the mesh again.
+
+All that a comparison looks at (rigid-body and free modes, static responses, the columns of a mode set) is written in
+one basis Q, orthonormal in W = K + omega_1² M. Then K, M and every displacement are small dense arrays, the W-norm is
+the Euclidean norm, and differences of displacements are accurate to roundoff, which differences of energies are not.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+
+from cms.assessment.quality.reference.ports import Ports
+from cms.linear_algebra.independent import Columns, Products, gram, independent_columns
+from cms.linear_algebra.solvers.tall import inner, subtract
+from cms.modes.families.families import Families
+from fe_models.foundation.arrays import Array
+
+__all__ = ["Coordinates", "ReferenceBasis"]
+
+NOISE = 1e-11  #: W-length of what is left of a unit column, below which it is rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Coordinates:
+    """K, M, the nodal norm and the displacements of a comparison in a W-orthonormal basis Q, (n_dof, n_Q)."""
+
+    K: Array  #: Qᵀ K Q, (n_Q, n_Q)
+    M: Array  #: Qᵀ M Q, (n_Q, n_Q)
+    nodal: Array  #: Qᵀ Q over the translations of all nodes, (n_Q, n_Q)
+    MGM: Array  #: Qᵀ M G M Q, G the elastic flexibility of the free body, (n_Q, n_Q)
+    at_b: Array  #: rows of Q at the boundary dofs, (n_b, n_Q)
+    at_ports: Array  #: motion of the reference points of the interfaces with Q, (6 n_ports, n_Q)
+    reference: Array  #: the reference columns, (n_Q, n_reference)
+    columns: Array  #: the columns of the mode set, (n_Q, n_columns)
+
+
+class ReferenceBasis:
+    """The part of Q that all mode sets of a body share: the span of the reference columns."""
+
+    def __init__(self, families: Families, ports: Ports, columns: Array, n_rigid: int, omega2: float) -> None:
+        """Make the basis.
+
+        Parameters
+        ----------
+        families
+            Of a coupled body.
+        ports
+            The reference points of its interfaces.
+        columns
+            Displacements the sets are judged by, (n_dof, n_reference).
+        n_rigid
+            How many of them, the first, are the M-orthonormal rigid-body modes.
+        omega2
+            omega_1² of W [1/s²].
+        """
+        body = families.body
+        self.body, self.families, self.ports = body, families, ports
+        self.n_rigid, self.omega2 = n_rigid, omega2
+        self._products = Products.of_body(body).beside
+        given = self._products(columns)
+        self._Q, _ = independent_columns(columns, body, omega2)
+        self._reference = self._inner(self._Q, given)
+        self._GM = families.flexibility(self._Q.MX)
+        self._nodal = self._translations(self._Q.X)
+
+    def coordinates(self, columns: Array) -> Coordinates:
+        """Return the coordinates of a mode set's columns, (n_dof, n_columns), beside the reference.
+
+        (1) unit columns in the W-norm; what lies in the span of the reference taken off, twice
+        (2) W-orthonormal basis Q_V of what is left
+        (3) coordinates (Q_refᵀ W V, Q_Vᵀ W V)
+        """
+        Q, V = self._Q, self._products(columns)
+        T_Q = self._inner(Q, V)
+        left = self._remainder(V)
+        basis = self._products(left)
+        if left.shape[1]:
+            # nearly dependent columns lose their orthogonality to the reference when they are brought to unit length
+            basis, _ = independent_columns(self._without_reference(basis), self.body, self.omega2)
+            basis = self._products(self._without_reference(basis))
+        if basis.X.shape[1]:  # a small body may have no dof that the reference does not span
+            G = self._inner(basis, basis)
+            basis = basis @ la.solve_triangular(la.cholesky((G + G.T) / 2), np.eye(len(G)))
+        T_V = self._inner(basis, V)
+        reference = np.vstack([self._reference, np.zeros((len(T_V), self._reference.shape[1]))])
+        M = _joined(Q.X, Q.MX, basis.X, basis.MX)
+        N = reference[:, : self.n_rigid]
+        elastic = np.eye(len(M)) - N @ (N.T @ M)  # rounding of K times a rigid-body motion is not energy
+        moved = self._translations(basis.X)
+        return Coordinates(
+            K=elastic.T @ _joined(Q.X, Q.KX, basis.X, basis.KX) @ elastic,
+            M=M,
+            nodal=_joined(self._nodal, self._nodal, moved, moved),
+            MGM=_joined(Q.MX, self._GM, basis.MX, self.families.flexibility(basis.MX)),
+            at_b=np.hstack([Q.X[self.body.b], basis.X[self.body.b]]),
+            at_ports=np.hstack([self.ports.A @ Q.X, self.ports.A @ basis.X]),
+            reference=reference,
+            columns=np.vstack([T_Q, T_V]),
+        )
+
+    def _translations(self, X: Array) -> Array:
+        """Return the translations of all nodes, those of rigid interfaces among them, (3 n_nodes, k)."""
+        return self.body.translations(X).reshape(3 * len(self.body.nodes), X.shape[1])
+
+    def _inner(self, Q: Columns, V: Columns) -> Array:
+        return inner(Q.KX, V.X) + self.omega2 * inner(Q.MX, V.X)
+
+    def _remainder(self, V: Columns) -> Array:
+        """Return unit columns without their part in the reference, those of which more than rounding is left."""
+        length = np.sqrt(np.maximum(self._length2(V), 0.0))
+        rest = V.X / np.where(length > 0, length, 1.0)
+        subtract(rest, self._Q.X, self._inner(self._Q, V) / np.where(length > 0, length, 1.0))
+        left = np.sqrt(np.maximum(self._length2(self._products(rest)), 0.0))
+        is_new = (left > NOISE) & (length > 0)
+        return np.ascontiguousarray(rest[:, is_new] / left[is_new])
+
+    def _without_reference(self, V: Columns) -> Array:
+        rest = V.X.copy()
+        subtract(rest, self._Q.X, self._inner(self._Q, V))
+        return rest
+
+    def _length2(self, V: Columns) -> Array:
+        return np.einsum("nk,nk->k", V.X, V.KX) + self.omega2 * np.einsum("nk,nk->k", V.X, V.MX)
+
+
+def _joined(X: Array, AX: Array, Y: Array, AY: Array) -> Array:
+    """Return [X Y]ᵀ A [X Y] of a symmetric A."""
+    XAY = inner(AX, Y) if Y.shape[1] else np.zeros((X.shape[1], 0))
+    return np.block([[gram(X, AX), XAY], [XAY.T, gram(Y, AY)]])

@@ -1,0 +1,259 @@
+"""The reference solution of the full model that mode sets are compared with, computed once and kept in a file."""
+
+import hashlib
+import logging
+import zipfile
+from dataclasses import dataclass, fields
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse.linalg as sla
+
+from cms.assessment.compare.pulse import Pulse
+from cms.assessment.quality.of_reduction.completeness import acceleration_labels, load_case_responses
+from cms.assessment.quality.reference.port_model import PortModel
+from cms.assessment.quality.reference.ports import Ports
+from cms.assessment.quality.reference.reference_response import reference_response
+from cms.assessment.quality.reference.transient import Snapshots, transient
+from cms.errors import CompareError
+from cms.linear_algebra.solvers.mode_count import ModeCount
+from cms.modes.families.families import Families
+from cms.modes.families.rigid_modes import geometric_rigid_modes
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array, frozen
+from fe_models.foundation.paths import replace_file
+from fe_models.foundation.ranks.spread_matrix import whole_matrix
+
+__all__ = ["FullModel", "read_full_model", "reference_digest", "solve_full_model", "write_full_model"]
+
+log = logging.getLogger(__name__)
+
+VERSION = "2"  #: of what is computed; a file of another version is made anew
+MODES_BEYOND = 2.0  #: multiple of the band up to which free modes follow a motion dynamically
+FIRST_SEARCH = 3  #: free modes found at first for each one in the band; mostly enough for twice its frequency
+MASS_TOLERANCE = 1e-10  #: relative residual of the solutions with M_II
+
+
+@dataclass(frozen=True, eq=False)
+class FullModel:
+    """Free modes, static responses, response of the interfaces and a motion of the full model.
+
+    Frequencies are in cycles per time unit of the body, displacements over all its dofs, without rigid-body motion.
+    """
+
+    band: float  #: highest frequency of the comparison
+    omega2: Array  #: elastic free modes, to twice the band, (n_modes,) [1/s²]
+    rigid: Array  #: M-orthonormal rigid-body modes, (n_dof, n_r)
+    Phi: Array  #: M-orthonormal elastic free modes in the band, (n_dof, n_band)
+    Psi_A: Array  #: attachment modes: static interface loads, (n_dof, n_e)
+    Psi_H: Array  #: inertia-relief modes: static inertia loads, (n_dof, n_r)
+    Psi_L: Array  #: the free body under its load cases, (n_dof, n_load_cases); zero: the load does not deform it
+    moved: Array  #: columns of the motion, (n_dof, k)
+    amplitudes: Array  #: of those columns, (k, n_t)
+    t: Array  #: of the motion, (n_t,) [time unit]
+    port_omega2: Array  #: modes of the response at the interfaces, (n,) [1/s²]
+    port_is_massive: Array  #: 1 where such a mode has mass, (n,)
+    port_modes: Array  #: those modes at the ports, (6 n_ports, n)
+    port_rigid: Array  #: rigid-body modes at the ports, (6 n_ports, n_r)
+    port_error: float  #: estimated error of that response at the top of the band, over its size
+    directions: Array  #: geometric rigid-body modes about the centre of mass, (n_dof, 6)
+    held_mass: Array  #: of those directions, what moves while the interfaces are held, (6,) [kg, kg m²]
+    mass: Array  #: of those directions, of the whole body, (6,) [kg, kg m²]
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            object.__setattr__(self, field.name, float(value) if field.type is float else frozen(value))
+
+    @property
+    def frequencies(self) -> Array:
+        """Elastic free frequencies, (n_modes,)."""
+        return np.sqrt(self.omega2) / (2 * np.pi)
+
+    @property
+    def n_band(self) -> int:
+        """Number of elastic free modes in the band."""
+        return self.Phi.shape[1]
+
+    @property
+    def parts(self) -> dict[str, slice]:
+        """Where the families stand in `columns`."""
+        slices, at = {}, 0
+        for name in ("rigid", "Phi", "Psi_A", "Psi_H", "Psi_L", "moved", "directions"):
+            width = getattr(self, name).shape[1]
+            slices[name], at = slice(at, at + width), at + width
+        return slices
+
+    @property
+    def columns(self) -> Array:
+        """All displacements side by side, (n_dof, n_columns)."""
+        return np.hstack([getattr(self, name) for name in self.parts])
+
+    def ports(self, names: tuple[str, ...]) -> PortModel:
+        """Return the body as it is seen at its interfaces of those names."""
+        return PortModel(names, self.port_omega2, self.port_is_massive > 0.5, self.port_modes, self.port_rigid)
+
+
+def solve_full_model(
+    families: Families,
+    pulse: Pulse,
+    *,
+    n_modes: int,
+    band: float | None,
+    damping: float,
+    motion: Snapshots | None,
+    n_expected: int = 0,
+) -> FullModel:
+    """Solve the full model.
+
+    Parameters
+    ----------
+    families
+        Of the body; its factorisation serves here too.
+    pulse
+        The force of the reference motion.
+    n_modes
+        Elastic free modes the band holds, where no band is given.
+    band
+        Highest frequency [cycles per time unit of the body]; None: that of mode n_modes.
+    damping
+        Ratio of every mode in the motion.
+    motion
+        A reference motion instead of the response to the pulse.
+    n_expected
+        Free modes that will be asked for later: found at once here, they cost less than in two searches.
+
+    Raises
+    ------
+    CompareError
+        If no elastic mode lies in the band.
+    """
+    body = families.body
+    if band is None:
+        n_most = body.n_dof - families.Psi_R.shape[1]
+        n_first = max(FIRST_SEARCH * n_modes, n_expected)
+        if n_first <= n_most // 4:  # a larger part of all modes is not worth a search beforehand
+            families.free_modes(n_modes=n_first)
+        band = float(families.free_modes(n_modes=min(n_modes, n_most)).frequencies[-1]) * (1 + 1e-9)
+    modes = families.free_modes(ModeCount(cutoff=MODES_BEYOND * band))
+    n_band = int((modes.frequencies <= band).sum())
+    if n_band == 0:
+        first = families.free_modes(n_modes=1).frequencies[0] / body.units.time
+        raise CompareError(
+            f"band: up to {band / body.units.time:g} Hz, but the first elastic mode of body {body.name!r} is at "
+            f"{first:.6g} Hz; choose a band that holds modes"
+        )
+    response = reference_response(families, Ports.of_body(body), band)
+    if motion is None:
+        load = pulse.load(body, band=band, first=float(modes.frequencies[0]))
+        motion = transient(families, load, cutoff=MODES_BEYOND * band / body.units.time, damping=damping)
+    directions = centered_directions(body)
+    return FullModel(
+        band=band,
+        omega2=modes.omega2,
+        rigid=families.free.N,
+        Phi=modes.Phi[:, :n_band],
+        Psi_A=deformation(families, families.Psi_A),
+        Psi_H=deformation(families, families.Psi_H),
+        Psi_L=deformation(families, load_case_responses(families)),
+        moved=deformation(families, motion.columns),
+        amplitudes=motion.amplitudes,
+        t=motion.t,
+        port_omega2=response.model.omega2,
+        port_is_massive=response.model.is_massive,
+        port_modes=response.model.modes,
+        port_rigid=response.model.rigid,
+        port_error=response.error,
+        directions=directions,
+        held_mass=held_mass(families, directions),
+        mass=np.einsum("nk,nk->k", directions, body.M @ directions),
+    )
+
+
+def static_labels(families: Families, full: FullModel) -> tuple[tuple[str, ...], ...]:
+    """Return names of the loads of Psi_A, Psi_H and Psi_L."""
+    held = families.held_labels("load")
+    cases = tuple(case.name for case in families.body.load_cases)
+    return tuple(held[k] for k in families.free.e), acceleration_labels(full.Psi_H.shape[1]), cases
+
+
+def deformation(families: Families, u: Array) -> Array:
+    """Return displacements without their rigid-body motion, u - N Nᵀ M u, which costs the energy norm its digits."""
+    free = families.free
+    return u - free.N @ (free.M_N.T @ u)
+
+
+def centered_directions(body: FEBody) -> Array:
+    """Return the geometric rigid-body modes about the centre of mass, (n_dof, 6), mesh axes."""
+    moved = geometric_rigid_modes(body)
+    M_moved = body.M @ moved
+    mass = moved[:, 0] @ M_moved[:, 0]
+    if mass <= 0:
+        return moved
+    # S = int c from the products of translations and rotations: d_x · theta_y gives S_z, d_y · theta_z S_x, …
+    products = moved[:, :3].T @ M_moved[:, 3:]
+    center = np.array([products[1, 2], products[2, 0], products[0, 1]]) / mass
+    return geometric_rigid_modes(body, origin=center)
+
+
+def held_mass(families: Families, directions: Array) -> Array:
+    """Return sum of the effective masses of all fixed-interface modes, (6,): b_Iᵀ M_II⁻¹ b_I, b = M d.
+
+    Its complement sits at the interfaces and moves with them.
+    """
+    body, fixed = families.body, families.fixed
+    M_ii, b = fixed.M_ii, (body.M @ directions)[fixed.i]
+    diagonal = M_ii.diagonal()
+    has_mass = np.flatnonzero(diagonal > 0)
+    M_ii, b, diagonal = M_ii[has_mass][:, has_mass], b[has_mass], diagonal[has_mass]
+    precondition = sla.LinearOperator(M_ii.shape, matvec=lambda x: x / diagonal)
+    total = np.zeros(b.shape[1])
+    for k in range(b.shape[1]):
+        if np.abs(b[:, k]).max(initial=0.0) > 0:
+            x, _ = sla.cg(M_ii, b[:, k], rtol=MASS_TOLERANCE, M=precondition, maxiter=2000)
+            total[k] = x @ b[:, k]
+    return total
+
+
+# The file -------------------------------------------------------------------------------------------------------------
+
+
+def reference_digest(body: FEBody, *asked: object) -> str:
+    """Return a digest of all that the reference solution depends on: matrices, dofs, interfaces, what was asked for."""
+    digest = hashlib.sha256(repr((VERSION, body.units.name, asked)).encode())
+    for matrix in (whole_matrix(body.K), whole_matrix(body.M)):
+        for array in (matrix.data, matrix.indices, matrix.indptr):
+            digest.update(np.ascontiguousarray(array).data)
+    for case in body.load_cases:
+        digest.update(case.name.encode())
+        digest.update(np.ascontiguousarray(case.f).data)
+    for interface in body.interfaces:
+        digest.update(interface.name.encode())
+        for part in (interface.nodes, interface.reference, interface.weights):
+            digest.update(np.ascontiguousarray(part).data)
+    for part in (body.nodes, body.dofs, body.b):
+        digest.update(np.ascontiguousarray(part).data)
+    return digest.hexdigest()
+
+
+def write_full_model(path: Path, full: FullModel, digest: str) -> None:
+    """Write a reference solution; `OSError` if that fails."""
+    buffer = BytesIO()
+    arrays = {field.name: getattr(full, field.name) for field in fields(full)}
+    np.savez(buffer, digest=np.frombuffer(bytes.fromhex(digest), np.uint8), **arrays)
+    replace_file(path, buffer.getvalue())
+
+
+def read_full_model(path: Path, digest: str) -> FullModel | None:
+    """Return the reference solution of that digest, or None if the file holds another one, or none that is whole."""
+    if not path.is_file():
+        return None
+    try:
+        with np.load(BytesIO(path.read_bytes()), allow_pickle=False) as file:
+            if bytes(file["digest"]).hex() != digest:
+                return None
+            return FullModel(**{field.name: file[field.name] for field in fields(FullModel)})
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        log.warning("%s: not a whole reference solution (%s); it is computed anew", path, error)
+        return None

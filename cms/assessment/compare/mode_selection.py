@@ -1,0 +1,295 @@
+"""Automatic selection: the fewest modes with which a set meets a stated error over a stated band."""
+
+import inspect
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Any, Protocol
+
+import numpy as np
+
+from cms.assessment.compare.coordinates import ReferenceBasis
+from cms.assessment.compare.free_shapes import judged_subset
+from cms.assessment.compare.subsets import SUBSETS
+from cms.assessment.quality.of_reduction.frf import DAMPING, LOWEST, compare_responses, frequency_grid
+from cms.assessment.quality.reference.free_basis import FreeBasis
+from cms.assessment.quality.reference.full_reference import FullReference
+from cms.assessment.quality.reference.port_model import PortModel, modal_response
+from cms.errors import ModeSetError
+from cms.modes.families.families import Families
+from cms.modes.families.sharing import families_of
+from cms.modes.mode_set import ModeSet
+from cms.modes.mode_sets import MODE_SETS
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.tall.on_disk import in_memory
+from fe_models.foundation.words import nearest, quoted
+
+__all__ = ["MEASURES", "Selection", "Trial", "select_modes"]
+
+FEWEST = 8  #: modes of the first set that is made
+MOST = 300  #: modes at which the search gives up, by default
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One number of modes and what came of it."""
+
+    n_modes: int
+    n_columns: int  #: of the mode set, static ones included
+    error: float  #: by the measure; inf where the set lacks a mode of the band, or could not be made
+    where: str  #: of the largest error, in words
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """The chosen set and why it was chosen."""
+
+    modes: ModeSet
+    n_modes: int
+    error: float  #: with that number
+    history: tuple[Trial, ...]  #: all numbers that were tried, ascending
+    sentence: str  #: the choice and its reason, for people
+    options: Mapping[str, str] = field(default_factory=dict)  #: what was asked for
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "options", MappingProxyType(dict(self.options)))
+
+
+def select_modes(
+    body: FEBody | Families,
+    *,
+    set: str = "craig-bampton",
+    error: float,
+    band: tuple[float, float],
+    measure: str = "frequency",
+    options: Mapping[str, Any] | None = None,
+    added: Callable[[ModeSet], ModeSet] | None = None,
+    most: int = MOST,
+) -> Selection:
+    """Find the fewest modes with which a set meets an error over a band.
+
+    (1) the full model once: free modes of the band, and its response at the interfaces where that is the measure
+    (2) sets that grow by columns: the set with many modes once; all smaller ones are judged as its subspaces in small
+        coordinates, from none up, until one meets the error; if none does, with twice as many
+    (3) other sets: 0, 1, 2, 4, … modes until one meets the error, then bisection for the fewest
+
+    Parameters
+    ----------
+    body
+        A coupled body with at least one interface, or its `Families`.
+    set
+        Name in `MODE_SETS` of a set with a number of modes.
+    error
+        Largest accepted error, such as 1e-3.
+    band
+        Frequencies (from, to) [Hz].
+    measure
+        "frequency": largest relative error of the elastic free-free frequencies in the band.
+        "frf": root mean square, over the logarithm of frequency, of the relative error of the receptance of all
+        interfaces, 1 % modal damping (`cms.assessment.quality.of_reduction.frf`).
+    options
+        Of the set, beside the number of modes.
+    added
+        What is done to the set before it is judged, such as `with_load_cases`.
+    most
+        Number of modes at which the search gives up.
+
+    Raises
+    ------
+    ModeSetError
+        If numbers or names are wrong, the band holds no mode, or no number of modes meets the error: the text has the
+        best that was found.
+    """
+    _check(set, error, band, measure)
+    options = dict(options or {})
+    with ExitStack() as stack:
+        families = stack.enter_context(families_of(body))
+        reference = stack.enter_context(FullReference(families, band=band[1]))
+        judge = MEASURES[measure](reference, band)
+        make = _Maker(set, families, options, added, most)
+        search = _by_subspaces if set in SUBSETS and added is None else _by_bisection
+        tried: dict[int, Trial] = {}
+        for trial in search(make, judge, reference, error):
+            tried[trial.n_modes] = trial
+        history = tuple(tried[n] for n in sorted(tried))
+        met = [trial for trial in history if trial.error <= error]
+        if not met:
+            best = min(history, key=lambda trial: trial.error)
+            raise ModeSetError(
+                f"select_modes: mode set {set!r} does not meet {judge.words} of {error:g} from {band[0]:g} to "
+                f"{band[1]:g} Hz with up to {history[-1].n_modes} modes; the best was {best.error:.3g} with "
+                f"{best.n_modes}, {best.where}; accept a larger error, or take another set or a lower band"
+            )
+        chosen = met[0]
+        sentence = _sentence(set, chosen, tried.get(chosen.n_modes - 1), judge.words, error, band)
+        asked = {"selected": sentence, "error": f"{error:g}", "band": f"{band[0]:g} to {band[1]:g} Hz"}
+        modes = make(chosen.n_modes)
+        return Selection(
+            replace(modes, options={**modes.options, **asked}), chosen.n_modes, chosen.error, history, sentence, asked
+        )
+
+
+class _Judge(Protocol):
+    """A measure made ready for one body and band."""
+
+    words: str  #: what it measures
+
+    def __call__(self, basis: FreeBasis, at_ports: Array) -> tuple[float, str]:
+        """Return the error of the free-free shapes of a set, and where it is largest."""
+
+
+class _FrequencyError:
+    words = "a frequency error"
+
+    def __init__(self, reference: FullReference, band: tuple[float, float]) -> None:
+        full = np.asarray(reference.frequencies)
+        self.full, self.time = full, reference.body.units.time
+        self.index = np.flatnonzero((full >= band[0]) & (full <= band[1]))
+        if not len(self.index):
+            raise ModeSetError(
+                f"select_modes: no elastic free mode of body {reference.body.name!r} lies from {band[0]:g} to "
+                f"{band[1]:g} Hz; the first is at {full[0]:.6g} Hz; widen the band, or measure the frf"
+            )
+
+    def __call__(self, basis: FreeBasis, at_ports: Array) -> tuple[float, str]:
+        found = basis.frequencies(self.time)
+        if len(found) <= self.index[-1]:
+            return np.inf, f"has {len(found)} elastic modes, the band holds mode {self.index[-1] + 1}"
+        errors = np.abs(found[self.index] / self.full[self.index] - 1)
+        k = self.index[int(np.argmax(errors))]
+        return float(errors.max()), f"largest at free mode {k + 1}, {self.full[k]:.5g} Hz"
+
+
+class _ResponseError:
+    words = "a frequency response error"
+
+    def __init__(self, reference: FullReference, band: tuple[float, float]) -> None:
+        body = reference.body
+        self.time, self.length, self.names = body.units.time, body.length or 1.0, reference.ports.names
+        low = band[0] or min(LOWEST * float(reference.frequencies[0]), band[1] / 2)
+        self.grid = frequency_grid(low, band[1])
+        self.full = modal_response(reference.response.model, self.grid, damping=DAMPING, time=self.time)
+
+    def __call__(self, basis: FreeBasis, at_ports: Array) -> tuple[float, str]:
+        model = PortModel(self.names, basis.omega2, basis.is_massive, at_ports @ basis.Phi, at_ports @ basis.N)
+        reduced = modal_response(model, self.grid, damping=DAMPING, time=self.time)
+        errors = compare_responses(self.full, reduced, self.length)
+        f = np.log(self.grid)
+        k = int(np.argmax(errors))
+        mean = float(np.sqrt(np.trapezoid(errors**2, f) / (f[-1] - f[0])))
+        return mean, f"largest {errors[k]:.3g} at {self.grid[k]:.5g} Hz"
+
+
+MEASURES: dict[str, Callable[[FullReference, tuple[float, float]], _Judge]] = {
+    "frequency": _FrequencyError,
+    "frf": _ResponseError,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class _Maker:
+    """Makes the set with a number of modes."""
+
+    name: str
+    families: Families
+    options: Mapping[str, Any]
+    added: Callable[[ModeSet], ModeSet] | None
+    most: int
+
+    def __call__(self, n_modes: int) -> ModeSet:
+        modes = MODE_SETS[self.name](self.families, n_modes=n_modes, **self.options)
+        return modes if self.added is None else self.added(modes)
+
+    @property
+    def n_most(self) -> int:
+        """Number of modes above which no set can be made."""
+        body = self.families.body
+        return min(self.most, max(0, body.n_dof - len(body.b) - 1))
+
+
+def _by_subspaces(make: _Maker, judge: _Judge, reference: FullReference, error: float) -> Iterator[Trial]:
+    """Judge all numbers of modes as subspaces of the set with the most, from the fewest up: (2)."""
+    basis, n_r = _reference_basis(make, reference)
+    n, first = min(make.n_most, max(FEWEST, 2 * reference.n_band)), 0
+    while True:
+        modes = make(n)
+        c = basis.coordinates(in_memory(modes.columns))
+        at_b = np.asarray(modes.columns[make.families.body.b])
+        for k in range(first, n + 1):
+            C, labels = SUBSETS[make.name](modes, at_b, k)
+            try:
+                subset = judged_subset(c, c.columns @ C, labels, c.reference[:, :n_r], basis.omega2)
+            except ModeSetError as problem:  # normal modes, none of them
+                yield Trial(k, len(labels), np.inf, str(problem))
+                continue
+            found, where = judge(subset.basis, c.at_ports)
+            yield Trial(k, len(labels), found, where)
+            if found <= error:
+                return
+        if n >= make.n_most:
+            return
+        n, first = min(make.n_most, 2 * n), n + 1
+
+
+def _by_bisection(make: _Maker, judge: _Judge, reference: FullReference, error: float) -> Iterator[Trial]:
+    """Judge sets that are made anew for each number of modes, by doubling and bisection: (3)."""
+    basis, n_r = _reference_basis(make, reference)
+
+    def tried(n: int) -> Trial:
+        try:
+            modes = make(n)
+            c = basis.coordinates(in_memory(modes.columns))
+            subset = judged_subset(c, c.columns, modes.labels, c.reference[:, :n_r], basis.omega2)
+        except ModeSetError as problem:
+            return Trial(n, 0, np.inf, str(problem))
+        return Trial(n, len(modes.labels), *judge(subset.basis, c.at_ports))
+
+    low, high = -1, 0
+    while True:
+        trial = tried(high)
+        yield trial
+        if trial.error <= error:
+            break
+        if high >= make.n_most:
+            return
+        low, high = high, min(make.n_most, max(1, 2 * high))
+    while high - low > 1:
+        middle = (low + high) // 2
+        trial = tried(middle)
+        yield trial
+        low, high = (low, middle) if trial.error <= error else (middle, high)
+
+
+def _reference_basis(make: _Maker, reference: FullReference) -> tuple[ReferenceBasis, int]:
+    """Small coordinates of rigid-body and free modes, and the number of the rigid-body ones."""
+    N = make.families.free.N
+    columns, n_r = np.hstack([N, reference.modes.Phi]), N.shape[1]
+    return ReferenceBasis(make.families, reference.ports, columns, n_r, float(reference.modes.omega2[0])), n_r
+
+
+def _sentence(
+    name: str, chosen: Trial, before: Trial | None, words: str, error: float, band: tuple[float, float]
+) -> str:
+    modes = "no vibration modes are" if chosen.n_modes == 0 else f"{chosen.n_modes} modes are the fewest"
+    text = (
+        f"{name}: {modes} needed for {words} of at most {error:g} from {band[0]:g} to {band[1]:g} Hz: "
+        f"{chosen.error:.3g} with these {chosen.n_columns} columns, {chosen.where}"
+    ).replace("fewest needed", "fewest")
+    if before is not None:
+        text += f"; {before.error:.3g} with one mode less"
+    return text
+
+
+def _check(name: str, error: float, band: tuple[float, float], measure: str) -> None:
+    if name not in MODE_SETS:
+        raise ModeSetError(f"select_modes: unknown mode set {quoted(name)}{nearest(name, MODE_SETS)}")
+    if "n_modes" not in inspect.signature(MODE_SETS[name]).parameters:
+        raise ModeSetError(f"select_modes: mode set {name!r} has no number of modes to choose")
+    if not 0 < error < 1:
+        raise ModeSetError(f"select_modes: error = {error}; expected a number between 0 and 1, such as 1e-3")
+    if len(band) != 2 or not 0 <= band[0] < band[1] < np.inf:
+        raise ModeSetError(f"select_modes: band = {tuple(band)}; expected two frequencies (from, to), 0 <= from < to")
+    if measure not in MEASURES:
+        raise ModeSetError(f"select_modes: unknown measure {quoted(measure)}{nearest(measure, MEASURES)}")

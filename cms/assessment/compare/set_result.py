@@ -1,0 +1,158 @@
+"""The result of one mode set: its points for every number of modes, its verdict, or why it could not be made."""
+
+import inspect
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from cms.assessment.compare.comparison import Point, SetResult
+from cms.assessment.compare.coordinates import Coordinates, ReferenceBasis
+from cms.assessment.compare.evaluation import Reference, judge_subset
+from cms.assessment.compare.free_shapes import judged_subset
+from cms.assessment.compare.subsets import SUBSETS
+from cms.assessment.compare.verdicts import is_good, set_sentence, severity, shown_point
+from cms.errors import CmsError
+from cms.modes.families.families import Families
+from cms.modes.mode_set import ModeSet
+from cms.modes.mode_sets import MODE_SETS
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.tall.on_disk import in_memory
+
+__all__ = ["SetPart", "counts_of_parts", "joined_parts", "set_part", "set_result"]
+
+
+@dataclass(frozen=True, eq=False)
+class SetPart:
+    """A mode set with some of the numbers of modes."""
+
+    points: tuple[Point, ...]  #: by ascending number of modes
+    columns: tuple[dict[str, int], ...]  #: family -> number of columns, of each point
+    refused: Mapping[int, str]  #: number of modes -> why it cannot be had
+    error: str  #: why the set cannot be judged at all
+    seconds: float
+
+
+def set_result(
+    name: str,
+    options: Mapping[str, Any],
+    counts: Sequence[int],
+    families: Families,
+    basis: ReferenceBasis,
+    reference: Reference,
+) -> SetResult:
+    """Return the result of one set; where it cannot be made, its sentence says why."""
+    return joined_parts(name, [set_part(name, options, counts, families, basis, reference)])
+
+
+def joined_parts(name: str, parts: Sequence[SetPart]) -> SetResult:
+    """Return the result of one set from its parts, which hold all numbers of modes."""
+    words = first_sentence(MODE_SETS[name].__doc__)
+    refused = {n_modes: why for part in parts for n_modes, why in part.refused.items()}
+    found = [pair for part in parts for pair in zip(part.points, part.columns, strict=True)]
+    found.sort(key=lambda pair: pair[0].n_modes)
+    points, columns = [point for point, _ in found], [each for _, each in found]
+    errors = [part.error for part in parts if part.error]
+    if errors or not points:
+        reasons = [refused[n_modes] for n_modes in sorted(refused, reverse=True)]
+        told = errors[0] if errors else "; ".join(dict.fromkeys(reasons))
+        return SetResult(name, words, (), None, "error", f"could not be made: {told}")
+    shown = shown_point(points)
+    kept = tuple(point if k == shown else without_curves(point) for k, point in enumerate(points))
+    chosen = columns[shown] if shown is not None else {}
+    sentence = set_sentence(points) + refused_words(refused)
+    seconds = sum(part.seconds for part in parts)
+    return SetResult(name, words, kept, shown, severity(points), sentence, chosen, seconds)
+
+
+def counts_of_parts(name: str, counts: Sequence[int]) -> list[tuple[int, ...]]:
+    """Return numbers of modes that are judged together: all, where sets with fewer modes are columns of the largest."""
+    asked = tuple(sorted(set(counts)))
+    is_one = name in SUBSETS or "n_modes" not in inspect.signature(MODE_SETS[name]).parameters
+    return [asked] if is_one else [(n_modes,) for n_modes in asked]
+
+
+def set_part(
+    name: str,
+    options: Mapping[str, Any],
+    counts: Sequence[int],
+    families: Families,
+    basis: ReferenceBasis,
+    reference: Reference,
+) -> SetPart:
+    """Return the points of one set, the number of columns of each family in each, and which are refused."""
+    began = time.perf_counter()
+    try:
+        points, columns, refused = judged_points(name, options, counts, families, basis, reference)
+    except (CmsError, np.linalg.LinAlgError) as error:
+        return SetPart((), (), {}, str(error), time.perf_counter() - began)
+    return SetPart(tuple(points), tuple(columns), refused, "", time.perf_counter() - began)
+
+
+def judged_points(
+    name: str,
+    options: Mapping[str, Any],
+    counts: Sequence[int],
+    families: Families,
+    basis: ReferenceBasis,
+    reference: Reference,
+) -> tuple[list[Point], list[dict[str, int]], dict[int, str]]:
+    """Return the points of one set, the number of columns of each family in each, and why others are refused."""
+    make = MODE_SETS[name]
+    takes = inspect.signature(make).parameters
+    body = families.body
+    asked = sorted(set(counts)) if "n_modes" in takes else [0]
+    points: list[Point] = []
+    families_of_columns: list[dict[str, int]] = []
+    refused: dict[int, str] = {}
+
+    def made(n_modes: int) -> ModeSet:
+        counted = {"n_modes": n_modes} if "n_modes" in takes else {}
+        return make(families, **counted, **options)
+
+    def judge(n_modes: int, c: Coordinates, T: Array, labels: tuple[str, ...], groups: Sequence[str]) -> None:
+        rigid = c.reference[:, reference.full.parts["rigid"]]
+        subset = judged_subset(c, T, labels, rigid, basis.omega2)
+        records = judge_subset(reference, c, subset)
+        points.append(Point(n_modes, len(labels), subset.n_q, subset.basis.dropped, records, is_good(records)))
+        families_of_columns.append({group: list(groups).count(group) for group in dict.fromkeys(groups)})
+
+    most: tuple[ModeSet, Coordinates] | None = None
+    for n_modes in reversed(asked):
+        try:
+            if most is None or name not in SUBSETS:
+                modes = made(n_modes)
+                most = modes, basis.coordinates(in_memory(modes.columns))
+            modes, c = most
+            if name in SUBSETS:
+                C, labels = SUBSETS[name](modes, np.asarray(modes.columns[body.b]), n_modes)
+                group_of = dict(zip(modes.labels, modes.groups, strict=True))
+                judge(n_modes, c, c.columns @ C, labels, [group_of[label] for label in labels])
+            else:
+                judge(n_modes, c, c.columns, modes.labels, modes.groups)
+        except CmsError as error:
+            refused[n_modes] = str(error)
+    return points[::-1], families_of_columns[::-1], refused
+
+
+def refused_words(refused: Mapping[int, str]) -> str:
+    """Say which numbers of modes could not be had; the first reason stands for all."""
+    if not refused:
+        return ""
+    numbers = ", ".join(str(n) for n in sorted(refused))
+    return f"; not possible with {numbers}: {refused[max(refused)]}"
+
+
+def without_curves(point: Point) -> Point:
+    """Return the point with the values and sentences of its records; frequencies and effective masses stay."""
+    kept = ("frequency-error", "effective-mass")
+    records = (record if record.name in kept else replace(record, data={}) for record in point.records)
+    return replace(point, records=tuple(records))
+
+
+def first_sentence(text: str | None) -> str:
+    """Return the first line of a docstring without its marks."""
+    line = (text or "").strip().split("\n")[0]
+    return line.split(" [1]_")[0].rstrip(".")

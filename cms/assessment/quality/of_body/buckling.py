@@ -1,0 +1,108 @@
+"""Buckling of a reduced body under its unit loads: where K + amplitude K_geo loses its stiffness (theory.md §7)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+
+from cms.assessment.quality.record import QualityRecord, information, judge
+from cms.body.reduced_body import ReducedBody
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.units import Units
+
+__all__ = ["CriticalLoad", "check_buckling", "critical_loads"]
+
+AXES = ("x", "y", "z")
+NEGLIGIBLE = 1e-10  #: eigenvalue over the largest of its load, below which a direction does not buckle
+
+
+@dataclass(frozen=True)
+class CriticalLoad:
+    """The amplitudes at which one load takes the stiffness of the body away; infinite: none does."""
+
+    load: str  #: in words, such as "force x at big_end", along the axes of B
+    along: float  #: least positive amplitude, in `unit`
+    against: float  #: size of the least negative amplitude, in `unit`; infinite for angular velocities
+    unit: str
+
+
+def critical_loads(reduced: ReducedBody) -> tuple[CriticalLoad, ...]:
+    """Return the critical amplitude of each unit load alone, from the reduced eigenproblem K x = -amplitude K_j x.
+
+    The balance of a load is that of the frame: in a Tisserand frame a force at an interface accelerates the body, in a
+    nodal frame the held interface answers it. Angular velocities omega: K + omega² (K_aa - 5C_aa) x = 0, the critical
+    speed of steady rotation; softening by the centrifugal force itself is counted. All are upper bounds, as close as
+    the modes come to the buckling shapes.
+
+    Returns
+    -------
+    tuple of CriticalLoad
+        Angular velocities about the axes of B, accelerations and angular accelerations that cause stress, then forces
+        and moments at the interfaces whose loads are known; none without geometric stiffness.
+    """
+    geometric, u = reduced.geometric, reduced.units
+    if geometric is None:
+        return ()
+    found = []
+    for a, axis in enumerate(AXES):
+        K_spin = np.asarray(geometric.spin[a]) - reduced.moments.C5[:, :, a, a]
+        omega2, _ = critical_factors(reduced, (K_spin + K_spin.T) / 2)
+        found.append(CriticalLoad(f"angular velocity {axis}", np.sqrt(omega2) / u.time, np.inf, "rad/s"))
+    parts = [
+        ("acceleration", geometric.translation, f"{u.length_symbol}/{u.time_symbol}²"),
+        ("angular acceleration", geometric.rotation, f"rad/{u.time_symbol}²"),
+    ]
+    for interface, K in zip((reduced.interfaces[k] for k in geometric.loaded), geometric.interfaces, strict=True):
+        parts.append((f"force at {interface.name}", K[:3], u.force_symbol))
+        parts.append((f"moment at {interface.name}", K[3:], f"{u.force_symbol} {u.length_symbol}"))
+    for name, matrices, unit in parts:
+        words = name.split(" at ")
+        for axis, K in zip(AXES, matrices, strict=True):
+            if np.any(K):
+                what = " at ".join([f"{words[0]} {axis}", *words[1:]])
+                found.append(CriticalLoad(what, *critical_factors(reduced, np.asarray(K)), unit))
+    return tuple(found)
+
+
+def critical_factors(reduced: ReducedBody, K_geo: Array) -> tuple[float, float]:
+    """Return the least factors f > 0 at which K + f K_geo, and at which K - f K_geo, is singular."""
+    size = 1 / np.sqrt(np.diag(reduced.K))
+    values = la.eigvalsh(size[:, None] * K_geo * size)
+    scale = np.abs(values).max(initial=0.0) * NEGLIGIBLE
+    least, largest = values[0], values[-1]
+    return (-1 / least if least < -scale else np.inf), (1 / largest if largest > scale else np.inf)
+
+
+def check_buckling(reduced: ReducedBody) -> QualityRecord:
+    """Critical amplitudes of the unit loads; the value is the largest of unit load over critical load."""
+    if not reduced.n_q:
+        return information("buckling", "the body has no modes")
+    if reduced.geometric is None:
+        return information("buckling", "the file has no geometric stiffness; loads do not stiffen or buckle the body")
+    if not (np.diag(reduced.K) > 0).all():
+        return information("buckling", "not every mode has a stiffness above zero; see the record on definiteness")
+    loads = critical_loads(reduced)
+    rows = [[load.load, load.along, load.against, load.unit] for load in loads]
+    value = max((1 / unit_factor(load, reduced.units) for load in loads), default=0.0)
+    return judge("buckling", value, "; ".join(sentences(loads)), {"loads": rows})
+
+
+def unit_factor(load: CriticalLoad, units: Units) -> float:
+    """Return how many unit loads buckle the body."""
+    if load.unit == "rad/s":
+        return (load.along * units.time) ** 2
+    return min(load.along, load.against)
+
+
+def sentences(loads: tuple[CriticalLoad, ...]) -> list[str]:
+    """Return the least angular velocity, acceleration, force and moment in words, with the sign of the load."""
+    words = []
+    for kind in ("angular velocity", "acceleration", "angular acceleration", "force", "moment"):
+        of_kind = [load for load in loads if load.load.split(" at ")[0][:-2] == kind]
+        of_kind = [load for load in of_kind if np.isfinite(min(load.along, load.against))]
+        if not of_kind:
+            continue
+        first = min(of_kind, key=lambda load: min(load.along, load.against))
+        sign = "" if kind == "angular velocity" or first.along < first.against else "-"
+        words.append(f"{first.load}: {sign}{min(first.along, first.against):.4g} {first.unit}")
+    return words or ["no load of these buckles the body within its modes"]

@@ -1,0 +1,165 @@
+"""Identities that the moments, matrices and modes of one reduced body satisfy (docs/theory.md §4-5)."""
+
+import numpy as np
+
+from cms.assessment.quality.record import QualityRecord, information, judge
+from cms.assessment.quality.reference.free_pencil import free_elastic_modes, has_inertia
+from cms.body.reduced_body import ReducedBody
+from fe_models.foundation.arrays import Array
+
+__all__ = [
+    "check_energy_shares",
+    "check_frame_condition",
+    "check_free_frequencies",
+    "check_inertia_tensor",
+    "check_inertia_terms",
+    "check_modal_mass",
+    "mode_size",
+]
+
+
+def check_modal_mass(reduced: ReducedBody) -> QualityRecord:
+    """M* = Σ_a S_aa,kl of the moments equals the modal mass M; both are the same integral where moments are exact."""
+    if reduced.n_q == 0:
+        return information("modal-mass", "the body has no modes")
+    defect = np.abs(reduced.moments.M - reduced.M) / np.abs(reduced.M).max()
+    row, column = np.unravel_index(np.argmax(defect), defect.shape)
+    reason = f"largest difference of M* and M is {defect.max():.1e} of the largest entry, modes {row + 1}, {column + 1}"
+    data = {"defect": defect}
+    if not reduced.moments.is_exact:
+        return information("modal-mass", f"{reason}; the moments are approximate, from bare matrices", data)
+    return judge("modal-mass", defect.max(), reason, data)
+
+
+def check_inertia_terms(reduced: ReducedBody) -> QualityRecord:
+    """Count the inertia terms that the program which reduced the body did not say, and say what a motion is worth."""
+    missing = reduced.moments.missing
+    what = f"{', '.join(missing)} missing" if missing else "none is missing"
+    reason = f"{what}; to be trusted: {reduced.moments.trust}"
+    return judge("inertia-terms", float(len(missing)), reason, {"missing": list(missing)})
+
+
+def check_frame_condition(reduced: ReducedBody) -> QualityRecord:
+    """Tisserand: 1C = 2C = 0 about the centre of mass; nodal at an interface: that interface does not move.
+
+    |1C_k| / sqrt(m) and |2C_k| / sqrt(tr J) are at most one for a mode of unit modal mass, so they are without unit.
+    """
+    frame = reduced.frame
+    if reduced.n_q == 0:
+        return information("frame-condition", "the body has no modes")
+    if frame.kind == "tisserand":
+        linear, angular = momenta(reduced)
+        value = max(linear.max(), angular.max())
+        k = int(np.argmax(np.maximum(linear, angular)))
+        reason = f"largest momentum of a mode is {value:.1e} of what its mass could carry (mode {k + 1})"
+        return judge("frame-condition", value, reason, {"linear": linear, "angular": angular})
+    if frame.kind == "nodal":
+        if frame.at and frame.at not in [each.name for each in reduced.interfaces]:
+            return judge("frame-condition", np.inf, f"the frame is carried by {frame.at!r}, which is no interface")
+        motion, where = held_motion(reduced)
+        if len(motion):
+            relative = np.abs(motion).max(axis=0) / mode_size(reduced)
+            reason = (
+                f"{where}, which carry the frame, move by {relative.max():.1e} of the largest displacement of a mode "
+                f"(mode {int(np.argmax(relative)) + 1})"
+            )
+            return judge("frame-condition", relative.max(), reason, {"motion": relative})
+    return information("frame-condition", f"a {frame.kind} frame leaves no condition that the file alone could show")
+
+
+def held_motion(reduced: ReducedBody) -> tuple[Array, str]:
+    """Motions with q that a nodal frame holds at zero, as far as the file has them, (n, n_q) [m], and what they are.
+
+    The six of an interface with a reference point, rotations times the body length, or held translations of kept nodes.
+    """
+    frame = reduced.frame
+    if frame.at and reduced.interface(frame.at).kind != "nodes":
+        scale = np.repeat([1.0, body_length(reduced)], 3)
+        return scale[:, None] * reduced.interface(frame.at).Psi, f"the six motions of interface {frame.at!r}"
+    row_of = {int(node): k for k, node in enumerate(reduced.node_ids)}
+    rows = [
+        frame.axes[component] @ reduced.Phi[row_of[int(node)]]
+        for node, component in frame.dofs
+        if component < 3 and int(node) in row_of
+    ]
+    return np.array(rows).reshape(-1, reduced.n_q), f"{len(rows)} held translations"
+
+
+def check_free_frequencies(reduced: ReducedBody) -> QualityRecord:
+    """Free-free frequencies stored in the file against those of its own moments and stiffness.
+
+    They couple 1C, 2C, S, R and m with K and M, so a wrong sign in one of them shows.
+    """
+    stored = np.asarray(reduced.free_frequencies)
+    if not reduced.is_held and not has_inertia(reduced):
+        return information("free-frequencies", "the body has no inertia about some axis, so no free-free frequencies")
+    try:
+        omega2, _, is_massive = free_elastic_modes(reduced)
+    except np.linalg.LinAlgError as none:
+        return judge("free-frequencies", np.inf, f"moments and stiffness have no free-free modes: {none}")
+    own = np.sqrt(np.maximum(omega2[is_massive], 0.0)) / (2 * np.pi)
+    if not len(stored):
+        return information("free-frequencies", "the file holds no free-free frequencies to compare with")
+    if len(own) != len(stored):
+        reason = f"the file lists {len(stored)} free-free frequencies, its moments and stiffness give {len(own)}"
+        return judge("free-frequencies", np.inf, reason, {"stored": stored, "recomputed": own})
+    error = np.abs(own / stored - 1)
+    k = int(np.argmax(error))
+    reason = f"largest relative difference is {error[k]:.1e}, of free-free mode {k + 1}"
+    return judge("free-frequencies", error[k], reason, {"stored": stored, "recomputed": own})
+
+
+def check_inertia_tensor(reduced: ReducedBody) -> QualityRecord:
+    """Positive mass, and a second moment about the centre of mass without a negative eigenvalue.
+
+    This is the triangle inequality of the principal moments: none exceeds the sum of the other two.
+    """
+    moments = reduced.moments
+    if not moments.m > 0:
+        return judge("inertia-tensor", np.inf, f"the mass is {moments.m:g}; expected a positive one")
+    c = moments.center_of_mass
+    R = moments.R - moments.m * np.outer(c, c)
+    values = np.linalg.eigvalsh((R + R.T) / 2)
+    scale = np.trace(moments.R)
+    value = max(0.0, -float(values[0]) / scale) if scale > 0 else np.inf
+    principal = np.linalg.eigvalsh(np.trace(R) * np.eye(3) - (R + R.T) / 2)
+    reason = "principal moments " + ", ".join(f"{p:.4g}" for p in principal)
+    reason += " can be those of a body" if value <= 1e-9 else " break the triangle inequality"
+    return judge("inertia-tensor", value, reason, {"principal_moments": principal})
+
+
+def check_energy_shares(reduced: ReducedBody) -> QualityRecord:
+    """The shares of the sources in the energy of each mode sum to one."""
+    if not reduced.energy_shares.size:
+        return information("energy-shares", "the file holds no energy shares")
+    defect = np.abs(reduced.energy_shares.sum(axis=1) - 1)
+    reason = f"largest distance of the sum from one is {defect.max():.1e}"
+    return judge("energy-shares", defect.max(), reason, {"shares": reduced.energy_shares})
+
+
+def momenta(reduced: ReducedBody) -> tuple[Array, Array]:
+    """Linear and angular momentum of each mode per what its modal mass could carry, (n_q,) each."""
+    moments = reduced.moments
+    mass = np.sqrt(np.where(np.diag(reduced.M) > 0, np.diag(reduced.M), 1.0))
+    center = moments.center_of_mass
+    angular = moments.C2 - np.cross(center, moments.C1, axis=0)
+    inertia = np.trace(moments.J0) - 2 * moments.m * float(center @ center)
+    linear = np.linalg.norm(moments.C1, axis=0) / np.sqrt(moments.m)
+    return linear / mass, np.linalg.norm(angular, axis=0) / np.sqrt(max(inertia, np.finfo(float).tiny)) / mass
+
+
+def mode_size(reduced: ReducedBody) -> Array:
+    """Largest displacement of each mode that the file shows, at least that of a rigid body of its mass, (n_q,).
+
+    A mode of unit modal mass moves by 1 / sqrt(m) in the mean, though it may leave all kept nodes at rest.
+    """
+    size = np.linalg.norm(reduced.Phi, axis=1).max(axis=0, initial=0.0)
+    at_ports = [np.linalg.norm(interface.Psi[:3], axis=0) for interface in reduced.interfaces]
+    return np.asarray(np.max([size, np.full(reduced.n_q, 1 / np.sqrt(reduced.moments.m)), *at_ports], axis=0))
+
+
+def body_length(reduced: ReducedBody) -> float:
+    """Diagonal of the bounding box of kept nodes and interfaces, or the radius of gyration where that is zero [m]."""
+    points = [reduced.nodes, *(interface.position[None] for interface in reduced.interfaces)]
+    length = float(np.linalg.norm(np.ptp(np.concatenate(points), axis=0))) if sum(map(len, points)) else 0.0
+    return length or float(np.sqrt(np.trace(reduced.moments.J0) / reduced.moments.m)) or 1.0

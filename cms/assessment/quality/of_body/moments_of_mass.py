@@ -1,0 +1,94 @@
+"""The moments of a file against each other and against its shapes at the kept nodes.
+
+They are integrals over one mass of products of a = [1, c, phi_x, phi_y, phi_z], so their Gram matrix has no negative
+eigenvalue. Where the mass lies the file does not say; but masses at the kept nodes with the right sum and centre give
+moments that point the same way, wherever these are not small. A wrong sign does not.
+"""
+
+import numpy as np
+
+from cms.assessment.quality.of_body.identities import body_length
+from cms.assessment.quality.of_body.symmetry import negativity
+from cms.assessment.quality.record import QualityRecord, information, judge
+from cms.body.reduced_body import ReducedBody
+from fe_models.foundation.arrays import Array
+
+__all__ = ["check_gram", "check_moments_of_shapes"]
+
+ROUNDING = 1e3 * np.finfo(float).eps  #: of the Gram matrix about the origin of B, relative
+LEAST_NODES = 60  #: that can stand for the mass of a body
+CLEAR = 0.1  #: of what the mass could carry, above which the direction of a moment is told
+
+
+def check_gram(reduced: ReducedBody) -> QualityRecord:
+    """The Gram matrix of the moments, about the centre of mass, has no negative eigenvalue (unit diagonal)."""
+    moments = reduced.moments
+    if moments.missing or not moments.is_exact:
+        return information("gram", "the moments are not all known, or approximate")
+    n, c = moments.n_q, moments.center_of_mass
+    L = np.eye(4 + 3 * n)
+    L[1:4, 0] = -c
+    gram = L @ moments.gram @ L.T
+    size = np.sqrt(np.abs(np.diag(gram)))
+    offset = float(np.linalg.norm(c) / (size[1:4].max() / size[0])) if size[1:4].max() > 0 else 0.0
+    value = negativity(gram)
+    value = 0.0 if value < ROUNDING * (1 + offset**2) else value
+    reason = (
+        f"some combination of positions and shapes would have a negative integral of its square ({-value:.1e})"
+        if value > 0
+        else "the moments are those of one mass"
+    )
+    return judge("gram", value, reason)
+
+
+def check_moments_of_shapes(reduced: ReducedBody) -> QualityRecord:
+    """Moments point the way of those that masses at the kept nodes have with the shapes there.
+
+    (1) masses nearest to equal ones with the right mass and centre
+    (2) P of each mode, and the parts of S_kl beside its trace, of these masses
+    (3) the cosine between these and those of the file, where both are at least `CLEAR` of what the mass could carry
+    """
+    moments, nodes = reduced.moments, np.asarray(reduced.nodes)
+    if moments.missing or len(nodes) < LEAST_NODES or not reduced.n_q:
+        return information("moments-shapes", "too few nodes, or moments that are not known")
+    weights = masses_at_nodes(reduced)
+    if weights is None:
+        return information("moments-shapes", "masses at the kept nodes cannot have the centre of mass of the file")
+    size = np.sqrt(moments.m) * body_length(reduced)
+    c = nodes - moments.center_of_mass
+    Phi = np.asarray(reduced.Phi)
+    own = moments.P - np.einsum("a,bk->abk", moments.center_of_mass, moments.C1)
+    made = np.einsum("i,ia,ibk->abk", weights, c, Phi, optimize=True)
+    found: dict[str, float] = {}
+    for k, cosine in enumerate(cosines(own.reshape(9, -1) / size, made.reshape(9, -1) / size)):
+        if np.isfinite(cosine):
+            found[f"3C of mode {k + 1}"] = (1 - cosine) / 2
+    second = np.einsum("i,iak,ibl->abkl", weights, Phi, Phi, optimize=True)
+    beside = ~np.eye(3, dtype=bool)
+    root = np.sqrt(reduced.n_q)
+    whole = cosines(moments.S_kl[beside].reshape(-1, 1) / root, second[beside].reshape(-1, 1) / root)[0]
+    if np.isfinite(whole):
+        found["4C and 5C"] = (1 - whole) / 2
+    if not found:
+        return information("moments-shapes", "no moment is large enough to tell its direction")
+    worst = max(found, key=lambda key: found[key])
+    reason = f"least alike is {worst}: cosine {1 - 2 * found[worst]:.2f} to that of masses at the kept nodes"
+    return judge("moments-shapes", found[worst], f"{reason}, of {len(found)}", {"found": found})
+
+
+def masses_at_nodes(reduced: ReducedBody) -> Array | None:
+    """Return masses nearest to equal ones with the right mass and centre, (n,); None: some would be negative."""
+    moments, L = reduced.moments, body_length(reduced)
+    c = (np.asarray(reduced.nodes) - moments.center_of_mass) / L
+    rows, equal = np.vstack([np.ones(len(c)), c.T]), np.full(len(c), 1 / len(c))
+    change, *_ = np.linalg.lstsq(rows, np.eye(4)[0] - rows @ equal, rcond=1e-9)
+    weights = equal + change
+    return np.asarray(moments.m * weights) if weights.min() >= 0 else None
+
+
+def cosines(a: Array, b: Array) -> Array:
+    """Return the cosine between columns of equal number, NaN where one is below `CLEAR`, (k,)."""
+    one, other = np.linalg.norm(a, axis=0), np.linalg.norm(b, axis=0)
+    is_clear = (one > CLEAR) & (other > CLEAR)
+    product = np.einsum("nk,nk->k", a, b)
+    return np.divide(product, one * other, out=np.full(len(one), np.nan), where=is_clear)

@@ -1,0 +1,71 @@
+"""What a file says of itself in words: labels by its columns, damping by its provenance, and what it cannot show."""
+
+import numpy as np
+import scipy.linalg as la
+
+from cms.assessment.quality.record import QualityRecord, information, judge
+from cms.body.reduced_body import ReducedBody
+from cms.reduction.basis.damping import damping_of_words, modal_damping
+
+__all__ = ["check_damping_told", "check_labels", "check_scope"]
+
+
+def check_labels(reduced: ReducedBody) -> QualityRecord:
+    """Labels, sources and energy shares are those of the columns on record."""
+    columns = reduced.columns
+    if columns is None:
+        return information("labels", "the file holds no columns of its mode set")
+    words, groups = columns.mode_labels(), columns.sources
+    wrong = [k + 1 for k, (own, made) in enumerate(zip(reduced.labels, words, strict=True)) if own != made]
+    if tuple(reduced.sources) != groups:
+        return judge("labels", np.inf, f"sources {', '.join(reduced.sources)}; the columns are of {', '.join(groups)}")
+    apart = float(np.abs(reduced.energy_shares - columns.group_shares()).max(initial=0.0))
+    reason = f"energy shares differ from those of the columns by {apart:.1e}"
+    if wrong:
+        reason = f"mode {wrong[0]} is called {reduced.labels[wrong[0] - 1]!r}, by its columns {words[wrong[0] - 1]!r}"
+        reason += f"; {len(wrong)} such labels"
+    return judge("labels", max(apart, np.inf if wrong else 0.0), reason)
+
+
+def check_damping_told(reduced: ReducedBody) -> QualityRecord:
+    """D is at least the damping that the provenance names: dampers of the model add to it, nothing takes from it.
+
+    The least eigenvalue of D less that damping, over modes of one frequency, over the largest entry of either.
+    """
+    told = reduced.provenance.get("damping")
+    damping = None if told is None else damping_of_words(told)
+    if "frame converted from" in reduced.provenance or damping is None:
+        return information("damping-told", "the provenance names no damping of these modes")
+    made = modal_damping(damping, reduced.M, reduced.K, second=reduced.units.time)
+    omega = np.sqrt(np.maximum(np.diag(reduced.K), 0.0))
+    omega = np.where(omega > 0, omega, 1.0)
+    scale = np.sqrt(np.outer(omega, omega))
+    own, made = reduced.D / scale, made / scale
+    size = max(np.abs(own).max(initial=0.0), np.abs(made).max(initial=0.0))
+    rest = (own + own.T) / 2 - made
+    least = float(la.eigvalsh(rest)[0] / size) if size > 0 else 0.0
+    reason = f"D holds the damping that the provenance names, {told}"
+    if least < 0:
+        reason = f"D is less than the damping that the provenance names, {told}, by {-least:.1e} of the largest"
+    return judge("damping-told", max(0.0, -least), reason)
+
+
+def check_scope(reduced: ReducedBody) -> QualityRecord:
+    """List what the file holds and cannot be checked without its model."""
+    unknown = {
+        "modes and frequencies themselves": True,
+        "3C to 5C beyond their sign": not reduced.moments.missing,
+        "triads of interfaces": bool(reduced.interfaces),
+        "physical damping": bool(np.any(reduced.D)),
+        "load cases": bool(reduced.load_cases),
+        "stress of the modes": reduced.stress is not None or reduced.point_stress is not None,
+        "geometric stiffness over two modes": reduced.geometric is not None,
+        "quadratic modes beside the interfaces": reduced.quadratic is not None,
+        "rotations of kept nodes beside the interfaces": reduced.kept is not None,
+        "static part of recovery rows": bool(reduced.recovery),
+        "columns of the mode set": reduced.columns is not None,
+        "numbers and sets": not reduced.numbering.is_empty,
+    }
+    names = [name for name, is_held in unknown.items() if is_held]
+    reason = f"not checked without the model: {', '.join(names)}"
+    return information("scope", reason, {"unknown": names})

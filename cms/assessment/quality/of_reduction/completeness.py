@@ -1,0 +1,125 @@
+"""Static completeness: whether a mode set answers loads on the interfaces and rigid-body accelerations exactly."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cms.assessment.quality.record import QualityRecord, information, judge
+from cms.assessment.quality.reference.free_basis import FreeBasis
+from cms.assessment.quality.reference.full_reference import FullReference
+from cms.modes.families.families import Families
+from fe_models.body.fe_body import FEBody
+from fe_models.body.load_cases import load_columns
+from fe_models.foundation.arrays import Array, frozen
+
+__all__ = [
+    "StaticCompleteness", "completeness_records", "energy_error", "load_case_responses", "static_completeness",
+]  # fmt: skip
+
+NO_LOAD = 1e-10  #: part of a load that is not in balance with rigid acceleration, below which it is rounding
+NO_ENERGY = 1e-24  #: strain energy of a response over the largest of its kind, below which there is none
+ACCELERATIONS = ("ax", "ay", "az", "alpha x", "alpha y", "alpha z")
+
+
+@dataclass(frozen=True, eq=False)
+class StaticCompleteness:
+    """Relative errors in energy norm, sqrt(eᵀ K e / uᵀ K u), of static responses in the span of a mode set."""
+
+    interface_loads: tuple[str, ...]  #: one per excess boundary dof E: 'load big_end ux'
+    interface: Array  #: body held at the determinate dofs R under that unit load, (n_e,); NaN: no deformation
+    inertia_loads: tuple[str, ...]
+    inertia: Array  #: interfaces held, under that rigid-body acceleration, (n_r,); NaN: no deformation
+    load_cases: tuple[str, ...] = ()  #: those of the body
+    load_case: Array = field(default_factory=lambda: np.zeros(0))  #: free body under it, (n_load_cases,); NaN: as above
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "interface", frozen(self.interface))
+        object.__setattr__(self, "inertia", frozen(self.inertia))
+        object.__setattr__(self, "load_case", frozen(self.load_case))
+
+
+def energy_error(body: FEBody, basis: FreeBasis, U: Array) -> Array:
+    """Relative energy error of the best approximation of columns U by rigid motion and modes, (k,); NaN: no energy.
+
+    c = Phiᵀ K u / omega², e = u - Phi c; the error is formed, not the difference of two energies. Rigid motion is taken
+    off first: it has no energy, but its rounding has.
+    """
+    U = U - basis.N @ (basis.N.T @ (body.M @ U))
+    K_U = body.K @ U
+    energy = np.einsum("nk,nk->k", U, K_U)
+    c = (basis.Phi.T @ K_U) / basis.omega2[:, None]
+    E = U - basis.Phi @ c
+    error = np.einsum("nk,nk->k", E, body.K @ E)
+    has_energy = energy > NO_ENERGY * energy.max(initial=0.0)
+    return np.sqrt(np.maximum(error, 0.0) / np.where(has_energy, energy, np.nan))
+
+
+def static_completeness(reference: FullReference, basis: FreeBasis) -> StaticCompleteness:
+    """Find the error of every unit interface load and every unit rigid-body acceleration.
+
+    Interface loads are in balance with the reactions at R (attachment modes Psi_A: with R any balanced combination of
+    interface forces); accelerations act with all interfaces held (inertia-relief modes Psi_H).
+    """
+    body, families = reference.body, reference.families
+    Psi_H, labels = families.Psi_H, families.held_labels("load")
+    cases = tuple(case.name for case in body.load_cases)
+    return StaticCompleteness(
+        tuple(labels[k] for k in families.free.e),
+        energy_error(body, basis, families.Psi_A),
+        acceleration_labels(Psi_H.shape[1]),
+        energy_error(body, basis, Psi_H),
+        cases,
+        load_case_error(reference, basis) if cases else np.zeros(0),
+    )
+
+
+def load_case_error(reference: FullReference, basis: FreeBasis) -> Array:
+    """Relative energy error of the free body under each load case, in balance with its acceleration, (n_load_cases,).
+
+    A load that only accelerates the body, such as gravity, gives NaN.
+    """
+    U = load_case_responses(reference.families)
+    error = np.full(U.shape[1], np.nan)
+    for k in np.flatnonzero(U.any(axis=0)):
+        error[k] = energy_error(reference.body, basis, U[:, [k]])[0]
+    return error
+
+
+def load_case_responses(families: Families) -> Array:
+    """Return the static response of the free body to each of its load cases, (n_dof, n_load_cases).
+
+    Zero of a load that only accelerates the body.
+    """
+    body = families.body
+    F = load_columns(body.load_cases, body.n_dof)
+    balanced = families.project(F)
+    deforms = np.linalg.norm(balanced, axis=0) > NO_LOAD * np.linalg.norm(F, axis=0)
+    U = np.zeros(F.shape)
+    if deforms.any():
+        U[:, deforms] = families.flexibility(F[:, deforms])
+    return U
+
+
+def acceleration_labels(n_r: int) -> tuple[str, ...]:
+    """Return names of the rigid-body accelerations; numbers where the body knows fewer than six."""
+    return ACCELERATIONS if n_r == 6 else tuple(f"acceleration {k + 1}" for k in range(n_r))
+
+
+def completeness_records(statics: StaticCompleteness) -> tuple[QualityRecord, ...]:
+    """Records "static-interface", "static-inertia" and, where the body has load cases, "static-load-cases"."""
+    records = []
+    for name, labels, errors in (
+        ("static-interface", statics.interface_loads, statics.interface),
+        ("static-inertia", statics.inertia_loads, statics.inertia),
+        ("static-load-cases", statics.load_cases, statics.load_case),
+    ):
+        if name == "static-load-cases" and not labels:
+            continue
+        data = {"labels": labels, "errors": errors}
+        if not np.isfinite(errors).any():
+            records.append(information(name, "no such load deforms the body", data))
+            continue
+        k = int(np.nanargmax(errors))
+        reason = f"largest of {len(errors)} loads is {errors[k]:.2e}, of {labels[k]!r}"
+        records.append(judge(name, errors[k], reason, data))
+    return tuple(records)

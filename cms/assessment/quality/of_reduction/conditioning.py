@@ -1,0 +1,40 @@
+"""Condition of a mode set's columns before the finishing step."""
+
+import numpy as np
+
+from cms.assessment.quality.record import QualityRecord, judge
+from cms.assessment.quality.reference.free_basis import FreeBasis
+from cms.linear_algebra.independent import independent_columns
+from cms.linear_algebra.solvers.tall import inner
+from cms.modes.mode_set import ModeSet
+from fe_models.body.fe_body import FEBody
+
+__all__ = ["column_condition", "conditioning_record", "dropped_record"]
+
+
+def column_condition(body: FEBody, modes: ModeSet, omega2: float) -> tuple[float, tuple[str, ...]]:
+    """Condition number of the independent columns at unit length in the norm of W = K + omega² M, and the dropped ones.
+
+    With W-orthonormal Q the columns are V = Q (Qᵀ W V): it is that of the small matrix Qᵀ W V, which a Gram matrix
+    of V would show only up to its root.
+    """
+    V = modes.columns
+    Q, redundant = independent_columns(V, body, omega2)
+    kept = np.setdiff1d(np.arange(V.shape[1]), redundant)
+    T = inner(Q.KX + omega2 * Q.MX, V)[:, kept]
+    T = T / np.linalg.norm(T, axis=0)
+    return float(np.linalg.cond(T)), tuple(modes.labels[k] for k in redundant)
+
+
+def conditioning_record(condition: float, n_columns: int) -> QualityRecord:
+    """Record "conditioning"."""
+    digits = max(0.0, np.log10(condition)) if condition > 0 else np.inf
+    reason = f"condition number {condition:.2e}: about {digits:.0f} of 16 digits are lost among the kept columns"
+    return judge("conditioning", condition, reason, {"n_columns": n_columns})
+
+
+def dropped_record(basis: FreeBasis, n_columns: int) -> QualityRecord:
+    """Record "dropped-columns" of a mode set, column by column."""
+    labels = basis.dropped
+    reason = f"{len(labels)} of {n_columns} columns: {'; '.join(labels)}" if labels else "every column is independent"
+    return judge("dropped-columns", float(len(labels)), reason, {"labels": labels})

@@ -1,0 +1,650 @@
+"""Everything that a modal file holds against its model, in the file's own modes.
+
+(1) the modes of the file over all dofs of the model, Phi, as its kept nodes tell them (`full_shapes`)
+(2) each field afresh from the model and Phi, by the functions that `reduce` makes it with
+(3) the largest difference over the size of the field; stiffness and stress over modes of unit energy, inertia over
+    modes of unit mass
+
+No second reduction is compared, so signs, order and frame of the modes are free. With more than `FEW` modes what costs
+much is compared in `PROBES` random combinations of them, in which every mode has a part.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from cms.assessment.quality.of_body.identities import mode_size
+from cms.assessment.quality.of_reduction.fields import Compared, apart, same
+from cms.assessment.quality.of_reduction.full_shapes import FullShapes, finished_in, named_frame
+from cms.assessment.quality.record import QualityRecord, information, judge
+from cms.assessment.quality.reference.free_basis import FreeBasis
+from cms.body.geometric_stiffness import UNIT_LOADS
+from cms.body.invariants import known_P, known_S_kl
+from cms.body.recovery_table import N_RIGID, RecoveryTable
+from cms.body.reduced_body import ReducedBody
+from cms.body.source_columns import SourceColumns
+from cms.errors import CmsError
+from cms.modes.families.families import Families
+from cms.modes.families.mechanism import rounding_of_energy
+from cms.modes.families.rigid_modes import geometric_rigid_modes
+from cms.modes.mode_set import ModeSet
+from cms.reduction.basis.damping import Damping, damping_of_words, modal_damping
+from cms.reduction.basis.finishing import SUSPECT_ENERGY, FinishedBasis
+from cms.reduction.basis.frames import Frame, FrameCondition, HeldFrame, frame_condition
+from cms.reduction.basis.stress_modes import nodal_stress_modes, point_stress_modes
+from cms.reduction.geometric_stiffness.geometric_reduction import stiffness_of_states
+from cms.reduction.geometric_stiffness.quadratic_modes import force_stiffness
+from cms.reduction.geometric_stiffness.unit_states import has_geometric_stiffness, states_of
+from cms.reduction.recovery.load_columns import forces_of_loads
+from cms.reduction.recovery.matrices import recovery_of_model
+from cms.reduction.recovery.request import OF_INTERFACES, OF_MOTION, RecoveryRequest
+from cms.reduction.reduction import assembled, kept_nodes, reduced_moments
+from fe_models.body.fe_body import FEBody
+from fe_models.errors import FeModelsError
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.tall.on_disk import in_memory
+
+__all__ = ["CONTENTS", "ReductionOptions", "contents_records"]
+
+FEW = 24  #: modes up to which each is compared by itself
+PROBES = 12  #: combinations of more modes
+FEW_NODES = 20  #: up to which quadratic modes are compared node by node
+NODE_PROBES = 8  #: combinations of the forces at more nodes
+NEGLIGIBLE = 1e-3  #: of the size that a field could have, below which its own size does not count
+ROUGH = 1e5  #: times the limit, for geometric stiffness that went over from another frame
+STRESS = (1.0, -1.0, -2.0)  #: exponents of mass, length and time
+CONVERTED = "frame converted from"  #: provenance of a file that was carried to another frame
+#: provenance that has to be that of the model and its mode set; paths, versions and solvers may differ
+OF_ORIGIN = ("full dofs", "mode set", "mode set columns", "mode set n_modes", "mesh sha256", "deck sha256")
+
+
+@dataclass(frozen=True)
+class ReductionOptions:
+    """What a file is meant to hold: the options of `reduce` that its job names."""
+
+    damping: Damping | None = None
+    frame: Frame | HeldFrame | None = None
+    stress: bool = True
+    geometric: bool | tuple[str, ...] = False  #: whether the stiffness is made, or at which interfaces
+    quadratic: bool = False
+    recovery: tuple[RecoveryRequest, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A file, its model, and its modes over all dofs."""
+
+    body: FEBody
+    modes: ModeSet
+    reduced: ReducedBody
+    Phi: Array  #: the file's modes over all dofs, mesh axes, (n_dof, n_q)
+    families: Families
+    basis: FreeBasis
+    options: ReductionOptions | None
+
+    @cached_property
+    def length(self) -> float:
+        """Size of the body [m]."""
+        return self.body.length or 1.0
+
+    @cached_property
+    def reach(self) -> float:
+        """The same, or the farthest distance of a node from the origin of B where that is more [m]."""
+        own = (self.body.nodes - self.reduced.frame.origin) @ self.reduced.frame.axes
+        return max(self.length, float(np.linalg.norm(own, axis=1).max(initial=0.0)))
+
+    @cached_property
+    def combined(self) -> Array:
+        """Combinations of the modes in which they are compared: each, or some random ones, (n_q, k)."""
+        n = self.reduced.n_q
+        if n <= FEW:
+            return np.eye(n)
+        R = np.random.default_rng(29).normal(size=(n, PROBES))
+        return R / np.linalg.norm(R, axis=0)
+
+    @cached_property
+    def by_energy(self) -> Array:
+        """The same of modes of unit strain energy, (n_q, k)."""
+        stiffness = np.diag(self.reduced.K)
+        return self.combined / np.sqrt(np.where(stiffness > 0, stiffness, 1.0))[:, None]
+
+    @property
+    def axes_words(self) -> str:
+        """What an axis over the combinations counts."""
+        return "mode" if self.reduced.n_q <= FEW else "combination"
+
+    @cached_property
+    def condition(self) -> FrameCondition:
+        """The frame that the file names, made of the model."""
+        return frame_condition(self.body, named_frame(self.reduced.frame))
+
+    @cached_property
+    def keeping(self) -> FEBody:
+        """The model that keeps what the file keeps with rotations."""
+        kept = self.reduced.kept
+        own = np.zeros(0, np.int64) if kept is None else self.reduced.node_ids[kept.nodes]
+        return replace(self.body, kept=np.union1d(self.body.kept, own).astype(np.int64))
+
+    @cached_property
+    def node_ids(self) -> IntArray:
+        """Nodes that the file has to keep, with those that it does."""
+        return np.union1d(self.reduced.node_ids, kept_nodes(self.keeping)).astype(np.int64)
+
+    @cached_property
+    def expected(self) -> ReducedBody:
+        """What follows from model and modes without much work; moments and columns are those of the file."""
+        n, frame = self.reduced.n_q, self.reduced.frame
+        none = np.zeros((self.body.n_dof, 0))
+        finished = FinishedBasis(
+            self.Phi, self.reduced.M, self.reduced.K,
+            self.reduced.columns or SourceColumns(("",), ("",), np.zeros((1, n)), np.zeros((1, n))),
+            dropped=(), n_rigid=0, free_omega2=np.zeros(0),
+        )  # fmt: skip
+        condition = FrameCondition(frame, lambda columns: none, none, none, none, np.zeros(3))
+        made = assembled(
+            self.keeping, self.modes, finished, condition, kept=self.node_ids, moments=self.reduced.moments
+        )
+        D, _ = wanted_damping(self)
+        return replace(made, D=self.reduced.D if D is None else D)
+
+
+def contents_records(
+    body: FEBody,
+    modes: ModeSet,
+    reduced: ReducedBody,
+    shapes: FullShapes | None,
+    families: Families,
+    basis: FreeBasis,
+    options: ReductionOptions | None = None,
+) -> tuple[QualityRecord, ...]:
+    """Return a record for each of `CONTENTS`: what the file holds against what the model makes of its modes.
+
+    Parameters
+    ----------
+    shapes
+        The file's modes over all dofs of the model; None: its kept nodes do not determine them.
+    options
+        What the file was asked to hold; None: damping as its provenance says, and no recovery tables are compared.
+    """
+    if shapes is None:
+        return tuple(information(name, "the file does not tell its modes over the whole body") for name in CONTENTS)
+    case = Case(body, modes, reduced, shapes.Phi, families, basis, options)
+    return tuple(record_of(name, case, compare) for name, compare in CONTENTS.items())
+
+
+def record_of(name: str, case: Case, compare: Callable[[Case], Iterator[Compared]]) -> QualityRecord:
+    """Return the record of some fields."""
+    found: list[Compared] = []
+    try:
+        found += compare(case)
+    except (CmsError, FeModelsError, np.linalg.LinAlgError) as error:
+        return judge(
+            name, np.inf, f"the model does not make it: {error}", {"fields": {e.field: e.defect for e in found}}
+        )
+    if not found:
+        return information(name, "the file holds none, and none was asked for")
+    worst = max(found, key=lambda each: np.inf if np.isnan(each.defect) else each.defect)
+    data: dict[str, float] = {}
+    for each in found:
+        data[each.field] = max(data.get(each.field, 0.0), each.defect)
+    at = f" ({worst.where})" if worst.where else ""
+    reason = f"{worst.field}{at}: {worst.doubt}" if worst.doubt else ""
+    if not reason:
+        reason = f"largest difference from the model is {worst.defect:.1e}, of {worst.field}{at}; {len(data)} fields"
+    return judge(name, worst.defect, reason, {"fields": data})
+
+
+def missing(field: str, where: str = "") -> Compared:
+    """Return what is said of a field that the file has to hold and does not."""
+    return Compared(field, np.inf, where, "the file does not hold it")
+
+
+# Geometry -------------------------------------------------------------------------------------------------------------
+
+
+def compare_points(case: Case) -> Iterator[Compared]:
+    """Nodes, their numbers and sets, and the surface."""
+    file, expected = case.reduced, case.expected
+    yield same("node_ids", file.node_ids, case.node_ids)
+    if len(file.node_ids) != len(case.node_ids):
+        return
+    yield apart("nodes", file.nodes, expected.nodes, case.length, axes="node")
+    at = np.zeros((0, 3)) if not file.interfaces else np.array([each.position for each in file.interfaces])
+    wanted = np.zeros((0, 3)) if not file.interfaces else np.array([each.position for each in expected.interfaces])
+    at, wanted = (np.vstack([x, file.nodes]) for x in (at, wanted)) if at.shape == wanted.shape else (at, wanted)
+    yield apart("frame.origin", at, wanted if at.shape == wanted.shape else at, case.length)
+    span = np.ptp(expected.nodes, axis=0).max(initial=0.0) or case.length
+    yield apart("frame.axes", file.nodes, expected.nodes, span)
+    yield same("surface", file.surface, expected.surface)
+    for name in ("nodes", "on_skin", "elements", "instances", "node_instance", "element_instance"):
+        yield same(f"numbering.{name}", getattr(file.numbering, name), getattr(expected.numbering, name))
+    own, sets = file.numbering.sets, expected.numbering.sets
+    yield same("numbering.sets.name", tuple(s.name for s in own), tuple(s.name for s in sets))
+    for a, b in zip(own, sets, strict=False):
+        for name in ("kind", "members", "size"):
+            yield same(f"numbering.sets.{name}", getattr(a, name), getattr(b, name), a.name)
+    if expected.kept is not None:
+        if file.kept is None:
+            yield missing("kept.nodes")
+        else:
+            yield same("kept.nodes", file.kept.nodes, expected.kept.nodes)
+
+
+def compare_frame(case: Case) -> Iterator[Compared]:
+    """Whether the modes satisfy the frame that the file names."""
+    frame, made = case.reduced.frame, case.condition.frame
+    C = case.condition.rigid_part(case.Phi)
+    scale = np.repeat([1.0, case.length], 3)[: len(C)]
+    rigid = np.abs(scale[:, None] * C) / mode_size(case.reduced)
+    k = int(np.argmax(rigid.max(axis=0, initial=0.0)))
+    words = f"mode {k + 1} moves rigidly as a {frame.kind} frame does not allow"
+    defect = float(rigid.max(initial=0.0))
+    yield Compared("frame.kind", defect, words if defect else "")
+    yield Compared("frame.at", defect, words if defect else "")
+    if frame.at and len(frame.dofs) and len(made.dofs):
+        yield same("frame.dofs", frame.dofs, made.dofs)
+    else:
+        yield Compared("frame.dofs", defect, words if defect else "")
+
+
+def compare_interfaces(case: Case) -> Iterator[Compared]:
+    """Names, kinds, places, axes, members and motions of the interfaces."""
+    file, expected = case.reduced.interfaces, case.expected.interfaces
+    yield same("interfaces.name", tuple(each.name for each in file), tuple(each.name for each in expected))
+    size = mode_size(case.reduced)
+    rows = np.repeat([1.0, 1 / case.length], 3)[:, None]
+    for own, made in zip(file, expected, strict=False):
+        for name in ("kind", "members", "has_rotation"):
+            yield same(f"interfaces.{name}", getattr(own, name), getattr(made, name), own.name)
+        yield apart("interfaces.position", own.position, made.position, case.length, own.name)
+        yield apart("interfaces.triad", own.triad, made.triad, 1.0, own.name)
+        yield apart("interfaces.Psi", own.Psi, made.Psi, rows * size, own.name, "motion mode")
+
+
+def compare_rotations(case: Case) -> Iterator[Compared]:
+    """Rotations of the kept points, and where they come from."""
+    file, expected = case.reduced.kept, case.expected.kept
+    if expected is None:
+        return
+    if file is None:
+        yield missing("kept.rotation")
+        return
+    yield same("kept.source", file.source, expected.source)
+    turn = np.abs(expected.rotation).max(axis=(0, 1), initial=0.0)
+    size = np.maximum(turn, mode_size(case.reduced) / case.length)
+    yield apart("kept.rotation", file.rotation, expected.rotation, size, axes="point component mode")
+
+
+def compare_sums(case: Case) -> Iterator[Compared]:
+    """Weighted sums over the nodes."""
+    file, expected = case.reduced.nodal_sums, case.expected.nodal_sums
+    if file is None or expected is None:
+        if expected is not None:
+            yield missing("nodal_sums.w")
+        elif file is not None:
+            yield Compared("nodal_sums.w", np.inf, "", "the model has none")
+        return
+    w, L, size = expected.w, case.reach, mode_size(case.reduced)
+    yield same("nodal_sums.is_volume", file.is_volume, expected.is_volume)
+    scales: dict[str, Array | float] = {"w": w, "S": w * L, "R": w * L**2, "U1": w * size, "U2": w * L * size}
+    for name, scale in scales.items():
+        yield apart(f"nodal_sums.{name}", getattr(file, name), getattr(expected, name), scale)
+
+
+# Inertia and damping --------------------------------------------------------------------------------------------------
+
+
+def compare_moments(case: Case) -> Iterator[Compared]:
+    """All moments of the modes, with which 1C to 5C go, over what a mode of unit mass could have.
+
+    1C and 2C by the full mass matrix too, which has them exactly of any body.
+    """
+    file, R = case.reduced.moments, case.combined
+    frame = case.reduced.frame
+    L = geometric_rigid_modes(case.body, origin=frame.origin).T @ (case.body.M @ case.Phi)
+    size = np.sqrt(file.m)
+    yield apart("moments.C1", file.C1, frame.axes.T @ L[:3], size, "by the mass matrix", "component mode")
+    yield apart(
+        "moments.P", file.C2, frame.axes.T @ L[3:], size * case.length, "2C by the mass matrix", "component mode"
+    )
+    made = reduced_moments(case.body, case.Phi @ R, case.reduced.frame)
+    if not file.missing:
+        yield same("moments.is_exact", file.is_exact, made.is_exact)
+    yield same("moments.missing", file.missing, made.missing)
+    if not made.is_exact and CONVERTED in case.reduced.provenance:
+        return  # what matrices alone tell of them depends on the frame
+    word = case.axes_words
+    yield apart("moments.C1", file.C1 @ R, made.C1, size, axes=f"component {word}")
+    P = known_P(made.P, file.missing)
+    yield apart("moments.P", file.P @ R, P, size * case.reach, axes=f"- - {word}")
+    S_kl = known_S_kl(made.S_kl, file.missing)
+    yield apart("moments.S_kl", R.T @ file.S_kl @ R, S_kl, 1.0, axes=f"- - {word} {word}")
+
+
+def compare_damping(case: Case) -> Iterator[Compared]:
+    """The damping matrix over modes of one frequency: that of the model, and what the job or the provenance adds."""
+    D, words = wanted_damping(case)
+    if D is None:
+        return
+    omega = np.sqrt(np.maximum(np.diag(case.reduced.K), 0.0))
+    scale = np.sqrt(np.outer(omega, omega))
+    scale = np.where(scale > 0, scale, 1.0)
+    own, made = case.reduced.D / scale, D / scale
+    size = max(np.abs(own).max(initial=0.0), np.abs(made).max(initial=0.0))
+    yield apart("D", own, made, size or 1.0, words, "mode mode")
+
+
+def wanted_damping(case: Case) -> tuple[Array | None, str]:
+    """Return the damping matrix that the file should have, and where it comes from; None where that is not known."""
+    reduced, options = case.reduced, case.options
+    told = reduced.provenance.get("damping", "none")
+    damping, words = damping_of_words(told), f"provenance: {told}"
+    if CONVERTED in reduced.provenance:
+        if options is None:
+            return None, ""
+        asked = str(options.damping) if options.damping else "none"
+        if asked == told:
+            return carried_damping(case, options.damping, options.frame), f"the job: {asked}, carried to this frame"
+        # of new modes, in place of all that was there
+        return None if damping is None else modal_damping(
+            damping, reduced.M, reduced.K, second=reduced.units.time
+        ), words
+    if options is not None:
+        damping, words = options.damping, f"the job: {options.damping or 'none'}"
+    elif damping is None and told != "none":
+        return None, ""
+    return damping_of(case.body, case.Phi, damping, reduced.M, reduced.K), words
+
+
+def damping_of(body: FEBody, Phi: Array, damping: Damping | None, M: Array, K: Array) -> Array:
+    """Return the damping of the model over shapes and what is added to it, (n_q, n_q)."""
+    D = np.zeros(K.shape) if damping is None else modal_damping(damping, M, K, second=body.units.time)
+    if body.D is not None:
+        of_model = Phi.T @ (body.D @ Phi)
+        D = D + (of_model + of_model.T) / 2
+    return D
+
+
+def carried_damping(case: Case, damping: Damping | None, frame: Frame | HeldFrame | None) -> Array:
+    """Return Tᵀ D T of the modes in the frame of the job, Phi_job T = Phi but for rigid motion."""
+    old = frame or named_frame(replace(case.reduced.frame, kind="tisserand", at=""))
+    finished = finished_in(case.body, case.basis, old)
+    Phi = in_memory(finished.Phi)
+    T = (Phi.T @ (case.body.K @ case.Phi)) / np.diag(finished.K)[:, None]
+    return np.asarray(T.T @ damping_of(case.body, Phi, damping, finished.M, finished.K) @ T)
+
+
+# Loads, stress, columns -----------------------------------------------------------------------------------------------
+
+
+def compare_load_cases(case: Case) -> Iterator[Compared]:
+    """Resultants and modal forces over the sum of the nodal forces."""
+    file, expected = case.reduced.load_cases, case.expected.load_cases
+    yield same("load_cases.name", tuple(each.name for each in file), tuple(each.name for each in expected))
+    is_turn = case.body.dofs[:, 1] >= 3
+    for own, made, load in zip(file, expected, case.body.load_cases, strict=False):
+        size = np.abs(load.f)
+        force = float(size[~is_turn].sum() + size[is_turn].sum() / case.length)
+        yield same("load_cases.kind", own.kind, made.kind, own.name)
+        yield apart("load_cases.force", own.force, made.force, force, own.name)
+        yield apart("load_cases.torque", own.torque, made.torque, force * case.reach, own.name)
+        yield apart("load_cases.h", own.h, made.h, size @ np.abs(case.Phi), own.name, "mode")
+
+
+def compare_sources(case: Case) -> Iterator[Compared]:
+    """Labels and shares by the columns on record; these by the mode set, up to the scale of each column.
+
+    The forces F of a mode on the columns V are VᵀK Phi, its coordinates A give it back, V A = Phi but for rigid motion.
+    """
+    file = case.reduced
+    if file.columns is None:
+        return
+    yield same("labels", file.labels, file.columns.mode_labels())
+    yield same("sources", file.sources, file.columns.sources)
+    if len(file.sources) == len(file.columns.sources):
+        yield apart("energy_shares", file.energy_shares, file.columns.group_shares(), 1.0, axes="mode source")
+    yield same("columns.labels", file.columns.labels, case.modes.labels)
+    yield same("columns.groups", file.columns.groups, case.modes.groups)
+    V, Z = case.modes.columns, case.by_energy
+    if len(file.columns.labels) != V.shape[1]:
+        return
+    K_Phi = case.body.K @ (case.Phi @ Z)
+    G, F, A = V.T @ K_Phi, np.asarray(file.columns.F) @ Z, np.asarray(file.columns.A) @ Z
+    energy = np.einsum("nc,nc->c", V, case.body.K @ V)
+    works = energy > SUSPECT_ENERGY * rounding_of_energy(case.body, V)  # the others are rigid-body motions
+    works &= np.asarray(file.columns.F).any(axis=1)  # a column without forces is on record as zero
+    size = np.where(works, np.sqrt(np.maximum(energy, 0.0)), np.inf)
+    own = np.einsum("ck,ck->c", F, F)
+    scale = np.divide(np.einsum("ck,ck->c", G, F), own, out=np.zeros_like(own), where=works & (own > 0))
+    yield apart("columns.F", scale[:, None] * F, G, size[:, None], axes=f"column {case.axes_words}")
+    back = np.divide(A, scale[:, None], out=np.zeros_like(A), where=scale[:, None] != 0)
+    u = V @ back
+    E = u - case.Phi @ Z
+    rounding = SUSPECT_ENERGY * rounding_of_energy(case.body, np.abs(V) @ np.abs(back))
+    error = np.sqrt(np.maximum(np.einsum("nk,nk->k", E, case.body.K @ E) - rounding, 0.0))
+    energy = np.sqrt(np.maximum(np.einsum("nk,nk->k", case.Phi @ Z, K_Phi), 0.0))
+    yield apart("columns.A", error, np.zeros_like(error), energy, axes=case.axes_words)
+
+
+def compare_stress(case: Case) -> Iterator[Compared]:
+    """Stress of modes of unit strain energy, over the largest stress."""
+    file, Z, frame, word = case.reduced, case.by_energy, case.reduced.frame, case.axes_words
+    is_asked = case.options is not None and case.options.stress
+    if file.stress is not None or is_asked:
+        made = nodal_stress_modes(case.body, case.Phi @ Z, case.node_ids, frame.axes)
+        if made is None and file.stress is not None:
+            yield Compared("stress", np.inf, "", "the model knows no stress at its nodes")
+        elif made is not None and file.stress is None:
+            yield missing("stress")
+        elif made is not None:
+            own = np.asarray(file.stress) @ Z
+            yield apart("stress", own, made, np.abs(made).max(initial=0.0), axes=f"node component {word}")
+    if file.point_stress is not None or is_asked:
+        points = point_stress_modes(case.body, case.Phi @ Z, frame.origin, frame.axes)
+        own_points = file.point_stress
+        if points is None or own_points is None:
+            if points is not None or own_points is not None:
+                yield (
+                    missing("point_stress.names")
+                    if own_points is None
+                    else Compared("point_stress.names", np.inf, "", "the model has no stress points")
+                )
+            return
+        yield same("point_stress.names", own_points.names, points.names)
+        yield apart("point_stress.positions", own_points.positions, points.positions, case.length, axes="point")
+        largest = np.abs(points.modes).max(initial=0.0)
+        yield apart("point_stress.modes", own_points.modes @ Z, points.modes, largest, axes=f"point component {word}")
+
+
+def compare_recovery(case: Case) -> Iterator[Compared]:
+    """Recovery tables: names, and numbers over those of their quantity."""
+    if case.options is None:
+        return
+    file, requests = case.reduced, case.options.recovery
+    asked = {request.name: request for request in requests}
+    for name in asked:
+        if name not in file.recovery:
+            yield missing("recovery.name", name)
+    present = [request for name, request in asked.items() if name in file.recovery]
+    if not present:
+        return
+    made = recovery_of_model(case.families, case.Phi, case.condition, case.expected, present, over=case.by_energy)
+    for name, table in made.items():
+        yield from compare_table(case, file.recovery[name], table)
+
+
+def compare_table(case: Case, own: RecoveryTable, made: RecoveryTable) -> Iterator[Compared]:
+    """Rows of one table, those of a quantity and dimension together.
+
+    Of a file that was carried to another frame the static part stays that of the first frame, whose reaction it has;
+    positions, velocities and accelerations are compared alone.
+    """
+    is_carried = CONVERTED in case.reduced.provenance
+    name = own.name
+    yield same("recovery.name", own.name, made.name, name)
+    for word in ("labels", "quantities", "entities", "numbers", "components", "loads"):
+        yield same(f"recovery.{word}", getattr(own, word), getattr(made, word), name)
+    yield same("recovery.system", own.system, made.system, name)
+    yield same("recovery.truncated", own.truncated, made.truncated, name)
+    for word in ("dimensions", "load_dimensions"):
+        yield apart(f"recovery.{word}", getattr(own, word), getattr(made, word), 1.0, name)
+    if own.labels != made.labels or own.loads != made.loads:
+        return
+    Z, reduced = case.by_energy, case.reduced
+    omega2 = float(np.diag(reduced.K).min(initial=np.inf))
+    rigid = np.repeat([1.0, 1 / case.length], 3) / np.sqrt(reduced.moments.m * omega2)
+    X = np.zeros((N_RIGID + reduced.n_q, N_RIGID + Z.shape[1]))
+    X[:N_RIGID, :N_RIGID], X[N_RIGID:, N_RIGID:] = np.diag(rigid), Z
+    scaled = np.concatenate([rigid, np.ones(Z.shape[1])])
+    loads = forces_of_loads(case.expected, own.loads)[N_RIGID:]  # Phiᵀ F
+    force = np.array([force_of_load(case, load) for load in own.loads])
+    strength = float((np.linalg.norm(loads / np.sqrt(np.diag(reduced.K))[:, None], axis=0) / force).max(initial=0.0))
+    typical = typical_sizes(case)
+    for quantity in dict.fromkeys(own.quantities):
+        of_quantity = np.flatnonzero(np.array(own.quantities) == quantity)
+        for dimensions in np.unique(own.dimensions[of_quantity], axis=0):
+            rows = of_quantity[(own.dimensions[of_quantity] == dimensions).all(axis=1)]
+            where, axes = f"{name}: {quantity}", f"row {case.axes_words}"
+            a, b = own.dynamic[:, rows] @ X, made.dynamic[:, rows] * scaled
+            anywhere = typical.get((quantity, float(dimensions[1])), 0.0)  # places that are held have none
+            first = max(np.abs(b[0]).max(initial=0.0), 0.0 if quantity in OF_MOTION else anywhere)
+            for order in range(3):
+                if is_carried and order and quantity not in OF_MOTION:
+                    continue
+                if is_carried and order != 0 and quantity == "displacement":
+                    continue
+                at_least = first / omega2 ** (order / 2)
+                if quantity in OF_MOTION:
+                    at_least = max(at_least, anywhere)
+                size = max(np.abs(b[order]).max(initial=0.0), NEGLIGIBLE * at_least)
+                yield apart("recovery.dynamic", a[order], b[order], size, f"{where}, order {order}", axes)
+            if is_carried:
+                continue
+            # what modes of the same force answer, beside which a small remainder is small
+            static = own.dynamic[0][rows][:, N_RIGID:] @ (loads / np.diag(reduced.K)[:, None])
+            answer = max((np.abs(static).max(axis=0, initial=0.0) / force).max(initial=0.0), anywhere * strength)
+            if quantity in OF_INTERFACES:
+                answer = max(answer, case.length ** (dimensions[1] - 1))
+            size = np.maximum(np.abs(made.static[rows]).max(axis=0, initial=0.0), NEGLIGIBLE * answer * force)
+            yield apart("recovery.static", own.static[rows], made.static[rows], size, where, "row load")
+
+
+def typical_sizes(case: Case) -> dict[tuple[str, float], float]:
+    """Return the largest size of rows over modes of unit strain energy by quantity and exponent of length."""
+    shapes = case.Phi @ case.by_energy
+    shape = float(np.abs(case.body.translations(shapes)).max(initial=0.0))
+    sizes = {(each, length): shape * case.length ** (length - 1) for each in OF_MOTION for length in (0.0, 1.0)}
+    stress = nodal_stress_modes(case.body, shapes, case.node_ids, case.reduced.frame.axes)
+    if stress is not None:
+        sizes["stress", STRESS[1]] = float(np.abs(stress).max(initial=0.0))
+    return sizes
+
+
+def force_of_load(case: Case, load: str) -> float:
+    """Return the size of a load of amplitude one as a force [N]."""
+    m, L = case.reduced.moments.m, case.length
+    for each in case.body.load_cases:
+        if load == f"load case {each.name}":
+            return float(np.abs(each.f).sum()) or 1.0
+    if load.startswith("gravity"):
+        return m
+    return m * case.reach if load.startswith("spin ") else 1 / L if load[-2:] in ("mx", "my", "mz") else 1.0
+
+
+# Second order ---------------------------------------------------------------------------------------------------------
+
+
+def compare_geometric(case: Case) -> Iterator[Compared]:
+    """Geometric stiffness of modes of unit strain energy: the inverse of the load that buckles, kind by kind."""
+    file = case.reduced.geometric
+    asked = False if case.options is None else case.options.geometric
+    if file is None:
+        if asked is not False and has_geometric_stiffness(case.body):
+            yield missing("geometric.spin")
+        return
+    names = [each.name for each in case.body.interfaces]
+    if not isinstance(asked, bool):
+        yield same("geometric.is_loaded", file.is_loaded, tuple(name in asked for name in names))
+    elif asked:
+        yield same("geometric.is_loaded", file.is_loaded, (True,) * len(names))
+    else:
+        yield Compared("geometric.is_loaded", 0.0)
+    loaded = [names[k] for k in file.loaded if k < len(names)]
+    Z = case.by_energy
+    states = states_of(case.families, case.condition, spread=file.spread is not None, interfaces=loaded)
+    made, own = stiffness_of_states(case.body, case.Phi @ Z, states), file.transformed(Z)
+    m, L = case.reduced.moments.m, case.reach
+    shape = np.abs(case.body.translations(case.Phi @ Z)).max(initial=0.0)
+    unit = np.abs(np.asarray(made.interfaces)[:, :3]).max(initial=0.0)  # of a unit force
+    force = {"translation": m, "rotation": m * L, "spin": m * L, "interfaces": 1.0}
+    by_axis = np.array([1.0, 1, 1, L, L, L])[:, None, None]
+    # how followers turn loads is not on record, nor the quadrature of their cells: in another frame it is not exact
+    is_carried = CONVERTED in case.reduced.provenance
+    for name in UNIT_LOADS:
+        kind = by_axis if name == "interfaces" else 1.0
+        words = f"load {case.axes_words} {case.axes_words}"
+        words = f"interface {words}" if name == "interfaces" else words
+        for part, at_least in ((None, unit), ("turned", shape)):
+            if part == "turned" and (own.turned is None or made.turned is None):
+                continue
+            source, target = (own, made) if part is None else (own.turned, made.turned)
+            a, b = (np.asarray(getattr(x, name)) / kind for x in (source, target))
+            size = max(np.abs(b).max(initial=0.0), NEGLIGIBLE * at_least * force[name])
+            size = size * ROUGH if is_carried else size
+            yield apart(f"geometric.{f'{part}.' if part else ''}{name}", a, b, size, axes=words)
+    if own.spread is not None and made.spread is not None:
+        for name, at_least in (("K", unit), ("turned", shape), ("turned_rigid", L)):
+            a, b = (np.asarray(getattr(x.spread, name)) / by_axis for x in (own, made))
+            if name != "K" and is_carried:
+                continue
+            size = max(np.abs(b).max(initial=0.0), NEGLIGIBLE * at_least) * (ROUGH if is_carried else 1.0)
+            yield apart(f"geometric.spread.{name}", a, b, size, axes="load")
+
+
+def compare_quadratic(case: Case) -> Iterator[Compared]:
+    """Displacement of second order of modes of unit strain energy, node by node or in combinations of nodes."""
+    file = case.reduced.quadratic
+    if file is None:
+        if case.options is not None and case.options.quadratic and CONVERTED not in case.reduced.provenance:
+            yield missing("quadratic")
+        return
+    Z, n = case.by_energy, 3 * len(file)
+    is_few = len(file) <= FEW_NODES
+    W = np.eye(n) if is_few else np.random.default_rng(30).normal(size=(n, NODE_PROBES)) / np.sqrt(n)
+    if len(case.node_ids) != len(file):
+        return
+    made = -force_stiffness(case.body, case.Phi @ Z, case.condition, case.node_ids, W, case.families)
+    own = Z.T @ np.tensordot(W.T, np.asarray(file).reshape(n, *file.shape[2:]), axes=1) @ Z
+    words = "component" if is_few else "combination"
+    yield apart("quadratic", own, made, np.abs(made).max(initial=0.0), axes=f"{words} {case.axes_words}")
+
+
+def compare_origin(case: Case) -> Iterator[Compared]:
+    """Name, mode set and digests of what the file was made of."""
+    yield same("name", case.reduced.name, case.body.name)
+    own, made = case.reduced.provenance, case.expected.provenance
+    yield Compared("provenance", 0.0)
+    for key in OF_ORIGIN:
+        if key in own and key in made:
+            yield same("provenance", own[key], made[key], key)
+
+
+#: record -> how its fields are compared, in the order of the verdicts
+CONTENTS: dict[str, Callable[[Case], Iterator[Compared]]] = {
+    "points": compare_points,
+    "frame": compare_frame,
+    "interfaces": compare_interfaces,
+    "invariants": compare_moments,
+    "damping-matrix": compare_damping,
+    "load-cases": compare_load_cases,
+    "stress-modes": compare_stress,
+    "geometric-stiffness": compare_geometric,
+    "quadratic-modes": compare_quadratic,
+    "kept-rotations": compare_rotations,
+    "recovery-rows": compare_recovery,
+    "nodal-sums": compare_sums,
+    "sources": compare_sources,
+    "origin": compare_origin,
+}

@@ -1,0 +1,138 @@
+"""Free-free frequencies and shapes of a reduced body against those of the full model."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from cms.assessment.quality.record import QualityRecord, judge
+from cms.assessment.quality.reference.free_basis import FreeBasis
+from cms.assessment.quality.reference.full_reference import FullReference
+from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+
+__all__ = ["FrequencyComparison", "compare_frequencies", "compare_shapes", "frequency_records", "mac"]
+
+CLUSTER = 1e-3  #: relative gap between two frequencies below which only the plane of their shapes is compared
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencyComparison:
+    """Elastic free-free modes in the band: full model against reduced body."""
+
+    full: Array  #: (n_full,) [Hz]
+    reduced: Array  #: all of the reduced body, ascending, (n_reduced,) [Hz]
+    error: Array  #: reduced over full frequency in their order - 1, (n_full,); NaN where the reduced body has none
+    mac: Array  #: mass-weighted, (n_full, n_reduced)
+    mac_nodal: Array  #: of the translations of all nodes, (n_full, n_reduced)
+    partner: IntArray  #: reduced mode that goes with each full one, by the mass-weighted MAC; -1: none, (n_full,)
+    partner_error: Array  #: its frequency over the full one - 1, (n_full,)
+    recovered: Array  #: part of each full shape in the partners of its cluster, mass-weighted, 0 to 1, (n_full,)
+    recovered_nodal: Array  #: the same, nodal; the MAC with the partner for a single mode, (n_full,)
+
+    def __post_init__(self) -> None:
+        for name in ("full", "reduced", "error", "mac", "mac_nodal", "partner_error", "recovered", "recovered_nodal"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+        object.__setattr__(self, "partner", frozen_int(self.partner))
+
+
+def mac(A: Array, B: Array, M_B: Array | None = None) -> Array:
+    """Modal assurance criterion (a·b)² / (a·a b·b) of all pairs of columns, (n_a, n_b).
+
+    Parameters
+    ----------
+    A, B
+        Shapes, (n, n_a) and (n, n_b).
+    M_B
+        M B for the mass-weighted criterion of shapes that are M-orthonormal, (n, n_b); None: the plain one.
+    """
+    if M_B is not None:
+        return np.asarray((A.T @ M_B) ** 2)
+    size = np.outer(np.einsum("nk,nk->k", A, A), np.einsum("nk,nk->k", B, B))
+    return np.asarray((A.T @ B) ** 2 / np.where(size > 0, size, 1.0))
+
+
+def compare_frequencies(reference: FullReference, basis: FreeBasis) -> FrequencyComparison:
+    """Compare the free-free modes of a mode set with those of the full model in its band."""
+    body, n = reference.body, reference.n_band
+    full, Phi = reference.frequencies[:n], reference.modes.Phi[:, :n]
+    reduced, shapes = basis.frequencies(body.units.time), basis.vibrating
+    a, b = (body.translations(X).reshape(-1, X.shape[1]) for X in (Phi, shapes))
+    return compare_shapes(full, reduced, mac(Phi, shapes, body.M @ shapes), a, b)
+
+
+def compare_shapes(full: Array, reduced: Array, massed: Array, a: Array, b: Array) -> FrequencyComparison:
+    """Compare frequencies and shapes of two models.
+
+    Shapes of multiple or nearly equal frequencies are known up to a rotation only, so `recovered` takes the part of a
+    full shape in the span of all partners of its cluster.
+
+    Parameters
+    ----------
+    full, reduced
+        Frequencies, ascending, (n_full,) and (n_reduced,) [Hz].
+    massed
+        Mass-weighted MAC of their shapes, (n_full, n_reduced).
+    a, b
+        Translations of all nodes in the shapes, in any coordinates that keep their scalar products, (n, n_full) and
+        (n, n_reduced).
+    """
+    n = len(full)
+    error = np.full(n, np.nan)
+    common = min(n, len(reduced))
+    error[:common] = reduced[:common] / full[:common] - 1
+    partner = np.full(n, -1, np.int64)
+    rows, columns = linear_sum_assignment(-massed)
+    partner[rows] = columns
+    partner_error = np.full(n, np.nan)
+    partner_error[rows] = reduced[columns] / full[rows] - 1
+    recovered, recovered_nodal = np.zeros(n), np.zeros(n)
+    for cluster in clusters(full):
+        members = partner[cluster]
+        members = members[members >= 0]
+        recovered[cluster] = massed[np.ix_(cluster, members)].sum(axis=1)
+        recovered_nodal[cluster] = span_share(a[:, cluster], b[:, members])
+    return FrequencyComparison(
+        full, reduced, error, massed, mac(a, b), partner, partner_error, np.minimum(recovered, 1.0), recovered_nodal
+    )
+
+
+def clusters(frequencies: Array) -> list[IntArray]:
+    """Return the indices of frequencies that lie within `CLUSTER` of their neighbours."""
+    is_apart = np.diff(frequencies) > CLUSTER * frequencies[1:]
+    return np.split(np.arange(len(frequencies)), np.flatnonzero(is_apart) + 1)
+
+
+def span_share(A: Array, B: Array) -> Array:
+    """Squared part of each column of A in the span of B, (n_a,)."""
+    if not B.shape[1]:
+        return np.zeros(A.shape[1])
+    Q, _ = np.linalg.qr(B)
+    size = np.einsum("nk,nk->k", A, A)
+    return np.asarray(np.minimum(((Q.T @ A) ** 2).sum(axis=0) / np.where(size > 0, size, 1.0), 1.0))
+
+
+def frequency_records(comparison: FrequencyComparison, band: float) -> tuple[QualityRecord, ...]:
+    """Records "frequency-error", "mac" and "mac-nodal" of the modes in the band [Hz]."""
+    c = comparison
+    size = np.where(np.isnan(c.error), np.inf, np.abs(c.error))
+    k = int(np.argmax(size))
+    if np.isfinite(size[k]):
+        reason = f"largest of {len(c.full)} modes up to {band:.4g} Hz: {100 * c.error[k]:.3g} % at {c.full[k]:.5g} Hz"
+    else:
+        reason = (
+            f"the reduced body has {len(c.reduced)} elastic modes, the full model {len(c.full)} up to {band:.4g} Hz"
+        )
+    data = {
+        "full_hz": c.full,
+        "reduced_hz": c.reduced,
+        "error": c.error,
+        "partner": c.partner,
+        "partner_error": c.partner_error,
+        "band_hz": band,
+    }
+    records = [judge("frequency-error", size[k], reason, data)]
+    for name, recovered, matrix in (("mac", c.recovered, c.mac), ("mac-nodal", c.recovered_nodal, c.mac_nodal)):
+        k = int(np.argmin(recovered))
+        reason = f"least recovered is the mode at {c.full[k]:.5g} Hz, to {100 * recovered[k]:.2f} %"
+        records.append(judge(name, 1 - recovered[k], reason, {"recovered": recovered, "mac": matrix}))
+    return tuple(records)

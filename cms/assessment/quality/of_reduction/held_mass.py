@@ -1,0 +1,121 @@
+"""Effective mass of a mode set with all interfaces held, against that of the full model."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse.linalg as sla
+
+from cms.assessment.quality.record import QualityRecord, information, judge
+from cms.assessment.quality.reference.free_basis import FreeBasis
+from cms.assessment.quality.reference.full_reference import FullReference
+from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
+from cms.modes.families.rigid_modes import geometric_rigid_modes
+from fe_models.foundation.arrays import Array, frozen
+
+__all__ = ["HeldMass", "answered_statically", "held_mass", "held_mass_record"]
+
+DIRECTIONS = ("ux", "uy", "uz", "rx", "ry", "rz")
+HELD = 1e-8  #: singular value of the interface motions over the largest, below which a combination holds them
+MASS_TOLERANCE = 1e-10  #: relative residual of the solutions with M_II
+NO_MASS = 1e-9  #: held mass over the mass of the body, below which a direction has none
+
+
+@dataclass(frozen=True, eq=False)
+class HeldMass:
+    """Effective masses about the centre of the nodes, mesh axes, by direction."""
+
+    frequencies: Array  #: of the mode set's modes with all interfaces held, (n,) [Hz]
+    mass: Array  #: effective mass and inertia of each, (n, 6) [kg, kg m²]
+    total: Array  #: sum over all modes of the full model, (6,)
+    rigid: Array  #: mass and inertia of the whole body, (6,)
+
+    def __post_init__(self) -> None:
+        for name in ("frequencies", "mass", "total", "rigid"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    @property
+    def remainder(self) -> Array:
+        """Share of the held mass that no mode of the set carries, (6,); 0 where nothing is held."""
+        has_mass = self.total > NO_MASS * self.rigid
+        return np.where(has_mass, 1 - self.mass.sum(axis=0) / np.where(has_mass, self.total, 1.0), 0.0)
+
+
+def held_mass(reference: FullReference, basis: FreeBasis) -> HeldMass:
+    """Find the effective masses of a mode set with all interfaces held.
+
+    (1) combinations of [N Phi] that do not move the held dofs: null space of their rows, rotations times the length
+    (2) their modes z; participation L = zᵀ M d of unit rigid-body motions d, effective mass L²
+    (3) the full model's sum b_Iᵀ M_II⁻¹ b_I, b = M d, by conjugate gradients; what distributing interfaces take out of
+        it (a mean motion each) is not taken off
+    """
+    body, families = reference.body, reference.families
+    d = geometric_rigid_modes(body, origin=body.nodes.mean(axis=0))
+    b = body.M @ d
+    X = np.hstack([basis.N, basis.Phi])
+    rows = X[families.h] * np.where(body.dofs[families.h, 1] < 3, 1.0, body.length or 1.0)[:, None]
+    size = np.linalg.norm(rows, axis=0)
+    size = np.where(size > 1e-12 * size.max(initial=0.0), size, 1.0)
+    _, singular, Vt = np.linalg.svd(rows / size)
+    rank = int((singular > HELD * singular.max(initial=0.0)).sum())
+    V = Vt[rank:].T / size[:, None]  # (1)
+    V = V / np.where((length := np.linalg.norm(V, axis=0)) > 0, length, 1.0)
+    mass = np.concatenate([np.ones(basis.N.shape[1]), basis.is_massive.astype(float)])
+    stiffness = np.concatenate([np.zeros(basis.N.shape[1]), basis.omega2])
+    G_K, G_M = V.T @ (stiffness[:, None] * V), V.T @ (mass[:, None] * V)
+    if V.shape[1]:
+        Z, is_massive = elastic_eigenvectors((G_K + G_K.T) / 2, (G_M + G_M.T) / 2, float(basis.omega2[0]))  # (2)
+        Z = Z[:, is_massive]
+    else:
+        Z = np.zeros((0, 0))
+    omega2 = np.einsum("kq,kl,lq->q", Z, G_K, Z)
+    L = Z.T @ V.T @ (X.T @ b)
+    order = np.argsort(omega2)
+    frequencies = np.sqrt(np.maximum(omega2[order], 0.0)) / (2 * np.pi) / body.units.time
+    return HeldMass(frequencies, L[order] ** 2, full_held_mass(reference, b), np.einsum("nk,nk->k", d, b))
+
+
+def full_held_mass(reference: FullReference, b: Array) -> Array:
+    """Return b_Iᵀ M_II⁻¹ b_I over the interior dofs that have mass, (6,)."""
+    fixed = reference.families.fixed
+    M_ii = fixed.M_ii
+    diagonal = M_ii.diagonal()
+    massive = np.flatnonzero(diagonal > 0)
+    M_ii, loads = M_ii[massive][:, massive], b[fixed.i[massive]]
+    precondition = sla.LinearOperator(M_ii.shape, matvec=lambda x: x / diagonal[massive])
+    total = np.zeros(loads.shape[1])
+    for k in range(loads.shape[1]):
+        if loads[:, k].any():
+            x, _ = sla.cg(M_ii, loads[:, k], rtol=MASS_TOLERANCE, M=precondition, maxiter=2000)
+            total[k] = x @ loads[:, k]
+    return total
+
+
+def held_mass_record(held: HeldMass, *, is_static_complete: bool = False) -> QualityRecord:
+    """Record "effective-mass": the translation whose held mass the modes carry least.
+
+    Where the mode set answers rigid-body accelerations statically, what its modes leave out is not lost: nothing is
+    judged.
+    """
+    data = {
+        "frequencies_hz": held.frequencies,
+        "mass": held.mass,
+        "total": held.total,
+        "rigid": held.rigid,
+        "remainder": held.remainder,
+    }
+    if not (held.total > NO_MASS * held.rigid).any():
+        return information("effective-mass", "nothing but the interfaces has mass", data)
+    remainder = held.remainder
+    k = int(np.argmax(remainder[:3]))
+    reason = f"with all interfaces held {len(held.frequencies)} modes carry of what can vibrate " + ", ".join(
+        f"{name} {100 * (1 - r):.0f} %" for name, r in zip(DIRECTIONS, remainder, strict=True)
+    )
+    record = judge("effective-mass", max(0.0, remainder[k]), reason, data)
+    return answered_statically(record) if is_static_complete else record
+
+
+def answered_statically(record: QualityRecord) -> QualityRecord:
+    """Return the record of a mode set that answers rigid-body accelerations statically: what it lacks is not judged."""
+    if record.verdict == "pass":
+        return record
+    return replace(record, verdict="info", reason=f"{record.reason}; the rest answers statically", action="")

@@ -1,0 +1,121 @@
+"""Quality records: a number without unit, its tolerance, a verdict, the reason, and what to do next.
+
+Tests, command line, reports and plots read the same record; every threshold of the package stands once, in `LIMITS`.
+"""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields
+from types import MappingProxyType
+from typing import Any, Literal
+
+import numpy as np
+
+from cms.assessment.quality.errors import QualityError
+from cms.assessment.quality.limits import LIMITS
+from fe_models.foundation.words import nearest, quoted
+
+__all__ = ["VERDICTS", "QualityRecord", "Verdict", "has_failed", "information", "judge", "plain", "worst"]
+
+Verdict = Literal["pass", "warn", "fail", "info"]
+VERDICTS: tuple[Verdict, ...] = ("info", "pass", "warn", "fail")  #: from harmless to bad
+
+
+@dataclass(frozen=True, eq=False)
+class QualityRecord:
+    """One question about a reduced body, and its answer."""
+
+    name: str  #: key in `LIMITS`, such as "frequency-error"
+    title: str  #: the same in words
+    value: float  #: without unit; NaN where the question does not apply
+    tolerance: float | None  #: largest value that passes; None: nothing is judged
+    verdict: Verdict
+    reason: str  #: what was found, in one sentence with its numbers
+    action: str  #: what to do next; "" where nothing is to be done
+    data: Mapping[str, Any] = field(default_factory=dict)  #: arrays, numbers and words behind it, for tables and plots
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "data", MappingProxyType(dict(self.data)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A view of a dict cannot be sent to another process; the dict can."""
+        values = (getattr(self, each.name) for each in fields(self))
+        return type(self), tuple(dict(value) if isinstance(value, MappingProxyType) else value for value in values)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the record in plain types, ready for JSON; numbers that are not finite become None."""
+        return {
+            "name": self.name,
+            "title": self.title,
+            "value": plain(self.value),
+            "tolerance": self.tolerance,
+            "verdict": self.verdict,
+            "reason": self.reason,
+            "action": self.action,
+            "data": {key: plain(value) for key, value in self.data.items()},
+        }
+
+
+def judge(
+    name: str, value: float, reason: str, data: Mapping[str, Any] | None = None, *, action: str | None = None
+) -> QualityRecord:
+    """Make the record of a value by the limit of that name; a value that is not a number fails.
+
+    Parameters
+    ----------
+    action
+        What to do unless it passes; that of the limit by default.
+
+    Raises
+    ------
+    QualityError
+        If there is no limit of that name.
+    """
+    if name not in LIMITS:
+        raise QualityError(f"quality record {quoted(name)}: unknown{nearest(name, LIMITS)}")
+    limit = LIMITS[name]
+    value = float(value)
+    verdict: Verdict
+    if limit.tolerance is None:
+        verdict = "info"
+    elif value <= limit.tolerance:
+        verdict = "pass"
+    elif limit.failing is not None and not value <= limit.failing:
+        verdict = "fail"
+    else:
+        verdict = "warn"
+    todo = "" if verdict in ("pass", "info") else (action or limit.action)
+    return QualityRecord(name, limit.title, value, limit.tolerance, verdict, reason, todo, data or {})
+
+
+def information(name: str, reason: str, data: Mapping[str, Any] | None = None, *, action: str = "") -> QualityRecord:
+    """Make the record of a question that cannot be answered here, or needs no answer; its value is NaN."""
+    limit = LIMITS[name]
+    return QualityRecord(name, limit.title, math.nan, limit.tolerance, "info", reason, action, data or {})
+
+
+def worst(records: Iterable[QualityRecord]) -> Verdict:
+    """Return the worst verdict; "info" where there are no records."""
+    return max((record.verdict for record in records), key=VERDICTS.index, default="info")
+
+
+def has_failed(records: Iterable[QualityRecord]) -> bool:
+    """Whether any record failed."""
+    return worst(records) == "fail"
+
+
+def plain(value: Any) -> Any:
+    """Return a value in the types of JSON: lists, numbers, text; what is not finite becomes None."""
+    if isinstance(value, np.ndarray):
+        if np.iscomplexobj(value):
+            return {"real": plain(value.real), "imag": plain(value.imag)}
+        return [plain(item) for item in value.tolist()]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    return value

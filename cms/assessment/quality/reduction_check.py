@@ -1,0 +1,142 @@
+"""Everything a mode set and its reduced body can be asked against the full model."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from cms.assessment.quality.body_check import check_body
+from cms.assessment.quality.errors import QualityError
+from cms.assessment.quality.of_reduction.completeness import completeness_records, static_completeness
+from cms.assessment.quality.of_reduction.conditioning import column_condition, conditioning_record, dropped_record
+from cms.assessment.quality.of_reduction.contents import ReductionOptions, contents_records
+from cms.assessment.quality.of_reduction.deformation import deformation_error, deformation_record
+from cms.assessment.quality.of_reduction.frequencies import compare_frequencies, frequency_records
+from cms.assessment.quality.of_reduction.frf import response_comparison, response_record
+from cms.assessment.quality.of_reduction.full_shapes import full_shapes, same_body_record
+from cms.assessment.quality.of_reduction.held_mass import held_mass, held_mass_record
+from cms.assessment.quality.of_reduction.interface_stiffening import (
+    has_both_kinds,
+    interface_stiffening,
+    stiffening_record,
+)
+from cms.assessment.quality.of_reduction.mass_properties import check_grounding, check_mass_properties
+from cms.assessment.quality.of_reduction.residuals import residual_bounds, residual_record
+from cms.assessment.quality.record import QualityRecord, information, judge
+from cms.assessment.quality.reference.free_basis import free_basis
+from cms.assessment.quality.reference.full_reference import FullReference, usable_band
+from cms.assessment.quality.reference.port_model import port_model
+from cms.assessment.quality.reference.transient import Snapshots
+from cms.body.reduced_body import ReducedBody
+from cms.modes.mode_set import ModeSet
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.tall.on_disk import of_this_process
+
+__all__ = ["check_reduction", "require_same_units"]
+
+
+def check_reduction(
+    body: FEBody,
+    modes: ModeSet,
+    reduced: ReducedBody,
+    *,
+    reference: FullReference | None = None,
+    uncoupled: FEBody | None = None,
+    snapshots: Snapshots | None = None,
+    own: tuple[QualityRecord, ...] | None = None,
+    options: ReductionOptions | None = None,
+) -> tuple[QualityRecord, ...]:
+    """Check a reduced body by itself and against its full model.
+
+    Parameters
+    ----------
+    body
+        The coupled body that `modes` and `reduced` were made from.
+    reference
+        The full model up to a band, to share it between mode sets; by default it is made here, for the band that
+        custom allows the mode set (`usable_band`).
+    uncoupled
+        The body before `couple`: adds the comparison of rigid with distributing interfaces (two more factorisations).
+    snapshots
+        A reference motion: adds the deformation error.
+    own
+        What `check_body` has found of the reduced body, so that it is not asked again; None: it is asked here.
+    options
+        What the file was asked to hold; None: its damping is compared with what its provenance says, and recovery
+        tables are not compared.
+
+    Returns
+    -------
+    tuple of QualityRecord
+        Those of `check_body`, then those against the full model.
+
+    Raises
+    ------
+    QualityError
+        If mode set or reference are of another body.
+    """
+    if modes.columns.shape[0] != body.n_dof:
+        raise QualityError(
+            f"check: mode set {modes.name!r} has columns of {modes.columns.shape[0]} dofs, body {body.name!r} has "
+            f"{body.n_dof}; check with the body it was made from"
+        )
+    require_same_units(body, reduced)
+    if (columns := of_this_process(modes.columns)) is not modes.columns:
+        modes = replace(modes, columns=columns)
+    if reference is None:
+        with FullReference(body, band=usable_band(modes, reduced)) as made:
+            return check_reduction(
+                body,
+                modes,
+                reduced,
+                reference=made,
+                uncoupled=uncoupled,
+                snapshots=snapshots,
+                own=own,
+                options=options,
+            )
+    if reference.body is not body:
+        raise QualityError(f"check: the reference is of another body than {body.name!r}")
+    found = check_body(reduced) if own is None else own
+    records = [record for record in found if record.name != "dropped-columns"]
+    grounding = check_grounding(body)
+    records += [grounding, check_mass_properties(body, reduced)]
+    if grounding.verdict == "fail":
+        return tuple(records)  # no free body: its rigid-body motions cost energy
+    basis = free_basis(body, modes, reference.families)
+    shapes = full_shapes(body, basis, reduced)
+    records.append(same_body_record(body, basis, reduced, shapes))
+    records += contents_records(body, modes, reduced, shapes, reference.families, basis, options)
+    records += frequency_records(compare_frequencies(reference, basis), reference.band)
+    static = completeness_records(static_completeness(reference, basis))
+    records += static
+    if body.interfaces and [each.name for each in reduced.interfaces] != [each.name for each in body.interfaces]:
+        records.append(information("frequency-response", "the interfaces of the file are not those of the model"))
+    elif body.interfaces:
+        records.append(response_of(reference, reduced))
+    records.append(residual_record(residual_bounds(reference, basis)))
+    is_complete = any(record.name == "static-inertia" and record.verdict == "pass" for record in static)
+    records.append(held_mass_record(held_mass(reference, basis), is_static_complete=is_complete))
+    condition, _ = column_condition(body, modes, float(basis.omega2[0]))
+    records += [conditioning_record(condition, modes.columns.shape[1]), dropped_record(basis, modes.columns.shape[1])]
+    if uncoupled is not None and has_both_kinds(uncoupled):
+        records.append(stiffening_record(interface_stiffening(uncoupled)))
+    if snapshots is not None:
+        records.append(deformation_record(deformation_error(body, basis, snapshots)))
+    return tuple(records)
+
+
+def response_of(reference: FullReference, reduced: ReducedBody) -> QualityRecord:
+    """Compare the responses at the interfaces; a file whose mass is not positive has none."""
+    try:
+        return response_record(response_comparison(reference, port_model(reduced)))
+    except np.linalg.LinAlgError as error:
+        return judge("frequency-response", np.inf, f"the file has no response: {error}")
+
+
+def require_same_units(body: FEBody, reduced: ReducedBody) -> None:
+    """Raise `QualityError` unless full model and reduced body are in the same units."""
+    if body.units != reduced.units:
+        raise QualityError(
+            f"check: body {body.name!r} is in units {body.units.name}, the reduced body {reduced.name!r} in "
+            f"{reduced.units.name}; check with the job the file was made from"
+        )

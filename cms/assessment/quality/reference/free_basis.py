@@ -1,0 +1,106 @@
+"""A mode set as modes of the free reduced body, over all dofs: where comparisons with the full model start."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+
+from cms.body.reduced_body import BodyFrame
+from cms.linear_algebra.independent import Products, gram, gram_in_blocks, independent_basis
+from cms.linear_algebra.solvers.tall import combine, inner
+from cms.modes.families.families import Families
+from cms.modes.mode_set import ModeSet
+from cms.reduction.basis.finishing import finish
+from cms.reduction.basis.frames import FrameCondition
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array, frozen
+from fe_models.foundation.tall.on_disk import of_this_process
+
+__all__ = ["FreeBasis", "free_basis", "ritz_basis"]
+
+MASSLESS = 1e-12  #: modal mass times omega_1² of a shape of unit W-length, below which it is static
+
+
+@dataclass(frozen=True, eq=False)
+class FreeBasis:
+    """The span of [Psi_R, mode set] with M- and K-orthogonal columns: rigid motions N and elastic shapes Phi."""
+
+    Phi: Array  #: elastic shapes, (n_dof, n), ascending omega2, massless ones last; Nᵀ M Phi = 0
+    omega2: Array  #: Phiᵀ K Phi, (n,): squared frequencies where there is mass [1/s²]
+    is_massive: np.ndarray  #: Phiᵀ M Phi = 1 there, 0 elsewhere, (n,) bool
+    N: Array  #: M-orthonormal rigid-body motions, (n_dof, n_r)
+    dropped: tuple[str, ...] = ()  #: labels of redundant columns
+
+    def __post_init__(self) -> None:
+        for name in ("Phi", "omega2", "N"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    def frequencies(self, time: float = 1.0) -> Array:
+        """Elastic free-free frequencies of the reduced body, ascending [Hz], time: [s] of the body's time unit."""
+        return np.sqrt(np.maximum(self.omega2[self.is_massive], 0.0)) / (2 * np.pi) / time
+
+    @property
+    def vibrating(self) -> Array:
+        """The shapes with mass, (n_dof, n_massive)."""
+        return self.Phi[:, self.is_massive]
+
+
+def free_basis(body: FEBody, modes: ModeSet, families: Families) -> FreeBasis:
+    """Finish a mode set in mean axes: the free-free modes of the reduced body, whatever frame its file has.
+
+    Parameters
+    ----------
+    families
+        Those of the body; only its rigid-body motions are used.
+
+    Raises
+    ------
+    ModeSetError, BodyError
+        As the finishing step of `reduce`.
+    """
+    N, M_N = families.free.N, families.free.M_N
+    condition = FrameCondition(
+        BodyFrame("tisserand", np.zeros(3)),
+        lambda columns: inner(M_N, columns),
+        Psi_R=N,
+        M_Psi_R=M_N,
+        W=M_N,
+        center=np.zeros(3),
+    )
+    finished = finish(body, modes, condition)
+    is_massive = np.diag(finished.M) > 0.5
+    order = np.lexsort((np.diag(finished.K), np.logical_not(is_massive)))
+    Phi = of_this_process(finished.Phi[:, order])
+    return FreeBasis(Phi, np.diag(finished.K)[order], is_massive[order], N, dropped=finished.dropped)
+
+
+def ritz_basis(body: FEBody, X: Array, N: Array) -> FreeBasis:
+    """Rayleigh-Ritz in the span of columns without rigid-body motion.
+
+    (1) W-orthonormal columns Q, W = K + omega_1² M, redundant ones dropped; what rounding has made of rigid-body
+        motion in the small remainders of nearly redundant columns is taken off
+    (2) Qᵀ M Q y = mu Qᵀ W Q y; omega² = (1 - omega_1² mu) / mu, and the static ones (mu = 0) last
+
+    Parameters
+    ----------
+    X
+        Elastic columns, (n_dof, k), with Nᵀ M X = 0.
+    N
+        M-orthonormal rigid-body motions, (n_dof, n_r).
+    """
+    products = Products.of_body(body)
+    G_K, G_M = products.grams(X)
+    stiffness, mass = np.diag(G_K), np.diag(G_M)
+    has_mass = mass > 0
+    omega2_1 = float((stiffness[has_mass] / mass[has_mass]).min())
+    basis, _ = independent_basis(X, G_K, G_M, products, body, omega2_1)  # (1)
+    Q = basis.columns(products)
+    E = Q.X - combine(N, inner(N, Q.MX))
+    G_M = gram_in_blocks(E, products.M)
+    mu, Y = la.eigh(G_M, gram(E, Q.KX) + omega2_1 * G_M)  # (2)
+    mu, Y = mu[::-1], Y[:, ::-1]
+    is_massive = mu * omega2_1 > MASSLESS
+    size = np.where(is_massive, 1 / np.sqrt(np.where(is_massive, mu, 1.0)), 1.0)
+    Phi = combine(E, Y * size)
+    omega2 = np.where(is_massive, 1 / np.where(is_massive, mu, 1.0) - omega2_1, 1.0)
+    return FreeBasis(Phi, omega2, is_massive, N)

@@ -1,0 +1,117 @@
+"""The free reduced body as one small pencil over rigid motion and modal coordinates, from a modal file alone."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cms.body.reduced_body import ReducedBody
+from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
+from fe_models.body.rigid_motion import rigid_motion_of_points
+from fe_models.foundation.arrays import Array, frozen, tilde
+
+__all__ = [
+    "FreePencil", "free_elastic_modes", "free_pencil", "has_inertia", "port_rows", "whole_pencil", "whole_port_rows",
+]  # fmt: skip
+
+NO_INERTIA = 1e-12  #: least eigenvalue of the scaled rigid mass matrix, below which there is no inertia about an axis
+
+
+@dataclass(frozen=True, eq=False)
+class FreePencil:
+    """M x'' + D x' + K x = f for x = (translation of B, rotation of B, q), small motion, components in B.
+
+    Of a held body x = q alone: its frame does not move.
+    """
+
+    M: Array  #: (n_r + n_q, n_r + n_q), n_r = 6, of a held body 0
+    K: Array  #: (n_r + n_q, n_r + n_q)
+    D: Array  #: (n_r + n_q, n_r + n_q)
+
+    def __post_init__(self) -> None:
+        for name in ("M", "K", "D"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+
+def free_pencil(reduced: ReducedBody) -> FreePencil:
+    """Return the pencil of a body without joints; of a held body that of its modes alone."""
+    return FreePencil(reduced.M, reduced.K, reduced.D) if reduced.is_held else whole_pencil(reduced)
+
+
+def whole_pencil(reduced: ReducedBody) -> FreePencil:
+    """Return the pencil of docs/theory.md §6 at rest.
+
+    M = [m 1, -S~, 1C; S~, J(0), 2C; 1Cᵀ, 2Cᵀ, M*], K = diag(0, K*), D = diag(0, D*).
+    """
+    moments, n = reduced.moments, reduced.n_q
+    M = np.zeros((6 + n, 6 + n))
+    M[:3, :3] = moments.m * np.eye(3)
+    M[3:6, :3] = tilde(moments.S)
+    M[:3, 3:6] = M[3:6, :3].T
+    M[3:6, 3:6] = moments.J0
+    M[:3, 6:], M[3:6, 6:] = moments.C1, moments.C2
+    M[6:, :6] = M[:6, 6:].T
+    M[6:, 6:] = reduced.M
+    K, D = np.zeros_like(M), np.zeros_like(M)
+    K[6:, 6:], D[6:, 6:] = reduced.K, reduced.D
+    return FreePencil(M, K, D)
+
+
+def free_elastic_modes(reduced: ReducedBody) -> tuple[Array, Array, np.ndarray]:
+    """Elastic modes of the free reduced body, ascending, then its massless shapes.
+
+    Rigid motion is condensed by M_rr x_r + M_rq q = 0.
+
+    Returns
+    -------
+    omega2
+        Squared frequencies, stiffness of massless shapes, (n,) [1/s²].
+    X
+        Shapes over x, (n_r + n_q, n).
+    is_massive
+        (n,) bool.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the body has no inertia about some axis, or a mode neither stiffness nor mass.
+    """
+    pencil = free_pencil(reduced)
+    T = np.eye(reduced.n_q)
+    if not reduced.is_held:
+        T = np.vstack([-np.linalg.solve(pencil.M[:6, :6], pencil.M[:6, 6:]), T])
+    G_M = T.T @ pencil.M @ T
+    Z, is_massive = elastic_eigenvectors(reduced.K, (G_M + G_M.T) / 2, stiffness_scale(reduced))
+    omega2 = np.einsum("kq,kl,lq->q", Z, reduced.K, Z)
+    order = np.lexsort((omega2, np.logical_not(is_massive)))
+    return omega2[order], T @ Z[:, order], is_massive[order]
+
+
+def has_inertia(reduced: ReducedBody) -> bool:
+    """Whether the rigid body has mass and a moment of inertia about every axis, by its scaled mass matrix."""
+    M_rr = whole_pencil(reduced).M[:6, :6]
+    size = np.sqrt(np.maximum(np.diag(M_rr), 0.0))
+    return bool((size > 0).all() and np.linalg.eigvalsh(M_rr / np.outer(size, size))[0] > NO_INERTIA)
+
+
+def stiffness_scale(reduced: ReducedBody) -> float:
+    """Smallest positive K_kk / M_kk of the modes [1/s²]; 1 where there is none."""
+    mass, stiffness = np.diag(reduced.M), np.diag(reduced.K)
+    has_both = (mass > 0) & (stiffness > 0)
+    return float((stiffness[has_both] / mass[has_both]).min()) if has_both.any() else 1.0
+
+
+def port_rows(reduced: ReducedBody, name: str) -> Array:
+    """Motion of an interface's reference point with x, components in B, (6, n_r + n_q)."""
+    if reduced.is_held:
+        return np.asarray(reduced.interface(name).Psi)
+    return whole_port_rows(reduced, name)
+
+
+def whole_port_rows(reduced: ReducedBody, name: str) -> Array:
+    """Motion of an interface's reference point with rigid motion and modes, components in B, (6, 6 + n_q)."""
+    interface = reduced.interface(name)
+    rows = np.zeros((6, 6 + reduced.n_q))
+    rows[:3, :6] = rigid_motion_of_points(interface.position[None], np.zeros(3))[0]
+    rows[3:, 3:6] = np.eye(3)
+    rows[:, 6:] = interface.Psi
+    return rows

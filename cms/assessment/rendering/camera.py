@@ -1,0 +1,77 @@
+"""The camera: its position such that every frame fits, and the projection of points."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cms.assessment.rendering.scene import Scene
+from fe_models.foundation.arrays import Array
+
+__all__ = ["Camera", "fitted_camera"]
+
+VIEW_ANGLE = 16.0  #: vertical angle of view [deg], that of a long lens; parallel edges stay nearly parallel
+FILL = 0.92  #: share of the picture that the scene may fill
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A pinhole camera; axes (right, up, forward) as rows."""
+
+    eye: Array  #: (3,) [m]
+    axes: Array  #: rows right, up, forward, (3, 3)
+    distance: float  #: distance from the eye to the centre of the scene [m]
+    size: tuple[int, int]  #: width and height [px]
+
+    @property
+    def focal_point(self) -> Array:
+        """Centre of the scene, (3,) [m]."""
+        return np.asarray(self.eye + self.distance * self.axes[2])
+
+    @property
+    def pixels(self) -> float:
+        """Focal length [px]."""
+        return float(self.size[1] / 2 / np.tan(np.deg2rad(VIEW_ANGLE) / 2))
+
+    def project(self, points: Array) -> Array:
+        """Return x (to the right), y (down) [px] and depth [m] of points, (..., 3) -> (..., 3)."""
+        seen = (points - self.eye) @ self.axes.T
+        scale = self.pixels / seen[..., 2]
+        x = self.size[0] / 2 + scale * seen[..., 0]
+        y = self.size[1] / 2 - scale * seen[..., 1]
+        return np.stack([x, y, seen[..., 2]], axis=-1)
+
+
+def fitted_camera(scene: Scene, size: tuple[int, int]) -> Camera:
+    """Return the camera along the scene's direction such that every point of every frame is in the picture.
+
+    A point at (x, y, z) from the centre, in camera axes, is in the picture if |x| <= a_x (d + z) and |y| <= a_y (d +
+    z), where d is the distance of the centre. The required d is a maximum over the points. The centre is then moved to
+    the middle of the picture, twice, which suffices for a long lens.
+    """
+    forward = scene.direction / np.linalg.norm(scene.direction)
+    right = np.cross(forward, scene.up)
+    right /= np.linalg.norm(right)
+    axes = np.stack([right, np.cross(right, forward), forward])
+    points = seen_points(scene) @ axes.T
+    half = FILL * np.tan(np.deg2rad(VIEW_ANGLE) / 2) * np.array([size[0] / size[1], 1.0])
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    for _ in range(3):
+        distance = fitting_distance(points - middle, half)
+        relative = points - middle
+        seen = relative[:, :2] / (distance + relative[:, 2:])
+        middle[:2] += (seen.min(axis=0) + seen.max(axis=0)) / 2 * distance
+    distance = fitting_distance(points - middle, half)
+    return Camera(eye=axes.T @ middle - distance * forward, axes=axes, distance=distance, size=size)
+
+
+def fitting_distance(relative: Array, half: Array) -> float:
+    """Return the smallest distance from which points, (n, 3) in camera axes, fit between tangents +-half, (2,)."""
+    distance = float(((np.abs(relative[:, :2]) / half).max(axis=1) - relative[:, 2]).max())
+    return distance if distance > 0 else 1.0  # for a single point any distance is valid
+
+
+def seen_points(scene: Scene) -> Array:
+    """Return the points that must be in the picture, (n, 3): all nodes, because corners of boxes would waste space."""
+    found = [surface.nodes[..., np.unique(surface.triangles), :].reshape(-1, 3) for surface in scene.surfaces]
+    found += [lines.points[..., np.unique(lines.segments), :].reshape(-1, 3) for lines in scene.lines]
+    return np.concatenate([part for part in found if len(part)])

@@ -1,0 +1,229 @@
+"""Recovery matrices of a reduced body: rows that give motions, stress and forces from its coordinates and loads.
+
+With z = (d, theta, q): the small displacement and rotation of B in axes of B, and the modal coordinates,
+
+    y = D_0 z + D_1 dz/dt + D_2 d²z/dt² + L p
+
+where D_k is `dynamic[k]`, L is `static`, and p are the amplitudes of the loads named in `loads`. For a stress or a
+force, D_0 is the mode displacement method. D_2 and L then add the static response to inertia and loads that the modes
+lack. Together they are the mode acceleration method (docs/theory.md §11).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from cms.body.geometric_stiffness import SPIN_PAIRS
+from cms.errors import BodyError
+from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int, require_finite, require_shape
+from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.units import Dimensions, Units, unit_words
+from fe_models.foundation.words import nearest, quoted
+
+__all__ = ["N_RIGID", "RecoveryTable", "spin_products"]
+
+N_RIGID = 6  #: number of coordinates of z before q: d and theta
+ORDERS = ("position", "velocity", "acceleration")  #: derivatives of z, in the order of `dynamic`
+TEXTS = ("labels", "quantities", "entities", "components")
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class RecoveryTable:
+    """Named rows of a reduced body; row components are in mesh axes or element axes, columns in axes of B.
+
+    Raises
+    ------
+    BodyError
+        If shapes do not fit, a number is not finite, or a label is repeated.
+    """
+
+    name: str
+    labels: tuple[str, ...]  #: label of each row, unique, such as "node 17 acceleration ux"
+    quantities: tuple[str, ...]  #: quantity of each row, such as "acceleration" or "beam force"
+    entities: tuple[str, ...]  #: what the row belongs to: "node", "element", "interface", "point" or "body"
+    numbers: IntArray  #: number of the node or element, (n_rows,); -1 if it only has a name
+    components: tuple[str, ...]  #: component of each row, such as "ux", "xx" or "end A My"
+    dimensions: Array  #: exponents of mass, length and time of each row, (n_rows, 3)
+    dynamic: Array  #: factors of z, dz/dt and d²z/dt², (3, n_rows, 6 + n_q)
+    loads: tuple[str, ...]  #: name of each column of `static`
+    load_dimensions: Array  #: exponents of mass, length and time of each amplitude, (n_loads, 3)
+    static: Array  #: residual static response to each load of unit amplitude, (n_rows, n_loads)
+    system: Units  #: unit system of all numbers
+    truncated: str = ""  #: description of what the rows neglect
+
+    def __post_init__(self) -> None:
+        where = f"recovery {self.name!r}"
+        n, n_loads = len(self.labels), len(self.loads)
+        put = object.__setattr__
+        for name in (*TEXTS, "loads"):
+            put(self, name, tuple(getattr(self, name)))
+        put(self, "numbers", frozen_int(self.numbers))
+        for name in ("dimensions", "dynamic", "load_dimensions", "static"):
+            put(self, name, frozen(getattr(self, name)))
+            require_finite(f"{where}: {name}", getattr(self, name))
+        for name in TEXTS[1:]:
+            if len(getattr(self, name)) != n:
+                raise BodyError(f"{where}: {n} labels, but {len(getattr(self, name))} {name}")
+        if self.numbers.shape != (n,):
+            raise BodyError(f"{where}: numbers: expected ({n},), got {self.numbers.shape}")
+        require_shape(f"{where}: dimensions", self.dimensions, (n, 3))
+        require_shape(f"{where}: load_dimensions", self.load_dimensions, (n_loads, 3))
+        require_shape(f"{where}: static", self.static, (n, n_loads))
+        if self.dynamic.ndim != 3 or self.dynamic.shape[:2] != (3, n) or self.dynamic.shape[2] < N_RIGID:
+            raise BodyError(f"{where}: dynamic: expected (3, {n}, 6 + n_q), got {self.dynamic.shape}")
+        for what, words in (("label", self.labels), ("load", self.loads)):
+            if len(set(words)) != len(words):
+                twice = next(word for k, word in enumerate(words) if word in words[:k])
+                raise BodyError(f"{where}: two rows or columns have the {what} {twice!r}; ask for each once")
+
+    @property
+    def n_rows(self) -> int:
+        """Number of rows."""
+        return len(self.labels)
+
+    @property
+    def n_q(self) -> int:
+        """Number of modes."""
+        return int(self.dynamic.shape[2]) - N_RIGID
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Unit of each row, such as "N mm"."""
+        return tuple(unit_words(self.system, Dimensions(*row)) for row in self.dimensions)
+
+    @property
+    def load_units(self) -> tuple[str, ...]:
+        """Unit of each load amplitude."""
+        return tuple(unit_words(self.system, Dimensions(*row)) for row in self.load_dimensions)
+
+    def values(
+        self, z: Array, z_dot: Array | None = None, z_ddot: Array | None = None, p: Array | None = None
+    ) -> Array:
+        """Return y for coordinates, rates, accelerations and load amplitudes; omitted arguments count as zero.
+
+        Parameters
+        ----------
+        z, z_dot, z_ddot
+            (..., 6 + n_q).
+        p
+            (..., n_loads).
+
+        Returns
+        -------
+        Array
+            (..., n_rows).
+        """
+        width = N_RIGID + self.n_q
+        total = 0.0
+        for matrix, columns, what, n in (
+            *((self.dynamic[k], x, f"{ORDERS[k]} of z", width) for k, x in enumerate((z, z_dot, z_ddot))),
+            (self.static, p, "loads", len(self.loads)),
+        ):
+            if columns is None:
+                continue
+            if np.shape(columns)[-1:] != (n,):
+                raise BodyError(
+                    f"recovery {self.name!r}: {what}: expected {n} numbers on the last axis, got {np.shape(columns)}"
+                )
+            total = total + np.asarray(columns) @ matrix.T
+        return np.asarray(total)
+
+    def rows(self, wanted: str) -> IntArray:
+        """Return the rows with that label or quantity, or whose label begins with these words.
+
+        Raises
+        ------
+        BodyError
+            If there is no such row.
+        """
+        found = [
+            k
+            for k, (label, quantity) in enumerate(zip(self.labels, self.quantities, strict=True))
+            if wanted in (label, quantity) or label.startswith(f"{wanted} ")
+        ]
+        if not found:
+            choices = [*dict.fromkeys(self.quantities), *self.labels]
+            raise BodyError(f"recovery {self.name!r}: no row {quoted(wanted)}{nearest(wanted, choices)}")
+        return np.array(found, dtype=np.int64)
+
+    def of_rows(self, rows: Sequence[int] | IntArray) -> "RecoveryTable":
+        """Return a table of some rows, in that order."""
+        rows = np.asarray(rows, dtype=np.int64)
+        texts: dict[str, Any] = {name: tuple(getattr(self, name)[int(k)] for k in rows) for name in TEXTS}
+        return replace(
+            self,
+            **texts,
+            numbers=self.numbers[rows],
+            dimensions=self.dimensions[rows],
+            dynamic=self.dynamic[:, rows],
+            static=self.static[rows],
+        )
+
+    def changed(self, X: Array, R: Array, p: Array) -> "RecoveryTable":
+        """Transform the rows to the coordinates of another frame of the same body.
+
+        Parameters
+        ----------
+        X
+            z = X z_new, (6 + n_q, 6 + n_q); the same for z_ddot, except for the acceleration of the origin about p_new.
+        R
+            New axes as columns, in old axes, (3, 3).
+        p
+            New origin in the old frame, (3,) [m]; the old origin moves about it, d² = ... + omega × (omega × -p).
+        """
+        static = np.array(self.static)
+        index = {name: k for k, name in enumerate(self.loads)}
+        for k, name in enumerate(self.loads):
+            group, _, component = name.rpartition(" ")
+            is_amount = not self.load_dimensions[k].any()  # the amplitude of a load case, which does not depend on axes
+            if not is_amount and (component in ("fx", "mx") or name == "gravity x"):
+                three = [index[f"{group} {component[:-1]}{axis}"] for axis in "xyz"]
+                static[:, three] = self.static[:, three] @ R
+            elif name == "spin xx":
+                six = [index[f"spin {'xyz'[a]}{'xyz'[b]}"] for a, b in SPIN_PAIRS]
+                T = spin_change(R)
+                static[:, six] = self.static[:, six] @ T + self.dynamic[2][:, :3] @ spin_accelerations(-p) @ T
+        return replace(self, dynamic=self.dynamic @ X, static=static)
+
+    def in_units(self, new: Units) -> "RecoveryTable":
+        """Return the table with its numbers in other units."""
+        old = self.system
+
+        def factors(dimensions: Array, time: float = 0.0) -> Array:
+            return np.array([Dimensions(m, length, t + time).factor(old, new) for m, length, t in dimensions])
+
+        z = np.zeros((N_RIGID + self.n_q, 3))
+        z[:3, 1], z[N_RIGID:, 0], z[N_RIGID:, 1] = 1.0, 0.5, 1.0
+        row = factors(self.dimensions)
+        dynamic = [row[:, None] / factors(z, -k) * matrix for k, matrix in enumerate(self.dynamic)]
+        static = row[:, None] / factors(self.load_dimensions).reshape(1, -1) * self.static
+        return replace(self, dynamic=np.array(dynamic), static=static, system=new)
+
+
+def spin_products(omega: Array) -> Array:
+    """Return amplitudes of the loads "spin xx yy zz xy yz zx", (..., 6), for angular velocities, (..., 3) [rad/s].
+
+    The amplitudes are omega_a omega_b; those of two different axes are doubled, because each stands for both orders.
+    """
+    omega = np.asarray(omega)
+    return np.stack([(1.0 if a == b else 2.0) * omega[..., a] * omega[..., b] for a, b in SPIN_PAIRS], axis=-1)
+
+
+def spin_accelerations(c: Array) -> Array:
+    """Return the acceleration omega × (omega × c) per amplitude of `spin_products`, (3, 6)."""
+    e = np.eye(3)
+    columns = [(np.cross(e[a], np.cross(e[b], c)) + np.cross(e[b], np.cross(e[a], c))) / 2 for a, b in SPIN_PAIRS]
+    return np.stack(columns, axis=1)
+
+
+def spin_change(R: Array) -> Array:
+    """Return the matrix from products in new axes to products in old axes, (6, 6), with omega_old = R omega_new."""
+    columns = []
+    for a, b in SPIN_PAIRS:
+        both = np.outer(R[:, a], R[:, b])  # omega_a omega_b of the new axes, as a tensor in old axes
+        both = (both + both.T) / 2
+        columns.append([both[i, j] * (1.0 if i == j else 2.0) for i, j in SPIN_PAIRS])
+    return np.array(columns).T

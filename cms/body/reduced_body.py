@@ -1,0 +1,253 @@
+"""The reduced body: content of the modal file and input of the multibody engine. Only pictures depend on mesh size."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cms.body.geometric_stiffness import GeometricStiffness
+from cms.body.invariants import Moments
+from cms.body.kept_points import KeptPoints
+from cms.body.nodal_sums import NodalSums
+from cms.body.recovery_table import RecoveryTable
+from cms.body.source_columns import SourceColumns
+from cms.body.stress import PointStress
+from cms.errors import BodyError
+from fe_models.body.load_cases import ReducedLoadCase
+from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int, require_finite, require_shape
+from fe_models.foundation.copies import FrozenMapping, frozen_copies
+from fe_models.foundation.tall.on_disk import row_slices
+from fe_models.foundation.units import Units
+from fe_models.foundation.words import nearest, quoted
+from fe_models.meshes.numbering import NONE, Numbering
+
+__all__ = ["BodyFrame", "ReducedBody", "ReducedInterface"]
+
+ORTHONORMAL = 1e-6  #: defect of axes that counts as rounding of printed digits
+
+
+def require_finite_rows(where: str, array: Array) -> None:
+    """Raise `BodyError` unless all numbers are finite; an array on disk is read in slices of rows."""
+    for rows in row_slices(len(array), array):
+        require_finite(where, array[rows])
+
+
+def require_orthonormal(where: str, axes: Array) -> None:
+    """Raise `BodyError` unless the columns are orthonormal."""
+    defect = float(np.abs(axes.T @ axes - np.eye(3)).max())
+    if not defect <= ORTHONORMAL:
+        raise BodyError(f"{where}: expected orthonormal axes as columns, they are {defect:.1e} from it")
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class BodyFrame:
+    """The frame B in which elastic displacement is measured, as its position in the undeformed mesh.
+
+    c_mesh = origin + axes @ c_B.
+    """
+
+    kind: str  #: "nodal", "tisserand", "buckens", or "held": the body is held to the ground, and its frame cannot move
+    origin: Array  #: in mesh coordinates, (3,) [m]
+    axes: Array = field(default_factory=lambda: np.eye(3))  #: axes of B as columns, in mesh axes, (3, 3)
+    at: str = ""  #: interface that defines a nodal frame; "": other dofs
+    #: dofs that a nodal frame holds, (mesh node, component), (6, 2); empty: another kind, or not recorded
+    dofs: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "origin", frozen(self.origin))
+        object.__setattr__(self, "axes", frozen(self.axes))
+        object.__setattr__(self, "dofs", frozen_int(self.dofs))
+        if self.dofs.shape != (len(self.dofs), 2):
+            raise BodyError(f"body frame: dofs: expected (n, 2) of (node, component), got {self.dofs.shape}")
+        require_shape("body frame: origin", self.origin, (3,))
+        require_shape("body frame: axes", self.axes, (3, 3))
+        require_finite("body frame: origin", self.origin)
+        require_finite("body frame: axes", self.axes)
+        require_orthonormal("body frame: axes", self.axes)
+        if np.linalg.det(self.axes) < 0:
+            raise BodyError("body frame: axes: expected right-handed axes as columns")
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class ReducedInterface:
+    """An interface of a reduced body: its reference point in B and the motion of that point with q."""
+
+    name: str
+    kind: str  #: "rigid", "distributing" or "nodes" (then Psi is the mean motion of the members)
+    position: Array  #: undeformed reference point in B, (3,) [m]
+    triad: Array  #: undeformed axes as columns in B, (3, 3)
+    Psi: Array  #: translation and rotation of the point in B for each mode, (6, n_q) [-, 1/m]
+    members: IntArray  #: member nodes, indices into `ReducedBody.nodes`, (n_members,)
+    #: False: Psi has no rotation (rows 3-5 are zero) and is the mean translation of the members, which are collinear
+    has_rotation: bool = True
+
+    def __post_init__(self) -> None:
+        where = f"interface {self.name!r}"
+        for name in ("position", "triad", "Psi"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+            require_finite(f"{where}: {name}", getattr(self, name))
+        object.__setattr__(self, "members", frozen_int(self.members))
+        require_shape(f"{where}: position", self.position, (3,))
+        require_shape(f"{where}: triad", self.triad, (3, 3))
+        require_orthonormal(f"{where}: triad", self.triad)
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class ReducedBody:
+    """A body as r = c + Phi q in its frame B, with M-orthonormal, K-diagonal shapes (docs/theory.md §3-5).
+
+    The unit of q follows from Phi.T M Phi = 1: sqrt(kg) m. Phi q is a length.
+    """
+
+    name: str
+    units: Units
+    frame: BodyFrame
+    M: Array  #: Phi.T M Phi, (n_q, n_q): identity, with zero diagonal entries for massless static shapes
+    K: Array  #: Phi.T K Phi, (n_q, n_q): diagonal of omega² [1/s²]
+    D: Array  #: modal damping, (n_q, n_q) [1/s]; zero if none was requested
+    labels: tuple[str, ...]  #: label of each mode: the sources of its energy
+    energy_shares: Array  #: share of each group of source columns in the energy of each mode, (n_q, n_sources)
+    sources: tuple[str, ...]  #: names of the groups of source columns, (n_sources,)
+    moments: Moments
+    #: elastic frequencies of the unsupported reduced body (of a held body: as held), ascending [Hz]
+    free_frequencies: Array
+    nodes: Array  #: kept nodes (surface, interfaces) in B, (n_kept, 3) [m]
+    #: indices of the kept nodes in the original model, (n_kept,); `numbering` has the user's numbers
+    node_ids: IntArray
+    Phi: Array  #: translations of the kept nodes in B, (n_kept, 3, n_q)
+    surface: IntArray  #: triangles of kept nodes, (n_tri, 3)
+    interfaces: tuple[ReducedInterface, ...]
+    provenance: Mapping[str, str] = field(default_factory=dict)  #: versions, digests, options, solver
+    columns: SourceColumns | None = None  #: columns of the mode set; None: not recorded
+    nodal_sums: NodalSums | None = None  #: data for a Buckens frame; None: not recorded
+    load_cases: tuple[ReducedLoadCase, ...] = ()
+    #: stress of the modes at the kept nodes, xx yy zz yz xz xy in axes of B, (n_kept, 6, n_q) [Pa per unit of q]; None:
+    #: left out or unknown. It is zero at reference nodes, which belong to no element
+    stress: Array | None = None
+    point_stress: PointStress | None = None  #: stress of the modes at named points; None: left out, or there are none
+    geometric: GeometricStiffness | None = None  #: for geometric stiffening; None: left out, or not known
+    #: g_kl of the kept nodes in B, displacement ½ Σ q_k q_l g_kl, (n_kept, 3, n_q, n_q) [1/(kg m)]; None: left out
+    quadratic: Array | None = None
+    #: the user's numbers of kept nodes and elements, and the sets
+    numbering: Numbering = field(default_factory=Numbering)
+    kept: KeptPoints | None = None  #: kept nodes that have rotations; None: there are none
+    recovery: Mapping[str, RecoveryTable] = field(default_factory=dict)  #: recovery matrices by name
+
+    def __post_init__(self) -> None:
+        where = f"reduced body {self.name!r}"
+        put = object.__setattr__
+        for name in ("M", "K", "D", "energy_shares", "free_frequencies", "nodes", "Phi"):
+            put(self, name, frozen(getattr(self, name)))
+            require_finite_rows(f"{where}: {name}", getattr(self, name))
+        for name in ("node_ids", "surface"):
+            put(self, name, frozen_int(getattr(self, name)))
+        if self.stress is not None:
+            put(self, "stress", frozen(self.stress))
+            require_shape(f"{where}: stress", self.stress, (len(self.nodes), 6, self.n_q))
+            require_finite_rows(f"{where}: stress", self.stress)
+        if self.quadratic is not None:
+            put(self, "quadratic", frozen(self.quadratic))
+            require_shape(f"{where}: quadratic", self.quadratic, (len(self.nodes), 3, self.n_q, self.n_q))
+            require_finite(f"{where}: quadratic", self.quadratic)
+            if self.geometric is None:
+                raise BodyError(f"{where}: quadratic modes without the geometric stiffness that is their inertia")
+        for name in ("labels", "sources", "interfaces", "load_cases"):
+            put(self, name, tuple(getattr(self, name)))
+        put(self, "provenance", FrozenMapping(dict(self.provenance)))
+        put(self, "recovery", FrozenMapping(dict(self.recovery)))
+        n, n_kept = self.n_q, len(self.nodes)
+        for name, shape in {
+            "M": (n, n),
+            "K": (n, n),
+            "D": (n, n),
+            "nodes": (n_kept, 3),
+            "Phi": (n_kept, 3, n),
+            "node_ids": (n_kept,),
+            "energy_shares": (n, len(self.sources)),
+        }.items():
+            require_shape(f"{where}: {name}", getattr(self, name), shape)
+        if len(self.labels) != n:
+            raise BodyError(f"{where}: {n} modes need as many labels, got {len(self.labels)}")
+        if self.moments.n_q != n:
+            raise BodyError(f"{where}: {n} modes, but moments of {self.moments.n_q}")
+        widths = {f"load case {case.name!r}: h": case.h.shape for case in self.load_cases}
+        if self.columns is not None:
+            widths["columns"] = (np.asarray(self.columns.A).shape[1],)
+        if self.kept is not None:
+            widths["kept points"] = (np.asarray(self.kept.rotation).shape[2],)
+        if self.nodal_sums is not None:
+            widths["nodal sums"] = (np.asarray(self.nodal_sums.U1).shape[1],)
+        if self.point_stress is not None:
+            widths["stress points"] = (np.asarray(self.point_stress.modes).shape[2],)
+        if self.geometric is not None:
+            widths["geometric stiffness"] = (self.geometric.n_q,)
+            if self.geometric.n_interfaces != len(self.interfaces):
+                raise BodyError(
+                    f"{where}: {len(self.interfaces)} interfaces, but geometric stiffness of "
+                    f"{self.geometric.n_interfaces}"
+                )
+            if self.geometric.spread is not None and self.nodal_sums is None:
+                raise BodyError(
+                    f"{where}: loads spread over the nodes without the nodal sums that are their resultants"
+                )
+        for name, table in self.recovery.items():
+            widths[f"recovery {name!r}"] = (table.n_q,)
+            if table.system != self.units or table.name != name:
+                raise BodyError(
+                    f"{where}: recovery {name!r}: expected a table of this name in {self.units.name}, got "
+                    f"{table.name!r} in {table.system.name}"
+                )
+        for name, width in widths.items():
+            if width != (n,):
+                raise BodyError(f"{where}: {n} modes, but {name} of {width[0]}")
+        if self.surface.size and (self.surface.min() < 0 or self.surface.max() >= n_kept):
+            raise BodyError(f"{where}: surface: nodes outside 0..{n_kept - 1}")
+        self.numbering.require_fit(where, n_kept, len(self.surface))
+        if self.kept is not None and (self.kept.nodes.min(initial=0) < 0 or self.kept.nodes.max(initial=0) >= n_kept):
+            raise BodyError(f"{where}: kept points: nodes outside 0..{n_kept - 1}")
+        for interface in self.interfaces:
+            require_shape(f"{where}: interface {interface.name!r}: Psi", interface.Psi, (6, n))
+            if interface.members.size and (interface.members.min() < 0 or interface.members.max() >= n_kept):
+                raise BodyError(f"{where}: interface {interface.name!r}: members outside 0..{n_kept - 1}")
+
+    @property
+    def n_q(self) -> int:
+        """Number of modes."""
+        return np.asarray(self.K).shape[0]
+
+    @property
+    def is_held(self) -> bool:
+        """Whether the body is intentionally held to the ground; a floating frame rejects it."""
+        return self.frame.kind == "held"
+
+    @property
+    def frequencies(self) -> Array:
+        """Frequencies of the modes with origin and axes of this frame held, (n_q,) [Hz]; inf for massless shapes."""
+        mass = np.diag(self.M)
+        omega2 = np.divide(np.diag(self.K), mass, out=np.full(self.n_q, np.inf), where=mass > 0)
+        return np.sqrt(np.maximum(omega2, 0.0)) / (2 * np.pi)
+
+    def node_name(self, row: int) -> str:
+        """Return the user's name of a kept node: "12", "PART-1-1.12", or "index 7" if it has no number."""
+        if self.numbering.nodes.size and self.numbering.nodes[row] != NONE:
+            return self.numbering.node_name(row)
+        return f"index {self.node_ids[row]}"
+
+    def interface(self, name: str) -> ReducedInterface:
+        """Return the interface of that name; raise `BodyError` with the known names if there is none."""
+        for interface in self.interfaces:
+            if interface.name == name:
+                return interface
+        choices = [interface.name for interface in self.interfaces]
+        raise BodyError(f"reduced body {self.name!r}: no interface {quoted(name)}{nearest(name, choices)}")
+
+    def load_case(self, name: str) -> ReducedLoadCase:
+        """Return the load case of that name; raise `BodyError` with the known names if there is none."""
+        for case in self.load_cases:
+            if case.name == name:
+                return case
+        choices = [case.name for case in self.load_cases]
+        raise BodyError(f"reduced body {self.name!r}: no load case {quoted(name)}{nearest(name, choices)}")

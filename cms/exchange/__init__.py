@@ -1,0 +1,1 @@
+"""Exchange: reduced bodies of other programs, read and written."""

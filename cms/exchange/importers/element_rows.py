@@ -1,0 +1,139 @@
+"""Rows of a superelement that another program calls forces and stresses of elements: what they are, in our words.
+
+Nastran numbers the items of an element force or stress by its output record, in whose order they stand below. Types
+that are not here have a record of several places (beams with stations, shells with corners), or one item that is a
+force or a moment (scalar springs and dampers, where the rows do not say which): they have no unit, and are left out.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from cms.errors import ForeignBodyError
+from cms.reduction.recovery.blocks import RowName
+from fe_models.foundation.arrays import Array, IntArray, frozen
+from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.units import Dimensions
+
+__all__ = ["ForeignRows", "force_rows", "motion_rows", "stress_rows"]
+
+FORCE, MOMENT, STRESS, LENGTH = Dimensions(1, 1, -2), Dimensions(1, 2, -2), Dimensions(1, -1, -2), Dimensions(0, 1, 0)
+PER_LENGTH, BENDING = Dimensions(1, 0, -2), Dimensions(1, 1, -2)
+SHELL = (
+    *((name, PER_LENGTH) for name in ("Nx", "Ny", "Nxy")),
+    *((name, BENDING) for name in ("Mx", "My", "Mxy")),
+    *((name, PER_LENGTH) for name in ("Qx", "Qy")),
+)
+ROD = (("N", FORCE), ("T", MOMENT))
+SCALAR = (11, 12, 13, 14, 20, 21, 22, 23)  #: springs and dampers of one item
+TYPE_NAMES = {
+    1: "CROD", 2: "CBEAM", 3: "CTUBE", 4: "CSHEAR", 10: "CONROD", 11: "CELAS1", 12: "CELAS2", 13: "CELAS3",
+    14: "CELAS4", 20: "CDAMP1", 21: "CDAMP2", 22: "CDAMP3", 23: "CDAMP4", 24: "CVISC", 33: "CQUAD4", 34: "CBAR",
+    38: "CGAP", 39: "CTETRA", 64: "CQUAD8", 67: "CHEXA", 68: "CPENTA", 69: "CBEND", 70: "CTRIAR", 74: "CTRIA3",
+    75: "CTRIA6", 82: "CQUADR", 102: "CBUSH", 144: "CQUAD4 with corners",
+}  # fmt: skip
+FORCE_ITEMS: Mapping[int, tuple[tuple[str, Dimensions], ...]] = {
+    1: ROD,
+    3: ROD,
+    4: (
+        *((f"F{a}{b}", FORCE) for a, b in ((4, 1), (2, 1), (1, 2), (3, 2), (2, 3), (4, 3), (3, 4), (1, 4))),
+        *(
+            (name, unit)
+            for k, flow in enumerate(("q12", "q23", "q34", "q41"), start=1)
+            for name, unit in ((f"kick {k}", FORCE), (flow, PER_LENGTH))
+        ),
+    ),
+    10: ROD,
+    24: ROD,
+    33: SHELL,
+    34: (
+        *((f"end {end} M{plane}", MOMENT) for end in "AB" for plane in (1, 2)),
+        *((name, FORCE) for name in ("V1", "V2", "N")),
+        ("T", MOMENT),
+    ),
+    38: (*((name, FORCE) for name in ("fx", "fy", "fz")), *((name, LENGTH) for name in ("u", "v", "w", "sv", "sw"))),
+    69: tuple(
+        (f"end {end} {name}", MOMENT if name in ("M1", "M2", "T") else FORCE)
+        for end in "AB"
+        for name in ("M1", "M2", "V1", "V2", "N", "T")
+    ),
+    74: SHELL,
+    102: (*((name, FORCE) for name in ("fx", "fy", "fz")), *((name, MOMENT) for name in ("mx", "my", "mz"))),
+}  #: items of element forces by type, in Nastran's order and signs
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class ForeignRows:
+    """Named rows over the dofs of a superelement."""
+
+    names: tuple[RowName, ...]
+    matrix: Array  #: (n_rows, n_dof)
+    about: str = ""  #: what has to be known of them, in words
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "matrix", frozen(self.matrix))
+        if self.matrix.ndim != 2 or len(self.matrix) != len(self.names):
+            raise ForeignBodyError(f"recovery: {len(self.names)} names of rows, got a matrix {self.matrix.shape}")
+        if not np.isfinite(self.matrix).all():
+            raise ForeignBodyError("recovery: expected finite rows")
+
+
+def force_rows(elements: IntArray, matrix: Array) -> tuple[ForeignRows, tuple[str, ...]]:
+    """Return the element forces of known types, and in words which were left out.
+
+    Parameters
+    ----------
+    elements
+        (type, id, item from 1) of each row, (n_rows, 3).
+    matrix
+        (n_rows, n_dof).
+    """
+    counts = {
+        (int(kind), int(number)): int(n)
+        for (kind, number), n in zip(*np.unique(elements[:, :2], axis=0, return_counts=True), strict=True)
+    }
+    names: list[RowName] = []
+    taken: list[int] = []
+    lost: dict[int, int] = {}
+    for row, (kind, number, item) in enumerate(elements.tolist()):
+        items = FORCE_ITEMS.get(kind, ())
+        if counts[kind, number] != len(items):
+            lost[kind] = lost.get(kind, 0) + 1
+            continue
+        component, dimensions = items[item - 1]
+        names.append(RowName("element force", "element", number, str(number), component, dimensions))
+        taken.append(row)
+    notes = tuple(
+        f"element forces (MEF1): {n} rows of {TYPE_NAMES.get(kind, f'type {kind}')} are left out: {why_lost(kind)}"
+        for kind, n in lost.items()
+    )
+    about = "Nastran's items, in the axes and signs of its elements"
+    return ForeignRows(tuple(names), matrix[taken], about), notes
+
+
+def why_lost(kind: int) -> str:
+    """Return why the rows of a type are not taken."""
+    if kind in SCALAR:
+        return "each is a force or a moment, and the file does not say which"
+    return "the order of their forces and moments is not known"
+
+
+def stress_rows(elements: IntArray, matrix: Array) -> ForeignRows:
+    """Return the element stresses, numbered by item; arguments as of `force_rows`."""
+    names = tuple(
+        RowName("element stress", "element", number, str(number), f"item {item}", STRESS)
+        for _, number, item in elements.tolist()
+    )
+    return ForeignRows(names, matrix, "Nastran's items, numbered from 1; all are taken for stresses")
+
+
+def motion_rows(dofs: IntArray, matrix: Array) -> ForeignRows:
+    """Return displacements of nodes, (node number, component 0-5) of each row, (n_rows, 2), basic axes."""
+    words = ("ux", "uy", "uz", "rx", "ry", "rz")
+    names = tuple(
+        RowName("displacement", "node", number, str(number), words[c], Dimensions(0, 0 if c >= 3 else 1, 0))
+        for number, c in dofs.tolist()
+    )
+    return ForeignRows(names, matrix, "displacements of all nodes that the files recover")

@@ -1,0 +1,210 @@
+"""Inertia that a reduced mass matrix does not say, from what is given beside: full mass, nodal masses, a mesh."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from cms.body.invariants import INERTIA_TERMS, Moments, moments_from_gram
+from cms.body.reduced_body import BodyFrame
+from cms.errors import ForeignBodyError
+from cms.reduction.basis.matrix_moments import gram_from_matrices
+from fe_models.body.fe_body import FEBody
+from fe_models.body.material import Material
+from fe_models.elements.solids.body import solid_body
+from fe_models.files.matrices.foreign_matrices import ForeignMatrices
+from fe_models.files.matrices.given import ScalarMassModel, scalar_mass_of
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.units import Units
+from fe_models.meshes.mesh import Mesh
+
+__all__ = [
+    "FullMass", "Inertia", "MeshMass", "NodalMasses", "completed", "full_mass_of", "moments_in_frame",
+    "moments_of_masses",
+]  # fmt: skip
+
+EXACT = 1e-6  #: difference of what both routes know, of its size, up to which both are one mass distribution
+#: the same, beyond which these are two bodies; lumping moves the second moment of a coarse mesh by some per cent
+OTHER_BODY = {"mass": 0.02, "first moment": 0.1, "second moment": 0.1}
+
+Shapes = Callable[[IntArray], Array]  #: (node number, component) rows -> shapes in basic axes, (n_rows, n_q)
+
+
+@dataclass(frozen=True, eq=False)
+class FullMass:
+    """The mass matrix of the full model, over dofs that the superelement recovers."""
+
+    M: sp.csc_array  #: both triangles, basic axes, (n_full, n_full)
+    dofs: IntArray  #: (node number, component 0-5) of every row, (n_full, 2)
+    places: Mapping[int, Array]  #: node number -> place, basic axes
+
+
+@dataclass(frozen=True, eq=False)
+class NodalMasses:
+    """Point masses at nodes that the superelement recovers, such as its lumped mass."""
+
+    node_numbers: IntArray  #: (n,)
+    masses: Array  #: (n,)
+
+
+@dataclass(frozen=True, eq=False)
+class MeshMass:
+    """The mesh behind the superelement, whose node numbers it recovers, and its density."""
+
+    mesh: Mesh
+    density: float | Mapping[str, float]  #: of all cells, or group name -> density
+
+
+Inertia = FullMass | NodalMasses | MeshMass
+
+
+def full_mass_of(foreign: ForeignMatrices) -> FullMass:
+    """Return the full mass of matrices as they were read.
+
+    Raises
+    ------
+    ForeignBodyError
+        If mass or the list of dofs is missing.
+    """
+    if foreign.M is None or foreign.dofs is None:
+        what = "M" if foreign.M is None else "the list of dofs of its rows"
+        raise ForeignBodyError(f"full mass: {what} is missing; give the file that holds it too")
+    places = {}
+    if foreign.nodes is not None and foreign.node_numbers is not None:
+        places = dict(zip(map(int, foreign.node_numbers), np.asarray(foreign.nodes), strict=True))
+    return FullMass(foreign.M, foreign.dofs, places)
+
+
+def moments_of_masses(
+    inertia: Inertia, shapes: Shapes, places: Mapping[int, Array], units: Units, frame: BodyFrame
+) -> tuple[Moments, str]:
+    """Return all moments of the shapes by the masses that are given beside, and in words what they are.
+
+    Parameters
+    ----------
+    shapes
+        Of the body, without rigid motion, in basic axes.
+    places
+        Node number -> place of all nodes of the superelement.
+
+    Raises
+    ------
+    ForeignBodyError
+        If a node with mass is not recovered, or its place is another one.
+    """
+    if isinstance(inertia, NodalMasses):
+        numbers, mass = np.asarray(inertia.node_numbers), np.asarray(inertia.masses, dtype=float)
+        if len(numbers) != len(mass) or not len(mass) or not np.isfinite(mass).all() or (mass < 0).any():
+            raise ForeignBodyError("nodal masses: expected a number of a node and a mass above zero in each row")
+        known = {int(number) for number in places}
+        lost = [int(number) for number in numbers if int(number) not in known]
+        if lost:
+            raise ForeignBodyError(f"nodal masses: nodes {lost[:6]} are not among those of the superelement")
+        c = np.array([places[int(number)] for number in numbers])
+        phi = shapes(translations_of(numbers)).reshape(len(numbers), 3, -1)
+        n = phi.shape[2]
+        a = np.concatenate([np.ones((len(c), 1)), c, phi.reshape(len(c), 3 * n)], axis=1)
+        gram, is_exact, words = np.asarray(a.T @ (mass[:, None] * a)), False, f"{len(mass)} nodal masses"
+    elif isinstance(inertia, FullMass):
+        gram, is_exact = gram_of_full_mass(inertia, shapes, places, units)
+        words = f"full mass matrix of {len(inertia.dofs)} dofs"
+    else:
+        gram, is_exact, words = gram_of_mesh(inertia, shapes, places, units), True, "mesh and density"
+    return replace(moments_in_frame(gram, frame), is_exact=is_exact), words
+
+
+def translations_of(numbers: IntArray) -> IntArray:
+    """Return (node number, component) of the translations of nodes, node-major, (3 n, 2)."""
+    return np.stack([np.repeat(numbers, 3), np.tile(np.arange(3), len(numbers))], axis=1).astype(np.int64)
+
+
+def gram_of_full_mass(
+    inertia: FullMass, shapes: Shapes, places: Mapping[int, Array], units: Units
+) -> tuple[Array, bool]:
+    """Return the Gram matrix ∫ a aᵀ by a full mass matrix, basic axes, and whether it is exact: M is M_s ⊗ 1."""
+    numbers = np.unique(inertia.dofs[:, 0])
+    lost = [int(number) for number in numbers if int(number) not in inertia.places and int(number) not in places]
+    if lost:
+        raise ForeignBodyError(f"full mass: nodes {lost[:6]} have no place; give their positions")
+    index = {int(number): k for k, number in enumerate(numbers)}
+    dofs = np.stack([np.array([index[int(number)] for number in inertia.dofs[:, 0]]), inertia.dofs[:, 1]], axis=1)
+    nodes = np.array([inertia.places.get(int(number), places.get(int(number))) for number in numbers])
+    body = FEBody("full mass", inertia.M, sp.csc_array(inertia.M.shape), nodes, dofs, units=units)
+    M_s = scalar_mass_of(body)
+    if M_s is None:
+        return gram_from_matrices(body, shapes(inertia.dofs)), False
+    return ScalarMassModel(body.name, M_s, body.nodes, body.dofs).mass_gram(shapes(inertia.dofs)), True
+
+
+def gram_of_mesh(inertia: MeshMass, shapes: Shapes, places: Mapping[int, Array], units: Units) -> Array:
+    """Return the Gram matrix ∫ a aᵀ by the elements of a mesh, basic axes."""
+    mesh = inertia.mesh
+    numbers = mesh.node_numbers if len(mesh.node_numbers) else np.arange(len(mesh.nodes))
+    common = [k for k, number in enumerate(numbers) if int(number) in places]
+    if common:
+        far = np.linalg.norm(mesh.nodes[common] - [places[int(numbers[k])] for k in common], axis=1)
+        size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
+        if far.max() > 1e-3 * size:
+            at = int(numbers[common[int(np.argmax(far))]])
+            raise ForeignBodyError(
+                f"mesh {mesh.source}: node {at} is {far.max():.3g} away from where the superelement has it; is it the "
+                "mesh behind it, in the same units and axes?"
+            )
+    density = inertia.density if isinstance(inertia.density, Mapping) else {"": inertia.density}
+    materials = {
+        group: Material(group or "given density", E=1.0, nu=0.0, rho=float(rho)) for group, rho in density.items()
+    }
+    body = solid_body(mesh, materials[""] if "" in materials else materials, name="mesh beside", units=units)
+    assert body.element_model is not None
+    return body.element_model.mass_gram(shapes(translations_of(numbers)))
+
+
+def moments_in_frame(gram: Array, frame: BodyFrame, missing: tuple[str, ...] = ()) -> Moments:
+    """Return the moments in B of a Gram matrix ∫ a aᵀ in basic axes about their origin: c_B = axesᵀ (c - origin)."""
+    n = (len(gram) - 4) // 3
+    L = np.zeros((4 + 3 * n, 4 + 3 * n))
+    L[0, 0] = 1.0
+    L[1:4, 0], L[1:4, 1:4] = -frame.axes.T @ frame.origin, frame.axes.T
+    L[4:, 4:] = np.kron(frame.axes.T, np.eye(n))
+    return moments_from_gram(L @ gram @ L.T, missing=missing)
+
+
+def completed(known: Moments, other: Moments, what: str) -> tuple[Moments, str]:
+    """Return moments whose missing parts are those of another route, and in words how both differ where both know.
+
+    What a reduced mass matrix says stays as it says it: m, S, R, 1C, 2C, M*.
+
+    Raises
+    ------
+    ForeignBodyError
+        If both are not of one body.
+    """
+    length = float(np.sqrt(np.trace(known.R) / known.m)) or 1.0
+    size = np.sqrt(known.m)
+    by_name = {
+        "mass": abs(other.m / known.m - 1),
+        "first moment": float(np.abs(other.S - known.S).max() / (known.m * length)),
+        "second moment": float(np.abs(other.R - known.R).max() / (known.m * length**2)),
+        "1C": float(np.abs(other.C1 - known.C1).max(initial=0.0) / size),
+        "2C": float(np.abs(other.C2 - known.C2).max(initial=0.0) / (size * length)),
+        "modal mass": float(np.abs(other.M - known.M).max(initial=0.0)),
+    }
+    wrong = [f"{name} differs by {100 * by_name[name]:.3g} %" for name, most in OTHER_BODY.items()
+             if not by_name[name] <= most]  # fmt: skip
+    if wrong:
+        raise ForeignBodyError(
+            f"{what}: they are not of this body: {', '.join(wrong)} (mass {other.m:.6g} where the reduced mass matrix "
+            f"says {known.m:.6g}); look for units, a part that is missing, or another model"
+        )
+    whole = replace(known, missing=())
+    P = np.asarray(other.P)
+    S_kl = np.asarray(other.S_kl)
+    trace = np.einsum("ab,kl->abkl", np.eye(3), other.M) / 3
+    parts = {
+        "P": whole.P + (P + P.swapaxes(0, 1)) / 2,
+        "S_kl": whole.S_kl + S_kl - trace,
+    }
+    assert known.missing == INERTIA_TERMS
+    is_exact = other.is_exact and max(by_name.values()) < EXACT
+    return replace(whole, **parts, is_exact=is_exact), ", ".join(f"{key} {x:.1e}" for key, x in by_name.items())

@@ -1,0 +1,96 @@
+"""Moments of a body from the invariants that other programs write: P from 3C, S_kl from 4C and 5C (theory.md §5)."""
+
+import numpy as np
+
+from cms.body.invariants import INERTIA_TERMS, Moments
+from cms.errors import ForeignBodyError
+from fe_models.foundation.arrays import Array
+
+__all__ = ["moments_of_invariants"]
+
+EPSILON = np.cross(np.eye(3)[:, None], np.eye(3)[None])  #: (a × b)_c = EPSILON_abc a_a b_b, (3, 3, 3)
+CONSISTENT = 1e-6  #: difference of two statements of one invariant, of its size, that is digits of a file
+ROUGH = 0.1  #: the same, up to which the one that the mass matrix says is taken, with a note
+
+
+def moments_of_invariants(
+    where: str,
+    m: float,
+    S: Array,
+    J0: Array,
+    C1: Array,
+    C2: Array,
+    M: Array,
+    *,
+    C3: Array | None = None,
+    C4: Array | None = None,
+    C5: Array | None = None,
+) -> tuple[Moments, tuple[str, ...]]:
+    """Return the moments of what a file says, and notes on where it says two things.
+
+    (1) R = ½ tr(J0) 1 - J0
+    (2) P_k = ½ tr(3C_k) 1 - 3C_kᵀ, its antisymmetric part by 2C
+    (3) S_ab,kl: trace by the modal mass, the part antisymmetric in a, b by 4C, the rest by 5C, S_lk = M_kl 1 - 5C_kl
+    (4) what is None is missing
+
+    Parameters
+    ----------
+    C1, C2
+        (3, n_q).
+    M
+        Modal mass, (n_q, n_q).
+    C3, C4, C5
+        (n_q, 3, 3), (n_q, n_q, 3), (n_q, n_q, 3, 3).
+
+    Raises
+    ------
+    ForeignBodyError
+        If two statements of one thing differ by more than a lumped mass explains.
+    """
+    n = M.shape[0]
+    notes: list[str] = []
+    given = {"3C": C3, "4C": C4, "5C": C5}
+    for name, shape in {"3C": (n, 3, 3), "4C": (n, n, 3), "5C": (n, n, 3, 3)}.items():
+        value = given[name]
+        if value is not None and value.shape != shape:
+            raise ForeignBodyError(f"{where}: {name}: expected shape {shape}, got {value.shape}")
+    P = np.einsum("abc,ck->abk", EPSILON, C2) / 2
+    if C3 is not None:  # (2)
+        trace = np.trace(C3, axis1=1, axis2=2) / 2
+        whole = np.moveaxis(trace[:, None, None] * np.eye(3) - C3.transpose(0, 2, 1), 0, 2)
+        turning = (whole - whole.swapaxes(0, 1)) / 2
+        compare(where, notes, "2C and the antisymmetric part of 3C", turning, P, np.abs(whole).max(initial=0.0))
+        P = P + (whole + whole.swapaxes(0, 1)) / 2
+    S_kl = np.einsum("ab,kl->abkl", np.eye(3), M) / 3  # (3)
+    size = np.abs(M).max(initial=0.0)
+    if C4 is not None:
+        S_kl -= np.einsum("abc,klc->abkl", EPSILON, C4) / 2
+    if C5 is not None:
+        of_C5 = np.trace(C5, axis1=2, axis2=3) / 2
+        compare(where, notes, "the modal mass and the trace of 5C", of_C5, M, size)
+        lk = of_C5[:, :, None, None] * np.eye(3) - C5  # [k, l, a, b] = S_ab,lk
+        even = np.moveaxis((lk + lk.swapaxes(2, 3)) / 2, (0, 1, 2, 3), (3, 2, 0, 1))
+        S_kl += even - np.einsum("ab,kl->abkl", np.eye(3), np.einsum("aakl->kl", even)) / 3
+        if C4 is None:
+            raise ForeignBodyError(f"{where}: 5C is there and 4C, which is a part of it, is not")
+    missing = tuple(name for name in INERTIA_TERMS if given[name] is None)
+    R = np.trace(J0) / 2 * np.eye(3) - J0
+    moments = Moments(m=m, S=S, R=(R + R.T) / 2, C1=C1, P=P, S_kl=symmetric(S_kl), is_exact=not notes, missing=missing)
+    return moments, tuple(notes)
+
+
+def symmetric(S_kl: Array) -> Array:
+    """Return S_ab,kl with S_ba,lk = S_ab,kl, which holds but for the digits of a file."""
+    return np.asarray((S_kl + S_kl.transpose(1, 0, 3, 2)) / 2)
+
+
+def compare(where: str, notes: list[str], what: str, found: Array, expected: Array, size: float) -> None:
+    """Add a note where two statements differ by more than digits; `ForeignBodyError` where by more than lumping."""
+    defect = float(np.abs(found - expected).max(initial=0.0))
+    if not defect <= ROUGH * size:
+        raise ForeignBodyError(
+            f"{where}: {what} differ by {defect / size if size else np.inf:.1e}: expected two words for one integral; "
+            "indices are in another order, a sign is another one, or the file is of two models"
+        )
+    if defect > CONSISTENT * size:
+        notes.append(f"{what} differ by {defect / size:.1e}: lumped masses beside consistent ones; the first is taken")

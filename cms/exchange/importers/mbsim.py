@@ -1,0 +1,127 @@
+"""Bodies of MBSim: the HDF5 input of its ExternalFlexibleFfrBody."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cms.body.invariants import Moments
+from cms.errors import ForeignBodyError
+from cms.exchange.importers.modal_body import ForeignInterface, ModalBody
+from fe_models.foundation.arrays import Array, IntArray
+
+__all__ = ["is_mbsim", "read_mbsim"]
+
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  #: (a, b) of the blocks of int phi_a phi_b
+STRESS_ORDER = [0, 1, 2, 4, 5, 3]  #: our xx yy zz yz xz xy, from xx yy zz xy yz zx
+DENSEST = 1100  #: bytes that a byte of a compressed file can stand for
+NEEDED = ("mass", "position integral", "position position integral", "shape function integral", "stiffness matrix")
+
+
+def is_mbsim(path: Path, head: bytes) -> bool:
+    """Whether a file is HDF5 with the datasets of MBSim."""
+    if not head.startswith(SIGNATURE):
+        return False
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            return all(name in file for name in NEEDED[1:4])
+    except (OSError, RuntimeError):  # the second of damaged tables inside
+        return False
+
+
+def read_mbsim(files: Sequence[Path], name: str, places: Mapping[int, Array]) -> ModalBody:
+    """Read a body of MBSim; names and shapes of the datasets in docs/formats.md.
+
+    Raises
+    ------
+    ForeignBodyError
+        If a dataset is missing, of another shape, or the file is damaged.
+    """
+    import h5py
+
+    path = files[0]
+    if len(files) > 1:
+        raise ForeignBodyError(f"{path}: expected one file of MBSim, got {len(files)}")
+    try:
+        with h5py.File(path, "r") as file:
+            return body_of_file(file, path, name)
+    except (OSError, RuntimeError) as error:
+        raise ForeignBodyError(f"{path}: cannot be read as HDF5: {error}; it is truncated or damaged") from error
+
+
+def body_of_file(file: Any, path: Path, name: str) -> ModalBody:
+    """Return the body of an open file."""
+    if "stiffness matrix" not in file:
+        raise ForeignBodyError(f"{path}: dataset 'stiffness matrix' is missing")
+    shape = file["stiffness matrix"].shape
+    if len(shape) != 2 or shape[0] != shape[1] or not shape[0]:
+        raise ForeignBodyError(f"{path}: dataset 'stiffness matrix': expected a square matrix, got shape {shape}")
+    n = shape[0]
+
+    def read(key: str, *shape: int) -> Array:
+        if key not in file:
+            raise ForeignBodyError(f"{path}: dataset {key!r} is missing")
+        dataset = file[key]
+        stored = dataset.id.get_storage_size()
+        if dataset.nbytes > 4096 + DENSEST * stored:
+            raise ForeignBodyError(f"{path}: dataset {key!r}: says {dataset.nbytes} bytes and holds {stored}")
+        if dataset.size != int(np.prod(shape)):
+            raise ForeignBodyError(f"{path}: dataset {key!r}: expected shape {shape}, got {dataset.shape}")
+        return np.asarray(dataset[()], dtype=float).reshape(shape)
+
+    m = float(read("mass"))
+    S_kl = np.zeros((3, 3, n, n))
+    blocks = read("shape function shape function integral", 6, n, n)
+    for (a, b), block in zip(UPPER, blocks, strict=True):
+        S_kl[a, b], S_kl[b, a] = block, block.T
+    moments = Moments(
+        m=m,
+        S=read("position integral", 3),
+        R=read("position position integral", 3, 3),
+        C1=read("shape function integral", 3, n),
+        P=read("position shape function integral", 3, 3, n),
+        S_kl=S_kl,
+    )
+    n_nodes = file["nodal relative position"].size // 3 if "nodal relative position" in file else 0
+    numbers = read("node numbers", n_nodes).astype(np.int64) if "node numbers" in file else 1 + np.arange(n_nodes)
+    rotation, stress = "nodal shape matrix of rotation", "nodal stress matrix"
+    surface: IntArray = np.zeros((0, 3), np.int64)
+    if "openmbv indices" in file:
+        surface = triangles_of(np.asarray(file["openmbv indices"][()]), n_nodes)
+    return ModalBody(
+        name=name,
+        M=moments.M,
+        K=read("stiffness matrix", n, n),
+        D=read("damping matrix", n, n) if "damping matrix" in file else None,
+        moments=moments,
+        node_numbers=numbers,
+        nodes=read("nodal relative position", n_nodes, 3) if n_nodes else np.zeros((0, 3)),
+        Phi=read("nodal shape matrix of translation", n_nodes, 3, n) if n_nodes else np.zeros((0, 3, n)),
+        rotations=read(rotation, n_nodes, 3, n) if rotation in file else None,
+        stress=read(stress, n_nodes, 6, n)[:, STRESS_ORDER] if stress in file else None,
+        surface=surface,
+        interfaces=tuple(
+            ForeignInterface(key.removeprefix("interface "), np.array([int(file.attrs[key])]))
+            for key in file.attrs
+            if key.startswith("interface ")
+        ),
+        program="MBSim",
+        provenance={"source": "MBSim, ExternalFlexibleFfrBody"},
+    )
+
+
+def triangles_of(indices: IntArray, n_nodes: int) -> IntArray:
+    """Return the triangles of faces as indices of nodes, each face ended by -1; others are cut into triangles."""
+    triangles, face = [], []
+    for index in indices.tolist():
+        if index >= 0:
+            face.append(int(index))
+            continue
+        triangles += [[face[0], face[k], face[k + 1]] for k in range(1, len(face) - 1)]
+        face = []
+    found = np.array(triangles, dtype=np.int64).reshape(-1, 3)
+    return found if found.size and found.max() < n_nodes else np.zeros((0, 3), np.int64)

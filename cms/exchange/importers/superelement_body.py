@@ -1,0 +1,344 @@
+"""A superelement becomes a reduced body: interfaces of its boundary nodes, rigid motion taken out, modes diagonal."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+
+from cms.body.invariants import INERTIA_TERMS, Moments
+from cms.body.recovery_table import RecoveryTable
+from cms.body.reduced_body import BodyFrame, ReducedBody
+from cms.errors import ForeignBodyError
+from cms.exchange.importers.inertia import Inertia, completed, moments_of_masses
+from cms.exchange.importers.superelement import RecoveryRows, Superelement, listed
+from cms.modes.families.rigid_modes import geometric_rigid_modes
+from cms.modes.mode_set import ModeSet
+from cms.reduction.basis.damping import Damping
+from cms.reduction.basis.finishing import finish
+from cms.reduction.basis.frames import Frame, TisserandFrame, frame_condition
+from cms.reduction.recovery.interface_rows import PartOfTable
+from cms.reduction.recovery.load_columns import LoadColumns
+from cms.reduction.recovery.matrices import table_of
+from cms.reduction.reduction import assembled
+from fe_models.body.fe_body import FEBody, Interface, Recovery
+from fe_models.body.load_cases import LoadCase
+from fe_models.body.positive_mass import positive_mass
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
+from fe_models.files.matrices.foreign_matrices import pair_keys
+from fe_models.files.matrices.given import require_freedom, require_positive_mass, require_units
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.units import Units
+from fe_models.meshes.numbering import Numbering
+
+__all__ = ["ImportOptions", "body_of_superelement", "fe_body_of_superelement"]
+
+RIGID = 1e-5  #: of the size of a motion: by how much recovered nodes may miss a rigid motion, digits of a file
+UNCOUPLED = 1e-9  #: coupling of modal coordinates and boundary in K, scaled, that is rounding
+NOTHING = 1e-13  #: stiffness of a boundary dof over the largest entry, that is rounding
+COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz")
+
+
+@dataclass(frozen=True, eq=False)
+class ImportOptions:
+    """What the files of another program do not say, and what is wanted of the body."""
+
+    units: Units  #: of all numbers of the files
+    interfaces: Mapping[str, Sequence[int]] | None = None  #: name -> boundary nodes; None: each node with six dofs
+    inertia: Inertia | None = None  #: what the reduced mass does not say; None: it stays missing
+    frame: Frame | None = None  #: Tisserand by default
+    damping: Damping | None = None  #: beside that of the files
+    mend_mass: bool = False  #: set slightly negative eigenvalues of the mass to zero
+    accept: tuple[str, ...] = ()  #: findings that are accepted, such as "units"
+
+
+def body_of_superelement(element: Superelement, options: ImportOptions) -> ReducedBody:
+    """Reduce a superelement to a body in a floating frame.
+
+    (1) the body of its matrices: boundary dofs, modal coordinates as dofs without place, recovered nodes (`FEBody`)
+    (2) the gates of bare matrices: free, mass positive, units plausible; recovered nodes follow a rigid motion
+    (3) its unit columns as a mode set, finished as every other: frame, rank, M-orthonormal, K-diagonal (theory.md §3)
+    (4) m, S, R, 1C, 2C, M* from the reduced mass; 3C, 4C, 5C from what is given beside, or missing (theory.md §5)
+
+    Raises
+    ------
+    ForeignBodyError
+        If the superelement does not fit together, or what is given beside is of another body.
+    BodyError
+        If it is held, a mechanism, or its mass is indefinite.
+    """
+    body = fe_body_of_superelement(element, options)  # (1)
+    require_freedom(body, held=False)  # (2)
+    require_units(body, accept=options.accept)
+    if options.mend_mass:
+        body = positive_mass(body)
+    else:
+        require_positive_mass(body)
+    require_rigid_recovery(body, element)
+    modes = ModeSet(  # (3)
+        "superelement",
+        np.eye(body.n_dof),
+        tuple(label_of(node, component, k) for k, (node, component) in enumerate(element.dofs)),
+        np.full(body.n_dof, np.nan),
+        {"program": element.program or "unknown"},
+    )
+    condition = frame_condition(body, options.frame or TisserandFrame())
+    finished = finish(body, modes, condition)
+    moments = known_moments(body, finished.Phi, finished.M, condition.frame)  # (4)
+    record = {"inertia": f"of the reduced mass alone; missing: {', '.join(INERTIA_TERMS)}"}
+    if options.inertia is not None:
+        places = {int(number): place for number, place in zip(element.node_numbers, body.nodes, strict=True)}
+        shapes = RecoveredShapes(body, element, finished.Phi)
+        other, words = moments_of_masses(options.inertia, shapes, places, options.units, condition.frame)
+        moments, difference = completed(moments, other, words)
+        record = {"inertia": f"3C, 4C, 5C by {words}, which differ from the reduced mass by: {difference}"}
+    reduced = assembled(
+        body, modes, finished, condition, kept=np.arange(len(body.nodes)), moments=moments, damping=options.damping
+    )
+    return replace(
+        reduced,
+        node_ids=element.node_numbers,
+        recovery=tables_of(element, body, finished.Phi, reduced),
+        provenance=dict(reduced.provenance) | record | {"node ids": f"numbers of {element.program or 'the files'}"},
+    )
+
+
+def tables_of(element: Superelement, body: FEBody, Phi: Array, reduced: ReducedBody) -> dict[str, RecoveryTable]:
+    """Return the further rows of a superelement over z = (d, theta, q): all is in its span, nothing is truncated.
+
+    The files say what x is there, x = T x' with x' the dofs of the body (`static_part`).
+    """
+    tables: dict[str, RecoveryTable] = {}
+    if not element.tables:
+        return tables
+    frame = reduced.frame
+    Psi_B = geometric_rigid_modes(body, origin=frame.origin) @ np.kron(np.eye(2), frame.axes)
+    motion = static_part(element, f"superelement {element.name!r}") @ np.hstack([Psi_B, Phi])
+    none = LoadColumns((), np.zeros((0, 3)), np.zeros(0, dtype=bool))
+    for name, rows in element.tables.items():
+        dynamic = np.zeros((3, len(rows.names), motion.shape[1]))
+        dynamic[0] = rows.matrix @ motion
+        part = PartOfTable(rows.names, dynamic, np.zeros((len(rows.names), 0)))
+        tables[name] = table_of(reduced, name, [part], none, f"{rows.about}; nothing beyond what the files leave out")
+    return tables
+
+
+def fe_body_of_superelement(element: Superelement, options: ImportOptions) -> FEBody:
+    """Return the body of a superelement: its matrices in Craig-Bampton form, its nodes, interfaces and loads.
+
+    Modal coordinates that the stiffness couples to the boundary are measured from their static answer to it,
+    x_q = x_q' - K_qq⁻¹ K_qb u_b, so that a rigid motion of the boundary is one of the body.
+    """
+    where = f"superelement {element.name!r}"
+    node = np.zeros(len(element.dofs), np.int64)
+    physical = ~element.is_modal
+    if not physical.any():
+        raise ForeignBodyError(f"{where}: expected dofs of boundary nodes, got modal coordinates alone")
+    node[physical] = element.places(element.dofs[physical, 0])
+    node[element.is_modal] = node[physical][0]
+    dofs = np.stack([node, element.dofs[:, 1]], axis=1)
+    T = static_part(element, where)
+    K, M = T.T @ without_rounding(element) @ T, T.T @ element.M @ T
+    D = None if element.D is None else T.T @ element.D @ T
+    own = np.flatnonzero(physical)
+    rows, matrix = [dofs[own]], [np.eye(len(dofs))[own]]
+    if element.recovery is not None:
+        further = further_rows(element, where)
+        rows.append(np.stack([element.places(further.dofs[:, 0]), further.dofs[:, 1]], axis=1))
+        matrix.append(further.matrix @ T)
+    body = FEBody(
+        name=element.name,
+        M=sp.csc_array((M + M.T) / 2),
+        K=sp.csc_array((K + K.T) / 2),
+        D=None if D is None else sp.csc_array((D + D.T) / 2),
+        nodes=element.nodes,
+        dofs=dofs,
+        units=options.units,
+        recovery=Recovery(sp.csr_array(np.concatenate(matrix)), np.concatenate(rows)),
+        load_cases=tuple(LoadCase(name, "force", T.T @ load) for name, load in element.loads.items()),
+        numbering=Numbering(nodes=element.node_numbers),
+        kept=np.unique(np.concatenate([table[table[:, 1] >= 3, 0] for table in rows])),
+        provenance=element.provenance,
+    )
+    return replace(body, interfaces=interfaces_of(body, element, options.interfaces))
+
+
+def without_rounding(element: Superelement) -> Array:
+    """Return the stiffness with zeros in rows that are rounding alone, as of the one interface of a free body."""
+    K = np.array(element.K)
+    length = float(np.linalg.norm(np.ptp(element.nodes, axis=0))) or 1.0
+    size = np.where(element.dofs[:, 1] >= 3, length, 1.0)
+    scaled = np.abs(K) / np.outer(size, size)
+    nothing = ~element.is_modal & (scaled.max(axis=1) <= NOTHING * scaled.max())
+    K[nothing], K[:, nothing] = 0.0, 0.0
+    return K
+
+
+def static_part(element: Superelement, where: str) -> Array:
+    """Return T of x = T x', the identity where the stiffness does not couple modal coordinates to the boundary."""
+    q = np.flatnonzero(element.is_modal)
+    T = np.eye(len(element.dofs))
+    if not len(q):
+        return T
+    b = np.flatnonzero(~element.is_modal)
+    K_qq, K_qb = np.asarray(element.K)[np.ix_(q, q)], np.asarray(element.K)[np.ix_(q, b)]
+    size = np.sqrt(np.abs(np.diag(element.K)))
+    scale = np.outer(size[q], size[b])
+    if (np.abs(K_qb) <= UNCOUPLED * np.where(scale > 0, scale, np.inf)).all() and not K_qb[scale == 0].any():
+        return T
+    values = la.eigvalsh(K_qq / np.outer(size[q], size[q])) if (size[q] > 0).all() else np.zeros(1)
+    if not values[0] > 1e-10:
+        raise ForeignBodyError(
+            f"{where}: modal coordinates are coupled to the boundary by stiffness, and some have none of their own; "
+            "expected modes with the boundary held (Craig-Bampton), or others that cost energy"
+        )
+    T[np.ix_(q, b)] = -np.linalg.solve(K_qq, K_qb)
+    return T
+
+
+def further_rows(element: Superelement, where: str) -> RecoveryRows:
+    """Return the recovery rows of dofs that are not boundary dofs; those that are must be the boundary dof itself."""
+    recovery = element.recovery
+    assert recovery is not None
+    keys, own = pair_keys(recovery.dofs), pair_keys(element.dofs)
+    is_own = np.isin(keys, own[~element.is_modal])
+    order = np.argsort(own)
+    for row in np.flatnonzero(is_own):
+        k = int(order[np.searchsorted(own[order], keys[row])])
+        expected = np.zeros(len(own))
+        expected[k] = 1.0
+        if np.abs(recovery.matrix[row] - expected).max() > RIGID:
+            raise ForeignBodyError(
+                f"{where}: recovery: node {recovery.dofs[row, 0]} is a boundary node, and its row for component "
+                f"{recovery.dofs[row, 1]} is not that dof; are rows of matrices and recovery in one order and axes?"
+            )
+    if len(np.unique(keys)) != len(keys):
+        raise ForeignBodyError(f"{where}: recovery: a dof has two rows")
+    taken = ~is_own & ~has_no_rotation(recovery)
+    return RecoveryRows(recovery.dofs[taken], recovery.matrix[taken])
+
+
+def has_no_rotation(recovery: RecoveryRows) -> np.ndarray:
+    """Whether a row is a rotation of a node whose rotations are all zero: one of solid elements, held by its program.
+
+    A node that has rotations turns with a rigid motion of the boundary, so that none of its rows is zero.
+    """
+    rotation = recovery.dofs[:, 1] >= 3
+    moving = np.unique(recovery.dofs[rotation & recovery.matrix.any(axis=1), 0])
+    return np.asarray(rotation & ~np.isin(recovery.dofs[:, 0], moving))
+
+
+def interfaces_of(
+    body: FEBody, element: Superelement, wanted: Mapping[str, Sequence[int]] | None
+) -> tuple[Interface, ...]:
+    """Return the interfaces of boundary nodes, coupled.
+
+    By default each node with six dofs is one, named "node 11", and nodes with translations are together one,
+    "boundary". Each boundary dof has to be in one: what is in none could not be joined, nor be told from a mode.
+    """
+    where = f"superelement {element.name!r}"
+    boundary = np.unique(element.dofs[~element.is_modal, 0])
+    rows = {int(number): np.flatnonzero((element.dofs[:, 0] == number) & ~element.is_modal) for number in boundary}
+    if wanted is None:
+        full = [number for number, own in rows.items() if len(own) == 6]
+        groups: dict[str, Sequence[int]] = {f"node {number}": [number] for number in full}
+        rest = [number for number, own in rows.items() if len(own) != 6]
+        if rest:
+            groups["boundary"] = rest
+    else:
+        groups = dict(wanted)
+    interfaces, taken = [], set[int]()
+    for name, numbers in groups.items():
+        if not len(numbers):
+            raise ForeignBodyError(f"{where}: interface {name!r}: expected node numbers, got none")
+        for number in numbers:
+            if int(number) not in rows:
+                raise ForeignBodyError(
+                    f"{where}: interface {name!r}: node {number} is no boundary node; they are {listed(boundary, 12)}"
+                )
+            if int(number) in taken:
+                raise ForeignBodyError(f"{where}: interface {name!r}: node {number} is in another interface or twice")
+            taken.add(int(number))
+        own = np.concatenate([rows[int(n)][np.argsort(element.dofs[rows[int(n)], 1])] for n in numbers])
+        nodes = element.places(np.array(numbers, dtype=np.int64))
+        if set(range(3)) - set(element.dofs[own, 1]):
+            raise ForeignBodyError(
+                f"{where}: interface {name!r}: expected nodes with three translations, got components "
+                f"{sorted({COMPONENTS[c] for c in element.dofs[own, 1]})}"
+            )
+        interfaces.append(Interface(name, "nodes", nodes, body.nodes[nodes].mean(axis=0), dofs=own))
+    return tuple(interfaces)
+
+
+def require_rigid_recovery(body: FEBody, element: Superelement) -> None:
+    """Raise `ForeignBodyError` unless recovered nodes follow a rigid motion of the boundary."""
+    assert body.recovery is not None
+    center = body.nodes.mean(axis=0)
+    length = body.length or 1.0
+    scale = np.array([1.0, 1, 1, 1 / length, 1 / length, 1 / length])
+    found = body.recovery.matrix @ (geometric_rigid_modes(body, origin=center) * scale)
+    expected = rigid_motion_of_dofs(body.nodes, body.recovery.dofs, center) * scale
+    rotations = body.recovery.dofs[:, 1] >= 3
+    defect = np.abs(found - expected) * np.where(rotations, length, 1.0)[:, None]
+    row = int(np.argmax(defect.max(axis=1)))
+    if not defect.max() <= RIGID:
+        number, component = element.node_numbers[body.recovery.dofs[row, 0]], body.recovery.dofs[row, 1]
+        raise ForeignBodyError(
+            f"superelement {element.name!r}: recovery: node {number}, {COMPONENTS[component]}, misses a rigid "
+            f"motion of the boundary by {defect.max():.1e} of it; are its rows in the axes of a "
+            "local coordinate system, or its place another one?"
+        )
+
+
+def known_moments(body: FEBody, Phi: Array, M: Array, frame: BodyFrame) -> Moments:
+    """Return the moments that follow from a reduced mass matrix: m, S, R, 1C, 2C and M*, in the frame B."""
+    axes = np.kron(np.eye(2), frame.axes)
+    Psi_R = geometric_rigid_modes(body, origin=frame.origin) @ axes
+    M_Psi_R = body.M @ Psi_R
+    rigid_mass = Psi_R.T @ M_Psi_R
+    J, lower = rigid_mass[3:, 3:], rigid_mass[:3, 3:]  # lower: -S~
+    S = np.array([lower[1, 2] - lower[2, 1], lower[2, 0] - lower[0, 2], lower[0, 1] - lower[1, 0]]) / 2
+    Y = M_Psi_R.T @ Phi
+    epsilon = np.cross(np.eye(3)[:, None], np.eye(3)[None])
+    return Moments(
+        m=float(np.trace(rigid_mass[:3, :3]) / 3),
+        S=S,
+        R=np.trace(J) / 2 * np.eye(3) - J,
+        C1=Y[:3],
+        P=np.einsum("abc,ck->abk", epsilon, Y[3:]) / 2,
+        S_kl=np.einsum("ab,kl->abkl", np.eye(3), M) / 3,
+        missing=INERTIA_TERMS,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class RecoveredShapes:
+    """Shapes of a superelement at any dofs that it recovers, in basic axes."""
+
+    body: FEBody
+    element: Superelement
+    Phi: Array  #: over the dofs of the body, without rigid motion, (n_dof, n_q)
+
+    def __call__(self, dofs: IntArray) -> Array:
+        """Return the rows of dofs (node number, component), (n, n_q); `ForeignBodyError` where one is not known."""
+        assert self.body.recovery is not None
+        known = self.body.recovery.dofs
+        keys = pair_keys(np.stack([self.element.node_numbers[known[:, 0]], known[:, 1]], axis=1))
+        order = np.argsort(keys)
+        wanted = pair_keys(dofs)
+        at = np.minimum(np.searchsorted(keys[order], wanted), len(keys) - 1)
+        is_there = keys[order][at] == wanted
+        if not is_there.all():
+            lost = np.unique(dofs[~is_there, 0])
+            raise ForeignBodyError(
+                f"superelement {self.element.name!r}: nodes {listed(lost)} have mass, and the files do not say how "
+                "they move: their recovery rows are missing (Nastran: displacements of all nodes in mug1); ask the "
+                "other program for them, or give masses at nodes that it recovers"
+            )
+        return np.asarray((self.body.recovery.matrix @ self.Phi)[order[at]])
+
+
+def label_of(node: int, component: int, k: int) -> str:
+    """Return the label of a row as a column of a mode set."""
+    return f"boundary {node} {COMPONENTS[component]}" if component >= 0 else f"modal coordinate {k + 1}"

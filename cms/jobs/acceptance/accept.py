@@ -1,0 +1,260 @@
+"""Make the acceptance of a body: judge it, compare it with its full model or its deck, and say what it is good for."""
+
+import os
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cms.assessment.quality.body_check import check_body
+from cms.assessment.quality.errors import QualityError
+from cms.assessment.quality.mesh_refinement import MOST_DOFS, mesh_refinement
+from cms.assessment.quality.of_body.effective_mass import EffectiveMass, can_be_held, effective_mass
+from cms.assessment.quality.record import QualityRecord, has_failed, judge
+from cms.assessment.quality.reduction_check import check_reduction, require_same_units
+from cms.assessment.quality.reference.full_reference import FullReference, usable_band
+from cms.body.modal_file.file import digest as digest_of
+from cms.body.modal_file.file import read
+from cms.body.reduced_body import ReducedBody
+from cms.errors import CmsError
+from cms.jobs.acceptance.acceptance import Acceptance, LeftOut, MeshError, now
+from cms.jobs.acceptance.against_model import compare_with_model
+from cms.jobs.acceptance.origin import source_files
+from cms.jobs.acceptance.range_of_use import custom_band, range_of_use
+from cms.jobs.body_of_job import coupled_body, uncoupled_body
+from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.job import Job, read_job
+from cms.jobs.mesh_of_job import is_cad, solid_mesh_of
+from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
+from cms.jobs.parts_of_job import materials_of, part_of_mesh
+from cms.jobs.reduce_job import reduction_options
+from cms.jobs.studies.mesh_convergence import mesh_convergence
+from cms.modes.families.families import Families
+from fe_models.errors import FeModelsError
+from fe_models.files.decks.read_deck import read_deck
+from fe_models.foundation.stages import Stages
+from fe_models.foundation.units import UNIT_SYSTEMS, unit_system
+from fe_models.foundation.words import quoted
+from fe_models.meshes.unused_nodes import drop_unused_nodes
+
+if TYPE_CHECKING:
+    from fe_models.body.fe_body import FEBody
+    from fe_models.files.decks.deck import Deck
+
+__all__ = ["FullModel", "accept_body"]
+
+
+@dataclass(frozen=True)
+class FullModel:
+    """The full model that a body is compared with: a job, or a deck of another program."""
+
+    job: Path | str | None = None  #: job file; one of our own bodies is compared with its mode set too
+    deck: Path | str | None = None  #: whole deck, read as `cms job` does
+    program: str | None = None  #: whose elements a deck (.inp) has: "calculix" or "abaqus"
+    densities: Mapping[str, float] = field(default_factory=dict)  #: of materials of the deck that have none
+
+    def __post_init__(self) -> None:
+        if self.job is not None and self.deck is not None:
+            raise QualityError("acceptance: expected a job or a deck as the full model, got both")
+
+
+def accept_body(
+    source: ReducedBody | Path | str,
+    full: FullModel | None = None,
+    *,
+    band: float | None = None,
+    most_dofs: int = MOST_DOFS,
+    stages: Stages | None = None,
+) -> Acceptance:
+    """Judge a reduced body, whoever has made it, so that the answer can be signed.
+
+    Parameters
+    ----------
+    source
+        A body, or its modal file.
+    full
+        The full model of the part; None: the file is judged by itself.
+    band
+        Highest frequency of interest [Hz]; None: what custom allows the body (its highest mode over 1.5).
+    most_dofs
+        Largest model that is made to estimate the error of the mesh; 0: no estimate.
+
+    Raises
+    ------
+    CmsError, FeModelsError
+        If a file is missing or damaged, or the full model is in other units.
+    """
+    stages = stages or Stages()
+    file = None if isinstance(source, ReducedBody) else Path(source)
+    reduced = source if isinstance(source, ReducedBody) else read(source)
+    full = full or FullModel()
+    if band is not None and not (np.isfinite(band) and band > 0):
+        raise QualityError(f"acceptance: band: expected a frequency above 0 [Hz], got {band:g}")
+    compared, left_out, job = "", None, None
+    own = check_body(reduced)
+    records = own
+    if full.job is not None:
+        job = read_job(Path(full.job))
+        records, compared = against_job(job, Path(full.job), reduced, own, band, stages)
+        if job.body.deck is not None:
+            left_out = cards_left_out(read_deck(job.body.deck))
+    elif full.deck is not None:
+        deck = read_deck(Path(full.deck), program=full.program)
+        left_out = cards_left_out(deck)
+        with tempfile.TemporaryDirectory(prefix="acceptance-") as folder:
+            job = job_of_deck(deck, full, reduced, Path(folder))
+            with stages("full model"):
+                body = uncoupled_body(job, stages)
+            records = (*own, *compare_with_model(body, reduced, band=band or band_of(reduced)))
+            compared = f"the deck {full.deck}, {body.n_dof} dofs, its supports removed"
+    elif (deck_path := reduced.provenance.get("deck")) and Path(deck_path).is_file():
+        left_out = cards_left_out(read_deck(Path(deck_path)))
+    if left_out is not None:
+        records = (*records, left_out_record(left_out))
+    if band is not None:
+        records = (*records, band_record(reduced, records, band))
+    error = mesh_error(job, most_dofs, stages)
+    if error.estimate is not None:
+        records = (*records, judge("mesh-error", error.largest, error.words, {"error": error.estimate.error}))
+    return Acceptance(
+        reduced,
+        records,
+        range_of_use(reduced, records),
+        () if has_failed(own) else effective_masses(reduced),
+        compared,
+        error,
+        left_out,
+        "" if file is None else str(file),
+        "" if file is None else digest_of(file),
+        source_files(reduced.provenance, Path.cwd() if file is None else file.resolve().parent),
+        now(),
+    )
+
+
+def against_job(
+    job: Job, path: Path, reduced: ReducedBody, own: tuple[QualityRecord, ...], band: float | None, stages: Stages
+) -> tuple[tuple[QualityRecord, ...], str]:
+    """Compare with the full model of a job: with its mode set too where the body was made with it."""
+    uncoupled = uncoupled_body(job, stages)
+    require_same_units(uncoupled, reduced)
+    with stages("couple interfaces"):
+        body = coupled_body(job, uncoupled)
+    name = f"the full model of {path}, {body.n_dof} dofs"
+    if reduced.provenance.get("mode set") == job.reduction.set and is_of_one_model(body, reduced):
+        with Families(body, solver=job.reduction.solver) as families:
+            with stages(f"mode set {job.reduction.set}"):
+                modes = job_mode_set(families, reduction_of(job, body))
+            top = usable_band(modes, reduced) if band is None else band
+            with stages("compare"), FullReference(families, band=top) as reference:
+                options = reduction_options(job, body)
+                records = check_reduction(
+                    body, modes, reduced, reference=reference, uncoupled=uncoupled, own=own, options=options
+                )
+        return records, f"{name}, and its mode set"
+    records = compare_with_model(body, reduced, band=band or band_of(reduced))
+    return (*own, *records), f"{name}; the body was made otherwise"
+
+
+def is_of_one_model(body: "FEBody", reduced: ReducedBody) -> bool:
+    """Whether a reduced body says that it was made of a model of this size."""
+    return reduced.provenance.get("full dofs") == str(body.n_dof)
+
+
+def band_record(reduced: ReducedBody, records: tuple[QualityRecord, ...], band: float) -> QualityRecord:
+    """Return whether the body is good up to the frequency that was asked for [Hz]."""
+    usable = range_of_use(reduced, records).band
+    said = f"asked for {band:.6g} Hz; good for up to {usable.highest:.6g} Hz ({usable.words})"
+    data = {"asked_hz": band, "usable_hz": usable.highest}
+    share = band / usable.highest if usable.highest > 0 else np.inf  # NaN: no vibration modes
+    return judge("band-asked", float(share), said, data)
+
+
+def band_of(reduced: ReducedBody) -> float:
+    """Return the band of custom [Hz], a little more than the first free frequency at least."""
+    band = 1.001 * custom_band(reduced).highest
+    if not band > 0:
+        raise QualityError(f"body {reduced.name!r}: has no elastic frequency to compare; give the band yourself")
+    return band
+
+
+def job_of_deck(deck: "Deck", full: FullModel, reduced: ReducedBody, folder: Path) -> Job:
+    """Return the job of a deck in the units of the body; what cannot be taken over is left out, and told."""
+    if reduced.units.name not in UNIT_SYSTEMS:
+        raise QualityError(
+            f"body {reduced.name!r}: is in units {quoted(reduced.units.name)} of its own; convert it (cms frame "
+            "--units), so that the deck can be read in the same"
+        )
+    names = tuple(dict.fromkeys(entry.name for entry in deck.ledger.entries.values() if entry.is_body))
+    request = JobRequest(reduced.units.name, full.densities, names)
+    assert full.deck is not None
+    path = folder / "deck.toml"
+    path.write_text(job_text(deck, request, os.fspath(Path(full.deck).resolve())), encoding="utf-8")
+    job = read_job(path)
+    return job.model_copy(update={"interfaces": {}, "load_cases": {}})
+
+
+def cards_left_out(deck: "Deck") -> tuple[LeftOut, ...]:
+    """Return the ledger of a deck."""
+    return tuple(
+        LeftOut(entry.name, entry.count, entry.consequence, entry.is_body) for entry in deck.ledger.entries.values()
+    )
+
+
+def left_out_record(left_out: tuple[LeftOut, ...]) -> QualityRecord:
+    """Return the record of what was left out of a deck: how many kinds of cards carry mass or stiffness."""
+    body = [each for each in left_out if each.is_body]
+    words = "; ".join(f"{each.count} {each.name}: {each.consequence}" for each in body)
+    said = words or f"everything that carries mass or stiffness is taken over; {len(left_out)} kinds of other cards not"
+    return judge("left-out", float(len(body)), said, {"cards": [[e.name, e.count, e.consequence] for e in left_out]})
+
+
+def effective_masses(reduced: ReducedBody) -> tuple[EffectiveMass, ...]:
+    """Return the effective masses with one interface held, for each that can be."""
+    if not reduced.n_q:
+        return ()
+    found = []
+    for interface in reduced.interfaces:
+        if reduced.is_held or can_be_held(reduced, interface.name):
+            try:
+                found.append(effective_mass(reduced, interface.name))
+            except np.linalg.LinAlgError:  # the records say what is wrong
+                continue
+    return tuple(found)
+
+
+def mesh_error(job: Job | None, most_dofs: int, stages: Stages) -> MeshError:
+    """Estimate what the mesh does to the lowest frequencies, as far as the job allows."""
+    if job is None:
+        return MeshError("not estimated: no full model was given that could be refined")
+    if not most_dofs:
+        return MeshError("not estimated, as asked")
+    try:
+        if is_cad(job):
+            found = mesh_convergence(job, n_modes=6, stages=stages)
+            return MeshError(
+                f"two sizes, {found.n_dof[0]} and {found.n_dof[1]} dofs: the lowest frequencies of the job's own lie "
+                f"too high by up to {100 * float(np.abs(found.error).max()):.2g} %",
+                found,
+            )
+        if job.body.mesh is None or job.shells or job.sections or job.ties:
+            return MeshError("not estimated: only bodies of one solid mesh are refined; compare two meshes of your own")
+        mesh = drop_unused_nodes(part_of_mesh(job, solid_mesh_of(job)))
+        refined = mesh_refinement(
+            mesh,
+            materials_of(job),
+            units=unit_system(job.body.units),
+            incompatible_modes=job.body.incompatible_modes,
+            most_dofs=most_dofs,
+            stages=stages,
+        )
+    except (CmsError, FeModelsError) as error:
+        return MeshError(f"not estimated: {error}")
+    return MeshError(
+        f"the bare solid with cells of {refined.how}, "
+        f"{refined.n_dof[1]} dofs for {refined.n_dof[0]}: the lowest free frequencies lie too high by up to "
+        f"{100 * float(refined.error.max()):.2g} %",
+        refined,
+    )

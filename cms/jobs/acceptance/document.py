@@ -1,0 +1,367 @@
+"""The document of an acceptance as sections of paragraphs, tables and pictures, before it becomes a page or a PDF."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cms.assessment.quality.body_record import body_record, body_size
+from cms.assessment.quality.of_body.effective_mass import DIRECTIONS, EffectiveMass
+from cms.assessment.quality.record import QualityRecord
+from cms.assessment.report.words import hertz
+from cms.jobs.acceptance.acceptance import VERDICT_WORDS, Acceptance
+from cms.jobs.acceptance.origin import origin_groups
+from cms.jobs.acceptance.pictures import body_picture, mass_picture
+from cms.jobs.acceptance.range_of_use import RangeOfUse
+
+__all__ = ["Document", "Paragraph", "Part", "Picture", "Table", "document_of"]
+
+MOST_MODES = 40  #: rows of a table of modes; the JSON file has all
+SIGNATURES = ("prepared", "checked", "released")
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """A sentence or some."""
+
+    words: str
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of words; a heading that ends in '>' stands right; `verdict` is the column that is coloured by its word."""
+
+    headings: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    widths: tuple[float, ...]  #: shares of the width of the page
+    verdict: int | None = None
+    caption: str = ""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture with its caption."""
+
+    png: bytes
+    caption: str
+    share: float = 1.0  #: of the width of the page
+
+
+Block = Paragraph | Table | Picture
+
+
+@dataclass(frozen=True)
+class Part:
+    """A numbered section."""
+
+    key: str
+    title: str
+    short: str  #: in the contents
+    blocks: tuple[Block, ...]
+
+
+@dataclass(frozen=True)
+class Document:
+    """What is printed."""
+
+    title: str
+    subtitle: str
+    verdict: str  #: "pass", "warn", "fail" or "info"
+    verdict_words: str
+    answer: str  #: the verdict in a sentence
+    figures: tuple[tuple[str, str], ...]  #: number and what it is
+    signatures: tuple[str, ...]
+    parts: tuple[Part, ...]
+    footer: str
+
+
+def document_of(acceptance: Acceptance) -> Document:
+    """Return the document of an acceptance, pictures drawn."""
+    a, u = acceptance, acceptance.body.units
+    worst_of = [record for record in a.records if record.verdict in ("fail", "warn")]
+    band = a.range.band
+    figures = [
+        (f"{a.body.moments.m:.5g} {u.mass_symbol}", "mass"),
+        (str(a.body.n_q), "elastic coordinates"),
+        (str(len(a.body.interfaces)), "interface" if len(a.body.interfaces) == 1 else "interfaces"),
+        (f"{hertz(band.highest)} Hz", "to be used up to" if band.is_compared else "to be used up to, by custom"),
+    ]
+    if math.isfinite(a.mesh_error.largest):
+        figures.append((f"{100 * a.mesh_error.largest:.2g} %", "mesh error of the lowest frequencies, estimated"))
+    answer = a.words + "."
+    if worst_of:
+        answer += f" To be looked at: {', '.join(record.title for record in worst_of)}."
+    parts = [
+        identity_part(a),
+        origin_part(a),
+        checks_part(a),
+        modes_part(a),
+        interfaces_part(a),
+        mass_part(a),
+        range_part(a),
+        deck_part(a),
+        mesh_part(a),
+    ]
+    footer = f"{a.file or a.body.name}{f', digest {a.digest}' if a.digest else ''}; made {a.made} by cms accept."
+    return Document(
+        f"Acceptance of the reduced body {a.body.name}",
+        f"units {u.name}; {a.body.provenance.get('mode set') or a.body.provenance.get('source', 'unknown mode set')}",
+        a.verdict,
+        VERDICT_WORDS[a.verdict],
+        answer,
+        tuple(figures),
+        SIGNATURES,
+        tuple(parts),
+        footer,
+    )
+
+
+def identity_part(a: Acceptance) -> Part:
+    """What the body is."""
+    body, u = body_record(a.body), a.body.units
+    size, inertia = body_size(a.body), f"{u.mass_symbol} {u.length_symbol}²"
+    tensor = np.array(body["inertia_about_center_of_mass"])
+    frame = body["frame"]
+    rows = [
+        (
+            "units",
+            f"{u.name}: {u.length_symbol}, {u.mass_symbol}, {u.time_symbol}; {u.force_symbol}, {u.stress_symbol}",
+        ),
+        ("body frame B", frame["kind"] + (f" at {frame['at']}" if frame["at"] else "")),
+        (f"origin of B [{u.length_symbol}]", f"{vector(frame['origin'], size)} in mesh coordinates"),
+        (f"mass [{u.mass_symbol}]", f"{body['mass']:.7g}"),
+        (f"centre of mass [{u.length_symbol}]", f"{vector(body['center_of_mass']['mesh'], size)} in mesh coordinates"),
+        (f"inertia about it [{inertia}], axes of B", vector(tensor[0], float(np.abs(tensor).max()))),
+        ("", vector(tensor[1], float(np.abs(tensor).max()))),
+        ("", vector(tensor[2], float(np.abs(tensor).max()))),
+        (f"principal moments [{inertia}]", vector(body["principal_moments"])),
+        ("invariants of inertia", moments_words(a)),
+        ("geometric stiffness", "yes" if body["geometric_stiffness"] else "none: loads and speed stiffen nothing"),
+        ("stress of the modes", "yes" if body["stress"]["nodal"] or body["stress"]["points"] else "none"),
+        ("kept nodes", f"{body['kept_nodes']}, {body['surface_triangles']} triangles of surface"),
+    ]
+    blocks: list[Block] = [Table(("", ""), tuple(rows), (0.32, 0.68))]
+    picture = body_picture(a.body)
+    if picture is not None:
+        blocks.insert(0, Picture(picture, "The body with its interfaces, undeformed.", 0.8))
+    return Part("identity", "What it is", "What it is", tuple(blocks))
+
+
+def moments_words(a: Acceptance) -> str:
+    """Return how well the inertia terms are known."""
+    moments = a.body.moments
+    if moments.missing:
+        return f"missing: {', '.join(moments.missing)}; to be trusted: {moments.trust}"
+    return "1C to 5C, exact integrals" if moments.is_exact else "1C to 5C, approximate (from matrices without elements)"
+
+
+def origin_part(a: Acceptance) -> Part:
+    """Where the body came from."""
+    rows = [(source.path, source.digest, source.state) for source in a.sources]
+    blocks: list[Block] = []
+    if a.file:
+        blocks.append(Paragraph(f"Modal file {a.file}; digest of its contents {a.digest}."))
+    if rows:
+        caption = "Files the body was made from, as its file has them on record, and whether they are still the same."
+        blocks.append(Table(("file", "sha256", "today"), tuple(rows), (0.3, 0.52, 0.18), 2, caption))
+    else:
+        blocks.append(Paragraph("The file has no digest of a file that it was made from."))
+    for title, words in origin_groups(a.body.provenance).items():
+        blocks.append(Table((title, ""), tuple(words.items()), (0.32, 0.68)))
+    return Part("origin", "Where it came from", "Origin", tuple(blocks))
+
+
+def checks_part(a: Acceptance) -> Part:
+    """Every check."""
+    order = {"fail": 0, "warn": 1, "pass": 2, "info": 3}
+    rows = tuple(
+        (record.verdict, record.title, number(record.value), number(record.tolerance), reason_of(record))
+        for record in sorted(a.records, key=lambda record: order[record.verdict])
+    )
+    against = f"Compared with {a.compared_with}." if a.compared_with else (
+        "No full model was given: frequencies, statics and responses are not compared with anything."
+    )  # fmt: skip
+    table = Table(("verdict", "check", "value>", "limit>", "found"), rows, (0.08, 0.24, 0.09, 0.08, 0.51), 0)
+    return Part("checks", "Checks", "Checks", (Paragraph(against), table))
+
+
+def reason_of(record: QualityRecord) -> str:
+    """Return what was found and what to do."""
+    return record.reason + (f". To do: {record.action}" if record.action else "")
+
+
+def modes_part(a: Acceptance) -> Part:
+    """Modes of the file, and the free frequencies beside those of the full model."""
+    modes = body_record(a.body)["modes"]
+    rows = tuple(
+        (
+            str(mode["number"]),
+            "static" if mode["frequency_hz"] is None else f"{mode['frequency_hz']:.6g}",
+            "" if not mode["damping_ratio"] else f"{100 * mode['damping_ratio']:.3g}",
+            mode["label"],
+        )
+        for mode in modes[:MOST_MODES]
+    )
+    caption = "Modes with the body frame held" + more_words(len(modes))
+    blocks: list[Block] = [
+        Table(("mode>", "Hz>", "damping %>", "energy from"), rows, (0.08, 0.16, 0.14, 0.62), None, caption)
+    ]
+    compared = next((record for record in a.records if record.name == "frequency-error" and record.data), None)
+    if compared is not None:
+        full, own = np.asarray(compared.data["full_hz"], float), np.asarray(compared.data["reduced_hz"], float)
+        error = np.asarray(compared.data["error"], float)
+        free = tuple(
+            (str(k + 1), f"{full[k]:.6g}", f"{own[k]:.6g}" if k < len(own) else "none",
+             f"{100 * error[k]:+.3g}" if np.isfinite(error[k]) else "none")
+            for k in range(min(len(full), MOST_MODES))
+        )  # fmt: skip
+        caption = "Elastic frequencies of the free body, in the band that was compared" + more_words(len(full))
+        blocks.append(
+            Table(("mode>", "full model Hz>", "reduced Hz>", "error %>"), free, (0.1, 0.3, 0.3, 0.3), None, caption)
+        )
+    return Part("modes", "Modes", "Modes", tuple(blocks))
+
+
+def more_words(n: int) -> str:
+    """Say how many rows are left out."""
+    return "." if n <= MOST_MODES else f"; the first {MOST_MODES} of {n}, the JSON file has all."
+
+
+def interfaces_part(a: Acceptance) -> Part:
+    """Interfaces with the nodes they are made of."""
+    size, length = body_size(a.body), a.body.units.length_symbol
+    rows = []
+    for interface, record in zip(a.body.interfaces, body_record(a.body)["interfaces"], strict=True):
+        nodes = [a.body.numbering.node_name(k) for k in interface.members]
+        shown = ", ".join(nodes[:8]) + (", ..." if len(nodes) > 8 else "")
+        rows.append((interface.name, interface.kind, vector(record["position_mesh"], size), str(len(nodes)), shown))
+    if not rows:
+        return Part("interfaces", "Interfaces", "Interfaces", (Paragraph("The body has no interface."),))
+    headings = ("name", "kind", f"place in mesh coordinates [{length}]", "nodes>", "which")
+    return Part(
+        "interfaces", "Interfaces", "Interfaces", (Table(headings, tuple(rows), (0.17, 0.13, 0.3, 0.08, 0.32)),)
+    )
+
+
+def mass_part(a: Acceptance) -> Part:
+    """Effective masses with their sums."""
+    if not a.masses:
+        words = "No interface can be held and driven, so there is no effective mass."
+        return Part("mass", "Effective mass", "Effective mass", (Paragraph(words),))
+    blocks: list[Block] = [
+        Paragraph(
+            "Share of mass and inertia that each mode puts into motion while one interface is held and driven, axes of "
+            "B, inertia about that interface; below each share the sum up to this mode. What no mode carries sits on "
+            "the interface itself, or belongs to modes that are left out."
+        )
+    ]
+    for found in a.masses:
+        blocks += [Picture(mass_picture(found), f"Sum of the effective mass, {found.at} held and driven.", 0.8)]
+        blocks += [mass_table(found)]
+    return Part("mass", "Effective mass", "Effective mass", tuple(blocks))
+
+
+def mass_table(found: EffectiveMass) -> Table:
+    """Return the shares and sums of one interface."""
+    rows = [
+        (str(k + 1), f"{found.frequencies[k]:.5g}",
+         *(f"{100 * s:.2f}\n{100 * c:.1f}" for s, c in zip(found.share[k], found.cumulative[k], strict=True)))
+        for k in range(min(len(found.frequencies), MOST_MODES))
+    ]  # fmt: skip
+    rows.append(("", "in no mode", *(f"{100 * rest:.1f}" for rest in found.remainder)))
+    headings = ("mode>", "Hz>", *(f"{name} %>" for name in DIRECTIONS))
+    caption = f"{found.at} held and driven" + more_words(len(found.frequencies))
+    return Table(headings, tuple(rows), (0.08, 0.16, *[0.76 / 6] * 6), None, caption)
+
+
+def range_part(a: Acceptance) -> Part:
+    """What the body is good for."""
+    r, u = a.range, a.body.units
+    blocks: list[Block] = [Paragraph(f"Frequencies: up to {hertz(r.band.highest)} Hz ({r.band.words}).")]
+    if r.speed is not None:
+        words = (
+            f"Angular speed: up to {r.speed.linear:.4g} rad/s without geometric stiffness, {r.limits.speed:g} of the "
+            f"lowest frequency with one interface held ({hertz(r.speed.lowest_held)} Hz, {r.speed.at})"
+        )
+        if r.speed.stiffened is not None and r.stiffened_limits is not None:
+            words += f"; with it up to {r.speed.stiffened:.4g} rad/s"
+        blocks.append(Paragraph(words + "."))
+    else:
+        blocks.append(Paragraph("Angular speed: not known; no interface can be held, or inertia terms are missing."))
+    loads = r.strictest()
+    if loads:
+        blocks.append(
+            Paragraph(
+                f"Loads and deflection: a linear body frame holds until an interface turns by {r.limits.rotation:g} "
+                f"rad against it, or a load changes the stiffness by {100 * r.limits.load:g} %"
+                f"{stiffened_words(r)}. For each interface the force and the moment that reach it first, alone, in "
+                "the balance of the body frame; strength is another question."
+            )
+        )
+        headings = ("interface", "load", "linear>", "with geometric stiffness>", f"deflection [{u.length_symbol}]>",
+                    "ends by")  # fmt: skip
+        rows = tuple(
+            (load.interface, f"{load.direction} [{load.unit}]", magnitude(load.linear),
+             "" if load.stiffened is None else magnitude(load.stiffened), f"{load.deflection:.3g}", load.governed_by)
+            for load in loads
+        )  # fmt: skip
+        blocks.append(Table(headings, rows, (0.18, 0.2, 0.14, 0.18, 0.13, 0.17)))
+    return Part("range", "What it is good for", "Range of use", tuple(blocks))
+
+
+def stiffened_words(r: RangeOfUse) -> str:
+    """Return the limits with geometric stiffness; nothing where the file has none."""
+    limits = r.stiffened_limits
+    if limits is None:
+        return ""
+    return f"; with geometric stiffness to {limits.rotation:g} rad, or {limits.load:g} of the load that buckles"
+
+
+def magnitude(value: float) -> str:
+    """Return a load; one that deforms nothing has no limit."""
+    return f"{value:.3g}" if math.isfinite(value) else "any"
+
+
+def deck_part(a: Acceptance) -> Part:
+    """What the deck has and the model not."""
+    if a.left_out is None:
+        words = "There is no deck beside the body, so nothing can be said of what was left out of it."
+        return Part("deck", "Left out of the deck", "Left out", (Paragraph(words),))
+    if not a.left_out:
+        words = "Every card of the deck is taken over."
+        return Part("deck", "Left out of the deck", "Left out", (Paragraph(words),))
+    rows = tuple(
+        ("warn" if each.is_body else "info", each.name, str(each.count), each.consequence)
+        for each in sorted(a.left_out, key=lambda each: not each.is_body)
+    )
+    words = "Cards that the full model does not take over; those marked carry mass or stiffness."
+    table = Table(("", "card", "count>", "consequence"), rows, (0.08, 0.24, 0.1, 0.58), 0)
+    return Part("deck", "Left out of the deck", "Left out", (Paragraph(words), table))
+
+
+def mesh_part(a: Acceptance) -> Part:
+    """What the mesh costs."""
+    error = a.mesh_error
+    blocks: list[Block] = [Paragraph(error.words[0].upper() + error.words[1:] + ".")]
+    if error.estimate is not None:
+        first, second = error.estimate.frequencies
+        rows = tuple(
+            (str(k + 1), f"{f_1:.6g}", f"{f_2:.6g}", f"{100 * e:+.2g}")
+            for k, (f_1, f_2, e) in enumerate(zip(first, second, error.estimate.error, strict=True))
+        )
+        labels = [f"{n} dofs, Hz>" for n in error.estimate.n_dof]
+        blocks.append(Table(("mode>", *labels, "estimated error %>"), rows, (0.1, 0.3, 0.3, 0.3)))
+    return Part("mesh", "Error of the mesh", "Mesh", tuple(blocks))
+
+
+def number(value: float | None) -> str:
+    """Return a value with three digits; none where there is none."""
+    return "" if value is None or not math.isfinite(value) else f"{value:.3g}"
+
+
+def vector(values: Sequence[float] | Iterable[float], scale: float | None = None) -> str:
+    """Return numbers in one line; what is rounding beside the scale (default: the greatest) reads 0."""
+    given = [float(value) for value in values]
+    least = 1e-12 * (max(map(abs, given), default=0.0) if scale is None else scale)
+    return ", ".join(f"{value if abs(value) > least else 0:.6g}" for value in given)

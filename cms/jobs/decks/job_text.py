@@ -1,0 +1,300 @@
+"""A whole deck as a job file: every table written out, with a header that lists what was not converted."""
+
+import json
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cms.errors import JobError
+from fe_models.files.decks.deck import Deck, LineSection, RodSection, ShellSection, SolidSection, Support
+from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.words import nearest, quoted
+
+__all__ = ["JobRequest", "job_text"]
+
+N_MODES = 10
+COLLINEAR = 1e-6
+
+
+@dataclass(frozen=True)
+class JobRequest:
+    """Data that the user adds to a deck."""
+
+    units: str  #: unit system of the numbers of the deck
+    densities: Mapping[str, float]  #: densities of materials that have none, by material; "" for all such materials
+    leave_out: tuple[str, ...] = ()  #: entries of the ledger with mass or stiffness that are left out intentionally
+
+
+def job_text(deck: Deck, request: JobRequest, deck_path: str) -> str:
+    """Return the text of a complete job.
+
+    Parameters
+    ----------
+    deck
+        The deck.
+    request
+        Units, densities, and entries to leave out.
+    deck_path
+        Path of the deck relative to the job file.
+
+    Raises
+    ------
+    MeshError
+        If the deck contains mass or stiffness that cannot be converted and is not named to be left out.
+    JobError
+        If a material lacks a constant, or a support or a section refers to nothing.
+    """
+    deck.ledger.require_whole(request.leave_out)
+    if deck.is_plain_mesh:
+        groups = dict.fromkeys(name for block in deck.mesh.blocks for name in block.groups)
+        raise JobError(
+            f"deck {deck.path}: a plain mesh, without materials, sections and steps; write a job with [body] mesh = "
+            f"{quoted(deck_path)} and tables [materials.NAME] and [interfaces.NAME]; its groups of elements are "
+            f"{', '.join(map(quoted, groups)) or 'none'}"
+        )
+    if not (deck.solids or deck.shells or deck.lines or deck.rods or deck.springs):
+        raise JobError(f"deck {deck.path}: expected solids, shells, lines, rods or springs, got none")
+    tables: dict[str, Any] = {
+        "body": {"name": deck.path.stem, "deck": deck_path, "units": request.units},
+        "materials": _materials(deck, request),
+    }
+    if deck.plane is not None:
+        tables["body"]["plane"] = ("yz", "zx", "xy")[deck.plane]
+    tables |= _sections(deck) | _attached(deck)
+    left_out = [name for name in request.leave_out]
+    if _has_cells_without_table(deck):
+        tables["body"]["accept"] = ["left-out"]
+    interfaces = {support.name: _interface(deck, support) for support in deck.supports}
+    tables["interfaces"] = interfaces
+    tables["load_cases"] = {load.name: _load(load) for load in deck.loads}
+    tables["reduction"] = {"set": "craig-bampton" if interfaces else "normal", "n_modes": N_MODES}
+    head = [f"# Written by cms job from {deck_path}, read as a deck of {deck.program}."]
+    if deck.ledger.entries:
+        head.append("# Not taken over from the deck (count, name: consequence):")
+        left = {name.upper().lstrip("*") for name in left_out}
+        for entry in deck.ledger.entries.values():
+            mark = "LEFT OUT ON REQUEST: " if entry.is_body and entry.name.upper().lstrip("*") in left else ""
+            head.append(f"#   {entry.count} {entry.name}: {mark}{entry.consequence}")
+    for support in deck.supports:
+        held = " ".join(MOTION_COMPONENTS[c] for c in support.components)
+        if support.is_boundary:
+            head.append(f"# The deck keeps {held} of {support.name} as the boundary of a superelement.")
+            continue
+        along = "" if support.axes is None else " along its own axes"
+        head.append(f"# The deck holds {held}{along} at the interface {support.name}; here the body is free.")
+    return "\n".join(head) + "\n\n" + toml_text({key: value for key, value in tables.items() if value})
+
+
+def sections_of(deck: Deck) -> list[SolidSection | ShellSection | LineSection | RodSection]:
+    """Return all sections of a deck."""
+    return [*deck.solids, *deck.shells, *deck.lines, *deck.rods]
+
+
+def materials_in(section: SolidSection | ShellSection | LineSection | RodSection) -> tuple[str, ...]:
+    """Return the names of the materials of a section."""
+    return section.materials if isinstance(section, ShellSection) else (section.material,)
+
+
+def _materials(deck: Deck, request: JobRequest) -> dict[str, Any]:
+    """Return the materials in use; a missing density is taken from the request.
+
+    Nastran and ANSYS take a missing density as zero. The job does the same if the deck has other masses, such as frames
+    of light beams between point masses. If nothing has mass, the user must give the density.
+    """
+    used = dict.fromkeys(name for each in sections_of(deck) for name in materials_in(each))
+    for name in request.densities:
+        if name and name not in used:
+            raise JobError(f"--density {quoted(name)}: the deck has no such material in use{nearest(name, used)}")
+    made: dict[str, Any] = {}
+    without = []
+    for name in used:
+        material = deck.materials.get(name)
+        if material is None:
+            raise JobError(
+                f"deck {deck.path}: a section names the material {quoted(name)}{nearest(name, deck.materials)}"
+            )
+        density = material.density or request.densities.get(name, request.densities.get("")) or None
+        if material.elasticity is None and (material.young is None or material.poisson is None):
+            raise JobError(f"deck {deck.path}: material {quoted(name)} has no elastic constants (linear)")
+        if not density and deck.program in ("nastran", "ansys") and _has_mass(deck, used):
+            density = 0.0
+            why = f"material {name} has none: massless, as {deck.program} takes it; --density {name}=... gives it one"
+            deck.ledger.note("density", why)
+        if density is None:
+            without.append(name)
+            continue
+        if material.elasticity is not None:
+            made[name] = {"elasticity": material.elasticity, "density": density}
+        else:
+            made[name] = {"young": material.young, "poisson": material.poisson, "density": density}
+            made[name] |= {} if material.shear is None else {"shear": material.shear}
+        made[name] |= {} if material.axes is None else {"axes": material.axes}
+    if without:
+        raise JobError(
+            f"deck {deck.path}: {len(without)} materials have no density: {', '.join(without)}; give it, as "
+            f"--density {without[0]}=7.85e-9"
+        )
+    return made
+
+
+def _has_mass(deck: Deck, used: Iterable[str]) -> bool:
+    """Whether anything in the deck has mass: points, other materials, or sections apart from their materials."""
+    return (
+        any(mass.mass for mass in deck.masses)
+        or any(deck.materials[name].density for name in used if name in deck.materials)
+        or any(shell.added_mass for shell in deck.shells)
+        or any(line.added_mass for line in deck.lines)
+    )
+
+
+def _sections(deck: Deck) -> dict[str, Any]:
+    """Return the tables of solids, shells and lines."""
+    tables: dict[str, dict[str, Any]] = {"solids": {}, "shells": {}, "sections": {}, "rods": {}}
+    for solid in deck.solids:
+        table = {"cells": solid.group, "material": solid.material}
+        if (solid.integration, solid.mass) != ("full", "consistent"):
+            table |= {"integration": solid.integration, "mass": solid.mass}
+        tables["solids"][_free(tables["solids"], solid.group)] = table
+    for shell in deck.shells:
+        row: dict[str, Any] = {"cells": shell.group}
+        if shell.layers:
+            keys = ("thickness", "angle", "material")
+            row["layers"] = [{key: getattr(layer, key) for key in keys} for layer in shell.layers]
+            row["direction"] = shell.direction
+        else:
+            row |= {"material": shell.material, "thickness": shell.thickness}
+        row |= {"offset": shell.offset} if shell.offset else {}
+        row |= {key: value for key in ("bending_ratio", "shear_ratio") if (value := getattr(shell, key)) != 1.0}
+        row |= {"added_mass": shell.added_mass} if shell.added_mass else {}
+        tables["shells"][_free(tables["shells"], shell.group)] = row
+    for line in deck.lines:
+        given: dict[str, Any] = {"lines": line.group, "material": line.material, **line.shape}
+        given |= {"orientation": list(line.orientation)} if line.orientation is not None else {}
+        given |= {"offset": list(line.offset)} if any(line.offset) else {}
+        given |= {} if line.shear else {"shear": False}
+        given |= {} if line.rotary_inertia else {"rotary_inertia": False}
+        given |= {"added_mass": line.added_mass} if line.added_mass else {}
+        tables["sections"][_free(tables["sections"], line.group)] = given
+    for rod in deck.rods:
+        row = {"lines": rod.group, "material": rod.material, "area": rod.area}
+        tables["rods"][_free(tables["rods"], rod.group)] = row
+    return tables
+
+
+def _attached(deck: Deck) -> dict[str, Any]:
+    """Return the tables of masses, springs, links, couplings and equations."""
+    tables: dict[str, dict[str, Any]] = {"masses": {}, "springs": {}, "links": {}, "couplings": {}, "equations": {}}
+    for k, mass in enumerate(deck.masses, start=1):
+        row: dict[str, Any] = {"node": mass.nodes, "mass": mass.mass}
+        if np.any(mass.inertia):
+            row["inertia"] = [list(axis) for axis in mass.inertia]
+        if any(mass.offset):
+            row["offset"] = list(mass.offset)
+        tables["masses"][f"mass_{k}"] = row
+    for k, spring in enumerate(deck.springs, start=1):
+        row = {"nodes": list(spring.nodes), "stiffness": list(spring.stiffness)}
+        row |= {"damping": list(spring.damping)} if spring.damping else {}
+        row |= {"triad": [list(axis) for axis in spring.triad]} if spring.triad else {}
+        row |= {"point": list(spring.point)} if spring.point else {}
+        tables["springs"][f"spring_{k}"] = row
+    for link in deck.rigid:
+        row = {"node": link.node, "followers": link.followers}
+        if link.components != tuple(range(6)):
+            row["components"] = [MOTION_COMPONENTS[c] for c in link.components]
+        tables["links"][link.name] = row
+    for coupling in deck.couplings:
+        row = {"node": coupling.node, "members": dict(coupling.members)}
+        if coupling.components != tuple(range(6)):
+            row["components"] = [MOTION_COMPONENTS[c] for c in coupling.components]
+        tables["couplings"][coupling.name] = row
+    for k, equation in enumerate(deck.equations, start=1):
+        tables["equations"][f"equation_{k}"] = {
+            "terms": [[node, MOTION_COMPONENTS[c], a] for node, c, a in equation.terms]
+        }
+    return tables
+
+
+def _interface(deck: Deck, support: Support) -> dict[str, Any]:
+    """Return the interface of a support: rigid if all its motions are held, otherwise of kind "nodes"."""
+    nodes = deck.mesh.node_sets[support.nodes]
+    points = deck.mesh.nodes[nodes]
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    is_spread = len(nodes) >= 3 and spread[1] > COLLINEAR * spread[0]
+    turns = np.isin(nodes, _nodes_with_rotations(deck))
+    all_held = set(support.components) >= set(range(6)) if turns.any() else set(support.components) >= {0, 1, 2}
+    is_rigid = all_held and (turns.any() or is_spread) and not support.is_boundary
+    made: dict[str, Any] = {"kind": "rigid" if is_rigid else "nodes", "nodes": support.nodes}
+    return made | ({} if support.axes is None else {"triad": support.axes})
+
+
+def _nodes_with_rotations(deck: Deck) -> Any:
+    """Return the indices of nodes of shells and lines, and of leaders of rigid groups."""
+    groups = {each.group for each in sections_of(deck) if not isinstance(each, SolidSection | RodSection)}
+    found = [
+        block.nodes[block.groups[group]].ravel() for block in deck.mesh.blocks for group in groups & set(block.groups)
+    ]
+    found += [deck.mesh.node_sets[link.node] for link in deck.rigid]
+    return np.unique(np.concatenate([np.zeros(0, np.int64), *found]))
+
+
+def _has_cells_without_table(deck: Deck) -> bool:
+    """Whether cells of the deck were left out on request."""
+    groups = {each.group for each in sections_of(deck)}
+    faces = {load.faces for load in deck.loads}
+    for block in deck.mesh.blocks:
+        if faces & set(block.groups):
+            continue
+        inside = np.zeros(len(block.nodes), dtype=bool)
+        for group in groups & set(block.groups):
+            inside[block.groups[group]] = True
+        if not inside.all():
+            return True
+    return False
+
+
+def _load(load: Any) -> dict[str, Any]:
+    if load.forces is not None:
+        return {"kind": "force", "each": {group: list(force) for group, force in load.forces.items()}}
+    if load.faces is not None:
+        return {"kind": "pressure", "faces": load.faces, "pressure": load.pressure}
+    return {"kind": "gravity", "acceleration": list(load.acceleration)}
+
+
+def _free(taken: Iterable[str], name: str) -> str:
+    made, k = name, 1
+    while made in taken:
+        k += 1
+        made = f"{name}_{k}"
+    return made
+
+
+def toml_text(tables: Mapping[str, Any]) -> str:
+    """Return tables as TOML: [a.b] for tables of tables, one key per line, inner tables in braces."""
+    lines: list[str] = []
+    for name, table in tables.items():
+        if all(isinstance(value, Mapping) for value in table.values()):
+            for inner, rows in table.items():
+                lines += [f"[{name}.{_key(inner)}]", *(f"{_key(k)} = {_value(v)}" for k, v in rows.items()), ""]
+        else:
+            lines += [f"[{name}]", *(f"{_key(k)} = {_value(v)}" for k, v in table.items()), ""]
+    return "\n".join(lines)
+
+
+def _key(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json.dumps(name, ensure_ascii=False)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_value(each) for each in value) + "]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str | Path):
+        return json.dumps(str(value), ensure_ascii=False)
+    return repr(int(value)) if isinstance(value, int | np.integer) else repr(float(value))

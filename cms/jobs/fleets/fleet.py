@@ -1,0 +1,130 @@
+"""A fleet of jobs: workers reduce each job to its own modal file."""
+
+import hashlib
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from cms.errors import JobError
+from cms.jobs.fleets.fleet_job import FleetJob, FleetRow, failed_row, reduce_and_write_one
+from cms.jobs.fleets.inputs import inputs_of
+from cms.jobs.job import read_job
+from cms.linear_algebra.solvers.registry import solver_of
+from fe_models.foundation.digest import file_digest
+from fe_models.foundation.paths import file_identity, remove_parts
+from fe_models.foundation.tasks.installation import source_mark
+from fe_models.foundation.tasks.journal import TaskJournal, open_task_journal
+from fe_models.foundation.tasks.workers import Workers, tasks_of
+
+__all__ = ["reduce_fleet"]
+
+KIND = "cms reduce journal 1"
+
+
+def reduce_fleet(
+    jobs: Sequence[str | os.PathLike[str]],
+    outputs: Sequence[str | os.PathLike[str]] | None = None,
+    *,
+    workers: Workers = None,
+    journal: str | os.PathLike[str] | None = None,
+    solver: str | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[FleetRow]:
+    """Reduce many jobs, each to a modal file. A failed job gives a row with its error, and the others continue.
+
+    Parameters
+    ----------
+    jobs
+        Job files.
+    outputs
+        Modal file of each job; default: beside the job, rod.toml gives rod.h5.
+    workers
+        Where jobs are run (docs/cluster.md); default: one process per processor. Processes of this machine share its
+        processors evenly.
+    journal
+        A file to which every finished job is appended. A finished job is not run again as long as its input files, the
+        program and its modal file are unchanged. None: no journal.
+    solver
+        Name of the solver (`cms.linear_algebra.solvers.registry`); it overrides the solver of the jobs.
+    progress
+        Receives the number of finished jobs and the number of all jobs.
+
+    Raises
+    ------
+    JobError
+        Before any work, if a job file cannot be read, or an output is also an input or the output of another job.
+    FactorizationError
+        If the solver is unknown or not installed.
+    WorkerError
+        If no workers are available.
+    """
+    if solver is not None:
+        solver_of(solver)
+    paths = [Path(path) for path in jobs]
+    made = [path.with_suffix(".h5") for path in paths] if outputs is None else [Path(path) for path in outputs]
+    fleet = fleet_of(paths, made, solver)
+    kept = None if journal is None else open_task_journal(Path(journal), KIND, source_mark(), "this call", JobError)
+    rows = {} if kept is None else known_rows(kept, fleet)
+    missing = [k for k in range(len(fleet)) if k not in rows]
+
+    def keep(i: int, row: FleetRow) -> None:
+        rows[missing[i]] = row
+        if kept is not None and not row.error:
+            kept.append(record_of(row))
+        if progress is not None:
+            progress(len(rows), len(fleet))
+
+    try:
+        if missing:
+            files = sorted({str(folder) for k in missing for folder in (fleet[k].job, fleet[k].output.parent)})
+            with tasks_of(workers, len(missing), threads=None) as tasks:
+                tasks.map(reduce_and_write_one, [fleet[k] for k in missing], failed=failed_row, done=keep, files=files)
+    finally:  # a worker that was killed while writing could not clean up
+        for k in missing:
+            remove_parts(fleet[k].output)
+    return [rows[k] for k in range(len(fleet))]
+
+
+def fleet_of(jobs: Sequence[Path], outputs: Sequence[Path], solver: str | None = None) -> list[FleetJob]:
+    """Return the checked jobs of a fleet; raise `JobError` if two of their files are the same."""
+    inputs = [inputs_of(path, read_job(path)) for path in jobs]
+    # several jobs may use the same mesh
+    digests = {each: file_digest(each) for each in {each for files in inputs for each in files}}
+    read = {file_identity(each) for each in digests}
+    made: dict[object, Path] = {}
+    found = []
+    for path, output, files in zip(jobs, outputs, inputs, strict=True):
+        where = file_identity(output)
+        if where in read:
+            raise JobError(f"{path}: {output} is an input of a job; choose another folder or name")
+        if where in made:
+            raise JobError(f"{path} and {made[where]} would both be written to {output}; rename one")
+        made[where] = path
+        mark = hashlib.sha256(" ".join([*(digests[each] for each in files), solver or ""]).strip().encode()).hexdigest()
+        found.append(FleetJob(Path(os.path.abspath(path)), Path(os.path.abspath(output)), mark, solver))
+    return found
+
+
+def known_rows(journal: TaskJournal, fleet: Sequence[FleetJob]) -> dict[int, FleetRow]:
+    """Return the rows of jobs whose inputs and modal file agree with the journal, by index of the job."""
+    records = {(str(record.get("job")), str(record.get("output"))): record for record in journal.records}
+    rows = {}
+    for k, job in enumerate(fleet):
+        found = records.get((str(job.job), str(job.output)), {})
+        try:
+            if found["digest"] == job.digest and found["made"] == file_digest(job.output):
+                notes = tuple(str(note) for note in found["notes"])
+                name, n_modes, seconds = str(found["name"]), int(found["n_modes"]), float(found["seconds"])
+                rows[k] = FleetRow(job, name, n_modes, seconds, notes, is_known=True)
+        except (KeyError, TypeError, ValueError):
+            continue
+    return rows
+
+
+def record_of(row: FleetRow) -> dict[str, object]:
+    """Return a row as a record of the journal."""
+    return {
+        "job": str(row.job.job), "output": str(row.job.output), "digest": row.job.digest,
+        "made": file_digest(row.job.output), "name": row.name, "n_modes": row.n_modes, "seconds": row.seconds,
+        "notes": row.notes,
+    }  # fmt: skip

@@ -1,0 +1,209 @@
+"""The report of a correlation as one HTML page that works offline."""
+
+from typing import Any
+
+import numpy as np
+
+from cms.assessment.correlation.correlate import Correlation
+from cms.assessment.correlation.update import Update
+from cms.assessment.quality.record import plain
+from cms.assessment.report.charts import Chart, base_layout, dtick
+from cms.assessment.report.html import Cell, Section, figure, page, table, text
+from cms.assessment.report.words import hertz, signed_percent
+from cms.jobs.studies.correlation_file import CorrelationResult
+
+__all__ = ["correlation_page"]
+
+GOOD_MAC, POOR_MAC = 0.9, 0.7  #: customary limits of the MAC
+GOOD_ERROR, POOR_ERROR = 0.02, 0.05
+GOOD_CROSS = 0.1  #: customary limit of the largest off-diagonal entry of an orthogonality matrix
+MOST_POINTS = 20
+
+
+def correlation_page(result: CorrelationResult) -> str:
+    """Return the page."""
+    last = result.correlation if result.update is None else result.update.after
+    sections = [pairs_section(result), mac_section(result), orthogonality_section(last), points_section(last)]
+    if result.update is not None:
+        sections.insert(1, update_section(result.update))
+    if result.damping:
+        sections.append(damping_section(result))
+    header = (
+        f'<h1>Test and model of {text(last.model.name)}</h1><p class="facts">{text(facts(last))}</p>{answer(result)}'
+    )
+    brand = f"{text(last.model.name)}<small>test and model</small>"
+    footer = text("Written by cms correlate. The same numbers stand in the JSON file where one was asked for.")
+    return page(f"{last.model.name}: test and model", brand, header, sections, {}, footer)
+
+
+def facts(c: Correlation) -> str:
+    """Return a description of what was compared."""
+    away = c.points.distances[np.isfinite(c.points.distances)]
+    placed = f", at most {away.max():.3g} from their nodes" if len(away) else ", placed by number"
+    return (
+        f"{c.measured.source}: {c.measured.n_modes} modes at {len(c.points.points)} points{placed}; the model has "
+        f"{len(c.model.frequencies)} elastic modes, {'free' if c.model.is_free else 'held'}"
+    )
+
+
+def answer(result: CorrelationResult) -> str:
+    """Return the main result in a sentence, with its numbers."""
+    first = result.correlation
+    last = first if result.update is None else result.update.after
+    if not last.pairs:
+        words, kind = "No measured mode has a partner in the model.", " none"
+    else:
+        macs = [pair.mac for pair in last.pairs]
+        error = float(np.abs(last.errors).max())
+        words = (
+            f"{len(last.pairs)} of {last.measured.n_modes} measured modes have a partner; largest frequency error "
+            f"{100 * error:.2g} %, least MAC {min(macs):.3f}."
+        )
+        if result.update is not None and first.pairs:
+            words += f" Before the update the largest error was {100 * float(np.abs(first.errors).max()):.2g} %."
+            if not result.update.is_converged:
+                words += " The update did not converge."
+        is_good = len(last.pairs) == last.measured.n_modes and error <= GOOD_ERROR and min(macs) >= GOOD_MAC
+        kind = "" if is_good else " doubtful"
+    return f'<section class="answer{kind}"><p>{text(words)}</p></section>'
+
+
+def graded(value: float, good: float, poor: float, words: str) -> Cell:
+    """Return a number in the colour of its grade; if good < poor, small values are good."""
+    sign = 1.0 if good < poor else -1.0
+    kind = "pass" if sign * value <= sign * good else "warn" if sign * value <= sign * poor else "fail"
+    return Cell(words, f"n {kind}")
+
+
+def pairs_section(result: CorrelationResult) -> Section:
+    """Return the section about pairs of modes."""
+    c = result.correlation if result.update is None else result.update.after
+    first = result.correlation
+    before = {pair.measured: error for pair, error in zip(first.pairs, first.errors, strict=True)}
+    by_mode = {pair.measured: (pair, error) for pair, error in zip(c.pairs, c.errors, strict=True)}
+    rows = []
+    for k in range(c.measured.n_modes):
+        cells = [Cell(str(k + 1), "n"), Cell(hertz(c.measured.frequencies[k]), "n"),
+                 Cell(f"{100 * c.measured.damping[k]:.3g}" if c.measured.damping.size else "\u2013", "n")]  # fmt: skip
+        if k in by_mode:
+            pair, error = by_mode[k]
+            cells += [
+                Cell(str(pair.computed + 1), "n", "by hand" if pair.by_hand else ""),
+                Cell(hertz(c.model.frequencies[pair.computed]), "n"),
+                graded(abs(error), GOOD_ERROR, POOR_ERROR, signed_percent(float(error))),
+                graded(pair.mac, GOOD_MAC, POOR_MAC, f"{pair.mac:.3f}"),
+            ]
+        else:
+            likest = int(np.argmax(c.mac[k]))
+            note = f"likest: {likest + 1}, {hertz(c.model.frequencies[likest])} Hz, MAC {c.mac[k, likest]:.2f}"
+            cells += [Cell("none", "n fail", note), *[Cell("\u2013", "n blank")] * 3]
+        if result.update is not None:
+            cells.append(Cell(signed_percent(float(before[k])) if k in before else "\u2013", "n"))
+        rows.append(cells)
+    headings = ["measured>", "Hz>", "damping %>", "computed>", "Hz>", "error>", "MAC>"]
+    headings += ["error before>"] if result.update is not None else []
+    lead = "Pairs by the greatest sum of MAC; errors are those of the model. Green, amber, red: within "
+    lead += f"{100 * GOOD_ERROR:g} %, {100 * POOR_ERROR:g} %, beyond; MAC above {GOOD_MAC:g}, {POOR_MAC:g}, below."
+    return Section("pairs", "Pairs of modes", "Pairs", table(headings, rows), lead)
+
+
+def heat(values: Any, across: str, down: str) -> Chart:
+    """Return a matrix from 0 to 1 as a chart."""
+    matrix = np.asarray(values)
+    trace: Chart = {
+        "type": "heatmap", "z": plain(matrix), "x": list(range(1, matrix.shape[1] + 1)),
+        "y": list(range(1, matrix.shape[0] + 1)), "zmin": 0, "zmax": 1,
+        "colorscale": [[0, "#f7fafc"], [0.5, "#6ea3cf"], [1, "#08306b"]], "showscale": False, "xgap": 1, "ygap": 1,
+        "hovertemplate": f"{down} %{{y}}<br>{across} %{{x}}<br>%{{z:.3f}}<extra></extra>",
+    }  # fmt: skip
+    layout = base_layout(across, down)
+    layout["xaxis"] |= {"tick0": 1, "dtick": dtick(matrix.shape[1]), "showgrid": False, "constrain": "domain"}
+    layout["yaxis"] |= {"autorange": "reversed", "tick0": 1, "dtick": dtick(matrix.shape[0]), "showgrid": False,
+                        "scaleanchor": "x", "constrain": "domain"}  # fmt: skip
+    layout |= {"height": 330, "showlegend": False}
+    return {"data": [trace], "layout": layout}
+
+
+def mac_section(result: CorrelationResult) -> Section:
+    """Return the section about the MAC before and after the update, and of the test with itself."""
+    shown = {"mac": ("test and model", result.correlation.mac, "computed mode")}
+    if result.update is not None:
+        shown["mac-after"] = ("test and updated model", result.update.after.mac, "computed mode")
+    shown["auto-mac"] = ("test with itself", result.correlation.auto_mac, "measured mode")
+    charts = {key: heat(values, across, "measured mode") for key, (_, values, across) in shown.items()}
+    body = "".join(figure(key, title) for key, (title, _, _) in shown.items())
+    lead = (
+        "Dark is 1, the same shape. Dark off the diagonal of the test with itself: shapes that its points do not tell "
+        "apart; add points before you trust a pair."
+    )
+    return Section("mac-section", "MAC", "MAC", f'<div class="grid">{body}</div>', lead, charts)
+
+
+def orthogonality_section(c: Correlation) -> Section:
+    """Return the section about orthogonality of the measured shapes in the mass of the model."""
+    if c.orthogonality is None or c.cross_orthogonality is None:
+        words = f'<p class="notice">Not known: {text(c.why_not)}.</p>'
+        return Section("orthogonality", "Orthogonality", "Orthogonality", words)
+    own = np.abs(c.orthogonality)
+    off = own - np.diag(np.diag(own))
+    k, j = np.unravel_index(int(np.argmax(off)), off.shape) if off.size > 1 else (0, 0)
+    words = "measured, of the pairs"
+    charts = {"own": heat(own, words, words),
+              "cross": heat(np.abs(c.cross_orthogonality), "computed, of the pairs", words)}  # fmt: skip
+    verdict = "within" if off[k, j] <= GOOD_CROSS else "beyond"
+    lead = (
+        f"By the mass of the model at the measured rows. Largest coupling of two measured shapes {off[k, j]:.3f}, "
+        f"modes {c.pairs[k].measured + 1} and {c.pairs[j].measured + 1}: {verdict} the custom of {GOOD_CROSS:g}."
+    )
+    body = figure("own", "measured shapes with each other") + figure("cross", "measured shapes with their partners")
+    return Section("orthogonality", "Orthogonality", "Orthogonality", f'<div class="grid">{body}</div>', lead, charts)
+
+
+def points_section(c: Correlation) -> Section:
+    """Return the section about the points with the poorest agreement."""
+    rows = [[Cell(str(point), "n"), Cell(node, "n"), graded(value, GOOD_MAC, POOR_MAC, f"{value:.3f}")]
+            for point, node, value in c.point_comac()[:MOST_POINTS]]  # fmt: skip
+    if not rows:
+        return Section("points", "Points", "Points", '<p class="notice">No modes are paired.</p>')
+    lead = (
+        "COMAC of each point over all pairs, the least of its directions, worst first: a sensor that is turned, "
+        "exchanged or out of scale, or a place where the model is wrong."
+    )
+    return Section("points", "Points", "Points", table(["point>", "node>", "COMAC>"], rows), lead)
+
+
+def update_section(update: Update) -> Section:
+    """Return the section about the parameters and their uncertainty."""
+    rows = []
+    for p, value, spread, told in zip(update.parameters, update.values, update.spread, update.determined, strict=True):
+        low, high = p.start * (1 + p.least), p.start * (1 + p.most)
+        at_end = np.isclose(value, [low, high], rtol=1e-9, atol=0.0).any()
+        cells = [Cell(p.name, "name", f"{p.path}{'; at its bound' if at_end else ''}"), Cell(f"{p.start:.6g}", "n"),
+                 Cell(f"{value:.6g}", "n"), Cell(signed_percent(float(value / p.start - 1)), "n"),
+                 Cell(f"\u00b1 {100 * spread:.2g} %", "n"), Cell(f"\u00b1 {100 * p.spread:.2g} %", "n"),
+                 graded(float(told), 0.9, 0.5, f"{100 * told:.0f} %")]  # fmt: skip
+        rows.append(cells)
+    headings = ["parameter", "start>", "updated>", "change>", "spread after>", "before>", "told by the test>"]
+    n = len(update.parameters)
+    pairs = [f"{update.parameters[i].name} and {update.parameters[j].name} ({update.correlation[i, j]:+.2f})"
+             for i in range(n) for j in range(i) if abs(update.correlation[i, j]) > 0.9]  # fmt: skip
+    lead = (
+        f"Least squares over the frequencies of the pairs, measured to {100 * update.frequency_spread:g} %; spreads "
+        "are standard deviations, shares of the start. A parameter that the test does not tell stays where it was, and "
+        "its number means nothing."
+    )
+    if pairs:
+        lead += f" The test hardly tells apart: {'; '.join(pairs)}."
+    return Section("update", "Updated parameters", "Update", table(headings, rows), lead)
+
+
+def damping_section(result: CorrelationResult) -> Section:
+    """Return the section about fits of the measured damping."""
+    rows = []
+    for fit in result.damping:
+        names = ("ratio",) if fit.kind == "ratio" else ("alpha [1/s]", "beta [s]")
+        words = ", ".join(f"{n} {v:.4g} \u00b1 {s:.2g}" for n, v, s in zip(names, fit.values, fit.spread, strict=True))
+        rows.append([Cell(fit.kind, "name"), Cell(words, note=fit.table().replace("\n", "; ")),
+                     Cell(f"{100 * fit.misfit:.2g} %", "n")])  # fmt: skip
+    lead = "Least squares over the measured ratios; the misfit is their root mean square distance, of critical damping."
+    return Section("damping", "Damping", "Damping", table(["law", "constants", "misfit>"], rows), lead)

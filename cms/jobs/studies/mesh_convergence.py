@@ -1,0 +1,124 @@
+"""How far the free frequencies of a meshed CAD body are from those of the geometry: the same job at two mesh sizes.
+
+(1) the job is meshed at its own size h and at a coarser one, curvature and least size in proportion;
+(2) both bodies are coupled as the job says, and their lowest elastic frequencies found;
+(3) with f(h) = f + c h^p the error at h is (f(r h) - f(h)) / (r^p - 1), Richardson's extrapolation. The ratio r is that
+    of the numbers of dofs, to the power 1/3. The order is taken as p = 1: frequencies of elements of order k converge
+    with h^(2k) where the modes are smooth, but with h^(2 lambda) beside a re-entrant edge, where the displacement goes
+    with r^lambda: lambda is 1/2 at a crack, 0.545 at a right angle, and such edges rule in the end. Smooth modes are
+    then overestimated, by a factor of (r⁴ - 1) / (r - 1)
+(4) cells of first order may be far from converging: no error is less than what the mesh report finds for them
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cms.errors import JobError
+from cms.jobs.body_of_job import job_body
+from cms.jobs.job import Job, read_job
+from cms.modes.mode_sets.free_interface import normal_modes
+from cms.reduction.reduction import reduce
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.stages import Stages
+
+__all__ = ["ORDER", "MeshConvergence", "mesh_convergence"]
+
+ORDER = 1.0  #: assumed order of convergence of the frequencies
+LEAST_RATIO = 1.05  #: of the sizes that the meshes came out with
+
+
+@dataclass(frozen=True, eq=False)
+class MeshConvergence:
+    """Free frequencies at two mesh sizes, and the estimated error of the finer."""
+
+    sizes: tuple[float, float]  #: coarse and fine, the fine is that of the job [length]
+    n_dof: tuple[int, int]  #: of the coupled bodies
+    frequencies: Array  #: at the coarse and the fine size, (2, n) [Hz]
+    first_order: float = 0.0  #: relative error that the report of the fine mesh finds for cells of first order
+
+    @property
+    def ratio(self) -> float:
+        """Coarse over fine element size, by the numbers of dofs."""
+        return float((self.n_dof[1] / self.n_dof[0]) ** (1 / 3))
+
+    @property
+    def change(self) -> Array:
+        """Relative difference of the coarse frequencies from the fine ones, (n,)."""
+        return np.asarray(self.frequencies[0] / self.frequencies[1] - 1)
+
+    @property
+    def error(self) -> Array:
+        """Estimated relative error of the fine frequencies, (n,), by steps (3) and (4); positive: they lie too high."""
+        return np.maximum(self.change / (self.ratio**ORDER - 1), self.first_order or -np.inf)
+
+
+def mesh_convergence(
+    job: Job | Path | str, *, ratio: float = 1.5, n_modes: int = 10, stages: Stages | None = None
+) -> MeshConvergence:
+    """Find the free frequencies of a CAD job at its own mesh size and at a coarser one.
+
+    Parameters
+    ----------
+    job
+        A job file whose mesh is a CAD file, or a job that was read.
+    ratio
+        The coarse size over that of the job, above 1.
+    n_modes
+        How many elastic frequencies.
+    stages
+        Takes the time of each stage.
+
+    Raises
+    ------
+    JobError
+        If the body is not meshed here, the ratio is none, or both sizes give the same mesh.
+    MeshError, InterfaceError
+        As a job.
+    """
+    job = job if isinstance(job, Job) else read_job(Path(job))
+    stages = stages or Stages()
+    if job.mesh_size is None:
+        raise JobError(
+            "converge: the body comes from a mesh or from matrices, which have one size; expected a CAD file with "
+            "[mesh_size]. Mesh it at two sizes and compare, or see what the mesh report says of cells of first order"
+        )
+    if not 1.1 <= ratio <= 4:
+        raise JobError(f"converge: ratio: expected a number between 1.1 and 4, got {ratio:g}")
+    if n_modes < 1:
+        raise JobError(f"converge: modes: expected 1 or more, got {n_modes}")
+    fine = job.mesh_size
+    coarse = fine.model_copy(
+        update={
+            "size": ratio * fine.size,
+            "smallest": None if fine.smallest is None else ratio * fine.smallest,
+            "curvature": max(fine.curvature / ratio, 3.0) if fine.curvature else 0.0,
+        }
+    )
+    n_dof, found = [], []
+    for table in (coarse, fine):  # (1)
+        reports: list[Any] = []
+        body = job_body(job.model_copy(update={"mesh_size": table}), stages, on_report=reports.append)
+        with stages("free modes"):
+            n_dof.append(body.n_dof)
+            found.append(free_frequencies(body, n_modes))  # (2)
+    n = min(len(each) for each in found)
+    frequencies = np.array([each[:n] for each in found])
+    first_order = next((each.first_order.error for each in reports if each.first_order is not None), 0.0)
+    result = MeshConvergence((coarse.size, fine.size), (n_dof[0], n_dof[1]), frequencies, first_order)
+    if result.ratio < LEAST_RATIO:
+        raise JobError(
+            f"converge: the sizes {coarse.size:g} and {fine.size:g} gave nearly the same mesh ({n_dof[0]} and "
+            f"{n_dof[1]} dofs): small features set the size; take a smaller size, or curvature = 0"
+        )
+    return result
+
+
+def free_frequencies(body: FEBody, n: int) -> Array:
+    """Return the lowest elastic frequencies of a free body, ascending, (n,) [Hz]."""
+    bare = replace(body, load_cases=())
+    reduced = reduce(bare, normal_modes(bare, n), stress=False, geometric=False)
+    return np.asarray(reduced.free_frequencies[:n] / body.units.time)

@@ -1,0 +1,1 @@
+"""Linear algebra of reduction: factorisations, eigensolvers, block products, and the memory that they take."""

@@ -1,0 +1,51 @@
+"""Eigenvectors of a small dense pencil without rigid-body motion, massless directions included."""
+
+import numpy as np
+import scipy.linalg as la
+
+from fe_models.foundation.arrays import Array
+
+__all__ = ["elastic_eigenvectors"]
+
+INDEPENDENT = 1e-14  #: smallest eigenvalue of the norm of a pencil, scaled to a unit diagonal
+MASSLESS = 1e-12  #: modal mass times omega_1² of a shape of unit W-length, below which the shape is static
+
+
+def elastic_eigenvectors(G_K: Array, G_M: Array, omega2_1: float) -> tuple[Array, Array]:
+    """Solve K z = omega² M z for a pencil without common null space, that is without rigid-body motion.
+
+    (1) transform to a basis in which W = K + omega_1² M is the identity, after scaling W to a unit diagonal
+    (2) an eigenvalue mu of M in this basis gives omega² = (1 - omega_1² mu) / mu
+    (3) solve again in nearly diagonal form, for relative accuracy at the stiff end of the spectrum
+
+    Returns
+    -------
+    Z
+        Coefficients by ascending omega², M-normalised (W-normalised if there is no mass), (k, k).
+    is_massive
+        (k,) bool.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If some direction has neither stiffness nor mass.
+    """
+    W = G_K + omega2_1 * G_M
+    size = np.sqrt(np.maximum(np.diag(W), 0.0))
+    if not (size > 0).all():
+        raise np.linalg.LinAlgError("a direction has neither stiffness nor mass")
+    energy, directions = la.eigh(W / np.outer(size, size))  # (1)
+    if len(energy) and energy[0] <= INDEPENDENT * energy[-1]:
+        raise np.linalg.LinAlgError(
+            f"a direction has {energy[0] / energy[-1]:.1e} of the energy of others, which is rounding"
+        )
+    basis = directions / np.sqrt(energy) / size[:, None]
+    mu, Y = la.eigh(basis.T @ G_M @ basis)  # (2)
+    mu, Z = mu[::-1], (basis @ Y)[:, ::-1]
+    is_massive = mu * omega2_1 > MASSLESS
+    Z[:, is_massive] /= np.sqrt(mu[is_massive])
+    massive = Z[:, is_massive]
+    if massive.shape[1]:  # (3)
+        _, Y = la.eigh(massive.T @ G_K @ massive, massive.T @ G_M @ massive)
+        Z[:, is_massive] = massive @ Y
+    return Z, is_massive

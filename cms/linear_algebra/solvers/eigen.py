@@ -1,0 +1,268 @@
+"""Vibration modes: the lowest eigenpairs of K x = omega² M x, by number or up to a frequency."""
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cms.errors import EigenError
+from cms.linear_algebra.solvers.factorization import Factorization, Matrix, factorize, matrix_of, shifted_matrix
+from cms.linear_algebra.solvers.inverse import Inverse
+from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
+from cms.linear_algebra.solvers.mode_search import DenseSearch, KrylovSearch
+from cms.linear_algebra.solvers.orientation import orientation
+from cms.linear_algebra.solvers.petsc.factor import PetscFactor
+from cms.linear_algebra.solvers.rank_space import RankSpace
+from cms.linear_algebra.solvers.shift_inverted import Modes, ShiftInverted, Wanted
+from cms.linear_algebra.solvers.slepc_search import SlepcSearch
+from cms.linear_algebra.solvers.tall import combine
+from cms.linear_algebra.solvers.tall_space import ArraySpace
+from fe_models.body.couplings.submatrix import PrincipalBlock
+from fe_models.foundation.arrays import Array, IntArray, frozen
+from fe_models.foundation.ranks.spread_columns import SpreadColumns
+from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
+from fe_models.foundation.solver import Solver
+from fe_models.foundation.tall.on_disk import in_memory
+from fe_models.foundation.threads import one_blas_thread
+
+__all__ = ["EigenResult", "eigenmodes"]
+
+SMALL = 300  #: number of dofs up to which dense matrices are faster
+LARGEST_DENSE = 3000  #: number of dofs up to which dense matrices are affordable, if many of the modes are wanted
+SHIFT = 1e-6  #: shift for a free body, relative to the median of K_kk / M_kk; near its first elastic omega²
+SHIFT_SMALL = 1e-4  #: the same for a dense pencil with few dofs
+ZERO = 1e-13  #: omega² relative to that median below which it is rounding of K: a rigid-body mode
+TIGHTEST, LOOSEST = 1e-13, 0.1  #: tightest tolerance that rounding allows, and loosest tolerance that is meaningful
+MISMATCH = 1e-3  #: defect of K x = omega² M x that only a factorisation of another matrix explains
+MOST_PROOFS = 3
+#: mode search of a solver, if it is not block Lanczos on rank 0
+SEARCHES: dict[str, type[SlepcSearch]] = {"slepc": SlepcSearch}
+GAP = 1e-4  #: relative gap between two values of omega² in which modes can be counted
+
+
+@dataclass(frozen=True, eq=False)
+class EigenResult:
+    """Modes by ascending frequency, M-orthonormal."""
+
+    omega2: Array  #: (n_modes,) [1/s²]; exactly 0 for rigid-body modes
+    frequencies: Array  #: (n_modes,) [Hz]
+    Phi: Array  #: (n, n_modes); `SpreadColumns` if the body is distributed
+    residuals: Array  #: |x - (omega² - sigma) (K - sigma M)⁻¹ M x|_M of x before its last inverse iteration, (n_modes,)
+    n_solves: int  #: number of columns solved
+    method: str  #: solver and its settings
+    is_proven: bool  #: whether the inertia of a second factorisation proved that no mode was missed
+
+    def __post_init__(self) -> None:
+        for name in ("omega2", "frequencies", "Phi", "residuals"):
+            value = getattr(self, name)
+            object.__setattr__(self, name, value if isinstance(value, SpreadColumns) else frozen(value))
+
+
+def eigenmodes(
+    K: Matrix,
+    M: Matrix,
+    n_modes: int | ModeCount,
+    *,
+    factorization: Inverse | None = None,
+    solver: str | Solver | None = None,
+    shift: float | None = None,
+    tolerance: float = 1e-5,
+    numbering: IntArray | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> EigenResult:
+    """Compute the lowest vibration modes of a sparse symmetric pencil.
+
+    (1) block Lanczos on S = (K - sigma M)⁻¹ M until the leading residuals are below the tolerance
+    (2) Y = S X / theta: one inverse iteration of the Ritz vectors X gives their true residuals |Y - X|_M, and corrects
+        components without mass (multipliers, massless dofs), which the M-norm does not measure
+    (3) Rayleigh-Ritz in the span of Y; Yᵀ (K - sigma M) Y = Yᵀ M X / theta needs no product with K
+    (4) signs, and directions within multiple frequencies, by `orientation`
+
+    Parameters
+    ----------
+    K
+        Stiffness, (n, n); semidefinite for a free body, indefinite only because of Lagrange multipliers.
+    M
+        Mass, (n, n), semidefinite, with zeros for massless dofs and multipliers. If K and M are `PrincipalBlock`, their
+        entries are not held during the search. Distributed matrices (`SpreadMatrix`) stay distributed, and so do the
+        modes if the blocks were factorised on the ranks (`SpreadColumns`).
+    n_modes
+        Number of modes, or a `ModeCount` for all modes up to a frequency [Hz], with or without proof.
+    factorization
+        Existing factorisation of K - shift M; None: made and freed here.
+    solver
+        Solver, or its name (`cms.linear_algebra.solvers.registry`), if no factorisation is given; default: the fastest
+        installed solver.
+    shift
+        sigma [1/s²], below all omega². Default: 0 if a factorisation is given, otherwise a small negative value that
+        also suits a free body.
+    tolerance
+        Largest residual |x - (omega² - sigma) S x|_M of a unit x. It bounds the relative error of omega² - sigma; the
+        actual error is of the order of its square.
+    numbering
+        Numbers of the rows by which the random start vector is assigned. The rows of one body in two orders then start
+        equally, and the modes agree better than the tolerance. Default: the order of the rows.
+    progress
+        Receives the number of modes found and the number wanted (0 while that is unknown).
+
+    Raises
+    ------
+    EigenError
+        If more modes are requested than exist, an eigenvalue is below the shift, the residuals stay above the
+        tolerance, or the inertia counts a different number of modes.
+    FactorizationError
+        If K - shift M is singular.
+    """
+    K, M = (A if isinstance(A, PrincipalBlock | SpreadMatrix) else matrix_of(A) for A in (K, M))
+    n = K.shape[0]
+    if K.shape != (n, n) or M.shape != (n, n):
+        raise EigenError(f"eigenmodes: expected K and M of one square shape, got {K.shape} and {M.shape}")
+    asked = mode_count(n_modes)
+    wanted = Wanted.of(asked)
+    if wanted.count is not None and wanted.count > n:
+        raise EigenError(f"eigenmodes: {asked.words}, but there are {n} dofs; choose n_modes <= {n}")
+    if not TIGHTEST <= tolerance <= LOOSEST:
+        raise EigenError(f"eigenmodes: tolerance = {tolerance:g}; expected {TIGHTEST:g} to {LOOSEST:g}")
+    is_large_part = wanted.count is not None and 3 * wanted.count > n
+    is_dense = n <= SMALL or (is_large_part and n <= LARGEST_DENSE)
+    scale = frequency_scale(K, M)
+    if shift is None:
+        shift = 0.0 if factorization is not None else -(SHIFT_SMALL if is_dense else SHIFT) * scale
+    with ExitStack() as stack:
+        stack.enter_context(one_blas_thread())
+        if factorization is None:
+            factorization = stack.enter_context(_factorize_shifted(matrix_of(K), matrix_of(M), shift, solver))
+        if factorization.n != n:
+            raise EigenError(f"eigenmodes: factorization: expected order {n}, got {factorization.n}")
+        kind: type[DenseSearch | KrylovSearch | SlepcSearch] = KrylovSearch
+        space: RankSpace | None = None
+        here = ArraySpace(n, numbering)
+        if is_dense:
+            kind = DenseSearch
+        elif isinstance(factorization, Factorization) and isinstance(factorization.factor, PetscFactor):
+            kind = SEARCHES.get(factorization.solver.name, KrylovSearch)
+            if kind is KrylovSearch and factorization.factor.ranks.size > 1:
+                space = RankSpace(factorization.factor, numbering)
+                stack.callback(space.close)
+        mass = M if space is not None or isinstance(M, SpreadMatrix) else matrix_of(M)
+        operator = ShiftInverted(mass, shift, factorization, tolerance, progress, space or here)
+        search = kind(operator, wanted)
+        modes = search.modes(wanted)
+        if asked.verify:
+            modes = _proven_modes(K, M, search, modes, wanted)
+        k = wanted.count if wanted.omega2 is None else int((modes.omega2[: modes.n_wanted] <= wanted.omega2).sum())
+        residuals, method = modes.residuals, search.description
+        n_solves, solver = operator.n_solves, factorization.description
+        # if K itself is factorised, there is no rigid-body mode, however far the mesh's omega² exceed those of the
+        # modes
+        omega2 = _zero_rigid(modes.omega2, zero=max(ZERO * scale, 1e-9 * abs(shift)) if shift else 0.0)
+        columns, whole = modes.expand(), modes.space.whole
+        del search, modes, operator  # frees the basis before the modes are copied
+        if space is not None:
+            space.close()
+        stays = space is not None and isinstance(K, PrincipalBlock) and space.has_rows_of(K)
+        Phi = space.columns(columns) if space is not None and stays else whole(columns)
+        del columns  # before the space is closed, when ranks drop data without references
+        Phi = combine(Phi, orientation(Phi, omega2)[:, :k], order="C")
+    omega2 = omega2[:k]
+    _require_match(K, M, Phi, omega2, shift, tolerance)
+    method = f"{method}; shift {shift:.6g}, tolerance {tolerance:g}, {n_solves} columns solved by {solver}"
+    return EigenResult(
+        omega2, np.sqrt(omega2) / (2 * np.pi), Phi, residuals[:k], n_solves, method, is_proven=asked.verify
+    )
+
+
+def frequency_scale(K: Matrix, M: Matrix) -> float:
+    """Return the median of K_kk / M_kk [1/s²], which is near the highest omega² of the mesh."""
+    stiffness, mass = K.diagonal(), M.diagonal()
+    has_both = (stiffness > 0) & (mass > 0)
+    if not has_both.any():
+        raise EigenError("eigenmodes: no dof has both stiffness and mass; expected a body that can vibrate")
+    return float(np.median(stiffness[has_both] / mass[has_both]))
+
+
+def _proven_modes(
+    K: Matrix, M: Matrix, search: KrylovSearch | DenseSearch | SlepcSearch, modes: Modes, wanted: Wanted
+) -> Modes:
+    """Return the modes when their number agrees with the inertia; search for more modes while it is larger."""
+    operator = search.operator
+    for _ in range(MOST_PROOFS):
+        last, sigma = counting_shift(modes.omega2, modes.n_wanted, wanted, operator.shift)
+        n_below = _count_below(K, M, sigma, operator.factorization)
+        if n_below == last:
+            return modes
+        if n_below < last:
+            raise EigenError(
+                f"eigenmodes: found {last} modes below {_hertz(sigma):.6g} Hz, but the inertia counts {n_below}; "
+                "expected symmetric K and M, and a factorisation of them"
+            )
+        modes = search.modes(wanted, at_least=n_below)
+    raise EigenError(
+        f"eigenmodes: the inertia counts {n_below} modes below {_hertz(sigma):.6g} Hz, found {last}; ask for more modes"
+    )
+
+
+def counting_shift(omega2: Array, k: int, wanted: Wanted, shift: float) -> tuple[int, float]:
+    """Return the number of modes below a shift, and the shift, in a gap at or after the last wanted mode."""
+    levels = np.concatenate([[shift], omega2])  # levels[j] is mode j, counted from 1
+    for j in range(k, len(omega2)):
+        low, high = levels[j], levels[j + 1]
+        if high - low > GAP * (high - shift):
+            sigma = (low + high) / 2
+            if wanted.omega2 is not None and j == k:
+                margin = GAP * (high - shift) / 4
+                sigma = min(max(wanted.omega2, low + margin), high - margin)
+            return j, sigma
+    return len(omega2), levels[-1] + GAP * (levels[-1] - shift)
+
+
+def _factorize_shifted(K: Matrix, M: Matrix, sigma: float, solver: str | Solver | None) -> Factorization:
+    A = K if sigma == 0 else shifted_matrix(K, M, sigma)
+    return factorize(A, definite=sigma <= 0 and bool((A.diagonal() > 0).all()), solver=solver)
+
+
+def _count_below(K: Matrix, M: Matrix, sigma: float, at_shift: Inverse) -> int:
+    """Count modes between the shift and sigma by Sylvester's law: each adds one negative eigenvalue of K - sigma M."""
+    with _factorize_shifted(K, M, sigma, at_shift.solver) as factorization:
+        inertia = factorization.inertia
+    if inertia.n_zero or at_shift.inertia.n_zero:
+        raise EigenError(
+            f"eigenmodes: {inertia.n_zero} pivots at {_hertz(sigma):.6g} Hz are zero within rounding, so that modes "
+            "cannot be counted there; ask for another number of modes, or do without the proof"
+        )
+    return inertia.n_negative - at_shift.inertia.n_negative
+
+
+def _zero_rigid(omega2: Array, *, zero: float) -> Array:
+    if (omega2 < -zero).any():
+        raise EigenError(
+            f"eigenmodes: omega² = {omega2.min():.6g} is negative; expected a stiffness without negative energy"
+        )
+    return np.where(omega2 <= zero, 0.0, omega2)
+
+
+def _require_match(K: Matrix, M: Matrix, Phi: Array, omega2: Array, shift: float, tolerance: float) -> None:
+    """Check K x = omega² M x for one random combination; the iteration itself uses K only through its factorisation."""
+    if not len(omega2):
+        return
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], size=len(omega2)) / np.sqrt(omega2 - shift)
+    force = K @ _combination(Phi, signs)
+    inertia = M @ _combination(Phi, omega2 * signs)
+    size = np.linalg.norm(force) + np.linalg.norm(M @ _combination(Phi, (omega2 - shift) * signs))
+    defect = np.linalg.norm(force - inertia) / size
+    if not defect < max(MISMATCH, 1e3 * tolerance):
+        raise EigenError(
+            f"eigenmodes: K x - omega² M x is {defect:.1e} of its terms; expected a factorisation of K - shift M "
+            f"(shift = {shift:g}) of these very matrices"
+        )
+
+
+def _combination(Phi: Any, c: Array) -> Array:
+    """Return Phi c, (n,), on rank 0."""
+    return in_memory(combine(Phi, c[:, None]))[:, 0] if isinstance(Phi, SpreadColumns) else np.asarray(Phi @ c)
+
+
+def _hertz(omega2: float) -> float:
+    return float(np.sqrt(max(omega2, 0.0)) / (2 * np.pi))

@@ -1,0 +1,251 @@
+"""Factorise a large symmetric matrix once, solve for many columns."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import TypeAlias
+
+import numpy as np
+import scipy.sparse as sp
+
+from cms.errors import FactorizationError
+from cms.linear_algebra.solvers.registry import solver_of
+from fe_models.body.couplings.submatrix import PrincipalBlock
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.ranks.spread_matrix import SpreadMatrix, spread_sum, whole_matrix
+from fe_models.foundation.solver import Factor, Solver
+
+__all__ = [
+    "EmptyFactor",
+    "Factorization",
+    "Inertia",
+    "Matrix",
+    "factorize",
+    "matrix_of",
+    "require_regular",
+    "shifted_matrix",
+]
+
+SINGULAR = 1e-3  #: relative residual after two solves; a regular matrix with condition number 1e12 leaves 1e-4
+
+#: a sparse matrix, or a block of one that is only formed while its entries are needed
+Matrix: TypeAlias = sp.csc_array | PrincipalBlock
+
+
+def matrix_of(A: Matrix) -> sp.csc_array:
+    """Return the matrix; a block is formed."""
+    return A.cut() if isinstance(A, PrincipalBlock) else sp.csc_array(whole_matrix(A))
+
+
+def shifted_matrix(K: Matrix, M: Matrix, sigma: float) -> Matrix:
+    """Return K - sigma M, (n, n), distributed if the blocks are; otherwise a sparse matrix."""
+    if isinstance(K, PrincipalBlock) and isinstance(M, PrincipalBlock) and K.index is M.index:
+        if isinstance(K.A, SpreadMatrix) and isinstance(M.A, SpreadMatrix):
+            return PrincipalBlock(spread_sum(K.A, M.A, -sigma), K.index)
+    return sp.csc_array(matrix_of(K) - sigma * matrix_of(M))
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """Numbers of negative and positive eigenvalues; certain only if no pivot was zero to rounding."""
+
+    n_negative: int
+    #: number of pivots that are zero to rounding; they are counted in the other numbers with a guessed sign
+    n_zero: int
+    n_positive: int
+
+
+class EmptyFactor:
+    """The factor of a matrix without rows, the interior of a body with all dofs on interfaces."""
+
+    n = n_factor_entries = n_negative = n_perturbed = n_positive = 0
+    description = "nothing to factorise"
+
+    def __init__(self) -> None:
+        self.is_open = True
+
+    def solve(self, b: Array) -> Array:
+        """Return columns without rows, (0, k)."""
+        return np.zeros((0, b.shape[1]), order="F")
+
+    def close(self) -> None:
+        """Do nothing: there is nothing to free."""
+        self.is_open = False
+
+
+class Factorization:
+    """A factorised symmetric matrix; the context manager frees the factor."""
+
+    def __init__(self, factor: Factor, solver: Solver) -> None:
+        self._factor = factor
+        self.solver = solver  #: the solver that made the factor, for further matrices of the same body
+
+    @property
+    def factor(self) -> Factor:
+        """The factor made by the solver."""
+        return self._factor
+
+    @property
+    def n(self) -> int:
+        """Order of the matrix."""
+        return self._factor.n
+
+    @property
+    def description(self) -> str:
+        """Solver, its version and settings, for the provenance."""
+        return self._factor.description
+
+    @property
+    def n_factor_entries(self) -> int:
+        """Number of stored entries of the factor, 8 bytes each."""
+        return self._factor.n_factor_entries
+
+    @property
+    def inertia(self) -> Inertia:
+        """Return the signs of the eigenvalues from the pivots, by Sylvester's law.
+
+        Raises
+        ------
+        FactorizationError
+            If the solver used off-diagonal pivots, as SuperLU may, so that their signs are meaningless.
+        """
+        factor = self._factor
+        if factor.n_negative < 0:
+            raise FactorizationError(
+                f"inertia: {self.description}: pivots are off the diagonal, so that their signs do not count "
+                "eigenvalues; install pypardiso (x86-64), or do without the proof"
+            )
+        return Inertia(factor.n_negative, factor.n_perturbed, factor.n_positive)
+
+    def solve(self, b: Array) -> Array:
+        """Return A⁻¹ b for one column, (n,), or many, (n, k), in the memory order of the factor."""
+        if not self._factor.is_open:
+            raise FactorizationError("solve: the factorisation was closed; factorise again")
+        b = np.asarray(b, dtype=np.float64)
+        if b.ndim not in (1, 2) or len(b) != self.n:
+            raise FactorizationError(f"solve: expected right-hand sides ({self.n},) or ({self.n}, k), got {b.shape}")
+        return self._factor.solve(b[:, None])[:, 0] if b.ndim == 1 else self._factor.solve(b)
+
+    def close(self) -> None:
+        """Free the factor."""
+        self._factor.close()
+
+    def __enter__(self) -> "Factorization":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def factorize(A: Matrix, *, definite: bool = True, solver: str | Solver | None = None) -> Factorization:
+    """Factorise a symmetric sparse matrix.
+
+    (1) extract the lower triangle, with every diagonal entry stored
+    (2) factorise with the requested solver; default: PARDISO, or our Cholesky factorisation if there is no PARDISO or
+        the matrix is large and definite
+    (3) check by two solves from a fixed random column; an (almost) singular matrix is rejected
+
+    Parameters
+    ----------
+    A
+        Symmetric, (n, n); only its lower triangle is read. A `PrincipalBlock` is not held during the factorisation.
+    definite
+        Whether A must be positive definite (Cholesky); False: any regular symmetric matrix.
+    solver
+        A `Solver`, or the name of one in `SOLVERS`; default: the fastest installed solver.
+
+    Raises
+    ------
+    FactorizationError
+        If A is not square, not finite or singular, if it is not definite although `definite`, or if the solver is
+        unknown or not installed.
+    FactorRoomError
+        If memory or disk space do not suffice for the factor.
+    """
+    chosen = solver_of(solver)
+    make = _ready(A, definite, chosen)
+    try:
+        factorization = Factorization(make(), chosen)
+    except FactorizationError as error:
+        hint = "; it is singular or not positive definite" if definite else "; it is singular"
+        raise FactorizationError(f"factorize: {error}{hint}") from error
+    del make  # also frees the lower triangle
+    require_regular(A, factorization)
+    return factorization
+
+
+def _ready(A: Matrix, definite: bool, solver: Solver) -> Callable[[], Factor]:
+    """Step (1): return a function that makes the factor; distributed rows stay distributed if the solver allows."""
+    block = A.spread() if isinstance(A, PrincipalBlock) and solver.spread is not None else None
+    if block is not None and solver.spread is not None:
+        if definite:
+            _require_positive(A.diagonal())
+        return partial(solver.spread, block, definite=definite)
+    lower = checked_lower(matrix_of(A))
+    if definite:
+        _require_positive(lower.data[lower.indptr[:-1]])
+    return partial(solver.factor, lower, definite=definite)
+
+
+def checked_lower(A: sp.csc_array) -> sp.csc_array:
+    """Return the lower triangle of a matrix that can be factorised."""
+    if A.shape[0] != A.shape[1] or A.shape[0] == 0:
+        raise FactorizationError(f"factorize: expected a square matrix with at least one row, got {A.shape}")
+    if not np.isfinite(A.data).all():
+        raise FactorizationError("factorize: the matrix holds NaN or infinite entries")
+    return lower_triangle(A)
+
+
+def lower_triangle(A: sp.csc_array) -> sp.csc_array:
+    """Return the lower triangle with every diagonal entry stored (as zero if necessary) and sorted row indices."""
+    n = A.shape[0]
+    if not A.has_canonical_format:
+        A = A.copy()
+        A.sum_duplicates()
+    is_lower = A.indices >= np.repeat(np.arange(n, dtype=A.indices.dtype), np.diff(A.indptr))
+    starts = np.concatenate([[0], np.cumsum(is_lower, dtype=A.indptr.dtype)])
+    indptr = starts[A.indptr]
+    indices, data = A.indices[is_lower], A.data[is_lower]
+    del is_lower, starts
+    # with sorted rows, the first entry of a column is its diagonal entry, if that is stored
+    lacks = np.diff(indptr) == 0
+    full = np.flatnonzero(~lacks)
+    lacks[full] = indices[indptr[full]] != full
+    missing = np.flatnonzero(lacks)
+    if len(missing):
+        at = indptr[missing]
+        indices, data = np.insert(indices, at, missing), np.insert(data, at, 0.0)
+        indptr = indptr + np.concatenate([[0], np.cumsum(lacks)]).astype(indptr.dtype)
+    return sp.csc_array((data, indices, indptr), shape=(n, n))
+
+
+def _require_positive(diagonal: Array) -> None:
+    bad = np.flatnonzero(diagonal <= 0)
+    if len(bad):
+        raise FactorizationError(
+            f"factorize: {len(bad)} diagonal entries are zero or negative, first at row {bad[0]} "
+            f"({diagonal[bad[0]]:.3g}); the matrix is singular or not positive definite"
+        )
+
+
+def require_regular(A: Matrix, factorization: Factorization) -> None:
+    """Solve twice from a random column: the result is dominated by the softest direction and reveals singularity.
+
+    An exactly singular matrix often passes the pivot check, because rounding leaves pivots near 1e-16 instead of zero.
+    Its solutions are then 1e16 times too large along the null space, and no longer satisfy A x = b.
+    """
+    b = np.random.default_rng(0).standard_normal(A.shape[0])
+    b = _unit(factorization.solve(b))
+    x = factorization.solve(b)
+    residual = np.linalg.norm(A @ x - b) if np.isfinite(x).all() else np.inf
+    if not residual < SINGULAR:
+        factorization.close()
+        raise FactorizationError(
+            f"factorize: the matrix is singular: a solution leaves {100 * min(residual, 9.99):.0f} % of its right-hand "
+            f"side; n = {A.shape[0]}"
+        )
+
+
+def _unit(x: Array) -> Array:
+    length = np.linalg.norm(x)
+    return x / length if np.isfinite(length) and length > 0 else np.full(len(x), np.nan)

@@ -1,0 +1,205 @@
+"""The search for the wanted modes: a Krylov basis for large pencils, dense matrices for small ones."""
+
+import numpy as np
+import scipy.linalg as la
+
+from cms.errors import EigenError
+from cms.linear_algebra.solvers.block_lanczos import BlockLanczos, RitzPairs
+from cms.linear_algebra.solvers.shift_inverted import Modes, ShiftInverted, Wanted, measured_residual, refined_modes
+from fe_models.foundation.arrays import Array
+
+__all__ = ["DenseSearch", "KrylovSearch"]
+
+BLOCK = 8  #: columns of a Lanczos block; narrow blocks need fewer columns in total
+#: columns of a wide block, and number of modes from which it is used; wide blocks are solved faster per column
+WIDE, MANY = 16, 32
+GUARDS = 8  #: Ritz vectors beyond the wanted ones that take part in the last step
+FIRST_GUESS = 30  #: expected number of modes, while only a frequency is given
+MOST_COLUMNS = 40  #: largest number of columns to solve, per wanted mode and guard
+MOST_REFINEMENTS = 4
+VISIBLE = 1e-6  #: share of a mode that a solve may change without an effect on the M-norm, because it has no mass
+FLOOR = 1e-13  #: residual from the recurrence below which only rounding is left
+NEGLIGIBLE = 1e-12  #: theta relative to the largest, below which a mode has no mass
+NEGATIVE = 1e-8  #: magnitude of a negative theta, relative to the largest, that is more than rounding
+MASSLESS = 1e-13  #: eigenvalue of M relative to the largest, below which a direction has no mass
+
+
+class KrylovSearch:
+    """Block Lanczos, extended until the wanted modes have converged; more modes can be requested afterwards."""
+
+    def __init__(self, operator: ShiftInverted, wanted: Wanted) -> None:
+        self.operator = operator
+        guess = wanted.count or FIRST_GUESS
+        block = WIDE if guess >= MANY else BLOCK
+        self.description = f"block Lanczos, block {block}"
+        self._lanczos = BlockLanczos(
+            operator.solve, operator.M_product, operator.space, block=block, capacity=basis_size(guess, block)
+        )
+        self._is_clean = operator.has_mass_everywhere  # otherwise S removes rounding in massless dofs
+
+    def modes(self, wanted: Wanted, at_least: int = 0) -> Modes:
+        """Return the wanted modes, or at least `at_least`, improved; their true residuals are below the tolerance."""
+        operator, tolerance = self.operator, self.operator.tolerance
+        for _ in range(MOST_REFINEMENTS):
+            ritz, k = self._converge(wanted, at_least, tolerance)
+            if self._is_clean:
+                modes = improved_modes(self._lanczos, ritz, k, operator.shift)
+                residual, defect = measured_residual(operator, modes)
+                self._is_clean = defect <= max(VISIBLE, 100 * residual)
+            if not self._is_clean:
+                n_kept = leading_count(ritz.theta, k, k + GUARDS)
+                X = operator.space.combine(self._lanczos.V, ritz.S[:, :n_kept])
+                modes = refined_modes(operator, X, ritz.theta[:n_kept], k)
+                residual = modes.residuals.max(initial=0.0)
+            if residual <= operator.tolerance:
+                return modes
+            tolerance = max(0.1 * tolerance, FLOOR)  # the residual from the recurrence was smaller than the true one
+        raise EigenError(
+            f"eigenmodes: residuals stay at {residual:.1e}, expected {operator.tolerance:.1e}; "
+            "K is too ill-conditioned for this tolerance: allow a larger one, or mend units and stiffness contrasts"
+        )
+
+    def _converge(self, wanted: Wanted, at_least: int, tolerance: float) -> tuple[RitzPairs, int]:
+        """Iterate until the wanted pairs have converged according to the recurrence; return all pairs and how many."""
+        lanczos = self._lanczos
+        next_look = 0
+        k, most = 1, np.inf
+        while lanczos.n_solves <= most:
+            if lanczos.m >= next_look or lanczos.is_exhausted:
+                ritz = lanczos.ritz()
+                refuse_negative(ritz.theta)
+                k, is_done = self._judge(ritz, wanted, at_least, tolerance)
+                if is_done:
+                    return ritz, k
+                if lanczos.is_exhausted:
+                    raise EigenError(f"eigenmodes: expected {k} modes, found all there are: {len(ritz.theta)}")
+                # computing the eigenpairs of T becomes more expensive as T grows
+                next_look = max(lanczos.m + lanczos.m // 64, k)
+                lanczos.grow(basis_size(k, lanczos.block))
+                most = MOST_COLUMNS * (k + 10 * lanczos.block)
+            if lanczos.m + lanczos.block > lanczos.capacity:
+                ritz = lanczos.ritz()
+                lanczos.restart(ritz, min(lanczos.m - lanczos.block, k + (lanczos.capacity - k) // 3))
+                next_look = 0
+            lanczos.advance()
+        raise EigenError(f"eigenmodes: no convergence after {lanczos.n_solves} columns; allow a larger tolerance")
+
+    def _judge(self, ritz: RitzPairs, wanted: Wanted, at_least: int, tolerance: float) -> tuple[int, bool]:
+        """Return how many pairs are wanted according to present knowledge, and whether all of them have converged."""
+        is_exhausted = self._lanczos.is_exhausted
+        theta, residuals = ritz.theta, ritz.residuals
+        if wanted.omega2 is None:
+            k = max(wanted.count or 0, at_least)
+            n_finite = leading_count(theta, 1, len(theta)) if len(theta) else 0
+            if is_exhausted and n_finite < k:
+                raise EigenError(
+                    f"eigenmodes: n_modes = {k}, but only {n_finite} modes have mass; choose n_modes <= {n_finite}"
+                )
+            is_bounded = True
+        else:
+            theta_cutoff = 1 / (wanted.omega2 - self.operator.shift)
+            k = max(int((theta > theta_cutoff).sum()), at_least)
+            # the next mode is certainly beyond the frequency, or has converged there
+            is_bounded = is_exhausted or (
+                k < len(theta)
+                and (theta[k] * (1 + residuals[k]) < theta_cutoff or residuals[k] <= tolerance)
+                and residuals[k] < 0.1
+            )
+        is_converged = residuals[:k] <= tolerance
+        self.operator.report(int(np.argmin(np.append(is_converged, False))), wanted.count or 0)
+        return k, bool(len(theta) >= k and is_converged.all() and is_bounded)
+
+
+def improved_modes(lanczos: BlockLanczos, ritz: RitzPairs, k: int, shift: float) -> Modes:
+    """Return modes in the span of Y = S X of the leading Ritz vectors X = V s, without a solve.
+
+    (1) S X = X theta + V_next (R s), so Y = S X / theta = X + V_next g with g = R s / theta: an inverse iteration
+    (2) (K - sigma M) Y = M X / theta, so Yᵀ (K - sigma M) Y = 1 / theta = H;  Yᵀ M Y = 1 + gᵀ g = G
+    (3) H z = (omega² - sigma) G z
+    """
+    p = leading_count(ritz.theta, k, len(ritz.theta))
+    g = ritz.coupling[:, :p] / ritz.theta[:p]  # (1)
+    mu, Z = la.eigh(np.diag(1 / ritz.theta[:p]), np.eye(p) + g.T @ g)  # (2), (3)
+    Z = Z[:, : k + GUARDS]
+    return Modes(
+        mu[: k + GUARDS] + shift,
+        k,
+        ritz.residuals[:k],
+        lanczos.V_and_next,
+        np.concatenate([ritz.S[:, :p] @ Z, g @ Z]),
+        lanczos.space,
+    )
+
+
+class DenseSearch:
+    """Computes all modes of a small pencil at once.
+
+    (1) M = B Bᵀ from the eigenvectors of S M S, S_kk = M_kk^(-1/2), without massless directions; the rank then depends
+        neither on the units of rotations and translations nor on a heavy point beside a light beam
+    (2) Bᵀ (K - sigma M)⁻¹ B q = theta q;  x = (K - sigma M)⁻¹ B q / theta has xᵀ M x = 1
+    """
+
+    description = "dense matrices"
+
+    def __init__(self, operator: ShiftInverted, wanted: Wanted) -> None:
+        self.operator = operator
+        M = operator.M_product @ np.eye(operator.n)
+        size = np.sqrt(np.where(M.diagonal() > 0, M.diagonal(), 1.0))
+        d, U = la.eigh(M / size / size[:, None])
+        if d[0] < -1e-10 * d[-1]:
+            raise EigenError("eigenmodes: M has a negative eigenvalue; expected a mass matrix")
+        has_mass = d > MASSLESS * d[-1]
+        B = size[:, None] * U[:, has_mass] * np.sqrt(d[has_mass])
+        self._A_inv_B = operator.solve(B)
+        projected = B.T @ self._A_inv_B
+        theta, Q = la.eigh((projected + projected.T) / 2)
+        self._theta, self._Q = theta[::-1], Q[:, ::-1]
+        refuse_negative(self._theta)
+
+    def modes(self, wanted: Wanted, at_least: int = 0) -> Modes:
+        """Return the wanted modes, or at least `at_least`, refined."""
+        operator, theta = self.operator, self._theta
+        n_finite = leading_count(theta, 1, len(theta))
+        if wanted.omega2 is None:
+            k = max(wanted.count or 0, at_least)
+        else:
+            k = max(int((theta > 1 / (wanted.omega2 - operator.shift)).sum()), at_least)
+        if k > n_finite:
+            raise EigenError(
+                f"eigenmodes: n_modes = {k}, but only {n_finite} modes have mass; choose n_modes <= {n_finite}"
+            )
+        n_kept = leading_count(theta, k, min(k + GUARDS, n_finite))
+        modes = refined_modes(operator, self._A_inv_B @ (self._Q[:, :n_kept] / theta[:n_kept]), theta[:n_kept], k)
+        for _ in range(MOST_REFINEMENTS):
+            if modes.residuals.max(initial=0.0) <= operator.tolerance:
+                break
+            modes = refined_modes(operator, modes.expand(), 1 / (modes.omega2 - operator.shift), k)
+        if modes.residuals.max(initial=0.0) > operator.tolerance:
+            raise EigenError(
+                f"eigenmodes: residuals are {modes.residuals.max():.1e}, expected {operator.tolerance:.1e}; "
+                "allow a larger tolerance"
+            )
+        operator.report(k, wanted.count or 0)
+        return modes
+
+
+def basis_size(k: int, block: int) -> int:
+    """Return the number of columns of a Krylov basis in which k modes usually converge without a restart."""
+    return 3 * k + 15 * block + 80
+
+
+def leading_count(theta: Array, least: int, most: int) -> int:
+    """Return how many of the leading theta, `least` to `most`, are large enough to take part in the last step."""
+    is_large = theta[:most] > NEGLIGIBLE * theta[0] if least <= 1 else theta[:most] > 0.1 * theta[least - 1]
+    return max(least, int(is_large.sum())) if least > 1 else int(is_large.sum())
+
+
+def refuse_negative(theta: Array) -> None:
+    """Raise `EigenError` if the pencil has eigenvalues below the shift."""
+    if len(theta) and theta[-1] < -NEGATIVE * theta[0]:
+        raise EigenError(
+            "eigenmodes: an eigenvalue omega² lies below the shift; expected a stiffness and a mass without negative "
+            "energy, and a shift below the lowest mode. A mass that is slightly indefinite, as some programs write "
+            "it, is "
+            "mended by mend_mass = true in the [body] of a job, mend_mass=True of body_from_matrices"
+        )

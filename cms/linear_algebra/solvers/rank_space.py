@@ -1,0 +1,255 @@
+"""The tall columns of an iteration, distributed by rows: rank 0 holds keys of them, and small matrices.
+
+Rank 0 runs the iteration and decides. All ranks perform operations on columns with their own rows at once. The rows are
+distributed like those of the factor, so solves need no redistribution, and no array as long as the body passes through
+rank 0.
+"""
+
+import weakref
+from collections.abc import Callable
+from itertools import count
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from cms.linear_algebra.solvers.factorization import Factorization, Matrix, matrix_of
+from cms.linear_algebra.solvers.inverse import Inverse
+from cms.linear_algebra.solvers.petsc.factor import CHUNK, PetscFactor, rows_here, solved_rows
+from cms.linear_algebra.solvers.tall import combine, inner, subtract
+from cms.linear_algebra.solvers.tall_space import ArrayBasis, ArraySpace, dealt
+from fe_models.body.couplings.submatrix import PrincipalBlock
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.ranks.product import RowsProduct
+from fe_models.foundation.ranks.ranks import Ranks
+from fe_models.foundation.ranks.row_layout import RowLayout
+from fe_models.foundation.ranks.rows import Rows, collected, own_rows
+from fe_models.foundation.ranks.spread_columns import Part, SpreadColumns, own_part
+from fe_models.foundation.ranks.trim import give_back
+
+__all__ = ["RankColumns", "RankSpace"]
+
+numbers = count()
+
+
+class RankColumns:
+    """Distributed columns, (n, k); freed when the last reference is dropped."""
+
+    def __init__(self, space: "RankSpace", part: Part, source: object = None) -> None:
+        """Refer to columns; source: their owner, if they are a part of others."""
+        self.part, self.shape, self.source = part, (space.n, part.last - part.first), source
+        if source is None:
+            weakref.finalize(self, space.dropped.append, part.key).atexit = False
+
+
+class RankBasis:
+    """A growing number of distributed columns."""
+
+    def __init__(self, space: "RankSpace", capacity: int) -> None:
+        self.space, self.capacity, self.key = space, capacity, new_key()
+        space.ask(None, basis_here, self.key, space.rows, capacity)
+        weakref.finalize(self, space.dropped.append, self.key).atexit = False
+
+    def columns(self, first: int, last: int) -> RankColumns:
+        """Return some columns, (n, last - first)."""
+        return RankColumns(self.space, Part(self.key, first, last), self)
+
+    def put(self, first: int, X: RankColumns) -> None:
+        """Write columns, starting at index `first`."""
+        self.space.ask(None, put_here, self.key, first, X.part)
+
+    def turn(self, m: int, C: Array) -> None:
+        """Replace the first k columns by V C, where V are the first m columns."""
+        self.space.ask(None, turn_here, self.key, m, C)
+
+    def grow(self, capacity: int, m: int) -> None:
+        """Allocate memory for more columns; the first m columns stay."""
+        self.space.ask(None, grow_here, self.key, capacity, m)
+        self.capacity = capacity
+
+
+class RankProduct:
+    """The product with a distributed matrix."""
+
+    def __init__(self, space: "RankSpace", A: Matrix) -> None:
+        self.space, self.key = space, new_key()
+        block = A.spread() if isinstance(A, PrincipalBlock) else None
+        if block is not None and block.rows == space.rows:
+            block.keep(self.key)
+        else:
+            space.ranks.store[self.key] = matrix_of(A)
+        space.ask(None, product_here, self.key, space.rows)
+        weakref.finalize(self, space.dropped.append, self.key).atexit = False
+
+    def __matmul__(self, x: RankColumns) -> RankColumns:
+        """Return A x, (n, k)."""
+        return self.space.made(x.shape[1], multiplied_here, self.key, x.part)
+
+
+class RankSpace:
+    """Columns are keys of rows on all ranks, until `close`; rank 0 holds only its own rows."""
+
+    def __init__(self, factor: PetscFactor, numbering: IntArray | None = None) -> None:
+        """Distribute columns like the rows of the factor; numbering: as for `ArraySpace`."""
+        self.numbering = numbering
+        self.factor, self.ranks, self.rows, self.n = factor, factor.ranks, factor.rows, factor.n
+        self.dropped: list[str] = []  #: keys without references; ranks drop their data with the next request
+
+    def ask(self, key: str | None, function: Callable[..., Any], *arguments: Any) -> list[Any]:
+        """Call function(ranks, *arguments) on all ranks; each keeps its result under the key (None: returns it)."""
+        dropped = [self.dropped.pop() for _ in range(len(self.dropped))]
+        return self.ranks.everywhere(kept_here, dropped, key, function, *arguments)
+
+    def made(self, k: int, function: Callable[..., Any], *arguments: Any) -> RankColumns:
+        """Return new columns, (n, k), whose rows the function returns on each rank."""
+        key = new_key()
+        self.ask(key, function, *arguments)
+        return RankColumns(self, Part(key, 0, k))
+
+    def close(self) -> None:
+        """Free data without references, on all ranks."""
+        self.ask(None, give_back_here)
+
+    def random(self, generator: np.random.Generator, k: int) -> RankColumns:
+        """Return columns of normally distributed numbers, (n, k), equal to those of a single process."""
+        self.ranks.store["columns"] = dealt(generator.standard_normal((k, self.n)).T, self.numbering)
+        return self.made(k, given_here, self.rows)
+
+    def inner(self, X: RankColumns, Y: RankColumns) -> Array:
+        """Return Xᵀ Y, (k, l), summed in the order of ranks."""
+        return np.asarray(np.sum(self.ask(None, inner_here, X.part, Y.part), axis=0))
+
+    def combine(self, X: RankColumns, C: Array) -> RankColumns:
+        """Return X C, (n, l)."""
+        return self.made(C.shape[1], combine_here, X.part, C)
+
+    def combined(self, X: RankColumns, C: Array) -> RankColumns:
+        """Return X C, (n, l), in new memory; X is freed with its last reference."""
+        return self.combine(X, C)
+
+    def subtract(self, Y: RankColumns, X: RankColumns, C: Array) -> None:
+        """Subtract X C from Y in place."""
+        self.ask(None, subtract_here, Y.part, X.part, C)
+
+    def scale(self, X: RankColumns, factors: Array) -> None:
+        """Multiply every column by its factor, (k,), in place."""
+        self.ask(None, scale_here, X.part, factors)
+
+    def basis(self, capacity: int) -> RankBasis:
+        """Allocate memory for `capacity` columns."""
+        return RankBasis(self, capacity)
+
+    def whole(self, X: RankColumns) -> Array:
+        """Return columns as an array of rank 0, (n, k)."""
+        return self.ask(None, collected_here, self.rows, X.part)[0]
+
+    def has_rows_of(self, A: PrincipalBlock) -> bool:
+        """Return whether the rows of a block are distributed like those of the columns."""
+        block = A.spread()
+        return block is not None and block.rows == self.rows
+
+    def columns(self, X: RankColumns) -> SpreadColumns:
+        """Return the columns as `SpreadColumns`; they end with the space, but results computed from them stay."""
+        return SpreadColumns(RowLayout(self.ranks, np.arange(self.n), self.rows), X.part, X)
+
+    def product(self, A: Matrix) -> RankProduct:
+        """Distribute the rows of a symmetric matrix, (n, n), if necessary, and return the product with it."""
+        return RankProduct(self, A)
+
+    def solver(self, factorization: Inverse) -> Callable[[RankColumns], RankColumns]:
+        """Return the function that solves for columns with the factor of this space."""
+        assert isinstance(factorization, Factorization)
+        assert factorization.factor is self.factor
+        return lambda b: self.made(b.shape[1], solved_here, self.factor.key, self.rows, b.part)
+
+
+def new_key() -> str:
+    """Return a key that no rank has used."""
+    return f"columns {next(numbers)}"
+
+
+def kept_here(ranks: Ranks, dropped: list[str], key: str | None, function: Callable[..., Any], *arguments: Any) -> Any:
+    """Drop data without references; call the function, and keep its result or return it."""
+    for each in dropped:
+        ranks.store.pop(each, None)
+    answer = function(ranks, *arguments)
+    if key is None:
+        return answer
+    ranks.store[key] = answer
+    return None
+
+
+def give_back_here(ranks: Ranks) -> None:
+    """Return freed memory to the system."""
+    give_back()
+
+
+def given_here(ranks: Ranks, rows: Rows) -> Array:
+    """Return this rank's rows of columns that rank 0 holds."""
+    return own_rows(ranks, rows, ranks.store.pop("columns", None))
+
+
+def collected_here(ranks: Ranks, rows: Rows, X: Part) -> Array | None:
+    """Return the columns on rank 0."""
+    return collected(ranks, rows, own_part(ranks, X))
+
+
+def inner_here(ranks: Ranks, X: Part, Y: Part) -> Array:
+    """Return the contribution of this rank's rows to Xᵀ Y."""
+    return inner(own_part(ranks, X), own_part(ranks, Y))
+
+
+def combine_here(ranks: Ranks, X: Part, C: Array) -> Array:
+    """Return this rank's rows of X C."""
+    return combine(own_part(ranks, X), C)
+
+
+def subtract_here(ranks: Ranks, Y: Part, X: Part, C: Array) -> None:
+    """Subtract this rank's rows of X C from those of Y."""
+    subtract(own_part(ranks, Y), own_part(ranks, X), C)
+
+
+def scale_here(ranks: Ranks, X: Part, factors: Array) -> None:
+    """Multiply columns by their factors."""
+    ArraySpace(0).scale(own_part(ranks, X), factors)
+
+
+def basis_here(ranks: Ranks, key: str, rows: Rows, capacity: int) -> None:
+    """Allocate this rank's rows of a basis."""
+    ranks.store[key] = ArrayBasis(rows.count(ranks.rank), capacity)
+
+
+def put_here(ranks: Ranks, key: str, first: int, X: Part) -> None:
+    """Write this rank's rows of columns into a basis."""
+    ranks.store[key].put(first, own_part(ranks, X))
+
+
+def turn_here(ranks: Ranks, key: str, m: int, C: Array) -> None:
+    """Transform this rank's rows of a basis."""
+    ranks.store[key].turn(m, C)
+
+
+def grow_here(ranks: Ranks, key: str, capacity: int, m: int) -> None:
+    """Allocate memory for more columns."""
+    ranks.store[key].grow(capacity, m)
+
+
+def product_here(ranks: Ranks, key: str, rows: Rows) -> None:
+    """Replace the matrix that rank 0 holds by this rank's rows; columns equal rows, because A is symmetric."""
+    A = ranks.store.pop(key, None)
+    ranks.store[key] = (A.indptr, A.indices, A.data) if isinstance(A, sp.csc_array) else A
+    ranks.store[key] = RowsProduct(ranks, rows, *rows_here(ranks, key, rows))
+
+
+def multiplied_here(ranks: Ranks, key: str, x: Part) -> Array:
+    """Return this rank's rows of A x."""
+    return np.asarray(ranks.store[key] @ own_part(ranks, x))
+
+
+def solved_here(ranks: Ranks, key: str, rows: Rows, b: Part) -> Array:
+    """Return this rank's rows of A⁻¹ b, for blocks of columns."""
+    x = np.empty((rows.count(ranks.rank), b.last - b.first), order="F")
+    for first in range(b.first, b.last, CHUNK):
+        some = Part(b.key, first, min(first + CHUNK, b.last))
+        x[:, first - b.first : some.last - b.first] = solved_rows(ranks, key, rows, own_part(ranks, some))
+    return x

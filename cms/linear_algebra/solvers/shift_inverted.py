@@ -1,0 +1,130 @@
+"""The shift-inverted operator S = (K - sigma M)⁻¹ M, and refinement of modes by one more application."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.linalg as la
+
+from cms.errors import EigenError
+from cms.linear_algebra.solvers.factorization import Matrix
+from cms.linear_algebra.solvers.inverse import Inverse
+from cms.linear_algebra.solvers.mode_count import ModeCount
+from cms.linear_algebra.solvers.tall_space import ArraySpace, TallSpace
+from fe_models.foundation.arrays import Array
+
+__all__ = ["Modes", "ShiftInverted", "Wanted", "measured_residual", "refined_modes"]
+
+SAMPLES = 4  #: number of columns for a common measurement of all residuals
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """The wanted modes: the first `count`, or all up to `omega2`."""
+
+    count: int | None
+    omega2: float | None
+
+    def __post_init__(self) -> None:
+        if self.count is not None and self.count < 1:
+            raise EigenError(f"eigenmodes: n_modes = {self.count}; expected at least 1")
+
+    @classmethod
+    def of(cls, wanted: ModeCount) -> "Wanted":
+        """Convert a mode count to the quantities of the pencil."""
+        return cls(wanted.n, None if wanted.cutoff is None else (2 * np.pi * wanted.cutoff) ** 2)
+
+
+class ShiftInverted:
+    """The operator S with its tolerance, on columns of one space; it counts the columns solved."""
+
+    def __init__(
+        self,
+        M: Matrix,
+        shift: float,
+        factorization: Inverse,
+        tolerance: float,
+        progress: Callable[[int, int], None] | None = None,
+        space: TallSpace | None = None,
+    ) -> None:
+        self.shift, self.tolerance = shift, tolerance
+        self.has_mass_everywhere = bool((M.diagonal() > 0).all())
+        self.n = M.shape[0]
+        self.space: TallSpace = space or ArraySpace(self.n)
+        self.M_product = self.space.product(M)
+        self.n_solves = 0
+        self.factorization, self._progress = factorization, progress
+        self._solve = self.space.solver(factorization)
+
+    def solve(self, b: Any) -> Any:
+        """Return (K - sigma M)⁻¹ b, (n, k)."""
+        self.n_solves += b.shape[1]
+        return self._solve(b)
+
+    def report(self, found: int, wanted: int) -> None:
+        """Report the progress of the search to the caller."""
+        if self._progress is not None:
+            self._progress(found, wanted)
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Modes as coefficients of a block of columns: the wanted modes, followed by a few guards."""
+
+    omega2: Array  #: ascending, (n_wanted + n_guards,)
+    n_wanted: int
+    residuals: Array  #: residuals of the wanted modes before the last improvement, (n_wanted,)
+    Y: Any  #: columns of the space, (n, p)
+    Z: Array  #: coefficients, M-orthonormal Phi = Y Z, (p, n_wanted + n_guards)
+    space: TallSpace
+
+    def expand(self) -> Any:
+        """Return the M-orthonormal modes Phi, columns of the space, (n, n_wanted + n_guards)."""
+        return self.space.combine(self.Y, self.Z)
+
+
+def refined_modes(operator: ShiftInverted, X: Any, theta: Array, n_wanted: int) -> Modes:
+    """Refine M-orthonormal Ritz vectors X, (n, p), by one inverse iteration and Rayleigh-Ritz.
+
+    (1) Y = S X / theta; residuals |Y - X|_M
+    (2) Yᵀ (K - sigma M) Y = Yᵀ M X / theta = H,  Yᵀ M Y = G;  H z = (omega² - sigma) G z
+    """
+    space, M = operator.space, operator.M_product
+    M_X = M @ X
+    Y = operator.solve(M_X)
+    space.scale(Y, 1 / theta)
+    H = space.inner(Y, M_X) / theta
+    del M_X
+    space.subtract(X, Y, np.eye(len(theta)))
+    residuals = np.sqrt(np.maximum(np.diag(space.inner(X, M @ X)), 0.0))[:n_wanted]
+    del X
+    G = space.inner(Y, M @ Y)
+    mu, Z = la.eigh((H + H.T) / 2, (G + G.T) / 2)
+    return Modes(mu + operator.shift, n_wanted, residuals, Y, Z, space)
+
+
+def measured_residual(operator: ShiftInverted, modes: Modes) -> tuple[float, float]:
+    """Measure (Σ_j |r_j|_M²)^½ of the wanted modes, r_j = x_j - (omega_j² - sigma) S x_j, with few columns.
+
+    A sum Σ ± r_j with random signs has the expected squared length Σ |r_j|² in any norm. The mean of `SAMPLES` sums is
+    used.
+
+    Returns
+    -------
+    residual
+        In the M-norm: an estimate of the root of the sum, which bounds each |r_j|_M.
+    defect
+        The same without M, relative to the columns; this also measures massless components.
+    """
+    k = modes.n_wanted
+    Z, above_shift = modes.Z[:, :k], modes.omega2[:k] - operator.shift
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(k, SAMPLES))
+    space, M = operator.space, operator.M_product
+    r = space.combine(modes.Y, Z @ signs)
+    size = np.sqrt(np.trace(space.inner(r, r)))
+    S_x = operator.solve(M @ space.combine(modes.Y, Z @ (above_shift[:, None] * signs)))
+    space.subtract(r, S_x, np.eye(SAMPLES))
+    squared = np.trace(space.inner(r, M @ r))
+    left = np.sqrt(np.trace(space.inner(r, r)))
+    return float(np.sqrt(max(squared, 0.0) / SAMPLES)), float(left / size) if size else 0.0

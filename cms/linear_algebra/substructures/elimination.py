@@ -1,0 +1,240 @@
+"""Elimination of one substructure after the other: its own modes, and its contribution to enclosing separators."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+
+from cms.errors import FactorizationError
+from cms.linear_algebra.substructures.dense import (
+    add_product,
+    add_rank_2k,
+    cholesky,
+    congruent,
+    largest_eigenpairs,
+    multiply_symmetric,
+    solve_triangular,
+)
+from fe_models.foundation.arrays import Array, IntArray
+
+__all__ = ["Part", "Reduced", "Remainder", "Substructure", "eliminate_part"]
+
+
+DEPENDENT = 1e-10  #: smallest constraint relative to the strongest one, below which it is redundant
+
+
+@dataclass(frozen=True, eq=False)
+class Substructure:
+    """An eliminated substructure with s dofs, and b dofs of the enclosing separators."""
+
+    start: int  #: first dof in elimination order
+    boundary: IntArray  #: dofs of enclosing separators that move it, ascending, (b,)
+    L: Array  #: Cholesky factor of its condensed stiffness, lower triangle, (s, s)
+    Psi: Array  #: its own constraint modes, -K_ss⁻¹ K_sb, (s, b)
+    Phi: Array  #: its own modes with all enclosing separators held, orthonormal in its condensed mass, (s, m)
+    omega2: Array  #: of these modes, ascending, (m,) [1/s²]
+    coupling: Array  #: mass between the modes of all substructures below, in order, and these modes, (m_below, m)
+    children: tuple[int, ...]
+    pivots: Array | None = None  #: only for a root with multipliers: L then holds the factors of SciPy's `lu_factor`
+    spread: Array | None = None  #: in that case S with S Sᵀ f = u for [K Cᵀ; C 0] [u; .] = [f; 0], (s, s - n_ties)
+
+    @property
+    def stop(self) -> int:
+        """Index after its last dof."""
+        return self.start + len(self.L)
+
+    @property
+    def n_numbers(self) -> int:
+        """Number of stored values."""
+        return self.L.size + self.Psi.size + self.Phi.size + self.coupling.size
+
+    def solve_own(self, f: Array) -> None:
+        """Overwrite f, (s, k) in C order, with K_ss⁻¹ f."""
+        if self.pivots is not None:
+            f[:] = la.lu_solve((self.L, self.pivots), f, check_finite=False)
+            return
+        solve_triangular(self.L, f.T, transposed=True, right=True)
+        solve_triangular(self.L, f.T, right=True)
+
+    def spread_own(self, xi: Array) -> None:
+        """Overwrite xi, (s, k) in C order, with S xi, where S Sᵀ = K_ss⁻¹."""
+        if self.spread is not None:
+            xi[:] = self.spread @ xi[: self.spread.shape[1]]
+            return
+        solve_triangular(self.L, xi.T, right=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Remainder:
+    """Contributions of eliminated substructures to the enclosing separators."""
+
+    boundary: IntArray  #: dofs, ascending, (b,)
+    K: Array  #: condensed stiffness, lower triangle, (b, b)
+    M: Array  #: condensed mass, lower triangle, (b, b)
+    rows: Array  #: mass between all modes below and the boundary, (m_below, b)
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Consecutive substructures that are eliminated as one task: a complete subtree, or a separator at the top.
+
+    K and M hold the columns of its dofs of the lower triangles in elimination order. Rows and dofs are numbered over
+    the whole body.
+    """
+
+    starts: IntArray  #: first dof of each substructure, and the end, (n + 1,)
+    #: children of each substructure, by index in this part; negative: index into `remainders` from the end
+    children: tuple[tuple[int, ...], ...]
+    K: sp.csc_array
+    M: sp.csc_array
+    omega2: float  #: modes of substructures are kept up to this omega² [1/s²]
+    multipliers: IntArray  #: dofs that are Lagrange multipliers; all belong to the root
+    remainders: tuple[Remainder, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Reduced:
+    """An eliminated part."""
+
+    substructures: tuple[Substructure, ...]
+    remainder: Remainder
+
+
+def eliminate_part(part: Part) -> Reduced:
+    """Eliminate all substructures of a part, children first.
+
+    Raises
+    ------
+    FactorizationError
+        If a condensed stiffness is not positive definite.
+    """
+    done: list[Substructure] = []
+    left: dict[int, Remainder] = {k - len(part.remainders): r for k, r in enumerate(part.remainders)}
+    for t, children in enumerate(part.children):
+        below = [left.pop(child) for child in children]
+        substructure, left[t] = eliminate(part, t, below, children)
+        done.append(substructure)
+    return Reduced(tuple(done), left[len(done) - 1])
+
+
+def eliminate(
+    part: Part, t: int, below: Sequence[Remainder], children: tuple[int, ...]
+) -> tuple[Substructure, Remainder]:
+    """Eliminate substructure t of a part; s are its own dofs, b those of enclosing separators.
+
+    (1) assemble K and M of s and b: entries of the body in the columns of s, plus contributions of the substructures
+        below
+    (2) K_ss = L Lᵀ,  W = L⁻¹ K_sb,  Psi = -L⁻ᵀ W;  K_bb <- K_bb - Wᵀ W
+    (3) modes with b held: K_ss phi = omega² M_ss phi up to the bound; none if K_ss - bound M_ss is positive definite
+    (4) M_bb <- Psi_ᵀ M Psi_ with Psi_ = [Psi; 1]: M_bb + Psiᵀ X + Xᵀ Psi,  X = M_sb + M_ss Psi / 2
+    (5) mass between own modes and b: phiᵀ (M_sb + M_ss Psi);  between modes below and b: D_b + D_s Psi, and own modes:
+        D_s phi
+    """
+    from cms.linear_algebra.substructures.extend_add import extend_add, put_rows
+
+    start, stop = int(part.starts[t]), int(part.starts[t + 1])
+    s = stop - start
+    first = int(part.starts[0])
+    entries = slice(part.K.indptr[start - first], part.K.indptr[stop - first])
+    outside = part.K.indices[entries]
+    boundary = np.unique(np.concatenate([outside[outside >= stop], *[r.boundary[r.boundary >= stop] for r in below]]))
+    b = len(boundary)
+    K_ss, K_sb, K_bb = _assembled(part.K, start - first, start, stop, boundary)  # (1)
+    M_ss, M_sb, M_bb = _assembled(part.M, start - first, start, stop, boundary)
+    m_below = sum(len(r.rows) for r in below)
+    D = np.zeros((m_below, s + b))
+    row = 0
+    for r in below:
+        p = int(np.searchsorted(r.boundary, stop))
+        own, out = r.boundary[:p] - start, np.searchsorted(boundary, r.boundary[p:])
+        place = np.concatenate([own, out])
+        extend_add(K_ss, K_sb, K_bb, r.K, place, p)
+        extend_add(M_ss, M_sb, M_bb, r.M, place, p)
+        put_rows(D, r.rows, row, np.concatenate([own, s + out]))
+        row += len(r.rows)
+    if len(part.multipliers) and part.multipliers[-1] < stop:
+        return _root_with_multipliers(part, start, K_ss, M_ss, D, children)
+    L = K_ss.copy(order="F")
+    if (failed := cholesky(L)) != 0:  # (2)
+        raise FactorizationError(
+            f"substructures: a pivot is zero or negative (dof {start + failed} in the order of elimination)"
+        )
+    Psi = K_sb
+    solve_triangular(L, Psi)
+    add_product(K_bb, Psi, -1.0)
+    solve_triangular(L, Psi, transposed=True)
+    np.negative(Psi, out=Psi)
+    omega2, Phi = own_modes(K_ss, M_ss, L, part.omega2)  # (3)
+    M_Psi = multiply_symmetric(M_ss, Psi)
+    X = M_sb + M_Psi / 2
+    add_rank_2k(M_bb, Psi, X)  # (4)
+    M_Psi += M_sb
+    rows = np.empty((m_below + len(omega2), b))  # (5)
+    np.matmul(D[:, :s], Psi, out=rows[:m_below])
+    rows[:m_below] += D[:, s:]
+    np.matmul(Phi.T, M_Psi, out=rows[m_below:])
+    done = Substructure(start, boundary, L, Psi, Phi, omega2, D[:, :s] @ Phi, children)
+    return done, Remainder(boundary, K_bb, M_bb, rows)
+
+
+def _root_with_multipliers(
+    part: Part, start: int, K_ss: Array, M_ss: Array, D: Array, children: tuple[int, ...]
+) -> tuple[Substructure, Remainder]:
+    """Eliminate a root that contains multipliers and all dofs that they tie: K_ss = [K Cᵀ; C 0].
+
+    Its modes are those of K and M in the null space of C, with orthonormal basis Z.
+    """
+    K_ss, M_ss = (np.tril(A) + np.tril(A, -1).T for A in (K_ss, M_ss))
+    is_tie = np.zeros(len(K_ss), dtype=bool)
+    is_tie[part.multipliers - start] = True
+    C = K_ss[np.ix_(is_tie, ~is_tie)]
+    Q, R, _ = la.qr(C.T, pivoting=True)
+    size = np.abs(np.diag(R))
+    if not (len(size) and size[-1] > DEPENDENT * size[0]) or len(size) < len(C):
+        raise FactorizationError("substructures: ties of distributing interfaces depend on each other")
+    Z = Q[:, len(C) :]
+    K, M = (np.asfortranarray(Z.T @ A[np.ix_(~is_tie, ~is_tie)] @ Z) for A in (K_ss, M_ss))
+    L = K.copy(order="F")
+    if cholesky(L) != 0:
+        raise FactorizationError("substructures: a pivot of the root is zero or negative")
+    omega2, Phi_z = own_modes(K, M, L, part.omega2)
+    Phi = np.zeros((len(K_ss), len(omega2)), order="F")
+    Phi[~is_tie] = Z @ Phi_z
+    factors, pivots = la.lu_factor(K_ss)
+    spread = np.zeros((len(K_ss), Z.shape[1]))
+    spread[~is_tie] = la.solve_triangular(L, Z.T, lower=True).T
+    none = np.zeros(0, dtype=np.int64)
+    empty = np.zeros((0, 0), order="F")
+    Psi = np.zeros((len(K_ss), 0), order="F")
+    done = Substructure(start, none, factors, Psi, Phi, omega2, D @ Phi, children, pivots, spread)
+    return done, Remainder(none, empty, empty, np.zeros((len(D) + len(omega2), 0)))
+
+
+def own_modes(K: Array, M: Array, L: Array, bound: float) -> tuple[Array, Array]:
+    """Step (3): return omega² up to a bound, ascending, and M-orthonormal modes; K and M (lower) may be overwritten.
+
+    M may be semidefinite: A = L⁻¹ M L⁻ᵀ has eigenvalues theta = 1 / omega², and 0 for massless directions.
+    """
+    s = len(K)
+    K -= bound * M
+    if cholesky(K) == 0:
+        return np.zeros(0), np.zeros((s, 0), order="F")
+    theta, Q = largest_eigenpairs(congruent(M, L), 1 / bound)
+    solve_triangular(L, Q, transposed=True)
+    Q /= np.sqrt(theta)
+    return 1 / theta, Q
+
+
+def _assembled(A: sp.csc_array, first: int, start: int, stop: int, boundary: IntArray) -> tuple[Array, Array, Array]:
+    """Step (1): return the entries of the body: A_ss (lower triangle), A_sb, and an empty A_bb."""
+    s, b = stop - start, len(boundary)
+    A_ss, A_sb, A_bb = (np.zeros(shape, order="F") for shape in ((s, s), (s, b), (b, b)))
+    entries = slice(A.indptr[first], A.indptr[first + s])
+    rows, values = A.indices[entries], A.data[entries]
+    columns = np.repeat(np.arange(s), np.diff(A.indptr[first : first + s + 1]))
+    own = rows < stop
+    A_ss[rows[own] - start, columns[own]] = values[own]
+    A_sb[columns[~own], np.searchsorted(boundary, rows[~own])] = values[~own]
+    return A_ss, A_sb, A_bb

@@ -1,0 +1,330 @@
+"""All mode families of one body from one factorisation of its interior stiffness (docs/theory.md §2)."""
+
+import logging
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from cms.errors import BodyError, ModeSetError
+from cms.linear_algebra.solvers.eigen import EigenResult
+from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
+from cms.linear_algebra.solvers.registry import solver_of
+from cms.linear_algebra.solvers.tall import combine, rows_times
+from cms.modes.families.fixed_interface import FixedInterfaceBody, fix_interfaces
+from cms.modes.families.flexibility import BoundaryConditions, CondensedBody, Flexibility
+from cms.modes.families.interface_cost import large_interfaces
+from cms.modes.families.rigid_modes import determinate_partition, independent_rigid_modes
+from cms.modes.families.static_modes import (
+    attachment_modes,
+    boundary_groups,
+    boundary_labels,
+    constraint_modes,
+    inertia_relief_modes,
+    redundant_constraint_modes,
+    residual_attachment_modes,
+    unrestrained_attachment_modes,
+)
+from cms.modes.families.vibration_modes import elastic_modes, fixed_interface_modes, no_modes
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.ranks.spread_columns import SpreadColumns
+from fe_models.foundation.ranks.spread_matrix import largest_entry
+from fe_models.foundation.solver import Solver
+from fe_models.foundation.tall.on_disk import of_this_process, release
+
+__all__ = ["Families"]
+
+GROUNDED = 1e-6  #: |K Psi_R| / (|K| |Psi_R|) above which a body is not free
+
+
+log = logging.getLogger(__name__)
+
+
+class Families:
+    """The mode families of a body; each is computed once, when first used. The context manager frees the factor.
+
+    >>> with Families(body) as families:                                   # doctest: +SKIP
+    ...     sets = [rubin(families, n_modes=k) for k in range(20)]
+
+    The held dofs h are the boundary dofs, plus interior dofs if the boundary dofs leave a rigid-body motion free
+    (theory.md §1). The interior stiffness K_II with h held is factorised once. Static and vibration modes for every
+    boundary condition then follow by means of the condensed stiffness S of h.
+    """
+
+    def __init__(
+        self, body: FEBody, *, announce: bool = True, solver: str | Solver | None = None, to_disk: bool = False
+    ) -> None:
+        """Prepare the families of a coupled body, without any computation.
+
+        Parameters
+        ----------
+        body
+            A coupled body.
+        announce
+            Whether to warn in advance of the cost of interfaces with very many dofs, and of cheaper options.
+        solver
+            Name of the solver, one of `cms.linear_algebra.solvers.registry.SOLVERS`; default: the fastest installed
+            solver.
+        to_disk
+            Whether the constraint modes, and large arrays made from them, are put on disk.
+
+        Raises
+        ------
+        BodyError
+            If the interfaces of the body have no boundary dofs yet.
+        FactorizationError
+            If the solver is unknown or not installed.
+        """
+        body.require_coupled()
+        self.body = body
+        self.solver = solver_of(solver)
+        self._announces, self._to_disk = announce, to_disk
+        self._stack = ExitStack()
+        self._is_open = True
+        self._modes: dict[bytes, list[_Found]] = {}
+        self._flexibilities: dict[bytes, Flexibility] = {}
+
+    def __enter__(self) -> "Families":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free the factorisation; computed families stay."""
+        self._is_open = False
+        self._stack.close()
+
+    def forget_vibration_modes(self) -> None:
+        """Compute vibration modes anew when they are next requested; the number requested before affects roundoff."""
+        self._modes.clear()
+
+    # -- Partition -------------------------------------------------------------------------------------------------
+
+    @property
+    def Psi_R(self) -> Array:
+        """Independent rigid-body modes about the mean of the nodes, (n_dof, n_r)."""
+        return self._rigid[0]
+
+    @cached_property
+    def _rigid(self) -> tuple[Array, IntArray]:
+        return independent_rigid_modes(self.body)
+
+    @cached_property
+    def _partition(self) -> tuple[IntArray, IntArray]:
+        return determinate_partition(self.body, self.Psi_R)
+
+    @property
+    def r(self) -> IntArray:
+        """Determinate dofs R, (n_r,), ascending; some are interior dofs if B leaves a rigid-body motion free."""
+        return self._partition[0]
+
+    @cached_property
+    def e(self) -> IntArray:
+        """Excess boundary dofs E = B without R, in the order of `body.b`, (n_e,)."""
+        return self.body.b[~np.isin(self.body.b, self.r)]
+
+    @property
+    def h(self) -> IntArray:
+        """Held dofs: B, then the interior dofs of R, (n_h,)."""
+        return np.concatenate([self.body.b, self._partition[1]])
+
+    @cached_property
+    def fixed(self) -> FixedInterfaceBody:
+        """Interior partition and its factorisation."""
+        if not self._is_open:
+            raise ModeSetError(f"families of body {self.body.name!r}: closed; make new ones")
+        for words in large_interfaces(self.body) if self._announces else ():
+            log.warning(words)
+        return self._stack.enter_context(fix_interfaces(self.body, self._partition[1], solver=self.solver))
+
+    def adopt(self, fixed: FixedInterfaceBody) -> None:
+        """Take over an existing interior factorisation, unless there is one here; it is freed with these families."""
+        if "fixed" not in vars(self):
+            vars(self)["fixed"] = self._stack.enter_context(fixed)
+
+    # -- Static families -------------------------------------------------------------------------------------------
+
+    @cached_property
+    def Psi_C(self) -> Array:
+        """Constraint modes of the held dofs, (n_dof, n_h); `SpreadColumns` if the body is distributed."""
+        return constraint_modes(self.fixed, to_disk=self._to_disk)
+
+    @cached_property
+    def S(self) -> Array:
+        """Stiffness condensed to the held dofs, Psi_Cᵀ K Psi_C, (n_h, n_h) [N/m]."""
+        S = rows_times(self.body.K[:, self.h].T, self.Psi_C)
+        release(self.Psi_C)
+        return (S + S.T) / 2
+
+    @cached_property
+    def condensed(self) -> CondensedBody:
+        """The parts from which every flexibility is made."""
+        return CondensedBody(self.fixed, self.Psi_C, self.S, self.Psi_R)
+
+    @cached_property
+    def free(self) -> Flexibility:
+        """Elastic flexibility Pᵀ G_R P of the free body.
+
+        Raises
+        ------
+        BodyError
+            If the body is held to the ground, so that K times its rigid-body modes is not zero.
+        """
+        self._require_free()
+        r = np.flatnonzero(np.isin(self.h, self.r))
+        return Flexibility(self.condensed, BoundaryConditions.free(len(self.h)), r)
+
+    @cached_property
+    def Psi_RC(self) -> Array:
+        """Redundant constraint modes, (n_dof, n_e)."""
+        return redundant_constraint_modes(self.free)
+
+    @cached_property
+    def Psi_A(self) -> Array:
+        """Attachment modes, (n_dof, n_e)."""
+        return attachment_modes(self.free)
+
+    @cached_property
+    def Psi_H(self) -> Array:
+        """Inertia-relief modes, (n_dof, n_r)."""
+        return inertia_relief_modes(self.fixed, self.Psi_R)
+
+    @cached_property
+    def Psi_U(self) -> Array:
+        """Unrestrained attachment modes, (n_dof, n_b)."""
+        return unrestrained_attachment_modes(self.free)
+
+    def residual_attachment(self, free_modes: EigenResult) -> Array:
+        """Return Psi_U minus the contribution of the kept free modes, (n_dof, n_b)."""
+        return residual_attachment_modes(self.body, self.Psi_U, free_modes)
+
+    def static(self, F: Array) -> Array:
+        """Return G_R F, the static response to load columns with R held, (n_dof, k)."""
+        return self.free.held(F)
+
+    def project(self, F: Array) -> Array:
+        """Return P F, load columns in equilibrium with the rigid-body accelerations that they cause, (n_dof, k)."""
+        return F - self.free.M_N @ (self.free.N.T @ F)
+
+    def flexibility(self, F: Array) -> Array:
+        """Return Pᵀ G_R P F, the elastic response of the free body to load columns, (n_dof, k)."""
+        return self.free.solve(F)
+
+    # -- Vibration families ----------------------------------------------------------------------------------------
+
+    def fixed_modes(self, n_modes: int | ModeCount) -> EigenResult:
+        """Return vibration modes with B held, over all dofs, without rigid-body motions that B may leave free."""
+        if len(self.h) > len(self.body.b):
+            directions = np.eye(len(self.h))[:, len(self.body.b) :]
+            return self.elastic_modes(BoundaryConditions(directions), n_modes)
+        return self._cached(b"fixed", mode_count(n_modes), lambda wanted: fixed_interface_modes(self.fixed, wanted))
+
+    def free_modes(self, n_modes: int | ModeCount) -> EigenResult:
+        """Return elastic vibration modes of the free body, over all dofs."""
+        return self._cached(b"free", mode_count(n_modes), lambda wanted: elastic_modes(self.free, wanted))
+
+    def elastic_modes(self, conditions: BoundaryConditions, n_modes: int | ModeCount) -> EigenResult:
+        """Return elastic vibration modes under these conditions of the held dofs, over all dofs."""
+        return self._cached(
+            conditions.key,
+            mode_count(n_modes),
+            lambda wanted: elastic_modes(self.flexibility_under(conditions), wanted),
+        )
+
+    def flexibility_under(self, conditions: BoundaryConditions) -> Flexibility:
+        """Return the flexibility of the body under these conditions of the held dofs."""
+        if conditions.key not in self._flexibilities:
+            self._require_free()
+            self._flexibilities[conditions.key] = Flexibility(self.condensed, conditions)
+        return self._flexibilities[conditions.key]
+
+    def without_boundary(self, Phi: Any) -> Any:
+        """Return Phi - Psi_C Phi_h, (n_dof, k): zero on the held dofs, and with the same span together with Psi_C."""
+        at_rest = combine(self.Psi_C, Phi[self.h])
+        return Phi - (at_rest if isinstance(Phi, SpreadColumns) else of_this_process(at_rest))
+
+    # -- Labels ----------------------------------------------------------------------------------------------------
+
+    def rigid_labels(self, family: str) -> tuple[str, ...]:
+        """Return a label for each rigid-body mode, such as 'rigid-body rx'."""
+        return tuple(f"{family} {MOTION_COMPONENTS[k]}" for k in self._rigid[1])
+
+    def held_labels(self, family: str) -> tuple[str, ...]:
+        """Return a label for each held dof."""
+        extra = self.body.dofs[self._partition[1]]
+        return (
+            *boundary_labels(self.body, family),
+            *(
+                f"{family} node {self.body.numbering.called(node)} {MOTION_COMPONENTS[component]}"
+                for node, component in extra
+            ),
+        )
+
+    def held_groups(self, family: str) -> tuple[str, ...]:
+        """Return a group for each held dof."""
+        return (*boundary_groups(self.body, family), *[f"{family} determinate"] * len(self._partition[1]))
+
+    # -- Internals -------------------------------------------------------------------------------------------------
+
+    def _require_free(self) -> None:
+        if self.body.is_held:
+            return  # the body is intentionally held, and has no rigid-body motion
+        force = np.abs(self.body.K @ self.Psi_R).max(axis=0)
+        scale = largest_entry(self.body.K) * np.abs(self.Psi_R).max(axis=0)
+        if (force > GROUNDED * scale).any():
+            raise BodyError(
+                f"body {self.body.name!r}: K times its rigid-body modes is {(force / scale).max():.1e} of |K|, "
+                "expected 0: held to the ground, or nodes not where K has them; release it, or mend the nodes"
+            )
+
+    def _cached(
+        self,
+        key: bytes,
+        wanted: ModeCount,
+        compute: Callable[[ModeCount], EigenResult],
+    ) -> EigenResult:
+        if wanted.n == 0:
+            return no_modes(self.body.n_dof)
+        for found in self._modes.get(key, []):
+            if (part := found.part(wanted)) is not None:
+                return part
+        modes = compute(wanted)
+        self._modes[key] = [_Found(modes, wanted.cutoff)]
+        return modes
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """Modes computed earlier, of which fewer may be requested later."""
+
+    modes: EigenResult
+    cutoff: float | None
+
+    def part(self, wanted: ModeCount) -> EigenResult | None:
+        frequencies, cutoff = self.modes.frequencies, wanted.cutoff
+        if wanted.verify and not self.modes.is_proven:
+            return None
+        if wanted.n is not None:
+            return _first(self.modes, wanted.n) if wanted.n <= len(frequencies) else None
+        known = max(self.cutoff or 0.0, frequencies[-1] * (1 - 1e-9) if len(frequencies) else 0.0)
+        if cutoff is None or cutoff > known:
+            return None
+        return _first(self.modes, int((frequencies <= cutoff).sum()))
+
+
+def _first(modes: EigenResult, k: int) -> EigenResult:
+    if k == len(modes.omega2):
+        return modes
+    return replace(
+        modes,
+        omega2=modes.omega2[:k],
+        frequencies=modes.frequencies[:k],
+        Phi=modes.Phi[:, :k],
+        residuals=modes.residuals[:k],
+    )

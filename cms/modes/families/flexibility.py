@@ -1,0 +1,312 @@
+"""The inverse of K under any boundary conditions of the interfaces, from one factorisation of K_II (docs/theory.md §2).
+
+Boundary conditions, springs and loads at the interfaces only change the boundary block: the condensed stiffness S =
+K_BB - K_BI K_II⁻¹ K_IB, which is small and dense. Rigid-body motions that remain free are projected out. The operator
+is then the elastic flexibility Pᵀ G P of the body under these conditions, and vibration modes need no other
+factorisation.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+
+from cms.errors import BodyError, EigenError
+from cms.linear_algebra.solvers.factorization import Inertia, factorize, shifted_matrix
+from cms.linear_algebra.solvers.tall import combine, inner
+from cms.modes.families.fixed_interface import FixedInterfaceBody
+from cms.modes.families.mechanism import free_motions, mechanism_words
+from fe_models.body.couplings.coupling_on_ranks import spread_extension
+from fe_models.body.couplings.submatrix import PrincipalBlock, principal_block
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
+from fe_models.foundation.solver import Solver
+from fe_models.foundation.tall.on_disk import of_this_process
+
+__all__ = ["BoundaryConditions", "CondensedBody", "Flexibility", "held_factor"]
+
+RIGID_ENERGY = 1e-14  #: squared motion against the conditions, below which a rigid-body motion is free
+COUNTED = 1e-11  #: eigenvalue of the scaled boundary block relative to its largest, above which its sign is certain
+
+
+@dataclass(frozen=True, eq=False)
+class CondensedBody:
+    """A body with its held dofs h: the boundary B, and further dofs needed to hold it (`determinate_partition`)."""
+
+    fixed: FixedInterfaceBody  #: interior factorisation; `fixed.b` are the held dofs h
+    Psi_C: Array  #: constraint modes, (n_dof, n_h); `SpreadColumns` if the body is distributed
+    S: Array  #: Psi_Cᵀ K Psi_C = K_hh + K_hI Psi_C,I, (n_h, n_h) [N/m]
+    Psi_R: Array  #: independent rigid-body modes, (n_dof, n_r)
+
+    @property
+    def body(self) -> FEBody:
+        """The body."""
+        return self.fixed.body
+
+
+@dataclass(frozen=True, eq=False)
+class BoundaryConditions:
+    """Admissible motion of the held dofs, u_h = Z z, with springs and masses of the neighbours on them."""
+
+    Z: Array  #: free directions, orthonormal columns, (n_h, n_z)
+    K_load: Array | None = None  #: stiffness of the neighbours over the held dofs, (n_h, n_h) [N/m]
+    M_load: Array | None = None  #: mass of the neighbours over the held dofs, (n_h, n_h) [kg]
+
+    @classmethod
+    def free(cls, n_h: int) -> "BoundaryConditions":
+        """Return the conditions of a free body."""
+        return cls(np.eye(n_h))
+
+    @property
+    def key(self) -> bytes:
+        """Bytes that identify these conditions."""
+        parts = (self.Z, self.K_load, self.M_load)
+        return b"|".join(b"" if part is None else np.ascontiguousarray(part).tobytes() for part in parts)
+
+
+class Flexibility:
+    """x = G f on the dofs that are free under the conditions: the interior dofs and z, u = T x (n_dof, n).
+
+    (1) f <- P f, P = 1 - M N Nᵀ: equilibrium with the acceleration of the free M-orthonormal rigid-body motions N
+    (2) v = K_II⁻¹ f_I;  g = Zᵀ (f_h - K_hI v)
+    (3) (Zᵀ (S + K_load) Z)_ee z_e = g_e, with z = 0 at as many pivots r as there are rigid-body motions
+    (4) u_h = Z z;  u_I = v + Psi_C,I u_h
+    (5) u <- Pᵀ u, so that Nᵀ M u = 0
+
+    M and K include the load of the neighbours. The operator is symmetric, and its null space is M N. `eigenmodes` uses
+    it as solver.
+    """
+
+    def __init__(self, condensed: CondensedBody, conditions: BoundaryConditions, r: IntArray | None = None) -> None:
+        """Make the operator; r gives pivots among the columns of Z, instead of a choice by pivoted QR."""
+        self.condensed, self.conditions = condensed, conditions
+        body, h, Z = condensed.body, condensed.fixed.b, conditions.Z
+        self._K_hi = sp.csr_array(body.K[:, h].T)[:, condensed.fixed.i]
+        S = condensed.S if conditions.K_load is None else condensed.S + conditions.K_load
+        S_z = Z.T @ S @ Z
+        motions = _free_motions(condensed, conditions)
+        on_z = Z.T @ motions[h]
+        n_n = motions.shape[1]
+        self.r = _pivots(on_z / _lengths(body, h, Z)[:, None]) if r is None else r
+        self.e = np.setdiff1d(np.arange(Z.shape[1]), self.r)
+        self._factor = held_factor(condensed, Z, S_z, self.e)
+        self.T = None if Z.shape[0] == Z.shape[1] else _expansion(condensed, Z)
+        self.M = self._with_load(body.M, conditions.M_load)
+        self.K = self._with_load(body.K, conditions.K_load)
+        self.N, self.M_N = self._orthonormal(motions if self.T is None else self.T.T @ motions)
+        self.n = self.M.shape[0]
+        self.n_rigid = n_n
+
+    @property
+    def numbering(self) -> IntArray | None:
+        """Numbers of the rows, independent of the order of interior dofs (see `eigenmodes`), (n,); None: as stored."""
+        if self.T is None:
+            return None
+        i = self.condensed.fixed.i
+        return np.concatenate([np.searchsorted(np.sort(i), i), np.arange(len(i), self.n)])
+
+    @property
+    def description(self) -> str:
+        """Name and settings of the solver, for the provenance."""
+        return f"{self.condensed.fixed.factorization.description}, boundary by its condensed stiffness"
+
+    @property
+    def solver(self) -> Solver:
+        """The solver that factorised the interior stiffness."""
+        return self.condensed.fixed.factorization.solver
+
+    @property
+    def inertia(self) -> Inertia:
+        """Inertia of K - sigma M at a shift between the rigid-body motions and the first elastic mode."""
+        n_negative = self.condensed.fixed.n_multipliers + self.n_rigid
+        return Inertia(n_negative, 0, self.n - n_negative)
+
+    def solve(self, f: Array) -> Array:
+        """Return Pᵀ G P f, (n, k), f (n, k): steps (1) to (5)."""
+        if self.n_rigid:
+            f = f - combine(self.M_N, inner(self.N, f))
+        u = self.held(f)
+        if self.n_rigid:
+            u -= combine(self.N, inner(self.M_N, u))
+        return u
+
+    def held(self, f: Array) -> Array:
+        """Return the static response to f with the pivots held, (n, k): steps (2) to (4)."""
+        fixed, Z = self.condensed.fixed, self.conditions.Z
+        i, h = fixed.i, fixed.b
+        n_i = len(i)
+        f_i, f_z = (f[i], Z.T @ f[h]) if self.T is None else (f[:n_i], f[n_i:])
+        v = fixed.factorization.solve(f_i)
+        g = f_z - Z.T @ (self._K_hi @ v)
+        z = np.zeros((Z.shape[1], f.shape[1]))
+        z[self.e] = self.solve_boundary(g[self.e])
+        u = of_this_process(combine(self.condensed.Psi_C, Z @ z))
+        u[i] += v
+        return u if self.T is None else np.concatenate([u[i], z])
+
+    def solve_boundary(self, g: Array) -> Array:
+        """Return z_e for loads g_e on the condensed stiffness, (n_e, k)."""
+        size, factor = self._factor
+        return g * 0.0 if not len(size) else size[:, None] * la.cho_solve(factor, size[:, None] * g)
+
+    def count_below(self, sigma: float) -> int:
+        """Count the elastic modes below sigma [1/s²] from the inertia of K - sigma M, block by block.
+
+        The count is the number of negative eigenvalues of K_II - sigma M_II, from one more factorisation, plus those of
+        the remainder condensed onto z, which is small and dense, minus those of multipliers and rigid-body motions.
+
+        Raises
+        ------
+        EigenError
+            If pivots are zero within rounding, so that they cannot be counted.
+        """
+        fixed, conditions = self.condensed.fixed, self.conditions
+        i, h, Z = fixed.i, fixed.b, conditions.Z
+        body = fixed.body
+        A_hz = (body.K[:, h] - sigma * body.M[:, h]) @ Z
+        A_zz = Z.T @ A_hz[h]
+        for load, factor in ((conditions.K_load, 1.0), (conditions.M_load, -sigma)):
+            if load is not None:
+                A_zz = A_zz + factor * (Z.T @ load @ Z)
+        K_ii, M_ii = PrincipalBlock(body.K, i), PrincipalBlock(body.M, i)
+        with factorize(shifted_matrix(K_ii, M_ii, sigma), definite=False, solver=self.solver) as shifted:
+            inertia = shifted.inertia
+            A_zz = A_zz - A_hz[i].T @ shifted.solve(A_hz[i]) if A_zz.size else A_zz
+        size = 1 / np.sqrt(np.where(np.diag(A_zz) != 0, np.abs(np.diag(A_zz)), 1.0))
+        values = la.eigvalsh((A_zz + A_zz.T) / 2 * np.outer(size, size)) if A_zz.size else np.zeros(0)
+        if inertia.n_zero or (len(values) and np.abs(values).min() < COUNTED * np.abs(values).max()):
+            raise EigenError(
+                "eigenmodes: pivots are zero within rounding, so that modes cannot be counted there; ask for another "
+                "number of modes, or do without the proof"
+            )
+        return inertia.n_negative + int((values < 0).sum()) - fixed.n_multipliers - self.n_rigid
+
+    def expand(self, x: Array) -> Array:
+        """Return displacement columns over all dofs, (n_dof, k), of columns x, (n, k)."""
+        return x if self.T is None else self.T @ x
+
+    def _with_load(self, A: sp.csc_array, load: Array | None) -> sp.csc_array:
+        """Return Tᵀ (A + load) T; distributed if A is distributed."""
+        if load is None and self.T is None:
+            return A
+        fixed = self.condensed.fixed
+        if load is not None:
+            h, n = fixed.b, A.shape[0]
+            row, column = np.nonzero(load)
+            added = sp.csc_array((load[row, column], (h[row], h[column])), shape=(n, n))
+            A = spread_extension(A, np.arange(n), added) if isinstance(A, SpreadMatrix) else sp.csc_array(A + added)
+        if self.T is None:
+            return A
+        if isinstance(A, SpreadMatrix):
+            return spread_extension(A, fixed.i, _boundary_entries(A, fixed, self.conditions.Z))
+        if self.T.shape[1] == len(self.condensed.fixed.i):
+            return principal_block(A, self.condensed.fixed.i)
+        A = sp.csc_array(self.T.T @ A @ self.T)
+        A.sort_indices()
+        return A
+
+    def _orthonormal(self, motions: Array) -> tuple[Array, Array]:
+        """Return M-orthonormal rigid-body motions, and M times them."""
+        if not motions.shape[1]:
+            return motions, motions
+        M_N = self.M @ motions
+        G = motions.T @ M_N
+        size = np.sqrt(np.maximum(np.diag(G), 0.0))
+        if not size.all() or la.eigvalsh(G / np.outer(size, size))[0] < 1e-10:
+            raise BodyError(
+                f"body {self.condensed.body.name!r}: has no inertia in some rigid-body motion; free and attachment "
+                "modes need all of them; take constraint modes (guyan, craig-bampton), or add the missing mass"
+            )
+        L = la.cholesky(G / np.outer(size, size), lower=True)
+        scale = la.solve_triangular(L, np.diag(1 / size), lower=True).T
+        return motions @ scale, M_N @ scale
+
+
+def _free_motions(condensed: CondensedBody, conditions: BoundaryConditions) -> Array:
+    """Return the rigid-body motions that the conditions leave free, (n_dof, n_n)."""
+    h, Z = condensed.fixed.b, conditions.Z
+    Psi_R = condensed.Psi_R
+    if not Psi_R.shape[1]:
+        return Psi_R  # a held body has no rigid-body motions
+    size = _lengths(condensed.body, h, np.eye(len(h)))
+    scaled = Psi_R[h] / size[:, None]
+    column = np.abs(scaled).max(axis=0)
+    scaled = scaled / column
+    against = scaled - (Z / size[:, None]) @ (Z.T @ (scaled * size[:, None]))
+    energy = against.T @ against
+    if conditions.K_load is not None:
+        stiffness = np.abs(condensed.S * np.outer(size, size)).max()
+        spring = Psi_R[h] / column
+        energy = energy + spring.T @ conditions.K_load @ spring / stiffness
+    values, vectors = la.eigh((energy + energy.T) / 2)
+    if values[0] < -1e-12 * max(values[-1], 1.0):
+        raise BodyError(
+            f"body {condensed.body.name!r}: the stiffness of its neighbours has negative energy in a rigid-body "
+            "motion; expected a symmetric positive semidefinite matrix"
+        )
+    return (Psi_R / column) @ vectors[:, values < RIGID_ENERGY]
+
+
+def _lengths(body: FEBody, h: IntArray, Z: Array) -> Array:
+    """Return the unit of every direction: 1 for translations, 1 / body length for rotations, (n_z,)."""
+    is_rotation = (body.dofs[h, 1] >= 3).astype(float)
+    turned = Z.T**2 @ is_rotation > 0.5
+    return np.where(turned, 1 / (body.length or 1.0), 1.0)
+
+
+def _pivots(motions: Array) -> IntArray:
+    """Return as many rows as there are motions, such that holding them prevents the motions, ascending."""
+    n = motions.shape[1]
+    if n == 0:
+        return np.zeros(0, np.int64)
+    _, _, pivots = la.qr(motions.T, mode="economic", pivoting=True)
+    return np.sort(pivots[:n]).astype(np.int64)
+
+
+def held_factor(condensed: CondensedBody, Z: Array, S_z: Array, e: IntArray) -> tuple[Array, tuple[Array, bool]]:
+    """Factorise S_ee, scaled by its diagonal: the scale, (n_e,), and the Cholesky factor.
+
+    Raises
+    ------
+    BodyError
+        If a motion of z_e costs no energy: a mechanism.
+    """
+    S_ee = S_z[np.ix_(e, e)]
+    if not len(e):
+        return np.zeros(0), (S_ee, True)
+    body = condensed.body
+    free = free_motions(body, condensed.Psi_C, Z[:, e], S_ee, np.abs(body.K.diagonal()[condensed.fixed.b]))
+    if free.shape[1]:
+        raise BodyError(mechanism_words(body, free))
+    size = 1 / np.sqrt(np.where(np.diag(S_ee) > 0, np.diag(S_ee), 1.0))
+    try:
+        return size, la.cho_factor(S_ee * np.outer(size, size), lower=True)
+    except la.LinAlgError as error:
+        raise BodyError(
+            f"body {body.name!r}: its stiffness seen from the interfaces is lost in the rounding of much larger terms; "
+            "give stiff springs and stiff short members stiffnesses nearer to those of their neighbours"
+        ) from error
+
+
+def _boundary_entries(A: SpreadMatrix, fixed: FixedInterfaceBody, Z: Array) -> sp.csc_array:
+    """Return Tᵀ A T without its interior block, (n_i + n_z, n_i + n_z)."""
+    n_i, n_z = len(fixed.i), Z.shape[1]
+    A_z = sp.csc_array(A[:, fixed.b] @ sp.csc_array(Z))
+    A_zi, A_zz = sp.coo_array(A_z[fixed.i].T), sp.coo_array(sp.csc_array(Z).T @ A_z[fixed.b] / 2)
+    rows = n_i + np.concatenate([A_zi.row, A_zz.row])
+    columns = np.concatenate([A_zi.col, n_i + A_zz.col])
+    half = sp.coo_array((np.concatenate([A_zi.data, A_zz.data]), (rows, columns)), shape=(n_i + n_z,) * 2).tocsc()
+    return sp.csc_array(half + half.T)
+
+
+def _expansion(condensed: CondensedBody, Z: Array) -> sp.csc_array:
+    """Return T in u = T x, x = (interior, z), (n_dof, n_i + n_z)."""
+    fixed = condensed.fixed
+    n_i = len(fixed.i)
+    row, column = np.nonzero(Z)
+    rows = np.concatenate([fixed.i, fixed.b[row]])
+    columns = np.concatenate([np.arange(n_i), n_i + column])
+    values = np.concatenate([np.ones(n_i), Z[row, column]])
+    return sp.csc_array((values, (rows, columns)), shape=(condensed.body.n_dof, n_i + Z.shape[1]))

@@ -1,0 +1,73 @@
+"""Motions that cost no energy: which they are, how many, and where they are largest.
+
+An energy uᵀ K u is a sum of terms K_kk u_k² and of others no larger: rounding leaves eps of them instead of zero.
+A motion is free where its energy is within that rounding, however soft the body is beside its stiffest part.
+"""
+
+import numpy as np
+import scipy.linalg as la
+
+from cms.linear_algebra.solvers.tall import combine, dots, squares
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.tall.on_disk import of_this_process
+from fe_models.foundation.words import node_list
+
+__all__ = ["free_motions", "mechanism_words", "moving_nodes", "rounding_of_energy", "without_energy"]
+
+WITHIN_ROUNDING = 30.0  #: energy in units of its rounding that is none: 0.01 to 1 of it is left of motions without any
+SUSPECT = 1e-6  #: energy of a direction, of the sum of K_kk u_k², above which it is certain
+
+
+def rounding_of_energy(body: FEBody, u: Array) -> Array:
+    """Size of the rounding in the strain energy of each column: eps times the sum of |K_kk| u_k², (k,)."""
+    return np.finfo(float).eps * squares(np.abs(body.K.diagonal()), u)
+
+
+def free_motions(body: FEBody, X: Array, C: Array, S: Array, terms: Array) -> Array:
+    """Return the motions in the span of X C that cost no energy, (n_dof, n_free).
+
+    (1) directions v of S, scaled by the size of its terms; only those of small eigenvalues are suspect
+    (2) a suspect motion u = X C v is free where uᵀ K u, of u itself, is within its rounding
+
+    Parameters
+    ----------
+    X, C
+        Columns, (n_dof, k), and independent combinations of them, (k, m).
+    S
+        (X C)ᵀ K (X C), (m, m).
+    terms
+        Sum of the terms K_kk x_k² of each column of X, or a part of it that tells its size, (k,).
+    """
+    size = np.sqrt(C.T**2 @ terms)
+    size = 1 / np.where(size > 0, size, 1.0)
+    values, vectors = la.eigh((S + S.T) / 2 * np.outer(size, size))
+    v = size[:, None] * vectors[:, values < SUSPECT]
+    if not v.shape[1]:
+        return np.zeros((body.n_dof, 0))
+    u = of_this_process(combine(X, C @ v))
+    return np.asarray(u[:, without_energy(body, u)])
+
+
+def without_energy(body: FEBody, u: Array) -> np.ndarray:
+    """Whether the strain energy of each motion is within its rounding, (k,) bool."""
+    return np.asarray(dots(u, body.K @ u) < WITHIN_ROUNDING * rounding_of_energy(body, u))
+
+
+def mechanism_words(body: FEBody, u: Array) -> str:
+    """Say how many motions without energy there are besides the rigid ones, and where they are largest."""
+    several = u.shape[1] > 1
+    return (
+        f"body {body.name!r}: {u.shape[1]} motion{'s' if several else ''} besides the rigid ones "
+        f"cost{'' if several else 's'} no energy: a mechanism (or a wire whose bending is lost in the rounding of its "
+        f"tension), largest at {moving_nodes(body, np.arange(body.n_dof), u)}; join the parts or add what holds them"
+    )
+
+
+def moving_nodes(body: FEBody, rows: IntArray, Phi: Array) -> str:
+    """Name the three nodes that move most in these motions over the given dofs, with their positions."""
+    is_translation = (body.dofs[rows, 1] >= 0) & (body.dofs[rows, 1] < 3)
+    chosen = is_translation if is_translation.any() else np.ones(len(rows), bool)
+    size = np.bincount(body.dofs[rows[chosen], 0], (Phi[chosen] ** 2).sum(axis=1), minlength=len(body.nodes))
+    order = np.argsort(-np.round(size / size.max(), 6), kind="stable")  # nodes that move alike: in their order
+    return node_list(order[: min(3, np.count_nonzero(size))].tolist(), body.nodes)

@@ -1,0 +1,191 @@
+"""Static modes of a body, defined by its boundary dofs (docs/theory.md §2)."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from cms.linear_algebra.solvers.eigen import EigenResult
+from cms.linear_algebra.solvers.tall import combine
+from cms.modes.families.fixed_interface import FixedInterfaceBody
+from cms.modes.families.flexibility import Flexibility
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.ranks.spread_columns import spread_parts
+from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
+from fe_models.foundation.tall.on_disk import of_this_process, on_disk, release
+
+__all__ = [
+    "attachment_modes",
+    "boundary_groups",
+    "boundary_labels",
+    "constraint_modes",
+    "inertia_relief_modes",
+    "redundant_constraint_modes",
+    "residual_attachment_modes",
+    "unrestrained_attachment_modes",
+]
+
+STIFF = 1e-14  #: compliance relative to the largest (rotations times body length squared), below which it is rounding
+STILL = 1e-24  #: the same for the energy of a response to inertia loads, where both factors are rounding
+BLOCK = 60  #: right-hand sides solved at a time; wider blocks are not faster and need more memory
+BLOCK_OF_RANKS = 16  #: the same for a distributed body, whose columns pass through rank 0
+
+
+def constraint_modes(fixed: FixedInterfaceBody, *, to_disk: bool = False) -> Array:
+    """Return constraint modes Psi_C: unit displacement of one boundary dof, with the other boundary dofs held.
+
+    The interior part is -K_II⁻¹ K_IB; columns have the order of the held dofs `fixed.b`. They are solved in blocks of
+    `BLOCK`. They are put on disk (`fe_models.foundation.tall.on_disk`) if requested, and distributed (`SpreadColumns`)
+    if K is.
+
+    Returns
+    -------
+    Array
+        (n_dof, n_b), translations per translation [-] or per rotation [m].
+    """
+    body, n = fixed.body, len(fixed.b)
+    if isinstance(body.K, SpreadMatrix):
+        return spread_parts(body.K.layout, n, _blocks_of_constraint_modes(fixed, BLOCK_OF_RANKS))  # type: ignore[return-value]
+    Psi_C, first = on_disk((body.n_dof, n)) if to_disk else np.zeros((body.n_dof, n)), 0
+    for block in _blocks_of_constraint_modes(fixed, BLOCK):
+        last = first + block.shape[1]
+        Psi_C[:, first:last] = block
+        release(Psi_C)
+        first = last
+    return Psi_C
+
+
+def _blocks_of_constraint_modes(fixed: FixedInterfaceBody, width: int) -> Iterator[Array]:
+    """Yield constraint modes in blocks of at most `width`, (n_dof, width)."""
+    K_b, i, b = fixed.body.K[:, fixed.b], fixed.i, fixed.b
+    for first in range(0, len(b), width):
+        last = min(first + width, len(b))
+        block = np.zeros((fixed.body.n_dof, last - first))
+        block[b[first:last], np.arange(last - first)] = 1.0
+        block[i] = fixed.factorization.solve(-K_b[:, first:last].toarray()[i])
+        yield block
+
+
+def redundant_constraint_modes(free: Flexibility) -> Array:
+    """Return redundant constraint modes Psi_RC: unit displacement of one E dof, with the other E dofs and R held.
+
+    Parameters
+    ----------
+    free
+        Flexibility of the free body, whose pivots are R.
+
+    Returns
+    -------
+    Array
+        (n_dof, n_e), the constraint modes of the E dofs.
+    """
+    return of_this_process(free.condensed.Psi_C[:, free.e])
+
+
+def attachment_modes(free: Flexibility) -> Array:
+    """Return attachment modes Psi_A: unit force on one E dof, with R held; Psi_A = Psi_C,E S_EE⁻¹.
+
+    Returns
+    -------
+    Array
+        (n_dof, n_e), translations per force [m/N] or per moment [1/N].
+    """
+    return of_this_process(combine(free.condensed.Psi_C[:, free.e], free.solve_boundary(np.eye(len(free.e)))))
+
+
+def inertia_relief_modes(fixed: FixedInterfaceBody, Psi_R: Array) -> Array:
+    """Return inertia-relief modes Psi_H: static response to the loads M Psi_R of rigid accelerations, with B held.
+
+    The interior part is K_II⁻¹ (M Psi_R)_I.
+
+    Parameters
+    ----------
+    Psi_R
+        Rigid-body modes, (n_dof, n_r).
+
+    Returns
+    -------
+    Array
+        (n_dof, n_r), translations per acceleration [s²] or per angular acceleration [m s²]. Exactly zero, not rounding,
+        if the body does not deform (such as a planar body, out of its plane).
+    """
+    Psi_H = np.zeros(Psi_R.shape)
+    F = (fixed.body.M @ Psi_R)[fixed.i]
+    Psi_H[fixed.i] = fixed.factorization.solve(F)
+    is_rotation = np.arange(Psi_R.shape[1]) >= 3
+    energy = np.einsum("nk,nk->k", F, Psi_H[fixed.i]) / _unit(fixed.body, is_rotation)
+    Psi_H[:, energy <= STILL * energy.max(initial=0.0)] = 0.0
+    return Psi_H
+
+
+def unrestrained_attachment_modes(free: Flexibility) -> Array:
+    """Return unrestrained attachment modes Psi_U = Pᵀ G_R P F_B: unit force on each boundary dof of the free body.
+
+    The force is in equilibrium with the rigid-body acceleration that it causes, so the choice of R does not matter. G_R
+    P F_B = Psi_C,E S_EE⁻¹ F_E - (G_R M N) N_Bᵀ with M-orthonormal rigid-body modes N needs six solves for any n_b.
+
+    Returns
+    -------
+    Array
+        (n_dof, n_b), with Psi_Rᵀ M Psi_U = 0; translations per force [m/N] or per moment [1/N]. Exactly zero, not
+        rounding, if the free body responds to a load by acceleration alone.
+    """
+    n_b, h = len(free.condensed.body.b), free.condensed.fixed.b
+    on_boundary = np.zeros((len(h), n_b))  # u_h of the unit forces with R held
+    on_boundary[free.e] = free.solve_boundary(np.eye(len(h), n_b)[free.e])
+    u = of_this_process(combine(free.condensed.Psi_C, on_boundary))
+    u -= combine(free.held(free.M_N), free.N[h[:n_b]].T)
+    u = u - combine(free.N, free.M_N.T @ u)
+    body, b = free.condensed.body, h[:n_b]
+    compliance = u[b, np.arange(n_b)] * _unit(body, body.dofs[b, 1] >= 3)
+    u[:, compliance <= STIFF * compliance.max(initial=0.0)] = 0.0
+    return u
+
+
+def residual_attachment_modes(body: FEBody, Psi_U: Array, free_modes: EigenResult) -> Array:
+    """Return residual attachment modes Psi_U - Phi Lambda⁻¹ Phi_Bᵀ: Psi_U minus the contribution of kept modes.
+
+    Parameters
+    ----------
+    Psi_U
+        Unrestrained attachment modes, (n_dof, n_b).
+    free_modes
+        Kept elastic modes of the free body.
+
+    Returns
+    -------
+    Array
+        (n_dof, n_b).
+    """
+    if not len(free_modes.omega2):
+        return Psi_U
+    residual = Psi_U - combine(free_modes.Phi, (free_modes.Phi[body.b] / free_modes.omega2).T)
+    residual[:, ~Psi_U.any(axis=0)] = 0.0  # a load without elastic response leaves no residual
+    return residual
+
+
+def _unit(body: FEBody, is_rotation: np.ndarray) -> Array:
+    """Return the factors that make compliances comparable: the body length squared for rotations, else 1."""
+    return np.where(is_rotation, body.length**2 or 1.0, 1.0)
+
+
+def boundary_labels(body: FEBody, family: str) -> tuple[str, ...]:
+    """Return a label for each boundary dof, such as 'constraint big_end ux' or 'constraint bolts node 12 uz'."""
+    labels = []
+    for interface in body.interfaces:
+        for dof in interface.dofs if interface.dofs is not None else ():
+            node, component = body.dofs[dof]
+            is_one_of_many = interface.kind == "nodes" and len(interface.nodes) > 1
+            at_node = f" node {body.numbering.called(node)}" if is_one_of_many else ""
+            labels.append(f"{family} {interface.name}{at_node} {MOTION_COMPONENTS[component]}")
+    return tuple(labels)
+
+
+def boundary_groups(body: FEBody, family: str) -> tuple[str, ...]:
+    """Return a group for each boundary dof, such as 'constraint big_end'."""
+    return tuple(
+        f"{family} {interface.name}"
+        for interface in body.interfaces
+        for _ in (interface.dofs if interface.dofs is not None else ())
+    )

@@ -1,0 +1,80 @@
+"""Vibration modes of a body under the boundary conditions of the classical mode sets (docs/theory.md §2)."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from cms.errors import EigenError
+from cms.linear_algebra.solvers.eigen import EigenResult, counting_shift, eigenmodes
+from cms.linear_algebra.solvers.mode_count import ModeCount
+from cms.linear_algebra.solvers.shift_inverted import Wanted
+from cms.modes.families.fixed_interface import FixedInterfaceBody
+from cms.modes.families.flexibility import Flexibility
+from fe_models.body.couplings.submatrix import PrincipalBlock
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.ranks.spread_columns import SpreadColumns
+
+__all__ = ["elastic_modes", "fixed_interface_modes", "no_modes"]
+
+
+def fixed_interface_modes(fixed: FixedInterfaceBody, wanted: ModeCount) -> EigenResult:
+    """Return vibration modes with all boundary dofs held, K_II phi = omega² M_II phi, over all dofs (n_dof, k)."""
+    if not len(fixed.i):  # every dof belongs to an interface
+        return no_modes(fixed.body.n_dof)
+    blocks = PrincipalBlock(fixed.body.K, fixed.i), PrincipalBlock(fixed.body.M, fixed.i)
+    numbering = np.searchsorted(np.sort(fixed.i), fixed.i)
+    modes = eigenmodes(*blocks, wanted, factorization=fixed.factorization, numbering=numbering)
+    if isinstance(modes.Phi, SpreadColumns):
+        block = blocks[0].spread()
+        assert block is not None  # the modes are distributed like the block
+        return replace(modes, Phi=block.expanded(modes.Phi))
+    Phi = np.zeros((fixed.body.n_dof, modes.Phi.shape[1]))
+    Phi[fixed.i] = modes.Phi
+    return replace(modes, Phi=Phi)
+
+
+def elastic_modes(flexibility: Flexibility, wanted: ModeCount) -> EigenResult:
+    """Return elastic vibration modes under any boundary conditions of the interfaces, over all dofs (n_dof, k).
+
+    Free modes belong to a free boundary, loaded modes to K + K_load, M + M_load, and mixed modes hold some boundary
+    dofs. The rigid-body motions that the conditions leave free are known in advance, and are not among the modes.
+    """
+    K, M, numbering = flexibility.K, flexibility.M, flexibility.numbering
+    modes = eigenmodes(K, M, replace(wanted, verify=False), factorization=flexibility, numbering=numbering)
+    if wanted.verify:
+        modes = _proven(flexibility, modes, wanted)
+    return replace(modes, Phi=flexibility.expand(modes.Phi))
+
+
+def _proven(flexibility: Flexibility, modes: EigenResult, asked: ModeCount) -> EigenResult:
+    """Return the modes after their number agrees with the inertia, counted for boundary and interior separately.
+
+    The proof of `eigenmodes` factorises K - sigma M as a whole. The reference node of a distributing interface has
+    neither mass nor stiffness, only multipliers, so that its pivots there are zero.
+    """
+    k = len(modes.omega2)
+    wanted = Wanted(k, None) if asked.cutoff is None else Wanted.of(asked)
+    last, sigma = counting_shift(modes.omega2, k, wanted, 0.0)
+    for n_extra in (4, 12, 36):  # a gap in which to count lies beyond the requested modes
+        try:
+            more = eigenmodes(
+                flexibility.K, flexibility.M, k + n_extra, factorization=flexibility, numbering=flexibility.numbering
+            )
+        except EigenError:  # there are no more modes
+            break
+        last, sigma = counting_shift(more.omega2, k, wanted, 0.0)
+        if last < k + n_extra:
+            break
+    n_below = flexibility.count_below(sigma)
+    if n_below != last:
+        raise EigenError(
+            f"eigenmodes: found {last} modes below {np.sqrt(sigma) / (2 * np.pi):.6g} Hz, but the inertia counts "
+            f"{n_below}; ask for more modes"
+        )
+    return replace(modes, is_proven=True)
+
+
+def no_modes(n_dof: int) -> EigenResult:
+    """Return an empty result, for a request of no modes."""
+    none: Array = np.zeros(0)
+    return EigenResult(none, none, np.zeros((n_dof, 0)), none, 0, "none asked for", is_proven=False)

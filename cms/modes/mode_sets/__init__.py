@@ -1,0 +1,55 @@
+"""Mode sets: reduction bases as data, one function for each, listed by name in `MODE_SETS` (docs/theory.md §3)."""
+
+from collections.abc import Callable
+
+from cms.modes.mode_set import ModeSet
+from cms.modes.mode_sets.assumed import assumed_modes
+from cms.modes.mode_sets.attachment import attachment, unrestrained_attachment
+from cms.modes.mode_sets.balanced import balanced_truncation
+from cms.modes.mode_sets.craig_bampton import craig_bampton, craig_bampton_ir, guyan
+from cms.modes.mode_sets.free_interface import craig_chang, dual_craig_bampton, herting, macneal, normal_modes, rubin
+from cms.modes.mode_sets.krylov import krylov
+from cms.modes.mode_sets.loaded_interface import benfield_hruda
+from cms.modes.mode_sets.multilevel import multilevel
+from cms.modes.mode_sets.user_basis import user_basis
+
+__all__ = [
+    "MODE_SETS",
+    "assumed_modes",
+    "attachment",
+    "balanced_truncation",
+    "benfield_hruda",
+    "craig_bampton",
+    "craig_bampton_ir",
+    "craig_chang",
+    "dual_craig_bampton",
+    "guyan",
+    "herting",
+    "krylov",
+    "macneal",
+    "multilevel",
+    "normal_modes",
+    "rubin",
+    "unrestrained_attachment",
+    "user_basis",
+]
+
+MODE_SETS: dict[str, Callable[..., ModeSet]] = {
+    "guyan": guyan,
+    "craig-bampton": craig_bampton,
+    "craig-bampton-ir": craig_bampton_ir,
+    "multilevel": multilevel,
+    "herting": herting,
+    "benfield-hruda": benfield_hruda,
+    "rubin": rubin,
+    "macneal": macneal,
+    "craig-chang": craig_chang,
+    "dual-craig-bampton": dual_craig_bampton,
+    "attachment": attachment,
+    "unrestrained-attachment": unrestrained_attachment,
+    "normal": normal_modes,
+    "krylov": krylov,
+    "balanced-truncation": balanced_truncation,
+    "assumed-modes": assumed_modes,
+    "user-basis": user_basis,
+}

@@ -1,0 +1,115 @@
+"""Blocks of columns of one family, and their assembly to a mode set."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cms.linear_algebra.solvers.eigen import EigenResult
+from cms.linear_algebra.solvers.mode_count import ModeCount
+from cms.modes.families.families import Families
+from cms.modes.families.static_modes import boundary_groups, boundary_labels
+from cms.modes.mode_set import ModeSet
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.ranks.spread_columns import spread_beside
+from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
+from fe_models.foundation.tall.on_disk import beside
+
+__all__ = [
+    "Block",
+    "boundary_block",
+    "constraint_block",
+    "inertia_relief_block",
+    "mode_set",
+    "rigid_block",
+    "static_block",
+    "vibration_block",
+]
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Named columns of one family."""
+
+    columns: Array  #: (n_dof, k)
+    labels: tuple[str, ...]  #: (k,)
+    groups: tuple[str, ...]  #: (k,)
+    frequencies: Array  #: (k,), NaN for static columns
+
+
+def static_block(columns: Array, labels: Sequence[str], groups: Sequence[str]) -> Block:
+    """Return static columns."""
+    return Block(columns, tuple(labels), tuple(groups), np.full(columns.shape[1], np.nan))
+
+
+def boundary_block(body: FEBody, columns: Array, family: str) -> Block:
+    """Return the static columns of a family, one for each boundary dof."""
+    return static_block(columns, boundary_labels(body, family), boundary_groups(body, family))
+
+
+def constraint_block(families: Families) -> Block:
+    """Return the constraint modes."""
+    return static_block(families.Psi_C, families.held_labels("constraint"), families.held_groups("constraint"))
+
+
+def rigid_block(families: Families) -> Block:
+    """Return the rigid-body modes."""
+    return _rigid_block(families, families.Psi_R, "rigid-body")
+
+
+def inertia_relief_block(families: Families) -> Block:
+    """Return the static responses to rigid-body accelerations with the boundary dofs B held."""
+    return _rigid_block(families, families.Psi_H, "inertia-relief")
+
+
+def _rigid_block(families: Families, columns: Array, family: str) -> Block:
+    labels = families.rigid_labels(family)
+    return static_block(columns, labels, [family] * len(labels))
+
+
+def vibration_block(kind: str, modes: EigenResult, columns: Array | None = None) -> Block:
+    """Return a block of vibration modes, or of columns made from them, one for each mode."""
+    n = len(modes.frequencies)
+    return Block(
+        modes.Phi if columns is None else columns,
+        tuple(f"{kind} {k + 1}" for k in range(n)),
+        (kind,) * n,
+        np.asarray(modes.frequencies),
+    )
+
+
+def mode_set(
+    name: str,
+    families: Families,
+    blocks: Sequence[Block],
+    *,
+    modes: EigenResult | None = None,
+    wanted: ModeCount | None = None,
+    options: Mapping[str, str] | None = None,
+    data: Mapping[str, Array] | None = None,
+) -> ModeSet:
+    """Assemble blocks to a mode set, and record the requested options and the solver used."""
+    recorded = {"solver": families.fixed.factorization.description}
+    if modes is not None:
+        recorded |= {"n_modes": str(len(modes.frequencies))}
+        if len(modes.frequencies):
+            recorded |= {"verified": str(modes.is_proven), "eigensolver": modes.method}
+    if wanted is not None and wanted.cutoff is not None:
+        recorded["cutoff"] = repr(float(wanted.cutoff))
+    return ModeSet(
+        name,
+        side_by_side(families.body, [block.columns for block in blocks]),
+        tuple(label for block in blocks for label in block.labels),
+        np.concatenate([block.frequencies for block in blocks]),
+        {**recorded, **(options or {})},
+        tuple(group for block in blocks for group in block.groups),
+        data or {},
+    )
+
+
+def side_by_side(body: FEBody, columns: Sequence[Array]) -> Array:
+    """Return blocks of columns side by side; distributed if the matrices of the body are."""
+    if isinstance(body.K, SpreadMatrix):
+        return spread_beside(body.K.layout, *columns)  # type: ignore[return-value]
+    return beside(*columns) if len(columns) > 1 else columns[0]

@@ -1,0 +1,130 @@
+"""Craig-Bampton and related sets: constraint modes with fixed- or mixed-interface modes, and inertia relief."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from cms.linear_algebra.solvers.eigen import EigenResult
+from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
+from cms.modes.families.families import Families
+from cms.modes.families.flexibility import BoundaryConditions
+from cms.modes.families.mixed_boundary import free_directions
+from cms.modes.families.sharing import families_of
+from cms.modes.mode_set import ModeSet
+from cms.modes.mode_sets.blocks import Block, constraint_block, inertia_relief_block, mode_set, vibration_block
+from cms.modes.mode_sets.selection import checked_modes, require_interfaces
+from fe_models.body.fe_body import FEBody
+
+__all__ = ["craig_bampton", "craig_bampton_ir", "guyan"]
+
+
+def craig_bampton(
+    body: FEBody | Families,
+    n_modes: int | ModeCount,
+    *,
+    free: Mapping[str, Sequence[str]] | None = None,
+) -> ModeSet:
+    """Craig-Bampton mode set: [Psi_C, fixed-interface modes] [1]_.
+
+    (1) Psi_C: constraint modes, with interior part -K_II⁻¹ K_IB
+    (2) K_II phi = omega² M_II phi, all boundary dofs held
+    (3) with free boundary dofs: phi of the body with the other boundary dofs held, as columns phi - Psi_C phi_B
+
+    Parameters
+    ----------
+    body
+        A coupled body with at least one interface, or its `Families`, which several sets can share.
+    n_modes
+        Number of fixed-interface modes; 0 gives Guyan-Irons. A `ModeCount` gives a cutoff frequency instead, and
+        whether to prove that no mode was missed.
+    free
+        Mixed boundary conditions: for each interface the components along its axes that step (2) leaves free, such as
+        {"pin": ["rz"]} for a bearing. These dofs keep their constraint modes.
+
+    Raises
+    ------
+    ModeSetError
+        If there are fewer interior dofs than modes, or no mode lies below the cutoff.
+    BodyError
+        If the body is a mechanism with its interfaces held.
+
+    References
+    ----------
+    .. [1] Hurty (1965), Craig & Bampton (1968), docs/bibliography.md; derived in docs/theory.md §2-3.
+    """
+    with families_of(body) as families:
+        body, wanted = families.body, mode_count(n_modes)
+        require_interfaces("craig_bampton", body)
+        block, modes = _held_modes("craig_bampton", families, wanted, free or {})
+        blocks = [constraint_block(families), block]
+        return mode_set("craig-bampton", families, blocks, modes=modes, wanted=wanted, options=_free_words(free))
+
+
+def craig_bampton_ir(
+    body: FEBody | Families,
+    n_modes: int | ModeCount,
+    *,
+    free: Mapping[str, Sequence[str]] | None = None,
+) -> ModeSet:
+    """Craig-Bampton with inertia relief: [Psi_C, Psi_H, fixed-interface modes] [1]_.
+
+    Psi_H holds the static responses to rigid-body accelerations with the boundary dofs B held. They make the set
+    statically complete: exact for gravity and for every static interface load of the accelerated body, for any number
+    of modes. Parameters and errors are those of `craig_bampton`.
+
+    References
+    ----------
+    .. [1] Hintz (1975), docs/bibliography.md; derived in docs/theory.md §2.
+    """
+    with families_of(body) as families:
+        body, wanted = families.body, mode_count(n_modes)
+        require_interfaces("craig_bampton_ir", body)
+        block, modes = _held_modes("craig_bampton_ir", families, wanted, free or {})
+        blocks = [constraint_block(families), inertia_relief_block(families), block]
+        return mode_set("craig-bampton-ir", families, blocks, modes=modes, wanted=wanted, options=_free_words(free))
+
+
+def guyan(body: FEBody | Families) -> ModeSet:
+    """Guyan-Irons static condensation: constraint modes only (Craig-Bampton with n_modes = 0) [1]_.
+
+    References
+    ----------
+    .. [1] Guyan (1965), docs/bibliography.md.
+    """
+    with families_of(body) as families:
+        body = families.body
+        require_interfaces("guyan", body)
+        return mode_set("guyan", families, [constraint_block(families)])
+
+
+def _held_modes(
+    name: str,
+    families: Families,
+    wanted: ModeCount,
+    free: Mapping[str, Sequence[str]],
+) -> tuple[Block, EigenResult]:
+    """Return the modes with B held, or with B held except its free dofs (then made zero on B by means of Psi_C)."""
+    body = families.body
+    directions = free_directions(body, free)
+    if not directions.shape[1]:
+        modes = checked_modes(name, "fixed-interface", families.fixed_modes, body, wanted)
+        if len(families.h) == len(body.b):
+            return vibration_block("fixed-interface", modes), modes
+        return vibration_block("fixed-interface", modes, families.without_boundary(modes.Phi)), modes
+    n_b, n_h = len(body.b), len(families.h)
+    Z = np.zeros((n_h, directions.shape[1] + n_h - n_b))
+    Z[:n_b, : directions.shape[1]] = directions
+    Z[n_b:, directions.shape[1] :] = np.eye(n_h - n_b)
+    modes = checked_modes(
+        name,
+        "mixed-interface",
+        lambda asked: families.elastic_modes(BoundaryConditions(Z), asked),
+        body,
+        wanted,
+    )
+    return vibration_block("mixed-interface", modes, families.without_boundary(modes.Phi)), modes
+
+
+def _free_words(free: Mapping[str, Sequence[str]] | None) -> dict[str, str]:
+    words = "; ".join(f"{name} {' '.join(components)}" for name, components in (free or {}).items() if components)
+    return {"free": words} if words else {}

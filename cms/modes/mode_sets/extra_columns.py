@@ -1,0 +1,156 @@
+"""Extra columns for any mode set: static responses to load cases and to steady rotation (residual vectors)."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from cms.errors import ModeSetError
+from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
+from cms.modes.centrifugal import CENTRIFUGAL, centrifugal_loads
+from cms.modes.families.families import Families
+from cms.modes.families.sharing import body_of, families_of
+from cms.modes.mode_set import ModeSet
+from fe_models.body.fe_body import FEBody
+from fe_models.body.load_cases import LoadCase, load_columns
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.tall.on_disk import in_memory
+from fe_models.foundation.words import nearest, quoted
+
+__all__ = ["EXTRA_COLUMNS", "with_centrifugal", "with_load_cases"]
+
+IN_THE_SPAN = 1e-6  #: part of a response, in the energy norm, below which it counts as already in the span
+#: energy of a column, relative to the energy of its dofs taken singly, below which it is rigid-body motion
+ROUNDING = 1e-13
+
+
+def with_load_cases(modes: ModeSet, body: FEBody | Families, *, names: Sequence[str] | None = None) -> ModeSet:
+    """Add the static responses to the load cases of a body to a mode set.
+
+    (1) held: K_II⁻¹ f_I with all boundary dofs held; makes the response of a supported body exact
+    (2) accelerating: Pᵀ G P f of the free body, in equilibrium with the acceleration by the load; exact in free motion
+    (3) of each response only the part u - V (Vᵀ K V)⁺ Vᵀ K u that the set lacks is added, if it exceeds 1e-6 of the
+        response
+
+    A statically complete set needs one column per load case, other sets two. Uniform gravity has no response (2).
+
+    Parameters
+    ----------
+    modes
+        A mode set of this body.
+    body
+        A coupled body with load cases, or its `Families`.
+    names
+        Names of the load cases; default: all except centrifugal ones.
+
+    Raises
+    ------
+    ModeSetError
+        If there are no load cases, or no load case of that name.
+    """
+    source, body = body, body_of(body)
+    cases = [case for case in body.load_cases if case.kind != CENTRIFUGAL]
+    if not cases:
+        raise ModeSetError(
+            f"with_load_cases: body {body.name!r} has no load cases; give it some before it is coupled, or leave the "
+            "extra columns out"
+        )
+    if names is not None:
+        by_name = {case.name: case for case in cases}
+        for name in names:
+            if name not in by_name:
+                raise ModeSetError(
+                    f"with_load_cases: body {body.name!r}: no load case {quoted(name)}{nearest(name, by_name)}"
+                )
+        cases = [by_name[name] for name in names]
+    return _with_responses(modes, source, cases, "load case")
+
+
+def with_centrifugal(modes: ModeSet, body: FEBody | Families) -> ModeSet:
+    """Add the static responses to the six centrifugal fields of steady rotation to a mode set.
+
+    This works as `with_load_cases` does, with the loads of `centrifugal_loads`. A rigid interface eliminates its
+    members. Their centrifugal field is no rigid motion, so the load must be made before coupling:
+
+    >>> body = replace(body, load_cases=(*body.load_cases, *centrifugal_loads(body)))  # doctest: +SKIP
+    >>> modes = with_centrifugal(modes, couple(body))                                  # doctest: +SKIP
+
+    Raises
+    ------
+    ModeSetError
+        If the body has rigid interfaces but no centrifugal loads.
+    """
+    source, body = body, body_of(body)
+    cases: Sequence[LoadCase] = [case for case in body.load_cases if case.kind == CENTRIFUGAL]
+    if not cases:
+        T = None if body.recovery is None else body.recovery.matrix
+        if T is not None and (T.nnz != T.shape[0] or not (T.data == 1.0).all()):
+            raise ModeSetError(
+                f"with_centrifugal: body {body.name!r} has eliminated dofs (rigid interfaces), whose centrifugal load "
+                "cannot be told from the coupled mass; add centrifugal_loads(body) to its load cases before coupling"
+            )
+        cases = centrifugal_loads(body)
+    return _with_responses(modes, source, cases, "")
+
+
+EXTRA_COLUMNS: dict[str, Callable[..., ModeSet]] = {"load-cases": with_load_cases, "centrifugal": with_centrifugal}
+
+
+def _with_responses(modes: ModeSet, source: FEBody | Families, cases: Sequence[LoadCase], family: str) -> ModeSet:
+    body = body_of(source)
+    if modes.columns.shape[0] != body.n_dof:
+        raise ModeSetError(
+            f"extra columns: mode set {modes.name!r} has columns of {modes.columns.shape[0]} dofs, body {body.name!r} "
+            f"has {body.n_dof}; make the set from this body"
+        )
+    F = load_columns(cases, body.n_dof)
+    names = [f"{family} {case.name}".strip() for case in cases]
+    columns, labels, groups, known = in_memory(modes.columns), [*modes.labels], [*modes.groups], []
+    with families_of(source) as families:
+        held = np.zeros_like(F)
+        held[families.fixed.i] = families.fixed.factorization.solve(F[families.fixed.i])  # (1)
+        for support, responses in (("held", held), ("accelerating", families.flexibility(F))):  # (2)
+            new, is_new = _not_in_span(body, columns, responses, F)  # (3)
+            columns = np.hstack([columns, new])
+            labels += [f"{name} {support}" for name, is_it in zip(names, is_new, strict=True) if is_it]
+            groups += [name for name, is_it in zip(names, is_new, strict=True) if is_it]
+            known += [f"{name} {support}" for name, is_it in zip(names, is_new, strict=True) if not is_it]
+    n_new = len(labels) - len(modes.labels)
+    return replace(
+        modes,
+        columns=columns,
+        labels=tuple(labels),
+        groups=tuple(groups),
+        frequencies=np.concatenate([modes.frequencies, np.full(n_new, np.nan)]),
+        options={
+            **modes.options,
+            f"extra {family or CENTRIFUGAL} columns": str(n_new),
+            f"extra {family or CENTRIFUGAL} columns in the span already": "; ".join(known) or "none",
+        },
+    )
+
+
+def _not_in_span(body: FEBody, V: Array, U: Array, F: Array) -> tuple[Array, np.ndarray]:
+    """Return K-orthonormal parts of the responses U to F outside the span of V and earlier ones, and which count."""
+    K = SymmetricProduct(body.K)
+    KV = K @ V
+    G = V.T @ KV
+    diagonal = np.abs(body.K.diagonal())
+    size = np.sqrt(np.maximum(np.diag(G), 0.0))
+    is_elastic = size**2 > ROUNDING * np.einsum("n,nk,nk->k", diagonal, V, V)
+    V, KV, size = V[:, is_elastic] / size[is_elastic], KV[:, is_elastic] / size[is_elastic], size[is_elastic]
+    G = G[np.ix_(is_elastic, is_elastic)] / np.outer(size, size)
+    energy = np.abs(np.einsum("nk,nk->k", U, F))
+    local = np.einsum("n,nk,nk->k", np.divide(1.0, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0), F, F)
+    rest = U
+    for _ in range(2):  # twice is enough
+        rest = rest - V @ np.linalg.lstsq(G, KV.T @ rest, rcond=ROUNDING)[0]
+    new, is_new = np.zeros((len(U), 0)), np.zeros(U.shape[1], bool)
+    for k in range(U.shape[1]):
+        x = rest[:, [k]] - new @ (new.T @ (K @ rest[:, [k]]))  # responses to proportional loads count once
+        left = abs(float(x[:, 0] @ (K @ x)[:, 0]))
+        # A load that is balanced by rigid-body acceleration leaves only rounding, far less than its dofs taken singly.
+        is_new[k] = left > IN_THE_SPAN**2 * energy[k] and energy[k] > IN_THE_SPAN**2 * local[k]
+        if is_new[k]:
+            new = np.hstack([new, x / np.sqrt(left)])
+    return new, is_new

@@ -1,0 +1,334 @@
+"""A reduced body of a straight beam without a mesh, from assumed functions along its axis."""
+
+import platform
+from collections.abc import Mapping
+from importlib import metadata
+
+import numpy as np
+import scipy.linalg as la
+
+from cms.body.geometric_stiffness import GeometricStiffness
+from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
+from cms.body.source_columns import source_columns
+from cms.errors import BodyError, ModeSetError
+from cms.linear_algebra.independent import RANK_TOLERANCE
+from cms.linear_algebra.solvers.orientation import orientation
+from cms.modes.mode_sets.axis_functions import AXIS_FUNCTIONS, CUBIC
+from cms.reduction.assumed_mode_beams.beam_fields import (
+    BeamFields,
+    beam_fields,
+    beam_moments,
+    inertia_rows,
+    rigid_fields,
+    strain_rows,
+)
+from cms.reduction.assumed_mode_beams.beam_geometric import beam_geometric_stiffness
+from cms.reduction.assumed_mode_beams.skin import tube
+from cms.reduction.basis.damping import Damping, modal_damping
+from cms.reduction.basis.frames import (
+    BuckensFrame,
+    Frame,
+    NodalFrame,
+    TisserandFrame,
+    checked_dofs,
+    determinate_rows,
+    placed,
+)
+from fe_models.body.beam_line import BeamLine
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.units import Units
+from fe_models.foundation.words import nearest, quoted
+from fe_models.meshes.numbering import Numbering
+
+__all__ = ["beam_from_assumed_modes"]
+
+
+def beam_from_assumed_modes(
+    line: BeamLine,
+    *,
+    name: str,
+    units: Units,
+    n_axial: int = 2,
+    n_bending: int = 4,
+    n_torsion: int = 1,
+    n_shear: int | None = None,
+    functions: str = "legendre",
+    stations: Mapping[str, float] | None = None,
+    frame: Frame | None = None,
+    damping: Damping | None = None,
+    geometric: bool = True,
+) -> ReducedBody:
+    """Return a beam whose displacement is a sum of functions along its axis (Ritz), reduced and ready for a system.
+
+    Energies and inertia integrals of all orders are integrals of polynomials along x, which Gauss points integrate
+    exactly.
+
+    (1) make the columns: axial, torsion, bending and shear along y and z (`beam_fields`), minus the rigid motion that
+        the frame removes
+    (2) write W = K + omega_1² M as A_Wᵀ A_W, where the rows of A_W are strain and motion at the Gauss points; pivoted
+        QR of A_W, which does not square the condition number, gives independent columns
+    (3) solve K z = omega² M z over them; the shapes are M-orthonormal and K-diagonal
+
+    Parameters
+    ----------
+    line
+        Mass and stiffness along x. The mesh axes of the body are the beam axes, with the origin at the start of the
+        beam.
+    name, units
+        Name and unit system of the body.
+    n_axial, n_bending, n_torsion
+        Number of functions for each motion; n_bending counts for y and z separately.
+    n_shear
+        Number of functions for the shear rotation, for y and z separately; default: n_bending + 1, or none if shear is
+        rigid.
+    functions
+        "legendre", "monomials" or "splines".
+    stations
+        Position x of each interface, by name; default: "start" and "end".
+    frame
+        Default: Tisserand (mean axes, for a free beam). `NodalFrame("start")` gives functions clamped there;
+        `NodalFrame(dofs=...)` holds six (station, component).
+    damping
+        Damping; default: none.
+    geometric
+        Whether to add the geometric stiffness of the unit loads, with which a system stiffens the body.
+
+    Returns
+    -------
+    ReducedBody
+        It has n_axial + n_torsion + 2 (n_bending + n_shear) modes, minus redundant ones (named in `provenance`). Its
+        skin for drawing is an elliptic tube with the radii of gyration of the section.
+
+    Raises
+    ------
+    ModeSetError
+        If a number is negative, no function is requested, or the family is unknown.
+    BodyError
+        If a law is not positive, a station is not on the beam, or the frame cannot be attached.
+    """
+    where = f"beam_from_assumed_modes: {name!r}"
+    if functions not in AXIS_FUNCTIONS:
+        raise ModeSetError(f"{where}: unknown functions {quoted(functions)}{nearest(functions, AXIS_FUNCTIONS)}")
+    if n_shear is None:
+        n_shear = n_bending + 1 if line.has_shear and n_bending > 0 else 0
+    counts = {"axial": n_axial, "bending": n_bending, "torsion": n_torsion, "shear": n_shear}
+    for motion, count in counts.items():
+        if count < 0:
+            raise ModeSetError(f"{where}: n_{motion} = {count}; expected 0 or more")
+    if not any(counts.values()):
+        raise ModeSetError(f"{where}: expected at least one function, got none")
+    if n_shear and not line.has_shear:
+        raise ModeSetError(f"{where}: n_shear = {n_shear}, but the beam is rigid in shear; give GAy and GAz")
+    places = {"start": 0.0, "end": line.length} if stations is None else dict(stations)
+    x_station = station_places(where, line, places)
+
+    x, weight = gauss_points(line, functions, counts)
+    require_rotary_inertia(where, line, x, counts)
+    fields = beam_fields(functions, counts, line, x)
+    rigid = rigid_fields(x, np.zeros(3))
+    condition = frame_of_beam(where, line, frame or TisserandFrame(), x_station, list(places), (x, weight, rigid))
+    at_stations = beam_fields(functions, counts, line, x_station).motion
+    C = rigid_part(condition, inertia_rows(line, x, weight, rigid), inertia_rows(line, x, weight, fields.motion),
+                   (x_station, at_stations))  # fmt: skip
+
+    A_K = strain_rows(line, x, weight, fields.strain)
+    A_M = inertia_rows(line, x, weight, fields.motion - rigid @ C)
+    T, omega2, dropped = elastic_modes(fields, A_K, A_M)  # (2), (3)
+    x_skin, skin, triangles = tube(line)
+    nodes_x = np.concatenate([x_station, x_skin])
+
+    def shapes(at: Array) -> Array:
+        """Return the motion of the sections for the modes, (n, 6, n_q)."""
+        motion = beam_fields(functions, counts, line, at).motion
+        return np.asarray((motion - rigid_fields(at, np.zeros(3)) @ C) @ T)
+
+    U = shapes(nodes_x)
+    turn = orientation(U.reshape(-1, T.shape[1]), omega2)
+    T, U = T @ turn, U @ turn
+    offsets = np.concatenate([np.zeros((len(x_station), 2)), skin])
+    nodes = np.column_stack([nodes_x, offsets])
+    arm = np.column_stack([np.zeros(len(nodes)), offsets])
+    # u + theta × o
+    Phi = U[:, :3] + np.cross(U[:, 3:], arm[:, :, None], axisa=1, axisb=1, axisc=1)
+
+    axes, origin = condition.axes, condition.origin
+    columns = source_columns(fields.labels, fields.groups, T, A_K.T @ (A_K @ T))
+    interfaces = tuple(
+        ReducedInterface(
+            station,
+            "rigid",
+            position=axes.T @ (nodes[k] - origin),
+            triad=axes.T,
+            Psi=np.concatenate([axes.T @ U[k, :3], axes.T @ U[k, 3:]]),
+            members=np.array([k]),
+        )
+        for k, station in enumerate(places)
+    )
+    M, K = np.eye(len(omega2)), np.diag(omega2)
+    return ReducedBody(
+        name=name,
+        units=units,
+        frame=condition,
+        M=M,
+        K=K,
+        D=np.zeros_like(K) if damping is None else modal_damping(damping, M, K, second=units.time),
+        labels=columns.mode_labels(),
+        energy_shares=columns.group_shares(),
+        sources=columns.sources,
+        moments=beam_moments(line, (x, weight), shapes(x), condition),
+        free_frequencies=free_frequencies(line, (x, weight, rigid), fields, A_K),
+        nodes=(nodes - origin) @ axes,
+        node_ids=np.arange(len(nodes)),
+        Phi=np.einsum("ba,nbk->nak", axes, Phi),
+        surface=triangles + len(x_station),
+        interfaces=interfaces,
+        provenance=provenance(line, functions, counts, dropped),
+        columns=columns,
+        geometric=stiffening(line, functions, counts, C, T, x_station, condition) if geometric else None,
+    )
+
+
+def require_rotary_inertia(where: str, line: BeamLine, x: Array, counts: Mapping[str, int]) -> None:
+    """Raise `BodyError` if torsion or shear would move without mass, which gives infinite eigenvalues."""
+    has_y, has_z = line.at("rho_Iy", x).any(), line.at("rho_Iz", x).any()
+    if counts["torsion"] and not (has_y or has_z):
+        raise BodyError(
+            f"{where}: n_torsion = {counts['torsion']}, but the sections have no moment of inertia about x, so that "
+            "torsion has no mass; give rho_Iy and rho_Iz, or n_torsion = 0 in a nodal frame"
+        )
+    if counts["shear"] and not (has_y and has_z):
+        raise BodyError(
+            f"{where}: n_shear = {counts['shear']}, but the sections have no rotary inertia, so that shear has no "
+            "mass; give rho_Iy and rho_Iz, or leave GAy and GAz infinite"
+        )
+
+
+def stiffening(
+    line: BeamLine, functions: str, counts: Mapping[str, int], C: Array, T: Array, x_station: Array, frame: BodyFrame
+) -> GeometricStiffness:
+    """Return the geometric stiffness of the modes T; section forces have jumps at the stations."""
+    x, weight = gauss_points(line, functions, counts, breaks=x_station, more=CUBIC + 1)
+    fields = beam_fields(functions, counts, line, x)
+    motion = (fields.motion - rigid_fields(x, np.zeros(3)) @ C) @ T
+    return beam_geometric_stiffness(line, (x, weight), motion, fields.strain @ T, x_station, frame)
+
+
+def station_places(where: str, line: BeamLine, places: Mapping[str, float]) -> Array:
+    """Return the checked positions of the stations, (n_stations,)."""
+    x = np.array([float(value) for value in places.values()])
+    outside = [name for name, value in places.items() if not 0 <= float(value) <= line.length]
+    if outside:
+        raise BodyError(
+            f"{where}: station {outside[0]!r}: expected a place within 0 .. {line.length:g}, got {places[outside[0]]:g}"
+        )
+    if not len(x):
+        raise BodyError(f"{where}: expected at least one station, where joints and forces act; got none")
+    return x
+
+
+def gauss_points(
+    line: BeamLine, functions: str, counts: Mapping[str, int], *, breaks: Array | None = None, more: int = 0
+) -> tuple[Array, Array]:
+    """Return points and weights that integrate products of two functions and a polynomial of degree `more` exactly."""
+    inner = np.zeros(0) if breaks is None else breaks
+    if functions != "splines":
+        return line.points(2 * max(counts[name] + (name == "bending") for name in counts) + more, breaks=inner)
+    sets = [count + first for count, first in zip(counts.values(), (1, 2, 1, 0), strict=True) if count]
+    knots = [np.linspace(0.0, line.length, n - CUBIC + 1) for n in sets if n > CUBIC]
+    return line.points(2 * CUBIC + more, breaks=np.concatenate([*knots, inner]))
+
+
+def frame_of_beam(
+    where: str, line: BeamLine, frame: Frame, x_station: Array, names: list[str], integral: tuple[Array, Array, Array]
+) -> BodyFrame:
+    """Return the body frame; its origin is the centre of mass, or the station of a nodal frame."""
+    x, weight, rigid = integral
+    mass = weight * line.at("rho_A", x)
+    center = np.array([mass @ x / mass.sum(), 0.0, 0.0])
+    if isinstance(frame, BuckensFrame):
+        raise BodyError(f"{where}: a beam without a mesh has no Buckens frame; take a Tisserand or a nodal frame")
+    if isinstance(frame, TisserandFrame):
+        rows = inertia_rows(line, x, weight, rigid)
+        size = np.linalg.norm(rows, axis=0)
+        if (size[3:] <= 1e-12 * size[0] * line.length).any():
+            raise BodyError(
+                f"{where}: no moment of inertia about x; a Tisserand frame needs one: give rho_Iy, rho_Iz or take a "
+                "nodal frame"
+            )
+        return placed("tisserand", frame, center)
+    if frame.at is not None and frame.at not in names:
+        raise BodyError(f"{where}: nodal frame: no station {quoted(frame.at)}{nearest(frame.at, names)}")
+    held = held_dofs(where, frame, x_station, names)
+    default = center if frame.at is None else np.array([x_station[names.index(frame.at)], 0.0, 0.0])
+    return placed("nodal", frame, default, held)
+
+
+def held_dofs(where: str, frame: NodalFrame, x_station: Array, names: list[str]) -> IntArray:
+    """Return the six (station, component) that a nodal frame holds, (6, 2)."""
+    points = np.column_stack([x_station, np.zeros((len(x_station), 2))])
+    if frame.dofs is not None:
+        held = checked_dofs(frame, f"{where}: nodal frame", Numbering())
+        if held[:, 0].min() < 0 or held[:, 0].max() >= len(names):
+            raise BodyError(f"{where}: nodal frame: dofs: expected stations 0..{len(names) - 1}, got {frame.dofs}")
+        determinate_rows(points[held[:, 0]], held[:, 1], f"{where}: nodal frame")
+        return held
+    stations = range(len(names)) if frame.at is None else [names.index(frame.at)]
+    every = np.array([(k, component) for k in stations for component in range(6)], dtype=np.int64)
+    return every[determinate_rows(points[every[:, 0]], every[:, 1], f"{where}: nodal frame")]
+
+
+def rigid_part(frame: BodyFrame, rigid_rows: Array, rows: Array, at_stations: tuple[Array, Array]) -> Array:
+    """Return C, (6, n_columns): the rigid motion about x = 0 that the frame removes from the columns."""
+    if frame.kind == "tisserand":
+        return np.asarray(np.linalg.lstsq(rigid_rows, rows, rcond=None)[0])
+    x_station, motion = at_stations
+    station, component = frame.dofs.T
+    return np.asarray(
+        np.linalg.solve(rigid_fields(x_station, np.zeros(3))[station, component], motion[station, component])
+    )
+
+
+def elastic_modes(fields: BeamFields, A_K: Array, A_M: Array) -> tuple[Array, Array, tuple[str, ...]]:
+    """Steps (2), (3): return the modes over the columns, (n_columns, n_q), their omega², and redundant labels."""
+    mass, stiffness = (np.einsum("nk,nk->k", A, A) for A in (A_M, A_K))
+    omega2_1 = float((stiffness / mass).min())
+    A_W = np.vstack([A_K / np.sqrt(omega2_1), A_M])
+    size = np.linalg.norm(A_W, axis=0)
+    _, R, pivots = la.qr(A_W / size, mode="economic", pivoting=True)
+    rank = int((np.abs(np.diag(R)) > RANK_TOLERANCE).sum())
+    kept = pivots[:rank]
+    basis = np.zeros((len(size), rank))
+    basis[kept] = la.solve_triangular(R[:rank, :rank], np.eye(rank)) / size[kept, None]
+    B_K, B_M = A_K @ basis, A_M @ basis
+    _, Z = la.eigh(B_K.T @ B_K, B_M.T @ B_M)
+    T = basis @ Z
+    omega2 = np.einsum("nk,nk->k", A_K @ T, A_K @ T)
+    order = np.argsort(omega2)
+    return T[:, order], omega2[order], tuple(fields.labels[k] for k in pivots[rank:])
+
+
+def free_frequencies(line: BeamLine, integral: tuple[Array, Array, Array], fields: BeamFields, A_K: Array) -> Array:
+    """Return the frequencies of the unsupported beam, ascending [Hz]; empty if it has no inertia about x."""
+    x, weight, rigid = integral
+    rows = inertia_rows(line, x, weight, rigid)
+    if not np.linalg.norm(rows[:, 3]) > 0:
+        return np.zeros(0)
+    A_M = inertia_rows(line, x, weight, fields.motion)
+    rest = A_M - rows @ np.linalg.lstsq(rows, A_M, rcond=None)[0]
+    _, omega2, _ = elastic_modes(fields, A_K, rest)
+    return np.asarray(np.sqrt(omega2) / (2 * np.pi))
+
+
+def provenance(line: BeamLine, functions: str, counts: Mapping[str, int], dropped: tuple[str, ...]) -> dict[str, str]:
+    """Return a record of how the body was made."""
+    laws = {name: getattr(line, name) for name in ("rho_A", "EA", "EIy", "EIz", "GJ", "rho_Iy", "rho_Iz", "GAy", "GAz")}
+    return {
+        "mode set": "assumed-modes of a beam without a mesh",
+        "mode set functions": functions,
+        **{f"mode set n_{motion}": str(count) for motion, count in counts.items()},
+        "mode set redundant": "; ".join(dropped) or "none",
+        "length": repr(line.length),
+        **{key: "function" if callable(law) else repr(float(law)) for key, law in laws.items()},
+        "version python": platform.python_version(),
+        "version numpy": metadata.version("numpy"),
+    }

@@ -1,0 +1,239 @@
+"""The finishing step of every mode set: rank, body frame, M-orthonormal shapes (docs/theory.md §3)."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.linalg as la
+
+from cms.body.source_columns import SourceColumns, source_columns
+from cms.errors import BodyError, ModeSetError
+from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
+from cms.linear_algebra.independent import (
+    Basis,
+    Products,
+    gram_in_blocks,
+    independent_basis,
+    orthonormal_basis,
+    within,
+)
+from cms.linear_algebra.solvers.orientation import orientation
+from cms.linear_algebra.solvers.tall import combine, combined, inner, subtract
+from cms.modes.families.mechanism import mechanism_words, rounding_of_energy, without_energy
+from cms.modes.mode_set import ModeSet
+from cms.reduction.basis.frames import FrameCondition
+from cms.reduction.basis.rigid_content import elastic_directions, orthonormal_motions
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.ranks.spread_columns import SpreadColumns, on_rows
+from fe_models.foundation.tall.on_disk import copied, in_memory, row_slices
+
+__all__ = ["FinishedBasis", "finish"]
+
+#: energy of a shape from a Gram matrix relative to its rounding, below which the energy is computed from the shape
+SUSPECT_ENERGY = 1e3
+#: rounding error in PhiᵀMPhi, below which shapes are formed directly from the columns of the set
+TRUSTED_ROUNDING = 1e-11
+ORTHONORMAL_DEFECT = 1e-9  #: largest accepted entry of Phi.T M Phi - 1
+
+
+@dataclass(frozen=True, eq=False)
+class FinishedBasis:
+    """M-orthonormal, K-diagonal elastic shapes in the chosen frame, and their origin."""
+
+    Phi: Array  #: (n_dof, n_q); `SpreadColumns` if the columns of the mode set are distributed
+    M: Array  #: Phi.T M Phi, (n_q, n_q): identity, zero rows for massless static shapes
+    K: Array  #: Phi.T K Phi, (n_q, n_q), diagonal
+    columns: SourceColumns  #: the columns of the mode set, and their shares in the energy of each shape
+    dropped: tuple[str, ...]  #: labels of redundant columns
+    n_rigid: int  #: number of independent rigid-body motions in the span of the columns
+    free_omega2: Array  #: squared elastic frequencies of the unsupported reduced body, ascending
+
+
+def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedBasis:
+    """Orthonormalise a mode set in a body frame.
+
+    (1) make W-orthonormal columns Q of the set, W = K + omega_1² M; drop and name redundant columns
+    (2) Q' = Q - Psi_R C removes the rigid part according to the frame; Qᵀ K Q does not change
+    (3) remove the rigid-body motions that lie in the span of Q (`elastic_directions`)
+    (4) solve K z = omega² M z in the remaining space; Phi = Q' z
+
+    Raises
+    ------
+    ModeSetError
+        If no elastic shape is left, or the columns are too ill-conditioned.
+    BodyError
+        If a shape other than a rigid-body motion has no strain energy, so that the body is a mechanism.
+    """
+    where = f"mode set {modes.name!r} of body {body.name!r}"
+    V, products = modes.columns, Products.of_body(body)
+    V_K, V_M = products.grams(V)
+    omega2_1 = first_elastic(where, body, V, V_K, V_M, condition)
+    Q, redundant = independent_basis(V, V_K, V_M, products, body, omega2_1)  # (1)
+    try:
+        found = elastic_pencil(where, body, Q, products, condition, omega2_1)
+    except ModeSetError:
+        if Q.is_formed:
+            raise
+        found = None
+    if found is None or (not Q.is_formed and found.rounding > TRUSTED_ROUNDING):
+        Q = orthonormal_basis(Q.combine(np.eye(Q.Z.shape[1])), Q.T, products, omega2_1)
+        found = elastic_pencil(where, body, Q, products, condition, omega2_1)
+    X, Z, is_massive, omega2 = found.X, found.Z, found.is_massive, diagonal_within(Q.G_K, found.Z)
+    defect, Phi = found.defect, combined(X, Q.Z @ Z)
+    if defect > ORTHONORMAL_DEFECT:
+        again, defect = normalised_again(Phi, is_massive, products)
+        Z, Phi = Z @ again, combined(Phi, again)
+        omega2 = diagonal_within(gram_in_blocks(Phi, products.K), np.eye(len(again)))
+    is_suspect = is_massive & (omega2 < SUSPECT_ENERGY * rounding_of_energy(body, Phi))
+    suspect = in_memory(Phi[:, is_suspect])
+    free = suspect[:, without_energy(body, suspect)]
+    if free.shape[1]:
+        raise BodyError(mechanism_words(body, free))
+    if defect > ORTHONORMAL_DEFECT:
+        raise ModeSetError(
+            f"{where}: shapes are M-orthonormal to {defect:.1e} only, expected {ORTHONORMAL_DEFECT:.0e}; "
+            "its columns are too ill-conditioned"
+        )
+    turn = orientation(Phi, omega2)
+    turn_in_place(Phi, turn)
+    A = Q.T @ (Z @ turn)
+    return FinishedBasis(
+        Phi=Phi,
+        M=np.diag(is_massive.astype(float)),
+        K=np.diag(omega2),
+        columns=source_columns(modes.labels, modes.groups, A, V_K @ A),
+        dropped=tuple(modes.labels[k] for k in redundant),
+        n_rigid=found.elastic.shape[0] - found.elastic.shape[1],
+        free_omega2=found.free_omega2,
+    )
+
+
+def normalised_again(Phi: Array, is_massive: np.ndarray, products: Products) -> tuple[Array, float]:
+    """Return the small matrix that makes the formed shapes M-orthonormal, and the remaining defect.
+
+    The modal mass of a shape of light nodes is a small difference in the Gram matrix of the columns, but a sum of small
+    terms in that of the formed shapes. Shapes are processed in the order of their frequency (Gram-Schmidt). Each is
+    therefore corrected only by slower shapes, whose stiffness is small compared to its own.
+    """
+    T = np.eye(len(is_massive))
+    for _ in range(2):
+        G_M = gram_in_blocks(combine(Phi, T), products.M)
+        size = np.sqrt(np.where(is_massive, np.diag(G_M), 1.0))
+        own = np.ix_(is_massive, is_massive)
+        U = la.cholesky((G_M / np.outer(size, size))[own])
+        step = np.diag(1 / size)
+        step[own] = step[own] @ la.solve_triangular(U, np.eye(len(U)))
+        T = T @ step
+    G_M = gram_in_blocks(combine(Phi, T), products.M)
+    own = np.ix_(is_massive, is_massive)
+    return T, float(np.abs(G_M[own] - np.eye(int(is_massive.sum()))).max(initial=0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class ElasticPencil:
+    """Shapes of a basis in the frame, as small matrices: steps (2) to (4) of `finish`."""
+
+    #: columns of the basis Q without their rigid part, (n_dof, l); the shapes are X Q.Z Z
+    X: Array
+    Z: Array  #: shapes as combinations of the basis, (k, n_q)
+    elastic: Array  #: directions of the basis without rigid-body motions, (k, n_q)
+    is_massive: np.ndarray  #: (n_q,) bool
+    free_omega2: Array  #: squared elastic frequencies of the unsupported reduced body, ascending
+    defect: float  #: largest entry of Zᵀ G_M Z - 1
+    rounding: float  #: estimated rounding error of PhiᵀMPhi - 1 due to rounding of G_M
+
+
+def elastic_pencil(
+    where: str, body: FEBody, Q: Basis, products: Products, condition: FrameCondition, omega2_1: float
+) -> ElasticPencil:
+    """Return the shapes of a W-orthonormal basis.
+
+    Raises
+    ------
+    ModeSetError
+        If no elastic shape is left, or the columns are too ill-conditioned.
+    """
+    elastic = elastic_part(body, Q, condition, omega2_1)  # (3)
+    if elastic.shape[1] == 0:
+        raise ModeSetError(f"{where}: its columns hold only rigid-body motion; add modes or interfaces")
+    try:
+        free_omega2 = free_elastic(Q, elastic, condition, omega2_1)
+    except np.linalg.LinAlgError as error:
+        raise ModeSetError(f"{where}: its columns are too ill-conditioned: {error}") from error
+    X = Q.X if Q.is_formed else copied(Q.X)  # (2)
+    subtract(X, condition.Psi_R, condition.rigid_part(Q.X))
+    X_M = gram_in_blocks(X, products.M)
+    G_M = within(X_M, Q.Z)
+    try:
+        Y, is_massive = elastic_eigenvectors(within(Q.G_K, elastic), within(G_M, elastic), omega2_1)  # (4)
+    except np.linalg.LinAlgError as error:
+        raise ModeSetError(f"{where}: its columns are too ill-conditioned in this frame: {error}") from error
+    Z = elastic @ Y
+    defect = np.abs(Z.T @ G_M @ Z - np.diag(is_massive.astype(float))).max()
+    lengths = np.sqrt(np.maximum(np.diag(X_M), 0.0)) @ np.abs(Q.Z @ Z)
+    return ElasticPencil(
+        X, Z, elastic, is_massive, free_omega2, defect, float(np.finfo(float).eps * (lengths**2).max())
+    )
+
+
+def turn_in_place(Phi: Any, turn: Array) -> None:
+    """Replace Phi by Phi turn; modes of which only the sign changes are not mixed with others."""
+    if isinstance(Phi, SpreadColumns):
+        on_rows(Phi.layout, turn_in_place, Phi, turn)
+        return
+    is_mixed = np.count_nonzero(turn, axis=0) > 1
+    mixed = np.flatnonzero(is_mixed | (np.count_nonzero(turn, axis=1) > 1))
+    signs, turn_mixed = np.diag(turn), turn[np.ix_(mixed, mixed)]
+    for rows in row_slices(len(Phi), Phi):
+        turned = Phi[rows, mixed] @ turn_mixed
+        Phi[rows] *= signs
+        Phi[rows, mixed] = turned
+
+
+def first_elastic(where: str, body: FEBody, V: Array, G_K: Array, G_M: Array, condition: FrameCondition) -> float:
+    """Estimate omega_1² of the free body: the smallest Rayleigh quotient of a column without its rigid part [1/s²].
+
+    Each quotient is an upper bound. The smallest is accurate enough to scale a norm. Columns whose energy is rounding,
+    such as those of parts without a connection, are left out.
+    """
+    rigid = inner(condition.M_Psi_R, V)
+    stiffness, mass = np.diag(G_K), np.diag(G_M)
+    elastic_mass = mass - np.einsum("rk,rk->k", rigid, np.linalg.solve(condition.Psi_R.T @ condition.M_Psi_R, rigid))
+    is_elastic = elastic_mass > 1e-9 * mass
+    if not is_elastic.any():
+        raise ModeSetError(f"{where}: its columns hold only rigid-body motion; add modes or interfaces")
+    rounding = rounding_of_energy(body, V)
+    is_certain = is_elastic & (stiffness > SUSPECT_ENERGY * rounding)
+    if not is_certain.any():
+        is_certain, stiffness = is_elastic, np.maximum(stiffness, rounding)
+    return float((stiffness[is_certain] / elastic_mass[is_certain]).min())
+
+
+def elastic_part(body: FEBody, Q: Basis, condition: FrameCondition, omega2_1: float) -> Array:
+    """Return the directions of W-orthonormal columns without rigid-body motion, (k, k - n_rigid)."""
+    S = orthonormal_motions(condition.Psi_R.T @ condition.M_Psi_R, omega2_1)
+    C = omega2_1 * Q.inner(condition.M_Psi_R @ S)
+    E = condition.Psi_R @ S - in_memory(Q.combine(C))
+    return elastic_directions(C, E.T @ (body.K @ E) + omega2_1 * (E.T @ (body.M @ E)))
+
+
+def diagonal_within(G: Array, Z: Array) -> Array:
+    """Return the diagonal of Zᵀ G Z, (k,)."""
+    return np.asarray(np.einsum("kq,kq->q", Z, G @ Z))
+
+
+def free_elastic(Q: Basis, elastic: Array, condition: FrameCondition, omega2_1: float) -> Array:
+    """Return squared elastic frequencies of the unsupported reduced body, ascending [1/s²], from its mean-axis pencil.
+
+    The mean-axis mass QᵀMQ - Yᵀ (Psi_RᵀMPsi_R)⁻¹ Y with Y = Psi_RᵀMQ follows from Gram matrices alone.
+    """
+    Y = Q.inner(condition.M_Psi_R).T
+    rigid_mass = condition.Psi_R.T @ condition.M_Psi_R
+    scale = np.sqrt(np.diag(rigid_mass))
+    if len(scale) and (not scale.all() or np.linalg.cond(rigid_mass / np.outer(scale, scale)) > 1e12):
+        return np.zeros(0)  # without inertia about some axis, a body has no mean axes
+    G_M = Q.G_M - Y.T @ np.linalg.solve(rigid_mass, Y)
+    A_K = within(Q.G_K, elastic)
+    Z, is_massive = elastic_eigenvectors(A_K, within(G_M, elastic), omega2_1)
+    return np.sort(diagonal_within(A_K, Z)[is_massive])

@@ -1,0 +1,90 @@
+"""Canonical moments of a body made of bare matrices, from acceleration fields (docs/theory.md §5).
+
+A linear field u = E c has the nodal values (E c, rotation ½ curl). With nodal inertia, these rotations make the
+products below exact if the inertia is isotropic. Otherwise the result is labelled approximate.
+"""
+
+import numpy as np
+
+from cms.modes.families.rigid_modes import geometric_rigid_modes
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.tall.on_disk import in_memory
+
+__all__ = ["gram_from_matrices"]
+
+
+def gram_from_matrices(body: FEBody, Phi: Array) -> Array:
+    """Return the Gram matrix ∫ a aᵀ dm of a = [1, c, phi_x, phi_y, phi_z] from M and the node positions.
+
+    (1) m, S, R from the rigid-body mass matrix: exact
+    (2) 1C = Psi_tᵀ M Phi: exact
+    (3) P_ab,k = (field c_a e_b)ᵀ M phi_k, whose antisymmetric part 2C is exact
+    (4) S_ab,kl = phi_kᵀ M (e_a (e_b·phi_l))
+
+    Returns
+    -------
+    Array
+        (4 + 3 n_q, 4 + 3 n_q) in mesh axes about the mesh origin.
+    """
+    Phi = in_memory(Phi)
+    n = Phi.shape[1]
+    node, component = body.dofs.T
+    gram = np.zeros((4 + 3 * n, 4 + 3 * n))
+    Psi_R = geometric_rigid_modes(body)
+    rigid_mass = Psi_R.T @ (body.M @ Psi_R)
+    J = rigid_mass[3:, 3:]
+    gram[0, 0] = np.trace(rigid_mass[:3, :3]) / 3
+    # (1) ∫ e_b · (e_a × c) = (e_b × e_a) · S
+    S = (
+        np.array(
+            [
+                rigid_mass[1, 5] - rigid_mass[2, 4],
+                rigid_mass[2, 3] - rigid_mass[0, 5],
+                rigid_mass[0, 4] - rigid_mass[1, 3],
+            ]
+        )
+        / 2
+    )
+    gram[0, 1:4] = gram[1:4, 0] = S
+    gram[1:4, 1:4] = np.trace(J) / 2 * np.eye(3) - J
+    M_Phi = body.M @ Phi
+    blocks = [slice(4 + a * n, 4 + (a + 1) * n) for a in range(3)]
+    for b in range(3):  # (2)
+        gram[0, blocks[b]] = Psi_R[:, b] @ M_Phi
+        gram[blocks[b], 0] = gram[0, blocks[b]]
+        for a in range(3):  # (3)
+            field = np.where(component == b, body.nodes[node, a], 0.0)
+            half_curl = np.cross(np.eye(3)[a], np.eye(3)[b]) / 2
+            is_rotation = component >= 3
+            field[is_rotation] = half_curl[component[is_rotation] - 3]
+            gram[1 + a, blocks[b]] = field @ M_Phi
+            gram[blocks[b], 1 + a] = gram[1 + a, blocks[b]]
+    u = _nodal(body, Phi)
+    for a in range(3):  # (4)
+        for b in range(3):
+            field = np.zeros_like(u)
+            field[:, a] = u[:, b]
+            if a == b:
+                field[:, 3:] += u[:, 3:] / 2
+            field[:, 3 + b] -= u[:, 3 + a] / 2
+            gram[blocks[a], blocks[b]] = M_Phi.T @ _columns(body, field)
+    # ∫ phi_a,k phi_b,l is the transpose of ∫ phi_b,l phi_a,k; both routes differ if M is not M_s ⊗ 1
+    return (gram + gram.T) / 2
+
+
+def _nodal(body: FEBody, columns: Array) -> Array:
+    """Return columns as a table (n_nodes, 6, k)."""
+    table = np.zeros((len(body.nodes), 6, columns.shape[1]))
+    node, component = body.dofs.T
+    has_place = component >= 0
+    table[node[has_place], component[has_place]] = columns[has_place]
+    return table
+
+
+def _columns(body: FEBody, table: Array) -> Array:
+    """Return a table (n_nodes, 6, k) as columns over the dofs."""
+    node, component = body.dofs.T
+    columns = table[node, component]
+    columns[component < 0] = 0.0
+    return columns

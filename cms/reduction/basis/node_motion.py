@@ -1,0 +1,117 @@
+"""Motion of nodes and interfaces, whether their dofs are in the body or only in its mesh."""
+
+import numpy as np
+import scipy.sparse as sp
+
+from cms.errors import BodyError
+from fe_models.body.couplings.couplings import mean_motion
+from fe_models.body.fe_body import FEBody, Interface
+from fe_models.body.rigid_motion import rigid_motion_of_points
+from fe_models.foundation.arrays import Array, IntArray
+
+__all__ = ["are_spread", "interface_node_motion", "is_mean", "node_motion", "reference_motion", "translation_rows"]
+
+
+def node_motion(body: FEBody, node: int) -> sp.csr_array | None:
+    """Return translation and rotation of a node as rows over u, (6, n_dof); None if it lacks some of the six."""
+    rows = np.flatnonzero((body.dofs[:, 0] == node) & (body.dofs[:, 1] >= 0))
+    if len(rows) == 6:
+        return sp.csr_array((np.ones(6), (body.dofs[rows, 1], rows)), shape=(6, body.n_dof))
+    if body.recovery is None:
+        return None
+    dofs = body.recovery.dofs
+    rows = np.flatnonzero((dofs[:, 0] == node) & (dofs[:, 1] >= 0))
+    return sp.csr_array(body.recovery.matrix[rows[np.argsort(dofs[rows, 1])]]) if len(rows) == 6 else None
+
+
+def interface_node_motion(body: FEBody, interface: Interface) -> sp.csr_array | None:
+    """Return the motion of the reference point that a member with six components moves rigidly, (6, n_dof).
+
+    This is for a rigid interface or one with a single node; None if there is no such node.
+    """
+    if interface.kind == "distributing" or (interface.kind == "nodes" and len(interface.nodes) > 1):
+        return None
+    motion = node_motion(body, int(interface.nodes[0]))
+    if motion is None:
+        return None
+    transport = np.eye(6)
+    transport[:3] = rigid_motion_of_points(interface.reference[None], body.nodes[interface.nodes[0]])[0]
+    return sp.csr_array(sp.csr_array(transport) @ motion)
+
+
+def reference_motion(body: FEBody, interface: Interface) -> tuple[sp.csr_array, Array, bool]:
+    """Return the motion of the reference point of an interface as rows over the dofs of the body.
+
+    It is the motion of the reference node, or of a member with six components that moves it rigidly, or else the
+    weighted mean motion of the members. If the members are collinear, it is their mean translation.
+
+    Returns
+    -------
+    motion
+        Translation and rotation of the point, mesh axes, (6, n_dof).
+    point
+        Position of the point, (3,) [m].
+    has_rotation
+        Whether the motion includes a rotation; otherwise rows 3-5 are zero.
+    """
+    dofs = interface.dofs
+    if dofs is None:
+        raise BodyError(f"body {body.name!r}: interface {interface.name!r} is not coupled; call cms.couple(body)")
+    if has_reference_node(body, interface):
+        motion = sp.csr_array((np.ones(6), (np.arange(6), dofs)), shape=(6, body.n_dof))
+        return motion, body.nodes[body.dofs[dofs[0], 0]], True
+    carried = interface_node_motion(body, interface)
+    if carried is not None:
+        return carried, interface.reference, True
+    points, weights = body.nodes[interface.nodes], np.asarray(interface.weights)
+    has_rotation = are_spread(points)
+    mean = mean_motion(points, weights, interface.reference) if has_rotation else mean_translation(weights)
+    return sp.csr_array(sp.csr_array(mean) @ translation_rows(body, interface.nodes)), interface.reference, has_rotation
+
+
+def is_mean(body: FEBody, interface: Interface) -> bool:
+    """Return whether the reference point is not a node of the body and follows several members."""
+    return not has_reference_node(body, interface) and interface_node_motion(body, interface) is None
+
+
+def has_reference_node(body: FEBody, interface: Interface) -> bool:
+    """Return whether the six boundary dofs of the interface belong to one node."""
+    dofs = np.asarray(interface.dofs)
+    return len(dofs) == 6 and len(np.unique(body.dofs[dofs, 0])) == 1
+
+
+def translation_rows(body: FEBody, nodes: IntArray) -> sp.csr_array:
+    """Return the translations of nodes, node-major, as rows over the dofs, (3 n, n_dof); zero without dofs."""
+    n = len(nodes)
+    place = np.full(len(body.nodes), -1, np.int64)
+    place[nodes] = np.arange(n)
+    rows = sp.csr_array((3 * n, body.n_dof))
+    sources = [(body.dofs, None)] if body.recovery is None else [(body.recovery.dofs, body.recovery.matrix)]
+    if body.recovery is not None:
+        of_mesh = np.isin(body.dofs[:, 0], body.recovery.dofs[:, 0])
+        # reference nodes, which the mesh does not have
+        sources.append((np.where(of_mesh[:, None], -1, body.dofs), None))
+    for dofs, matrix in sources:
+        chosen = np.flatnonzero((dofs[:, 1] >= 0) & (dofs[:, 1] < 3) & (place[dofs[:, 0]] >= 0))
+        target = 3 * place[dofs[chosen, 0]] + dofs[chosen, 1]
+        placement = sp.csr_array((np.ones(len(chosen)), (target, np.arange(len(chosen)))), shape=(3 * n, len(chosen)))
+        if matrix is None:
+            own = sp.csr_array(
+                (np.ones(len(chosen)), (np.arange(len(chosen)), chosen)), shape=(len(chosen), body.n_dof)
+            )
+        else:
+            own = matrix[chosen]
+        rows = sp.csr_array(rows + placement @ own)
+    return rows
+
+
+def are_spread(points: Array) -> bool:
+    """Return whether the points are not collinear, so that their mean motion has a rotation."""
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(len(points) >= 3 and spread[1] > 1e-6 * spread[0])
+
+
+def mean_translation(weights: Array) -> Array:
+    """Return the matrix of the weighted mean translation of points, without rotation, (6, 3 n_points), node-major."""
+    translation = np.kron(weights, np.eye(3))
+    return np.vstack([translation, np.zeros_like(translation)])

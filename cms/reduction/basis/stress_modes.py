@@ -1,0 +1,68 @@
+"""Stress modes: stress of each mode at kept nodes and at named points, in the axes of the body frame."""
+
+import numpy as np
+
+from cms.body.stress import PointStress
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.ranks.spread_columns import SpreadColumns
+from fe_models.foundation.tall.on_disk import in_memory, is_on_disk, release, zeros_like
+
+__all__ = ["nodal_stress_modes", "point_stress_modes", "turned_stress"]
+
+FEWEST = 16  #: smallest number of columns processed at a time, for any body
+FEWEST_OF_RANKS = 4  #: the same for distributed columns, which belong to large bodies
+BYTES_AT_ONCE = 512e6  #: memory for the stress at all nodes, before the kept nodes are selected
+BYTES_FROM_DISK = (
+    64e6  #: the same if columns lie on disk or are distributed; with the columns themselves it takes five times as much
+)
+
+
+def nodal_stress_modes(body: FEBody, Phi: Array, nodes: IntArray, axes: Array) -> Array | None:
+    """Return the stress of the shapes at some nodes in the axes of B, (n, 6, n_q) [Pa per unit]; None if unknown.
+
+    Parameters
+    ----------
+    body
+        Body, coupled or not.
+    Phi
+        Shapes over its dofs, (n_dof, n_q).
+    nodes
+        Indices into `FEBody.nodes`, (n,). Reference nodes are not in the mesh; their stress is zero.
+    axes
+        Axes of B as columns, in mesh axes, (3, 3).
+    """
+    model = body.element_model
+    if model is None or not model.has_nodal_stress:
+        return None
+    modes = zeros_like(Phi, (len(nodes), 6, Phi.shape[1]))
+    is_elsewhere = is_on_disk(Phi) or isinstance(Phi, SpreadColumns)
+    room = BYTES_FROM_DISK if is_elsewhere else BYTES_AT_ONCE
+    fewest = FEWEST_OF_RANKS if isinstance(Phi, SpreadColumns) else FEWEST
+    # wide blocks, because the geometry is computed once per block
+    width = max(fewest, int(room / (48 * len(body.nodes))))
+    for begin in range(0, Phi.shape[1], width):
+        columns = slice(begin, begin + width)
+        everywhere = model.nodal_stress(body.mesh_displacement(in_memory(Phi[:, columns])), nodes=nodes)
+        on_mesh = nodes < len(everywhere)
+        modes[on_mesh, :, columns] = turned_stress(everywhere[nodes[on_mesh]], axes)
+        release(modes)
+    return modes
+
+
+def point_stress_modes(body: FEBody, Phi: Array, origin: Array, axes: Array) -> PointStress | None:
+    """Return the stress of the shapes at the stress points of the body; None if it has none."""
+    points = body.stress_points
+    if points is None:
+        return None
+    modes = points.stress(body.mesh_displacement(in_memory(Phi)))
+    return PointStress(points.names, (np.asarray(points.positions) - origin) @ axes, turned_stress(modes, axes))
+
+
+def turned_stress(stress: Array, axes: Array) -> Array:
+    """Return stress components in other axes: Rᵀ sigma R, (n, 6, k), where R = axes has the new axes as columns."""
+    if np.array_equal(axes, np.eye(3)):
+        return np.asarray(stress)
+    tensor = np.asarray(stress)[:, [[0, 5, 4], [5, 1, 3], [4, 3, 2]]]
+    turned = np.einsum("ia,nijk,jb->nabk", axes, tensor, axes, optimize=True)
+    return np.stack([turned[:, a, b] for a, b in ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))], axis=1)

@@ -1,0 +1,133 @@
+"""Geometric stiffness of a reduced body from its elements: one static solution and matrix per unit load (theory.md §7).
+
+(1) balance the unit loads f_j with the support of the frame: P f_j (`cms.reduction.geometric_stiffness.unit_loads`)
+(2) compute static states u_j = G_R P f_j with the factorisation of the mode set; only their stress counts
+(3) compute Phiᵀ K_geo(sigma_j) Phi of the elements, also for rotations of the body, as needed for other frames
+(4) add rigid links: forces on followers, internal minus applied, do work on their second-order motion
+(5) add interfaces that follow the mean of their members: the applied loads do work on the second-order mean motion
+"""
+
+import numpy as np
+
+from cms.body.geometric_stiffness import GeometricStiffness, stiffness_of_loads
+from cms.linear_algebra.solvers.tall import rows_times
+from cms.modes.families.families import Families
+from cms.modes.families.rigid_modes import geometric_rigid_modes
+from cms.modes.families.sharing import body_of
+from cms.reduction.basis.frames import FrameCondition
+from cms.reduction.basis.node_motion import is_mean, reference_motion, translation_rows
+from cms.reduction.geometric_stiffness.link_work import followers, link_work
+from cms.reduction.geometric_stiffness.mean_work import mean_second_order
+from cms.reduction.geometric_stiffness.spread_loads import turned_rigid_work
+from cms.reduction.geometric_stiffness.unit_states import UnitStates, states_of
+from fe_models.body.fe_body import FEBody, Interface
+from fe_models.body.mass_loads import MassLoads
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.tall.on_disk import beside
+
+__all__ = ["elastic_part", "reduced_geometric_stiffness", "stiffness_of_states"]
+
+LOADS_AT_ONCE = 60  #: number of loads whose mesh displacements are held at a time
+
+
+def reduced_geometric_stiffness(body: FEBody | Families, Phi: Array, condition: FrameCondition) -> GeometricStiffness:
+    """Return the geometric stiffness of shapes for all unit loads of a body frame.
+
+    Parameters
+    ----------
+    body
+        A coupled body with an element model, or its `Families`.
+    Phi
+        Shapes over its dofs that satisfy the condition of the frame, (n_dof, n_q).
+    condition
+        The frame condition, which is also the support of all loads.
+
+    Raises
+    ------
+    BodyError
+        If the body has no element model with geometric stiffness.
+    """
+    return stiffness_of_states(body_of(body), Phi, states_of(body, condition))
+
+
+def stiffness_of_states(body: FEBody, Phi: Array, states: UnitStates) -> GeometricStiffness:
+    """Steps (3) to (5) for the static states of the unit loads; the factorisation is no longer needed.
+
+    The matrices are computed over shapes and rotations about the axes of B; the mixed part becomes `TurnedLoads`.
+    """
+    frame = states.condition.frame
+    rotations = geometric_rigid_modes(body, origin=frame.origin)[:, 3:] @ frame.axes
+    columns = beside(rotations, Phi)
+    K = np.zeros((states.mass.k, columns.shape[1], columns.shape[1]))
+    for first in range(0, len(states.loaded), LOADS_AT_ONCE):
+        some = slice(first, first + LOADS_AT_ONCE)
+        loads = states.loaded[some]
+        mass = MassLoads(states.mass.A[loads], states.mass.b[loads])
+        K[loads] = elastic_part(body, states.u[:, some], mass, columns)
+    is_loaded = states.is_loaded or (True,) * len(body.interfaces)
+    K -= mean_part(body, states.on_dofs, columns, frame.axes, is_loaded)
+    turned = (K[:, :3, 3:] + K[:, 3:, :3].transpose(0, 2, 1)) / 2
+    rigid = None if states.spread is None else turned_rigid_work(body, states.spread, frame)
+    return stiffness_of_loads(K[:, 3:, 3:], turned, rigid, is_loaded=is_loaded)
+
+
+def elastic_part(body: FEBody, u: Array, mass: MassLoads, Phi: Array) -> Array:
+    """Return the result of steps (3) and (4) for static states u, (n_dof, k), under loads per unit mass, (k, n, n)."""
+    model = body.element_model
+    assert model is not None
+    u_mesh = body.mesh_displacement(u)
+    K = model.geometric_stiffness(u_mesh, mass, body.mesh_displacement(Phi))
+    if body.recovery is None:
+        return K
+    T, dofs = body.recovery.matrix, body.recovery.dofs
+    nodes = followers(T, dofs, body.dofs)
+    if not len(nodes):
+        return K
+    forces = model.internal_forces(u_mesh, nodes=nodes)
+    on_followers = forces - model.mass_forces(mass)
+    on_followers[~np.isin(dofs[:, 0], nodes)] = 0.0
+    return K + link_work(T, dofs, body.dofs, on_followers, Phi)
+
+
+def mean_part(body: FEBody, on_dofs: Array, Phi: Array, axes: Array, is_loaded: tuple[bool, ...]) -> Array:
+    """Step (5): return the work of the loads on the second-order motion of the interfaces, (k, n, n).
+
+    A distributing interface transmits the load on its reference node to its members. The other interfaces that are not
+    nodes of the body follow several members, or a lever. This only matters for their own unit loads, with indices 12 +
+    6 i + c, where i counts the loaded interfaces.
+    """
+    work = distributing_part(body, on_dofs, Phi)
+    turn = np.kron(np.eye(2), axes)
+    loaded = [interface for interface, is_own in zip(body.interfaces, is_loaded, strict=True) if is_own]
+    for number, interface in enumerate(loaded):
+        own = slice(12 + 6 * number, 18 + 6 * number)
+        motion, _, turns = reference_motion(body, interface)
+        if interface.kind == "distributing":
+            continue
+        if is_mean(body, interface):
+            gamma = members_second_order(body, interface, Phi, turns)
+            work[own] += np.einsum("cj,ckl->jkl", turn, gamma, optimize=True)
+        else:
+            six = np.stack([np.zeros(6, np.int64), np.arange(6)], axis=1)
+            work[own] += link_work(motion, six, body.dofs, np.asarray(turn, np.float64), Phi)
+    return work
+
+
+def distributing_part(body: FEBody, on_dofs: Array, Phi: Array) -> Array:
+    """Return the work of loads on reference nodes that follow the mean of their members, (k, n, n)."""
+    n = Phi.shape[1]
+    work = np.zeros((on_dofs.shape[1], n, n))
+    for interface in body.interfaces:
+        if interface.kind == "distributing":
+            _, _, turns = reference_motion(body, interface)
+            gamma = members_second_order(body, interface, Phi, turns)
+            work += np.einsum("cj,ckl->jkl", on_dofs[np.asarray(interface.dofs)], gamma, optimize=True)
+    return work
+
+
+def members_second_order(body: FEBody, interface: Interface, Phi: Array, turns: bool) -> Array:
+    """Return the second-order mean motion of the members for the shapes, (6, n, n), mesh axes."""
+    rows = translation_rows(body, interface.nodes)
+    v = rows_times(rows, Phi).reshape(len(interface.nodes), 3, -1)
+    weights = np.asarray(interface.weights)
+    return mean_second_order(body.nodes[interface.nodes], weights, interface.reference, v, turns=turns)

@@ -1,0 +1,98 @@
+"""Unit loads of a body, balanced by the frame, for which the geometric stiffness is computed (theory.md §7).
+
+Loads per unit mass, about the origin and along the axes of the frame B: -e_a for the acceleration of the origin, -e_a ×
+c for the angular acceleration, -½ [e_a × (e_b × c) + e_b × (e_a × c)] for products of angular velocities. Then a unit
+force and a unit moment at every interface, or at chosen interfaces. Optionally, six loads distributed over the nodes
+(`cms.reduction.geometric_stiffness.spread_loads`). All are balanced by the same support, W Psi_R of the frame
+condition.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cms.body.geometric_stiffness import SPIN_PAIRS
+from cms.body.reduced_body import BodyFrame
+from cms.reduction.basis.frames import FrameCondition
+from cms.reduction.basis.node_motion import reference_motion
+from fe_models.body.fe_body import FEBody
+from fe_models.body.mass_loads import MassLoads
+from fe_models.foundation.arrays import Array
+
+__all__ = ["UnitLoads", "balanced", "unit_loads", "unit_mass_loads"]
+
+#: remainder of a load, relative to the load, that counts as zero, because the support carries all of it
+BALANCED = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class UnitLoads:
+    """Loads per unit mass and loads on dofs; load j is the sum of both."""
+
+    mass: MassLoads  #: k loads
+    on_dofs: Array  #: over the dofs of the body, (n_dof, k) [N, N m]
+    F: Array  #: sum of both over the dofs of the body, (n_dof, k)
+    is_zero: np.ndarray  #: whether the remaining load is zero, (k,) bool
+
+
+def unit_loads(
+    body: FEBody, frame: BodyFrame, spread: Array | None = None, is_loaded: tuple[bool, ...] = ()
+) -> UnitLoads:
+    """Return the 12 loads per unit mass, then six for each loaded interface, then the given ones, (n_dof, 6).
+
+    Without `is_loaded`, all interfaces are loaded.
+    """
+    mass = unit_mass_loads(frame)
+    turn = np.kron(np.eye(2), frame.axes)
+    chosen = is_loaded or (True,) * len(body.interfaces)
+    columns = [
+        reference_motion(body, interface)[0].T @ turn
+        for interface, is_chosen in zip(body.interfaces, chosen, strict=True)
+        if is_chosen
+    ]
+    on_dofs = np.hstack([np.zeros((body.n_dof, 12)), *columns, *([] if spread is None else [spread])])
+    none = MassLoads.none(on_dofs.shape[1] - 12)
+    return together(body, MassLoads(np.concatenate([mass.A, none.A]), np.concatenate([mass.b, none.b])), on_dofs)
+
+
+def unit_mass_loads(frame: BodyFrame) -> MassLoads:
+    """Return the 12 loads per unit mass of a frame: 3 translations, 3 rotations, 6 products as in `SPIN_PAIRS`."""
+    e = frame.axes.T  # e[a]: axis a of B
+    A, b = np.zeros((12, 3, 3)), np.zeros((12, 3))
+    b[:3] = -e
+    for a in range(3):
+        A[3 + a] = -np.cross(e[a], np.eye(3)).T
+    for j, (p, q) in enumerate(SPIN_PAIRS):
+        A[6 + j] = float(p == q) * np.eye(3) - (np.outer(e[p], e[q]) + np.outer(e[q], e[p])) / 2
+    b[3:] = -A[3:] @ frame.origin
+    return MassLoads(A, b)
+
+
+def balanced(body: FEBody, loads: UnitLoads, condition: FrameCondition) -> UnitLoads:
+    """Return P f = f - W Psi_R (Psi_Rᵀ W Psi_R)⁻¹ Psi_Rᵀ f: each load with the reaction of the support.
+
+    If the support is the mass itself (Tisserand frame), the reaction is the load of a rigid-body acceleration.
+    """
+    amounts = np.asarray(np.linalg.solve(condition.Psi_R.T @ condition.W, condition.Psi_R.T @ loads.F), np.float64)
+    if condition.frame.kind == "tisserand":
+        after = together(body, loads.mass.plus_rigid(-amounts, condition.center), loads.on_dofs)
+    else:
+        after = together(body, loads.mass, loads.on_dofs - condition.W @ amounts)
+    is_zero = np.abs(after.F).max(axis=0) <= BALANCED * np.abs(loads.F).max(axis=0)
+    # a load per unit mass may load sections even if its nodal forces vanish
+    is_zero &= _size(body, after.mass) <= BALANCED * _size(body, loads.mass)
+    return UnitLoads(after.mass, after.on_dofs, after.F, is_zero)
+
+
+def _size(body: FEBody, mass: MassLoads) -> Array:
+    """Return the largest force per unit mass at the nodes and over a length of the body, (k,)."""
+    at_nodes = np.abs(mass.at(body.nodes)).max(axis=(0, 1))
+    return np.asarray(at_nodes + np.abs(mass.A).max(axis=(1, 2)) * body.length)
+
+
+def together(body: FEBody, mass: MassLoads, on_dofs: Array) -> UnitLoads:
+    """Return both kinds of loads, and their sum over the dofs of the body."""
+    assert body.element_model is not None
+    on_mesh = body.element_model.mass_forces(mass)
+    F = on_dofs + (on_mesh if body.recovery is None else body.recovery.matrix.T @ on_mesh)
+    return UnitLoads(mass, on_dofs, F, np.asarray(~F.any(axis=0)))

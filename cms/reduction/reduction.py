@@ -1,0 +1,347 @@
+"""Reduction of a coupled FEBody by a mode set to a ReducedBody in a body frame."""
+
+import logging
+import platform
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from importlib import metadata
+from typing import Any
+
+import numpy as np
+
+from cms.body.invariants import Moments, moments_from_gram
+from cms.body.nodal_sums import NodalSums
+from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
+from cms.errors import BodyError, ModeSetError
+from cms.linear_algebra.solvers.tall import inner, rows_times
+from cms.modes.families.families import Families
+from cms.modes.families.rigid_modes import geometric_rigid_modes
+from cms.modes.families.sharing import body_of
+from cms.modes.mode_set import ModeSet
+from cms.reduction.basis.damping import Damping, modal_damping
+from cms.reduction.basis.finishing import FinishedBasis, finish
+from cms.reduction.basis.frames import Frame, FrameCondition, HeldFrame, TisserandFrame, frame_condition
+from cms.reduction.basis.kept_rotations import kept_points
+from cms.reduction.basis.matrix_moments import gram_from_matrices
+from cms.reduction.basis.node_motion import reference_motion, translation_rows
+from cms.reduction.basis.node_weights import node_weights, weighted_rigid_modes
+from cms.reduction.basis.stress_modes import nodal_stress_modes, point_stress_modes
+from cms.reduction.geometric_stiffness.geometric_reduction import stiffness_of_states
+from cms.reduction.geometric_stiffness.quadratic_modes import quadratic_modes
+from cms.reduction.geometric_stiffness.room_for_stiffness import (
+    chosen_words,
+    left_out_words,
+    require_room_for_stiffness,
+)
+from cms.reduction.geometric_stiffness.unit_states import (
+    UnitStates,
+    has_geometric_stiffness,
+    require_geometric_stiffness,
+    states_of,
+)
+from cms.reduction.recovery.load_columns import nodes_of_loads
+from cms.reduction.recovery.matrices import recovery_of_model, unique
+from cms.reduction.recovery.request import RecoveryRequest
+from fe_models.body.fe_body import FEBody, Interface
+from fe_models.body.kept_nodes import keep_nodes
+from fe_models.body.load_cases import LoadCase, ReducedLoadCase
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.ranks.spread_columns import SpreadColumns
+from fe_models.foundation.tall.on_disk import in_memory, release, zeros_like
+
+__all__ = ["assembled", "reduce"]
+
+log = logging.getLogger(__name__)
+
+SHAPES_AT_ONCE = 64  #: number of shapes whose displacements of all nodes are held at a time
+
+
+def reduce(
+    source: FEBody | Families,
+    modes: ModeSet,
+    *,
+    frame: Frame | HeldFrame | None = None,
+    damping: Damping | None = None,
+    stress: bool = True,
+    geometric: bool | UnitStates | None = None,
+    quadratic: bool = False,
+    keep: Sequence[Any] = (),
+    recovery: RecoveryRequest | Iterable[RecoveryRequest] = (),
+) -> ReducedBody:
+    """Reduce a body to the span of a mode set.
+
+    Parameters
+    ----------
+    source
+        A coupled body, or the `Families` that made `modes`; the geometric stiffness then reuses their factorisation.
+    modes
+        A mode set of that body.
+    frame
+        Body reference frame. Default: Tisserand (mean axis), or the ground for a held body.
+    damping
+        Damping added to the body's own D, which is projected; default: none.
+    stress
+        Whether to keep the stress of the modes at the kept nodes and the stress points, if the body knows it.
+    geometric
+        Whether to add the geometric stiffness of the unit loads (`cms.GeometricStiffness`). With it, a multibody system
+        stiffens the body by its spin, accelerations and interface loads. Default: True if the elements are known and it
+        needs at most 2 GB (`cms.reduction.geometric_stiffness.room_for_stiffness`); a warning and the provenance say if
+        it is left out. It costs a factorisation, unless `source` brings one, the static solution of 12 + 6 n_interfaces
+        loads, and one pass over the elements. Alternatively, the static states of the unit loads in this frame
+        (`unit_states`), which need no further factorisation.
+    quadratic
+        Whether to add quadratic modes, the second-order displacement of every kept node (`quadratic_modes`), together
+        with the geometric stiffness that supplies their inertia. They are meant for slender bodies and cost three
+        static solutions per kept node.
+    keep
+        Nodes to keep with translations and rotations, in addition to surface and interfaces: numbers of the user's
+        mesh, names of sets, or positions [x, y, z] in mesh axes (`fe_models.keep_nodes`). Nodes of lines and point
+        masses are always kept.
+    recovery
+        Tables of recovery rows to add (`ReducedBody.recovery`): motions, stress, forces in elements and at interfaces,
+        with their static part, which needs the factorisation.
+
+    Raises
+    ------
+    ModeSetError
+        If the set does not belong to the body, or no elastic shape is left.
+    BodyError
+        If the body is a mechanism or the frame cannot be attached; or if the geometric stiffness is requested of a body
+        without an element model, or does not fit into the memory of this machine.
+    RecoveryError
+        If the body does not know a requested recovery row.
+    """
+    body = body_of(source)
+    states = geometric if isinstance(geometric, UnitStates) else None
+    left_out = ""
+    if geometric or quadratic:
+        require_geometric_stiffness(body)
+        require_room_for_stiffness(body, modes.columns.shape[1], None if states is None else states.names)
+    elif geometric is None:
+        geometric = has_geometric_stiffness(body)
+        left_out = left_out_words(body, modes.columns.shape[1]) if geometric else ""
+    if modes.columns.shape[0] != body.n_dof:
+        raise ModeSetError(
+            f"reduce: mode set {modes.name!r} has columns of {modes.columns.shape[0]} dofs, body "
+            f"{body.name!r} has {body.n_dof}; make the set from this body"
+        )
+    if left_out:
+        log.warning("body %r: %s", body.name, left_out)
+        geometric = False
+    frame = frame or (HeldFrame() if body.is_held else TisserandFrame())
+    condition = frame_condition(body, frame)
+    if states is not None:
+        require_states_of(body, condition.frame, states)
+    elif geometric or quadratic:
+        states = states_of(source, condition)
+    finished = finish(body, modes, condition)
+    keeping = keep_nodes(body, keep)
+    if len(loaded := nodes_of_loads(body, unique(recovery))):
+        keeping = replace(keeping, kept=np.concatenate([keeping.kept, loaded]))
+    kept = kept_nodes(keeping)
+    axes, origin = condition.frame.axes, condition.frame.origin
+    moments = reduced_moments(body, finished.Phi, condition.frame)
+    told = left_out if states is None else chosen_words(body, states.names)
+    reduced = assembled(keeping, modes, finished, condition, kept=kept, moments=moments, damping=damping)
+    return replace(
+        reduced,
+        provenance={**reduced.provenance, **({"geometric stiffness": told} if told else {})},
+        recovery=recovery_of_model(source, in_memory(finished.Phi), condition, reduced, recovery) if recovery else {},
+        stress=nodal_stress_modes(body, finished.Phi, kept, axes) if stress else None,
+        point_stress=point_stress_modes(body, finished.Phi, origin, axes) if stress else None,
+        geometric=None if states is None else stiffness_of_states(body, finished.Phi, states),
+        quadratic=quadratic_modes(source, in_memory(finished.Phi), condition, kept) if quadratic else None,
+    )
+
+
+def assembled(
+    body: FEBody,
+    modes: ModeSet,
+    finished: FinishedBasis,
+    condition: FrameCondition,
+    *,
+    kept: IntArray,
+    moments: Moments,
+    damping: Damping | None = None,
+) -> ReducedBody:
+    """Return the reduced body of a finished basis at the kept nodes, without stress and second-order terms.
+
+    Parameters
+    ----------
+    Kept nodes of the body, ascending, (n_kept,); they include the surface and the members of interfaces.
+        Nodes of the body, ascending; among them surface and members of interfaces, (n_kept,).
+    Moments of the shapes in the frame of `condition`.
+        Of the shapes in the frame of `condition`.
+    """
+    axes, origin = condition.frame.axes, condition.frame.origin
+    Phi_kept = kept_translations(body, finished.Phi, kept, axes)
+    index_of = np.full(len(body.nodes), -1, np.int64)
+    index_of[kept] = np.arange(len(kept))
+    return ReducedBody(
+        name=body.name,
+        units=body.units,
+        frame=condition.frame,
+        M=finished.M,
+        K=finished.K,
+        D=reduced_damping(body, finished, damping),
+        labels=finished.columns.mode_labels(),
+        energy_shares=finished.columns.group_shares(),
+        sources=finished.columns.sources,
+        moments=moments,
+        free_frequencies=np.sqrt(np.maximum(finished.free_omega2, 0.0)) / (2 * np.pi),
+        nodes=(body.nodes[kept] - origin) @ axes,
+        node_ids=kept,
+        Phi=Phi_kept,
+        surface=index_of[body.surface],
+        numbering=body.numbering.of_rows(kept, len(body.nodes)).without_indices(kept),
+        kept=kept_points(body, finished.Phi, axes, index_of),
+        interfaces=tuple(
+            reduced_interface(body, interface, finished.Phi, condition.frame, index_of) for interface in body.interfaces
+        ),
+        provenance=reduction_provenance(body, modes, finished, damping),
+        columns=finished.columns,
+        nodal_sums=reduced_nodal_sums(body, finished.Phi, condition.frame),
+        load_cases=tuple(reduced_load_case(body, case, finished.Phi, condition.frame) for case in body.load_cases),
+    )
+
+
+def kept_translations(body: FEBody, Phi: Array, nodes: IntArray, axes: Array) -> Array:
+    """Return the translations of the shapes at some nodes in axes of B, (n, 3, n_q), in blocks of shapes."""
+    if isinstance(Phi, SpreadColumns):  # only the rows of these nodes
+        moved = rows_times(translation_rows(body, nodes), Phi).reshape(len(nodes), 3, -1)
+        return np.einsum("ba,nbk->nak", axes, moved)
+    kept = zeros_like(Phi, (len(nodes), 3, Phi.shape[1]))
+    for first in range(0, Phi.shape[1], SHAPES_AT_ONCE):
+        some = slice(first, first + SHAPES_AT_ONCE)
+        # exact zeros stay exact if the axes are aligned
+        kept[:, :, some] = np.einsum("ba,nbk->nak", axes, body.translations(Phi[:, some])[nodes])
+        release(kept)
+    return kept
+
+
+def require_states_of(body: FEBody, frame: BodyFrame, states: UnitStates) -> None:
+    """Raise `ModeSetError` unless the static states belong to this body in this frame."""
+    other = states.condition.frame
+    is_same = frame.kind == other.kind and np.array_equal(frame.dofs, other.dofs)
+    is_same = is_same and np.array_equal(frame.origin, other.origin) and np.array_equal(frame.axes, other.axes)
+    if states.body is not body or not is_same:
+        raise ModeSetError(
+            f"reduce: the unit states are those of body {states.body.name!r} in a {other.kind} frame, expected "
+            f"{body.name!r} in a {frame.kind} frame with the same origin and axes; make them for this very frame"
+        )
+
+
+def kept_nodes(body: FEBody) -> IntArray:
+    """Return the nodes that a reduced body keeps: surface, interfaces, reference nodes, requested nodes; ascending."""
+    parts = [body.surface.ravel(), body.kept] + [interface.nodes for interface in body.interfaces]
+    parts += [body.dofs[interface.dofs, 0] for interface in body.interfaces if interface.dofs is not None]
+    return np.unique(np.concatenate(parts))
+
+
+def reduced_moments(body: FEBody, Phi: Array, frame: BodyFrame) -> Moments:
+    """Return the canonical moments of the shapes in B, from exact element integrals if the body has them."""
+    if body.element_model is not None:
+        gram = body.element_model.mass_gram(body.mesh_displacement(Phi))
+    else:
+        gram = gram_from_matrices(body, Phi)
+    return moments_from_gram(gram_in_frame(gram, frame), is_exact=body.element_model is not None)
+
+
+def gram_in_frame(gram: Array, frame: BodyFrame) -> Array:
+    """Return the Gram matrix of a_B, c_B = axesᵀ (c - origin), phi_B = axesᵀ phi, from that of a = [1, c, phi].
+
+    Components of all shapes are grouped, (4 + 3 n_q, 4 + 3 n_q). The given array is overwritten.
+    """
+    n = (len(gram) - 4) // 3
+    L = np.eye(4)
+    L[1:, 0] = -frame.axes.T @ frame.origin
+    L[1:, 1:] = frame.axes.T
+    gram[:4] = L @ gram[:4]
+    gram[:, :4] = gram[:, :4] @ L.T
+    if not np.array_equal(frame.axes, np.eye(3)):  # exact numbers stay exact if the axes are aligned
+        rows = gram[4:].reshape(3, n * len(gram))
+        rows[:] = frame.axes.T @ rows
+        for part in np.array_split(gram, max(1, gram.nbytes // 2**26)):
+            part[:, 4:] = (frame.axes.T @ part[:, 4:].reshape(len(part), 3, n)).reshape(len(part), 3 * n)
+    return gram
+
+
+def reduced_nodal_sums(body: FEBody, Phi: Array, frame: BodyFrame) -> NodalSums | None:
+    """Return weighted sums over the nodes in the frame B; None if the nodes are too few or collinear."""
+    weights = node_weights(body)
+    if not weights.any():
+        return None
+    c = (body.nodes - frame.origin) @ frame.axes
+    try:
+        U = inner(weighted_rigid_modes(body, frame.origin), Phi)
+    except BodyError:  # nodes are collinear or have no translations, so there is no Buckens frame
+        return None
+    return NodalSums(
+        w=weights.sum(),
+        S=weights @ c,
+        R=c.T @ (weights[:, None] * c),
+        U1=frame.axes.T @ U[:3],
+        U2=frame.axes.T @ U[3:],
+        is_volume=body.node_volumes is not None,
+    )
+
+
+def reduced_load_case(body: FEBody, case: LoadCase, Phi: Array, frame: BodyFrame) -> ReducedLoadCase:
+    """Return the modal forces of a load case, and its resultant about the origin of B."""
+    wrench = geometric_rigid_modes(body, origin=frame.origin).T @ case.f
+    R = frame.axes.T
+    h = inner(Phi, case.f[:, None])[:, 0] if isinstance(Phi, SpreadColumns) else Phi.T @ case.f
+    return ReducedLoadCase(case.name, case.kind, force=R @ wrench[:3], torque=R @ wrench[3:], h=h)
+
+
+def reduced_interface(
+    body: FEBody, interface: Interface, Phi: Array, frame: BodyFrame, index_of: IntArray
+) -> ReducedInterface:
+    """Return the motion of an interface with the modes: of its reference node, or the mean motion of its nodes."""
+    motion, reference, has_rotation = reference_motion(body, interface)
+    Psi = rows_times(motion, Phi)
+    R = frame.axes.T
+    return ReducedInterface(
+        interface.name,
+        interface.kind,
+        position=R @ (reference - frame.origin),
+        triad=R @ interface.triad,
+        Psi=np.concatenate([R @ Psi[:3], R @ Psi[3:]]),
+        members=index_of[interface.nodes],
+        has_rotation=has_rotation,
+    )
+
+
+def reduced_damping(body: FEBody, finished: FinishedBasis, damping: Damping | None) -> Array:
+    """Return D* = Phiᵀ D Phi plus the modal or Rayleigh damping, (n_q, n_q) [1/s]."""
+    D = np.zeros_like(finished.K)
+    if body.D is not None:
+        Phi = in_memory(finished.Phi)
+        D += Phi.T @ (body.D @ Phi)
+        D = (D + D.T) / 2
+    if damping is not None:
+        D += modal_damping(damping, finished.M, finished.K, second=body.units.time)
+    return D
+
+
+def reduction_provenance(
+    body: FEBody, modes: ModeSet, finished: FinishedBasis, damping: Damping | None
+) -> Mapping[str, str]:
+    """Return from what the reduced body was made, and by which versions."""
+    versions = {f"version {name}": metadata.version(name) for name in ("numpy", "scipy")}
+    try:
+        versions["version floatframe"] = metadata.version("floatframe")
+    except metadata.PackageNotFoundError:  # a checkout that is not installed
+        versions["version floatframe"] = "unknown"
+    return {
+        **dict(body.provenance),
+        "mode set": modes.name,
+        **{f"mode set {key}": value for key, value in modes.options.items()},
+        "mode set columns": str(modes.columns.shape[1]),
+        "mode set redundant": "; ".join(finished.dropped) or "none",
+        "mode set rigid-body motions removed": str(finished.n_rigid),
+        "full dofs": str(body.n_dof),
+        "damping": str(damping) if damping else "none",
+        "version python": platform.python_version(),
+        **versions,
+    }

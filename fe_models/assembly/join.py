@@ -1,0 +1,234 @@
+"""Joining of bodies with shared nodes into one body, with common translations and rotations at shared nodes.
+
+(1) the matrices of the parts are placed side by side; every node of the joined body has the components that any part
+    gives it, and all six if it leads other nodes
+(2) u_parts = S u, where S is a selection matrix, gives K = Sᵀ diag(K_parts) S
+(3) constraints are eliminated, u = T u_rest (`fe_models.assembly.constraints`)
+(4) rotations without stiffness and without mass are dropped from the dofs
+
+The recovery has a row for each dof of the parts. It also has rows for components that only a constraint gives to a node
+(all six of a leader that belongs to no part). Such a node moves in pictures and sensors as its interface does.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_models.assembly.constraints import Constraint, MeanMotion, RigidNodes, eliminated
+from fe_models.assembly.massless_nodes import MasslessNodes
+from fe_models.body.elimination import eliminate_dofs
+from fe_models.body.fe_body import MULTIPLIER, FEBody, Recovery
+from fe_models.body.weld import WeldedModel, WeldedPoints, mesh_rows
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.errors import BodyError
+from fe_models.meshes.numbering import NONE, NamedSet, Numbering, no_numbers, numbering_side_by_side
+
+__all__ = ["Joined", "Part", "join"]
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A body without interfaces, and the nodes of the joined body that are its first nodes."""
+
+    body: FEBody
+    nodes: IntArray  #: numbers in the joined body, (n,); nodes of the part beyond n are its own (skin), without dofs
+
+
+@dataclass(frozen=True, eq=False)
+class Joined:
+    """The joined body, and the position of each given node among its nodes."""
+
+    body: FEBody
+    place: IntArray  #: node of the body for each given node, -1 if it has none, (n_nodes,)
+
+
+def join(
+    name: str,
+    parts: Sequence[Part],
+    points: Array,
+    constraints: Iterable[Constraint] = (),
+    *,
+    numbers: IntArray | None = None,
+    node_sets: Mapping[str, IntArray] | None = None,
+) -> Joined:
+    """Make one body of parts that share nodes.
+
+    Parameters
+    ----------
+    name
+        Name of the joined body.
+    parts
+        Parts, in one unit system and with the same axes.
+    points
+        Positions of all nodes, used or not, (n_nodes, 3) [m].
+    constraints
+        Constraints between these nodes.
+    numbers
+        The user's numbers of these nodes, (n_nodes,); None: they have no numbers.
+    node_sets
+        Sets of these nodes.
+
+    Raises
+    ------
+    BodyError
+        If there is no part, or a constraint is impossible.
+    """
+    constraints = list(constraints)
+    if not parts:
+        raise BodyError(f"body {name!r}: expected parts, got none")
+    first_node = np.cumsum([0, *(len(part.body.nodes) for part in parts)])
+    place = np.full(len(points), -1)
+    for part, begin in zip(reversed(parts), reversed(first_node[:-1].tolist()), strict=True):
+        place[part.nodes] = begin + np.arange(len(part.nodes))
+    leaders = _leaders(constraints)
+    added = leaders[place[leaders] < 0]
+    place[added] = first_node[-1] + np.arange(len(added))
+    dofs, S, dof_of = _shared_dofs(parts, place, leaders)
+    bodies = [part.body for part in parts]
+    whole = _side_by_side(name, bodies, S, dofs, np.concatenate([b.nodes for b in bodies] + [points[added]]))
+    kept = np.concatenate([_kept(part, begin, place) for part, begin in zip(parts, first_node, strict=False)])
+    whole = replace(whole, numbering=_numbering(parts, added, numbers, node_sets or {}), kept=kept)
+    slaves, T_s = eliminated(constraints, points, dof_of, whole.n_dof)
+    if len(slaves):
+        whole = eliminate_dofs(whole, slaves, T_s)
+    references = place[[c.node for c in constraints if isinstance(c, MeanMotion)]]
+    n_of_parts = sum(len(recovered_dofs(body)) for body in bodies)
+    return Joined(_without_idle_dofs(whole, n_of_parts, references), place)
+
+
+def _kept(part: Part, begin: int, place: IntArray) -> IntArray:
+    """Return the nodes that a part keeps, as nodes of the joined body; shared nodes have one copy."""
+    kept = part.body.kept
+    is_shared = kept < len(part.nodes)
+    return np.concatenate([place[part.nodes[kept[is_shared]]], begin + kept[~is_shared]])
+
+
+def _numbering(
+    parts: Sequence[Part], added: IntArray, numbers: IntArray | None, node_sets: Mapping[str, IntArray]
+) -> Numbering:
+    """Return the numbering of the joined body; each part has its own copy of a shared node, with the same number.
+
+    Skin points refer to the node that moves them, which their part numbers like the joined body.
+    """
+    side = []
+    for part in parts:
+        own = part.body.numbering.nodes  # indices of the joined body, with which the mesh of the part was numbered
+        at = np.full(len(part.body.nodes), NONE) if not own.size else np.array(own)
+        at[: len(part.nodes)] = part.nodes
+        on_skin = (np.arange(len(at)) >= len(part.nodes)).astype(np.int64)
+        elements = tuple(each for each in part.body.numbering.sets if each.kind == "elements")
+        numbering = replace(part.body.numbering, nodes=at, on_skin=on_skin, sets=elements)
+        side.append((part.body.name, numbering, len(at), len(part.body.surface)))
+    side.append(("", Numbering(nodes=added) if len(added) else Numbering(), len(added), 0))
+    whole = numbering_side_by_side(side, share_numbers=True)
+    sets = []
+    for name, members in node_sets.items():
+        rows = np.flatnonzero(np.isin(whole.nodes, members))
+        sets.append(NamedSet(name, "nodes", rows, len(np.unique(members))))
+    has = whole.nodes != NONE
+    if numbers is None:
+        return replace(whole, nodes=no_numbers(), on_skin=no_numbers(), sets=(*sets, *whole.sets))
+    return replace(whole, nodes=np.where(has, numbers[whole.nodes], NONE), sets=(*sets, *whole.sets))
+
+
+def _leaders(constraints: list[Constraint]) -> IntArray:
+    """Return the nodes that need six dofs: leaders of rigid groups, and nodes that follow mean motions."""
+    return np.unique([c.node for c in constraints if isinstance(c, RigidNodes | MeanMotion)]).astype(np.int64)
+
+
+def _shared_dofs(parts: Sequence[Part], place: IntArray, leaders: IntArray) -> tuple[IntArray, sp.csr_array, IntArray]:
+    """Steps (1) and (2): return the joined dofs, S, and the dof of each component of each node, (n_nodes, 6)."""
+    asked = (6 * place[leaders][:, None] + np.arange(6)).ravel()
+    side = np.concatenate([6 * place[part.nodes[part.body.dofs[:, 0]]] + part.body.dofs[:, 1] for part in parts])
+    found = np.unique(np.concatenate([side, asked]))
+    S = sp.csr_array(
+        (np.ones(len(side)), (np.arange(len(side)), np.searchsorted(found, side))), shape=(len(side), len(found))
+    )
+    dofs = np.stack([found // 6, found % 6], axis=1)
+    dof_of = np.full((len(place), 6), -1)
+    wanted = 6 * place[:, None] + np.arange(6)
+    at = np.minimum(np.searchsorted(found, wanted), len(found) - 1)
+    has = (found[at] == wanted) & (place >= 0)[:, None]
+    dof_of[has] = at[has]
+    return dofs, S, dof_of
+
+
+def _side_by_side(name: str, bodies: list[FEBody], S: sp.csr_array, dofs: IntArray, nodes: Array) -> FEBody:
+    first = np.cumsum([0, *(len(body.nodes) for body in bodies)])
+    recoveries = [
+        Recovery(sp.eye_array(body.n_dof, format="csr"), body.dofs) if body.recovery is None else body.recovery
+        for body in bodies
+    ]
+    loose = np.flatnonzero(np.diff(S.tocsc().indptr) == 0)  # dofs of leaders that belong to no part
+    own = sp.csr_array((np.ones(len(loose)), (np.arange(len(loose)), loose)), shape=(len(loose), len(dofs)))
+    n_mesh_dof = tuple(int(recovery.matrix.shape[0]) for recovery in recoveries)
+    models = [body.element_model for body in bodies]
+    volumes = [np.zeros(len(b.nodes)) if b.node_volumes is None else b.node_volumes for b in bodies]
+    points = tuple(
+        (body.name, body.stress_points, rows)
+        for body, rows in zip(bodies, mesh_rows(n_mesh_dof), strict=True)
+        if body.stress_points is not None
+    )
+    n_added = len(nodes) - int(first[-1])
+    has_volumes = any(volume.any() for volume in volumes)
+    counts = tuple(len(body.nodes) for body in bodies)
+    return FEBody(
+        name=name,
+        M=S.T @ sp.block_diag([body.M for body in bodies], format="csc") @ S,
+        K=S.T @ sp.block_diag([body.K for body in bodies], format="csc") @ S,
+        D=None
+        if all(body.D is None for body in bodies)
+        else S.T @ sp.block_diag([sp.csc_array(b.K.shape) if b.D is None else b.D for b in bodies], format="csc") @ S,
+        nodes=nodes,
+        dofs=dofs,
+        units=bodies[0].units,
+        surface=np.concatenate([body.surface + begin for body, begin in zip(bodies, first, strict=False)]),
+        element_model=None
+        if any(model is None for model in models)
+        else WeldedModel(
+            (*(model for model in models if model is not None), MasslessNodes(len(loose), n_added)),
+            (*n_mesh_dof, len(loose)),
+            (*counts, n_added),
+        ),
+        recovery=Recovery(
+            sp.vstack([sp.block_diag([recovery.matrix for recovery in recoveries], format="csr") @ S, own], "csr"),
+            np.concatenate(
+                [*(r.dofs + np.array([n, 0]) for r, n in zip(recoveries, first, strict=False)), dofs[loose]]
+            ),
+        ),
+        stress_points=WeldedPoints(points) if points else None,
+        node_volumes=np.concatenate([*volumes, np.zeros(n_added)]) if has_volumes else None,
+        provenance={
+            f"{body.name}: {key}" if len(bodies) > 1 else key: value
+            for body in bodies
+            for key, value in body.provenance.items()
+        },
+    )
+
+
+def recovered_dofs(body: FEBody) -> IntArray:
+    """Return (node, component) of the mesh dofs of a body, (n_mesh_dof, 2)."""
+    return body.dofs if body.recovery is None else body.recovery.dofs
+
+
+def _without_idle_dofs(body: FEBody, n_of_parts: int, references: IntArray) -> FEBody:
+    """Step (4). A rotation with mass but without stiffness stays, and appears as a motion of zero frequency.
+
+    The reference of a mean motion that follows in some components only has no other motion, so its other translations
+    are idle too. If a recovery row beyond those of the parts belongs to an idle dof, it does not give the motion of its
+    node. It loses its component, because the motion is not zero but unknown.
+    """
+    is_idle = (body.dofs[:, 1] >= 3) | np.isin(body.dofs[:, 0], references)
+    for A in (body.K, body.M):
+        is_idle &= np.asarray(abs(A).sum(axis=0)).ravel() == 0
+    idle = np.flatnonzero(is_idle)
+    if not len(idle):
+        return body
+    without = eliminate_dofs(body, idle, sp.csr_array((len(idle), body.n_dof)))
+    assert without.recovery is not None
+    T, dofs = without.recovery.matrix, without.recovery.dofs.copy()
+    is_lost = (np.arange(len(dofs)) >= n_of_parts) & ~abs(T).sum(axis=1).astype(bool)
+    dofs[is_lost, 1] = MULTIPLIER
+    return replace(without, recovery=Recovery(T, dofs))

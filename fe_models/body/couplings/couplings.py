@@ -1,0 +1,326 @@
+"""Couplings: interfaces with many nodes get boundary dofs. FEBody in, FEBody out (docs/theory.md §1).
+
+A rigid interface (RBE2) eliminates its member dofs: u_members = T u_reference. A distributing interface (RBE3) keeps
+them: the reference node follows the weighted mean motion of the members, u_reference = A u_members. Six Lagrange
+multipliers enforce this; they stay in the body as massless interior dofs. K is then indefinite, but the motions that
+satisfy the constraints have positive energy. Eliminating the members instead would fill K with a dense block over all
+members.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_models.body.couplings.coupling_on_ranks import spread_extension
+from fe_models.body.couplings.submatrix import principal_block
+from fe_models.body.fe_body import MULTIPLIER, FEBody, Interface, Recovery
+from fe_models.body.rigid_motion import rigid_motion_of_points
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.errors import BodyError
+from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
+
+__all__ = ["couple", "mean_motion"]
+
+#: ratio of smallest to largest radius of the members about their line, below which they count as collinear
+RANK_TOLERANCE = 1e-6
+
+
+def couple(body: FEBody) -> FEBody:
+    """Give every interface of the body its boundary dofs.
+
+    The dofs of the result are, in this order: the mesh dofs that stay; for each rigid or distributing interface the six
+    dofs of its reference node (a new node at the end of `nodes`, mesh axes); and the multipliers.
+
+    Raises
+    ------
+    BodyError
+        If two interfaces share a node, or the members of an interface cannot carry a rotation (collinear, too few).
+    """
+    if body.recovery is not None and body.interfaces and body.is_coupled:
+        raise BodyError(f"body {body.name!r}: is coupled already")
+    _refuse_overlap(body)
+    todo = [interface for interface in body.interfaces if interface.dofs is None]
+    rigid = [interface for interface in todo if interface.kind == "rigid"]
+    distributing = [interface for interface in todo if interface.kind == "distributing"]
+    _require_dofs(body, todo)
+    for interface in (*rigid, *distributing):
+        _require_spread(body, interface)
+    dofs_of_node = _DofTable(body)
+
+    # order of the new dofs: kept mesh dofs | reference nodes | multipliers
+    slaves = [dofs_of_node.all_of(interface.nodes) for interface in rigid]
+    is_kept = np.ones(body.n_dof, dtype=bool)
+    for slave in slaves:
+        is_kept[slave] = False
+    keep = np.flatnonzero(is_kept)
+    references = [*rigid, *distributing]
+    first_reference = len(keep)
+    first_multiplier = first_reference + 6 * len(references)
+    n_new = first_multiplier + 6 * len(distributing)
+    reference_node = {interface.name: len(body.nodes) + k for k, interface in enumerate(references)}
+    new_dofs = np.concatenate(
+        [body.dofs[keep]]
+        + [_node_dofs(reference_node[interface.name]) for interface in references]
+        + [
+            np.stack([np.full(6, reference_node[interface.name]), np.full(6, MULTIPLIER)], axis=1)
+            for interface in distributing
+        ]
+    )
+
+    # u_mesh = T u, where T is the identity on kept dofs and the rigid motion of the reference node on slave dofs
+    slave_rows = np.concatenate(slaves) if slaves else np.zeros(0, np.int64)
+    blocks = [_rigid_rows(body, interface, slave) for interface, slave in zip(rigid, slaves, strict=True)]
+    T_s = sp.block_diag(blocks, format="csr") if blocks else sp.csr_array((0, 0))
+    recovery = _recovery_matrix(body.n_dof, keep, slave_rows, T_s, first_reference, n_new)
+    n_constrained = n_new - first_reference - T_s.shape[1]
+    D = None if body.D is None else _congruence(body.D, keep, slave_rows, T_s, n_constrained)
+    new_index = np.full(body.n_dof, -1, np.int64)
+    new_index[keep] = np.arange(len(keep))
+    constraints = (
+        _multiplier_rows(
+            body, distributing, dofs_of_node, new_index, first_reference + 6 * len(rigid), first_multiplier, n_new
+        )
+        if distributing
+        else None
+    )
+    K = _congruence(body.K, keep, slave_rows, T_s, n_constrained, constraints)
+    M = _congruence(body.M, keep, slave_rows, T_s, n_constrained)
+
+    boundary = {interface.name: first_reference + 6 * k + np.arange(6) for k, interface in enumerate(references)}
+    for interface in todo:
+        if interface.kind == "nodes":
+            boundary[interface.name] = new_index[dofs_of_node.all_of(interface.nodes)]
+    interfaces = tuple(
+        replace(
+            interface, dofs=boundary.get(interface.name, None if interface.dofs is None else new_index[interface.dofs])
+        )
+        for interface in body.interfaces
+    )
+    return replace(
+        body,
+        M=M,
+        K=K,
+        D=D,
+        dofs=new_dofs,
+        interfaces=interfaces,
+        nodes=np.concatenate([body.nodes, *[interface.reference[None] for interface in references]]),
+        node_volumes=None
+        if body.node_volumes is None
+        else np.concatenate([body.node_volumes, np.zeros(len(references))]),
+        numbering=body.numbering.with_nodes_added(len(references)),
+        recovery=Recovery(recovery, body.dofs, body.K.layout if isinstance(body.K, SpreadMatrix) else None)
+        if body.recovery is None
+        else replace(body.recovery, matrix=sp.csr_array(body.recovery.matrix @ recovery)),
+        load_cases=tuple(replace(case, f=recovery.T @ case.f) for case in body.load_cases),
+    )
+
+
+def mean_motion(points: Array, weights: Array, reference: Array) -> Array:
+    """Return the weighted mean motion of points: the best-fitting rigid motion of the reference point (RBE3).
+
+    Minimising Σ w_i |u_i - d - theta × (c_i - reference)|² gives [d; theta] = (Σ w GᵀG)⁻¹ Σ w Gᵀ u.
+
+    Parameters
+    ----------
+    points
+        Positions, (n_points, 3) [m].
+    weights
+        Weight of each point, (n_points,) [-].
+    reference
+        Reference point, (3,) [m].
+
+    Returns
+    -------
+    Array
+        A in [d; theta] = A u, (6, 3 n_points), columns node-major.
+    """
+    G = rigid_motion_of_points(points, reference)  # (n, 3, 6)
+    weighted = weights[:, None, None] * G
+    N = np.einsum("nak,nal->kl", weighted, G)
+    return np.linalg.solve(N, weighted.reshape(-1, 6).T)
+
+
+@dataclass(frozen=True, eq=False)
+class _Positions:
+    """Rows of each node in the dof table: order[start[node]:start[node + 1]], sorted by component."""
+
+    order: IntArray
+    start: IntArray
+
+
+class _DofTable:
+    """Look-up of the dofs of given nodes, by node and component."""
+
+    def __init__(self, body: FEBody) -> None:
+        order = np.lexsort((body.dofs[:, 1], body.dofs[:, 0]))
+        self.positions = _Positions(order, np.searchsorted(body.dofs[order, 0], np.arange(len(body.nodes) + 1)))
+        self.body = body
+
+    def all_of(self, nodes: IntArray) -> IntArray:
+        """Return all dofs of these nodes, node by node in component order."""
+        order, start = self.positions.order, self.positions.start
+        return np.concatenate([order[start[node] : start[node + 1]] for node in nodes])
+
+    def translations_of(self, nodes: IntArray, where: str) -> IntArray:
+        """Return the three translational dofs of each node, (3 n,), node-major."""
+        dofs = self.all_of(nodes)
+        dofs = dofs[(self.body.dofs[dofs, 1] >= 0) & (self.body.dofs[dofs, 1] < 3)]
+        if len(dofs) != 3 * len(nodes):
+            raise BodyError(
+                f"{where}: expected three translational dofs at every member node, got {len(dofs)} "
+                f"at {len(nodes)} nodes"
+            )
+        return dofs
+
+
+def _node_dofs(node: int) -> IntArray:
+    return np.stack([np.full(6, node), np.arange(6)], axis=1)
+
+
+def _rigid_rows(body: FEBody, interface: Interface, slaves: IntArray) -> Array:
+    """Return the rows of u_members = T u_reference for these slave dofs, (n_slaves, 6)."""
+    node, component = body.dofs[slaves].T
+    rows = np.zeros((len(slaves), 6))
+    translation = component < 3
+    motion = rigid_motion_of_points(body.nodes[node], interface.reference)
+    rows[translation] = motion[np.flatnonzero(translation), component[translation]]
+    rows[~translation, component[~translation]] = 1.0
+    return rows
+
+
+def _recovery_matrix(
+    n_dof: int, keep: IntArray, slave_rows: IntArray, T_s: sp.csr_array, first_reference: int, n_new: int
+) -> sp.csr_array:
+    T_s = sp.coo_array(T_s)
+    rows = np.concatenate([keep, slave_rows[T_s.row]])
+    columns = np.concatenate([np.arange(len(keep)), first_reference + T_s.col])
+    values = np.concatenate([np.ones(len(keep)), T_s.data])
+    return sp.csr_array((values, (rows, columns)), shape=(n_dof, n_new))
+
+
+def _congruence(
+    A: sp.csc_array,
+    keep: IntArray,
+    slave_rows: IntArray,
+    T_s: sp.csr_array,
+    n_more: int,
+    more: sp.csc_array | None = None,
+) -> sp.csc_array:
+    """Return Tᵀ A T + more with T = [1 0; 0 T_s], where T has n_more empty rows and columns at the end.
+
+    The kept block is cut out in one pass, and the few new rows and columns are added. The product with the whole T
+    would read all of A three times. A distributed matrix stays distributed.
+    """
+    n_new = len(keep) + T_s.shape[1] + n_more
+    new = _reference_entries(A, keep, slave_rows, T_s, n_new) if len(slave_rows) else None
+    if isinstance(A, SpreadMatrix):
+        return spread_extension(A, keep, sum((B for B in (new, more) if B is not None), sp.csc_array((n_new, n_new))))
+    A_kk = principal_block(A, keep)
+    result = sp.csc_array((A_kk.data, A_kk.indices, _longer(A_kk.indptr, n_new)), shape=(n_new, n_new))
+    for B in (new, more):
+        if B is not None:
+            result = sp.csc_array(result + B)
+    return result
+
+
+def _reference_entries(
+    A: sp.csc_array, keep: IntArray, slave_rows: IntArray, T_s: sp.csr_array, n_new: int
+) -> sp.csc_array:
+    """Return the rows and columns of the reference nodes, (n_new, n_new)."""
+    n_kept = len(keep)
+    A_slave = sp.csr_array(A[:, slave_rows] @ T_s)  # (n_dof, 6 n_rigid)
+    A_kr = sp.coo_array(A_slave[keep])
+    A_rr = sp.coo_array(T_s.T @ A_slave[slave_rows])
+    half = sp.coo_array(
+        (
+            np.concatenate([A_kr.data, A_rr.data / 2]),
+            (np.concatenate([A_kr.row, n_kept + A_rr.row]), n_kept + np.concatenate([A_kr.col, A_rr.col])),
+        ),
+        shape=(n_new, n_new),
+    ).tocsc()
+    return sp.csc_array(half + half.T)
+
+
+def _longer(indptr: IntArray, n: int) -> IntArray:
+    """Return the column pointers extended to n columns; the new columns are empty."""
+    return np.concatenate([indptr, np.full(n + 1 - len(indptr), indptr[-1], indptr.dtype)])
+
+
+def _multiplier_rows(
+    body: FEBody,
+    distributing: list[Interface],
+    dofs_of_node: _DofTable,
+    new_index: IntArray,
+    first_reference: int,
+    first_multiplier: int,
+    n_new: int,
+) -> sp.csc_array:
+    """Return [[0, Cᵀ], [C, 0]] of the constraints C u = A u_members - u_reference = 0, scaled to the size of K.
+
+    The scale is the stiffness of the members. The rotation rows are scaled to lengths (theta times the radius of the
+    interface), so that the pivots of the factorisation stay comparable.
+    """
+    rows, columns, values = [], [], []
+    for k, interface in enumerate(distributing):
+        where = f"body {body.name!r}: interface {interface.name!r}"
+        members = dofs_of_node.translations_of(interface.nodes, where)
+        if (new_index[members] < 0).any():
+            raise BodyError(f"{where}: shares nodes with a rigid interface")
+        points = body.nodes[interface.nodes]
+        A = mean_motion(points, np.asarray(interface.weights), interface.reference)
+        radius = float(
+            np.sqrt(np.average(((points - points.mean(axis=0)) ** 2).sum(axis=1), weights=interface.weights))
+        )
+        scale = np.repeat([1.0, radius], 3) * float(body.K.diagonal()[members].mean())
+        C = scale[:, None] * np.hstack([A, -np.eye(6)])
+        dofs = np.concatenate([new_index[members], first_reference + 6 * k + np.arange(6)])
+        row, column = np.nonzero(C)
+        rows.append(first_multiplier + 6 * k + row)
+        columns.append(dofs[column])
+        values.append(C[row, column])
+    row, column, value = np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
+    C = sp.csc_array((value, (row, column)), shape=(n_new, n_new))
+    return sp.csc_array(C + C.T)
+
+
+def _refuse_overlap(body: FEBody) -> None:
+    owner: dict[int, str] = {}
+    for interface in body.interfaces:
+        shared = [owner[node] for node in interface.nodes.tolist() if node in owner]
+        if shared:
+            raise BodyError(
+                f"body {body.name!r}: interfaces {shared[0]!r} and {interface.name!r} share "
+                f"{shared.count(shared[0])} nodes; a node can belong to one interface only"
+            )
+        owner.update(dict.fromkeys(interface.nodes.tolist(), interface.name))
+
+
+def _require_dofs(body: FEBody, interfaces: list[Interface]) -> None:
+    """Raise `BodyError` if members have no dofs because they already follow other nodes."""
+    has_dofs = np.zeros(len(body.nodes), dtype=bool)
+    has_dofs[body.dofs[:, 0]] = True
+    for interface in interfaces:
+        without = interface.nodes[~has_dofs[interface.nodes]]
+        if len(without):
+            raise BodyError(
+                f"body {body.name!r}: interface {interface.name!r}: {len(without)} member nodes have no dofs, first "
+                f"node {body.numbering.called(without[0])}: they follow a rigid link; take the node that leads them"
+            )
+
+
+def _require_spread(body: FEBody, interface: Interface) -> None:
+    """Raise `BodyError` if the members lie at one point or on one line, so that a rotation about it moves nothing."""
+    where = f"body {body.name!r}: interface {interface.name!r}"
+    has_rotation = np.isin(interface.nodes, body.dofs[body.dofs[:, 1] >= 3, 0]).any()
+    if interface.kind == "rigid" and has_rotation:
+        return  # one node with rotations carries all six motions
+    weights = np.asarray(interface.weights) if interface.kind == "distributing" else np.ones(len(interface.nodes))
+    used = interface.nodes[weights > 0]
+    points = body.nodes[used]
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    if len(used) < 3 or spread[1] <= RANK_TOLERANCE * spread[0]:
+        raise BodyError(
+            f"{where}: kind {interface.kind!r} needs at least 3 member nodes that are not on one line, got "
+            f"{len(used)}{' on one line' if len(used) > 2 else ''}; select more nodes or take kind 'nodes'"
+        )

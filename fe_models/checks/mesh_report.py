@@ -1,0 +1,371 @@
+"""Report of a mesh: its numbers and faults, before any solution."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from math import nan
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fe_models.body.material import AnyMaterial, assign_materials
+from fe_models.checks.first_order import FirstOrderError, first_order_error
+from fe_models.checks.report import Finding, Report
+from fe_models.checks.unit_check import implausible_units
+from fe_models.errors import MeshError
+from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.units import Units, unit_system
+from fe_models.meshes.cell_angles import face_angles
+from fe_models.meshes.cell_shapes import CELL_SHAPES, cell_jacobians, quadrature, shape_values
+from fe_models.meshes.connectivity import Connectivity, coincident_nodes, connectivity
+from fe_models.meshes.mesh import Mesh
+from fe_models.meshes.objects.as_mesh import as_mesh
+from fe_models.meshes.unused_nodes import used_nodes
+
+__all__ = ["CellGeometry", "MeshReport", "cell_geometry", "report_mesh"]
+
+COINCIDENCE = 1e-6  #: distance of coincident nodes relative to the diagonal of the bounding box
+FLAT = 1e-9  #: volume relative to the cube of the cell size, below which the cell is degenerate
+ROUNDING = 1e-12  #: Jacobian relative to its mean, below which it counts as zero
+FIRST_ORDER_NOTED = 0.02  #: error of the lowest frequencies above which first-order cells give a warning
+UNMEASURABLE = {"inverted", "degenerate", "overlap", "transition"}  #: errors that prevent the computation of modes
+_CHUNK = 20_000  #: number of cells processed at a time, so that a million dofs need 100 MB
+
+
+@dataclass(frozen=True, eq=False)
+class CellGeometry:
+    """Volumes and Jacobians of the cells of one type."""
+
+    volume: Array  #: (n_cells,) [m³]
+    moment: Array  #: ∫x over the cell, (n_cells, 3) [m⁴]
+    lowest_inside: Array  #: smallest Jacobian at the integration points divided by the mean magnitude, (n_cells,)
+    lowest_at_nodes: Array  #: smallest Jacobian at the nodes divided by the mean magnitude, (n_cells,)
+    flatness: Array  #: volume divided by the cube of the largest extent, (n_cells,)
+
+
+@dataclass(frozen=True, eq=False)
+class MeshReport(Report):
+    """Numbers of a mesh and findings about it."""
+
+    source: str
+    units: Units
+    n_nodes: int  #: number of nodes of solid cells
+    n_unused_nodes: int
+    n_cells: Mapping[str, int]  #: number of cells by type
+    lo: Array  #: bounding box of the used nodes, (3,) [m]
+    hi: Array  #: (3,) [m]
+    volume: float  #: [m³]
+    mass: float | None  #: [kg]; None: no material was given
+    mass_centre: Array | None  #: (3,) [m]
+    n_parts: int  #: number of parts without a common node
+    part_cells: tuple[int, ...]  #: number of cells of each part, largest first
+    n_coincident: int  #: number of nodes that coincide with another node
+    inverted: Mapping[str, IntArray]  #: rows of cells with a Jacobian <= 0 at an integration point, by type
+    degenerate: Mapping[str, IntArray]  #: rows of cells without volume, by type
+    distorted: Mapping[str, IntArray]  #: rows of cells with a Jacobian <= 0 at a node only, by type
+    findings: tuple[Finding, ...]
+    first_order: FirstOrderError | None = None  #: None: no first-order cells, or not measured
+    origin: Mapping[str, str] = field(default_factory=dict)  #: origin of the mesh, as the mesh states it
+    #: smallest and largest angle between neighbouring faces of a cell [degrees]
+    angles: tuple[float, float] = (nan, nan)
+    #: smallest Jacobian of a cell divided by its mean, at integration points and nodes; 1 is best
+    lowest_jacobian: float = nan
+
+    def numbers(self) -> list[tuple[str, str]]:
+        """Return label and value of each number, as text."""
+        length, mass = self.units.length_symbol, self.units.mass_symbol
+        cells = ", ".join(f"{count} {kind}" for kind, count in self.n_cells.items())
+        rows = [
+            ("file", self.source),
+            *self.origin.items(),
+            ("nodes", f"{self.n_nodes}" + (f" ({self.n_unused_nodes} unused)" if self.n_unused_nodes else "")),
+            ("cells", cells),
+            ("bounding box", f"{_vector(self.lo)} to {_vector(self.hi)} {length}"),
+            ("size", f"{_vector(self.hi - self.lo)} {length}"),
+            ("volume", f"{self.volume:.6g} {length}³"),
+        ]
+        if self.mass is not None and self.mass_centre is not None:
+            rows.append(("mass", f"{self.mass:.6g} {mass}"))
+            rows.append(("centre of mass", f"{_vector(self.mass_centre)} {length}"))
+        rows.append(("angles of the cells", f"{self.angles[0]:.3g} to {self.angles[1]:.3g} degrees"))
+        rows.append(("least Jacobian over mean", f"{self.lowest_jacobian:.3g}"))
+        rows.append(("connected parts", str(self.n_parts)))
+        if self.n_coincident:
+            rows.append(("coincident nodes", str(self.n_coincident)))
+        return rows
+
+
+def report_mesh(
+    mesh: Any,
+    materials: AnyMaterial | Mapping[str, AnyMaterial] | None = None,
+    *,
+    units: Units | str = "m-kg-s",
+    incompatible_modes: bool = False,
+) -> MeshReport:
+    """Measure a mesh and check whether it can serve as a finite element model.
+
+    Parameters
+    ----------
+    mesh
+        The mesh, of this package or of another library (`fe_models.as_mesh`).
+    materials
+        One material, or one for each group of cells; None: no mass is computed, and density and modulus are not
+        checked.
+    units
+        Unit system of the numbers.
+    incompatible_modes
+        Whether eight-node bricks will have incompatible modes, as in `solid_body`.
+
+    Raises
+    ------
+    MaterialError
+        If a material names an unknown group, or cells have no material or two materials.
+    """
+    mesh = as_mesh(mesh)
+    units = unit_system(units) if isinstance(units, str) else units
+    used = used_nodes(mesh)
+    if not used.any():
+        raise MeshError(f"mesh {mesh.source}: expected solid cells, got none")
+    X = mesh.nodes[used]
+    lo, hi = X.min(axis=0), X.max(axis=0)
+    geometry = {kind: cell_geometry(mesh, kind) for kind in mesh.cells}
+    findings = []
+    degenerate = _select(geometry, lambda g: g.flatness <= FLAT)
+    inverted = _select(geometry, lambda g: (g.lowest_inside <= ROUNDING) & (g.flatness > FLAT))
+    distorted = _select(geometry, lambda g: (g.lowest_inside > ROUNDING) & (g.lowest_at_nodes <= ROUNDING))
+    findings += _cell_findings(mesh, inverted, degenerate, distorted)
+    links = connectivity(mesh)
+    coincident = coincident_nodes(mesh, COINCIDENCE * float(np.linalg.norm(hi - lo)))
+    findings += _link_findings(links, coincident, mesh)
+    n_unused = int((~used).sum())
+    if n_unused:
+        findings.append(Finding("unused", False, f"{n_unused} nodes belong to no solid cell and will be dropped"))
+    findings += [Finding("reader", False, note) for note in mesh.notes]
+    mass = centre = None
+    given: tuple[AnyMaterial, ...] = ()
+    if materials is not None:
+        given, number = assign_materials(mesh, materials)
+        mass, centre = _mass(geometry, given, number)
+    first_order = _first_order(mesh, materials, incompatible_modes, findings)
+    if first_order is not None and first_order.error > FIRST_ORDER_NOTED:
+        findings.append(Finding("first-order", False, first_order.words()))
+    size = float(np.linalg.norm(hi - lo))
+    findings += [Finding("units", is_error, text) for is_error, text in implausible_units(units, size, given)]
+    return MeshReport(
+        source=mesh.source,
+        units=units,
+        n_nodes=int(used.sum()),
+        n_unused_nodes=n_unused,
+        n_cells=MappingProxyType({kind: len(cells) for kind, cells in mesh.cells.items()}),
+        lo=frozen(lo),
+        hi=frozen(hi),
+        volume=float(sum(g.volume.sum() for g in geometry.values())),
+        mass=mass,
+        mass_centre=None if centre is None else frozen(centre),
+        n_parts=len(links.part_cells),
+        part_cells=links.part_cells,
+        n_coincident=coincident.size,
+        inverted=inverted,
+        degenerate=degenerate,
+        distorted=distorted,
+        findings=tuple(findings),
+        first_order=first_order,
+        origin=mesh.origin,
+        angles=face_angles(mesh),
+        lowest_jacobian=min(float(min(g.lowest_inside.min(), g.lowest_at_nodes.min())) for g in geometry.values()),
+    )
+
+
+def _first_order(
+    mesh: Mesh,
+    materials: AnyMaterial | Mapping[str, AnyMaterial] | None,
+    incompatible_modes: bool,
+    findings: list[Finding],
+) -> FirstOrderError | None:
+    """Return the error due to first-order cells; None also if cells are too bad to be raised to second order."""
+    if UNMEASURABLE & {finding.kind for finding in findings if finding.is_error}:
+        return None
+    try:
+        return first_order_error(mesh, materials, incompatible_modes=incompatible_modes)
+    except MeshError:
+        return None
+
+
+def cell_geometry(mesh: Mesh, kind: str) -> CellGeometry:
+    """Return volumes, first moments and smallest Jacobians of all cells of one type."""
+    cells = mesh.cells[kind]
+    measure = _measure_tetra10 if kind == "tetra10" else partial(_measure, kind)
+    parts = [measure(mesh.nodes[cells[start : start + _CHUNK]]) for start in range(0, len(cells), _CHUNK)]
+    return CellGeometry(*(frozen(np.concatenate(part)) for part in zip(*parts, strict=True)))
+
+
+def _measure(kind: str, X: Array) -> tuple[Array, ...]:
+    """Return the fields of `CellGeometry` for cells with these nodes, (n_cells, n_nodes, 3)."""
+    points, weights = quadrature(kind)
+    N, _ = shape_values(kind, points)
+    jacobians = cell_jacobians(kind, X, np.vstack([points, CELL_SHAPES[kind].nodes]))
+    inside = jacobians[:, : len(points)]
+    size = np.abs(inside) @ weights  # volume without regard to sign
+    mean = np.where(size > 0, size, 1.0) / weights.sum()
+    extent = (X.max(axis=1) - X.min(axis=1)).max(axis=1)
+    return (
+        inside @ weights,
+        np.einsum("en,end->ed", (inside * weights) @ N, X),
+        inside.min(axis=1) / mean,
+        jacobians[:, len(points) :].min(axis=1) / mean,
+        size / np.where(extent > 0, extent, 1.0) ** 3,
+    )
+
+
+def _measure_tetra10(X: Array) -> tuple[Array, ...]:
+    """Measure ten-node tetrahedra; straight-edged ones, usually nearly all, from their corners (constant Jacobian)."""
+    middles = np.array(CELL_SHAPES["tetra10"].middles)
+    extent = (X.max(axis=1) - X.min(axis=1)).max(axis=1)
+    bend = np.abs(2 * X[:, 4:] - X[:, middles[:, 0]] - X[:, middles[:, 1]]).max(axis=(1, 2))
+    curved = bend > ROUNDING * extent
+    fields = _measure("tetra", X[:, :4])
+    if curved.any():
+        for straight, exact in zip(fields, _measure("tetra10", X[curved]), strict=True):
+            straight[curved] = exact
+    return fields
+
+
+def _select(
+    geometry: Mapping[str, CellGeometry], test: Callable[[CellGeometry], NDArray[np.bool_]]
+) -> Mapping[str, IntArray]:
+    chosen = {kind: frozen_int(np.flatnonzero(test(g))) for kind, g in geometry.items()}
+    return MappingProxyType({kind: rows for kind, rows in chosen.items() if rows.size})
+
+
+def _mass(
+    geometry: Mapping[str, CellGeometry], materials: tuple[AnyMaterial, ...], number: Mapping[str, IntArray]
+) -> tuple[float, Array]:
+    """Return mass and its centre."""
+    rho = np.array([material.rho for material in materials])
+    mass = sum(float(rho[number[kind]] @ g.volume) for kind, g in geometry.items())
+    moment = sum((rho[number[kind]] @ g.moment for kind, g in geometry.items()), np.zeros(3))
+    return mass, moment / mass if mass else moment
+
+
+def _cell_findings(
+    mesh: Mesh,
+    inverted: Mapping[str, IntArray],
+    degenerate: Mapping[str, IntArray],
+    distorted: Mapping[str, IntArray],
+) -> list[Finding]:
+    findings = []
+    if inverted:
+        everything = sum(len(rows) for rows in inverted.values()) == mesh.n_cells
+        hint = (
+            "all cells are inside out: the mesh is mirrored, reverse their node order"
+            if everything
+            else "mesh again there, or move their middle nodes"
+        )
+        findings.append(
+            Finding(
+                "inverted", True, f"{_listed(mesh, inverted)} inverted (Jacobian <= 0 at an integration point); {hint}"
+            )
+        )
+    if degenerate:
+        findings.append(
+            Finding(
+                "degenerate",
+                True,
+                f"{_listed(mesh, degenerate)} degenerate (without volume); remove them or mesh again there",
+            )
+        )
+    if distorted:
+        findings.append(
+            Finding(
+                "distorted",
+                False,
+                f"{_listed(mesh, distorted)} distorted: the Jacobian is <= 0 at a "
+                f"node, though not where it is integrated",
+            )
+        )
+    return findings
+
+
+def _listed(mesh: Mesh, chosen: Mapping[str, IntArray]) -> str:
+    """Return '3 tetra10 cells (numbers 5, 8, 12) are'."""
+    parts = []
+    for kind, rows in chosen.items():
+        numbers = mesh.cell_numbers[kind][rows[:5]] if kind in mesh.cell_numbers else rows[:5]
+        first = ", ".join(str(number) for number in numbers)
+        at = _vector(mesh.nodes[mesh.cells[kind][rows[0]]].mean(axis=0))
+        parts.append(
+            f"{rows.size} {kind} cells ({'numbers' if kind in mesh.cell_numbers else 'rows'} {first}"
+            f"{', ...' if rows.size > 5 else ''}; the first at {at})"
+        )
+    return " and ".join(parts) + " are"
+
+
+def _link_findings(links: Connectivity, coincident: IntArray, mesh: Mesh) -> list[Finding]:
+    findings = []
+    merge = f"; {coincident.size} nodes coincide with another: merge them" if coincident.size else ""
+    if len(links.part_cells) > 1:
+        shown = ", ".join(
+            f"{count} cells about {_vector(mesh.nodes[node])}"
+            for count, node in zip(links.part_cells[:5], links.part_node, strict=False)
+        )
+        findings.append(
+            Finding(
+                "parts",
+                True,
+                f"the mesh falls into {len(links.part_cells)} parts that are not "
+                f"connected ({shown}); expected one body{merge}",
+            )
+        )
+    elif coincident.size:
+        findings.append(
+            Finding(
+                "coincident",
+                False,
+                f"{coincident.size} nodes coincide with another (first: node "
+                f"{coincident[0]} at {_vector(mesh.nodes[coincident[0]])}): the "
+                f"mesh is cut open there unless that is meant; merge them",
+            )
+        )
+    if links.n_facet_parts > len(links.part_cells):
+        findings.append(
+            Finding(
+                "hinge",
+                False,
+                f"{links.n_facet_parts} pieces share no facet with the rest and hang "
+                f"together in single nodes or edges, which may act as hinges",
+            )
+        )
+    if links.n_overlapping:
+        findings.append(
+            Finding(
+                "overlap",
+                True,
+                f"{links.n_overlapping} facets belong to more than two cells: cells overlap; remove the doubled ones",
+            )
+        )
+    if links.n_mismatched:
+        findings.append(
+            Finding(
+                "transition",
+                True,
+                f"{links.n_mismatched} facets join cells with different middle "
+                f"nodes (linear beside quadratic): their middle nodes hang free; "
+                f"use one order",
+            )
+        )
+    if links.n_transitions:
+        findings.append(
+            Finding(
+                "tetra-on-quad",
+                False,
+                f"{links.n_transitions} quadrilateral facets carry triangles "
+                f"of other cells: displacements gape there; use one type",
+            )
+        )
+    return findings
+
+
+def _vector(x: Array) -> str:
+    return f"({', '.join(f'{value:.5g}' for value in x)})"

@@ -1,0 +1,185 @@
+"""Report of a shell mesh: its numbers and findings, before any solution."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.spatial import cKDTree
+
+from fe_models.body.material import AnyMaterial
+from fe_models.checks.report import Finding, Report
+from fe_models.checks.unit_check import implausible_units
+from fe_models.elements.beams.attachments import RigidLink, Spring
+from fe_models.elements.shells.quality import WARP_LIMIT, cell_quality
+from fe_models.elements.shells.skin import cell_edges
+from fe_models.foundation.units import Units
+from fe_models.meshes.objects.as_mesh import as_shell_mesh
+from fe_models.meshes.shell_mesh import ShellMesh
+
+__all__ = ["ShellReport", "report_shell"]
+
+COINCIDENCE = 1e-6  #: distance of coincident nodes relative to the diagonal of the bounding box
+WARP_NOTED = 10.0  #: angle between the two halves of a quad above which a warning is given [degree]
+ASPECT_NOTED = 20.0  #: ratio of longest to shortest side above which a warning is given
+
+
+@dataclass(frozen=True, eq=False)
+class ShellReport(Report):
+    """Numbers of a mesh of shells, and findings about it."""
+
+    source: str
+    units: Units
+    n_nodes: int
+    n_cells: dict[str, int]  #: number of cells by type
+    n_lines: int  #: number of stiffener lines
+    area: float  #: [m²]
+    warp: float  #: largest warp of all quads [degree]
+    n_parts: int  #: number of parts that are not joined by a cell, stiffener, link or spring
+    n_free_edges: int  #: number of edges that belong to one cell only
+    findings: tuple[Finding, ...]
+
+    def numbers(self) -> list[tuple[str, str]]:
+        """Return label and value of each number, as text."""
+        length = self.units.length_symbol
+        return [
+            ("file", self.source),
+            ("nodes", str(self.n_nodes)),
+            *[(f"cells {kind}", str(count)) for kind, count in self.n_cells.items()],
+            ("lines of stiffeners", str(self.n_lines)),
+            ("area", f"{self.area:.6g} {length}²"),
+            ("largest warp of a quad", f"{self.warp:.3g} degrees"),
+            ("free edges", str(self.n_free_edges)),
+            ("connected parts", str(self.n_parts)),
+        ]
+
+
+def report_shell(
+    mesh: Any,
+    materials: Iterable[AnyMaterial],
+    *,
+    units: Units,
+    springs: Iterable[Spring] = (),
+    links: Iterable[RigidLink] = (),
+) -> ShellReport:
+    """Measure a shell, and check its cells, whether it is connected, and whether its units are plausible.
+
+    Parameters
+    ----------
+    mesh
+        Nodes, cells, and lines of stiffeners.
+    materials
+        Materials of cells and stiffeners.
+    units
+        Declared unit system.
+    springs, links
+        Springs and rigid links, which also join parts.
+    """
+    mesh = as_shell_mesh(mesh)
+    findings, area, warp = _judge_cells(mesh)
+    edges = cell_edges(tuple(mesh.cells.values()))
+    pairs = [edges.nodes, mesh.lines, *[np.array([spring.nodes]) for spring in springs]]
+    pairs += [np.array([(link.node, follower) for follower in link.followers]) for link in links]
+    joined = np.concatenate(pairs)
+    n = len(mesh.nodes)
+    graph = sp.coo_array((np.ones(len(joined)), (joined[:, 0], joined[:, 1])), shape=(n, n))
+    n_parts, part = sp.csgraph.connected_components(graph, directed=False)
+    size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
+    if n_parts > 1:
+        first = [int(np.flatnonzero(part == k)[0]) for k in range(min(n_parts, 4))]
+        findings.append(
+            Finding(
+                "parts",
+                True,
+                f"{n_parts} parts that no cell, stiffener, link or spring joins, with the nodes "
+                f"{', '.join(_names(mesh, first))}; merge coincident nodes, or accept parts that an interface holds "
+                "together",
+            )
+        )
+    close = cKDTree(mesh.nodes).query_pairs(COINCIDENCE * size) if size else set()
+    if close:
+        pair = min(close)
+        findings.append(
+            Finding(
+                "coincident",
+                False,
+                f"{len(close)} pairs of nodes lie at one place, first {' and '.join(_names(mesh, pair))}; merge them "
+                "unless a slit is meant",
+            )
+        )
+    flips = (edges.nodes[edges.first] == edges.nodes[edges.second]).all(axis=1)
+    if flips.any():
+        nodes = _names(mesh, edges.nodes[edges.first[flips][0]])
+        findings.append(
+            Finding(
+                "normals",
+                False,
+                f"the normal changes sides at {int(flips.sum())} edges, first between nodes {' and '.join(nodes)}: "
+                "top, bottom, offset and pressure change sides there; give the cells one sense (orient_normals), or "
+                "leave it where walls are meant so",
+            )
+        )
+    findings += [Finding("units", is_error, text) for is_error, text in implausible_units(units, size, materials)]
+    return ShellReport(
+        mesh.source,
+        units,
+        n,
+        {kind: len(cells) for kind, cells in mesh.cells.items()},
+        len(mesh.lines),
+        area,
+        warp,
+        int(n_parts),
+        int((edges.count == 1).sum()),
+        tuple(findings),
+    )
+
+
+def _judge_cells(mesh: ShellMesh) -> tuple[list[Finding], float, float]:
+    """Return findings about single cells, their total area, and the largest warp."""
+    findings = []
+    area = warp = 0.0
+    for kind, cells in mesh.cells.items():
+        if not len(cells):
+            continue
+        quality = cell_quality(mesh.nodes, cells)
+        area += float(quality.area.sum())
+        warp = max(warp, float(quality.warp.max()))
+        is_sound = ~quality.is_degenerate & ~quality.is_folded
+        for word, is_error, is_found, text in (
+            ("degenerate", True, quality.is_degenerate, "have no area; merge their nodes and remove them"),
+            (
+                "inverted",
+                True,
+                quality.is_folded,
+                "are folded: an inner angle of 180 degrees or more; move their nodes",
+            ),
+            (
+                "warped",
+                True,
+                is_sound & (quality.warp > WARP_LIMIT),
+                f"are warped beyond {WARP_LIMIT:g} degrees, by up to {quality.warp.max():.3g}; split them into "
+                "triangles, or mesh finer",
+            ),
+            (
+                "warped",
+                False,
+                is_sound & (quality.warp > WARP_NOTED) & (quality.warp <= WARP_LIMIT),
+                f"are warped by more than {WARP_NOTED:g} degrees; a finer mesh is more exact there",
+            ),
+            (
+                "aspect",
+                False,
+                is_sound & (quality.aspect > ASPECT_NOTED),
+                f"have sides in a ratio above {ASPECT_NOTED:g}, up to {quality.aspect.max():.3g}",
+            ),
+        ):
+            rows = np.flatnonzero(is_found)
+            if rows.size:
+                first = mesh.cell_name(kind, rows[0])
+                findings.append(Finding(word, is_error, f"{rows.size} {kind} cells {text} (first {first})"))
+    return findings, area, warp
+
+
+def _names(mesh: ShellMesh, nodes: Iterable[int]) -> list[str]:
+    return [str(mesh.node_numbers[node] if mesh.node_numbers.size else node) for node in nodes]

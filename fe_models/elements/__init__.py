@@ -1,0 +1,1 @@
+"""Element formulations: solids, shells and beams, and the recovery of their stress, strain and forces."""

@@ -1,0 +1,289 @@
+"""All shell elements of one cell type: stiffness, mass, stress resultants, stress."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fe_models.elements.beams.slices import Slices
+from fe_models.elements.shells.geometry import CellPlanes, cell_planes
+from fe_models.elements.shells.laminate import ShellLaw, shell_law
+from fe_models.elements.shells.quad import quad_strains
+from fe_models.elements.shells.shapes import FlatShape, flat_quadrature, flat_shape
+from fe_models.elements.shells.shell_property import AnyShellProperty, LaminateProperty
+from fe_models.elements.shells.strains import N_STRAINS, FlatLaw, FlatStrains, jacobians
+from fe_models.elements.shells.triangle import triangle_strains
+from fe_models.errors import ShellError
+from fe_models.foundation.arrays import Array, IntArray, tilde
+
+__all__ = ["ShellCells", "shell_cells"]
+
+CHUNK = 500  #: number of cells whose operators are held at once
+LEAST_ANGLE = 5.0  #: smallest angle between the direction of a layup and the normal of a cell [degree]
+#: gamma of quads, relative to the shear modulus; docs/shells.md shows the error of larger and smaller values
+DRILLING = 0.1
+DRILLING_SHARE = {"triangle": 1.0, "quad": 0.3}  #: share of the drilling rotations in the displacement of the sides
+STRAIN_DEGREE = {"triangle": 2, "quad": 3}
+MASS_DEGREE = {"triangle": 4, "quad": 5}  #: covers squares of quadratic fields, times the area element
+
+
+@dataclass(frozen=True, eq=False)
+class ShellCells:
+    """Cells of one type, with their planes, thicknesses and laws."""
+
+    kind: str
+    cells: IntArray  #: nodes, (n, c)
+    planes: CellPlanes
+    laws: tuple[ShellLaw, ...]
+    law: IntArray  #: index of the law of each cell, (n,)
+
+    @property
+    def t(self) -> Array:
+        """Thickness, (n,) [m]."""
+        return self.by_law(lambda law: law.thickness, slice(None))
+
+    def by_law(self, value: Callable[[ShellLaw], Any], rows: slice) -> Array:
+        """Evaluate a function of the law for each of some cells, (n, ...)."""
+        return np.array([value(law) for law in self.laws], dtype=float)[self.law[rows]]
+
+    @property
+    def dofs(self) -> IntArray:
+        """Dofs of the nodes of each cell, (n, 6 c)."""
+        return (6 * self.cells[:, :, None] + np.arange(6)).reshape(len(self.cells), -1)
+
+    def chunks(self) -> Iterator[slice]:
+        """Yield slices of rows whose operators fit in memory."""
+        for begin in range(0, len(self.cells), CHUNK):
+            yield slice(begin, min(begin + CHUNK, len(self.cells)))
+
+    def strains(self, rows: slice) -> FlatStrains:
+        """Return strain operators in local axes, over the dofs of the nodes, at the points of `STRAIN_DEGREE`."""
+        planes = self.planes[rows]
+        law = FlatLaw(
+            A=self.by_law(lambda law: law.A, rows),
+            B=self.by_law(lambda law: law.B, rows),
+            bending=self.by_law(lambda law: law.bending, rows),
+            shear_flexibility=self.by_law(lambda law: np.linalg.inv(law.H), rows),
+            drilling=DRILLING * self.by_law(lambda law: law.shear_modulus, rows),
+            nu=self.by_law(lambda law: law.nu, rows),
+        )
+        local = quad_strains(planes.xy, law) if self.kind == "quad" else triangle_strains(planes.xy, law)
+        return FlatStrains(_times_blocks(local.B, planes), local.weights)
+
+    def elasticity(self, rows: slice) -> Array:
+        """Return the matrix from strains to resultants N, M, Q and drilling moment, (n, 9, 9) [N/m, N m]."""
+        stiffness = self.by_law(lambda law: law.stiffness, rows)
+        D = np.zeros((len(stiffness), N_STRAINS, N_STRAINS))
+        D[:, :8, :8] = stiffness
+        D[:, 8, 8] = DRILLING * self.by_law(lambda law: law.shear_modulus, rows)
+        return D
+
+    def stiffness(self) -> Array:
+        """Return Σ w Bᵀ D B over the dofs of the nodes, (n, 6 c, 6 c)."""
+        n, d = len(self.cells), 6 * self.cells.shape[1]
+        K = np.empty((n, d, d))
+        for rows in self.chunks():
+            strains = self.strains(rows)
+            weighted = self.elasticity(rows)[:, None] @ (strains.weights[..., None, None] * strains.B)
+            part = len(strains.B)
+            K[rows] = strains.B.reshape(part, -1, d).transpose(0, 2, 1) @ weighted.reshape(part, -1, d)
+        return (K + K.transpose(0, 2, 1)) / 2
+
+    def slices(self, rows: slice) -> Slices:
+        """Return pieces of the normal as rigid slices, with mass per area and its second moment along the normal.
+
+        A point moves by u + theta × z n, z in -t/2..t/2, so the drilling rotation does not move it. The second moment
+        is t²/12 for one material. Layers may have their centre of mass away from the middle surface.
+        """
+        planes = self.planes[rows]
+        points, w = flat_quadrature(self.kind, MASS_DEGREE[self.kind])
+        shape = flat_shape(self.kind, points)
+        n, p, c = len(planes.R), len(points), self.cells.shape[1]
+        _, det = jacobians(shape.gradients, planes.xy)
+        mass = self.by_law(lambda law: law.mass, rows)[:, None] * w * det
+        arm = self.mass_arms(rows)
+        motion = np.zeros((n, p, 6, c, 6))
+        motion[:, :, :3] = translations(planes, shape.values, shape.side_values, shape, DRILLING_SHARE[self.kind])
+        for a in range(3, 6):
+            motion[:, :, a, :, a] = shape.values
+        motion[:, :, :3] -= np.einsum("nab,npbcd->npacd", tilde(arm), motion[:, :, 3:])
+        moments = np.zeros((n, p, 3))
+        moments[:, :, 2] = mass * self.by_law(lambda law: law.spread, rows)[:, None]
+        return Slices(
+            position=shape.values @ planes.corners + arm[:, None],
+            mass=mass,
+            axes=np.broadcast_to(planes.R[:, None], (n, p, 3, 3)),
+            moments=moments,
+            motion=motion.reshape(n, p, 6, 6 * c),
+            dofs=self.dofs[rows],
+        )
+
+    def mass_arms(self, rows: slice) -> Array:
+        """Return the vector from the middle surface to the centre of mass, mesh axes, (n, 3) [m]."""
+        return self.by_law(lambda law: law.centre, rows)[:, None] * self.planes.R[rows][:, :, 2]
+
+    def areas(self) -> Array:
+        """Return the area of each cell, (n,) [m²]."""
+        points, w = flat_quadrature(self.kind, STRAIN_DEGREE[self.kind])
+        return np.asarray(jacobians(flat_shape(self.kind, points).gradients, self.planes.xy)[1] @ w)
+
+    def mass_matrices(self) -> Array:
+        """Return consistent mass matrices with rotary inertia, (n, 6 c, 6 c)."""
+        return np.concatenate([self.slices(rows).mass_matrices() for rows in self.chunks()])
+
+    def resultants(self, u: Array, rows: slice) -> Array:
+        """Return N_x N_y N_xy, M_x M_y M_xy, Q_x Q_y in local axes at the strain points, (n, p, 8, k) [N/m, N].
+
+        Parameters
+        ----------
+        u
+            Columns over the dofs of the nodes, (6 n_nodes, k).
+        rows
+            Rows of the cells.
+        """
+        strains = self.strains(rows)
+        n, p, _, d = strains.B.shape
+        values = (strains.B.reshape(n, p * N_STRAINS, d) @ u[self.dofs[rows]]).reshape(n, p, N_STRAINS, -1)
+        return np.asarray((self.elasticity(rows)[:, None] @ values)[:, :, :8])
+
+    def internal_forces(self, u: Array, rows: slice) -> Array:
+        """Return K u of some cells over the dofs of their nodes, (n, 6 c, k) [N, N m]."""
+        strains = self.strains(rows)
+        n, p, _, d = strains.B.shape
+        flat = strains.B.reshape(n, p * N_STRAINS, d)
+        values = (flat @ u[self.dofs[rows]]).reshape(n, p, N_STRAINS, -1)
+        resultants = (self.elasticity(rows)[:, None] @ values) * strains.weights[..., None, None]
+        return np.asarray(flat.transpose(0, 2, 1) @ resultants.reshape(n, p * N_STRAINS, -1))
+
+    def corner_resultants(self, u: Array, rows: slice) -> Array:
+        """Return the resultants extrapolated linearly to the corners, (n, c, 8, k)."""
+        return np.einsum("cp,npsk->ncsk", corner_extrapolation(self.kind), self.resultants(u, rows))
+
+    def stress(self, resultants: Array, rows: slice, height: float) -> Array:
+        """Return the stress at one height of the thickness, (n, ..., 6, k) [Pa], xx yy zz yz xz xy in mesh axes.
+
+        sigma = Q (eps + z kappa) of the layer at this height (of the lower layer where two meet). Transverse shear
+        follows from equilibrium (`fe_models.elements.shells.laminate`). One material gives N/t + 12 z M/t³ and 3 Q/(2
+        t) (1 - 4 z²/t²).
+
+        Parameters
+        ----------
+        resultants
+            Stress resultants in local axes, (n, p, 8, k).
+        rows
+            Rows of the cells.
+        height
+            z/t: -1/2 bottom, 0 middle, 1/2 top.
+        """
+
+        def at_height(law: ShellLaw) -> Array:
+            z = height * law.thickness
+            return law.stress(z, law.layer_at(z))
+
+        local = self.by_law(at_height, rows)[:, None] @ resultants
+        return np.einsum("nas,npsk->npak", stress_directions(self.planes.R[rows]), local)
+
+
+def shell_cells(
+    nodes: Array, kind: str, cells: IntArray, used: tuple[AnyShellProperty, ...], of_cell: IntArray
+) -> ShellCells:
+    """Return the elements of one cell type.
+
+    Parameters
+    ----------
+    nodes
+        Positions, (n_nodes, 3) [m].
+    kind, cells
+        Type and nodes of the cells.
+    used, of_cell
+        Properties, and the index of the property of each cell, (n,).
+    """
+    none = (0.0, 0.0, 0.0)
+    directions = np.array([item.direction if isinstance(item, LaminateProperty) else none for item in used])
+    offsets = np.array([item.offset for item in used], dtype=float)
+    planes = cell_planes(nodes, cells, offsets[of_cell], directions[of_cell])
+    along = directions[of_cell]
+    lengths = np.linalg.norm(along, axis=1)
+    across = np.linalg.norm(np.cross(along, planes.R[:, :, 2]), axis=1)
+    lost = np.flatnonzero((lengths > 0) & (across < np.sin(np.deg2rad(LEAST_ANGLE)) * lengths))
+    if lost.size:
+        raise ShellError(
+            f"laminate: {lost.size} {kind} cells stand across direction {tuple(along[lost[0]].tolist())}, first cell "
+            f"{lost[0]}: within {LEAST_ANGLE:g} degrees of their normal it gives no axis on them; give these cells a "
+            "laminate with another direction"
+        )
+    return ShellCells(kind, cells, planes, tuple(shell_law(item) for item in used), of_cell)
+
+
+def translations(planes: CellPlanes, N: Array, E: Array, shape: FlatShape, share: float) -> Array:
+    """Return translations of the middle surface for unit dofs of the nodes, mesh axes, (n, p, 3, c, 6).
+
+    u = Σ N_i (u_i + theta_i × lever_i) - 1/8 Σ_sides E_k (theta_j - theta_i) × (x_j - x_i). On each side this is the
+    parabola of the cubic through the ends with their rotations, normal to the plane (bending) and in it (drilling). So
+    u is quadratic along sides, and a rigid rotation is exact.
+
+    Parameters
+    ----------
+    planes
+        Planes of the cells.
+    N, E
+        Functions of corners (N) and sides (E), or their derivatives with respect to one coordinate: (p, c) or (n, p,
+        c).
+    shape
+        Shape functions, which name the ends of the sides.
+    share
+        Share of the drilling part.
+    """
+    n, c = planes.levers.shape[:2]
+    N, E = (np.broadcast_to(table, (n, *table.shape[-2:])) for table in (N, E))
+    u = np.zeros((n, N.shape[1], 3, c, 6))
+    for a in range(3):
+        u[:, :, a, :, a] = N
+    normal = planes.R[:, :, 2]
+    kept = np.eye(3) - (1 - share) * normal[:, :, None] * normal[:, None, :]
+    for corner in range(c):
+        u[:, :, :, corner, 3:] -= N[:, :, corner, None, None] * tilde(planes.levers[:, corner])[:, None]
+    for side, (i, j) in enumerate(shape.sides):
+        arm = tilde(planes.corners[:, j] - planes.corners[:, i]) @ kept / 8
+        bulge = E[:, :, side, None, None] * arm[:, None]
+        u[:, :, :, j, 3:] += bulge
+        u[:, :, :, i, 3:] -= bulge
+    return u
+
+
+def corner_extrapolation(kind: str) -> Array:
+    """Return the matrix from values at the strain points to values at the corners, linear or bilinear, (c, p)."""
+    points, _ = flat_quadrature(kind, STRAIN_DEGREE[kind])
+    if kind == "triangle":
+        corners = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
+        at_points, at_corners = (np.column_stack([np.ones(len(x)), x]) for x in (points, corners))
+    else:
+        corners = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+        at_points, at_corners = (np.column_stack([np.ones(len(x)), x, x[:, 0] * x[:, 1]]) for x in (points, corners))
+    return np.asarray(at_corners @ np.linalg.inv(at_points))
+
+
+def stress_directions(R: Array) -> Array:
+    """Return the map from local sigma_x sigma_y tau_xy tau_xz tau_yz to xx yy zz yz xz xy in mesh axes, (n, 6, 5)."""
+    columns = []
+    for i, j in ((0, 0), (1, 1), (0, 1), (0, 2), (1, 2)):
+        tensor = np.einsum("na,nb->nab", R[:, :, i], R[:, :, j])
+        if i != j:
+            tensor = tensor + tensor.transpose(0, 2, 1)
+        columns.append(np.stack([tensor[:, a, b] for a, b in ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))], axis=1))
+    return np.stack(columns, axis=2)
+
+
+def _times_blocks(B: Array, planes: CellPlanes) -> Array:
+    """Return B T, block by block: B over local dofs of the corners becomes B over dofs of the nodes."""
+    n, p, s, d = B.shape
+    c = d // 6
+    blocks = B.reshape(n, p * s, c, 6)
+    Rt = planes.R.transpose(0, 2, 1)
+    out = np.empty((n, c, p * s, 6))
+    for k in range(c):
+        force = np.ascontiguousarray(blocks[:, :, k, :3]) @ Rt
+        out[:, k, :, :3] = force
+        out[:, k, :, 3:] = np.ascontiguousarray(blocks[:, :, k, 3:]) @ Rt - force @ tilde(planes.levers[:, k])
+    return out.transpose(0, 2, 1, 3).reshape(n, p, s, d)

@@ -1,0 +1,196 @@
+"""Thickness and material, or layers, and offset of groups of cells."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.body.material import AnisotropicMaterial, AnyMaterial, Material, OrthotropicMaterial, require_isotropic
+from fe_models.errors import ShellError
+from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.words import nearest, quoted
+from fe_models.meshes.shell_mesh import ShellMesh
+
+__all__ = ["AnyShellProperty", "LaminateProperty", "Layer", "ShellProperty", "assign_shell_properties", "symmetric"]
+
+
+@dataclass(frozen=True)
+class ShellProperty:
+    """Thickness, material and offset of a group of cells.
+
+    Raises
+    ------
+    ShellError
+        Unless the thickness is positive, the added mass is not negative, and all numbers are finite.
+    """
+
+    thickness: float  #: [m]
+    material: Material
+    offset: float = 0.0  #: distance of the middle surface from the nodes, along the normal of the cell [m]
+    added_mass: float = 0.0  #: additional mass per area, without stiffness, distributed through the thickness [kg/m²]
+    bending_ratio: float = 1.0  #: bending stiffness relative to that of a plate of this thickness (ribs, honeycomb)
+    shear_ratio: float = 1.0  #: transverse shear stiffness relative to that of a plate of this thickness
+
+    def __post_init__(self) -> None:
+        require_isotropic("shell property", self.material)
+        _require_numbers("shell property", self, ("thickness", "offset", "added_mass"))
+        _require_ratios("shell property", self)
+        if not self.thickness > 0:
+            raise ShellError(f"shell property: thickness: expected a length above zero, got {self.thickness}")
+        if self.added_mass < 0:
+            raise ShellError(f"shell property: added_mass: expected zero or more, got {self.added_mass}")
+
+    @property
+    def materials(self) -> tuple[AnyMaterial, ...]:
+        """The material, as a tuple, as for layers."""
+        return (self.material,)
+
+
+@dataclass(frozen=True)
+class Layer:
+    """One layer of a laminate.
+
+    Raises
+    ------
+    ShellError
+        Unless the thickness is positive and the angle finite, or if the material has its own axes.
+    """
+
+    material: AnyMaterial
+    thickness: float  #: [m]
+    angle: float = 0.0  #: angle of material axis 1 from the layup direction, right-handed about the normal [degree]
+
+    def __post_init__(self) -> None:
+        _require_numbers("layer", self, ("thickness", "angle"))
+        if not self.thickness > 0:
+            raise ShellError(f"layer: thickness: expected a length above zero, got {self.thickness}")
+        material = self.material
+        if isinstance(material, AnisotropicMaterial):
+            raise ShellError(
+                f"layer: material {material.name!r} is anisotropic; layers are isotropic (Material) or orthotropic "
+                "(OrthotropicMaterial)"
+            )
+        if isinstance(material, OrthotropicMaterial) and not np.array_equal(material.axes, np.eye(3)):
+            raise ShellError(
+                f"layer: material {material.name!r} has axes of its own; the angle of a layer is measured from the "
+                "direction of the layup: use a material without axes"
+            )
+
+
+@dataclass(frozen=True)
+class LaminateProperty:
+    """Layers and offset of a group of cells.
+
+    Raises
+    ------
+    ShellError
+        Unless there are layers, the direction is not zero, and all numbers are finite.
+    """
+
+    layers: tuple[Layer, ...]  #: from the bottom to the top, along the normal of the cell
+    direction: tuple[float, float, float]  #: direction in mesh axes; its projection onto a cell is the first layup axis
+    offset: float = 0.0  #: distance of the middle surface from the nodes, along the normal of the cell [m]
+    added_mass: float = 0.0  #: additional mass per area, without stiffness, distributed through the thickness [kg/m²]
+    bending_ratio: float = 1.0  #: bending stiffness relative to that of the layer; 1 if there are several layers
+    shear_ratio: float = 1.0  #: transverse shear stiffness relative to that of the layers
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "layers", tuple(self.layers))
+        if not self.layers or not all(isinstance(layer, Layer) for layer in self.layers):
+            raise ShellError(f"laminate: layers: expected one Layer or more, got {self.layers!r}")
+        direction = np.asarray(self.direction)
+        if direction.shape != (3,) or direction.dtype.kind not in "iuf" or not np.isfinite(direction).all():
+            raise ShellError(f"laminate: direction: expected three finite numbers, got {self.direction!r}")
+        if not np.linalg.norm(direction) > 0:
+            raise ShellError("laminate: direction: expected a vector that is not zero, such as (1, 0, 0)")
+        object.__setattr__(self, "direction", tuple(float(x) for x in direction))
+        _require_numbers("laminate", self, ("offset", "added_mass"))
+        _require_ratios("laminate", self)
+        if self.bending_ratio != 1 and len(self.layers) > 1:
+            raise ShellError(
+                f"laminate: bending_ratio: expected 1 with several layers, got {self.bending_ratio}; it does not say "
+                "how they couple membrane and bending"
+            )
+        if self.added_mass < 0:
+            raise ShellError(f"laminate: added_mass: expected zero or more, got {self.added_mass}")
+
+    @property
+    def thickness(self) -> float:
+        """Thickness of all layers together [m]."""
+        return sum(layer.thickness for layer in self.layers)
+
+    @property
+    def materials(self) -> tuple[AnyMaterial, ...]:
+        """Materials of the layers, each once."""
+        return tuple(dict.fromkeys(layer.material for layer in self.layers))
+
+
+AnyShellProperty = ShellProperty | LaminateProperty
+
+
+def symmetric(layers: Sequence[Layer]) -> tuple[Layer, ...]:
+    """Return the layers, bottom to middle, followed by their mirror image: [0, 90] gives [0, 90, 90, 0]."""
+    return (*layers, *reversed(layers))
+
+
+def _require_numbers(where: str, item: object, names: tuple[str, ...]) -> None:
+    for name in names:
+        value = getattr(item, name)
+        if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
+            raise ShellError(f"{where}: {name}: expected a finite number, got {value!r}")
+
+
+def _require_ratios(where: str, item: object) -> None:
+    for name in ("bending_ratio", "shear_ratio"):
+        _require_numbers(where, item, (name,))
+        if not getattr(item, name) > 0:
+            raise ShellError(f"{where}: {name}: expected a number above zero, got {getattr(item, name)}")
+
+
+def assign_shell_properties(
+    mesh: ShellMesh, properties: AnyShellProperty | Mapping[str, AnyShellProperty]
+) -> tuple[tuple[AnyShellProperty, ...], dict[str, IntArray]]:
+    """Return the properties in use and, for each cell type, the index of the property of every cell.
+
+    Parameters
+    ----------
+    mesh
+        The mesh; its `cell_sets` name the groups.
+    properties
+        One property for all cells, or one for each group name. Groups may overlap if they have the same property.
+
+    Raises
+    ------
+    ShellError
+        If a group is unknown, or cells have no property or two properties.
+    """
+    if isinstance(properties, AnyShellProperty):
+        return (properties,), {kind: np.zeros(len(cells), np.int64) for kind, cells in mesh.cells.items()}
+    used = tuple(dict.fromkeys(properties.values()))
+    number = {kind: np.full(len(cells), -1, np.int64) for kind, cells in mesh.cells.items()}
+    for group, item in properties.items():
+        if group not in mesh.cell_sets:
+            raise ShellError(f"shells: the mesh has no group of cells {quoted(group)}{nearest(group, mesh.cell_sets)}")
+        index = used.index(item)
+        for kind, rows in mesh.cell_sets[group].items():
+            taken = rows[(number[kind][rows] >= 0) & (number[kind][rows] != index)]
+            if taken.size:
+                raise ShellError(
+                    f"shells: {taken.size} {kind} cells of group {group!r} have two thicknesses or materials, first "
+                    f"{mesh.cell_name(kind, taken[0])}; make the groups disjoint"
+                )
+            number[kind][rows] = index
+    missing = {kind: np.flatnonzero(index < 0) for kind, index in number.items() if (index < 0).any()}
+    if missing:
+        counts = ", ".join(f"{rows.size} {kind}" for kind, rows in missing.items())
+        groups = [
+            group
+            for group, by_type in mesh.cell_sets.items()
+            if any(np.isin(missing[kind], by_type[kind]).any() for kind in missing if kind in by_type)
+        ]
+        where = f"they are in the groups {', '.join(groups)}: give these one" if groups else "they are in no group"
+        raise ShellError(
+            f"shells: cells without a thickness: {counts}; {where}; cells outside the body are left out by  "
+            'read_shell_mesh(groups=...) or, in a job, accept = ["left-out"]'
+        )
+    return used, number

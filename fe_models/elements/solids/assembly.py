@@ -1,0 +1,358 @@
+"""Stiffness and consistent mass of a mesh of solid elements, assembled directly into compressed sparse form.
+
+(1) number the element nodes of all elements consecutively, and list for each node the places where it occurs;
+(2) derive the graph of the nodes: row i holds the nodes that share an element with node i, ascending;
+(3) compute element matrices in batches of bounded size, in threads;
+(4) after each batch, add the contributions of the elements to the rows of each node, in the order of the elements. No
+    two threads write to one entry, and the sums do not depend on the number of threads, so results are bitwise
+    reproducible;
+(5) assemble the scalar mass M_s once and expand it by components, M = M_s ⊗ 1₃.
+"""
+
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_models.body.material import AnyMaterial, Material, isotropic_tensor
+from fe_models.elements.solids.elements import ReferenceElement, reference_element
+from fe_models.elements.solids.incompatible import KIND, brick_chunks, brick_stiffness
+from fe_models.errors import MeshError
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.threads import n_threads
+from fe_models.meshes.mesh import Mesh
+
+__all__ = ["Progress", "assemble", "elastic_properties", "expand_scalar_mass"]
+
+Progress = Callable[[float], None]  #: receives the finished fraction, 0 to 1
+
+BATCH_BYTES = 32e6  #: memory of one batch of element matrices; larger batches leave the cache and are not faster
+LARGEST_INT32 = 2**31 - 1
+
+
+@dataclass(frozen=True, eq=False)
+class NodeGraph:
+    """Graph of nodes that share an element, and the places of each node in the elements."""
+
+    start: IntArray  #: first entry of `places` of each node, (n_nodes + 1,)
+    places: np.ndarray  #: places in the joined element lists, node by node, ascending, (n_places,) int32
+    row_start: IntArray  #: first entry of `columns` of each node, (n_nodes + 1,)
+    columns: np.ndarray  #: neighbours of each node, including itself, ascending, (n_entries,) int32
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes."""
+        return len(self.row_start) - 1
+
+
+@dataclass(frozen=True, eq=False)
+class Elasticity:
+    """Elastic constants and densities of the materials of a mesh, as arrays."""
+
+    properties: Array  #: lam, mu, rho of each material, (n_materials, 3); lam and mu are unused for general materials
+    tensors: Array  #: matrix of each material that maps strain to stress, (n_materials, 6, 6)
+    is_general: np.ndarray  #: whether a material is not isotropic, (n_materials,) bool
+
+    @staticmethod
+    def of(properties: Array, tensors: Mapping[int, Array] | None) -> "Elasticity":
+        """Make it from lam, mu, rho and the stiffness matrices of the materials that are not isotropic."""
+        given = dict(tensors or {})
+        every = [given.get(k, isotropic_tensor(lam, mu)) for k, (lam, mu, _) in enumerate(properties)]
+        return Elasticity(properties, np.array(every), np.isin(np.arange(len(properties)), list(given)))
+
+
+def assemble(
+    mesh: Mesh,
+    properties: Array,
+    of_cell: Mapping[str, IntArray],
+    *,
+    incompatible: bool = False,
+    integration: str = "full",
+    mass: str = "consistent",
+    tensors: Mapping[int, Array] | None = None,
+    progress: Progress | None = None,
+) -> tuple[sp.csc_array, sp.csr_array]:
+    """Assemble the stiffness and the scalar mass of all solid cells.
+
+    Parameters
+    ----------
+    mesh
+        Every node must belong to a solid cell.
+    properties
+        lam [Pa], mu [Pa], rho [kg/m³] of each material, (n_materials, 3).
+    of_cell
+        Index of the material of each cell, (n_cells,), by cell type.
+    incompatible
+        Whether eight-node bricks have incompatible modes (`fe_models.elements.solids.incompatible`).
+    integration, mass
+        Names in `INTEGRATIONS` and `MASSES` of `fe_models.elements.solids.elements`. A lumped element mass is the
+        diagonal of the consistent mass, scaled to the mass of the element.
+    tensors
+        Stiffness of each material that is not isotropic, by its index: maps strain to stress, (6, 6) [Pa], rows xx yy
+        zz yz xz xy. The lam and mu of these materials are not used.
+    progress
+        Called with the finished fraction.
+
+    Returns
+    -------
+    tuple
+        K, (3 n_nodes, 3 n_nodes) [N/m], where dof 3 i + c is component c of node i, and M_s, (n_nodes, n_nodes) [kg].
+        Both are exactly symmetric, with sorted indices.
+
+    Raises
+    ------
+    MeshError
+        If there is no solid cell, a cell names a node that does not exist, a node belongs to no solid cell, or an
+        element is inverted (Jacobian not positive at a quadrature point).
+    """
+    kinds = require_assemblable(mesh)
+    lists = {kind: np.ascontiguousarray(mesh.cells[kind], dtype=np.int32) for kind in kinds}
+    with ThreadPoolExecutor(n_threads()) as pool:
+        graph = node_graph(list(lists.values()), len(mesh.nodes), pool)
+        K_data, M_data = assembled_data(
+            mesh.nodes,
+            lists,
+            Elasticity.of(properties, tensors),
+            of_cell,
+            graph,
+            pool,
+            incompatible,
+            (integration, mass),
+            progress,
+        )
+        K = expanded_stiffness(graph, K_data, pool)
+    M_s = sp.csr_array((M_data, graph.columns, index_like(graph.row_start, len(M_data))), shape=2 * (graph.n_nodes,))
+    return K, M_s
+
+
+def elastic_properties(materials: tuple[AnyMaterial, ...]) -> tuple[Array, dict[int, Array]]:
+    """Return lam, mu, rho of each material, (n, 3), and the stiffness matrices of those that are not isotropic."""
+    rows = [(m.lam, m.mu, m.rho) if isinstance(m, Material) else (0.0, 0.0, m.rho) for m in materials]
+    return np.array(rows), {k: m.stiffness for k, m in enumerate(materials) if not isinstance(m, Material)}
+
+
+def expand_scalar_mass(M_s: sp.csr_array) -> sp.csc_array:
+    """Return M = M_s ⊗ 1₃, (3 n_nodes, 3 n_nodes), dof 3 i + c, from the symmetric scalar mass, (n_nodes, n_nodes)."""
+    from fe_models.elements.solids.assembly_kernels import expand_mass
+
+    n_nodes, nnz = M_s.shape[0], 3 * M_s.nnz
+    index_type = np.int32 if nnz <= LARGEST_INT32 else np.int64
+    indptr, indices, data = np.zeros(3 * n_nodes + 1, index_type), np.empty(nnz, index_type), np.empty(nnz)
+    row_start, columns = np.asarray(M_s.indptr, np.int64), np.asarray(M_s.indices, np.int32)
+    with ThreadPoolExecutor(n_threads()) as pool:
+        in_parts(pool, expand_mass, (row_start, columns, M_s.data), (indptr, indices, data))
+    return sorted_csc(data, indices, indptr)
+
+
+def node_graph(lists: list[np.ndarray], n_nodes: int, pool: ThreadPoolExecutor) -> NodeGraph:
+    """Make the node graph, steps (1) and (2), from the element lists of all types, each (n_cells, nodes per cell)."""
+    from fe_models.elements.solids.assembly_kernels import node_incidence, row_columns, row_counts
+
+    members = np.concatenate([cells.ravel() for cells in lists])
+    if members.size > LARGEST_INT32:
+        raise MeshError(f"assembly: {members.size} element nodes, expected at most {LARGEST_INT32}")
+    offsets = np.cumsum([0, *[cells.size for cells in lists]])
+    first = np.concatenate(
+        [
+            offset + np.repeat(np.arange(0, cells.size, cells.shape[1], dtype=np.int32), cells.shape[1])
+            for offset, cells in zip(offsets[:-1].astype(np.int32), lists, strict=True)
+        ]
+    )
+    n_members = np.concatenate([np.full(cells.size, cells.shape[1], np.int8) for cells in lists])
+    start, places = node_incidence(members, n_nodes)
+    unused = np.flatnonzero(np.diff(start) == 0)
+    if unused.size:
+        raise MeshError(
+            f"assembly: {unused.size} of {n_nodes} nodes belong to no solid cell (first: {unused[0]}); "
+            f"drop them first: fe_models.meshes.unused_nodes.drop_unused_nodes(mesh)"
+        )
+    counts = np.zeros(n_nodes, np.int64)
+    in_parts(pool, row_counts, (members, first, n_members, start, places), (counts,))
+    row_start = np.concatenate([[0], np.cumsum(counts)])
+    columns = np.empty(row_start[-1], np.int32)
+    in_parts(pool, row_columns, (members, first, n_members, start, places), (row_start, columns))
+    return NodeGraph(start, places, row_start, columns)
+
+
+def assembled_data(
+    nodes: Array,
+    lists: Mapping[str, np.ndarray],
+    elasticity: "Elasticity",
+    of_cell: Mapping[str, IntArray],
+    graph: NodeGraph,
+    pool: ThreadPoolExecutor,
+    incompatible: bool,
+    rules: tuple[str, str],
+    progress: Progress | None,
+) -> tuple[Array, Array]:
+    """Compute the entries of K, row by row, and of M_s: steps (3) and (4)."""
+    from fe_models.elements.solids.assembly_kernels import element_matrices, scatter_elements
+    from fe_models.elements.solids.tensor_kernels import tensor_stiffness
+
+    n_parts = n_threads()
+    K_data, M_data = np.zeros(9 * len(graph.columns)), np.zeros(len(graph.columns))
+    where = np.zeros((n_parts, graph.n_nodes), np.int32)
+    cursor = graph.start[:-1].copy()
+    first_place = 0
+    for kind, cells in lists.items():
+        element = reference_element(kind, *rules)
+        tables = kernel_tables(element)
+        n_a = element.n_nodes
+        # 9 + 1 numbers for each pair of nodes
+        n_batch = min(len(cells), max(n_parts, int(BATCH_BYTES / (80 * n_a**2))))
+        K_e, M_e = np.empty((n_batch, 3 * n_a, 3 * n_a)), np.empty((n_batch, n_a, n_a))
+        is_inverted = np.zeros(len(cells), bool)
+        materials = np.asarray(of_cell[kind])
+        for begin in range(0, len(cells), n_batch):
+            batch = cells[begin : begin + n_batch]
+            cuts = [len(batch) * part // n_parts for part in range(n_parts + 1)]
+            shares = [(slice(a, b), slice(begin + a, begin + b)) for a, b in pairwise(cuts)]
+            run(
+                pool,
+                [
+                    (
+                        element_matrices,
+                        nodes,
+                        cells[rows],
+                        elasticity.properties,
+                        materials[rows],
+                        *tables,
+                        K_e[at],
+                        M_e[at],
+                        is_inverted[rows],
+                    )
+                    for at, rows in shares
+                ],
+            )
+            if incompatible and kind == KIND and not is_inverted[begin : begin + len(batch)].any():
+                of_batch = elasticity.tensors[materials[begin : begin + len(batch)]]
+                for rows, _ in brick_chunks(batch):
+                    K_e[rows] = brick_stiffness(nodes[batch[rows]], of_batch[rows])
+            elif elasticity.is_general[materials[begin : begin + len(batch)]].any():
+                run(
+                    pool,
+                    [
+                        (tensor_stiffness, nodes, cells[rows], elasticity.tensors, elasticity.is_general,
+                         materials[rows], *tables[1], K_e[at])
+                        for at, rows in shares
+                    ],
+                )  # fmt: skip
+            if rules[1] == "lumped":
+                M_e[: len(batch)] = lumped_mass(M_e[: len(batch)])
+            run(
+                pool,
+                [
+                    (
+                        scatter_elements,
+                        batch,
+                        first_place,
+                        graph.start,
+                        graph.places,
+                        cursor,
+                        graph.row_start,
+                        graph.columns,
+                        K_e,
+                        M_e,
+                        part,
+                        n_parts,
+                        where[part],
+                        K_data,
+                        M_data,
+                    )
+                    for part in range(n_parts)
+                ],
+            )
+            first_place += batch.size
+            if progress is not None:
+                progress(first_place / len(graph.places))
+        require_upright(kind, is_inverted)
+    return K_data, M_data
+
+
+def lumped_mass(M_e: Array) -> Array:
+    """Return diagonal element masses, (n, n_a, n_a): the diagonal of M_e, scaled to the sum of all its entries."""
+    diagonal = np.einsum("eaa->ea", M_e)
+    total = M_e.sum(axis=(1, 2))
+    return np.asarray((diagonal * (total / diagonal.sum(axis=1))[:, None])[:, :, None] * np.eye(M_e.shape[1]))
+
+
+def kernel_tables(element: ReferenceElement) -> tuple[tuple[np.ndarray, ...], ...]:
+    """Return the kernel's tables: for affine elements, and for stiffness and mass of curved elements."""
+    affine = (element.nodes, element.axis_nodes, element.stiffness_integrals, element.mass_integrals)
+    stiffness = (element.stiffness.gradients, element.stiffness.weights)
+    return affine, stiffness, (element.mass.values, element.mass.gradients, element.mass.weights)
+
+
+def expanded_stiffness(graph: NodeGraph, K_data: Array, pool: ThreadPoolExecutor) -> sp.csc_array:
+    """Make K from its entries, the row starts and the column numbers; rows equal columns, because K is symmetric."""
+    from fe_models.elements.solids.assembly_kernels import expand_columns
+
+    index_type = np.int32 if len(K_data) <= LARGEST_INT32 else np.int64
+    indptr, indices = np.zeros(3 * graph.n_nodes + 1, index_type), np.empty(len(K_data), index_type)
+    in_parts(pool, expand_columns, (graph.row_start, graph.columns), (indptr, indices))
+    return sorted_csc(K_data, indices, indptr)
+
+
+def sorted_csc(data: Array, indices: np.ndarray, indptr: np.ndarray) -> sp.csc_array:
+    """Wrap the arrays of a square matrix with sorted and unique column entries, without check or copy."""
+    matrix = sp.csc_array((data, indices, indptr), shape=2 * (len(indptr) - 1,))
+    matrix.has_canonical_format = True
+    return matrix
+
+
+def index_like(values: IntArray, largest: int) -> np.ndarray:
+    """Return index numbers as int32 if they fit; this halves the memory and suits the sparse solvers."""
+    return values.astype(np.int32) if largest <= LARGEST_INT32 else values
+
+
+def in_parts(pool: ThreadPoolExecutor, kernel: Any, inputs: tuple[Any, ...], outputs: tuple[Any, ...]) -> None:
+    """Run kernel(*inputs, part, n_parts, *outputs) for every part, in threads."""
+    n_parts = n_threads()
+    run(pool, [(kernel, *inputs, part, n_parts, *outputs) for part in range(n_parts)])
+
+
+def run(pool: ThreadPoolExecutor, calls: list[tuple[Any, ...]]) -> None:
+    """Run the calls (function, *arguments) in threads, and wait for all of them."""
+    futures = [pool.submit(function, *arguments) for function, *arguments in calls]
+    for future in futures:
+        future.result()
+
+
+def require_assemblable(mesh: Mesh) -> list[str]:
+    """Return the types of the solid cells; raise `MeshError` if nodes or cells cannot form a body."""
+    kinds = [kind for kind, cells in mesh.cells.items() if len(cells)]
+    if not kinds:
+        raise MeshError("assembly: the mesh has no solid cells; expected tetrahedra, hexahedra or wedges")
+    if not np.isfinite(mesh.nodes).all():
+        raise MeshError(
+            f"assembly: {(~np.isfinite(mesh.nodes)).any(axis=1).sum()} nodes have coordinates that are not "
+            f"finite numbers"
+        )
+    for kind in kinds:
+        require_known_nodes(kind, mesh.cells[kind], len(mesh.nodes))
+    return kinds
+
+
+def require_known_nodes(kind: str, cells: IntArray, n_nodes: int) -> None:
+    """Raise `MeshError` if cells have the wrong number of nodes or refer to unknown nodes."""
+    expected = reference_element(kind).n_nodes
+    if cells.ndim != 2 or cells.shape[1] != expected:
+        raise MeshError(f"assembly: {kind}: expected (n_cells, {expected}) nodes, got {cells.shape}")
+    if cells.min() < 0 or cells.max() >= n_nodes:
+        raise MeshError(f"assembly: {kind}: expected nodes 0..{n_nodes - 1}, got {cells.min()}..{cells.max()}")
+
+
+def require_upright(kind: str, is_inverted: np.ndarray) -> None:
+    """Raise `MeshError` that names the inverted elements of one type."""
+    rows = np.flatnonzero(is_inverted)
+    if rows.size:
+        some = ", ".join(str(row) for row in rows[:5]) + (", ..." if rows.size > 5 else "")
+        raise MeshError(
+            f"assembly: {rows.size} of {len(is_inverted)} {kind} cells are inverted or collapsed (Jacobian "
+            f"not positive): cells {some}; expected the node order of VTK; repair the mesh, or straighten "
+            f"curved elements there"
+        )

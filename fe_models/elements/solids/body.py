@@ -1,0 +1,351 @@
+"""The finite element body of a mesh of solid cells."""
+
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.metadata import version
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_models.body.fe_body import FEBody, Interface
+from fe_models.body.mass_loads import MassLoads
+from fe_models.body.material import AnyMaterial, assign_materials, material_words
+from fe_models.elements.solids.assembly import Progress, assemble, elastic_properties, expand_scalar_mass
+from fe_models.elements.solids.assembly_on_ranks import SpreadMesh, assemble_on_ranks
+from fe_models.elements.solids.elements import INTEGRATIONS, MASSES, reference_element
+from fe_models.elements.solids.geometric import internal_forces, projected_geometric_stiffness
+from fe_models.elements.solids.geometric_on_ranks import spread_geometric_stiffness
+from fe_models.elements.solids.incompatible import KIND
+from fe_models.elements.solids.rotation import nodal_rotation
+from fe_models.elements.solids.stress import nodal_stress, stiffest_at_nodes
+from fe_models.foundation.arrays import Array, IntArray, frozen_int
+from fe_models.foundation.errors import BodyError
+from fe_models.foundation.ranks.product import RowsProduct
+from fe_models.foundation.ranks.ranks import Ranks
+from fe_models.foundation.ranks.row_layout import RowLayout
+from fe_models.foundation.ranks.rows import Rows
+from fe_models.foundation.ranks.spread_columns import Part, SpreadColumns, own_part, spread_columns
+from fe_models.foundation.ranks.spread_matrix import SpreadMatrix
+from fe_models.foundation.tall.on_disk import in_memory, row_slices
+from fe_models.foundation.threads import n_threads
+from fe_models.foundation.units import Units
+from fe_models.foundation.words import nearest, quoted
+from fe_models.meshes.boundary import boundary_triangles
+from fe_models.meshes.cell_shapes import cell_jacobians
+from fe_models.meshes.mesh import Mesh
+from fe_models.meshes.mesh_numbering import solid_numbering
+from fe_models.meshes.objects.as_mesh import as_mesh
+
+__all__ = ["SolidModel", "scalar_mass_gram", "solid_body"]
+
+CELLS_AT_ONCE = 8_000  #: number of cells whose Jacobians are held at once
+GRAM_BYTES = 64e6  #: memory for M_s times a block of columns
+
+
+@dataclass(frozen=True, eq=False)
+class SolidModel:
+    """The element model of a solid body (`fe_body.ElementModel`): mass integrals, stress, geometric stiffness."""
+
+    mesh: Mesh
+    materials: tuple[AnyMaterial, ...]
+    of_cell: Mapping[str, IntArray]  #: index of the material of each cell, (n_cells,), by cell type
+    M_s: sp.csr_array | SpreadMatrix  #: scalar consistent mass, (n_nodes, n_nodes) [kg]
+    incompatible: bool = False  #: whether eight-node bricks have incompatible modes
+    integration: str = "full"  #: integration of the stiffness, one of `fe_models.elements.solids.elements.INTEGRATIONS`
+    parts: SpreadMesh | None = None  #: the distributed mesh, if several ranks assembled it
+
+    @cached_property
+    def of_node(self) -> IntArray:
+        """Material whose stress each node shows: that of the stiffest adjoining element, (n_nodes,)."""
+        return frozen_int(stiffest_at_nodes(self.mesh, self.materials, self.of_cell))
+
+    @property
+    def has_nodal_stress(self) -> bool:
+        """True, because solid elements know their stress."""
+        return True
+
+    def mass_gram(self, u: Any) -> Array:
+        """Return ∫ a aᵀ dm with a = [1, c, u_x, u_y, u_z], (4 + 3 k, 4 + 3 k), exact; u is (3 n_nodes, k)."""
+        if isinstance(self.M_s, SpreadMatrix):
+            return spread_mass_gram(self.M_s, self.mesh.nodes, u)
+        return scalar_mass_gram(self.M_s, self.mesh.nodes, np.asarray(u).reshape(len(self.mesh.nodes), 3, -1))
+
+    def nodal_stress(self, u: Array, *, nodes: IntArray | None = None) -> Array:
+        """Return the stress at the nodes, (n_nodes, 6, k) [Pa], xx yy zz yz xz xy, of columns u, (3 n_nodes, k).
+
+        If `nodes` are given, only their elements are visited, and the other nodes report zero.
+        """
+        require_rows("nodal_stress", u, 3 * len(self.mesh.nodes))
+        return nodal_stress(
+            self.mesh, self.materials, self.of_cell, self.of_node, u, nodes=nodes, incompatible=self.incompatible
+        )
+
+    def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
+        """Return half the curl of u at nodes of the mesh, (n, 3, k); NaN at other nodes."""
+        require_rows("nodal_rotation", u, 3 * len(self.mesh.nodes))
+        rotation = np.full((len(nodes), 3, u.shape[1]), np.nan)
+        is_own = nodes < len(self.mesh.nodes)
+        rotation[is_own] = nodal_rotation(self.mesh, u, nodes[is_own])
+        return rotation
+
+    @property
+    def has_geometric_stiffness(self) -> bool:
+        """True, because solid elements know their geometric stiffness."""
+        return True
+
+    def mass_forces(self, loads: MassLoads) -> Array:
+        """Return consistent nodal forces of loads per unit mass, (3 n_nodes, k); exact for loads linear in c."""
+        return np.asarray(self.M_s @ loads.at(self.mesh.nodes).reshape(len(self.mesh.nodes), -1)).reshape(-1, loads.k)
+
+    def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
+        """Return ∫ sigma grad N dV of the columns u, (3 n_nodes, k) [N]; if `nodes` are given, only there."""
+        require_rows("internal_forces", u, 3 * len(self.mesh.nodes))
+        return internal_forces(
+            self.mesh,
+            self.materials,
+            self.of_cell,
+            u,
+            nodes=nodes,
+            incompatible=self.incompatible,
+            integration=self.integration,
+        )
+
+    def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Any) -> Array:
+        """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), of the states u, (3 n_nodes, k); only their stress counts.
+
+        If Phi is distributed, each rank computes the contribution of its cells.
+        """
+        require_rows("geometric_stiffness", u, 3 * len(self.mesh.nodes))
+        require_rows("geometric_stiffness", Phi, 3 * len(self.mesh.nodes))
+        if isinstance(Phi, SpreadColumns) and self.parts is not None:
+            rules = {"incompatible": self.incompatible, "integration": self.integration}
+            return spread_geometric_stiffness(self.parts, self.materials, u, Phi, rules)
+        return projected_geometric_stiffness(
+            self.mesh,
+            self.materials,
+            self.of_cell,
+            u,
+            Phi,
+            incompatible=self.incompatible,
+            integration=self.integration,
+        )
+
+
+def solid_body(
+    mesh: Any,
+    materials: AnyMaterial | Mapping[str, AnyMaterial],
+    *,
+    name: str,
+    units: Units,
+    interfaces: Iterable[Interface] = (),
+    incompatible_modes: bool = False,
+    integration: str = "full",
+    mass: str = "consistent",
+    progress: Progress | None = None,
+    ranks: Ranks | None = None,
+) -> FEBody:
+    """Make the body of a mesh of solid cells: isoparametric elements with consistent mass, dof 3 i + c at node i.
+
+    Parameters
+    ----------
+    mesh
+        Tetrahedra, hexahedra, wedges and pyramids, also mixed; faces and lines are ignored. A `fe_models.Mesh`, or a
+        mesh of meshio, pyvista or scikit-fem (`fe_models.as_mesh`).
+    materials
+        One material for all cells, or one for each group name (`assign_materials`), in the units of the mesh. Materials
+        may be anisotropic.
+    name
+        Name of the body.
+    units
+        Unit system of coordinates and materials.
+    interfaces
+        Named places that `cms.couple` couples later.
+    incompatible_modes
+        Whether eight-node bricks have internal bending modes (`fe_models.elements.solids.incompatible`). Other cells do
+        not change.
+    integration
+        Integration of the stiffness: "full", or "reduced" with the fewest points that finite element programs use
+        (`fe_models.elements.solids.elements.REDUCED`): 8 points for 20-node bricks as in C3D20R, 2 points for six-node
+        wedges.
+    mass
+        "consistent"; "reduced", with the points of the reduced stiffness; "14-point", as ANSYS integrates 20-node
+        bricks; or "lumped" to the diagonal. Too few points leave some motions without mass: the mass matrix is then
+        singular.
+    progress
+        Receives the finished fraction of the assembly, 0 to 1.
+    ranks
+        Processes that assemble parts of the mesh and keep their rows of K and M (`SpreadMatrix`). None, or a single
+        rank: K and M are ordinary matrices.
+
+    Returns
+    -------
+    FEBody
+        Its element model is a `SolidModel`, and its surface is the boundary triangles.
+
+    Raises
+    ------
+    MaterialError
+        If a group is unknown, or cells have no material or two materials.
+    MeshError
+        If there is no solid cell, a node belongs to no solid cell, or an element is inverted.
+    """
+    rule_words = _rule_words(integration, mass)
+    mesh = as_mesh(mesh)
+    used, of_cell = assign_materials(mesh, materials)
+    properties, tensors = elastic_properties(used)
+    rules: dict[str, Any] = {
+        "incompatible": incompatible_modes,
+        "integration": integration,
+        "mass": mass,
+        "tensors": tensors,
+    }
+    if ranks is None or ranks.size == 1:
+        K, M_s = assemble(mesh, properties, of_cell, progress=progress, **rules)
+        M, parts = expand_scalar_mass(M_s), None
+    else:
+        K, M, M_s, parts = assemble_on_ranks(ranks, mesh, properties, of_cell, rules)
+    n_nodes = len(mesh.nodes)
+    return FEBody(
+        name=name,
+        M=M,
+        K=K,
+        nodes=mesh.nodes,
+        dofs=np.stack([np.repeat(np.arange(n_nodes), 3), np.tile(np.arange(3), n_nodes)], axis=1),
+        interfaces=tuple(interfaces),
+        units=units,
+        surface=boundary_triangles(mesh),
+        node_volumes=node_volumes(mesh),
+        element_model=SolidModel(mesh, used, of_cell, M_s, incompatible_modes, integration, parts),
+        numbering=solid_numbering(mesh),
+        provenance=provenance(mesh, used, of_cell) | _brick_words(mesh, incompatible_modes) | rule_words,
+    )
+
+
+def scalar_mass_gram(M_s: sp.csr_array, nodes: Array, u: Array) -> Array:
+    """Return Aᵀ M_s A with A = [1, X, u_x, u_y, u_z] (docs/theory.md §5), (4 + 3 k, 4 + 3 k).
+
+    Parameters
+    ----------
+    M_s
+        Scalar mass, (n_nodes, n_nodes) [kg].
+    nodes
+        Positions X, (n_nodes, 3) [m].
+    u
+        Translations of the nodes, (n_nodes, 3, k) [m].
+    """
+    n_parts = n_threads()
+    cuts = np.linspace(0, len(nodes), n_parts + 1).astype(int)
+    parts = [M_s[a:b] for a, b in pairwise(cuts)]
+    with ThreadPoolExecutor(n_parts) as pool:  # threads for sparse products; dense products have their own threads
+
+        def multiply(block: Array) -> Array:
+            return np.concatenate(list(pool.map(lambda part: part @ block, parts)))
+
+        return gram_by_products(multiply, nodes, u.reshape(len(nodes), -1), width_of_gram(len(nodes)))
+
+
+def width_of_gram(n_nodes: int) -> int:
+    """Return how many columns are multiplied by M_s at a time."""
+    return max(16, int(GRAM_BYTES / (8 * n_nodes)))
+
+
+def gram_by_products(multiply: Callable[[Array], Array], nodes: Array, columns: Array, width: int) -> Array:
+    """Return Aᵀ M_s A with A = [1, X, columns] from products x -> M_s x of `width` columns at a time.
+
+    Parameters
+    ----------
+    nodes, columns
+        Rows of X and of u_x, u_y, u_z for all nodes. On one of several ranks: for its own nodes; the results of all
+        ranks are then summed.
+    """
+    n_nodes, k = columns.shape
+    linear = np.hstack([np.ones((n_nodes, 1)), nodes])
+    gram = np.zeros((4 + k, 4 + k))
+    first = linear.T @ multiply(linear)
+    gram[:4, :4] = (first + first.T) / 2
+    for begin in range(0, k, width):
+        end = min(begin + width, k)
+        product = multiply(np.ascontiguousarray(in_memory(columns[:, begin:end])))
+        own = slice(4 + begin, 4 + end)
+        gram[:4, own] = linear.T @ product
+        for rows in row_slices(n_nodes, columns):
+            gram[4 : 4 + end, own] += columns[rows, :end].T @ product[rows]
+        gram[own, : 4 + begin] = gram[: 4 + begin, own].T  # symmetric by definition, so only one half is computed
+        gram[own, own] = (gram[own, own] + gram[own, own].T) / 2
+    return gram
+
+
+def spread_mass_gram(M_s: SpreadMatrix, nodes: Array, u: Any) -> Array:
+    """Return `scalar_mass_gram` of columns u, (3 n_nodes, k), for a distributed M_s, as the sum over the ranks.
+
+    Distributed columns must be laid out as the dofs of the nodes. Columns of rank 0 are sent to the ranks.
+    """
+    order = (3 * M_s.order[:, None] + np.arange(3)).ravel()
+    layout = RowLayout(M_s.ranks, order, Rows(tuple(3 * start for start in M_s.rows.starts)))
+    columns, places = spread_columns(layout, u), spread_columns(M_s.layout, nodes)
+    if not columns.layout.is_like(layout):
+        raise BodyError(f"mass_gram: u, {columns.shape}: its rows are distributed differently from those of M_s")
+    width = width_of_gram(len(nodes))
+    return np.asarray(np.sum(M_s.layout.ask(gram_here, M_s.key, places.part, columns.part, width), axis=0))
+
+
+def gram_here(ranks: Ranks, key: str, nodes: Part, u: Part, width: int) -> Array:
+    """Return the contribution of this rank's rows to Aᵀ M_s A."""
+    product: RowsProduct = ranks.store[key]
+    own = own_part(ranks, u)
+    columns = np.ascontiguousarray(own).reshape(product.n_own, 3 * own.shape[1])
+    return gram_by_products(product.__matmul__, own_part(ranks, nodes), columns, width)
+
+
+def node_volumes(mesh: Mesh) -> Array:
+    """Return the volume that each node represents, (n_nodes,) [m³]: element volumes, distributed by ∫N_n².
+
+    The consistent weight ∫N_n is negative at the corners of quadratic elements. The shares are those of the reference
+    cell. Volumes are integrated with the stress points, which is exact for cells with straight edges.
+    """
+    volumes = np.zeros(len(mesh.nodes))
+    for kind, cells in mesh.cells.items():
+        element = reference_element(kind)
+        share = element.mass.weights @ element.mass.values**2
+        for begin in range(0, len(cells), CELLS_AT_ONCE):
+            rows = cells[begin : begin + CELLS_AT_ONCE]
+            V = cell_jacobians(kind, mesh.nodes[rows], element.stress.points) @ element.stress.weights
+            volumes += np.bincount(rows.ravel(), np.outer(V, share / share.sum()).ravel(), minlength=len(volumes))
+    return volumes
+
+
+def provenance(mesh: Mesh, materials: tuple[AnyMaterial, ...], of_cell: Mapping[str, IntArray]) -> dict[str, str]:
+    """Return the origin of the body: mesh, digest, elements, materials and the version of scikit-fem."""
+    record = {"mesh": mesh.source, "mesh sha256": mesh.digest, "nodes": str(len(mesh.nodes))}
+    record |= {f"file {path}": digest for path, digest in mesh.included.items()}
+    record |= dict(mesh.origin)
+    record |= {f"cells {kind}": str(len(cells)) for kind, cells in mesh.cells.items() if len(cells)}
+    for number, material in enumerate(materials):
+        count = sum(int((index == number).sum()) for index in of_cell.values())
+        record[f"material {material.name}"] = f"{material_words(material)}, {count} cells"
+    if len(materials) > 1:
+        record["stress where materials meet"] = 'of the stiffest; of each with stress_points = "borders"'
+    return {key: value for key, value in record.items() if value} | {"scikit-fem": version("scikit-fem")}
+
+
+def _brick_words(mesh: Mesh, incompatible_modes: bool) -> dict[str, str]:
+    return {f"cells {KIND} with": "incompatible modes"} if incompatible_modes and len(mesh.cells.get(KIND, ())) else {}
+
+
+def _rule_words(integration: str, mass: str) -> dict[str, str]:
+    """Describe deviations from full integration and consistent mass; raise `BodyError` for unknown rules."""
+    for what, value, choices in (("integration", integration, INTEGRATIONS), ("mass", mass, MASSES)):
+        if value not in choices:
+            raise BodyError(f"solid_body: {what}: unknown {quoted(value)}{nearest(value, choices)}")
+    words = {"integration of the stiffness": integration} if integration != "full" else {}
+    return words | ({"mass of the cells": mass} if mass != "consistent" else {})
+
+
+def require_rows(where: str, u: Array, n_rows: int) -> None:
+    """Raise `BodyError` unless u has that many rows and is two-dimensional."""
+    if u.ndim != 2 or u.shape[0] != n_rows:
+        raise BodyError(f"{where}: u: expected columns over {n_rows} dofs, got {u.shape}")

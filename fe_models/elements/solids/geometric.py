@@ -1,0 +1,185 @@
+"""Geometric stiffness of solid elements: Phiᵀ K_geo(sigma_j) Phi of many states j in one pass (docs/theory.md §7).
+
+K_geo(sigma)_kl = ∫ sigma_ab Σ_c phi_k,c,a phi_l,c,b dV is linear in the stress. The products of gradients of a pair of
+columns do not depend on the state. They are therefore computed once at every point, and one matrix product with the
+stress of all states sums over the points. With very many columns these products dominate the cost; a sparse matrix is
+then assembled for each state (`fe_models.elements.solids.geometric_matrix`).
+"""
+
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+
+import numpy as np
+
+from fe_models.body.material import AnyMaterial
+from fe_models.elements.solids.elements import ShapeTable, reference_element
+from fe_models.elements.solids.geometric_matrix import (
+    MANY_COLUMNS,
+    scalar_geometric_matrices,
+    sparse_geometric_stiffness,
+)
+from fe_models.elements.solids.incompatible import KIND, brick_chunks, brick_operators, brick_stiffness, gradient_stress
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.threads import n_threads, one_blas_thread
+from fe_models.meshes.mesh import Mesh
+
+__all__ = ["internal_forces", "projected_geometric_stiffness"]
+
+CHUNK_BYTES = 1.5e6  #: memory of the products that a thread holds at once; they must stay in its cache
+
+
+def projected_geometric_stiffness(
+    mesh: Mesh,
+    materials: tuple[AnyMaterial, ...],
+    of_cell: Mapping[str, IntArray],
+    u: Array,
+    Phi: Array,
+    *,
+    incompatible: bool = False,
+    integration: str = "full",
+) -> Array:
+    """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), for the stress of the states u, (3 n_nodes, k).
+
+    Parameters
+    ----------
+    mesh, materials, of_cell
+        As in `fe_models.elements.solids.stress.nodal_stress`.
+    u
+        Displacements of the states, dof 3 i + c is component c of node i, (3 n_nodes, k).
+    Phi
+        Columns, (3 n_nodes, n).
+    incompatible
+        Whether eight-node bricks have incompatible modes. The stress then acts on the gradients of their complete
+        field.
+    integration
+        Integration of the stiffness, one of `fe_models.elements.solids.elements.INTEGRATIONS`.
+    """
+    n_nodes, n = len(mesh.nodes), Phi.shape[1]
+    tensors = np.array([material.stiffness for material in materials])
+    if n >= MANY_COLUMNS:
+        tables = {
+            kind: geometric_table(kind, integration)
+            for kind in mesh.cells
+            if kind in of_cell and not (incompatible and kind == KIND)
+        }
+        matrices = scalar_geometric_matrices(mesh, tensors, of_cell, tables, u)
+        K = sparse_geometric_stiffness(matrices, u.shape[1], Phi)
+        if incompatible and len(mesh.cells.get(KIND, ())):
+            K += _of_bricks(mesh.nodes, mesh.cells[KIND], tensors[of_cell[KIND]], u, Phi)
+        return K
+    states = np.ascontiguousarray(u).reshape(n_nodes, 3, -1)
+    columns = np.ascontiguousarray(Phi).reshape(n_nodes, 3, -1)
+    pairs = np.zeros((states.shape[2], n * (n + 1) // 2))
+    n_parts = n_threads()
+    with one_blas_thread(), ThreadPoolExecutor(n_parts) as pool:
+        for kind, cells in mesh.cells.items():
+            if incompatible and kind == KIND:
+                continue
+            cuts = np.linspace(0, len(cells), n_parts + 1).astype(int)
+            futures = [
+                pool.submit(
+                    _pairs_of,
+                    mesh.nodes,
+                    cells[a:b],
+                    of_cell[kind][a:b],
+                    tensors,
+                    geometric_table(kind, integration),
+                    states,
+                    columns,
+                )
+                for a, b in pairwise(cuts)
+                if b > a
+            ]
+            for future in futures:  # summed in this order, so that results are bitwise reproducible
+                pairs += future.result()
+    K = np.empty((len(pairs), n, n))
+    row, column = np.triu_indices(n)
+    K[:, row, column] = pairs
+    K[:, column, row] = pairs
+    if incompatible and len(mesh.cells.get(KIND, ())):
+        K += _of_bricks(mesh.nodes, mesh.cells[KIND], tensors[of_cell[KIND]], u, Phi)
+    return K
+
+
+def _of_bricks(nodes: Array, cells: IntArray, tensors: Array, u: Array, Phi: Array) -> Array:
+    """Return Phiᵀ K_geo Phi of bricks with incompatible modes, (k, n, n); tensors: stiffness of cells, (n, 6, 6)."""
+    n = Phi.shape[1]
+    K = np.zeros((u.shape[1], n, n))
+    for rows, dofs in brick_chunks(cells):
+        B, volumes = brick_operators(nodes[cells[rows]], tensors[rows])
+        sigma = gradient_stress(B @ u[dofs][:, None], tensors[rows]) * volumes[:, :, None, None]
+        sigma = sigma.reshape(*volumes.shape, 1, 3, 3, -1)
+        H = (B @ Phi[dofs][:, None]).reshape(*volumes.shape, 3, 3, n)  # u_c,b
+        for j in range(len(K)):
+            K[j] += H.reshape(-1, n).T @ (sigma[..., j] @ H).reshape(-1, n)
+    return (K + K.transpose(0, 2, 1)) / 2
+
+
+def internal_forces(
+    mesh: Mesh,
+    materials: tuple[AnyMaterial, ...],
+    of_cell: Mapping[str, IntArray],
+    u: Array,
+    *,
+    nodes: IntArray | None = None,
+    incompatible: bool = False,
+    integration: str = "full",
+) -> Array:
+    """Return ∫ sigma grad N dV at the points of the geometric stiffness, (3 n_nodes, k); zero except at `nodes`."""
+    from fe_models.elements.solids.geometric_kernels import add_internal_forces
+
+    fields = np.ascontiguousarray(u).reshape(len(mesh.nodes), 3, -1)
+    forces = np.zeros(fields.shape)
+    tensors = np.array([material.stiffness for material in materials])
+    wanted = np.ones(len(mesh.nodes), dtype=bool)
+    if nodes is not None:
+        wanted[:] = False
+        wanted[nodes[nodes < len(wanted)]] = True
+    for kind, all_cells in mesh.cells.items():
+        is_wanted = wanted[all_cells].any(axis=1)
+        if is_wanted.any():
+            table = geometric_table(kind, integration)
+            cells, material = all_cells[is_wanted], of_cell[kind][is_wanted]
+            if incompatible and kind == KIND:
+                for rows, dofs in brick_chunks(cells):
+                    K = brick_stiffness(mesh.nodes[cells[rows]], tensors[material[rows]])
+                    np.add.at(forces.reshape(3 * len(mesh.nodes), -1), dofs, K @ np.asarray(u)[dofs])
+                continue
+            add_internal_forces(mesh.nodes, cells, material, tensors, table.gradients, table.weights, fields, forces)
+    forces[~wanted] = 0.0
+    return forces.reshape(3 * len(mesh.nodes), -1)
+
+
+def geometric_table(kind: str, integration: str = "full") -> ShapeTable:
+    """Return the quadrature of the geometric stiffness.
+
+    sigma · grad N must be exact for affine cells, so that the work on a rigid rotation equals that of the nodal forces
+    K u to roundoff. The four stress points of a quadratic tetrahedron satisfy this (degree 2); bricks need the
+    stiffness points.
+    """
+    element = reference_element(kind, integration)
+    return element.stress if kind == "tetra10" else element.stiffness
+
+
+def _pairs_of(
+    nodes: Array, cells: IntArray, material: IntArray, tensors: Array, table: ShapeTable, states: Array, columns: Array
+) -> Array:
+    """Return the sum over the points of these cells, (n_states, n_pairs)."""
+    from fe_models.elements.solids.geometric_kernels import stress_and_products
+
+    n_states, n = states.shape[2], columns.shape[2]
+    n_points, n_pairs = len(table.weights), n * (n + 1) // 2
+    n_chunk = min(len(cells), max(1, int(CHUNK_BYTES / (48 * n_points * max(n_pairs + n_states, 1)))))
+    sigma = np.empty((n_chunk, n_points, 6, n_states))
+    products = np.empty((n_chunk, n_points, 6, n_pairs))
+    total = np.zeros((n_states, n_pairs))
+    for begin in range(0, len(cells), n_chunk):
+        rows = slice(begin, min(begin + n_chunk, len(cells)))
+        n_rows = rows.stop - begin
+        stress_and_products(
+            nodes, cells[rows], material[rows], tensors, table.gradients, table.weights, states, columns,
+            sigma[:n_rows], products[:n_rows],
+        )  # fmt: skip
+        total += sigma[:n_rows].reshape(-1, n_states).T @ products[:n_rows].reshape(-1, n_pairs)
+    return total

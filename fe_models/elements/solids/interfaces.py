@@ -1,0 +1,202 @@
+"""Interfaces of a meshed body at selected nodes: rigid, distributing, or with the dofs of every node."""
+
+from collections.abc import Sequence
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fe_models.body.couplings.couplings import RANK_TOLERANCE
+from fe_models.body.fe_body import Interface
+from fe_models.errors import InterfaceError
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.meshes.boundary import area_centroid, facet_weights
+from fe_models.meshes.mesh import Mesh
+from fe_models.meshes.objects.as_mesh import selectable
+from fe_models.meshes.selections import Selection, selected_facets
+
+__all__ = ["check_overlap", "distributing_interface", "nodes_interface", "rigid_interface"]
+
+
+def rigid_interface(
+    mesh: Any,
+    name: str,
+    selection: Selection,
+    *,
+    reference: ArrayLike | None = None,
+    triad: ArrayLike | None = None,
+) -> Interface:
+    """Make a rigid interface (RBE2): the selected nodes move rigidly with the reference node.
+
+    Parameters
+    ----------
+    mesh
+        Mesh of the body, from this package or another library, or a basis of scikit-fem (`fe_models.as_mesh`).
+    name
+        Name of the interface.
+    selection
+        Selected nodes.
+    reference
+        Reference point, (3,) [m]; None: the area centroid of the selected facets, or the mean of the nodes if they form
+        no facet.
+    triad
+        Axes of the interface as columns in mesh axes, (3, 3); None: the mesh axes.
+
+    Raises
+    ------
+    InterfaceError
+        If fewer than three nodes are selected, or all lie on one line, which would leave a rotation free.
+    """
+    mesh = selectable(mesh)
+    nodes = _members(name, mesh, selection)
+    _require_spread(name, "rigid", mesh.nodes[nodes], np.ones(len(nodes)))
+    return _interface(mesh, name, "rigid", nodes, selection, reference, triad)
+
+
+def distributing_interface(
+    mesh: Any,
+    name: str,
+    selection: Selection,
+    *,
+    reference: ArrayLike | None = None,
+    triad: ArrayLike | None = None,
+) -> Interface:
+    """Make a distributing interface (RBE3): the reference node follows the area-weighted mean motion of the nodes.
+
+    Members are the nodes of the selected facets: the facets of a face group, or else the boundary facets whose nodes
+    are all selected. The weight of a node is its area (`fe_models.meshes.boundary.facet_weights`). The corners of flat
+    quadratic triangles have zero weight and stay members.
+
+    Parameters
+    ----------
+    mesh, name, selection, reference, triad
+        As for `rigid_interface`; the default reference is the area centroid.
+
+    Raises
+    ------
+    InterfaceError
+        If no facet is selected, or the weighted nodes lie on one line.
+    """
+    mesh = selectable(mesh)
+    facets = _facets(name, mesh, selection)
+    if not facets:
+        count = len(_members(name, mesh, selection))
+        raise InterfaceError(
+            f"interface {name!r}: the {count} selected nodes make up no complete facet of the surface "
+            f"and so have no area; select a surface, or widen the tolerance so that middle nodes "
+            f"are selected too"
+        )
+    weights = facet_weights(mesh.nodes, facets)
+    nodes = np.unique(np.concatenate([rows.ravel() for rows in facets.values()]))
+    area = weights[nodes].sum()
+    if (weights[nodes] < -1e-3 * area).any():
+        raise InterfaceError(f"interface {name!r}: the facets are so curved that nodes weigh less than nothing; refine")
+    member_weights = np.maximum(weights[nodes], 0.0)
+    _require_spread(name, "distributing", mesh.nodes[nodes], member_weights)
+    return _interface(mesh, name, "distributing", nodes, selection, reference, triad, member_weights)
+
+
+def nodes_interface(
+    mesh: Any,
+    name: str,
+    selection: Selection,
+    *,
+    reference: ArrayLike | None = None,
+    triad: ArrayLike | None = None,
+) -> Interface:
+    """Make an interface in which every dof of every selected node is a boundary dof.
+
+    Parameters
+    ----------
+    mesh, name, selection, reference, triad
+        As for `rigid_interface`; joints act at the reference point.
+
+    Raises
+    ------
+    InterfaceError
+        If no node is selected.
+    """
+    mesh = selectable(mesh)
+    return _interface(mesh, name, "nodes", _members(name, mesh, selection), selection, reference, triad)
+
+
+def check_overlap(interfaces: Sequence[Interface], *, numbers: IntArray | None = None) -> None:
+    """Raise `InterfaceError` if two interfaces have the same name or share nodes; the message names pairs and counts.
+
+    numbers: user's numbers of the nodes, (n_nodes,); None or empty: the messages use indices.
+    """
+    shared = []
+    for first, second in combinations(interfaces, 2):
+        if first.name == second.name:
+            raise InterfaceError(f"interfaces: two are named {first.name!r}; give each its own name")
+        common = np.intersect1d(first.nodes, second.nodes)
+        if common.size:
+            node = common[0] if numbers is None or not numbers.size else numbers[common[0]]
+            shared.append(f"{first.name!r} and {second.name!r} share {common.size} nodes (first node {node})")
+    if shared:
+        raise InterfaceError(
+            f"interfaces: {'; '.join(shared)}; a node can follow only one interface: make the "
+            f"selections smaller, or join the two interfaces to one"
+        )
+
+
+def _members(name: str, mesh: Mesh, selection: Selection) -> IntArray:
+    try:
+        return selection.members(mesh)
+    except InterfaceError as error:
+        raise InterfaceError(f"interface {name!r}: {error}") from None
+
+
+def _facets(name: str, mesh: Mesh, selection: Selection) -> dict[str, IntArray]:
+    try:
+        return selected_facets(mesh, selection)
+    except InterfaceError as error:
+        raise InterfaceError(f"interface {name!r}: {error}") from None
+
+
+def _require_spread(name: str, kind: str, positions: Array, weights: Array) -> None:
+    """Raise `InterfaceError` unless the weighted points span a plane, that is two radii of gyration above zero."""
+    where = f"interface {name!r}: {kind}"
+    weighted = positions[weights > 0]
+    if len(weighted) < 3:
+        raise InterfaceError(
+            f"{where}: expected at least 3 nodes that are not on one line, got {len(weighted)}; a "
+            f"single node carries no rotation: use kind 'nodes', or select more"
+        )
+    w = weights[weights > 0] / weights.sum()
+    radii = np.linalg.svd(np.sqrt(w)[:, None] * (weighted - w @ weighted), compute_uv=False)
+    if radii[0] == 0:
+        raise InterfaceError(f"{where}: its {len(weighted)} nodes are all at one place; merge coincident nodes")
+    if radii[1] <= RANK_TOLERANCE * radii[0]:
+        raise InterfaceError(
+            f"{where}: its {len(weighted)} nodes lie on one line (widths {radii[1]:.2g} and "
+            f"{radii[0]:.2g}), so the rotation about it is free; select nodes beside the line"
+        )
+
+
+def _interface(
+    mesh: Mesh,
+    name: str,
+    kind: str,
+    nodes: IntArray,
+    selection: Selection,
+    reference: ArrayLike | None,
+    triad: ArrayLike | None,
+    weights: Array | None = None,
+) -> Interface:
+    if reference is None:
+        facets = _facets(name, mesh, selection)
+        point = area_centroid(mesh.nodes, facets)[1] if facets else mesh.nodes[nodes].mean(axis=0)
+    else:
+        point = np.asarray(reference, dtype=float)
+        if point.shape != (3,) or not np.isfinite(point).all():
+            raise InterfaceError(f"interface {name!r}: reference: expected three finite coordinates, got {reference}")
+    axes = np.eye(3) if triad is None else np.asarray(triad, dtype=float)
+    is_triad = axes.shape == (3, 3) and np.abs(axes.T @ axes - np.eye(3)).max() < 1e-8 and np.linalg.det(axes) > 0
+    if not is_triad:
+        raise InterfaceError(
+            f"interface {name!r}: triad: expected orthonormal right-handed axes as columns (3, 3), "
+            f"got {np.array2string(axes, precision=4)}"
+        )
+    return Interface(name, kind, nodes, point, triad=axes, weights=weights)

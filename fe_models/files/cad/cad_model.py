@@ -1,0 +1,202 @@
+"""A CAD file opened in gmsh: its solids, in millimetres or as they are, its faces, and what its numbers mean."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+
+from fe_models.errors import MeshError
+from fe_models.files.cad.cad_faces import CadFace, cad_faces
+from fe_models.files.cad.cad_units import CAD_SUFFIXES, length_unit
+from fe_models.files.cad.gmsh_model import gmsh_call, gmsh_model
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.paths import near_file
+from fe_models.foundation.units import Units, unit_system
+from fe_models.foundation.words import nearest, quoted
+
+__all__ = ["CadModel", "CadPart", "open_cad", "read_cad"]
+
+OVERLAP = 1e-6  #: relative volume that solids may share by rounding
+OPTIONS: dict[str, float | str] = {
+    "Geometry.OCCImportLabels": 1,
+    "Geometry.OCCScaling": 1.0,
+    "Mesh.MeshSizeMin": 0.0,
+    "Mesh.MeshSizeMax": 1e22,
+    "Mesh.MeshSizeFromCurvature": 0,
+    "Mesh.ElementOrder": 1,
+}  #: as they begin; what is set while the model is open goes with it
+MILLIMETRE = 1e-3  #: [m]
+KERNEL_UNITS = {1e-3: "MM", 1e-2: "CM", 1.0: "M", 1e3: "KM", 0.0254: "INCH", 0.3048: "FT"}  #: [m] -> name
+
+
+@dataclass(frozen=True, eq=False)
+class CadPart:
+    """What a CAD file holds, in the length unit of the job."""
+
+    path: Path
+    digest: str  #: sha256 of the file
+    format: str  #: "STEP", "IGES" or "BREP"
+    unit: str  #: of the file, "" where it has none
+    units: Units  #: of the job
+    solids: tuple[str, ...]  #: names of the solids, or "" where they have none
+    faces: tuple[CadFace, ...]
+    volume: float  #: of all solids [length³]
+    lo: Array  #: bounding box, (3,)
+    hi: Array
+
+    @property
+    def words(self) -> str:
+        """What the file is and how its unit met that of the job."""
+        symbol = self.units.length_symbol
+        unit = f"in {self.unit}, taken to {symbol}" if self.unit else f"without unit, its numbers taken as {symbol}"
+        n, m = len(self.solids), len(self.faces)
+        return f"{self.format} {unit}; {n} solid{'s' * (n > 1)}, {m} faces, volume {self.volume:.6g} {symbol}³"
+
+
+@dataclass(frozen=True, eq=False)
+class CadModel:
+    """An open model of gmsh beside what was found in it."""
+
+    gmsh: ModuleType
+    part: CadPart
+    scale: float  #: the length unit of the job over that of the model
+
+
+def read_cad(path: str | Path, *, units: Units | str) -> CadPart:
+    """Return solids and faces of a CAD file.
+
+    Parameters
+    ----------
+    path
+        STEP (.step, .stp), IGES (.iges, .igs) or BREP (.brep).
+    units
+        In whose length unit the numbers are wanted. STEP and IGES name their own and are converted; BREP has none, and
+        its numbers are taken as they are.
+
+    Raises
+    ------
+    MeshError
+        If the file is missing, damaged, of another kind, names no length unit, or holds no solid, or solids overlap.
+    MeshingError
+        If gmsh is not installed.
+    """
+    with open_cad(path, units=units) as model:
+        return model.part
+
+
+@contextmanager
+def open_cad(path: str | Path, *, units: Units | str) -> Iterator[CadModel]:
+    """Open a CAD file in gmsh, as `read_cad` does, for as long as the context lasts.
+
+    (1) the file's unit is read from its text; gmsh converts STEP to millimetres whatever it is, and leaves IGES in its
+        own, since the kernel sews faces whose edges are 1e-6 apart at most, which is less than the digits of metres;
+    (2) faces without solids are sewn to one if they close; several solids are cut where they touch, so that they share
+        faces and their meshes fit;
+    (3) every number is divided by `scale`, the length unit of the job in units of the model.
+    """
+    path = Path(path)
+    units = unit_system(units) if isinstance(units, str) else units
+    content = _content(path)
+    kind = CAD_SUFFIXES[path.suffix.lower()]
+    unit = length_unit(path, content)
+    model_unit = unit[1] if unit is not None and kind == "IGES" and unit[1] in KERNEL_UNITS else MILLIMETRE
+    scale = 1.0 if unit is None else units.length / model_unit
+    where = f"geometry {path}"
+    with gmsh_model(path.stem, OPTIONS | {"Geometry.OCCTargetUnit": KERNEL_UNITS[model_unit]}) as gmsh:
+        with gmsh_call(where, advice=f"is it a {kind} file, whole and of this kind?"):
+            shapes = gmsh.model.occ.importShapes(str(path))
+            gmsh.model.occ.synchronize()
+        if not gmsh.model.getEntities(3):
+            _sew(where, gmsh, shapes)
+        _join(where, gmsh)
+        faces = cad_faces(gmsh, scale)
+        part = CadPart(
+            path=path,
+            digest=sha256(content).hexdigest(),
+            format=kind,
+            unit="" if unit is None else unit[0],
+            units=units,
+            solids=tuple(gmsh.model.getEntityName(3, tag).rpartition("/")[2] for _, tag in gmsh.model.getEntities(3)),
+            faces=faces,
+            volume=_volume(gmsh) / scale**3,
+            lo=np.min([face.lo for face in faces], axis=0),
+            hi=np.max([face.hi for face in faces], axis=0),
+        )
+        yield CadModel(gmsh, part, scale)
+
+
+def _content(path: Path) -> bytes:
+    where = f"geometry {path}"
+    if path.suffix.lower() not in CAD_SUFFIXES:
+        raise MeshError(f"{where}: unknown suffix {quoted(path.suffix)}{nearest(path.suffix, CAD_SUFFIXES)}")
+    if not path.is_file():
+        raise MeshError(f"{where}: there is no such file{near_file(path)}")
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise MeshError(f"{where}: cannot be read: {error.strerror or error}") from error
+    if not content.strip():
+        raise MeshError(f"{where}: the file is empty")
+    return content
+
+
+def _volume(gmsh: ModuleType) -> float:
+    return float(sum(gmsh.model.occ.getMass(3, tag) for _, tag in gmsh.model.getEntities(3)))
+
+
+def _sew(where: str, gmsh: ModuleType, shapes: list[tuple[int, int]]) -> None:
+    """Make one solid of faces that close; IGES files often hold no more than faces."""
+    faces = [tag for dim, tag in shapes if dim == 2]
+    if not faces:
+        raise MeshError(f"{where}: expected a solid, got neither solids nor faces; is the file whole? Export the solid")
+    advice = "export it as a solid, best as STEP"
+    with gmsh_call(f"{where}: it holds {len(faces)} faces and no solid, and they do not close", advice=advice):
+        shell = gmsh.model.occ.addSurfaceLoop(faces, sewing=True)
+        gmsh.model.occ.addVolume([shell])
+        gmsh.model.occ.remove([(2, tag) for tag in faces], recursive=True)
+        gmsh.model.occ.synchronize()
+    borders = gmsh.model.getBoundary(gmsh.model.getEntities(2), combined=True, oriented=False)
+    loose = [tag for _, tag in gmsh.model.getEntities(2) if not len(gmsh.model.getAdjacencies(2, tag)[0])]
+    solids = gmsh.model.getEntities(3)
+    if len(solids) != 1 or borders or loose or not _is_one_shell(gmsh) or not _volume(gmsh) > 0:
+        raise MeshError(
+            f"{where}: it holds {len(faces)} faces and no solid, and they do not close to one ({len(borders)} edges "
+            f"are open); {advice}"
+        )
+
+
+def _is_one_shell(gmsh: ModuleType) -> bool:
+    """Whether all faces hang together by edges: a body with a cavity cannot be told from two bodies."""
+    left = {tag for _, tag in gmsh.model.getEntities(2)}
+    front = {left.pop()}
+    while front:
+        edges = {int(edge) for face in front for edge in gmsh.model.getAdjacencies(2, face)[1]}
+        beside = {int(face) for edge in edges for face in gmsh.model.getAdjacencies(1, edge)[0]}
+        front = beside & left
+        left -= front
+    return not left
+
+
+def _join(where: str, gmsh: ModuleType) -> None:
+    """Cut several solids where they touch, so that they share faces; solids that overlap are refused."""
+    solids = gmsh.model.getEntities(3)
+    if len(solids) < 2:
+        return
+    before = _volume(gmsh)
+    names = {tag: gmsh.model.getEntityName(3, tag) for _, tag in solids}
+    with gmsh_call(f"{where}: its {len(solids)} solids could not be joined", advice="export them as one solid"):
+        _, parts = gmsh.model.occ.fragment(solids, [])
+        gmsh.model.occ.synchronize()
+    after = _volume(gmsh)
+    if abs(after - before) > OVERLAP * before or len(gmsh.model.getEntities(3)) != len(solids):
+        raise MeshError(
+            f"{where}: its {len(solids)} solids overlap: together they fill {after / before:.6g} of the sum of their "
+            "volumes, and their mass would count twice. Cut them where they meet, or export fewer"
+        )
+    for (_, tag), pieces in zip(solids, parts, strict=True):
+        for _, piece in pieces:
+            gmsh.model.setEntityName(3, piece, names[tag])

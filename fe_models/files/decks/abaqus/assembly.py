@@ -1,0 +1,255 @@
+"""Assemblies of Abaqus: instances of parts become one flat deck.
+
+Nodes and elements of the k-th instance (from 0) have k S added to their numbers, those of the assembly itself n S, with
+n instances and S a power of ten above all numbers. Sets of an instance are called `INSTANCE.set`, as Abaqus calls them;
+where a line names `INSTANCE.17`, the number of that node stands.
+"""
+
+import re
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from fe_models.errors import MeshError
+from fe_models.files.abaqus_deck import DeckBlock
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.words import nearest, quoted
+
+__all__ = ["TURNED", "flat_assembly"]
+
+TURNED = "TURNED WITH ITS INSTANCE"  #: parameter added here: the nine numbers of R, of equations in its axes
+
+SETS = {"NSET": "NSET", "ELSET": "ELSET", "NODE": "NSET", "ELEMENT": "ELSET"}  #: keyword -> parameter with its name
+NAMES = (
+    "NSET",
+    "ELSET",
+    "NAME",
+    "SURFACE",
+    "REF NODE",
+    "ROT NODE",
+    "ORIENTATION",
+)  #: parameters that name something of a part
+
+
+class FlatAssembly(NamedTuple):
+    """A deck with its instances written out."""
+
+    blocks: list[DeckBlock]
+    notes: list[str]  #: how numbers follow from those of the deck
+    instances: tuple[str, ...] = ()  #: whose numbers were moved, the k-th by k step; none where numbers are the deck's
+    step: int = 0
+
+
+def flat_assembly(where: str, blocks: list[DeckBlock]) -> FlatAssembly:
+    """Return the blocks of a deck with its instances written out, and how their numbers follow from those of the deck.
+
+    Raises
+    ------
+    MeshError
+        If an instance names no part, or its place cannot be understood.
+    """
+    parts, instances, own, model = _sorted(where, blocks)
+    if not instances:
+        return FlatAssembly(blocks if not parts else [*(b for part in parts.values() for b in part), *model], [])
+    inside = [b for part in parts.values() for b in part] + [b for _, extra in instances for b in extra] + own
+    step = 10 ** len(str(max([_largest(block) for block in inside] or [1])))
+    out: list[DeckBlock] = []
+    offsets: dict[str, int] = {}
+    for k, (head, extra) in enumerate(instances):
+        name, part = head.parameters.get("NAME", ""), head.parameters.get("PART", "").upper()
+        if part not in parts and not extra:
+            raise MeshError(f"{where}, {head.place}: *INSTANCE of an unknown part {quoted(part)}{nearest(part, parts)}")
+        offsets[name.upper()] = k * step
+        R, t = _motion(where, head)
+        out += [_placed(block, name, k * step, R, t) for block in [*parts.get(part, []), *extra]]
+    for block in own:
+        of = offsets.get(block.parameters.get("INSTANCE", "").upper())
+        prefix = block.parameters.get("INSTANCE", "") if of is not None else ""
+        offset = len(instances) * step if of is None else of
+        if block.keyword in SETS:
+            out.append(_numbered(block, offset, prefix))
+        else:
+            out.append(block)
+    out = [_resolved(block, offsets) for block in [*out, *model]]
+    words = [f"{name}: numbers of the deck + {offset}" for name, offset in offsets.items()]
+    words.append(f"nodes of the assembly: + {len(instances) * step}")
+    has_own_nodes = any(block.keyword == "NODE" for block in own)
+    if len(instances) == 1 and not has_own_nodes:
+        return FlatAssembly(out, [f"instances are written out; {'; '.join(words[:8])}"] if own else [])
+    names = tuple(head.parameters.get("NAME", "") for head, _ in instances)
+    return FlatAssembly(out, [f"instances are written out; {'; '.join(words[:8])}"], names, step)
+
+
+def _sorted(
+    where: str, blocks: list[DeckBlock]
+) -> tuple[dict[str, list[DeckBlock]], list[tuple[DeckBlock, list[DeckBlock]]], list[DeckBlock], list[DeckBlock]]:
+    """Return the blocks of parts, of instances, of the assembly itself, and of the model."""
+    parts: dict[str, list[DeckBlock]] = {}
+    instances: list[tuple[DeckBlock, list[DeckBlock]]] = []
+    own: list[DeckBlock] = []
+    model: list[DeckBlock] = []
+    target, in_assembly = model, False
+    for block in blocks:
+        if block.keyword == "PART":
+            target = parts.setdefault(block.parameters.get("NAME", "").upper(), [])
+        elif block.keyword == "INSTANCE":
+            instances.append((block, []))
+            target = instances[-1][1]
+        elif block.keyword in ("ASSEMBLY", "END INSTANCE"):
+            target, in_assembly = own, True
+        elif block.keyword in ("END PART", "END ASSEMBLY"):
+            target, in_assembly = model, False
+        else:
+            target.append(block)
+    if in_assembly:
+        raise MeshError(f"{where}: expected *END ASSEMBLY, got none; the deck is incomplete")
+    return parts, instances, own, model
+
+
+def _largest(block: DeckBlock) -> int:
+    if block.keyword not in ("NODE", "ELEMENT"):
+        return 1
+    first = [line.split(",")[0].strip() for line in block.lines]
+    return max([int(word) for word in first if word.isdigit()] or [1])
+
+
+def _motion(where: str, head: DeckBlock) -> tuple[Array, Array]:
+    """Return R and t of x → R x + t: a translation, then a rotation about the line of two points by an angle."""
+    try:
+        rows = [[float(word or 0) for word in line.rstrip(", ").split(",")] for line in head.lines]
+        t = np.array([*rows[0], 0.0, 0.0, 0.0][:3]) if rows else np.zeros(3)
+        if len(rows) < 2:
+            return np.eye(3), t
+        a, b, angle = np.array(rows[1][:3]), np.array(rows[1][3:6]), np.radians(rows[1][6])
+    except (ValueError, IndexError) as error:
+        raise MeshError(
+            f"{where}, {head.place}: *INSTANCE: expected x, y, z and a, b, angle below ({error})"
+        ) from error
+    R = Rotation.from_rotvec(angle * (b - a) / np.linalg.norm(b - a)).as_matrix()
+    return R, R @ (t - a) + a
+
+
+def _placed(block: DeckBlock, instance: str, offset: int, R: Array, t: Array) -> DeckBlock:
+    """Return a block of a part as it is in an instance."""
+    block = _numbered(block, offset, instance)
+    parameters = {
+        key: f"{instance}.{value}" if key in NAMES and value and not value.isdigit() else value
+        for key, value in block.parameters.items()
+    }
+    for key in ("REF NODE", "ROT NODE"):
+        if parameters.get(key, "").isdigit():
+            parameters[key] = str(int(parameters[key]) + offset)
+    if block.keyword in ("BEAM SECTION", "BEAM GENERAL SECTION") and not np.array_equal(R, np.eye(3)):
+        n1 = block.lines[1] if len(block.lines) > 1 else "0, 0, -1"
+        turned = R @ np.array([float(word or 0) for word in n1.rstrip(", ").split(",")][:3])
+        line = ", ".join(repr(float(value)) for value in turned)
+        return replace(block, parameters=parameters, lines=[*block.lines[:1], line, *block.lines[2:]])
+    if block.keyword in ("ORIENTATION", "TRANSFORM") and block.lines:
+        line = _turned_points(block, R, t)
+        return replace(block, parameters=parameters, lines=[line, *block.lines[1:]])
+    if block.keyword == "NODE":
+        lines = []
+        for line in block.lines:
+            words = [word.strip() for word in line.rstrip(", ").split(",")]
+            x = R @ np.array([float(word or 0) for word in [*words[1:4], "0", "0", "0"][:3]]) + t
+            lines.append(", ".join([words[0], *(repr(float(value)) for value in x)]))
+        return replace(block, parameters=parameters, lines=lines)
+    if block.keyword in ("SPRING", "DASHPOT") and not np.array_equal(R, np.eye(3)):
+        parameters = parameters | {TURNED: " ".join(repr(float(x)) for x in R.ravel())}
+    if block.keyword == "EQUATION":
+        turned = {} if np.array_equal(R, np.eye(3)) else {TURNED: " ".join(repr(float(x)) for x in R.ravel())}
+        return replace(block, parameters=parameters | turned, lines=_equations(block, instance, offset))
+    if block.keyword == "MPC":
+        return replace(block, parameters=parameters, lines=_mpcs(block, instance, offset, bool(np.any(t))))
+    if block.keyword not in SETS and block.keyword in ("SURFACE", "BOUNDARY", "NODAL THICKNESS"):
+        lines = [_prefixed(line, instance, offset) for line in block.lines]
+        return replace(block, parameters=parameters, lines=lines)
+    return replace(block, parameters=parameters)
+
+
+def _equations(block: DeckBlock, instance: str, offset: int) -> list[str]:
+    """Return the lines of *EQUATION, a line each for the number of terms and for every term."""
+    words = [word.strip() for line in block.lines for word in line.rstrip(", ").split(",")]
+    lines, at = [], 0
+    while at < len(words):
+        n = int(words[at]) if words[at].isdigit() else 0
+        if not 0 < n <= (len(words) - at - 1) // 3:
+            raise MeshError(
+                f"{block.place}: *EQUATION: expected a number of terms, then node, component, coefficient of each; got "
+                f"{', '.join(words[at : at + 4])}"
+            )
+        rows = [words[k : k + 3] for k in range(at + 1, at + 1 + 3 * n, 3)]
+        lines += [str(n), *(", ".join([_named(node, instance, offset), c, value]) for node, c, value in rows)]
+        at += 1 + 3 * n
+    return lines
+
+
+def _mpcs(block: DeckBlock, instance: str, offset: int, is_moved: bool) -> list[str]:
+    """Return the lines of *MPC: a kind, unless the line goes on, and nodes or sets."""
+    lines = []
+    for line in block.lines:
+        kind, *words = [word.strip() for word in line.rstrip(", ").split(",")]
+        if kind.upper() == "MEANROT" and is_moved:
+            raise MeshError(
+                f"{block.place}: *MPC, MEANROT inside a part of which instance {quoted(instance)} is moved: its last "
+                "node says an axis by its coordinates, which move along; write it into *ASSEMBLY"
+            )
+        head = _named(kind, instance, offset) if kind.isdigit() and kind != "0" else kind
+        lines.append(", ".join([head, *(_named(word, instance, offset) for word in words)]))
+    return lines
+
+
+def _named(word: str, instance: str, offset: int) -> str:
+    """Return a node number or set of the part as it is called in the deck."""
+    return str(int(word) + offset) if word.isdigit() else f"{instance}.{word}" if word else word
+
+
+def _turned_points(block: DeckBlock, R: Array, t: Array) -> str:
+    """Return the points of axes as they are in an instance: directions turn, the two points of an axis move too."""
+    words = [float(word or 0) for word in block.lines[0].rstrip(", ").split(",")]
+    points = np.array([*words, 0.0, 0.0, 0.0][: 9 if len(words) > 6 else 6]).reshape(-1, 3)
+    is_axis = block.keyword == "TRANSFORM" and block.parameters.get("TYPE", "R").upper() == "C"
+    return ", ".join(repr(float(value)) for value in (points @ R.T + (t if is_axis else 0.0)).ravel())
+
+
+def _prefixed(line: str, instance: str, offset: int) -> str:
+    """Return a line whose first word is a set or a number of the part."""
+    first, comma, rest = line.partition(",")
+    word = first.strip()
+    return f"{_named(word, instance, offset)}{comma}{rest}"
+
+
+def _numbered(block: DeckBlock, offset: int, instance: str) -> DeckBlock:
+    """Return nodes, elements or sets with their numbers moved, and names of sets within sets those of the instance."""
+    if block.keyword not in SETS or (not offset and not instance):
+        return block
+    lines = []
+    for line in block.lines:
+        words = [word.strip() for word in line.rstrip(", ").split(",")]
+        if block.keyword == "NODE":
+            words[0] = str(int(words[0]) + offset)
+        elif "GENERATE" in block.parameters:
+            words[:2] = [str(int(word) + offset) for word in words[:2]]
+        else:
+            words = [
+                str(int(word) + offset) if word.isdigit() else f"{instance}.{word}" if instance and word else word
+                for word in words
+            ]
+        lines.append(", ".join(words) + ("," if line.endswith(",") and block.keyword == "ELEMENT" else ""))
+    return replace(block, lines=lines)
+
+
+def _resolved(block: DeckBlock, offsets: dict[str, int]) -> DeckBlock:
+    """Return a block in which INSTANCE.17 is the number of that node."""
+
+    def number(match: re.Match[str]) -> str:
+        of = offsets.get(match[1].strip().upper())
+        return match[0] if of is None else str(int(match[2]) + of)
+
+    pattern = re.compile(r"([^,.\s][^,.]*)\.(\d+)(?=\s*(?:,|$))")
+    if block.keyword in ("NODE", "ELEMENT", "STEP", "ELASTIC", "DENSITY"):
+        return block
+    parameters = {key: pattern.sub(number, value) for key, value in block.parameters.items()}
+    return replace(block, parameters=parameters, lines=[pattern.sub(number, line) for line in block.lines])

@@ -1,0 +1,274 @@
+"""Couplings of Abaqus and CalculiX: equations, rigid bodies, kinematic and distributing couplings."""
+
+import numpy as np
+
+from fe_models.files.abaqus_deck import DeckBlock
+from fe_models.files.decks.abaqus.assembly import TURNED
+from fe_models.files.decks.abaqus.draft import Draft
+from fe_models.files.decks.abaqus.elements import faces_of
+from fe_models.files.decks.abaqus.multipoint import LINEARISED, read_linearised
+from fe_models.files.decks.abaqus.ties import read_tie
+from fe_models.files.decks.deck import Coupling, Equation, RigidGroup
+from fe_models.files.decks.equations import Row, solved_equations
+from fe_models.foundation.arrays import IntArray
+
+__all__ = ["equations_in_basic_axes", "read_coupling", "surface_nodes"]
+
+
+def read_coupling(here: str, block: DeckBlock, draft: Draft) -> None:
+    """Take one block that couples nodes."""
+    keyword, given = block.keyword, block.parameters
+    if keyword == "EQUATION" and "REMOVE" in given:
+        draft.ledger.note("*EQUATION, REMOVE", "constraints change between steps; those of the model are taken")
+    elif keyword == "EQUATION":
+        _equations(here, block, draft)
+    elif keyword == "RIGID BODY":
+        _rigid_body(here, block, draft)
+    elif keyword == "COUPLING":
+        draft.pending = dict(given)
+    elif keyword in ("KINEMATIC", "DISTRIBUTING") and draft.pending:
+        _coupling(here, block, draft)
+        draft.pending = {}
+    elif keyword == "DISTRIBUTING COUPLING":
+        _distributing_coupling(here, block, draft)
+    elif keyword == "TIE" and "CYCLIC SYMMETRY" not in given and "MULTISTAGE" not in given:
+        read_tie(here, block, draft, surface_nodes(here, draft, block.lines[0].split(",")[0].strip()))
+    elif keyword == "MPC":
+        _mpcs(here, block, draft)
+    else:
+        draft.ledger.refuse(f"*{keyword}", "this coupling is not known here", line=block.line_number)
+
+
+def _equations(here: str, block: DeckBlock, draft: Draft) -> None:
+    """Lines: number of terms; then node, component, coefficient of each, up to four a line."""
+    words = [word.strip() for line in block.lines for word in line.rstrip(", ").split(",")]
+    turn = block.parameters.get(TURNED)
+    axes = None if turn is None else np.array(turn.split(), dtype=float).reshape(3, 3).T
+    at = 0
+    while at < len(words):
+        n = int(words[at])
+        rows = [words[at + 1 + 3 * k : at + 4 + 3 * k] for k in range(n)]
+        at += 1 + 3 * n
+        terms = []
+        for node, component, coefficient in rows:
+            nodes = draft.nodes_of(here, node)
+            is_one = len(nodes) == 1 and int(nodes[0]) not in draft.rotations
+            if not is_one or not 1 <= int(component) <= 6:
+                why = "equations of sets, of rotations at a ROT NODE, or of other components than 1 to 6"
+                draft.ledger.refuse("*EQUATION", why, line=block.line_number)
+                break
+            terms.append((int(nodes[0]), int(component) - 1, float(coefficient)))
+        else:
+            draft.raw_equations.append((terms, axes))
+
+
+def equations_in_basic_axes(draft: Draft) -> None:
+    """Make the equations of a deck those of its nodes in basic axes.
+
+    (1) a component of a node with axes R of its own, or those of its instance, is R[c] · u; terms of the same component
+        are added
+    (2) equations of which the first terms are components of one such node are solved together for as many of its
+        components in basic axes, those that are determined best, so that these give way
+    """
+    turned: list[tuple[tuple[int, int], Row]] = []
+    for terms, of_instance in draft.raw_equations:
+        node, component, _ = terms[0]
+        row: Row = {}
+        for other, c, a in terms:
+            first = c - c % 3
+            axes = draft.transformed.get(other, of_instance)
+            parts = [(c, 1.0)] if axes is None else [(first + j, float(axes[c % 3, j])) for j in range(3)]
+            for j, r in parts:
+                row[other, j] = row.get((other, j), 0.0) + a * r  # (1)
+        if node in draft.transformed or of_instance is not None:
+            turned.append(((node, component - component % 3), row))
+        else:
+            _keep(draft, row)
+    made, refused = solved_equations(turned)  # (2)
+    for node, count in refused:
+        why = f"equations that say more of a node (first: {node}) than its components, or the same twice"
+        draft.ledger.refuse("*EQUATION", why, count=count)
+    for row in made:
+        _keep(draft, row)
+
+
+def _keep(draft: Draft, row: Row) -> None:
+    """Add one equation; terms that vanish are left out, but for the first."""
+    terms = [
+        (draft.node_group(draft.where, [node]), c, float(a))
+        for k, ((node, c), a) in enumerate(row.items())
+        if a != 0 or k == 0
+    ]
+    draft.equations.append(Equation(tuple(terms)))
+
+
+def _rigid_body(here: str, block: DeckBlock, draft: Draft) -> None:
+    spaced = {"REFNODE": "REF NODE", "ROTNODE": "ROT NODE"}  # blanks may be left out
+    given = {spaced.get(key, key): value for key, value in block.parameters.items()}
+    if "NSET" in given:
+        members = draft.nodes_of(here, given["NSET"])
+    elif "ELSET" in given:
+        members = _nodes_of_elements(draft, draft.elements_of(here, given["ELSET"]))
+    else:
+        members = np.zeros(0, np.int64)
+    if not members.size or "REF NODE" not in given:
+        draft.ledger.refuse("*RIGID BODY", "without NSET or ELSET, or without REF NODE", line=block.line_number)
+        return
+    if "ROT NODE" in given:
+        leader = int(draft.nodes_of(here, given["REF NODE"])[0])
+        draft.rotations[int(draft.nodes_of(here, given["ROT NODE"])[0])] = leader
+    _rigid_group(here, draft, int(draft.nodes_of(here, given["REF NODE"])[0]), members)
+
+
+def _rigid_group(
+    here: str, draft: Draft, leader: int, members: IntArray, components: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
+) -> None:
+    name = f"rigid_{len(draft.rigid) + 1}"
+    followers = draft.node_group(here, np.setdiff1d(members, [leader]), f"{name}_nodes")
+    draft.rigid.append(RigidGroup(name, draft.node_group(here, [leader]), followers, components))
+
+
+def _coupling(here: str, block: DeckBlock, draft: Draft) -> None:
+    given = draft.pending
+    leader = int(draft.nodes_of(here, given.get("REF NODE", ""))[0])
+    members = surface_nodes(here, draft, given.get("SURFACE", ""))
+    if "INFLUENCE RADIUS" in given:
+        members = _within(here, draft, leader, members, float(given["INFLUENCE RADIUS"]))
+    weighting = block.parameters.get("WEIGHTING METHOD", "UNIFORM").upper()
+    if weighting != "UNIFORM":
+        why = f"weights that fall with the distance ({weighting}): only UNIFORM"
+        draft.ledger.refuse("*DISTRIBUTING, WEIGHTING METHOD", why, line=block.line_number)
+        return
+    if block.keyword == "KINEMATIC":
+        components = tuple(sorted(_limits(block))) or (0, 1, 2, 3, 4, 5)
+        whole = all(set(part) <= set(components) or not set(part) & set(components) for part in ((0, 1, 2), (3, 4, 5)))
+        if not whole and ("ORIENTATION" in given or draft.transformed.keys() & {leader, *members.tolist()}):
+            why = "single components along axes of their own (ORIENTATION, *TRANSFORM)"
+            draft.ledger.refuse("*KINEMATIC", why, line=block.line_number)
+            return
+        _rigid_group(here, draft, leader, members, components)
+        return
+    if block.lines and _limits(block) != set(range(6)):
+        draft.ledger.refuse("*DISTRIBUTING", "of some components of the reference node", line=block.line_number)
+        return
+    name = given.get("CONSTRAINT NAME", f"coupling_{len(draft.couplings) + 1}")
+    draft.ledger.note("*DISTRIBUTING", "every node of the surface has the same weight", line=block.line_number)
+    group = draft.node_group(here, np.setdiff1d(members, [leader]), f"{name}_nodes")
+    draft.couplings.append(Coupling(name, draft.node_group(here, [leader]), ((group, 1.0),)))
+
+
+def _within(here: str, draft: Draft, leader: int, members: IntArray, radius: float) -> IntArray:
+    """Return the nodes within a distance of a node (INFLUENCE RADIUS)."""
+    at = draft.mesh.coordinates[draft.mesh.rows_of(np.array([leader]))][0]
+    away = np.linalg.norm(draft.mesh.coordinates[draft.mesh.rows_of(members)] - at, axis=1)
+    if not (away <= radius).any():
+        raise ValueError(f"no node of the surface within INFLUENCE RADIUS = {radius:g} of node {leader}")
+    return members[away <= radius]
+
+
+def _limits(block: DeckBlock) -> set[int]:
+    """Return the components, 0 to 5, of lines of a first and a last one."""
+    held: set[int] = set()
+    for line in block.lines:
+        limits = [int(word) for word in line.rstrip(", ").split(",")]
+        held |= set(range(limits[0] - 1, limits[-1]))
+    return held
+
+
+def _distributing_coupling(here: str, block: DeckBlock, draft: Draft) -> None:
+    of_set = draft.points_of(block.parameters.get("ELSET", ""))
+    if of_set is None or len(of_set.rows) != 1:
+        draft.ledger.refuse("*DISTRIBUTING COUPLING", "expected one element DCOUP3D", line=block.line_number)
+        return
+    members = []
+    for line in block.lines:
+        word, weight = [part.strip() for part in line.rstrip(", ").split(",")][:2]
+        members.append((draft.node_group(here, draft.nodes_of(here, word), word), float(weight)))
+    name = f"coupling_{len(draft.couplings) + 1}"
+    draft.couplings.append(Coupling(name, draft.node_group(here, next(iter(of_set.rows.values()))), tuple(members)))
+
+
+def _mpcs(here: str, block: DeckBlock, draft: Draft) -> None:
+    listed: list[list[str]] = []
+    for line in block.lines:
+        words = [word.strip() for word in line.rstrip(", ").split(",")]
+        if listed and words[0].isdigit():  # the line above goes on
+            listed[-1] += words[1:] if words[0] == "0" else words
+        else:
+            listed.append(words)
+    for kind, *words in listed:
+        name = f"*MPC, {kind.upper()}"
+        if kind.upper() in LINEARISED:
+            why = read_linearised(here, draft, kind.upper(), words)
+            if why:
+                draft.ledger.refuse(name, why, line=block.line_number)
+            continue
+        if kind.upper() == "DIST":
+            why = "a limit of a distance, closed or open like a gap, is not linear"
+            draft.ledger.refuse(name, why, line=block.line_number)
+            continue
+        if kind.upper() not in ("BEAM", "TIE", "PIN") or len(words) != 2:
+            draft.ledger.refuse(name, "this constraint is not known here", line=block.line_number)
+            continue
+        members, leaders = (draft.nodes_of(here, word) for word in words)
+        if len(leaders) != 1:
+            draft.ledger.refuse(name, "of nodes in pairs; write a line for each pair", line=block.line_number)
+        elif kind.upper() != "BEAM":
+            _equal(here, draft, int(leaders[0]), members, is_tied=kind.upper() == "TIE")
+        elif draft.program == "abaqus":
+            _rigid_group(here, draft, int(leaders[0]), members)
+        else:
+            why = "CalculiX keeps the distance of the nodes alone, Abaqus all of their motion: read it as abaqus, or"
+            draft.ledger.refuse(name, f"{why} write *RIGID BODY", line=block.line_number)
+
+
+def _equal(here: str, draft: Draft, leader: int, members: IntArray, *, is_tied: bool) -> None:
+    """Take PIN, equal displacements, and TIE, equal rotations too: without a lever, however far apart the nodes are."""
+    first = draft.node_group(here, [leader])
+    for member in np.setdiff1d(members, [leader]).tolist():
+        other = draft.node_group(here, [member])
+        draft.equations += [Equation(((other, c, 1.0), (first, c, -1.0))) for c in range(3)]
+    if is_tied:
+        _rigid_group(here, draft, leader, members, (3, 4, 5))
+
+
+def surface_nodes(here: str, draft: Draft, name: str) -> IntArray:
+    """Return the numbers of the nodes of a surface: of element faces or of nodes."""
+    block = draft.surfaces.get(name.upper())
+    if block is None:
+        return draft.nodes_of(here, name)
+    found = [np.zeros(0, np.int64)]
+    for line in block.lines:
+        word, _, face = (part.strip() for part in line.partition(","))
+        if block.parameters.get("TYPE", "ELEMENT").upper() == "NODE":
+            found.append(draft.nodes_of(here, word))
+        else:
+            elements = draft.elements_of(here, word)
+            label = face.upper().split(",")[0].strip()
+            if label in ("SPOS", "SNEG", "") or not label[1:].isdigit():
+                found.append(_nodes_of_elements(draft, elements))
+                continue
+            rows = faces_of(draft, elements, int(label[1:]))
+            corners = np.unique(np.concatenate([np.zeros(0, np.int64), *(r.ravel() for r in rows.values())]))
+            found.append(_with_middles(draft, elements, draft.mesh.node_numbers[corners]))
+    return np.unique(np.concatenate(found))
+
+
+def _with_middles(draft: Draft, elements: IntArray, corners: IntArray) -> IntArray:
+    """Return the corner nodes of faces with the middle nodes of edges between two of them."""
+    from fe_models.meshes.cell_shapes import CELL_SHAPES
+
+    found = [corners]
+    for _, kind, table in draft.mesh.elements:
+        if kind in CELL_SHAPES and CELL_SHAPES[kind].middles:
+            cells = table[np.isin(table[:, 0], elements), 1:]
+            n = len(CELL_SHAPES[kind].corners)
+            for k, parents in enumerate(CELL_SHAPES[kind].middles):
+                both = np.isin(cells[:, list(parents)], corners).all(axis=1)
+                found.append(cells[both, n + k])
+    return np.unique(np.concatenate(found))
+
+
+def _nodes_of_elements(draft: Draft, elements: IntArray) -> IntArray:
+    parts = [table[np.isin(table[:, 0], elements), 1:].ravel() for _, _, table in draft.mesh.elements]
+    return np.unique(np.concatenate([np.zeros(0, np.int64), *parts]))

@@ -1,0 +1,205 @@
+"""What a deck says, whatever its program: mesh, materials, sections, attachments, couplings, supports, loads, ledger.
+
+Nodes are named by groups of the mesh (`RawMesh.node_sets`): readers add the groups that a deck leaves unnamed, such as
+`node_17` or `rbe2_5`, so that a job can name whatever the deck names by number.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from fe_models.files.decks.ledger import Ledger
+from fe_models.meshes.cells.raw_mesh import RawMesh
+
+__all__ = [
+    "Coupling",
+    "Deck",
+    "DeckLayer",
+    "DeckMass",
+    "DeckMaterial",
+    "DeckSpring",
+    "Equation",
+    "LineSection",
+    "Load",
+    "RigidGroup",
+    "RodSection",
+    "ShellSection",
+    "SolidSection",
+    "Support",
+]
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class DeckMaterial:
+    """A linear material, isotropic or orthotropic; what the deck does not say is None."""
+
+    name: str
+    young: float | Vector | None = None  #: three: orthotropic, E_1, E_2, E_3
+    poisson: float | Vector | None = None  #: or nu_12, nu_13, nu_23
+    density: float | None = None
+    shear: Vector | None = None  #: orthotropic: G_12, G_13, G_23
+    axes: tuple[Vector, Vector, Vector] | None = None  #: rows: axes 1, 2, 3 in basic axes; None: basic axes
+    #: anisotropic: stress by strain in its axes, six rows 11 22 33 23 13 12, shear strains doubled; no other constants
+    elasticity: tuple[tuple[float, ...], ...] | None = None
+
+
+@dataclass(frozen=True)
+class SolidSection:
+    """Solid cells of one material and one formulation."""
+
+    group: str  #: of cells
+    material: str
+    integration: str = "full"  #: one of `fe_models.elements.solids.elements.INTEGRATIONS`, or "incompatible"
+    mass: str = "consistent"
+    orientation: str = ""  #: name of the axes of its material
+
+
+@dataclass(frozen=True)
+class DeckLayer:
+    """One layer of a shell."""
+
+    material: str
+    thickness: float
+    angle: float = 0.0  #: of axis 1 of its material from the direction of the layup, about the normal [degree]
+    orientation: str = ""  #: name of axes, or an angle as the deck writes it; while a deck is read
+
+
+@dataclass(frozen=True)
+class ShellSection:
+    """Shell cells of one thickness, or of the same layers."""
+
+    group: str
+    material: str  #: empty: each of the layers has its own
+    thickness: float  #: of all layers
+    offset: float = 0.0  #: of the middle surface from the nodes, along the normal
+    added_mass: float = 0.0  #: mass per area without stiffness
+    layers: tuple[DeckLayer, ...] = ()  #: bottom to top
+    direction: Vector = (1.0, 0.0, 0.0)  #: projected on the shell, angle 0 of layers
+    orientation: str = ""  #: name of the axes of its material; while a deck is read
+    bending_ratio: float = 1.0  #: stiffness in bending over that of the material and thickness
+    shear_ratio: float = 1.0  #: stiffness in transverse shear, likewise
+
+    @property
+    def materials(self) -> tuple[str, ...]:
+        """Of the layers, or the one."""
+        return tuple(layer.material for layer in self.layers) or (self.material,)
+
+
+@dataclass(frozen=True)
+class LineSection:
+    """Lines of one cross-section."""
+
+    group: str
+    material: str
+    shape: Mapping[str, object]  #: keys of a table [sections.NAME] of a job: shape and its dimensions
+    orientation: Vector | None = None  #: towards the local y axis; None: each line has its own in the mesh, or none
+    offset: tuple[float, float] = (0.0, 0.0)
+    shear: bool = True
+    rotary_inertia: bool = True
+    added_mass: float = 0.0  #: per length
+
+
+@dataclass(frozen=True)
+class RodSection:
+    """Lines that carry force along themselves only (trusses)."""
+
+    group: str
+    material: str
+    area: float
+
+
+@dataclass(frozen=True)
+class DeckMass:
+    """A rigid piece on each node of a group."""
+
+    nodes: str
+    mass: float
+    inertia: tuple[tuple[float, float, float], ...] = ((0.0,) * 3,) * 3  #: about its centre of mass, basic axes
+    offset: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class DeckSpring:
+    """A spring between two nodes, each named by a group of one."""
+
+    nodes: tuple[str, str]
+    stiffness: tuple[float, ...]  #: along and about x, y, z of the triad
+    damping: tuple[float, ...] | None = None
+    triad: tuple[Vector, Vector, Vector] | None = None  #: rows: its axes in basic axes; None: basic axes
+    point: Vector | None = None  #: where it acts; None: midway between its nodes
+
+
+@dataclass(frozen=True)
+class RigidGroup:
+    """Nodes that move rigidly with one node (RBE2, *RIGID BODY, *KINEMATIC COUPLING, *MPC BEAM)."""
+
+    name: str
+    node: str  #: group of the node that leads
+    followers: str
+    components: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """A node that follows the weighted mean motion of others (RBE3, *DISTRIBUTING COUPLING)."""
+
+    name: str
+    node: str
+    #: groups of nodes, and the weight of each of their nodes: one number for translations, or six
+    members: tuple[tuple[str, float | tuple[float, ...]], ...]
+    components: tuple[int, ...] = (0, 1, 2, 3, 4, 5)  #: of the node that follow
+
+
+@dataclass(frozen=True)
+class Equation:
+    """Σ coefficient × component of a node = 0; the first term gives way (*EQUATION, MPC)."""
+
+    terms: tuple[tuple[str, int, float], ...]  #: group of one node, component 0-5, coefficient
+
+
+@dataclass(frozen=True)
+class Support:
+    """Components that the deck holds at the nodes of a group, or keeps as the boundary of a superelement."""
+
+    name: str
+    nodes: str
+    components: tuple[int, ...]
+    is_boundary: bool = False
+    axes: tuple[Vector, Vector, Vector] | None = None  #: rows: along which they are held; None: basic axes
+
+
+@dataclass(frozen=True)
+class Load:
+    """One load: forces at nodes, a pressure on faces, or gravity; each has the keys of its kind and no others."""
+
+    name: str
+    forces: Mapping[str, tuple[float, ...]] | None = None  #: group -> force and moment at each of its nodes, (6,)
+    faces: str | None = None
+    pressure: float | None = None
+    acceleration: Vector | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Deck:
+    """A whole deck, and the ledger of what is not in it."""
+
+    path: Path
+    program: str
+    mesh: RawMesh
+    ledger: Ledger
+    materials: Mapping[str, DeckMaterial] = field(default_factory=dict)
+    solids: tuple[SolidSection, ...] = ()
+    shells: tuple[ShellSection, ...] = ()
+    lines: tuple[LineSection, ...] = ()
+    masses: tuple[DeckMass, ...] = ()
+    springs: tuple[DeckSpring, ...] = ()
+    rigid: tuple[RigidGroup, ...] = ()
+    couplings: tuple[Coupling, ...] = ()
+    equations: tuple[Equation, ...] = ()
+    supports: tuple[Support, ...] = ()
+    loads: tuple[Load, ...] = ()
+    rods: tuple[RodSection, ...] = ()
+    plane: int | None = None  #: axis across the plane in which the deck holds all of its points; None: space
+    is_plain_mesh: bool = False  #: nodes, elements and their sets alone, such as a mesher writes

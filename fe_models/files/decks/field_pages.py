@@ -1,0 +1,23 @@
+"""The tables of fields of all programs in Markdown, for the page docs/deck_fields.md."""
+
+from fe_models.files.decks.abaqus.keywords import PARAMETERS, parameters_of
+from fe_models.files.decks.ansys.command_fields import COLUMNS, COMMANDS, fields_of_command
+from fe_models.files.decks.field_table import TableField, markdown_table, parse_fields
+from fe_models.files.decks.nastran.card_fields import CARDS, fields_of
+
+__all__ = ["field_tables"]
+
+
+def field_tables() -> str:
+    """Return a section for each program: every card, keyword or command that is read, and its fields."""
+    abaqus = {f"*{name}": parameters_of(name) for name in sorted(PARAMETERS)}
+    ansys = {name: fields_of_command(name) for name in sorted(COMMANDS)}
+    ansys["EBLOCK, columns"] = parse_fields(COLUMNS.split())
+    whole = (TableField(1, "all", "read"),)
+    nastran = {name: fields_of(name) or whole for name in sorted(CARDS)}
+    sections = [
+        ("Nastran", "card", nastran),
+        ("Abaqus and CalculiX", "keyword", abaqus),
+        ("ANSYS", "command", ansys),
+    ]
+    return "\n\n".join(f"## {title}\n\n{markdown_table(what, fields)}" for title, what, fields in sections)

@@ -1,0 +1,74 @@
+"""Tables of what is read of the cards, keywords and commands of a program, one line of symbols each.
+
+NAME        read
+NAME=value  refused unless it is blank or has this value, the default
+NAME!       refused unless it is blank
+NAME~       says nothing about mass, stiffness or damping
+NAME^       damping or the like, which is left out and named in the ledger
+-           blank in every deck
+...         the fields before it repeat, or the reader takes the rest itself
+"""
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from fe_models.files.bulk_data.cards import real_of
+
+__all__ = ["TableField", "has_default", "markdown_table", "parse_fields"]
+
+SYMBOLS = re.compile(r"(?P<name>[^=!~^]+)(?P<kind>[=!~^]?)(?P<default>.*)")
+USES = {"": "read", "=": "default", "!": "default", "~": "harmless", "^": "left out"}
+
+
+@dataclass(frozen=True)
+class TableField:
+    """One field of a card or command, or one parameter of a keyword."""
+
+    number: int  #: of the field, from 1
+    name: str
+    use: str  #: "read", "default", "blank", "harmless" or "left out"
+    default: str = ""  #: value that says nothing, for "default"
+
+
+def parse_fields(words: Iterable[str]) -> tuple[TableField, ...]:
+    """Return the fields of a line of a table, without those that the reader takes as a repeating rest."""
+    found = []
+    for number, word in enumerate(words, start=1):
+        if word == "...":
+            break
+        match = SYMBOLS.fullmatch(word)
+        assert match is not None  # the tables are ours
+        use = "blank" if word == "-" else USES[match["kind"]]
+        found.append(TableField(number, match["name"], use, match["default"]))
+    return tuple(found)
+
+
+def has_default(word: str, default: str) -> bool:
+    """Whether a field has its default, as text or as a number."""
+    if not default:
+        return False
+    if word.upper() == default:
+        return True
+    try:
+        return real_of(word) == real_of(default)
+    except ValueError:
+        return False
+
+
+def markdown_table(what: str, fields: Mapping[str, tuple[TableField, ...]]) -> str:
+    """Return a table of Markdown: a row for each name, a column for each use."""
+    columns = (("read", "read"), ("default", "refused unless blank or"), ("left out", "left out, named"))
+    lines = [
+        f"| {what} | {' | '.join(title for _, title in columns)} | no effect on the body |",
+        "|---|---|---|---|---|",
+    ]
+    for name, items in fields.items():
+        cells = []
+        for use, _ in (*columns, ("harmless", "")):
+            words = [
+                f"{each.name} = {each.default}" if each.default else each.name for each in items if each.use == use
+            ]
+            cells.append(", ".join(f"`{word}`" for word in words))
+        lines.append(f"| `{name}` | {' | '.join(cells)} |")
+    return "\n".join(lines)

@@ -1,0 +1,88 @@
+"""The case control of a deck of Nastran, and its parameters: which sets and matrices count for the body."""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from fe_models.errors import MeshError
+from fe_models.files.bulk_data.cards import Card
+from fe_models.files.decks.ledger import Ledger
+from fe_models.files.decks.nastran.model import NastranModel
+
+__all__ = ["CaseControl", "case_control", "read_parameters"]
+
+#: commands that add mass, stiffness or damping to the body
+ADDING = ("K2GG", "M2GG", "B2GG", "K42GG", "K2PP", "M2PP", "B2PP", "TFL", "MFLUID", "NSM", "A2GG", "BGSET", "BCSET")
+PARAMETER = re.compile(r"(?im)^[ \t]*PARAM[ \t]*,[ \t]*([A-Z0-9_]+)[ \t]*,[ \t]*([^,\s$]+)")
+
+
+@dataclass(frozen=True)
+class CaseControl:
+    """What stands between CEND and BEGIN BULK."""
+
+    chosen: dict[str, set[int]]  #: "SPC", "MPC" -> sets that subcases select, 0 for a subcase without one
+    has_temperature: bool  #: whether a temperature is selected, which materials may depend on
+    adding: tuple[str, ...]  #: commands of `ADDING`, as they stand there
+    parameters: tuple[Card, ...]
+
+    def check(self, ledger: Ledger) -> None:
+        """Refuse commands that add mass, stiffness or damping; name modal damping, which is left out."""
+        for line in self.adding:
+            if line.upper().startswith("SDAMP"):
+                ledger.note("SDAMPING", f"modal damping ({line}) is left out: give the job a table [damping]")
+            else:
+                ledger.refuse(line.split("=")[0].strip().upper(), f"the case control says {line}: it adds to the body")
+
+
+def case_control(text: str) -> CaseControl | None:
+    """Return the case control of a deck; None where the deck has none, but bulk data alone.
+
+    A command above the first SUBCASE counts for all subcases that do not have it themselves.
+    """
+    head = re.split(r"(?im)^[ \t]*BEGIN", text, maxsplit=1)
+    if len(head) < 2 or not re.search(r"(?im)^[ \t]*(CEND|SUBCASE|SPC|MPC|LOAD|METHOD|DISP|ECHO|TITLE)", head[0]):
+        return None
+    control = re.split(r"(?im)^[ \t]*CEND", head[0], maxsplit=1)[-1]
+    parts = re.split(r"(?im)^[ \t]*(?:SUBCASE|SUBCOM|SYM)\b[^\n]*", control)
+    chosen: dict[str, set[int]] = {}
+    for kind in ("SPC", "MPC"):
+        numbers = [re.findall(rf"(?im)^[ \t]*{kind}[ \t]*=[ \t]*(\d+)", part) for part in parts]
+        above = int(numbers[0][-1]) if numbers[0] else 0
+        own = [int(found[-1]) if found else above for found in numbers[1:]]
+        chosen[kind] = set(own) if own else {above}
+    words = "|".join(ADDING)
+    adding = re.findall(rf"(?im)^[ \t]*((?:{words}|SDAMP[A-Z]*)(?:\([^)]*\))?[ \t]*=[^\n$]*)", control)
+    parameters = [
+        Card("PARAM", (name.upper(), value), f"case control: PARAM,{name}")
+        for name, value in PARAMETER.findall(head[0])
+    ]
+    has_temperature = bool(re.search(r"(?im)^[ \t]*TEMP[A-Z]*[ \t]*(\((MAT|INIT|BOTH)[A-Z]*\))?[ \t]*=", control))
+    lines = tuple(line.strip() for line in dict.fromkeys(adding))
+    return CaseControl(chosen, has_temperature, lines, tuple(parameters))
+
+
+def read_parameters(model: NastranModel, cards: Iterable[Card]) -> None:
+    """Take PARAM, from the case control or the bulk data: WTMASS, COUPMASS; G and others of damping are named.
+
+    Raises
+    ------
+    MeshError
+        If WTMASS or COUPMASS has two values.
+    """
+    given: dict[str, Card] = {}
+    for card in cards:
+        name = card.text(1).upper()
+        old = given.setdefault(name, card)
+        if name in ("WTMASS", "COUPMASS") and old.text(2) != card.text(2):
+            raise MeshError(f"{card.where}: {name} = {card.text(2)}, but {old.where} says {old.text(2)}; keep one")
+    model.wtmass = given["WTMASS"].real(2) if "WTMASS" in given else 1.0
+    model.is_lumped = (given["COUPMASS"].text(2) if "COUPMASS" in given else "-1").startswith("-")
+    for name in ("G", "GFL", "ALPHA1", "ALPHA2"):
+        if name in given and given[name].real(2, 0.0):
+            model.ledger.note(
+                "PARAM", f"damping {name} = {given[name].text(2)} is left out: give the job a table [damping]"
+            )
+    for name in ("K6ROT", "SNORM"):
+        if name in given and given[name].text(2).strip("0."):
+            why = f"{name} = {given[name].text(2)}: shells here have a drilling stiffness of their own"
+            model.ledger.note("PARAM", why)

@@ -1,0 +1,171 @@
+"""A deck of Nastran while it is read: its cards by name, its grid points, and what has been made of them so far."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fe_models.errors import MeshError
+from fe_models.files.bulk_data.cards import Card
+from fe_models.files.bulk_data.coordinate_systems import GridPoints
+from fe_models.files.decks.deck import (
+    Coupling,
+    DeckMass,
+    DeckMaterial,
+    DeckSpring,
+    Equation,
+    LineSection,
+    Load,
+    RigidGroup,
+    ShellSection,
+    SolidSection,
+    Support,
+)
+from fe_models.files.decks.equations import Row
+from fe_models.files.decks.ledger import Ledger
+from fe_models.files.nastran import ELEMENT_TYPES
+from fe_models.foundation.arrays import Array
+
+__all__ = ["ALL", "ALONG", "NastranModel"]
+
+ALL = (0, 1, 2, 3, 4, 5)
+ALONG = 1e-9  #: part of a vector across a line, below which it is along it
+
+
+@dataclass
+class NastranModel:
+    """What the cards of a deck have said so far."""
+
+    where: str
+    cards: dict[str, list[Card]]  #: by name
+    points: GridPoints
+    ledger: Ledger
+    #: "SPC", "MPC" -> the sets that subcases select, 0 for a subcase without one; None: there is no case control
+    chosen: dict[str, set[int]] | None
+    has_temperature: bool | None = None  #: whether the case control selects one for materials; None: there is none
+    wtmass: float = 1.0  #: PARAM,WTMASS: all masses are multiplied by it
+    is_lumped: bool = True  #: unless PARAM,COUPMASS
+    materials: dict[str, DeckMaterial] = field(default_factory=dict)
+    solids: list[SolidSection] = field(default_factory=list)
+    shells: list[ShellSection] = field(default_factory=list)
+    lines: list[LineSection] = field(default_factory=list)
+    masses: list[DeckMass] = field(default_factory=list)
+    springs: list[DeckSpring] = field(default_factory=list)
+    rigid: list[RigidGroup] = field(default_factory=list)
+    couplings: list[Coupling] = field(default_factory=list)
+    equations: list[Equation] = field(default_factory=list)
+    #: equations in basic axes, of a first point with axes of its own: (point, 0 or 3 for its rotations), coefficients
+    rows: list[tuple[tuple[int, int], Row]] = field(default_factory=list)
+    plain_rows: list[Row] = field(default_factory=list)  #: others: the first one gives way
+    supports: list[Support] = field(default_factory=list)
+    loads: list[Load] = field(default_factory=list)
+    groups: dict[str, tuple[int, ...]] = field(default_factory=dict)  #: of nodes, by their numbers
+    faces: dict[str, list[tuple[int, ...]]] = field(default_factory=dict)  #: group -> corner grids of faces
+    elements: dict[int, tuple[str, str]] = field(default_factory=dict)  #: number -> card, group of cells
+    held: dict[int, set[int]] = field(default_factory=dict)  #: grid point -> components that are held
+    plane: int | None = None  #: axis of the basic system across the plane of a planar deck
+    grounded: dict[int, set[int]] = field(default_factory=dict)  #: grid point -> components that elements hold
+    last_point: int = 0  #: number of the last grid point that was made here
+    properties: dict[str, dict[int, Card]] = field(default_factory=dict)  #: by kind and number, made when asked for
+    ends: dict[tuple[int, int], int] = field(default_factory=dict)  #: element, end 0 or 1 -> a node of its own
+
+    def of(self, *names: str) -> list[Card]:
+        """Return the cards of these names, in their order by name."""
+        return [card for name in names for card in self.cards.get(name, ())]
+
+    def point(self, card: Card, number: int) -> Array:
+        """Return the position of a grid point in basic axes, (3,)."""
+        if number not in self.points.positions:
+            raise MeshError(f"{card.where} {card.text(1)}: names grid point {number}, which is not defined")
+        return self.points.positions[number]
+
+    def new_point(self, position: Array) -> int:
+        """Return the number of a new grid point at a position in basic axes, (3,)."""
+        self.last_point = max(self.last_point, *self.points.positions) if not self.last_point else self.last_point
+        self.last_point += 1
+        self.points.positions[self.last_point] = np.asarray(position)
+        return self.last_point
+
+    def add_equation(self, row: Row) -> None:
+        """Add an equation in basic axes; terms that vanish are left out, but for the first, which gives way."""
+        terms = [(f"node_{node}", c, a) for k, ((node, c), a) in enumerate(row.items()) if a != 0 or k == 0]
+        for node in dict.fromkeys(node for node, _ in row):
+            self.groups[f"node_{node}"] = (node,)
+        self.equations.append(Equation(tuple(terms)))
+
+    def used_points(self) -> set[int]:
+        """Return the grid points with a motion of their own: of sectioned elements, masses, springs, leaders."""
+        found: set[int] = set()
+        for cards in self.cards.values():
+            for card in cards:
+                name = card.name
+                if name in ELEMENT_TYPES and self.elements.get(card.integer(1, -1), ("", ""))[0] == name:
+                    first, last = 3, 3 + max(ELEMENT_TYPES[name])
+                    words = [card.text(k) for k in range(first, last)]
+                    found |= {int(word) for word in words if word.isdigit()}
+        found |= {number for number in self.ends.values()}
+        groups = [mass.nodes for mass in self.masses] + [name for each in self.springs for name in each.nodes]
+        groups += [link.node for link in self.rigid] + [coupling.node for coupling in self.couplings]
+        return found.union(*(self.groups[name] for name in groups)) & set(self.points.positions)
+
+    def property_of(self, card: Card, *names: str) -> Card | None:
+        """Return the property card that an element names in its field 2, its own number where that is blank."""
+        key = " ".join(names)
+        if key not in self.properties:
+            self.properties[key] = {each.integer(1): each for each in self.of(*names)}
+        return self.properties[key].get(card.integer(2, card.integer(1)))
+
+    def property_value(self, card: Card, name: str, size: int) -> float | None:
+        """Return the value of the property that an element names, of cards that hold several, each in `size` fields."""
+        number = card.integer(2, card.integer(1))
+        for each in self.cards.get(name, ()):
+            for k in range(1, len(each.fields) + 1, size):
+                if each.text(k) and each.integer(k) == number:
+                    return each.real(k + 1, 0.0)
+        return None
+
+    def axes(self, number: int) -> Array:
+        """Return the displacement axes of a grid point, (3, 3), columns in basic axes."""
+        return self.points.axes.get(number, np.eye(3))
+
+    def system(self, card: Card, number: int, at: Array) -> Array:
+        """Return the axes of a coordinate system at a point, (3, 3), columns in basic axes."""
+        if number not in self.points.systems:
+            raise MeshError(f"{card.where} {card.text(1)}: names coordinate system {number}, which is not defined")
+        return self.points.systems[number].axes_at(at)
+
+    def group(self, card: Card, numbers: Iterable[int], name: str = "") -> str:
+        """Return the name of a group of these grid points, made here."""
+        nodes = tuple(sorted(set(numbers)))
+        for number in nodes:
+            self.point(card, number)
+        made = f"node_{nodes[0]}" if len(nodes) == 1 else name
+        while self.groups.get(made, nodes) != nodes:
+            made += "_"
+        self.groups[made] = nodes
+        return made
+
+
+def components_of(card: Card, word: str) -> tuple[int, ...]:
+    """Return the components of a field such as 123456."""
+    if not word.isdigit() or not set(word) <= set("0123456"):
+        raise MeshError(f"{card.where} {card.text(1)}: expected components such as 123, got {word!r}")
+    return tuple(sorted({int(letter) - 1 for letter in word if letter != "0"}))
+
+
+def numbers_of(card: Card, first: int) -> list[int]:
+    """Return the numbers from a field on, ranges (a THRU b, with BY c) written out."""
+    words = [word for word in card.fields[first - 1 :] if word]
+    found: list[int] = []
+    k = 0
+    while k < len(words):
+        if k + 2 < len(words) and words[k + 1].upper() == "THRU":
+            step, used = (int(words[k + 4]), 5) if k + 4 < len(words) and words[k + 3].upper() == "BY" else (1, 3)
+            if int(words[k + 2]) - int(words[k]) > 10_000_000 or step < 1:
+                raise MeshError(f"{card.where}: {words[k]} THRU {words[k + 2]}: not a range of grid points")
+            found += range(int(words[k]), int(words[k + 2]) + 1, step)
+            k += used
+        else:
+            found.append(int(words[k]))
+            k += 1
+    return found

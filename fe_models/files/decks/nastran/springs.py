@@ -1,0 +1,275 @@
+"""Springs, dampers and bushings of Nastran, and gaps as the linear springs of their first state."""
+
+import numpy as np
+
+from fe_models.files.bulk_data.cards import Card
+from fe_models.files.decks.deck import DeckSpring, Vector
+from fe_models.files.decks.nastran.model import ALL, ALONG, NastranModel
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.components import MOTION_COMPONENTS
+
+__all__ = ["read_springs", "scalar_ends", "springs_to_ground"]
+
+
+def read_springs(model: NastranModel) -> None:
+    """Take what acts between two grid points, or between one and the ground."""
+    for card in model.of("CBUSH"):
+        _bush(model, card)
+    for card in model.of("CBUSH1D"):
+        _bush_1d(model, card)
+    for card in model.of("CGAP"):
+        _gap(model, card)
+    for card in model.of("CELAS1", "CELAS2", "CDAMP1", "CDAMP2"):
+        _scalar_spring(model, card)
+    for card in model.of("CVISC"):
+        _axial_damper(model, card)
+
+
+def springs_to_ground(model: NastranModel) -> None:
+    """Take springs to points that are held in all components and belong to nothing else as elements to the ground."""
+    springs, model.springs = model.springs, []
+    attached = model.used_points() | {node for row in model.plain_rows for node, _ in row}
+    attached |= {node for _, row in model.rows for node, _ in row}
+    attached |= {node for link in model.couplings for group, _ in link.members for node in model.groups[group]}
+    for spring in springs:
+        ends = [model.groups[name][0] for name in spring.nodes]
+        is_ground = [set(ALL) <= model.held.get(node, set()) and node not in attached for node in ends]
+        if is_ground[0] == is_ground[1]:
+            model.springs.append(spring)
+            continue
+        free = ends[is_ground.index(False)]
+        why = (
+            f"tie grid point {free} to point {ends[is_ground.index(True)]}, which is held; the body is free here: put "
+            "them into the system file"
+        )
+        model.ledger.note("springs", why)
+        damping = spring.damping or (0.0,) * 6
+        is_used = [bool(spring.stiffness[k] or damping[k]) for k in ALL]
+        whole = [k for first in (0, 3) for k in range(first, first + 3) if any(is_used[first : first + 3])]
+        model.grounded.setdefault(free, set()).update(whole)
+
+
+def scalar_ends(model: NastranModel, card: Card) -> list[tuple[int, int] | None] | None:
+    """Return (grid point, component) of both ends of a scalar element, None for the ground.
+
+    None in place of the list if a point is scalar.
+    """
+    ends: list[tuple[int, int] | None] = []
+    for k in (3, 5):
+        number, word = card.integer(k, 0), card.text(k + 1) or "0"
+        if number == 0:
+            ends.append(None)
+        elif number in model.points.positions and word in set("123456"):
+            ends.append((number, int(word) - 1))
+        else:
+            return None
+    return ends
+
+
+def _ground(model: NastranModel, card: Card, node: int, components: tuple[int, ...], what: str) -> None:
+    """Note an element to the ground: a body is free here, and gets an interface where it would be attached."""
+    words = ", ".join(MOTION_COMPONENTS[c] for c in components)
+    why = f"ties {words} of grid point {node} to the ground{what}; the body is free here: put it into the system file"
+    model.ledger.note(card.name, why)
+    model.grounded.setdefault(node, set()).update(components)
+
+
+def _axial_damper(model: NastranModel, card: Card) -> None:
+    """CVISC: a damper along and about the line between its grid points."""
+    number = card.integer(2, card.integer(1))
+    for known in model.of("PVISC"):
+        for k in (1, 5):
+            if known.text(k) and known.integer(k) == number:
+                along, about = known.real(k + 1, 0.0), known.real(k + 2, 0.0)
+                ends = [model.point(card, card.integer(n)) for n in (3, 4)]
+                R = _any_axes(ends[1] - ends[0])
+                names = [model.group(card, [card.integer(n)]) for n in (3, 4)]
+                damping = (along, 0.0, 0.0, about, 0.0, 0.0)
+                model.springs.append(DeckSpring((names[0], names[1]), (0.0,) * 6, damping, _rows(R)))
+                return
+    model.ledger.refuse("CVISC", f"names PVISC {number}, which is not defined")
+
+
+def _rows(axes: Array) -> tuple[Vector, Vector, Vector]:
+    """Return axes, (3, 3) columns, as rows of a deck."""
+    rows = [(float(a[0]), float(a[1]), float(a[2])) for a in axes.T]
+    return rows[0], rows[1], rows[2]
+
+
+def _bush(model: NastranModel, card: Card) -> None:
+    known = model.property_of(card, "PBUSH")
+    if known is None:
+        model.ledger.refuse("CBUSH", f"names PBUSH {card.text(2) or card.text(1)}, which is not defined")
+        return
+    if not card.integer(4, 0):
+        _ground(model, card, card.integer(3), ALL, f" by PBUSH {known.text(1)}")
+        return
+    k, b = [0.0] * 6, [0.0] * 6
+    keys = {"K": k, "B": b}
+    words = list(known.fields)
+    for place in range(1, len(words), 8):
+        key = words[place].upper()
+        if key == "GE" and any(known.real(place + 2 + j, 0.0) for j in range(6)):
+            model.ledger.note("PBUSH", "structural damping GE is left out: give the job a table [damping]")
+        elif key == "M" and known.real(place + 2, 0.0):
+            model.ledger.refuse("PBUSH", f"M = {known.text(place + 2)}: mass of a bushing")
+        elif key in keys:
+            keys[key][:] = [known.real(place + 2 + j, 0.0) for j in range(6)]
+        elif key not in ("", "GE", "M", "RCV", "T", "ALPHA"):
+            model.ledger.refuse("PBUSH", f"{key}: expected K, B, GE, M, RCV")
+    ends = [model.point(card, card.integer(n)) for n in (3, 4)]
+    has_length = bool(np.linalg.norm(ends[1] - ends[0]))
+    is_round = all(row[1] == row[2] and row[4] == row[5] for row in (k, b))
+    if has_length and not is_round and not card.text(8) and not card.text(5):
+        why = "with length, other values along y than along z, and neither orientation nor CID: which is y is not said"
+        model.ledger.refuse("CBUSH", why)
+        return
+    if not has_length and not card.text(8):
+        why = "of no length and without CID: its axes are those of the displacements of GA (CD)"
+        model.ledger.note("CBUSH", why)
+    triad = _bush_axes(model, card, ends)
+    if triad is None:
+        model.ledger.refuse("CBUSH", "whose orientation is along the element itself, which says no direction of y")
+        return
+    names = [model.group(card, [card.integer(n)]) for n in (3, 4)]
+    damping = tuple(b) if any(b) else None
+    point = None
+    if card.real(9, 0.5) != 0.5 and has_length:
+        at = ends[0] + card.real(9) * (ends[1] - ends[0])
+        point = (float(at[0]), float(at[1]), float(at[2]))
+    model.springs.append(DeckSpring((names[0], names[1]), tuple(k), damping, _rows(triad), point))
+
+
+def _bush_axes(model: NastranModel, card: Card, ends: list[Array]) -> Array | None:
+    """Return the axes of a bush, (3, 3), columns: of CID, else x along the element and y towards the vector.
+
+    None if the vector is along the element.
+    """
+    if card.text(8):
+        return model.system(card, card.integer(8), ends[0])
+    x = ends[1] - ends[0]
+    if not np.linalg.norm(x) or not card.text(5):
+        return model.axes(card.integer(3)) if not np.linalg.norm(x) else _any_axes(x)
+    word = card.text(5)
+    is_grid = word.isdigit() and not card.text(6)
+    v = model.point(card, int(word)) - ends[0] if is_grid else np.array([card.real(k, 0.0) for k in (5, 6, 7)])
+    v = v if is_grid else model.axes(card.integer(3)) @ v
+    x = x / np.linalg.norm(x)
+    z = np.cross(x, v)
+    if np.linalg.norm(z) <= ALONG * np.linalg.norm(v):
+        return None
+    z = z / np.linalg.norm(z)
+    return np.stack([x, np.cross(z, x), z], axis=1)
+
+
+def _any_axes(x: Array) -> Array:
+    x = x / np.linalg.norm(x)
+    y = np.cross(x, np.eye(3)[int(np.argmin(np.abs(x)))])
+    y = y / np.linalg.norm(y)
+    return np.stack([x, y, np.cross(x, y)], axis=1)
+
+
+def _scalar_spring(model: NastranModel, card: Card) -> None:
+    """A spring or damper between the same component of two grid points.
+
+    Two forces along an axis balance only on one line: the points must lie at one place, or apart along this axis. Two
+    moments always balance.
+    """
+    if card.name in ("CELAS2", "CDAMP2"):
+        value: float | None = card.real(2)
+    else:
+        value = model.property_value(
+            card, "PELAS" if card.name == "CELAS1" else "PDAMP", 4 if card.name == "CELAS1" else 2
+        )
+    if value is None:
+        kind = card.name.replace("C", "P", 1).rstrip("1")
+        model.ledger.refuse(card.name, f"names {kind} {card.text(2)}, which is not defined")
+        return
+    ends = scalar_ends(model, card)
+    if ends is None:
+        model.ledger.refuse(card.name, "to a scalar point")
+        return
+    grids = [end for end in ends if end is not None]
+    if len(grids) < 2:
+        if grids:
+            _ground(model, card, grids[0][0], (grids[0][1],), f" with {value:g}")
+        return
+    (a, c), (b, c_b) = grids
+    if c != c_b:
+        model.ledger.refuse(card.name, "between different components, whose forces do not balance")
+        return
+    axes = [model.axes(node) for node in (a, b)]
+    apart = model.point(card, b) - model.point(card, a)
+    across = apart - (apart @ axes[0][:, c % 3]) * axes[0][:, c % 3]
+    if np.abs(axes[0] - axes[1]).max() > ALONG or (c < 3 and np.abs(across).max() > ALONG * np.abs(apart).max()):
+        model.ledger.refuse(
+            card.name, "between grid points of different axes, or apart across its direction: its forces do not balance"
+        )
+        return
+    names = [model.group(card, [node]) for node in (a, b)]
+    six, none = tuple(value if k == c else 0.0 for k in range(6)), (0.0,) * 6
+    stiffness, damping = (six, None) if card.name.startswith("CELAS") else (none, six)
+    model.springs.append(DeckSpring((names[0], names[1]), stiffness, damping, _rows(axes[0])))
+
+
+def _bush_1d(model: NastranModel, card: Card) -> None:
+    """CBUSH1D: a spring and damper along the line of its grid points, or along axis x of CID."""
+    known = model.property_of(card, "PBUSH1D")
+    if known is None:
+        model.ledger.refuse("CBUSH1D", f"names PBUSH1D {card.text(2) or card.text(1)}, which is not defined")
+        return
+    k, c, mass = (known.real(n, 0.0) for n in (2, 3, 4))
+    if mass:
+        model.ledger.refuse("PBUSH1D", f"M = {known.text(4)}: mass of a bushing")
+    if any(known.fields[8:]):
+        model.ledger.note("PBUSH1D", "laws that are not linear, or vary with time: K and C are taken")
+    if not card.integer(4, 0):
+        _ground(model, card, card.integer(3), ALL[:3], f" by PBUSH1D {known.text(1)}")
+        return
+    axes = _axes_along(model, card, 5)
+    if axes is None:
+        why = "of no length and without CID, or apart across axis x of CID: its forces do not balance"
+        model.ledger.refuse("CBUSH1D", why)
+        return
+    names = [model.group(card, [card.integer(n)]) for n in (3, 4)]
+    none = (0.0,) * 5
+    model.springs.append(DeckSpring((names[0], names[1]), (k, *none), (c, *none) if c else None, _rows(axes)))
+
+
+def _axes_along(model: NastranModel, card: Card, field: int) -> Array | None:
+    """Return axes of which x is that of the system in a field, or the line from GA to GB; None: no forces balance."""
+    ends = [model.point(card, card.integer(n)) for n in (3, 4)]
+    apart = ends[1] - ends[0]
+    if not card.text(field):
+        return _any_axes(apart) if np.linalg.norm(apart) else None
+    axes = model.system(card, card.integer(field), ends[0])
+    across = apart - (apart @ axes[:, 0]) * axes[:, 0]
+    return axes if np.abs(across).max() <= ALONG * np.abs(apart).max() else None
+
+
+def _gap(model: NastranModel, card: Card) -> None:
+    """CGAP: a linear spring of its first state, as in Nastran's linear solutions.
+
+    Closed (U0 <= 0): KA along x, KT (MU1 KA where it is blank) across. Open: KB along x, 1e-14 KA where it is blank,
+    which is none here.
+    """
+    known = model.property_of(card, "PGAP")
+    if known is None:
+        model.ledger.refuse("CGAP", f"names PGAP {card.text(2) or card.text(1)}, which is not defined")
+        return
+    opening, stiffness = known.real(2, 0.0), known.real(4)
+    is_open = opening > 0
+    along = known.real(5, 0.0) if is_open else stiffness
+    across = 0.0 if is_open else known.real(6) if known.text(6) else known.real(7, 0.0) * stiffness
+    state = f"open by {opening:g}" if is_open else "closed"
+    model.ledger.note("CGAP", f"{state} at first: a linear spring of {along:g} along and {across:g} across its axis")
+    axes = _axes_along(model, card, 8)
+    has_length = bool(np.linalg.norm(model.point(card, card.integer(4)) - model.point(card, card.integer(3))))
+    if axes is None or (across and has_length):
+        why = "apart across its axis, or with stiffness across its length: its forces do not balance"
+        model.ledger.refuse("CGAP", why)
+        return
+    names = [model.group(card, [card.integer(n)]) for n in (3, 4)]
+    if along or across:
+        six = (along, across, across, 0.0, 0.0, 0.0)
+        model.springs.append(DeckSpring((names[0], names[1]), six, None, _rows(axes)))

@@ -1,0 +1,174 @@
+"""Tapered beams of Nastran: pieces of one section each, the mean of the taper over the piece."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.files.bulk_data.cards import Card, real_of
+from fe_models.files.decks.nastran.bar_shapes import DIMENSIONS
+from fe_models.files.decks.nastran.model import NastranModel
+from fe_models.foundation.arrays import Array
+
+__all__ = ["N_PIECES", "cut_tapers"]
+
+N_PIECES = 12  #: of a tapered beam
+YES = ("YES", "YESA", "NO")
+FIRST = 3  #: field of the area of a PBEAM
+SIZES = 6  #: A, I1, I2, I12, J, NSM
+
+
+@dataclass(frozen=True)
+class Taper:
+    """What varies along a beam, linearly between its stations."""
+
+    places: Array  #: x/L of the stations, (n,), rising from 0 to 1
+    sizes: Array  #: (n, n_sizes): A, I1, I2, I12, J, NSM of a PBEAM; dimensions and NSM of a PBEAML
+
+    @property
+    def is_none(self) -> bool:
+        """Whether all stations are alike."""
+        return bool(np.abs(self.sizes - self.sizes[0]).max() <= 1e-12 * np.abs(self.sizes).max())
+
+    def at(self, x: float) -> Array:
+        """Return the sizes at a place x/L."""
+        return np.array([np.interp(x, self.places, column) for column in self.sizes.T])
+
+
+def cut_tapers(model: NastranModel) -> None:
+    """Cut every tapered beam into pieces between new nodes on the line of its ends, each with a property of its own.
+
+    The first piece keeps the number of the beam. Released ends and offsets stay at the ends; the nodes between are on
+    the line from one offset end to the other.
+    """
+    tapers: dict[int, tuple[Card, Taper]] = {}
+    for name, taper_of in (("PBEAM", _pbeam_taper), ("PBEAML", _pbeaml_taper)):
+        for k, card in enumerate(model.cards.get(name, [])):
+            taper = taper_of(card)
+            if taper is not None and taper.is_none:
+                model.cards[name][k] = _property(card, card.integer(1), taper.sizes[0])
+            elif taper is not None:
+                tapers[card.integer(1)] = (card, taper)
+    beams = [card for card in model.of("CBEAM") if card.integer(2, card.integer(1)) in tapers]
+    if not beams:
+        return
+    last_element = max(card.integer(1, 0) for cards in model.cards.values() for card in cards if card.name[0] == "C")
+    last_property = max(card.integer(1) for card in model.of("PBEAM", "PBEAML", "PBAR", "PBARL"))
+    made: dict[int, list[int]] = {}  # property -> of its pieces
+    for pid, (card, taper) in tapers.items():
+        made[pid] = [last_property + k for k in range(1, N_PIECES + 1)]
+        last_property += N_PIECES
+        for k, number in enumerate(made[pid]):
+            sizes = taper.at((k + 0.5) / N_PIECES)
+            model.cards[card.name].append(_property(card, number, sizes))
+    kept = [card for card in model.cards["CBEAM"] if card not in beams]
+    for beam in beams:
+        pieces = _pieces(model, beam, made[beam.integer(2, beam.integer(1))], last_element)
+        last_element += N_PIECES - 1
+        kept += pieces
+    model.cards["CBEAM"] = kept
+    why = f"tapers: {N_PIECES} pieces of one section each, between nodes of their own"
+    model.ledger.note("CBEAM", why, count=len(beams))
+
+
+def _pieces(model: NastranModel, beam: Card, properties: list[int], last: int) -> list[Card]:
+    """Return the pieces of a beam, from its first to its second end."""
+    from fe_models.files.decks.nastran.bars import OFFSETS, line_of_ends, orientation_of
+
+    ends = line_of_ends(model, beam)
+    between = [ends[0] + (ends[1] - ends[0]) * k / N_PIECES for k in range(1, N_PIECES)]
+    nodes = [beam.integer(3), *(model.new_point(point) for point in between), beam.integer(4)]
+    v = [repr(float(x)) for x in orientation_of(model, beam)]
+    offt = (beam.text(8).upper() or "GGG").ljust(3, "G")
+    made = []
+    for k in range(N_PIECES):
+        fields = [""] * 16
+        fields[:8] = [
+            str(beam.integer(1) if k == 0 else last + k), str(properties[k]), str(nodes[k]), str(nodes[k + 1]), *v,
+            f"B{offt[1:]}",
+        ]  # fmt: skip
+        if k == 0:
+            fields[8] = beam.text(9)
+            for j in OFFSETS[0]:
+                fields[j - 1] = beam.text(j)
+        if k == N_PIECES - 1:
+            fields[9] = beam.text(10)
+            for j in OFFSETS[1]:
+                fields[j - 1] = beam.text(j)
+        made.append(Card("CBEAM", tuple(fields), beam.where))
+    return made
+
+
+def _property(card: Card, number: int, sizes: Array) -> Card:
+    """Return a property of one section; what stands behind the stations of a PBEAM is kept."""
+    words = [repr(float(value)) for value in sizes]
+    if card.name == "PBEAML":
+        return Card(card.name, (str(number), *card.fields[1:8], *words), card.where)
+    at = _behind_stations(card)
+    fields = (str(number), card.text(2), *words, *[""] * 8, *card.fields[at - 1 :])
+    return Card(card.name, fields, card.where)
+
+
+def _first_station(card: Card) -> int:
+    return 9 if card.text(9).upper() in YES else 17
+
+
+def _behind_stations(card: Card) -> int:
+    """Return the field behind the stations of a PBEAM, of K1."""
+    at = _first_station(card)
+    while card.text(at).upper() in YES:
+        at += 16 if card.text(at).upper() == "YES" else 8
+    return at
+
+
+def _pbeam_taper(card: Card) -> Taper | None:
+    """Return the taper of a PBEAM; None where it has no stations.
+
+    Blank fields of end B are those of end A, of other stations those between the ends.
+    """
+    first = [card.real(FIRST + j, 0.0) for j in range(SIZES)]
+    given: list[tuple[float, list[float | None]]] = []
+    at = _first_station(card)
+    while card.text(at).upper() in YES:
+        x = card.real(at + 1, 1.0)
+        given.append((x, [card.real(at + 2 + j) if card.text(at + 2 + j) else None for j in range(SIZES)]))
+        at += 16 if card.text(at).upper() == "YES" else 8
+    if not given:
+        return None
+    last = next((sizes for x, sizes in given if x == 1.0), [None] * SIZES)
+    end = [a if b is None else b for a, b in zip(first, last, strict=True)]
+    rows = [(0.0, first), (1.0, end)]
+    for x, sizes in given:
+        if 0 < x < 1:
+            between = [a + (b - a) * x for a, b in zip(first, end, strict=True)]
+            rows.append((x, [m if s is None else s for m, s in zip(between, sizes, strict=True)]))
+    return _taper(rows)
+
+
+def _pbeaml_taper(card: Card) -> Taper | None:
+    """Return the taper of a PBEAML; None where it has no stations, or its shape is not known."""
+    n = DIMENSIONS.get(card.text(4).upper(), 0)
+    words = list(card.fields[8:])
+    first = _numbers(words[: n + 1], [0.0] * (n + 1))
+    rows = [(0.0, first)]
+    at = n + 1
+    if not n or not any(words[at:]):
+        return None
+    while any(words[at:]):
+        if words[at].upper() not in ("YES", "NO", ""):
+            return None  # the reader of the section says what is wrong
+        x = real_of(words[at + 1]) if words[at + 1 : at + 2] and words[at + 1] else 1.0
+        rows.append((x, _numbers(words[at + 2 : at + 3 + n], first)))
+        at += n + 3
+    if not any(x == 1.0 for x, _ in rows):
+        rows.append((1.0, first))
+    return _taper(rows)
+
+
+def _numbers(words: list[str], default: list[float]) -> list[float]:
+    words = words + [""] * (len(default) - len(words))
+    return [real_of(word) if word else value for word, value in zip(words, default, strict=True)]
+
+
+def _taper(rows: list[tuple[float, list[float]]]) -> Taper:
+    rows = sorted(rows)
+    return Taper(np.array([x for x, _ in rows]), np.array([row for _, row in rows]))

@@ -1,0 +1,100 @@
+"""Whole decks of Nastran: bulk data with their includes, by the cards of `fe_models.files.bulk_data`."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from fe_models.errors import MeshError
+from fe_models.files.bulk_data.cards import Card, read_cards
+from fe_models.files.bulk_data.coordinate_systems import read_grid_points
+from fe_models.files.bulk_data.includes import bulk_text
+from fe_models.files.decks.deck import Deck
+from fe_models.files.decks.ledger import Ledger
+from fe_models.files.decks.nastran.attached import read_attached
+from fe_models.files.decks.nastran.bars import BARS
+from fe_models.files.decks.nastran.card_fields import check_cards
+from fe_models.files.decks.nastran.case_control import case_control, read_parameters
+from fe_models.files.decks.nastran.model import NastranModel
+from fe_models.files.decks.nastran.sections import SHELLS, SOLIDS, read_sections
+from fe_models.files.decks.nastran.supports import hold_points
+from fe_models.files.nastran import ELEMENT_TYPES, nodes_of
+from fe_models.meshes.cells.raw_mesh import RawBlock, RawMesh
+
+__all__ = ["read_nastran_deck"]
+
+
+def read_nastran_deck(path: Path, data: bytes) -> Deck:
+    """Return what a deck of Nastran says.
+
+    Raises
+    ------
+    MeshError
+        If the deck is damaged. What cannot be taken over is in the ledger.
+    """
+    where = f"deck {path}"
+    included: dict[str, str] = {}
+    text = bulk_text(where, path, data.decode("utf-8", "replace"), included)
+    cards: dict[str, list[Card]] = {}
+    for card in read_cards(where, text):
+        cards.setdefault(card.name, []).append(card)
+    if "GRID" not in cards:
+        raise MeshError(f"{where}: expected grid points (GRID), got none; is this a Nastran bulk data file?")
+    points = read_grid_points([card for found in cards.values() for card in found])
+    head = case_control(text)
+    model = NastranModel(where, cards, points, Ledger(where), None if head is None else head.chosen)
+    model.has_temperature = None if head is None else head.has_temperature
+    parameters = [*([] if head is None else head.parameters), *cards.get("PARAM", ())]
+    read_parameters(model, parameters)
+    hold_points(model)
+    read_sections(model)
+    read_attached(model)
+    check_cards(model)
+    if head is not None:
+        head.check(model.ledger)
+    mesh = replace(_mesh(model), included=included)
+    return Deck(
+        path, "nastran", mesh, model.ledger, model.materials, tuple(model.solids), tuple(model.shells),
+        tuple(model.lines), tuple(model.masses), tuple(model.springs), tuple(model.rigid), tuple(model.couplings),
+        tuple(model.equations), tuple(model.supports), tuple(model.loads), plane=model.plane,
+    )  # fmt: skip
+
+
+def _mesh(model: NastranModel) -> RawMesh:
+    """Return grid points, the elements that have a section, and groups."""
+    numbers = np.array(list(model.points.positions), dtype=np.int64)
+    place = {int(number): row for row, number in enumerate(numbers)}
+    positions = np.array([model.points.positions[int(number)] for number in numbers])
+    cells: dict[tuple[str, int, str], tuple[list[int], list[list[int]]]] = {}
+    for name in (*SOLIDS, *SHELLS, *BARS):
+        for card in model.cards.get(name, ()):
+            number = card.integer(1)
+            group = model.elements.get(number, (name, ""))[1]
+            widest = max(ELEMENT_TYPES[name])
+            given = [card.text(k) for k in range(3, 3 + widest)]
+            for end in (0, 1):
+                if (number, end) in model.ends:
+                    given[end] = str(model.ends[number, end])
+            if name in SHELLS and widest == 4:
+                given = given[:4]
+            count, words = nodes_of(card.where, name, given)
+            rows = [place.get(int(word), -1) for word in words]
+            if -1 in rows:
+                raise MeshError(f"{card.where} {number}: names a grid point that is not defined")
+            listed = cells.setdefault((name, count, group), ([], []))
+            listed[0].append(number)
+            listed[1].append(rows)
+    blocks = []
+    for (name, count, group), (own_numbers, rows_of_nodes) in cells.items():
+        kind, order = ELEMENT_TYPES[name][count]
+        table = np.array(rows_of_nodes, dtype=np.int64)
+        table = table if order is None else table[:, order]
+        groups = {group: np.arange(len(table))} if group else {}
+        blocks.append(RawBlock(kind, table, groups, np.array(own_numbers, dtype=np.int64)))
+    for name, faces in model.faces.items():
+        for kind, n in (("triangle", 3), ("quad", 4)):
+            table = np.array([[place[node] for node in face] for face in faces if len(face) == n], dtype=np.int64)
+            if len(table):
+                blocks.append(RawBlock(kind, table, {name: np.arange(len(table))}))
+    sets = {name: np.array([place[node] for node in nodes], dtype=np.int64) for name, nodes in model.groups.items()}
+    return RawMesh(positions, tuple(blocks), sets, numbers)

@@ -1,0 +1,65 @@
+"""One door for whole decks: the program by the suffix, one error for everything that can be wrong with a file."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from fe_models.errors import FeModelsError, MeshError
+from fe_models.files.decks.abaqus.whole_deck import read_abaqus_deck
+from fe_models.files.decks.ansys.cdb import read_cdb_deck
+from fe_models.files.decks.deck import Deck
+from fe_models.files.decks.nastran.whole_deck import read_nastran_deck
+from fe_models.foundation.paths import near_file
+from fe_models.foundation.words import damage, nearest, quoted
+from fe_models.meshes.cells.raw_mesh import require_nodes
+
+__all__ = ["DECK_FORMATS", "read_deck"]
+
+DECK_FORMATS: dict[str, Callable[..., Deck]] = {
+    ".inp": read_abaqus_deck,
+    ".cdb": read_cdb_deck,
+    ".bdf": read_nastran_deck,
+    ".nas": read_nastran_deck,
+    ".dat": read_nastran_deck,
+    ".fem": read_nastran_deck,
+    ".blk": read_nastran_deck,
+    ".bulk": read_nastran_deck,
+    ".asm": read_nastran_deck,
+    ".pch": read_nastran_deck,
+}  #: suffix -> reader (path, content, program)
+
+
+def read_deck(path: str | Path, *, program: str | None = None) -> Deck:
+    """Read a whole deck: mesh, materials, sections, couplings, supports, loads, and the ledger of the rest.
+
+    Parameters
+    ----------
+    path
+        The file; its suffix names the program (`DECK_FORMATS`).
+    program
+        "calculix" (the default) or "abaqus" for decks (.inp) that both read, but integrate differently.
+
+    Raises
+    ------
+    MeshError
+        If the file is missing, of another kind, or damaged. What it holds and is not taken over is in the ledger.
+    """
+    path = Path(path)
+    where = f"deck {path}"
+    suffix = path.suffix.lower()
+    if suffix not in DECK_FORMATS:
+        raise MeshError(f"{where}: unknown suffix {quoted(suffix)}{nearest(suffix, DECK_FORMATS)}")
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise MeshError(f"{where}: cannot be read: {error.strerror or error}{near_file(path)}") from error
+    reader = DECK_FORMATS[suffix]
+    if program is not None and reader is not read_abaqus_deck:
+        raise MeshError(f"{where}: program = {program!r} belongs to decks of Abaqus and CalculiX (.inp); leave it out")
+    try:
+        deck = reader(path, data) if program is None else reader(path, data, program=program)
+        require_nodes(where, deck.mesh)
+        return deck
+    except FeModelsError:
+        raise
+    except Exception as error:  # whatever a damaged file does to a reader, the user gets one message
+        raise MeshError(f"{where}: could not be read: {damage(error)}") from error

@@ -1,0 +1,194 @@
+"""A body from what the files of another program say: rows find their nodes, then they pass the gate of free bodies."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_models.body.fe_body import FEBody, Interface
+from fe_models.body.load_cases import LoadCase
+from fe_models.errors import MatrixError
+from fe_models.files.matrices.foreign_matrices import ROLES, SCALAR, ForeignMatrices
+from fe_models.files.matrices.given import body_from_matrices
+from fe_models.files.matrices.supports import without_supports
+from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.units import Units
+from fe_models.meshes.boundary import boundary_triangles
+from fe_models.meshes.mesh import Mesh
+from fe_models.meshes.mesh_numbering import node_sets, solid_numbering
+from fe_models.meshes.node_cloud import NodeCloud
+from fe_models.meshes.numbering import Numbering
+
+__all__ = ["body_from_foreign", "nodes_of", "with_geometry"]
+
+NODE_MAJOR = (3, 6)  #: rows of every node where no list of dofs is given
+
+
+def nodes_of(read: ForeignMatrices) -> NodeCloud:
+    """Return the nodes that the files of the matrices bring themselves.
+
+    Raises
+    ------
+    MatrixError
+        If they bring none.
+    """
+    if read.nodes is None or read.node_numbers is None:
+        raise MatrixError(
+            f"{where_of(read)}: the files say nothing of where the nodes are; give the deck or mesh they were made of: "
+            'geometry = "model.inp" in [body] of a job, geometry= in Python'
+        )
+    return NodeCloud(read.nodes, node_numbers=read.node_numbers, source=", ".join(read.files))
+
+
+def with_geometry(read: ForeignMatrices, geometry: Mesh | NodeCloud) -> ForeignMatrices:
+    """Return the record with the nodes of a deck or mesh, and dofs for its rows where the files name none.
+
+    Without a list of dofs the rows are taken as 3 (or 6) to a node in ascending order of their numbers 1, 2, ..., of
+    which a note tells; whether that is so, the stiffness says of a free body: in another order it is not free.
+
+    Raises
+    ------
+    MatrixError
+        If rows and nodes do not fit.
+    """
+    where = where_of(read)
+    numbers = numbers_of(geometry)
+    read = replace(read, nodes=geometry.nodes, node_numbers=numbers)
+    if read.dofs is None:
+        n, n_nodes = read.n_dof or 0, len(numbers)
+        per_node = next((k for k in NODE_MAJOR if n == k * n_nodes), None)
+        if per_node is None:
+            raise MatrixError(
+                f"{where}: {n} rows and no list of their dofs: expected 3 or 6 for each of the {n_nodes} nodes of "
+                f"{geometry.source or 'the geometry'}; give the list of dofs, or write the matrices with node "
+                "numbers"
+            )
+        if not np.array_equal(np.sort(numbers), np.arange(1, n_nodes + 1)):
+            raise MatrixError(
+                f"{where}: no list of dofs, and the nodes are numbered {numbers.min()} to {numbers.max()} with gaps, "
+                "so that nobody knows which row is whose; write the matrices with node numbers (Abaqus: "
+                "FORMAT=MATRIX INPUT)"
+            )
+        dofs = np.stack([np.repeat(np.arange(1, n_nodes + 1), per_node), np.tile(np.arange(per_node), n_nodes)], axis=1)
+        note = f"rows taken as {per_node} to a node in the order of their numbers, as no list of dofs was given"
+        read = replace(read, dofs=dofs, notes=(*read.notes, note))
+    return read
+
+
+def body_from_foreign(
+    read: ForeignMatrices,
+    geometry: Mesh | NodeCloud | None = None,
+    *,
+    name: str,
+    units: Units,
+    interfaces: Iterable[Interface] = (),
+    held: bool = False,
+    remove_supports: bool = False,
+    mend_mass: bool = False,
+    accept: Iterable[str] = (),
+) -> FEBody:
+    """Make a body of matrices that were read, with the nodes of a deck or mesh beside them.
+
+    (1) dofs and nodes of the rows (`with_geometry`); the nodes of the body are those of the geometry, in its order
+    (2) rows without any stiffness and mass leave: what they hold shows as a support in (4)
+    (3) where asked for, supports whose rows exist are taken out (`without_supports`)
+    (4) `body_from_matrices`: free, or held as it is said to be; exact mass moments where M is M_s ⊗ 1₃
+
+    Parameters
+    ----------
+    read
+        Of `read_matrices`.
+    geometry
+        Of `read_geometry`; None: the files bring their nodes.
+    name, units, interfaces, held, mend_mass, accept
+        As for `body_from_matrices`; interfaces by indices of the nodes of the geometry.
+    remove_supports
+        Whether springs and penalties between nodes and the ground are taken out of K.
+
+    Raises
+    ------
+    MatrixError
+        If stiffness, mass, dofs or nodes are missing or do not fit.
+    BodyError
+        As `body_from_matrices`.
+    """
+    where = where_of(read)
+    read = with_geometry(read, geometry if geometry is not None else nodes_of(read))  # (1)
+    for role, words in {"K": "stiffness", "M": "mass"}.items():
+        if getattr(read, role) is None:
+            got = ", ".join(name for name in ROLES if getattr(read, name) is not None) or "none"
+            raise MatrixError(f"{where}: expected stiffness and mass, got {got}; the {words} {role} is missing")
+    nodes, dofs = np.asarray(read.nodes), rows_of_nodes(where, read)
+    matrices = {role: sp.csc_array(matrix) for role in ROLES if (matrix := getattr(read, role)) is not None}
+    notes = list(read.notes)
+    is_kept = (abs(matrices["K"]).sum(axis=0) > 0) | (abs(matrices["M"]).sum(axis=0) > 0)  # (2)
+    is_kept[read.constrained] = False
+    if not is_kept.all():
+        kept = np.flatnonzero(is_kept)
+        notes.append(f"{len(is_kept) - len(kept)} rows without stiffness and mass, or held, were left out")
+        matrices = {role: matrix[kept][:, kept] for role, matrix in matrices.items()}
+        dofs = dofs[kept]
+    if len(read.removed):
+        notes.append(f"{len(read.removed)} dofs have no rows: the other program holds them")
+    if remove_supports:  # (3)
+        matrices["K"], note = without_supports(where, matrices["K"], matrices["M"], nodes, dofs)
+        notes.append(note)
+    files = dict(read.files)
+    if geometry is not None and geometry.digest:
+        files |= {geometry.source: geometry.digest, **geometry.included}
+    record = {"mesh": ", ".join(files)} | {f"file {path}": digest for path, digest in files.items()}
+    record |= {"program": read.program} if read.program else {}
+    record |= (
+        {"triangles": ", ".join(f"{role} {kind}" for role, kind in read.triangle.items())} if read.triangle else {}
+    )
+    record |= {"notes": "; ".join(notes)} if notes else {}
+    body = body_from_matrices(  # (4)
+        matrices["M"], matrices["K"], nodes, dofs, name=name, units=units, interfaces=interfaces, D=matrices.get("D"),
+        surface=boundary_triangles(geometry) if isinstance(geometry, Mesh) else None,
+        provenance=record, held=held, mend_mass=mend_mass, accept=accept,
+        numbering=foreign_numbering(read, geometry),
+    )  # fmt: skip
+    loads = {load: force[is_kept] for load, force in read.loads.items()}
+    return body.with_load_cases(*(LoadCase(load, "force", force) for load, force in loads.items()))
+
+
+def foreign_numbering(read: ForeignMatrices, geometry: Mesh | NodeCloud | None) -> Numbering:
+    """Return what the other program calls nodes, and elements and sets where a mesh says it."""
+    numbers = np.zeros(0, np.int64) if read.node_numbers is None else read.node_numbers
+    if isinstance(geometry, Mesh):
+        return replace(solid_numbering(geometry), nodes=numbers)
+    sets = node_sets(geometry.node_sets) if geometry is not None else []
+    return Numbering(nodes=numbers, sets=tuple(sets))
+
+
+def rows_of_nodes(where: str, read: ForeignMatrices) -> IntArray:
+    """Return (index of the node, component) of every row, (n_dof, 2)."""
+    if read.dofs is None or read.node_numbers is None:
+        raise MatrixError(f"{where}: the dofs of the rows are not known; give the list of dofs with the matrices")
+    scalars = np.flatnonzero(read.dofs[:, 1] == SCALAR)
+    if len(scalars):
+        raise MatrixError(
+            f"{where}: {len(scalars)} rows have no place (scalar points, modal coordinates), first "
+            f"{read.dofs[scalars[0], 0]}: these are the matrices of a reduced body, which `cms import` takes"
+        )
+    order = np.argsort(read.node_numbers)
+    ordered = read.node_numbers[order]
+    at = np.minimum(np.searchsorted(ordered, read.dofs[:, 0]), len(ordered) - 1)
+    missing = np.unique(read.dofs[ordered[at] != read.dofs[:, 0], 0])
+    if len(missing):
+        raise MatrixError(
+            f"{where}: {len(missing)} nodes of the rows are not in the geometry, first {missing[0]}; is this the deck "
+            "they were made of?"
+        )
+    return np.stack([order[at], read.dofs[:, 1]], axis=1)
+
+
+def numbers_of(geometry: Mesh | NodeCloud) -> IntArray:
+    """Return the numbers of the nodes: those of the file, or 1, 2, ... where it has none."""
+    return geometry.node_numbers if geometry.node_numbers.size else np.arange(1, len(geometry.nodes) + 1)
+
+
+def where_of(read: ForeignMatrices) -> str:
+    """Return the beginning of a message: the files."""
+    return f"matrices {', '.join(read.files) or 'in memory'}"

@@ -1,0 +1,180 @@
+"""One door for mesh files: the format by its suffix, one error for everything that can be wrong with a file."""
+
+from collections.abc import Callable, Iterable
+from hashlib import sha256
+from pathlib import Path
+from typing import TypeVar
+
+from fe_models.errors import FeModelsError, MeshError
+from fe_models.files.abaqus import read_abaqus
+from fe_models.files.cad.cad_units import CAD_SUFFIXES
+from fe_models.files.geometry import geometry_from_raw
+from fe_models.files.gmsh import read_gmsh
+from fe_models.files.med import read_med
+from fe_models.files.nastran import read_nastran
+from fe_models.files.vtk import read_vtk
+from fe_models.foundation.digest import file_digest
+from fe_models.foundation.words import damage, nearest, quoted
+from fe_models.meshes.cells.line_cells import line_mesh_from_raw
+from fe_models.meshes.cells.raw_mesh import RawMesh, mesh_from_raw
+from fe_models.meshes.cells.shell_cells import shell_mesh_from_raw
+from fe_models.meshes.line_mesh import LineMesh
+from fe_models.meshes.mesh import Mesh
+from fe_models.meshes.node_cloud import NodeCloud
+from fe_models.meshes.shell_mesh import ShellMesh
+
+__all__ = ["MESH_FORMATS", "read_geometry", "read_line_mesh", "read_mesh", "read_shell_mesh"]
+
+M = TypeVar("M")
+
+MESH_FORMATS: dict[str, tuple[str, Callable[[Path, bytes], RawMesh]]] = {
+    ".msh": ("Gmsh", read_gmsh),
+    ".vtk": ("VTK", read_vtk),
+    ".vtu": ("VTK", read_vtk),
+    ".inp": ("Abaqus", read_abaqus),
+    ".bdf": ("Nastran", read_nastran),
+    ".nas": ("Nastran", read_nastran),
+    ".dat": ("Nastran", read_nastran),
+    ".fem": ("Nastran", read_nastran),
+    ".blk": ("Nastran", read_nastran),
+    ".bulk": ("Nastran", read_nastran),
+    ".med": ("MED", read_med),
+}  #: suffix -> format and its reader (path, content)
+
+
+def read_mesh(path: str | Path) -> Mesh:
+    """Read the mesh of one body from a file.
+
+    The suffix names the format: Gmsh 2.2 and 4.1 (.msh), VTK (.vtk, .vtu), Abaqus and CalculiX (.inp), Nastran
+    (.bdf, .nas, .dat, .fem, .blk, .bulk), MED (.med). Cells of two dimensions become faces, those of one or none become
+    node sets; they select interfaces and are no part of the body. `Mesh.notes` says what was left out.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    Mesh
+        With the sha256 of the file as `digest`.
+
+    Raises
+    ------
+    MeshError
+        If the file is missing, unreadable, damaged, of an unknown or unsupported kind, or could only be read with
+        another meaning than its own program gives it.
+    """
+    return _read(path, mesh_from_raw)
+
+
+def read_geometry(path: str | Path) -> Mesh | NodeCloud:
+    """Read nodes, numbers and groups from a deck or mesh beside matrices, by the readers of meshes and whole decks.
+
+    Returns
+    -------
+    Mesh or NodeCloud
+        A mesh where all elements are solids that are known here, else the nodes and what selects them.
+
+    Raises
+    ------
+    MeshError
+        As `read_mesh`, but for elements: they may be of any kind.
+    """
+    from fe_models.files.decks.read_deck import DECK_FORMATS, read_deck
+
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix in DECK_FORMATS and (suffix not in MESH_FORMATS or MESH_FORMATS[suffix][1] is read_nastran):
+        return geometry_from_raw(read_deck(path).mesh, path, file_digest(str(path)))  # coordinate systems, INCLUDE
+    return _read(path, geometry_from_raw)
+
+
+def read_line_mesh(path: str | Path, *, groups: Iterable[str] | None = None) -> LineMesh:
+    """Read the lines of a frame from a mesh file, by the same readers as `read_mesh`.
+
+    Cells with two nodes, and those with three as two lines, are beams: Gmsh curves, VTK lines, Abaqus B31 and B32,
+    Nastran CBAR and CBEAM, MED SE2. Their groups name sections (Gmsh physical curves, Abaqus element sets, Nastran
+    pid_7), groups of points name interfaces. Solids, faces and nodes on no line are left out; `notes` says so.
+
+    Parameters
+    ----------
+    path
+        The file.
+    groups
+        Only the lines of these groups; None: all lines.
+
+    Raises
+    ------
+    MeshError
+        As `read_mesh`, and if there are no lines or a group is unknown.
+    """
+    wanted = None if groups is None else tuple(groups)
+    return _read(path, lambda raw, path, digest: line_mesh_from_raw(raw, path, digest, wanted))
+
+
+def read_shell_mesh(
+    path: str | Path, *, groups: Iterable[str] | None = None, stiffeners: Iterable[str] = ()
+) -> ShellMesh:
+    """Read the triangles and quads of a shell from a mesh file, by the same readers as `read_mesh`.
+
+    Cells of three and four nodes are shells, those of six and nine four shells each: Gmsh surfaces, VTK, Abaqus S3 and
+    S4, Nastran CTRIA3 and CQUAD4, MED TR3 and QU4. Their groups name thicknesses (Gmsh physical surfaces, Abaqus
+    element sets, Nastran pid_7); groups of points and lines name interfaces. Solids and nodes of neither shells nor
+    stiffeners are left out; `notes` says so.
+
+    Parameters
+    ----------
+    path
+        The file.
+    groups
+        Only the cells of these groups; None: all triangles and quads.
+    stiffeners
+        Groups of lines that are beams on the shell; other lines only select nodes.
+
+    Raises
+    ------
+    MeshError
+        As `read_mesh`, and if there are no triangles or quads or a group is unknown.
+    """
+    wanted, lines = None if groups is None else tuple(groups), tuple(stiffeners)
+    return _read(path, lambda raw, path, digest: shell_mesh_from_raw(raw, path, digest, wanted, lines))
+
+
+def _read(path: str | Path, convert: Callable[[RawMesh, Path, str], M]) -> M:
+    """Find the reader of a file and convert what it says; whatever is wrong becomes one message."""
+    path = Path(path)
+    where = f"mesh {path}"
+    suffix = path.suffix.lower()
+    if not path.exists():
+        raise MeshError(f"{where}: there is no such file{_neighbours(path)}")
+    if path.is_dir():
+        raise MeshError(f"{where}: expected a file, got a directory")
+    if suffix in CAD_SUFFIXES:
+        raise MeshError(
+            f"{where}: this is a CAD geometry, which has to be meshed: a table [mesh_size] in a job, or "
+            f"fe_models.mesh_cad(path, fe_models.MeshSize(size), units=...)"
+        )
+    if suffix not in MESH_FORMATS:
+        raise MeshError(f"{where}: unknown suffix {quoted(suffix)}{nearest(suffix, MESH_FORMATS)}")
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise MeshError(f"{where}: cannot be read: {error.strerror or error}") from error
+    if not data.strip():
+        raise MeshError(f"{where}: the file is empty")
+    name, reader = MESH_FORMATS[suffix]
+    try:
+        return convert(reader(path, data), path, sha256(data).hexdigest())
+    except FeModelsError:
+        raise
+    except (Exception, SystemExit) as error:  # whatever a damaged file does to a parser, the user gets one message
+        raise MeshError(f"{where}: could not be read as a {name} file: {damage(error)}") from error
+
+
+def _neighbours(path: Path) -> str:
+    """Name the meshes beside a missing file."""
+    if not path.parent.is_dir():
+        return f"; the directory {path.parent} does not exist"
+    files = [p.name for p in path.parent.iterdir() if p.suffix.lower() in MESH_FORMATS]
+    return nearest(path.name, files[:20]) if files else ""

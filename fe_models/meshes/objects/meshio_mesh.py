@@ -1,0 +1,89 @@
+"""What a `meshio.Mesh` says: its cells; named sets and whole-number data become groups."""
+
+from typing import Any
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.meshes.cells.node_order import mirrored_cells, mirrored_order
+from fe_models.meshes.cells.raw_mesh import RawBlock, RawMesh
+
+__all__ = ["CELL_NUMBERS", "NODE_NUMBERS", "groups_of_values", "numbers_among", "raw_from_meshio", "upright_wedges"]
+
+NODE_NUMBERS = ("node", "node_id", "GlobalNodeId")  #: point data that are numbers of nodes
+CELL_NUMBERS = ("element", "element_id", "GlobalElementId")  #: cell data that are numbers of cells
+MOST_GROUPS = 1000  #: cell data with more distinct values are numbers of cells, not groups
+
+
+def raw_from_meshio(mesh: Any) -> RawMesh:
+    """Return nodes, cells and groups of a `meshio.Mesh`.
+
+    Cell sets keep their names; every value of whole-number cell data is a group `<array>_<value>`. Point sets, and
+    whole-number point data that hold only 0 and 1, become node sets. Point data "node" and cell data "element" (or of
+    VTK, "GlobalNodeId" and "GlobalElementId") with a different whole number each are the numbers of nodes and cells.
+    Linear wedges are taken inside out where they do not follow VTK's own definition of their orientation.
+    """
+    nodes = np.asarray(mesh.points, dtype=float)
+    cell_numbers = numbers_of_cells(mesh)
+    blocks = []
+    for k, block in enumerate(mesh.cells):
+        cells = upright_wedges(block.type, nodes, np.asarray(block.data, dtype=np.int64))
+        groups: dict[str, IntArray] = {}
+        for name, values in mesh.cell_data.items():
+            if name not in CELL_NUMBERS or cell_numbers is None:
+                groups |= groups_of_values(name, np.asarray(values[k]))
+        for name, sets in mesh.cell_sets.items():
+            members = None if sets[k] is None else np.asarray(sets[k])
+            if members is not None and members.size and not name.startswith("gmsh:"):
+                groups[name] = np.flatnonzero(members) if members.dtype == bool else members.astype(np.int64)
+        blocks.append(RawBlock(block.type, cells, groups, None if cell_numbers is None else cell_numbers[k]))
+    node_sets = {
+        name: np.flatnonzero(values)
+        for name, values in mesh.point_data.items()
+        if np.ndim(values) == 1 and np.asarray(values).dtype.kind in "iub" and set(np.unique(values)) == {0, 1}
+    }
+    node_sets |= {name: np.asarray(members, dtype=np.int64) for name, members in mesh.point_sets.items()}
+    return RawMesh(nodes, tuple(blocks), node_sets, numbers_among(mesh.point_data, NODE_NUMBERS, len(nodes)))
+
+
+def numbers_of_cells(mesh: Any) -> list[IntArray] | None:
+    """Return the numbers of the cells, block by block; None if there are none."""
+    ends = np.cumsum([0, *(len(block.data) for block in mesh.cells)])
+    joined = {
+        name: np.concatenate([np.asarray(part).reshape(-1) for part in values])
+        for name, values in mesh.cell_data.items()
+        if name in CELL_NUMBERS and len(values)
+    }
+    found = numbers_among(joined, CELL_NUMBERS, int(ends[-1]))
+    return None if found is None else np.split(found, ends[1:-1])
+
+
+def numbers_among(data: Any, names: tuple[str, ...], n: int) -> IntArray | None:
+    """Return the first of these arrays that numbers n things: a whole number from 0 for each, no two the same."""
+    for name in names:
+        values = np.asarray(data[name]).reshape(-1) if name in data else np.zeros(0)
+        if values.size == n and n and values.dtype.kind in "iu" and values.min() >= 0 and len(np.unique(values)) == n:
+            return values.astype(np.int64)
+    return None
+
+
+def upright_wedges(kind: str, nodes: Array, cells: IntArray) -> IntArray:
+    """Return the cells; linear wedges that are inside out in VTK's own definition are turned."""
+    inside = cells.size and cells.min() >= 0 and cells.max() < len(nodes)
+    if kind == "wedge" and inside and np.isfinite(nodes).all() and mirrored_cells("wedge", nodes, cells):
+        return np.asarray(cells[:, mirrored_order("wedge")])
+    return cells
+
+
+def groups_of_values(name: str, values: np.ndarray) -> dict[str, IntArray]:
+    """Return group -> rows for whole-number data, one group for each value."""
+    if values.ndim == 2 and values.shape[1] == 1:
+        values = values[:, 0]
+    if values.ndim != 1 or values.dtype.kind not in "iub":
+        return {}
+    found, which = np.unique(values, return_inverse=True)
+    if len(found) > MOST_GROUPS:
+        return {}
+    order = np.argsort(which, kind="stable")
+    parts = np.split(order, np.cumsum(np.bincount(which))[:-1])
+    return {f"{name}_{int(value)}": rows for value, rows in zip(found, parts, strict=True)}

@@ -1,5 +1,0 @@
-"""Users' functions as C functions that the kernels call by their address."""
-
-from floatframe.compiling.callbacks.user_forces import Callback, callback_of, raise_errors_of
-
-__all__ = ["Callback", "callback_of", "raise_errors_of"]

@@ -1,0 +1,13 @@
+"""Joints with play: hinges and ball joints whose pin moves in its bearing, and dead bands along or about an axis."""
+
+from floatframe.components.clearances.backlash import Backlash
+from floatframe.components.clearances.ball import BallWithPlay
+from floatframe.components.clearances.hinge import HingeWithPlay
+
+ELEMENTS = {
+    "backlash": "floatframe.components.clearances.backlash:Backlash",
+    "ball": "floatframe.components.clearances.ball:BallWithPlay",
+    "hinge": "floatframe.components.clearances.hinge:HingeWithPlay",
+}
+
+__all__ = ["ELEMENTS", "Backlash", "BallWithPlay", "HingeWithPlay"]

@@ -1,0 +1,101 @@
+"""Backlash: a dead band along or about an axis, between two dissipative spring stops."""
+
+from dataclasses import dataclass
+
+from numba import njit
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
+from floatframe.components.clearances.contact import Range, depth_force, require_numbers
+from floatframe.errors import ModelError
+from floatframe.model.bodies.markers import Marker
+from floatframe.model.checked_values import unit_vector
+from floatframe.model.elements import Element, ElementLaw, GapSpring, Placed
+from floatframe.model.elements.pairs import (
+    add_axial_force,
+    add_torque,
+    angle_about,
+    angle_numbers,
+    axial_motion,
+    direction_of,
+    turning_speed,
+)
+from floatframe.model.elements.unit_names import in_units
+
+__all__ = ["Backlash"]
+
+MOTIONS = {"along": ("N", "m"), "about": ("N m", "rad")}  #: units of force and displacement
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class Backlash(Element):
+    """A dead band in the motion of marker b relative to marker a, along an axis or about it.
+
+    The motion is free for `lower` < displacement < `upper`. Beyond, with the depth x, the force is k xⁿ max(0, 1 + chi
+    x_dot). The displacement along the axis is the distance of the markers along it; the angle is zero as assembled and
+    must stay within half a turn. Use the markers of the joint along or about whose axis the backlash acts.
+
+    Raises
+    ------
+    ModelError
+        If a number is out of its range, or a marker is not a `Marker`.
+    """
+
+    name: str
+    marker_a: Marker
+    marker_b: Marker
+    lower: float  #: [m, rad]
+    upper: float  #: above `lower` [m, rad]
+    stiffness: float  #: k of the stops [N/mⁿ, N m/radⁿ]
+    exponent: float = 1.0  #: n
+    damping: float = 0.0  #: chi, damping proportional to the approach velocity [s/m, s/rad]
+    motion: str = "along"  #: "along" the axis, or "about" it
+    axis: Array = (0.0, 0.0, 1.0)  # type: ignore[assignment]  #: in the axes of marker a, (3,)
+
+    def __post_init__(self) -> None:
+        where = f"element {self.name!r}"
+        require_numbers(self, {"lower": Range(), "upper": Range()})
+        if self.motion not in MOTIONS:
+            raise ModelError(f"{where}: motion: expected one of {', '.join(MOTIONS)}, got {self.motion!r}")
+        if not self.lower < self.upper:
+            raise ModelError(f"{where}: upper: expected a value above lower = {self.lower:g}, got {self.upper:g}")
+        object.__setattr__(self, "axis", unit_vector(f"{where}: axis", self.axis))
+
+    def law(self, placed: Placed) -> ElementLaw:
+        """Return the law of the backlash."""
+        force, way = MOTIONS[self.motion]
+        outputs = {"way": way, "force": force, "energy": "J", "power lost": "W", "gap": way}
+        data = [self.stiffness, self.exponent, self.damping, self.lower, self.upper, float(self.motion == "about")]
+        data += angle_numbers(self.axis, placed.A[0], placed.A[1])
+        return ElementLaw(
+            function=backlash_law,
+            data=data,
+            outputs=tuple(outputs),
+            output_units=in_units(placed.units, list(outputs.values())),
+            tangent="complex",
+            acts=("moment", "moment") if self.motion == "about" else ("wrench", "force"),
+            energy="energy",
+            power_lost="power lost",
+            gaps={"gap": GapSpring(self.stiffness, self.exponent)},
+        )
+
+
+@njit
+def backlash_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+    """Write the force of the stop that is touched, and the outputs."""
+    lower, upper, is_turn = data[3], data[4], data[5] > 0.0
+    e = direction_of(x, 0, data, 6)
+    if is_turn:
+        way, speed = angle_about(x, 0, 1, data, 6), turning_speed(x, 0, 1, e)
+    else:
+        way, speed = axial_motion(x, 0, 1, e)
+    side = 1.0 if way.real >= 0.5 * (lower + upper) else -1.0
+    end = upper if side > 0.0 else lower
+    N, spring, energy = depth_force(side * (way - end), side * speed, data, 0)
+    if is_turn:
+        add_torque(wrench, 0, 1, -side * N, e)
+    else:
+        add_axial_force(wrench, x, 0, 1, -side * N, e)
+    seen[0], seen[1], seen[2], seen[3] = way, side * N, energy, (N - spring) * side * speed
+    seen[4] = side * (end - way)

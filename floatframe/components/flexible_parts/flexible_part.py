@@ -1,0 +1,39 @@
+"""A flexible part that consists of several bodies of a system."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.words import nearest, quoted
+from floatframe.errors import ModelError
+from floatframe.model.bodies.markers import Marker
+from floatframe.model.forces import Force
+from floatframe.model.joints import Joint
+from floatframe.model.system import Body
+
+__all__ = ["FlexiblePart", "PartMaker"]
+
+
+@dataclass(frozen=True, eq=False)
+class FlexiblePart:
+    """Bodies, joints and forces for a system, and markers at named points of the part."""
+
+    name: str
+    bodies: tuple[Body, ...]
+    joints: tuple[Joint, ...]
+    forces: tuple[Force, ...]
+    markers: Mapping[str, Marker]
+
+    def marker(self, place: str) -> Marker:
+        """Return the marker at a named point; `ModelError` with the choices if there is none."""
+        if place not in self.markers:
+            raise ModelError(f"part {self.name!r}: no place {quoted(place)}{nearest(place, self.markers)}")
+        return self.markers[place]
+
+
+class PartMaker(Protocol):
+    """A function that returns a part at a given position, such as `partial(finite_segments, line=line, n=10)`."""
+
+    def __call__(self, name: str, *, position: Array, orientation: Array) -> FlexiblePart:
+        """Return the part with its origin at a position, (3,), rotated by Euler parameters, (4,)."""

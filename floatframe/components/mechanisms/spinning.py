@@ -1,0 +1,140 @@
+"""Spinning slender bodies, for which a linear floating frame fails without geometric stiffness.
+
+The bodies are given as reduced bodies whose axis is the x axis of their mesh.
+"""
+
+from typing import Literal
+
+import numpy as np
+
+from cms.body.reduced_body import ReducedBody
+from floatframe.components.mechanisms.rods import between
+from floatframe.errors import ModelError
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.bodies.ground import GROUND
+from floatframe.model.bodies.markers import Marker
+from floatframe.model.bodies.rigid_body import RigidBody
+from floatframe.model.functions.time_functions import TimeFunction, cycloidal_spin_up
+from floatframe.model.joints import FixedJoint, Joint, PointOnLine, RevoluteJoint, SphericalJoint
+from floatframe.model.system import System
+
+__all__ = ["rotating_blade", "spin_up_beam", "spinning_shaft"]
+
+Stiffening = bool | Literal["auto"]
+Z = np.array([0.0, 0.0, 1.0])
+X = np.array([1.0, 0.0, 0.0])
+
+
+def spin_up_beam(
+    beam: ReducedBody,
+    *,
+    speed: float = 6.0,
+    duration: float = 15.0,
+    hub_radius: float = 0.0,
+    pitch: TimeFunction | None = None,
+    root: str = "root",
+    stiffening: Stiffening = "auto",
+) -> System:
+    """Return a beam along x that a driven hub accelerates to a spin about z (problem of Kane, Ryan and Banerjee).
+
+    Bodies "hub" (rigid, its motion prescribed) and "beam"; joints "drive" (ground, hub) and "root" (hub, beam).
+    The angle of the drive is `cycloidal_spin_up(speed, duration)`.
+
+    Parameters
+    ----------
+    beam
+        A reduced body with an interface at its root.
+    speed, duration
+        Final speed and duration of the spin-up [rad/s, s].
+    hub_radius
+        Distance of the root from the axis [m].
+    pitch
+        Rotation of the root about the beam axis as a function of time, in addition to the spin; None: fixed to the hub.
+    root
+        Interface of the beam.
+    stiffening
+        As for `FlexibleBody`.
+    """
+    at = np.array([hub_radius, 0.0, 0.0])
+    size = float(np.linalg.norm(np.ptp(beam.nodes, axis=0))) or 1.0
+    hub = RigidBody("hub", beam.moments.m, beam.moments.m * size**2 * np.eye(3))
+    blade = FlexibleBody("beam", beam, position=at - between(beam, root), stiffening=stiffening)
+    on_hub, on_beam = Marker("hub", position=at), Marker("beam", root)
+    held: Joint = FixedJoint("root", on_hub, on_beam)
+    if pitch is not None:
+        held = RevoluteJoint("root", on_hub, on_beam, axis=X, motions={"angle": pitch})
+    drive = cycloidal_spin_up(speed, duration)
+    joints = [RevoluteJoint("drive", GROUND, Marker("hub"), axis=Z, motions={"angle": drive}), held]
+    return System([hub, blade], joints, [], beam.units, "spin-up of a beam")
+
+
+def rotating_blade(
+    blade: ReducedBody,
+    *,
+    hub_radius: float = 0.0,
+    hub_inertia: float | None = None,
+    root: str = "root",
+    stiffening: Stiffening = "auto",
+) -> System:
+    """Return a blade along x, fixed to a hub that rotates freely about z.
+
+    Bodies "hub" and "blade"; joints "main" (ground, hub) and "root". With `floatframe.analyses.campbell` or
+    `steady_rotation` it gives the frequencies of the rotating blade.
+
+    Parameters
+    ----------
+    blade
+        A reduced body with an interface at its root.
+    hub_radius
+        Distance of the root from the axis [m].
+    hub_inertia
+        Inertia of the hub about z [kg m²]; default: 1e9 times that of the blade, so that the speed is constant.
+    root
+        Interface of the blade.
+    stiffening
+        As for `FlexibleBody`.
+    """
+    at = np.array([hub_radius, 0.0, 0.0])
+    size = float(np.linalg.norm(np.ptp(blade.nodes, axis=0))) + hub_radius
+    if hub_inertia is None:
+        hub_inertia = 1e9 * blade.moments.m * size**2
+    if not hub_inertia > 0:
+        raise ModelError(f"rotating_blade: hub_inertia: expected a number above 0, got {hub_inertia:g}")
+    hub = RigidBody("hub", hub_inertia / size**2, hub_inertia * np.eye(3))
+    body = FlexibleBody("blade", blade, position=at - between(blade, root), stiffening=stiffening)
+    joints: list[Joint] = [
+        RevoluteJoint("main", GROUND, Marker("hub"), axis=Z),
+        FixedJoint("root", Marker("hub", position=at), Marker("blade", root)),
+    ]
+    return System([hub, body], joints, [], blade.units, "rotating blade")
+
+
+def spinning_shaft(
+    shaft: ReducedBody,
+    *,
+    speed: float = 0.0,
+    ends: tuple[str, str] = ("left", "right"),
+    stiffening: Stiffening = "auto",
+) -> System:
+    """Return a shaft along x that spins about x on two bearings, which allow bending, and sliding at the right end.
+
+    Body "shaft"; joints "left" (spherical) and "right" (a point on the axis).
+
+    Parameters
+    ----------
+    shaft
+        A reduced body with interfaces at the bearings.
+    speed
+        Initial spin [rad/s].
+    ends
+        Interfaces at the bearings.
+    stiffening
+        As for `FlexibleBody`.
+    """
+    a, b = (between(shaft, end) for end in ends)
+    body = FlexibleBody("shaft", shaft, position=-a, omega_B=speed * X, stiffening=stiffening)
+    joints: list[Joint] = [
+        SphericalJoint("left", GROUND, Marker("shaft", ends[0])),
+        PointOnLine("right", Marker(GROUND, position=b - a), Marker("shaft", ends[1]), axis=X),
+    ]
+    return System([body], joints, [], shaft.units, "spinning shaft")

@@ -1,0 +1,81 @@
+"""Validation of the fields that all tyres share."""
+
+from typing import Any
+
+from floatframe.components.wheels.roads.road import FlatRoad, GridRoad
+from floatframe.errors import ModelError
+from floatframe.model.checked_values import number, unit_vector
+
+__all__ = ["check_common", "check_road", "common_numbers", "landing_depth"]
+
+STEEPEST = 1.0  #: steepest slope on which a wheel can follow the ground itself; steeper ground needs an envelope
+LANDINGS = 500  #: ratio of radius to landing depth
+FIT = 1e-6  #: relative difference, taken as rounding, between the radius of a wheel and that of an envelope
+
+
+def check_common(
+    tyre: Any, positive: tuple[str, ...], at_least_zero: tuple[str, ...], free: tuple[str, ...] = ()
+) -> None:
+    """Validate the numbers of a tyre and its road, and set them as floats.
+
+    Raises
+    ------
+    ModelError
+        If a number is out of its range, the road is not a road, or an envelope is for another wheel.
+    """
+    where = f"element {tyre.name!r}"
+    for key in ("radius", "stiffness", "low_speed", *positive):
+        object.__setattr__(tyre, key, number(f"{where}: {key}", getattr(tyre, key), above=0.0))
+    zero = ("damping", "relaxation_x", "relaxation_y", "settling_time", *at_least_zero)
+    for key in zero:
+        object.__setattr__(tyre, key, number(f"{where}: {key}", getattr(tyre, key), at_least=0.0))
+    if tyre.landing_depth is not None:
+        depth = number(f"{where}: landing_depth", tyre.landing_depth, above=0.0)
+        object.__setattr__(tyre, "landing_depth", depth)
+    for key in free:
+        object.__setattr__(tyre, key, number(f"{where}: {key}", getattr(tyre, key)))
+    object.__setattr__(tyre, "axis", unit_vector(f"{where}: axis", tyre.axis))
+    check_road(where, tyre.road, tyre.radius)
+
+
+def check_road(where: str, road: Any, radius: float) -> None:
+    """Raise `ModelError` unless it is a road; an envelope must be for a wheel of this radius."""
+    if not isinstance(road, FlatRoad | GridRoad):
+        raise ModelError(
+            f"{where}: road: expected FlatRoad, GridRoad or what makes one (profile_road, iso_8608_road, "
+            f"Polyline.enveloped), got {road!r}"
+        )
+    if isinstance(road, FlatRoad):
+        return
+    if road.envelope_radius is None:
+        slope, at = road.steepest
+        if slope > STEEPEST:
+            raise ModelError(
+                f"{where}: road: beyond x = {at:g} it rises with a slope of {slope:.3g}; a wheel cannot follow ground "
+                f"that is steeper than {STEEPEST:g}: use its envelope, road.enveloped({radius:g})"
+            )
+    else:
+        if abs(road.envelope_radius - radius) > FIT * radius:
+            raise ModelError(
+                f"{where}: road: it is the envelope of a disc of radius {road.envelope_radius:g}, the wheel's is "
+                f"{radius:g}; make it with the wheel's radius"
+            )
+
+
+def landing_depth(given: float | None, radius: float) -> float:
+    """Return the deflection over which damping and tread forces build up."""
+    return radius / LANDINGS if given is None else given
+
+
+def common_numbers(tyre: Any) -> list[float]:
+    """Return the first parameters in the data, in the order of `contact`."""
+    return [
+        tyre.radius,
+        tyre.stiffness,
+        tyre.damping,
+        landing_depth(tyre.landing_depth, tyre.radius),
+        tyre.low_speed,
+        tyre.settling_time,
+        tyre.relaxation_x,
+        tyre.relaxation_y,
+    ]

@@ -1,0 +1,1 @@
+"""Design: sweeps, optimisation, sensitivities, identification, generated code and the laboratory."""

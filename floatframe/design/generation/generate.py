@@ -1,0 +1,154 @@
+"""Code for one system: its recursive equations with its numbers, zeros and ones gone, common terms shared."""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.paths import replace_files
+from fe_models.foundation.words import quoted
+from floatframe.design.generation.graph import Operations
+from floatframe.design.generation.joint_forces import model_terms
+from floatframe.design.generation.languages.c import c_files
+from floatframe.design.generation.languages.casadi import casadi_files
+from floatframe.design.generation.languages.matlab import matlab_files
+from floatframe.design.generation.languages.python import python_files
+from floatframe.design.generation.links import TreeTerms
+from floatframe.design.generation.routines import ROUTINES, Routine, routine_of
+from floatframe.engine.tree.recursive import RelativeModel
+from floatframe.errors import ModelError
+from floatframe.model.system import System
+
+__all__ = ["LANGUAGES", "GeneratedCode", "generate"]
+
+LANGUAGES: dict[str, Callable[[Routine, Sequence[str]], dict[str, str]]] = {
+    "c": c_files,
+    "python": python_files,
+    "casadi": casadi_files,
+    "matlab": matlab_files,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class GeneratedCode:
+    """The text of a routine, and what it costs."""
+
+    name: str  #: of the function
+    what: str
+    language: str
+    files: dict[str, str]  #: name of the file -> text
+    inputs: dict[str, int]  #: name -> length, in the order of the arguments
+    outputs: dict[str, tuple[int, ...]]  #: name -> shape, in their order
+    operations: Operations  #: of a call
+    general: tuple[int, int]  #: additions and multiplications of the same recursion with all zeros and ones
+    parameter_names: tuple[str, ...]  #: of the input `parameters`, in its order
+    parameter_values: Array  #: that they have in the system [kg, kg m, kg m², m/s²]
+
+    def write(self, directory: str | Path) -> tuple[Path, ...]:
+        """Write the files into a directory, which is made if there is none; return their paths."""
+        folder = Path(directory)
+        folder.mkdir(parents=True, exist_ok=True)
+        replace_files({folder / name: text.encode() for name, text in self.files.items()})
+        return tuple(folder / name for name in self.files)
+
+
+def identifier(text: str) -> str:
+    """Return a text as a name in any language."""
+    name = re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_").lower()
+    return name if name and name[0].isalpha() else f"f_{name}".rstrip("_")
+
+
+def generate(
+    system: System, *, what: str = "inverse", language: str = "c", parameters: Sequence[str] = (),
+    name: str | None = None,
+) -> GeneratedCode:  # fmt: skip
+    """Return code for the equations of motion of one system, in the coordinates of `relative_model(system)`.
+
+    Parameters
+    ----------
+    system
+        A tree of rigid and flexible bodies. Of its forces, gravity and linear joint forces (stiffness, damping,
+        preload; angles counted without end) are in the code; what else acts is given as `force`.
+    what
+        "inverse" (forces of a motion), "residual" (those less given forces), "mass" (matrix), "forward"
+        (accelerations), "kinematics" (places and velocities of all bodies), "jacobian" (derivatives of the forces of a
+        motion), "sensitivity" (their derivatives by parameters).
+    language
+        "c", "python", "casadi" or "matlab".
+    parameters
+        Numbers that stay symbols, an input of their own: "link1/m", a body ("link1": its ten inertial parameters),
+        "gravity", or patterns ("*/m"). All others are numbers in the code.
+    name
+        Of the function; None: that of the system and what is generated.
+
+    Raises
+    ------
+    ModelError
+        If there is no such routine, language or parameter, the system is no tree, holds other forces, couplers or
+        elements, or (forward) prescribes a coordinate, or the name is none.
+    """
+    for role, value, choices in (("what", what, ROUTINES), ("language", language, LANGUAGES)):
+        if value not in choices:
+            raise ModelError(f"generate: {role}: expected one of {', '.join(choices)}, got {quoted(value)}")
+    if isinstance(parameters, str):
+        raise ModelError(f"generate: parameters: expected a list of names, got the text {quoted(parameters)}")
+    function = identifier(f"{system.name}_{what}") if name is None else name
+    if function != re.sub(r"\W", "", function, flags=re.ASCII) or not function[:1].isalpha():
+        raise ModelError(f"generate: name: expected letters, digits and underscores, got {quoted(function)}")
+    model, tree = model_terms(system, ("*",) if what == "sensitivity" and not parameters else parameters)
+    if what == "forward":
+        require_free(model)
+    routine = routine_of(tree, what, function)
+    notes = notes_of(system, routine, model, tree)
+    files = LANGUAGES[language](routine, notes)
+    inputs = {each: n for each, n, _ in routine.inputs}
+    outputs = {output.name: output.values.shape for output in routine.outputs}
+    return GeneratedCode(
+        function, what, language, files, inputs, outputs, routine.operations, routine.asked, tree.parameter_names,
+        np.array(tree.parameter_values),
+    )  # fmt: skip
+
+
+def require_free(model: RelativeModel) -> None:
+    """Raise `ModelError` if a coordinate is prescribed, which accelerations under forces do not know."""
+    if model.driven:
+        raise ModelError(
+            f"generate: coordinate {quoted(model.driven[0])} is prescribed by a function of time, which forward does "
+            'not know; leave out the motion of its joint, or take what = "residual"'
+        )
+
+
+def notes_of(system: System, routine: Routine, model: RelativeModel, tree: TreeTerms) -> list[str]:
+    """Return what stands at the head of the code: what it is, sizes, units, the order of coordinates."""
+    count, units = routine.operations, system.units
+    notes = [
+        f"{routine.meaning} of {quoted(system.name)}, generated by floatframe.", "",
+        f"{count.additions} additions, {count.multiplications} multiplications, {count.divisions} divisions, "
+        f"{count.functions} sines and cosines, {count.signs} changes of sign.", "",
+    ]  # fmt: skip
+    if routine.has_series:
+        notes += ["Elastic rotations of markers: to rounding up to 4 rad, meaningless beyond 5 rad.", ""]
+    notes += [f"{name}, {n}: {meaning}" for name, n, meaning in routine.inputs]
+    notes += [f"{out.name}, {' x '.join(map(str, out.values.shape))}: {out.meaning}" for out in routine.outputs]
+    if units.name != "m-kg-s":
+        symbols = units.length_symbol, units.mass_symbol, units.time_symbol, units.force_symbol
+        words = ", ".join(f"{si} for {own}" for si, own in zip(("m", "kg", "s", "N"), symbols, strict=True))
+        notes += [f"All in units of {units.name}: {words}."]
+    if tree.springs:
+        notes += ["Springs and dampers of joints are in it; angles of springs are counted without end."]
+    unit = {each.name: each.unit for each in model.expansion.tree.columns}
+    force = {"rad": "N m", "m": "N"}
+    notes += ["", "order of z"]
+    notes += [f"  {k}: {name} [{unit.get(name, '1')}]" for k, name in enumerate(model.names)]
+    notes += ["order of rates, of their rates, and of forces"]
+    for k, name in enumerate(model.rate_names):
+        words = f" [{unit[name]}/s], [{unit[name]}/s2], [{force[unit[name]]}]" if unit.get(name) in force else ""
+        notes += [f"  {k}: {name}{words}"]
+    if tree.parameter_names:
+        values = zip(tree.parameter_names, tree.parameter_values, strict=True)
+        notes += ["parameters, with their values in the system"]
+        notes += [f"  {k}: {name} = {value!r}" for k, (name, value) in enumerate(values)]
+    return notes

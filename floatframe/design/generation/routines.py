@@ -1,0 +1,239 @@
+"""What can be generated: inputs and outputs of a routine, and its outputs as terms."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from floatframe.design.generation.derivatives import jacobian, position_seeds, seeds_of
+from floatframe.design.generation.elastic import MarkerPlace, MarkerRates, cross
+from floatframe.design.generation.graph import STUMPFF, Graph, Operations, Scalar, Terms, operations, reachable, terms
+from floatframe.design.generation.grouping import carried_inwards
+from floatframe.design.generation.joint_forces import spring_forces
+from floatframe.design.generation.links import Frame, TreeTerms, symbols_of
+from floatframe.design.generation.modes import ElasticMarker
+from floatframe.design.generation.recursions import (
+    Joint,
+    forward_dynamics,
+    inverse_dynamics,
+    joints_of,
+    mass_matrix,
+)
+from floatframe.design.generation.rotation_series import expanded
+
+__all__ = ["ROUTINES", "Output", "Routine", "routine_of"]
+
+
+@dataclass(frozen=True, eq=False)
+class Output:
+    """One array of results."""
+
+    name: str
+    values: Terms  #: terms, of the shape that the array has
+    meaning: str
+
+
+@dataclass(frozen=True, eq=False)
+class Routine:
+    """A function to be written out."""
+
+    name: str
+    inputs: tuple[tuple[str, int, str], ...]  #: name, length, meaning
+    outputs: tuple[Output, ...]
+    graph: Graph
+    meaning: str
+    asked: tuple[int, int]  #: additions and multiplications of the same recursion with all zeros and ones
+    has_series: bool  #: whether elastic rotations are polynomials, good up to 4 rad
+
+    @property
+    def values(self) -> list[Scalar]:
+        """Return all outputs one after the other, rows first."""
+        return [value for output in self.outputs for value in output.values.ravel()]
+
+    @property
+    def operations(self) -> Operations:
+        """Return the operations of a call."""
+        return operations(self.values)
+
+
+def force_output(name: str, values: Terms) -> Output:
+    """Return forces along rates as an output."""
+    return Output(name, values, "forces along the rates [N, N m]")
+
+
+def needed_forces(tree: TreeTerms, joints: Sequence[Joint]) -> Terms:
+    """Return the forces along the rates that a motion needs beside those of springs and dampers, (n,)."""
+    return np.asarray(inverse_dynamics(tree, tree.v, tree.a, joints) - spring_forces(tree))
+
+
+def inverse(tree: TreeTerms) -> list[Output]:
+    """Return the forces that a motion needs."""
+    return [force_output("force", needed_forces(tree, joints_of(tree)))]
+
+
+def residual(tree: TreeTerms) -> list[Output]:
+    """Return what is left of the equations of motion."""
+    given = symbols_of(tree.graph, "force", len(tree.v))
+    force = needed_forces(tree, joints_of(tree))
+    return [Output("residual", force - given, "M z_ddot + h - force [N, N m]")]
+
+
+def mass(tree: TreeTerms) -> list[Output]:
+    """Return the mass matrix."""
+    return [Output("mass_matrix", mass_matrix(tree, joints_of(tree)), "M, symmetric [kg, kg m, kg m2]")]
+
+
+def forward(tree: TreeTerms) -> list[Output]:
+    """Return the accelerations under forces."""
+    given = symbols_of(tree.graph, "force", len(tree.v))
+    acceleration = forward_dynamics(tree, given + spring_forces(tree), joints_of(tree))
+    return [Output("acceleration", acceleration, "z_ddot [m/s2, rad/s2]")]
+
+
+def derivatives(tree: TreeTerms) -> list[Output]:
+    """Return the derivatives of the forces of a motion."""
+    joints = joints_of(tree)
+    force = needed_forces(tree, joints)
+    return [
+        Output("by_z", jacobian(tree.graph, force, position_seeds(tree)), "force by z along the rates"),
+        Output("by_z_dot", jacobian(tree.graph, force, seeds_of(tree.graph, list(tree.v))), "force by z_dot"),
+        Output("by_z_ddot", mass_matrix(tree, joints), "force by z_ddot: the mass matrix"),
+    ]
+
+
+def sensitivity(tree: TreeTerms) -> list[Output]:
+    """Return the derivatives of the forces of a motion by parameters."""
+    force = needed_forces(tree, joints_of(tree))
+    by = jacobian(tree.graph, force, seeds_of(tree.graph, tree.parameters))
+    return [Output("by_parameters", by, "force by parameters, (rates, parameters)")]
+
+
+Motion = tuple[Terms, Terms, Terms, Terms]  #: r, R_GN, v, omega of a frame, ground axes
+
+
+def carried(graph: Graph, tree: TreeTerms, motion: Motion, marker: ElasticMarker) -> Motion:
+    """Return the motion of a marker on a flexible body from that of the body."""
+    (r, R, v, omega), place = motion, MarkerPlace(graph, marker, tree.x)
+    rates = MarkerRates(place, tree.v, np.full(len(tree.v), graph.zero, dtype=object))
+    p = R @ place.rho
+    return r + p, R @ place.E, v + cross(omega, p) + R @ rates.d_dot, omega + R @ rates.nu
+
+
+def taken_back(motion: Motion, place: MarkerPlace, rates: MarkerRates) -> Motion:
+    """Return the motion of a flexible body from that of its marker at the joint."""
+    r, R, v, omega = motion
+    R = R @ place.E.T
+    p, omega = R @ place.d, omega - R @ rates.nu
+    return r - p, R, v - cross(omega, p) - R @ rates.d_dot, omega
+
+
+def placed_nodes(tree: TreeTerms, joints: Sequence[Joint]) -> list[Motion]:
+    """Return the motion of the frames of all nodes."""
+    graph, zero = tree.graph, terms(tree.graph, np.zeros(3))
+    placed: list[Motion] = []
+    for link, joint in zip(tree.links, joints, strict=True):
+        motion = (zero, terms(graph, np.eye(3)), zero, zero) if link.parent < 0 else placed[link.parent]
+        place = link.r
+        if link.above is not None:
+            motion, place = carried(graph, tree, motion, link.above), zero
+        r, R, v, omega = motion
+        R_in = R @ joint.A
+        p = R @ place + R_in @ joint.d
+        R = R_in @ joint.E
+        v = v + cross(omega, p)
+        if link.n_z:
+            rate = tree.v[link.v0 : link.v0 + link.n_z]
+            v, omega = v + R @ (rate @ joint.columns[:, :3]), omega + R @ (rate @ joint.columns[:, 3:])
+        motion = r + p, R, v, omega
+        if joint.own is not None:
+            rest = np.full(len(tree.v), graph.zero, dtype=object)
+            motion = taken_back(motion, joint.own, MarkerRates(joint.own, tree.v, rest))
+        placed.append(motion)
+    return placed
+
+
+def placed_frame(tree: TreeTerms, frame: Frame, placed: Sequence[Motion]) -> Motion:
+    """Return the motion of a frame on a body."""
+    motion = placed[frame.node]
+    if frame.marker is not None:
+        motion = carried(tree.graph, tree, motion, frame.marker)
+    r, R, v, omega = motion
+    arm = R @ frame.origin
+    return r + arm, R @ frame.axes, v + cross(omega, arm), omega
+
+
+def kinematics(tree: TreeTerms) -> list[Output]:
+    """Return place, axes and velocity of the frames of all bodies, ground axes."""
+    placed = placed_nodes(tree, joints_of(tree, is_whole=False))
+    meanings = {
+        "position": "origins of the body frames, (bodies, 3) [m]",
+        "axes": "R_GB of the bodies, (bodies, 3, 3)",
+        "velocity": "of the origins, (bodies, 3) [m/s]",
+        "angular_velocity": "ground axes, (bodies, 3) [rad/s]",
+    }
+    columns = zip(*(placed_frame(tree, frame, placed) for frame in tree.frames), strict=True)
+    outputs = [Output(name, np.stack(each), text) for (name, text), each in zip(meanings.items(), columns, strict=True)]
+    if tree.interfaces:
+        names = ", ".join(frame.name for frame in tree.interfaces)
+        columns = zip(*(placed_frame(tree, frame, placed) for frame in tree.interfaces), strict=True)
+        outputs += [
+            Output(f"interface_{name}", np.stack(each), f"the same of the interfaces {names}")
+            for name, each in zip(meanings, columns, strict=True)
+        ]
+    return outputs
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What a name of a routine stands for."""
+
+    make: Callable[[TreeTerms], list[Output]]
+    inputs: tuple[str, ...]
+    meaning: str
+    is_force: bool = True  #: follows from the forces along the rates alone
+
+
+MOTION = ("z", "z_dot", "z_ddot")
+ROUTINES = {
+    "inverse": Kind(inverse, MOTION, "Inverse dynamics: the forces that a motion needs"),
+    "residual": Kind(residual, (*MOTION, "force"), "Residual of the equations of motion"),
+    "mass": Kind(mass, ("z",), "Mass matrix"),
+    "forward": Kind(forward, ("z", "z_dot", "force"), "Forward dynamics: accelerations under forces"),
+    "kinematics": Kind(kinematics, ("z", "z_dot"), "Places and velocities of all bodies", is_force=False),
+    "jacobian": Kind(derivatives, MOTION, "Derivatives of the forces of a motion"),
+    "sensitivity": Kind(sensitivity, MOTION, "Derivatives of the forces of a motion by parameters"),
+}
+INPUTS = {
+    "z": "positions [m, rad, 1]",
+    "z_dot": "rates",
+    "z_ddot": "rates of the rates",
+    "force": "forces along the rates [N, N m]",
+    "parameters": "numbers kept as symbols",
+}
+
+
+def written_out(graph: Graph, outputs: Sequence[Output]) -> tuple[Output, ...]:
+    """Return outputs without functions of rotations that languages do not have."""
+    values = expanded(graph, [value for output in outputs for value in output.values.ravel()])
+    results, first = [], 0
+    for output in outputs:
+        part = np.array(values[first : first + output.values.size], dtype=object)
+        results.append(replace(output, values=part.reshape(output.values.shape)))
+        first += output.values.size
+    return tuple(results)
+
+
+def routine_of(tree: TreeTerms, what: str, name: str) -> Routine:
+    """Return a routine by one of the names in `ROUTINES`."""
+    kind = ROUTINES[what]
+    if kind.is_force:
+        tree = carried_inwards(tree)
+    before = tuple(tree.graph.asked)
+    made = kind.make(tree)
+    asked = (tree.graph.asked[0] - before[0], tree.graph.asked[1] - before[1])
+    has_series = any(term.kind == STUMPFF for term in reachable(v for each in made for v in each.values.ravel()))
+    outputs = written_out(tree.graph, made)
+    sizes = dict.fromkeys(INPUTS, len(tree.v)) | {"z": len(tree.x), "parameters": len(tree.parameters)}
+    wanted = (*kind.inputs, *(("parameters",) if tree.parameters else ()))
+    inputs = tuple((each, sizes[each], INPUTS[each]) for each in wanted)
+    return Routine(name, inputs, outputs, tree.graph, kind.meaning, asked, has_series)

@@ -1,0 +1,289 @@
+"""A system as an FMU of generated C: model exchange and co-simulation, and nothing that it needs where it runs."""
+
+import hashlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+import numpy as np
+
+from fe_models.foundation.paths import replace_file
+from fe_models.foundation.words import quoted
+from floatframe.design.generation.generate import identifier, notes_of, require_free
+from floatframe.design.generation.graph import SYMBOL, Scalar, reachable
+from floatframe.design.generation.joint_forces import model_terms
+from floatframe.design.generation.languages.c import c_files
+from floatframe.design.generation.links import TreeTerms
+from floatframe.design.generation.routines import Routine, routine_of
+from floatframe.design.generation.units.compiler import compiled_library, platform_folder
+from floatframe.engine.tree.recursion.nodes import ROTATION
+from floatframe.engine.tree.recursive import RelativeModel
+from floatframe.errors import ModelError
+from floatframe.files.cosimulation.archive import documentation, identifier_of, release, zipped
+from floatframe.files.cosimulation.interface import Variable
+from floatframe.files.cosimulation.model_description import Description, model_description
+from floatframe.model.system import System
+
+__all__ = ["GeneratedUnit", "generate_fmu"]
+
+VERSIONS = (2, 3)
+WORDS = "Multibody system {}: equations of motion as generated C, without needs where it runs."
+STEP = "step"  #: the parameter of the unit
+#: on the page of documentation
+PAGE = """<p>The sources are in the folder sources.</p>
+<p>Time is in seconds. In co-simulation forces are held over a communication step, which is taken by the classical
+Runge-Kutta method in equal steps of at most the parameter {}. States can be kept, restored and serialised.</p>"""
+STABLE = 2.6  #: step times the fastest frequency
+
+
+@dataclass(frozen=True)
+class GeneratedUnit:
+    """What was written."""
+
+    path: Path
+    variables: tuple[Variable, ...]
+    platform: str  #: folder of its binary, such as linux64
+
+
+def generate_fmu(
+    system: System, path: str | Path, *, fmi: int = 2, step: float = 1e-3, parameters: Sequence[str] = (),
+    stop_time: float = 1.0,
+) -> GeneratedUnit:  # fmt: skip
+    """Write the equations of motion of one system as an FMU of compiled C, for model exchange and co-simulation.
+
+    States are the positions z and rates of `relative_model(system)`, which begin as the system is placed; inputs the
+    forces along the rates; derivatives those of the generated forward dynamics. In co-simulation inputs are held and
+    the classical Runge-Kutta method takes equal steps of at most `step`, which is a parameter of the unit.
+
+    Parameters
+    ----------
+    system
+        As for `generate`: a tree, gravity and linear joint forces.
+    path
+        The FMU; it holds its sources too, so that other machines can compile it.
+    fmi
+        Version, 2 or 3.
+    step
+        Longest step in co-simulation [s].
+    parameters
+        Numbers that can be set in the unit, as in `generate`: "link1/m", "link1", "gravity", patterns.
+    stop_time
+        That a simulation ends at unless told otherwise [s].
+
+    Raises
+    ------
+    ModelError
+        If the system is no such tree, a coordinate is prescribed, it holds events or units, a value is impossible,
+        there is no C compiler, or the file cannot be written.
+    """
+    if fmi not in VERSIONS:
+        raise ModelError(f"generate_fmu: fmi: expected one of {', '.join(map(str, VERSIONS))}, got {fmi!r}")
+    for role, value in (("step", step), ("stop_time", stop_time)):
+        if not (0.0 < value < math.inf):
+            raise ModelError(f"generate_fmu: {role}: expected a time above 0, got {value!r}")
+    target = Path(path)
+    if target.suffix.lower() != ".fmu" or target.is_dir() or not target.parent.is_dir():
+        raise ModelError(f"generate_fmu: {target}: expected a file name that ends in .fmu, in a folder that exists")
+    folder = platform_folder(fmi)
+    model, tree = model_terms(system, parameters)
+    require_free(model)
+    for kind, named in (("event", system.events), ("unit", system.fmus)):
+        if named:
+            raise ModelError(
+                f"generate_fmu: expected bodies, joints, gravity and linear joint forces, got {kind} "
+                f"{quoted(named[0].name)}, of which the unit would know nothing; leave it out"
+            )
+    routine = routine_of(tree, "forward", identifier(f"{system.name}_forward"))
+    require_stable(model, tree, step / system.units.time)
+    variables = unit_variables(model, tree, routine, step)
+    notes = notes_of(system, routine, model, tree)
+    sources = {name: text.encode() for name, text in c_files(routine, notes).items()}
+    for name in ("unit.h", "unit.c", f"fmi{fmi}.c"):
+        sources[name] = files("floatframe.design.generation.units").joinpath("data", name).read_bytes()
+    described = repr([variables, fmi, step, stop_time]).encode()
+    token = hashlib.sha256(described + b"".join(name.encode() + text for name, text in sorted(sources.items())))
+    name = identifier_of(system.name)
+    about = Description(
+        system.name, name, f"{{{token.hexdigest()[:32]}}}", f"floatframe {release()}", system.units, stop_time, step,
+        WORDS.format(system.name), is_hosted=False, has_derivatives=True,
+        sources=tuple(sorted(each for each in sources if each.endswith(".c"))),
+    )  # fmt: skip
+    sources["model.h"] = model_header(tree, routine, variables, about).encode()
+    suffix, library = compiled_library(sources)
+    archive = {f"sources/{each}": text for each, text in sources.items()}
+    if fmi == 3:
+        archive["sources/buildDescription.xml"] = build_description(about)
+    archive["modelDescription.xml"] = model_description(about, variables, fmi)
+    archive[f"binaries/{folder}/{name}{suffix}"] = library
+    archive["documentation/index.html"] = documentation(about, variables, PAGE.format(STEP)).encode()
+    try:
+        replace_file(target, zipped(archive))
+    except OSError as error:
+        raise ModelError(f"generate_fmu: {target}: cannot be written: {error.strerror}") from error
+    return GeneratedUnit(target, variables, folder)
+
+
+def require_stable(model: RelativeModel, tree: TreeTerms, step: float) -> None:
+    """Raise `ModelError` if steps of the Runge-Kutta method are too long for flexible bodies and springs of joints.
+
+    step: in units of time of the system. The method is stable up to 2.785 along the negative and 2.83 along the
+    imaginary axis; frequencies are those of small motions about the system as placed.
+    """
+    if not tree.springs and all(link.modes is None for link in tree.links):
+        return
+    z, rest = model.positions()[0], np.zeros(model.n_rates)
+    K, D, M = (each.copy() for each in model.derivatives(z, rest, rest))
+    for spring in tree.springs:
+        K[spring.rate, spring.rate] += spring.stiffness
+        D[spring.rate, spring.rate] += spring.damping
+    n = len(rest)
+    matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, np.hstack([K, D]))]])
+    fastest = float(np.abs(np.linalg.eigvals(matrix)).max())
+    if step * fastest > STABLE:
+        unit = model.expansion.system.units
+        raise ModelError(
+            f"generate_fmu: step: {step * unit.time:g} s is too long for the fastest mode, {fastest:.4g} rad/"
+            f"{unit.time_symbol}; expected {0.9 * STABLE / fastest * unit.time:.2g} s or less, bodies with fewer "
+            "modes (modes, with_modes), or softer springs and dampers of joints"
+        )
+
+
+def rotations(tree: TreeTerms) -> list[tuple[int, int]]:
+    """Return first position and first rate of each rotation of three rates."""
+    return [(link.x0, link.v0) for link in tree.links if link.kind == ROTATION]
+
+
+def slides(tree: TreeTerms) -> list[tuple[int, int]]:
+    """Return position and rate of all positions that change by their rate."""
+    found = rotations(tree)
+    x = set(range(len(tree.x))) - {x0 + k for x0, _ in found for k in range(4)}
+    v = set(range(len(tree.v))) - {v0 + k for _, v0 in found for k in range(3)}
+    return list(zip(sorted(x), sorted(v), strict=True))
+
+
+def dotted(name: str) -> str:
+    """Return the name of a coordinate as sensors name it."""
+    return name.replace("/", ".")
+
+
+def unit_variables(model: RelativeModel, tree: TreeTerms, routine: Routine, step: float) -> tuple[Variable, ...]:
+    """Return the variables in the order of their value references (unit.h)."""
+    units = model.expansion.system.units
+    z, z_dot = model.positions()
+    symbols = {"rad": "rad", "m": units.length_symbol}
+    unit_of = {each.name: symbols[each.unit] for each in model.expansion.tree.columns}
+    place = [unit_of.get(name, "") for name in model.names]  # of modes and Euler parameters none
+    rate = [unit_of.get(name, "") for name in model.rate_names]
+    forces = {"rad": f"{units.force_symbol} {units.length_symbol}", units.length_symbol: units.force_symbol}
+    force = [forces.get(unit, "") for unit in rate]
+    z_names = [f"{dotted(name)}.value" for name in model.names]
+    v_names = [f"{dotted(name)}.rate" for name in model.rate_names]
+    f_names = [f"{dotted(name)}.force" for name in model.rate_names]
+    found = [Variable("time", "independent", "s", "time")]
+    for name, start, unit, own in zip(z_names, z, place, model.names, strict=True):
+        found.append(state(name, unit, f"position along {own}", float(start)))
+    rates = {v0 + k: f"angular velocity, {own}" for _, v0 in rotations(tree) for k, own in enumerate("xyz")}
+    for k, (name, start, unit, own) in enumerate(zip(v_names, z_dot, rate, model.rate_names, strict=True)):
+        found.append(state(name, per(unit, units.time_symbol), rates.get(k, f"rate along {own}"), float(start)))
+    for name, unit, own in zip(f_names, force, model.rate_names, strict=True):
+        found.append(Variable(name, "input", unit, f"force along {own}, added to that of gravity"))
+    for name, value in zip(tree.parameter_names, tree.parameter_values, strict=True):
+        words = f"{name} of the system, in its units ({units.name})"
+        found.append(Variable(name, "parameter", "", words, float(value), is_tunable=True))
+    found.append(Variable(STEP, "parameter", "s", "longest step in co-simulation", step, is_tunable=True))
+    of_place = dict(slides(tree))
+    turns = {x0 + k: (x0, v0) for x0, v0 in rotations(tree) for k in range(4)}
+    for k, (name, unit) in enumerate(zip(z_names, place, strict=True)):
+        x0, v0 = turns.get(k, (0, 0))
+        needs = (*z_names[x0 : x0 + 4], *v_names[v0 : v0 + 3]) if k in turns else (v_names[of_place[k]],)
+        found.append(derivative(name, per(unit, "s"), needs))
+    acceleration = routine.outputs[0].values
+    whole = {x0: z_names[x0 : x0 + 4] for x0, _ in rotations(tree)}
+    for k, (name, unit) in enumerate(zip(v_names, rate, strict=True)):
+        wanted = needed(acceleration[k], {"z": z_names, "z_dot": v_names, "force": f_names}, whole)
+        found.append(derivative(name, per(per(unit, units.time_symbol), "s"), wanted))
+    return tuple(found)
+
+
+def state(name: str, unit: str, words: str, start: float) -> Variable:
+    """Return a state, which is an output that depends on itself."""
+    return Variable(name, "output", unit, words, start, is_state=True, depends_on=(name,))
+
+
+def derivative(name: str, unit: str, needs: Sequence[str]) -> Variable:
+    """Return the derivative of a state."""
+    return Variable(f"der({name})", "local", unit, f"derivative of {name}", derivative_of=name, depends_on=tuple(needs))
+
+
+def needed(term: Scalar, names: dict[str, list[str]], whole: dict[int, list[str]]) -> list[str]:
+    """Return the names of the symbols that a term needs; of Euler parameters all four, which are made one in length."""
+    found: dict[str, None] = {}
+    for each in reachable([term]):
+        stem, _, k = each.name[:-1].partition("[") if each.kind == SYMBOL else ("", "", "")
+        if stem in names:
+            own = names[stem][int(k)]
+            four = next((group for group in whole.values() if own in group), [own])
+            found |= dict.fromkeys(four)
+    return list(found)
+
+
+def per(unit: str, time: str) -> str:
+    """Return a unit by time."""
+    if "/" not in unit:
+        return f"{unit or '1'}/{time}"
+    above, below = unit.split("/")
+    return f"{above}/{below}²" if below == time else f"{above}/{below} {time}"
+
+
+def model_header(tree: TreeTerms, routine: Routine, variables: Sequence[Variable], about: Description) -> str:
+    """Return model.h: sizes, starts and the call of the generated function."""
+    pairs = {"turns": rotations(tree), "slides": slides(tree)}
+    n_values = 1 + len(tree.x) + 2 * len(tree.v) + len(tree.parameters) + 1
+    tables = []
+    for name, rows in pairs.items():
+        text = ", ".join(f"{{{x0}, {v0}}}" for x0, v0 in rows) or "{0, 0}"
+        tables.append(f"static const int {name}[][2] = {{{text}}}; /* first position, first rate */")
+    starts = ",\n    ".join(f"{each.start!r}" for each in variables[:n_values])
+    arguments = ", ".join({"force": "f", "parameters": "p", "z": "z", "z_dot": "v"}[each[0]] for each in routine.inputs)
+    return f"""/* Sizes and numbers of one system for unit.c, generated by floatframe. */
+#ifndef MODEL_H
+#define MODEL_H
+
+#include "{routine.name}.h"
+
+#define TOKEN "{about.token}"
+#define SECONDS {float(about.units.time)!r} /* of a unit of time of the system */
+#define ACCELERATIONS(z, v, f, p, a) {routine.name}({arguments}, a)
+
+enum {{
+    N_Z = {len(tree.x)},
+    N_V = {len(tree.v)},
+    N_P = {len(tree.parameters)},
+    N_TURNS = {len(pairs["turns"])},
+    N_SLIDES = {len(pairs["slides"])}
+}};
+
+#ifdef UNIT_C
+{chr(10).join(tables)}
+
+static const double start_values[] = {{ /* by value reference */
+    {starts}
+}};
+#endif
+
+#endif
+"""
+
+
+def build_description(about: Description) -> bytes:
+    """Return sources/buildDescription.xml of FMI 3.0."""
+    root = Element("fmiBuildDescription", {"fmiVersion": "3.0"})
+    one = SubElement(root, "BuildConfiguration", {"modelIdentifier": about.identifier})
+    group = SubElement(one, "SourceFileSet", {"language": "C99"})
+    for name in about.sources:
+        SubElement(group, "SourceFile", {"name": name})
+    indent(root)
+    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, encoding="utf-8") + b"\n"

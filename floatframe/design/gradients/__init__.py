@@ -1,0 +1,5 @@
+"""Gradients: derivatives of motions, equilibria and vibrations by parameters, direct and adjoint."""
+
+from floatframe.design.gradients.sensitivities import Sensitivities, sensitivities
+
+__all__ = ["Sensitivities", "sensitivities"]

@@ -1,0 +1,245 @@
+"""The steps of generalized-alpha differentiated: the derivatives of the motion that was computed, not of another.
+
+With S = (x, u, u_dot, a) after a step, x varied along displacements (docs/theory.md §9), a step with the increment xi
+and the unknowns (xi, c_k w), c_k = beta h², is
+
+    (1) c_k r(x_1, u_1, u_dot_1, w, p) = 0,   g(x_1, u_1, w, p) = 0
+    (2) x_1 = x_0 (+) xi:  dx_1 = A dx_0 + T dxi,  A = exp(-xi_theta), T its right Jacobian, on rotations
+    (3) a_1, u_1, u_dot_1 linear in xi and S_0
+
+Direct: (1) differentiated, solved for the columns dxi of all parameters, carried on by (2), (3). Adjoint: the transpose
+of all of it backwards, one right side an output. Both solve with the same matrices, so that they agree to rounding.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+
+from fe_models.foundation.arrays import Array
+from floatframe.design.gradients.outputs import vector_of
+from floatframe.design.gradients.parameters import Family, Neighbour
+from floatframe.design.gradients.tangents import Point, PointTangents, in_blocks, tangents_at
+from floatframe.engine.initial_conditions.initial import (
+    ConsistentState,
+    assembled,
+    checked,
+    solve_accelerations,
+    with_compatible_velocities,
+)
+from floatframe.engine.kernels.work import new_work
+from floatframe.engine.open_equations.configuration import Configurations
+from floatframe.engine.open_equations.rows import Structure
+from floatframe.errors import ConvergenceError, ModelError
+from floatframe.integrators.carry import Carry
+from floatframe.integrators.generalized_alpha import GeneralizedAlpha, begun_carry
+from floatframe.model.rotations import rotation_exp
+from floatframe.model.state import State
+from floatframe.model.system import System
+
+__all__ = ["ComputedMotion", "Step", "adjoint_gradient", "computed_motion", "direct_columns", "start_columns"]
+
+
+@dataclass(frozen=True, eq=False)
+class ComputedMotion:
+    """All that a run has computed: a point and a carry after each step, the start first."""
+
+    method: GeneralizedAlpha
+    h: float
+    carries: tuple[Carry, ...]
+    points: tuple[Point, ...]
+
+    @property
+    def c_k(self) -> float:
+        """Beta h²."""
+        return self.method.coefficients[2] * self.h**2
+
+
+def computed_motion(
+    system: System, method: GeneralizedAlpha, t_start: float, h: float, n_steps: int, state: State | None
+) -> ComputedMotion:
+    """Return the steps of a run, as `integrate` takes them.
+
+    Raises
+    ------
+    ConvergenceError
+        If a step fails.
+    """
+    from floatframe.engine.compiling.system import compiled_system
+
+    work = new_work(compiled_system(system).model)
+    begun = method.start(system, t_start, state)  # results begin with it, the steps with velocities shifted by O(h²)
+    carry = method.prepared(system, begun, h, t_start)
+    carries, points = [carry], [Point(t_start, begun.state, begun.u_dot, begun.w, angle=begun.angle)]
+    for k in range(n_steps):
+        after, _, _, failure = method.advance(system, carry, work, t0=t_start, h=h, first=k, n_steps=1, every=2)
+        t = t_start + (k + 1) * h
+        if failure is not None:
+            words = f"sensitivities: the step of {h:g} to t = {t:g} failed: {failure.words}"
+            raise ConvergenceError(words, t=t - h, h=h, residual=failure.residual)
+        points.append(Point(t, after.state, after.u_dot, after.w, carry.w, after.angle))
+        carries.append(after)
+        carry = after
+    return ComputedMotion(method, h, tuple(carries), tuple(points))
+
+
+def start_columns(
+    family: Family, group: Configurations, own: Neighbour, motion: ComputedMotion, t_start: float, state: State | None
+) -> tuple[Array, Array]:
+    """Return dS/dp, (4 n_u, n_p), of what the steps begin with, and that of (x, u, u_dot, w), (3 n_u + n_w, n_p).
+
+    The latter of what results begin with; both by differences of the whole consistent start.
+    """
+    x_0 = vector_of(group, own.compiled, motion.points[0].state)
+    S, shown = [], []
+    for parameter in family.parameters:
+        of_S, of_shown = [], []
+        for each in parameter.around:
+            begun = begun_beside(each, t_start, state)
+            carry = motion.method.prepared(each.system, begun, motion.h, t_start)
+            dx = group.difference(x_0, vector_of(group, each.compiled, carry.state))
+            of_S.append(np.concatenate([dx, carry.state.u, carry.u_dot, carry.a]))
+            dx = group.difference(x_0, vector_of(group, each.compiled, begun.state))
+            of_shown.append(np.concatenate([dx, begun.state.u, begun.u_dot, begun.w]))
+        S.append(parameter.derivative(of_S))
+        shown.append(parameter.derivative(of_shown))
+    return np.array(S).T, np.array(shown).T
+
+
+def begun_beside(each: Neighbour, t: float, state: State | None) -> Carry:
+    """Return what `GeneralizedAlpha.start` makes of a neighbour: what it checks has been checked of the system."""
+    compiled, work = each.compiled, each.work
+    given = compiled.placed if state is None else checked(compiled, state)
+    work.state.time[...] = t
+    closed = with_compatible_velocities(compiled, work, assembled(compiled, work, given))
+    made = ConsistentState(closed, *solve_accelerations(compiled, work, closed))
+    return begun_carry(made)
+
+
+class ScaledSolver:
+    """LU factors of a matrix with rows and columns of one size, and a step of refinement: units do not cost digits."""
+
+    def __init__(self, matrix: Array, t: float) -> None:
+        """Factorise; `ModelError` if the matrix is singular."""
+        self.matrix = matrix
+        with np.errstate(divide="ignore"):
+            self.rows = 1 / np.abs(matrix).max(axis=1)
+            self.columns = 1 / np.abs(self.rows[:, None] * matrix).max(axis=0)
+        if not (np.isfinite(self.rows).all() and np.isfinite(self.columns).all()):
+            raise ModelError(f"sensitivities: the Newton matrix at t = {t:g} is singular")
+        self.lu = la.lu_factor(self.rows[:, None] * matrix * self.columns)
+
+    def solve(self, right: Array, *, is_transposed: bool = False) -> Array:
+        """Return the solution of A x = right, or of Aᵀ x = right."""
+        matrix = self.matrix.T if is_transposed else self.matrix
+        x = self.once(right, is_transposed)
+        return x + self.once(right - matrix @ x, is_transposed)
+
+    def once(self, right: Array, is_transposed: bool) -> Array:
+        """Return it without refinement."""
+        if is_transposed:
+            return np.asarray(self.rows[:, None] * la.lu_solve(self.lu, self.columns[:, None] * right, trans=1))
+        return np.asarray(self.columns[:, None] * la.lu_solve(self.lu, self.rows[:, None] * right))
+
+
+class Step:
+    """One step, linearised where it ended."""
+
+    def __init__(self, structure: Structure, own: Neighbour, group: Configurations, motion: ComputedMotion, k: int):
+        """Linearise step k of a motion, from point k to point k + 1."""
+        alpha_m, alpha_f, beta, gamma = motion.method.coefficients
+        h, before, after = motion.h, motion.carries[k], motion.carries[k + 1]
+        self.n, self.c_k = group.n_v, motion.c_k
+        self.point = motion.points[k + 1]
+        xi = h * before.state.u + h**2 * ((0.5 - beta) * before.a + beta * after.a)
+        self.T, self.A = group.tangent(xi), group.by_bodies(xi, lambda theta: rotation_exp(-theta))
+        m = (1 - alpha_m) / (1 - alpha_f)
+        # coefficients of dxi, du_0, du_dot_0, da_0 in (3)
+        self.of_a = 1 / (beta * h**2), -1 / (beta * h), 0.0, -(0.5 - beta) / beta
+        self.of_u = linear((0.0, 1.0, 0.0, h * (1 - gamma)), gamma * h, self.of_a)
+        self.of_u_dot = linear((0.0, 0.0, -alpha_f / (1 - alpha_f), alpha_m / (1 - alpha_f)), m, self.of_a)
+        self.at: PointTangents = tangents_at(structure, own.compiled.model, own.work, self.point, self.c_k)
+        by_xi = self.at.K @ self.T + self.of_u[0] * self.at.C + self.of_u_dot[0] * self.at.M
+        rows = self.at.G_x @ self.T + self.of_u[0] * self.at.G_v
+        self.solver = ScaledSolver(np.block([[by_xi, -self.at.J.T], [rows, self.at.V]]), self.point.t)
+
+    def forward(self, S: Array, by_p: Array) -> tuple[Array, Array]:
+        """Return dS_1, (4 n_u, n_p), and dw, (n_w, n_p), from dS_0 and the derivatives of residual and rows by p."""
+        x, u, u_dot, a = np.split(S, 4)
+        moved_x = self.A @ x
+        u_known = self.of_u[1] * u + self.of_u[2] * u_dot + self.of_u[3] * a
+        u_dot_known = self.of_u_dot[1] * u + self.of_u_dot[2] * u_dot + self.of_u_dot[3] * a
+        at = self.at
+        bodies = at.K @ moved_x + at.C @ u_known + at.M @ u_dot_known
+        rows = at.G_x @ moved_x + at.G_v @ u_known
+        z = self.solver.solve(-(np.vstack([bodies, rows]) + by_p))
+        xi, mu = z[: self.n], z[self.n :]
+        a_1 = self.of_a[0] * xi + self.of_a[1] * u + self.of_a[3] * a
+        S_1 = [moved_x + self.T @ xi, self.of_u[0] * xi + u_known, self.of_u_dot[0] * xi + u_dot_known, a_1]
+        return np.vstack(S_1), mu / self.c_k
+
+    def backward(self, S_bar: Array, w_bar: Array) -> tuple[Array, Array]:
+        """Return the adjoint of S_0, (4 n_u, n_out), and that of the residuals, (n_u + n_w, n_out).
+
+        The transposed of `forward`, line by line.
+        """
+        x, u, u_dot, a = np.split(S_bar, 4)
+        xi = self.T.T @ x + self.of_u[0] * u + self.of_u_dot[0] * u_dot + self.of_a[0] * a
+        eta = -self.solver.solve(np.vstack([xi, w_bar / self.c_k]), is_transposed=True)
+        bodies, rows = eta[: self.n], eta[self.n :]
+        at = self.at
+        moved_x = x + at.K.T @ bodies + at.G_x.T @ rows
+        u_known = u + at.C.T @ bodies + at.G_v.T @ rows
+        u_dot_known = u_dot + at.M.T @ bodies
+        return np.vstack(
+            [
+                self.A.T @ moved_x,
+                self.of_u[1] * u_known + self.of_u_dot[1] * u_dot_known + self.of_a[1] * a,
+                self.of_u[2] * u_known + self.of_u_dot[2] * u_dot_known,
+                self.of_u[3] * u_known + self.of_u_dot[3] * u_dot_known + self.of_a[3] * a,
+            ]
+        ), eta
+
+
+def linear(own: tuple[float, ...], factor: float, of_a: tuple[float, ...]) -> tuple[float, ...]:
+    """Return own + factor of_a, coefficient by coefficient."""
+    return tuple(x + factor * y for x, y in zip(own, of_a, strict=True))
+
+
+def direct_columns(
+    family: Family, structure: Structure, own: Neighbour, group: Configurations, motion: ComputedMotion,
+    S: Array, shown: Array, keep: set[int],
+) -> dict[int, Array]:  # fmt: skip
+    """Return d(x, u, u_dot, w)/dp, (3 n_u + n_w, n_p), at the points that are to be kept."""
+    n = group.n_v
+    kept = {0: shown} if 0 in keep else {}
+    points = motion.points[1 : max(keep, default=0) + 1]
+    for k, (_, by_p) in enumerate(in_blocks(family.parameters, points, motion.c_k)):
+        S, w = Step(structure, own, group, motion, k).forward(S, by_p)
+        if k + 1 in keep:
+            kept[k + 1] = np.vstack([S[: 3 * n], w])
+    return kept
+
+
+def adjoint_gradient(
+    family: Family, structure: Structure, own: Neighbour, group: Configurations, motion: ComputedMotion,
+    S: Array, shown: Array, slopes: dict[int, Array],
+) -> Array:  # fmt: skip
+    """Return the gradient of outputs through the motion, (n_out, n_p).
+
+    slopes: derivatives of the outputs by (x, u, u_dot, w) at point k, (n_out, 3 n_u + n_w).
+    """
+    n, n_w, n_out = group.n_v, len(structure.holds), len(next(iter(slopes.values())))
+    S_bar, gradient = np.zeros((4 * n, n_out)), np.zeros((n_out, len(family.parameters)))
+    last = max(slopes)
+    points = motion.points[1 : last + 1][::-1]
+    for k, (_, by_p) in zip(range(last, 0, -1), in_blocks(family.parameters, points, motion.c_k), strict=True):
+        w_bar = np.zeros((n_w, n_out))
+        if k in slopes:
+            S_bar[: 3 * n] += slopes[k][:, : 3 * n].T
+            w_bar = slopes[k][:, 3 * n :].T
+        S_bar, eta = Step(structure, own, group, motion, k - 1).backward(S_bar, w_bar)
+        gradient += eta.T @ by_p
+    if 0 in slopes:
+        gradient += slopes[0] @ shown
+    return gradient + S_bar.T @ S

@@ -1,0 +1,170 @@
+"""Numbers that are differentiated: a column of a sensor, and what is taken of it over time."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.words import nearest, quoted
+from floatframe.analyses.observed_state import observed_state
+from floatframe.design.gradients.parameters import Neighbour
+from floatframe.design.gradients.tangents import Point
+from floatframe.design.studies.study_file import TAKES
+from floatframe.engine.compiling.file_frames import rows_of_file
+from floatframe.engine.compiling.system import CompiledSystem
+from floatframe.engine.kernels.memory import Rows, new_rows
+from floatframe.engine.open_equations.configuration import Configurations
+from floatframe.errors import ModelError
+from floatframe.model.state import State
+from floatframe.model.system import System
+from floatframe.results.results_file import MemorySource
+from floatframe.results.sensors import EnergySensor, MomentumSensor, Sensor, measured, sensor_of
+from floatframe.results.trajectory import Trajectory
+from floatframe.simulation.integration import joint_rows
+
+__all__ = ["Column", "Take", "Wanted", "columns_of", "moved", "values_at", "wanted_of", "weights_of"]
+
+#: what is taken of values over time, (n_t,): a key of `TAKES`, or a function that returns a number and its derivatives
+Take = str | Callable[[Array], tuple[float, Array]]
+
+OF_THE_WAY = ("work", "dissipated", "balance")  #: energies that are sums over the motion, not of its state
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """An output by name."""
+
+    name: str
+    of: str  #: a sensor or joint coordinate and its column, "tip x"
+    take: Take  #: of its values over time, a key of `TAKES`, or a function of them
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """A column of a sensor."""
+
+    sensor: Sensor
+    column: str
+
+
+def wanted_of(outputs: Sequence[str] | Mapping[str, str | tuple[str, Take]]) -> tuple[Wanted, ...]:
+    """Return outputs as they are given: "tip x" (its last value), or by name, with what is taken of the values."""
+    if isinstance(outputs, str):
+        raise ModelError(f"sensitivities: outputs: expected a list of sensor columns, got the text {outputs!r}")
+    named = outputs if isinstance(outputs, Mapping) else {str(of): of for of in outputs}
+    if not named:
+        raise ModelError("sensitivities: outputs: expected at least one")
+    found = []
+    for name, given in named.items():
+        of, take = (given, "last") if isinstance(given, str) else given
+        if not callable(take) and take not in TAKES:
+            raise ModelError(f"sensitivities: output {name!r}: no way to take {quoted(take)}{nearest(take, TAKES)}")
+        found.append(Wanted(name, of, take))
+    return tuple(found)
+
+
+def columns_of(system: System, wanted: tuple[Wanted, ...]) -> tuple[Column, ...]:
+    """Return the columns of outputs; `ModelError` with the nearest name if there is no such sensor."""
+    coordinates = [f"{joint.name}.{name}" for joint in system.joints for name in joint.coordinates]
+    sensors = [*(sensor.name for sensor in system.sensors), *coordinates]
+    found = []
+    for each in wanted:
+        fitting = [name for name in sensors if each.of == name or each.of.startswith(f"{name} ")]
+        if not fitting:
+            raise ModelError(f"output {each.name!r}: of = {quoted(each.of)}: no such sensor{nearest(each.of, sensors)}")
+        name = max(fitting, key=len)
+        column = each.of[len(name) + 1 :]
+        sensor = sensor_of(system, name)
+        if isinstance(sensor, EnergySensor) and column in OF_THE_WAY:
+            raise ModelError(
+                f"output {each.name!r}: {column!r} is a sum over the whole motion, which this does not differentiate; "
+                "take kinetic, strain, gravity, springs or total"
+            )
+        found.append(Column(sensor, column))
+    return tuple(found)
+
+
+def values_at(neighbour: Neighbour, columns: tuple[Column, ...], points: Sequence[Point]) -> tuple[Array, list[str]]:
+    """Return what columns measure at points, (n_points, n_outputs), and their units; angles next to those counted."""
+    compiled = neighbour.compiled
+    if any(isinstance(each.sensor, EnergySensor | MomentumSensor) for each in columns):
+        rows = [observed_state(compiled, neighbour.work, p.state, p.u_dot, p.w, p.t)[0] for p in points]
+        joined = Rows(*(np.concatenate([getattr(row, name) for row in rows]) for name in Rows._fields))
+    else:
+        joined = new_rows(compiled.model, len(points))
+        for k, p in enumerate(points):
+            for name in ("r", "p", "q", "u"):
+                getattr(joined, name)[k] = getattr(p.state, name)
+            joined.u_dot[k], joined.w[k], joined.t[k] = p.u_dot, p.w, p.t
+    for k, p in enumerate(points):
+        joined.angle[k] = p.angle if len(p.angle) else 0.0
+    head = replace(neighbour.head, angles=compiled.angles)
+    motion = Trajectory(head, MemorySource(joint_rows(neighbour.system, [rows_of_file(compiled, joined)])), True)
+    values, units = [], []
+    for each in columns:
+        measurement = measured(neighbour.system, motion, [each.sensor])[each.sensor.name]
+        names = list(measurement.columns)
+        column = names[0] if not each.column and len(names) == 1 else each.column
+        if column not in names:
+            hint = nearest(column, names) if column else f"; expected one of its columns: {', '.join(names)}"
+            raise ModelError(f"sensitivities: sensor {each.sensor.name!r} has no column {column!r}{hint}")
+        values.append(measurement.columns[column])
+        units.append(measurement.units[column])
+    return np.array(values).T.reshape(len(points), len(columns)), units
+
+
+def moved(group: Configurations, compiled: CompiledSystem, point: Point, change: Array, factor: float) -> Point:
+    """Return a point moved by factor times a change of (x, u, u_dot, w), (3 n_u + n_w,)."""
+    n = group.n_v
+    dx, du, da, dw = np.split(factor * change, [n, 2 * n, 3 * n])
+    state = replace(point.state, u=point.state.u + du)
+    if dx.any():
+        x = group.retract(vector_of(group, compiled, point.state), dx)
+        state = state_of(group, compiled, group.normalized(x), state.u)
+    return Point(point.t, state, point.u_dot + da, point.w + dw, point.w_start, point.angle)
+
+
+def vector_of(group: Configurations, compiled: CompiledSystem, state: State) -> Array:
+    """Return x of a state of the engine."""
+    q0 = compiled.model.bodies.q0
+    return np.concatenate(
+        [part for i in range(len(state.r)) for part in (state.r[i], state.p[i], state.q[q0[i] : q0[i + 1]])]
+    )
+
+
+def state_of(group: Configurations, compiled: CompiledSystem, x: Array, u: Array) -> State:
+    """Return the state of the engine of x and u."""
+    r, p, q = [], [], [np.zeros(0)]
+    for j, _, n in group.parts():
+        r.append(x[j : j + 3])
+        p.append(x[j + 3 : j + 7])
+        q.append(x[j + 7 : j + 7 + n])
+    return State(np.array(r), np.array(p), np.concatenate(q), u)
+
+
+def weights_of(take: Take, values: Array) -> tuple[float, Array]:
+    """Return the number that is taken of values over time, and its derivatives by them, (n_t,)."""
+    if callable(take):
+        value, slopes = take(values)
+        slopes = np.asarray(slopes, dtype=float)
+        if slopes.shape != values.shape:
+            raise ModelError(f"sensitivities: expected {len(values)} derivatives of an output, got {slopes.shape}")
+        return float(value), slopes
+    n, weights = len(values), np.zeros(len(values))
+    if take in ("last", "first"):
+        weights[-1 if take == "last" else 0] = 1.0
+    elif take in ("least", "greatest"):
+        weights[values.argmin() if take == "least" else values.argmax()] = 1.0
+    elif take == "largest":
+        k = int(np.abs(values).argmax())
+        weights[k] = np.sign(values[k])
+    elif take == "mean":
+        weights[:] = 1 / n
+    elif take == "rms":
+        size = np.sqrt((values**2).mean())
+        weights[:] = values / (n * size) if size > 0 else 0.0
+    else:  # range
+        weights[values.argmax()] += 1.0
+        weights[values.argmin()] -= 1.0
+    return float(TAKES[take](values)), weights

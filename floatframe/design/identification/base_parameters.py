@@ -1,0 +1,195 @@
+"""Base parameters: the fewest combinations of parameters that torques or reactions can tell apart.
+
+All directions N of the parameters that change nothing, (p, k), are found either by rules (`transfer_rules`) or by the
+rank of a sampled linear form. Of the parameters k are then left out, chosen such that the rest is well determined, and
+what they did is added to those that stay:
+
+    phi = (phi_1, phi_2),   N = (N_1, N_2):     beta = phi_1 - N_1 N_2⁻¹ phi_2,      Y phi = Y_1 beta.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.words import nearest, quoted
+from floatframe.design.identification.reaction_rules import silent_at_base
+from floatframe.design.identification.regressors import LinearForm
+from floatframe.design.identification.transfer_rules import common, silent_directions
+from floatframe.design.identification.tree_samples import TreeSamples, as_placed
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.errors import ModelError
+
+__all__ = ["SOURCES", "BaseParameters", "base_parameters", "form_rows", "random_samples", "sampled_silence"]
+
+SOURCES = ("torques", "reactions", "both")
+RANK = 1e-9  #: singular values below this times the largest are zero, of columns of length one
+SHOWN = 1e-9  #: factors of combinations below this times the largest are zero
+N_SAMPLES = 60  #: random instants for a body, at least
+LOOP_REACH = 0.3  #: rad, or of the length of the system, about where a system with loops is placed: they stay closed
+
+
+@dataclass(frozen=True, eq=False)
+class BaseParameters:
+    """Combinations beta = B phi."""
+
+    form: LinearForm
+    source: str  #: of `SOURCES`
+    kept: IntArray  #: parameters that lead the combinations, (n_base,)
+    B: Array  #: (n_base, p), the identity in the columns `kept`
+    silent: Array  #: orthonormal directions that change nothing, (p, k)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The combinations as formulas: "J_zz(link1) + J_yy(link2) + 0.25 m(link3)"."""
+        return tuple(formula(row, self.form.names, lead) for row, lead in zip(self.B, self.kept, strict=True))
+
+    @property
+    def without_effect(self) -> tuple[str, ...]:
+        """Parameters that change nothing at all, by name."""
+        used = np.abs(self.B).max(axis=0, initial=0.0) > SHOWN
+        return tuple(name for name, is_used in zip(self.form.names, used, strict=True) if not is_used)
+
+    def values(self, phi: Array) -> Array:
+        """Return beta, (n_base,), of parameters, (p,)."""
+        return self.B @ np.asarray(phi)
+
+    def rows(self, Y: Array) -> Array:
+        """Return the columns of a linear form, (..., p), that belong to the combinations, (..., n_base)."""
+        return Y[..., self.kept]
+
+
+def base_parameters(form: LinearForm, *, source: str = "torques", by: str = "rules", seed: int = 0) -> BaseParameters:
+    """Return the base parameters of a linear form.
+
+    Parameters
+    ----------
+    form
+        See `linear_form`.
+    source
+        What is measured: "torques" of all coordinates, "reactions" of the ground, or "both".
+    by
+        "rules" over the joints, or "samples": the rank of the form over random motions.
+    seed
+        Of these.
+
+    Raises
+    ------
+    ModelError
+        If a name is not known, or there is no rule.
+    """
+    if source not in SOURCES:
+        raise ModelError(f"base_parameters: source: expected one of {', '.join(SOURCES)}, got {source!r}")
+    if by not in ("rules", "samples"):
+        raise ModelError(f"base_parameters: by: no road {quoted(by)}{nearest(by, ['rules', 'samples'])}")
+    if by == "rules":
+        silent = silent_by_rules(form, source)
+    else:
+        silent = sampled_silence(form_rows(form, random_samples(form, seed), source), form)
+    return combined(form, source, silent)
+
+
+def silent_by_rules(form: LinearForm, source: str) -> Array:
+    """Return the directions of the parameters, (p, k), that rules find without effect on what is measured."""
+    if form.independent is not None:
+        raise ModelError(
+            f"system {form.system.name!r}: rules of base parameters are those of trees, and its joints close loops; "
+            "find the base parameters by samples"
+        )
+    if source == "torques":
+        return silent_directions(form)
+    if source == "reactions":
+        return silent_at_base(form)
+    size = typical(form)[:, None]
+    spaces = [(silent / size).T for silent in (silent_directions(form), silent_at_base(form))]
+    return common(spaces).T * size
+
+
+def random_samples(form: LinearForm, seed: int = 0) -> TreeSamples:
+    """Return random instants: angles over a turn (with loops near by), lengths and rates of the order of the system."""
+    rng = np.random.default_rng(seed)
+    is_length = np.array([column.unit == "m" for column in form.columns])
+    size = np.where(is_length, compiled_system(form.system).length, 1.0)
+    if form.independent is None:
+        x = rng.uniform(-np.pi, np.pi, (N_SAMPLES * len(form.system.bodies), len(size))) * size
+    else:
+        x = rng.uniform(-LOOP_REACH, LOOP_REACH, (max(N_SAMPLES, 2 * len(form.names)), len(size))) * size
+        x += as_placed(form.system)[form.independent]
+    return form.samples(x, rng.normal(size=x.shape) * size, rng.normal(size=x.shape) * size)
+
+
+def form_rows(form: LinearForm, samples: TreeSamples, source: str) -> Array:
+    """Return the rows of what is measured, (n rows, p)."""
+    parts = []
+    if source != "reactions":
+        parts.append(form.torques(samples))
+    if source != "torques":
+        parts.append(form.reactions(samples))
+    return np.concatenate(parts, axis=1).reshape(-1, len(form.names))
+
+
+def sampled_silence(rows: Array, form: LinearForm) -> Array:
+    """Return directions of no effect from the singular values of sampled rows whose columns are scaled to one."""
+    size = typical(form)
+    scaled = rows * size
+    _, s, Vt = la.svd(scaled, full_matrices=False)
+    null = Vt[s <= RANK * s[0]].T * size[:, None]
+    return la.orth(null) if null.shape[1] else null
+
+
+def typical(form: LinearForm) -> Array:
+    """Return the units of the parameters in the lengths of the system, (p,)."""
+    size = compiled_system(form.system).length
+    body = np.array([1.0] + [size] * 3 + [size**2] * 6)
+    rest = len(form.names) - form.n_inertial
+    return np.concatenate([np.tile(body, len(form.system.bodies)), np.ones(rest)])
+
+
+def combined(form: LinearForm, source: str, silent: Array) -> BaseParameters:
+    """Return combinations in which parameters of outer bodies lead where they can, moments of inertia before masses.
+
+    Parameters are left out one by one, of the direction that shows them most, in the order of `preference`.
+    """
+    p, k = silent.shape
+    size = typical(form)
+    N = silent / size[:, None]
+    left_out: list[int] = []
+    rest = N.copy()
+    for j in preference(form):
+        if len(left_out) == k:
+            break
+        row = rest[j]
+        if np.linalg.norm(row) > 1e-6 * max(np.linalg.norm(N[j]), np.abs(N).max() * 1e-3):
+            left_out.append(j)
+            row = row / np.linalg.norm(row)
+            rest = rest - np.outer(rest @ row, row)
+    kept = np.array([j for j in range(p) if j not in set(left_out)], dtype=np.int64)
+    B = np.zeros((len(kept), p))
+    B[np.arange(len(kept)), kept] = 1.0
+    if left_out:
+        out = np.array(left_out)
+        B[:, out] = -la.solve(N[out].T, N[kept].T).T * (size[kept][:, None] / size[out][None])
+    B[np.abs(B) * size[None] < SHOWN * size[kept][:, None]] = 0.0
+    return BaseParameters(form, source, kept, B, la.orth(silent) if k else silent)
+
+
+def preference(form: LinearForm) -> list[int]:
+    """Return the parameters in the order in which they are left out: masses, first moments, inertias, from the tip."""
+    order = (0, 3, 2, 1, 7, 4, 9, 5, 6, 8)
+    bodies = range(len(form.system.bodies) - 1, -1, -1)
+    inertial = [10 * i + k for k in order[:1] for i in bodies] + [10 * i + k for k in order[1:] for i in bodies]
+    return inertial + list(range(form.n_inertial, len(form.names)))
+
+
+def formula(row: Array, names: Sequence[str], lead: int) -> str:
+    """Return a combination as a formula, its leading parameter first."""
+    words = names[lead]
+    for j, name in enumerate(names):
+        if j == lead or row[j] == 0.0:
+            continue
+        factor = abs(row[j])
+        number = "" if abs(factor - 1) < SHOWN else f"{factor:.6g} "
+        words += f" {'-' if row[j] < 0 else '+'} {number}{name}"
+    return words

@@ -1,0 +1,276 @@
+"""Base parameters from measured torques and reactions, with their standard deviations.
+
+(1) W beta = y + e: rows of the linear form for each channel and instant, columns of the base parameters.
+(2) Ordinary least squares gives residuals, and from each channel's sigma_k its noise.
+(3) Rows are divided by the sigma_k of their channel and solved again, until the sigma_k stand (weighted).
+(4) Rows whose residual is far above the noise lose weight, w = min(1, c sigma_k / |e|), until all stands (robust [1]_).
+(5) Deviations are those of white noise: C = (Wᵀ S⁻¹ W)⁻¹, whose diagonal are the variances of beta. Rows that follow
+    each other faster than the noise changes say less than they count: `whiteness` tells.
+
+References
+----------
+.. [1] Huber (1964), Annals of Mathematical Statistics 35, 73-101.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.linalg as la
+
+from fe_models.foundation.arrays import Array
+from floatframe.design.identification.base_parameters import BaseParameters, base_parameters
+from floatframe.design.identification.regressors import LinearForm
+from floatframe.design.identification.tree_samples import TreeSamples
+from floatframe.errors import ModelError
+
+__all__ = ["METHODS", "Estimate", "Measured", "estimate"]
+
+METHODS = ("ordinary", "weighted", "robust")
+HUBER = 1.345  #: sigma from which a residual counts less; 95 % efficient where there are no outliers
+UNFIT = 0.3  #: misfit of a channel above which the model is not that of the measurement
+SURE = 4.0  #: deviations below zero by which a parameter that cannot be negative is so for sure
+POSITIVE = ("motor-inertia(", "viscous(", "coulomb(")  #: parameters of drives that cannot be negative
+POOR = 1e4  #: condition number of the weighted rows, columns scaled, above which a motion does not excite
+#: times 1/sqrt(n) that neighbouring residuals of white noise correlate at most, 99.5 %; the fit itself makes it less
+WHITE = 2.6
+ROUNDS = 30  #: of weights, at most
+BASE = ("base F_x", "base F_y", "base F_z", "base M_x", "base M_y", "base M_z")
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """A motion with what was measured on it."""
+
+    samples: TreeSamples
+    torques: Array | None = None  #: of the coordinates, (n, n_c) [N, N m]
+    reactions: Array | None = None  #: force and moment of the ground on the tree about `point`, ground axes, (n, 6)
+    point: Array | None = None  #: (3,) [m]; None: the origin
+    time: Array | None = None  #: (n,) [s]
+    #: filter over the instants, axis 0, of what was measured and of the linear form alike; None: neither
+    smooth: Callable[[Array], Array] | None = None
+    used: slice = field(default_factory=lambda: slice(None))  #: instants that count, after it
+
+    def __post_init__(self) -> None:
+        n, n_c = len(self.samples.x), self.samples.n_independent
+        if self.torques is None and self.reactions is None:
+            raise ModelError("identification: expected measured torques, reactions, or both; got none")
+        for name, values, width in (("torques", self.torques, n_c), ("reactions", self.reactions, 6)):
+            if values is not None and np.shape(values) != (n, width):
+                raise ModelError(
+                    f"identification: {name}: expected {n} rows of {width} columns, one row for each instant of the "
+                    f"motion; got an array {np.shape(values)}"
+                )
+            if values is not None and not np.isfinite(values).all():
+                raise ModelError(f"identification: {name}: expected finite numbers, got NaN or infinity")
+
+    @property
+    def source(self) -> str:
+        """What was measured, of `base_parameters.SOURCES`."""
+        if self.torques is None:
+            return "reactions"
+        return "torques" if self.reactions is None else "both"
+
+    @property
+    def times(self) -> Array:
+        """Times of the instants that count, or their numbers, (n_used,)."""
+        return (np.arange(float(len(self.samples.x))) if self.time is None else np.asarray(self.time))[self.used]
+
+    def rows(self, form: LinearForm) -> tuple[Array, Array]:
+        """Return the linear form, (n_used, channels, p), and the measured values, (n_used, channels)."""
+        W, y = [], []
+        if self.torques is not None:
+            W.append(form.torques(self.samples))
+            y.append(np.asarray(self.torques, dtype=float))
+        if self.reactions is not None:
+            W.append(form.reactions(self.samples, self.point))
+            y.append(np.asarray(self.reactions, dtype=float))
+        made, measured = np.concatenate(W, axis=1), np.concatenate(y, axis=1)
+        if self.smooth is not None:
+            made, measured = self.smooth(made), self.smooth(measured)
+        return made[self.used], measured[self.used]
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Base parameters as estimated."""
+
+    base: BaseParameters
+    measured: Measured
+    values: Array  #: beta, (n_base,)
+    covariance: Array  #: (n_base, n_base)
+    sigma: Array  #: noise of the channels, (channels,) [N or N m]
+    residuals: Array  #: measured less modelled, (n, channels)
+    weights: Array  #: of robust estimation, 1 where a row counts whole, (n, channels)
+    condition: float  #: of the weighted rows, columns scaled to length one
+    whiteness: Array  #: correlation of neighbouring residuals of each channel, (channels,)
+
+    @property
+    def deviations(self) -> Array:
+        """Standard deviations of the values, (n_base,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def relative_deviations(self) -> Array:
+        """Standard deviations over the values, (n_base,)."""
+        return self.deviations / np.maximum(np.abs(self.values), np.finfo(float).tiny)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the measured channels."""
+        names = [column.name for column in self.base.form.columns]
+        return (
+            *(names if self.measured.torques is not None else ()),
+            *(BASE if self.measured.reactions is not None else ()),
+        )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What makes the deviations doubtful, in words."""
+        said = []
+        if self.condition > POOR:
+            worst = self.base.names[int(np.argmax(self.relative_deviations))]
+            said.append(
+                f"the motion excites poorly: condition number {self.condition:.2g}, least known {worst}; measure "
+                "another motion (exciting_motion finds one)"
+            )
+        unfit = [
+            f"{name} by {share:.0%}"
+            for name, share in zip(self.channels, self.misfit(self.measured), strict=True)
+            if share > UNFIT
+        ]
+        if unfit:
+            said.append(
+                f"the model misses {', '.join(unfit)} of what was measured: look at friction, units (degrees said "
+                "to be rad), signs, the zero of angles (as the system is placed), gravity, exchanged columns, noise"
+            )
+        negative = [
+            name
+            for name, value, deviation in zip(self.base.names, self.values, self.deviations, strict=True)
+            if name.startswith(POSITIVE) and value < -SURE * deviation
+        ]
+        if negative:
+            said.append(
+                f"{', '.join(negative)} came out negative, which no drive is: look at the signs of torques, positions"
+            )
+        n = len(self.residuals)
+        coloured = [name for name, r in zip(self.channels, self.whiteness, strict=True) if r > WHITE / np.sqrt(n)]
+        if coloured:
+            said.append(
+                f"residuals of {', '.join(coloured)} are not white: the model lacks something there, or rows follow "
+                "faster than the noise changes, and the deviations are too small; take fewer rows"
+            )
+        return tuple(said)
+
+    def predicted(self, measured: Measured) -> Array:
+        """Return the channels of another motion as the estimate has them, (n, channels): for validation."""
+        return self.compared(measured)[0]
+
+    def misfit(self, measured: Measured) -> Array:
+        """Return the rms of measured less predicted over the rms of measured, of each channel of another motion."""
+        predicted, y = self.compared(measured)
+        size = np.sqrt((y**2).mean(axis=0))
+        return np.sqrt(((y - predicted) ** 2).mean(axis=0)) / np.where(size > 0, size, 1.0)
+
+    def compared(self, measured: Measured) -> tuple[Array, Array]:
+        """Return the channels of another motion, predicted and measured, (n, channels) each."""
+        if measured.source != self.measured.source:
+            raise ModelError(
+                f"identification: estimated from {self.measured.source}, but the other motion has {measured.source}"
+            )
+        W, y = measured.rows(self.base.form)
+        return self.base.rows(W) @ self.values, y
+
+
+def estimate(
+    form: LinearForm, measured: Measured, *, method: str = "weighted", base: BaseParameters | None = None
+) -> Estimate:
+    """Return the base parameters that fit measurements best.
+
+    Parameters
+    ----------
+    form
+        The model, see `linear_form`.
+    measured
+        A motion, with torques, reactions, or both.
+    method
+        Of `METHODS`.
+    base
+        Combinations to estimate; by default those of the rank of the form over random motions.
+
+    Raises
+    ------
+    ModelError
+        If there are fewer rows than parameters, or the motion leaves combinations undetermined; by name.
+    """
+    if method not in METHODS:
+        raise ModelError(f"estimate: method: expected one of {', '.join(METHODS)}, got {method!r}")
+    if base is None:
+        base = base_parameters(form, source=measured.source, by="samples")
+    elif base.source != measured.source:
+        raise ModelError(f"estimate: base parameters are those of {base.source}, but measured were {measured.source}")
+    every, y = measured.rows(form)
+    W = base.rows(every)
+    n, n_channels, n_base = W.shape
+    if n * n_channels <= n_base:
+        raise ModelError(
+            f"estimate: {n} instants of {n_channels} channels cannot tell {n_base} parameters; measure longer"
+        )
+    if not y.any():
+        raise ModelError("estimate: all measured torques and reactions are zero: nothing was measured")
+    require_excited(base, W)
+    sigma, weights = np.ones(n_channels), np.ones((n, n_channels))
+    beta = solved(W, y, sigma, weights)
+    for _ in range(1 if method == "ordinary" else ROUNDS):
+        e = y - W @ beta
+        before = sigma
+        sigma = noise(e, weights, n_base / n_channels)
+        if method == "ordinary":
+            sigma = np.full(n_channels, np.sqrt((sigma**2).mean()))
+            break
+        if method == "robust":
+            weights = np.minimum(1.0, HUBER * sigma / np.maximum(np.abs(e), 1e-300))
+        beta = solved(W, y, sigma, weights)
+        if np.allclose(sigma, before, rtol=1e-8, atol=0.0):
+            break
+    e = y - W @ beta
+    A = (W * np.sqrt(weights)[..., None] / sigma[:, None]).reshape(-1, n_base)
+    size = np.linalg.norm(A, axis=0)
+    s, Vt = la.svd(A / size, full_matrices=False)[1:]
+    half = (Vt.T / s) / size[:, None]
+    after = (e[1:] * e[:-1]).sum(axis=0) / np.maximum((e**2).sum(axis=0), np.finfo(float).tiny)
+    return Estimate(base, measured, beta, half @ half.T, sigma, e, weights, float(s[0] / s[-1]), after)
+
+
+def noise(e: Array, weights: Array, spent: float) -> Array:
+    """Return the noise of channels from their residuals, each of which has spent a share of the parameters."""
+    n = len(e)
+    if weights.min() < 1.0:  # the median does not see outliers
+        return np.median(np.abs(e), axis=0) / 0.6744897501960817 + np.finfo(float).tiny
+    return np.sqrt((e**2).sum(axis=0) / max(n - spent, 1.0)) + np.finfo(float).tiny
+
+
+def solved(W: Array, y: Array, sigma: Array, weights: Array) -> Array:
+    """Return the weighted least squares solution, (n_base,), columns scaled."""
+    root = np.sqrt(weights) / sigma
+    A = (W * root[..., None]).reshape(-1, W.shape[-1])
+    size = np.linalg.norm(A, axis=0)
+    return la.lstsq(A / size, (y * root).ravel(), lapack_driver="gelsy")[0] / size
+
+
+def require_excited(base: BaseParameters, W: Array) -> None:
+    """Raise `ModelError` with the combinations that a motion does not show."""
+    A = W.reshape(-1, W.shape[-1])
+    size = np.linalg.norm(A, axis=0)
+    seen = size > 1e-10 * size.max()
+    missing = [name for name, is_seen in zip(base.names, seen, strict=True) if not is_seen]
+    if not missing:
+        s, Vt = la.svd(A / size, full_matrices=False)[1:]
+        hidden = Vt[s <= 1e-9 * s[0]]
+        missing = [base.names[j] for j in np.flatnonzero(np.abs(hidden).max(axis=0, initial=0.0) > 0.1)]
+    if missing:
+        shown = "; ".join(missing[:6]) + ("; ..." if len(missing) > 6 else "")
+        raise ModelError(
+            f"estimate: this motion does not tell {len(missing)} of {len(base.names)} combinations: {shown}; move all "
+            "joints together, at several speeds (exciting_motion finds such a motion)"
+        )

@@ -1,0 +1,436 @@
+"""An estimate as one HTML page that works offline, and as a record for JSON."""
+
+from typing import Any
+
+import numpy as np
+
+from cms.assessment.report.charts import base_layout, line
+from cms.assessment.report.html import Cell, Section, figure, page, table, text
+from fe_models.foundation.arrays import Array
+from floatframe.design.identification.base_parameters import base_parameters
+from floatframe.design.identification.estimation import Estimate, Measured
+from floatframe.design.identification.excitation import ExcitingMotion
+from floatframe.design.identification.next_motion import NextMotion
+from floatframe.design.identification.physical import RealParameters
+from floatframe.design.identification.regressors import LinearForm
+from floatframe.engine.tree.topology import tree_of
+
+__all__ = ["identification_html", "identification_record", "verdict_of"]
+
+SURE, DOUBTFUL = 0.05, 0.3  #: relative deviations up to which a parameter is well known, and from which it is not known
+UNREAL = (
+    "no real bodies, with positive masses and inertias, fit within the noise: look at signs, units and places of the "
+    "joints in the system file, or at what the model lacks"
+)
+OFF = 3.0  #: deviations by which a value differs from the system file for sure
+NEARER = 0.7  #: share of its deviation that another motion leaves where it helps
+MOST_NAMES = 8  #: combinations that a list names
+VERDICTS = {"well known": "pass", "roughly known": "", "not known": "fail", "zero within its deviation": "warn"}
+COLORS = {
+    "measured": "#1b1f24", "modelled": "#0072B2", "predicted": "#0072B2", "residual": "#CC79A7", "position": "#0072B2",
+}  # fmt: skip
+
+
+def identification_record(
+    made: Estimate, real: RealParameters | None, check: Measured | None, notes: tuple[str, ...],
+    better: NextMotion | None = None,
+) -> dict[str, Any]:  # fmt: skip
+    """Return an estimate as plain numbers and words."""
+    form = made.base.form
+    told = set(made.base.names)
+    others = {}
+    for source in ("reactions", "both") if made.base.source == "torques" else ():
+        names = base_parameters(form, source=source, by="samples").names
+        others[source] = {"n_base": len(names), "new": [name for name in names if name not in told]}
+    prior = made.base.values(form.values)
+    is_drive = made.base.kept >= form.n_inertial
+    units = [unit_of(form, int(k)) for k in made.base.kept]
+    after = [None] * len(prior) if better is None else better.deviations.tolist()
+    return {
+        "system": form.system.name,
+        "source": made.base.source,
+        "n_parameters": len(form.names),
+        "n_base": len(made.values),
+        "n_instants": len(made.residuals),
+        "condition": made.condition,
+        "parameters": [
+            {
+                "name": name,
+                "value": value,
+                "unit": unit,
+                "deviation": deviation,
+                "relative": relative,
+                "verdict": verdict_of(value, deviation),
+                "a_priori": None if drive else own,
+                "off": None if drive else (value - own) / deviation,
+                "deviation_of_next_motion": then,
+            }
+            for name, value, unit, deviation, relative, own, drive, then in zip(
+                made.base.names,
+                made.values.tolist(),
+                units,
+                made.deviations.tolist(),
+                made.relative_deviations.tolist(),
+                prior.tolist(),
+                is_drive.tolist(),
+                after,
+                strict=True,
+            )
+        ],
+        "next_motion": None
+        if better is None
+        else {
+            "condition": better.condition,
+            "period": better.motion.period,
+            "coordinates": {
+                name: row for name, row in zip(better.motion.names, better.motion.coefficients.tolist(), strict=True)
+            },
+        },
+        "channels": [
+            {"name": name, "unit": unit, "noise": sigma, "whiteness": r, "misfit": fit}
+            for name, unit, sigma, r, fit in zip(
+                channel_words(made),
+                channel_units(made),
+                made.sigma.tolist(),
+                made.whiteness.tolist(),
+                made.misfit(made.measured).tolist(),
+                strict=True,
+            )
+        ],
+        "validation": None
+        if check is None
+        else dict(zip(channel_words(made), made.misfit(check).tolist(), strict=True)),
+        "without_effect": list(made.base.without_effect),
+        "told_by_other_sources": others,
+        "real_bodies": None
+        if real is None
+        else {
+            "excess": real.excess,
+            "bodies": {body.name: real.phi[10 * i : 10 * i + 10].tolist() for i, body in enumerate(form.system.bodies)},
+            "least": real.least.tolist(),
+        },
+        "warnings": [*made.warnings, *([] if real is None or real.is_fit else [UNREAL])],
+        "notes": list(notes),
+    }
+
+
+def unit_of(form: LinearForm, k: int) -> str:
+    """Return the unit of a parameter, in the symbols of the system."""
+    units = form.system.units
+    mass, length, time, force = (getattr(units, f"{name}_symbol") for name in ("mass", "length", "time", "force"))
+    if k < form.n_inertial:
+        return (mass, *[f"{mass} {length}"] * 3, *[f"{mass} {length}²"] * 6)[k % 10]
+    columns = tree_of(form.system).columns
+    place, row = divmod(k - form.n_inertial, len(columns))
+    is_length = columns[row].unit == "m"
+    act = force if is_length else f"{force} {length}"
+    return {
+        "motor-inertia": mass if is_length else f"{mass} {length}²",
+        "viscous": f"{force} {time}/{length}" if is_length else f"{act} {time}/rad",
+        "coulomb": act,
+        "offset": act,
+    }[form.terms[place]]
+
+
+def verdict_of(value: float, deviation: float) -> str:
+    """Return how well a value is known, in words."""
+    if deviation <= SURE * abs(value):
+        return "well known"
+    if deviation < DOUBTFUL * abs(value):
+        return "roughly known"
+    return "zero within its deviation" if abs(value) < 2 * deviation else "not known"
+
+
+def channel_words(made: Estimate) -> list[str]:
+    """Return what the channels are called in files."""
+    units = {column.name: column.unit for column in made.base.form.columns}
+    return [
+        name if name.startswith("base ") else f"{name} {'force' if units[name] == 'm' else 'torque'}"
+        for name in made.channels
+    ]
+
+
+def channel_units(made: Estimate) -> list[str]:
+    """Return the units of the channels."""
+    units = made.base.form.system.units
+    force, moment = units.force_symbol, f"{units.force_symbol} {units.length_symbol}"
+    return [force if name.endswith("force") or name.startswith("base F") else moment for name in channel_words(made)]
+
+
+def identification_html(made: Estimate, record: dict[str, Any], check: Measured | None) -> str:
+    """Return the page of an estimate whose record was made."""
+    sections = [parameter_section(record), fit_section(made, record), residual_section(made, record)]
+    if check is not None:
+        sections.append(validation_section(made, record, check))
+    sections.append(unseen_section(record))
+    if record["next_motion"] is not None:
+        sections.append(next_section(made, record))
+    if record["real_bodies"] is not None:
+        sections.append(real_section(made, record))
+    return page(
+        f"{record['system']}: identification",
+        f"{text(record['system'])}<small>identification</small>",
+        header(record),
+        sections,
+        {},
+        text("Written by floatframe identify."),
+    )
+
+
+def header(record: dict[str, Any]) -> str:
+    """Return the title, the facts, and the answer."""
+    n = {words: sum(each["verdict"] == words for each in record["parameters"]) for words in VERDICTS}
+    facts = [
+        f"{record['n_base']} combinations of {record['n_parameters']} parameters from {record['source']} at "
+        f"{record['n_instants']} instants",
+        f"condition number {record['condition']:.3g}",
+        *record["notes"],
+    ]
+    answer = (
+        f"{n['well known']} of {record['n_base']} combinations are known within {SURE:.0%}, "
+        f"{n['roughly known']} within {DOUBTFUL:.0%}, {n['not known']} are not known; "
+        f"{n['zero within its deviation']} cannot be told from zero."
+    )
+    off = [each["name"] for each in record["parameters"] if each["off"] is not None and abs(each["off"]) > OFF]
+    if off:
+        answer += f" {len(off)} differ from the system file by more than {OFF:g} deviations."
+    elif record["parameters"]:
+        answer += f" None differs from the system file by more than {OFF:g} deviations."
+    warned = "".join(f"<p>{text(words)}</p>" for words in record["warnings"])
+    return (
+        f'<h1>{text(record["system"])}: what the measurement tells</h1><p class="facts">{text("; ".join(facts))}</p>'
+        f'<section class="answer{" none" if record["warnings"] else ""}"><p>{text(answer)}</p>{warned}</section>'
+    )
+
+
+def parameter_section(record: dict[str, Any]) -> Section:
+    """The combinations with their deviations."""
+    rows = [
+        (
+            Cell(each["name"], "name"),
+            Cell(number(each["value"], each["deviation"]), "n"),
+            Cell(f"± {each['deviation']:.2g}", "n"),
+            Cell(each["unit"]),
+            Cell(each["verdict"], VERDICTS[each["verdict"]], note=share_words(each)),
+            Cell("" if each["a_priori"] is None else number(each["a_priori"], each["deviation"]), "n"),
+            Cell(
+                "" if each["off"] is None else f"{each['off']:+.1f}",
+                "n fail" if each["off"] is not None and abs(each["off"]) > OFF else "n",
+            ),
+        )
+        for each in record["parameters"]
+    ]
+    heads = ("combination", "value>", "deviation>", "unit", "", "in the system file>", "off it, deviations>")
+    return Section(
+        "parameters", "What the motion tells", "Parameters", table(heads, rows),
+        "A combination is all that can be told, its parts are not. Deviations are standard deviations; three times as "
+        "much is nearly sure. The system file knows no drives.",
+    )  # fmt: skip
+
+
+def share_words(each: dict[str, Any]) -> str:
+    """Return the deviation over the value, where that says something."""
+    return "" if each["verdict"] == "zero within its deviation" else f"{each['relative']:.1%}"
+
+
+def number(value: float, deviation: float) -> str:
+    """Return a value with the digits that its deviation leaves, two of which are doubtful."""
+    if not deviation > 0:
+        return f"{value:.5g}"
+    places = 1 - int(np.floor(np.log10(deviation)))
+    return f"{value:.{places}f}" if 0 <= places <= 12 else f"{value:.5g}"
+
+
+def fit_section(made: Estimate, record: dict[str, Any]) -> Section:
+    """Measured and modelled; noise of the channels."""
+    rows = [
+        (
+            Cell(each["name"], "name"),
+            Cell(f"{each['noise']:.3g}", "n"),
+            Cell(each["unit"]),
+            Cell(f"{each['misfit']:.2%}", "n"),
+            Cell(f"{each['whiteness']:+.2f}", "n"),
+        )
+        for each in record["channels"]
+    ]
+    drawn = figure("fit", "Measured (black) and modelled (blue).", height=160 * len(rows) + 60)
+    heads = ("channel", "noise>", "unit", "misfit>", "neighbours correlate>")
+    return Section(
+        "fit", "How well it fits", "Fit", drawn + table(heads, rows),
+        "Noise is the standard deviation of the residual, misfit its rms over that of what was measured.",
+        {"fit": fit_chart(made)},
+    )  # fmt: skip
+
+
+def residual_section(made: Estimate, record: dict[str, Any]) -> Section:
+    """What is left, in its own scale."""
+    drawn = figure(
+        "residuals", "Measured less modelled; grey: two standard deviations, where 95 % of noise lies.",
+        height=160 * len(record["channels"]) + 60,
+    )  # fmt: skip
+    return Section(
+        "residuals", "What is left", "Residuals", drawn,
+        "Noise has no shape. Waves, steps at reversals of a joint or drifts are something that the model lacks: "
+        "elasticity, friction of another kind, a wrong zero.",
+        {"residuals": residual_chart(made)},
+    )  # fmt: skip
+
+
+def validation_section(made: Estimate, record: dict[str, Any], check: Measured) -> Section:
+    """A motion that the estimate has not seen."""
+    rows = [(Cell(name, "name"), Cell(f"{misfit:.2%}", "n")) for name, misfit in record["validation"].items()]
+    drawn = figure("check", "Measured (black) and predicted (blue).", height=160 * len(rows) + 60)
+    return Section(
+        "validation", "Another motion", "Validation", drawn + table(("channel", "misfit>"), rows),
+        "A motion that was not used for the estimate.", {"check": prediction_chart(made, check)},
+    )  # fmt: skip
+
+
+def unseen_section(record: dict[str, Any]) -> Section:
+    """What no motion tells, and what else to measure."""
+    words = ", ".join(record["without_effect"]) or "none"
+    rows = [
+        (
+            Cell({"reactions": "reactions at the base", "both": "torques and reactions"}[source], "name"),
+            Cell(str(each["n_base"]), "n"),
+            Cell("; ".join(each["new"][:MOST_NAMES]) + ("; ..." if len(each["new"]) > MOST_NAMES else "")),
+        )
+        for source, each in record["told_by_other_sources"].items()
+    ]
+    heads = ("measured instead", "combinations>", "among them, in other combinations than here")
+    more = f"<p>{text('Other sensors tell other combinations:')}</p>{table(heads, rows)}" if rows else ""
+    return Section(
+        "unseen", "What no motion tells", "Unseen",
+        f"<p>{text('Parameters without any effect on what was measured: ' + words)}.</p>{more}", "",
+    )  # fmt: skip
+
+
+def next_section(made: Estimate, record: dict[str, Any]) -> Section:
+    """The motion that would tell more, and how much."""
+    each_helped = [
+        each
+        for each in record["parameters"]
+        if each["deviation_of_next_motion"] < NEARER * each["deviation"] and each["verdict"] != "well known"
+    ]
+    rows = [
+        (
+            Cell(each["name"], "name"),
+            Cell(f"± {each['deviation']:.2g}", "n"),
+            Cell(f"± {each['deviation_of_next_motion']:.2g}", "n"),
+            Cell(each["unit"]),
+            Cell(verdict_of(each["value"], each["deviation_of_next_motion"])),
+        )
+        for each in each_helped
+    ]
+    heads = ("combination", "deviation now>", "with this motion>", "unit", "then")
+    told = (
+        table(heads, rows)
+        if rows
+        else "<p>No combination that is doubtful now would be told much better: measure longer, with less noise, or "
+        "with larger accelerations.</p>"
+    )
+    worse = sum(each["deviation_of_next_motion"] > each["deviation"] / NEARER for each in record["parameters"])
+    if worse:
+        told += (
+            f"<p>{text(f'It tells {worse} of the combinations less well than this one did: measure it besides')}.</p>"
+        )
+    n = record["next_motion"]
+    drawn = figure("next", "Positions of the coordinates over one period.", height=100 * len(n["coordinates"]) + 60)
+    return Section(
+        "next", "Which motion would help", "Next motion", told + drawn,
+        f"A Fourier series of {n['period']:.3g} {made.base.form.system.units.time_symbol} within the positions, rates "
+        f"and accelerations of this measurement, chosen for its condition number ({n['condition']:.3g} against "
+        f"{record['condition']:.3g}), with as many rows and the same noise. Write it with --motion FILE.csv.",
+        {"next": next_chart(n, [column.unit for column in made.base.form.columns])},
+    )  # fmt: skip
+
+
+def real_section(made: Estimate, record: dict[str, Any]) -> Section:
+    """Real bodies that fit."""
+    rows = []
+    for name, phi in record["real_bodies"]["bodies"].items():
+        size = max(abs(x / phi[0]) for x in phi[1:4]) or 1.0
+        largest = max(abs(x) for x in phi[4:])
+        rows.append(
+            (
+                Cell(name, "name"),
+                Cell(f"{phi[0]:.4g}", "n"),
+                *(Cell(plain_number(x / phi[0], size), "n") for x in phi[1:4]),
+                *(Cell(plain_number(phi[k], largest), "n") for k in (4, 7, 9, 5, 6, 8)),
+            )
+        )
+    form = made.base.form
+    mass, first, second = (unit_of(form, k) for k in (0, 1, 4))
+    length = first.removeprefix(f"{mass} ")
+    heads = (
+        "body", f"mass [{mass}]>", *(f"c_{a} [{length}]>" for a in "xyz"),
+        *(f"J_{ab}>" for ab in ("xx", "yy", "zz", "xy", "xz", "yz")),
+    )  # fmt: skip
+    return Section(
+        "real", "Bodies that could be built", "Bodies", table(heads, rows),
+        "Positive masses and inertias that fit the measurements (squared misfit "
+        f"{record['real_bodies']['excess']:+.2%} over the best), near the system file where nothing was measured. "
+        f"J about the origin of the body, elements of the tensor [{second}].",
+    )  # fmt: skip
+
+
+def plain_number(value: float, size: float) -> str:
+    """Return a number, rounding beside a size as zero."""
+    return "0" if abs(value) < 1e-9 * size else f"{value:.4g}"
+
+
+def fit_chart(made: Estimate) -> dict[str, Any]:
+    """Return the channels over time, below each other."""
+    _, y = made.measured.rows(made.base.form)
+    return stacked(made, made.measured.times, {"measured": y, "modelled": y - made.residuals})
+
+
+def residual_chart(made: Estimate) -> dict[str, Any]:
+    """Return the residuals over time, with the band of their noise."""
+    chart = stacked(made, made.measured.times, {"residual": made.residuals})
+    chart["layout"]["shapes"] = [
+        {
+            "type": "rect", "xref": "paper", "x0": 0, "x1": 1, "yref": "y" if k == 0 else f"y{k + 1}",
+            "y0": -2 * sigma, "y1": 2 * sigma, "fillcolor": "#9aa5b1", "opacity": 0.18, "line": {"width": 0},
+        }
+        for k, sigma in enumerate(made.sigma.tolist())
+    ]  # fmt: skip
+    return chart
+
+
+def prediction_chart(made: Estimate, check: Measured) -> dict[str, Any]:
+    """Return the channels of another motion."""
+    _, y = check.rows(made.base.form)
+    return stacked(made, check.times, {"measured": y, "predicted": made.predicted(check)})
+
+
+def next_chart(motion: dict[str, Any], units: list[str]) -> dict[str, Any]:
+    """Return the positions of a motion over its period."""
+    rows = np.array(list(motion["coordinates"].values()))
+    t = np.linspace(0, motion["period"], 201)
+    made = ExcitingMotion(tuple(motion["coordinates"]), motion["period"], rows, motion["condition"])
+    names = [f"{name}<br>[{unit}]" for name, unit in zip(motion["coordinates"], units, strict=True)]
+    return panels(t, {"position": made.at(t)[0]}, names)
+
+
+def stacked(made: Estimate, t: Array, curves: dict[str, Array]) -> dict[str, Any]:
+    """Return a chart with a panel for each channel."""
+    names = [f"{name}<br>[{unit}]" for name, unit in zip(channel_words(made), channel_units(made), strict=True)]
+    return panels(t, curves, names)
+
+
+def panels(t: Array, curves: dict[str, Array], names: list[str]) -> dict[str, Any]:
+    """Return a chart with a panel for each name, below each other; curves: (n_t, n) by what they are."""
+    traces, layout, n = [], base_layout("time [s]", ""), len(names)
+    for k, name in enumerate(names):
+        for label, values in curves.items():
+            trace = line(t, values[:, k], label, COLORS[label], width=1.3, hover="%{y:.4g}")
+            trace |= {"yaxis": "y" if k == 0 else f"y{k + 1}", "showlegend": k == 0 and len(curves) > 1}
+            traces.append(trace)
+        axis = dict(base_layout("", "")["yaxis"])
+        axis |= {"domain": [1 - (k + 0.88) / n, 1 - k / n], "title": {"text": name, "font": {"size": 10}}}
+        layout["yaxis" if k == 0 else f"yaxis{k + 1}"] = axis
+    layout["xaxis"] |= {"anchor": f"y{n}" if n > 1 else "y"}
+    layout.pop("height")
+    layout["autosize"] = True
+    return {"data": traces, "layout": layout}

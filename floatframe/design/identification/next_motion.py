@@ -1,0 +1,66 @@
+"""The motion that would tell more: an exciting one within what the robot did already, and how well it would tell."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+
+from fe_models.foundation.arrays import Array
+from floatframe.design.identification.base_parameters import form_rows
+from floatframe.design.identification.estimation import Estimate
+from floatframe.design.identification.excitation import ExcitingMotion, MotionLimits, exciting_motion
+
+__all__ = ["NextMotion", "next_motion"]
+
+N_HARMONICS, N_INSTANTS, N_STARTS, MOST = 5, 40, 12, 8
+LEAST = 1e-3  #: rad or m, the range of a coordinate that hardly moved
+
+
+@dataclass(frozen=True, eq=False)
+class NextMotion:
+    """A motion, and the deviations with which it would tell the base parameters."""
+
+    motion: ExcitingMotion
+    deviations: Array  #: of as many rows with the same noise, (n_base,)
+    condition: float  #: of these rows over the noise, columns of length one; compare `Estimate.condition`
+
+
+def next_motion(made: Estimate, *, seed: int = 0) -> NextMotion | None:
+    """Return an exciting motion within the positions, rates and accelerations of the one that was measured.
+
+    None: none that was tried has a lower condition number than that one.
+
+    It lasts as long as what was measured, and is judged with as many rows and the noise that was found. Torques are not
+    limited: those of the estimate stay near what was measured, as accelerations do.
+
+    Raises
+    ------
+    ModelError
+        If loops cannot be closed on the way.
+    """
+    form, samples = made.base.form, made.measured.samples
+    own = slice(None) if form.independent is None else form.independent
+    x, rate, acceleration = (getattr(samples, name)[:, own] for name in ("x", "rate", "acceleration"))
+    limits = {}
+    for k, column in enumerate(form.columns):
+        low, high = float(x[:, k].min()), float(x[:, k].max())
+        spare = max(LEAST - (high - low), 0.0)
+        limits[column.name] = MotionLimits(
+            low - spare, high + spare, max(float(np.abs(rate[:, k]).max()), LEAST),
+            max(float(np.abs(acceleration[:, k]).max()), LEAST),
+        )  # fmt: skip
+    t = made.measured.times
+    n = len(t)
+    duration = float(t[-1] - t[0]) * n / (n - 1)
+    motion = exciting_motion(
+        made.base, limits, period=duration, n_harmonics=N_HARMONICS, n_instants=N_INSTANTS, n_starts=N_STARTS,
+        max_iterations=MOST, seed=seed,
+    )  # fmt: skip
+    moved = form.samples(*motion.at(np.arange(n) * duration / n))
+    rows = made.base.rows(form_rows(form, moved, made.base.source)).reshape(n, -1, len(made.values))
+    A = (rows / made.sigma[:, None]).reshape(-1, len(made.values))
+    size = np.linalg.norm(A, axis=0)
+    s, Vt = la.svd(A / size, full_matrices=False)[1:]
+    deviations = np.linalg.norm(Vt.T / s, axis=1) / size
+    condition = float(s[0] / s[-1])
+    return NextMotion(motion, deviations, condition) if condition < made.condition else None

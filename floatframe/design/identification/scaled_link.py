@@ -1,0 +1,83 @@
+"""A flexible link with other mass, stiffness and damping than its finite element model says: what is identified of it.
+
+With the density times mu and the moduli times kappa, shapes are the same; with M-orthonormal modes q goes over to
+sqrt(mu) q, so that
+
+    m, S, R -> mu (.),   C1, P -> sqrt(mu) (.),   Psi -> Psi / sqrt(mu),   omega² -> kappa/mu omega²,
+
+and geometric stiffness by interface forces is divided by mu, that by accelerations stays. All but the frequencies and
+stresses is the change of the unit of mass by 1/mu, which the modal file knows of every entry. Uniform factors are what
+is wrong of a model at first order: density and modulus of a material, the thickness of a tube; a body whose shapes are
+wrong is updated by its finite elements.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from cms.body.modal_file.file import convert_units
+from cms.body.reduced_body import ReducedBody
+from floatframe.errors import ModelError
+from floatframe.model.bodies.flexible_body import FlexibleBody
+
+__all__ = ["scaled_link"]
+
+
+def scaled_link(
+    body: FlexibleBody, *, mass: float = 1.0, stiffness: float = 1.0, damping: Sequence[float] | None = None
+) -> FlexibleBody:
+    """Return a flexible body whose mass and stiffness are those of its model times factors.
+
+    Parameters
+    ----------
+    body
+        As its model says. Load cases stay; recovery tables are left out.
+    mass, stiffness
+        Factors of density and moduli, above 0.
+    damping
+        Ratio of each mode in the frame of the reduced body, the last one for all further modes; None: the ratios stay.
+
+    Raises
+    ------
+    ModelError
+        If a factor is not above 0, or a ratio below 0.
+    """
+    for name, value in (("mass", mass), ("stiffness", stiffness)):
+        if not 0 < value < np.inf:
+            raise ModelError(f"scaled_link of {body.name!r}: {name}: expected a factor above 0, got {value:.6g}")
+    scaled = scaled_body(body.reduced, float(mass), float(stiffness))
+    if damping is not None:
+        given = np.asarray(damping, dtype=float)
+        if given.ndim != 1 or not len(given) or not (given >= 0).all():
+            raise ModelError(
+                f"scaled_link of {body.name!r}: damping: expected ratios of 0 or more, one for each mode, got {damping}"
+            )
+        ratios = given[np.minimum(np.arange(scaled.n_q), len(given) - 1)]
+        omega = np.where(np.diag(scaled.M) > 0, np.sqrt(np.maximum(np.diag(scaled.K), 0.0)), 0.0)
+        scaled = replace(scaled, D=np.diag(2 * ratios * omega))
+    return replace(body, reduced=scaled)
+
+
+def scaled_body(reduced: ReducedBody, mass: float, stiffness: float) -> ReducedBody:
+    """Return a reduced body with density and moduli times factors."""
+    lighter = replace(reduced.units, name="scaled", mass=reduced.units.mass / mass)
+    made = replace(convert_units(replace(reduced, recovery={}), lighter), units=reduced.units)
+    ratio = stiffness / mass  # numbers in the lighter unit are those of moduli times `mass`
+    loads = tuple(
+        replace(case, h=case.h / mass, force=case.force / mass, torque=case.torque / mass) for case in made.load_cases
+    )
+    columns, root = made.columns, np.sqrt(ratio)
+    return replace(
+        made,
+        columns=None if columns is None else replace(columns, A=columns.A * root, F=columns.F * root),
+        K=made.K * ratio,
+        D=made.D * root,
+        free_frequencies=made.free_frequencies * root,
+        stress=None if made.stress is None else made.stress * ratio,
+        point_stress=None
+        if made.point_stress is None
+        else replace(made.point_stress, modes=made.point_stress.modes * ratio),
+        load_cases=loads,
+        provenance=dict(reduced.provenance) | {"scaled": f"mass {mass:.9g}, stiffness {stiffness:.9g}"},
+    )

@@ -1,0 +1,162 @@
+"""Motions of a tree of rigid bodies at many instants, as arrays: what linear forms are made of.
+
+For sample s, body i and column k of the joints (docs/relative.md §2): pose, angular velocity and accelerations of the
+body, direction of the column, and the place of the marker that it moves. The velocity that a unit rate of column k
+gives to the point P of a body that hangs at its joint is ±(t_k + a_k × (P - p_k)), its angular velocity ±a_k.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.words import quoted
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.initial_conditions.newton_equations import set_iterate
+from floatframe.engine.kernels.model import Model
+from floatframe.engine.kernels.work import new_work
+from floatframe.engine.tree.kernels.entry import motion_of_joints, mover
+from floatframe.engine.tree.kernels.tree import JointWork, Tree, new_joint_work
+from floatframe.engine.tree.topology import SystemTree, tree_of
+from floatframe.errors import ModelError
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.system import System
+
+__all__ = [
+    "TreeSamples", "as_placed", "distances", "gravity_of", "joints_as_placed", "motion_of_tree", "rigid_bodies",
+    "rigid_tree", "tree_samples",
+]  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class TreeSamples:
+    """n instants of a motion of n_b bodies by n_c columns of joints; ground axes but where said."""
+
+    x: Array  #: coordinates, (n, n_c) [m or rad]
+    rate: Array  #: (n, n_c)
+    acceleration: Array  #: (n, n_c)
+    r: Array  #: origins of the bodies, (n, n_b, 3) [m]
+    R: Array  #: their axes, (n, n_b, 3, 3)
+    omega: Array  #: angular velocity, axes of the body, (n, n_b, 3) [rad/s]
+    a: Array  #: acceleration of the origin less gravity, axes of the body, (n, n_b, 3) [m/s²]
+    alpha: Array  #: angular acceleration, axes of the body, (n, n_b, 3) [rad/s²]
+    t: Array  #: velocity of the moved marker by unit rate, (n, n_c, 3)
+    turn: Array  #: angular velocity by unit rate, (n, n_c, 3)
+    point: Array  #: marker that the column moves, (n, n_c, 3) [m]
+    #: rates of all coordinates by those of the independent ones, (n, n_c, n_i); None: all are independent
+    gamma: Array | None = None
+
+    @property
+    def n_independent(self) -> int:
+        """Number of coordinates that move independently, whose torques are measured."""
+        return int(self.x.shape[1] if self.gamma is None else self.gamma.shape[2])
+
+
+def rigid_bodies(system: System, where: str) -> None:
+    """Raise `ModelError` if a body is flexible."""
+    flexible = [body.name for body in system.bodies if isinstance(body, FlexibleBody)]
+    if flexible:
+        raise ModelError(
+            f"{where}: expected rigid bodies, got the flexible {', '.join(quoted(name) for name in flexible)}; "
+            "inertial parameters are those of rigid bodies: replace it by a RigidBody, or fit what sensors see "
+            "(fit_outputs)"
+        )
+
+
+def rigid_tree(system: System, where: str) -> SystemTree:
+    """Return the tree of a system of rigid bodies without loops; `ModelError` if it is not one."""
+    rigid_bodies(system, where)
+    tree = tree_of(system)
+    loops = [*tree.cut, *tree.constrained, *(coupler.name for coupler in system.couplers)]
+    if loops:
+        raise ModelError(
+            f"{where}: expected a tree, but {', '.join(quoted(name) for name in loops)} "
+            f"{'is a constraint' if len(loops) == 1 else 'are constraints'} beside its joints (a loop, a joint without "
+            "coordinates of its own, or friction by normal force); loops of joints: linear_form(independent=...); "
+            "for others leave it out, or identify the open tree"
+        )
+    return tree
+
+
+def gravity_of(system: System) -> Array:
+    """Return the acceleration of gravity, ground axes, (3,) [m/s²]."""
+    return np.array(compiled_system(system).model.gravity)
+
+
+def tree_samples(system: System, x: Array, rate: Array, acceleration: Array) -> TreeSamples:
+    """Return the motion of a rigid tree at given coordinates.
+
+    Parameters
+    ----------
+    x, rate, acceleration
+        Of each coordinate of `tree_of(system).columns` at each instant, (n, n_c). As in results, angles are zero as
+        the system is placed, distances where the points of the markers coincide. The rotation of a spherical joint or
+        a free body is the rotation vector from where it is placed, its rates are angular velocities about the axes of
+        the moved marker.
+    """
+    tree = rigid_tree(system, f"system {system.name!r}: samples").tree
+    n, n_c = len(x), len(tree.side)
+    if not x.shape == rate.shape == acceleration.shape == (n, n_c):
+        raise ModelError(
+            f"system {system.name!r}: samples: expected three arrays (n, {n_c}), one column for each of "
+            f"{', '.join(each.name for each in tree_of(system).columns)}; got {x.shape}, {rate.shape}, "
+            f"{acceleration.shape}"
+        )
+    return motion_of_tree(system, tree, x, rate, acceleration)
+
+
+def motion_of_tree(
+    system: System, tree: Tree, x: Array, rate: Array, acceleration: Array, gamma: Array | None = None
+) -> TreeSamples:
+    """Return the motion of a tree, or of what cut loops leave, by all its coordinates."""
+    compiled = compiled_system(system)
+    model, work, joints = compiled.model, new_work(compiled.model), joints_as_placed(system)
+    move, start = mover(model, work, tree, joints), distances(tree, joints)
+    n, n_c, n_b = len(x), len(tree.side), len(tree.parent)
+    r, R = np.empty((n, n_b, 3)), np.empty((n, n_b, 3, 3))
+    u, u_dot = np.empty((n, n_b, 6)), np.empty((n, n_b, 6))
+    t, turn, point = np.empty((n, n_c, 3)), np.empty((n, n_c, 3)), np.empty((n, n_c, 3))
+    markers = [int(tree.near[i] if tree.is_reversed[i] else tree.far[i]) for i in range(n_b)]
+    for s in range(n):
+        joints.rate[:], joints.acceleration[:] = rate[s], acceleration[s]
+        joints.x[:] = x[s] - start
+        move()
+        r[s], R[s], t[s], turn[s] = work.state.r, work.state.R, joints.t, joints.a
+        u[s], u_dot[s] = work.state.u.reshape(n_b, 6), work.state.u_dot.reshape(n_b, 6)
+    for k, i in enumerate(owners(tree)):
+        m = markers[i]
+        point[:, k] = r[:, i] if m < 0 else marker_places(model, m, r, R)
+    a = np.einsum("sbij,sbi->sbj", R, u_dot[:, :, :3] - gravity_of(system))
+    return TreeSamples(x, rate, acceleration, r, R, u[:, :, 3:], a, u_dot[:, :, 3:], t, turn, point, gamma)
+
+
+def marker_places(model: Model, m: int, r: Array, R: Array) -> Array:
+    """Return the places of a marker of a rigid body or the ground, (n, 3)."""
+    i, position = int(model.markers.body[m]), model.markers.position[m]
+    return np.broadcast_to(position, r[:, 0].shape) if i < 0 else r[:, i] + R[:, i] @ position
+
+
+def joints_as_placed(system: System) -> JointWork:
+    """Return the working arrays of the joints of a tree that begin as the system is placed."""
+    tree, compiled = tree_of(system).tree, compiled_system(system)
+    model, work, joints = compiled.model, new_work(compiled.model), new_joint_work(compiled.model, tree)
+    set_iterate(work, compiled.placed, None, None)
+    motion_of_joints(model, work, tree, joints)
+    joints.d_start[:], joints.Q_start[:] = joints.d, joints.Q
+    return joints
+
+
+def as_placed(system: System) -> Array:
+    """Return the coordinates of a tree as its system is placed, (n_c,): distances of markers, angles zero."""
+    return distances(tree_of(system).tree, joints_as_placed(system))
+
+
+def distances(tree: Tree, joints: JointWork) -> Array:
+    """Return the distances of the markers of joints along their columns, zero for those that turn, (n_c,)."""
+    is_distance = ~tree.alpha.any(axis=1)
+    return np.einsum("ka,ka->k", tree.tau, joints.d[owners(tree)]) * is_distance
+
+
+def owners(tree: Tree) -> IntArray:
+    """Return the body that each column moves, (n_c,)."""
+    return np.repeat(np.arange(len(tree.parent)), np.diff(tree.column0))

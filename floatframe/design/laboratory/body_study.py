@@ -1,0 +1,206 @@
+"""Mode sets of one body against its full model, over the whole body: error over the number of modes and over time.
+
+(1) the full model moves in the system (`suspended_motion`), once for each system
+(2) each set with each number of modes is reduced in mean axes, put into the systems and run with the same steps
+(3) errors of deformation (`BodyReference`), of stress at named places and of the forces of the bushings on the body
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from cms.errors import CmsError
+from cms.modes.families.families import Families
+from cms.modes.mode_set import ModeSet
+from cms.reduction.basis.damping import RayleighDamping
+from cms.reduction.basis.finishing import finish
+from cms.reduction.basis.frames import TisserandFrame, frame_condition
+from cms.reduction.reduction import reduce
+from fe_models.body.fe_body import FEBody
+from fe_models.elements.shells.shell_points import ShellPoints
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.errors import ReportedError
+from fe_models.meshes.numbering import Numbering
+from floatframe.design.laboratory.body_errors import BodyErrors, BodyReference, largest_difference
+from floatframe.design.laboratory.substitution import with_body
+from floatframe.design.laboratory.suspended_body import SuspendedMotion, suspended_motion
+from floatframe.errors import ModelError
+from floatframe.integrators.generalized_alpha import GeneralizedAlpha
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.bodies.markers import Marker, body_name
+from floatframe.model.forces import Bushing
+from floatframe.model.rotations import rotation_matrix
+from floatframe.model.system import System
+from floatframe.results.trajectory import Trajectory
+from floatframe.simulation.integration import integrate
+
+__all__ = ["Loading", "SetError", "body_study", "full_motions", "lean_body", "stress_rows"]
+
+MakeModes = Callable[[Families, int], ModeSet]
+
+
+@dataclass(frozen=True)
+class Loading:
+    """A system and how it is run."""
+
+    system: System
+    integrator: GeneralizedAlpha
+    t_end: float  #: [s]
+    h: float  #: [s]
+    every: int = 1  #: errors are looked at every so many steps
+
+
+@dataclass(frozen=True, eq=False)
+class SetError:
+    """What one set with one number of modes makes of one loading."""
+
+    loading: str
+    mode_set: str
+    n_modes: int
+    n_q: int = 0  #: modal coordinates
+    errors: BodyErrors | None = None  #: over time; None where it failed
+    stress: Mapping[str, float] = field(default_factory=dict)  #: place -> greatest error over the greatest stress there
+    force: float = float("nan")  #: of the bushings on the body, over their greatest
+    failure: str = ""  #: why there is none
+
+    @property
+    def largest(self) -> tuple[float, float]:
+        """The greatest epsilon_M and epsilon_K; NaN where it failed."""
+        return (float("nan"), float("nan")) if self.errors is None else self.errors.largest
+
+
+def full_motions(
+    loadings: Mapping[str, Loading],
+    name: str,
+    body: FEBody,
+    *,
+    free: Sequence[str],
+    damping: RayleighDamping | None = None,
+) -> dict[str, SuspendedMotion]:
+    """Return the motion of the full model under each loading; parameters and errors as `suspended_motion`."""
+    return {
+        key: suspended_motion(
+            each.system, name, body, free=free, integrator=each.integrator, t_end=each.t_end, h=each.h,
+            every=each.every, damping=damping,
+        )
+        for key, each in loadings.items()
+    }  # fmt: skip
+
+
+def body_study(
+    loadings: Mapping[str, Loading],
+    name: str,
+    body: FEBody,
+    full: Mapping[str, SuspendedMotion],
+    cases: Sequence[tuple[str, MakeModes, int]],
+    *,
+    damping: RayleighDamping | None = None,
+    stress: Mapping[str, sp.sparray] | None = None,
+    on_case: Callable[[SetError], None] | None = None,
+) -> tuple[SetError, ...]:
+    """Run every set under every loading beside the full model: steps (2) and (3).
+
+    Parameters
+    ----------
+    loadings
+        By name; their flexible body is a place holder.
+    name
+        Of the flexible body.
+    body
+        Its coupled finite element model (`lean_body` saves time).
+    full
+        Of `full_motions`.
+    cases
+        Name of a set, what makes it, number of modes.
+    stress
+        Place -> rows over the dofs of the body (`stress_rows`).
+    on_case
+        Called with each result, for progress.
+
+    Raises
+    ------
+    ModelError
+        If a loading has no motion of the full model. Sets that fail become results that say why.
+    """
+    missing = [key for key in loadings if key not in full]
+    if missing:
+        raise ModelError(f"body study: no motion of the full model for {', '.join(missing)}")
+    references = {key: BodyReference(body, full[key].t, full[key].u) for key in loadings}
+    condition = frame_condition(body, TisserandFrame())
+    results = []
+
+    def told(result: SetError) -> None:
+        results.append(result)
+        if on_case is not None:
+            on_case(result)
+
+    with Families(body) as families:
+        for set_name, make, n_modes in cases:
+            try:
+                modes = make(families, n_modes)
+                Phi = finish(body, modes, condition).Phi
+                reduced = reduce(
+                    families, modes, frame=TisserandFrame(), damping=damping, stress=False, geometric=False
+                )
+            except (CmsError, ReportedError) as error:
+                for key in loadings:
+                    told(SetError(key, set_name, n_modes, failure=str(error)))
+                continue
+            for key, each in loadings.items():
+                system = replace(with_body(each.system, name, [reduced], stiffening=False), sensors=())
+                try:
+                    motion = integrate(system, each.integrator, each.t_end, each.h)
+                except ReportedError as error:
+                    told(SetError(key, set_name, n_modes, reduced.n_q, failure=str(error)))
+                    continue
+                q = motion.body(name).q[:: each.every].T
+                forces = {b: bushing_force(system, name, motion, b)[:: each.every] for b in full[key].forces}
+                told(
+                    SetError(
+                        key, set_name, n_modes, reduced.n_q, references[key].errors(Phi, q),
+                        {place: references[key].history_error(rows, Phi, q) for place, rows in (stress or {}).items()},
+                        largest_difference(forces, {b: f[:, :3] for b, f in full[key].forces.items()}),
+                    )
+                )  # fmt: skip
+    return tuple(results)
+
+
+def lean_body(body: FEBody) -> FEBody:
+    """Return the body without surface and numbering, which no motion needs: reductions are quicker."""
+    return replace(body, surface=np.zeros((0, 3), np.int64), kept=np.zeros(0, np.int64), numbering=Numbering())
+
+
+def stress_rows(body: FEBody) -> sp.csr_array:
+    """Return the stress at the stress points of a shell as rows over the dofs, (6 n_points, n_dof) [Pa/m].
+
+    Parameters
+    ----------
+    body
+        Coupled, with points of `fe_models.shell_points`: few, for their cells are asked dof by dof.
+
+    Raises
+    ------
+    ModelError
+        If it has none.
+    """
+    points = body.stress_points
+    if not isinstance(points, ShellPoints) or body.recovery is None:
+        raise ModelError(f"stress rows: body {body.name!r}: expected stress points of fe_models.shell_points")
+    on_mesh = np.unique(np.concatenate([group.dofs[rows].ravel() for group, rows in points.parts]))
+    dofs = np.unique(sp.csr_array(body.recovery.matrix)[on_mesh].indices)
+    pick = sp.csr_array((np.ones(len(dofs)), (np.arange(len(dofs)), dofs)), shape=(len(dofs), body.n_dof))
+    values = points.stress(body.mesh_displacement(pick.T.toarray()))
+    return sp.csr_array(sp.csr_array(values.reshape(-1, len(dofs))) @ pick)
+
+
+def bushing_force(system: System, name: str, motion: Trajectory, bushing: str) -> Array:
+    """Return the force of a bushing on the body, mesh axes, (n_t, 3) [N]."""
+    force = next(each for each in system.forces if isinstance(each, Bushing) and each.name == bushing)
+    end = force.marker_b
+    sign = -1.0 if body_name(end.body if isinstance(end, Marker) else end) == name else 1.0
+    body = system.body(name)
+    assert isinstance(body, FlexibleBody)
+    R = rotation_matrix(motion.body(name).p) @ body.reduced.frame.axes.T
+    return sign * np.einsum("tab,ta->tb", R, motion.reaction(bushing).force)

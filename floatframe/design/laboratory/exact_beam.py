@@ -1,0 +1,59 @@
+"""Geometrically exact beams as a reference: no linear frame, no modes; two divisions tell how far it is settled."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.body.fe_body import FEBody
+from fe_models.elements.beams.model import BeamModel
+from floatframe.components.flexible_parts.exact_beams import exact_beams
+from floatframe.design.laboratory.substitution import with_part
+from floatframe.errors import ModelError
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.system import System
+
+__all__ = ["ExactBeam", "with_exact_beams"]
+
+
+@dataclass(frozen=True)
+class ExactBeam:
+    """Reference: the lines of the body as geometrically exact beams, of this many elements and of twice as many.
+
+    The finer motion is the reference; errors fall with the square of the element, so that a third of the difference of
+    both is its own error.
+    """
+
+    elements: int = 32  #: of all lines together, at least
+
+    def __post_init__(self) -> None:
+        if self.elements < 1:
+            raise ModelError(f"exact beam: elements: expected a whole number from 1, got {self.elements}")
+
+    @property
+    def words(self) -> str:
+        """The reference in words."""
+        return "geometrically exact beams"
+
+
+def with_exact_beams(system: System, name: str, model: FEBody, elements: int) -> System:
+    """Return the system with its flexible body as exact beams of so many elements, and the sensors that they know.
+
+    Raises
+    ------
+    ModelError
+        If the body is not of lines, or something of the system names what such beams have not.
+    """
+    body = system.body(name)
+    if not isinstance(body, FlexibleBody):
+        raise ModelError(f"system {system.name!r}: body {name!r}: expected a flexible body")
+    lines = len(model.element_model.dofs) if isinstance(model.element_model, BeamModel) else 1
+    part = exact_beams(
+        name,
+        model,
+        pieces=int(np.ceil(elements / max(lines, 1))),
+        position=body.position,
+        orientation=body.orientation,
+        velocity=body.velocity,
+        omega_B=body.omega_B,
+    )
+    return with_part(system, name, part)

@@ -1,0 +1,65 @@
+"""The finite element model itself as a reference: the body with all of its dofs, inside the multibody system.
+
+With every displacement of the mesh among its shapes the floating frame loses nothing: no mode is left out, static or
+vibrating, so that what differs from it is the truncation of a case. It stays a description of small deformation about
+a moving frame, with the geometric stiffness of the unit loads; where that ends, parts or an exact beam tell.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cms.modes.mode_set import ModeSet
+from fe_models.body.fe_body import MULTIPLIER, FEBody
+from fe_models.foundation.components import MOTION_COMPONENTS
+from floatframe.errors import ModelError
+
+__all__ = ["MOST_DOFS", "FullModel", "all_dofs"]
+
+MOST_DOFS = 1200  #: dense matrices of that size are factorised in every few steps, and each unit load has one
+
+
+@dataclass(frozen=True)
+class FullModel:
+    """Reference: the body of the job unreduced, all of its dofs run in the system by the integrator of the study."""
+
+    most_dofs: int = MOST_DOFS  #: more are refused: matrices are dense, a factorisation costs their third power
+
+    @property
+    def words(self) -> str:
+        """The reference in words."""
+        return "the full finite element model"
+
+
+def all_dofs(body: FEBody, most_dofs: int = MOST_DOFS) -> ModeSet:
+    """Return unit columns of every dof of a coupled body: the set that leaves nothing out.
+
+    The reference node of a distributing interface follows its members, C_r u_r + C_m u_m = 0 (its multiplier rows of
+    K), and has no column of its own; multipliers have none.
+
+    Raises
+    ------
+    ModelError
+        If these are more than may be.
+    """
+    is_multiplier = body.dofs[:, 1] == MULTIPLIER
+    followers = [i.dofs for i in body.interfaces if i.kind == "distributing" and i.dofs is not None]
+    is_free = ~is_multiplier
+    for dofs in followers:
+        is_free[dofs] = False
+    free = np.flatnonzero(is_free)
+    if len(free) > most_dofs:
+        raise ModelError(
+            f"study: reference: the full model of body {body.name!r} has {len(free)} dofs, more than {most_dofs}: its "
+            "matrices are dense in the system. Take a coarser mesh for the study, allow more (most_dofs), or a case "
+            "with many modes as reference"
+        )
+    V = np.zeros((body.n_dof, len(free)))
+    V[free, np.arange(len(free))] = 1.0
+    if followers:
+        C = body.K[np.flatnonzero(is_multiplier), :].toarray()
+        r = np.concatenate(followers)
+        V[r] = -np.linalg.solve(C[:, r], C[:, free])
+    labels = tuple(f"dof {body.numbering.called(n)} {MOTION_COMPONENTS[c]}" for n, c in body.dofs[free])
+    options = {"columns": "every dof of the body"}
+    return ModeSet("all dofs", V, labels, np.full(len(free), np.nan), options, ("dofs",) * len(free))

@@ -1,0 +1,299 @@
+"""One mechanism, many descriptions of its flexible body, each motion beside a reference: error, cost, what fails first.
+
+(1) every case is reduced, put into the system and run; the first run is made twice, so that compilation is no cost
+(2) error of each column of each sensor: root mean square of its distance from the reference, over the range of the
+    reference; the error of a case is its largest
+(3) what a case lacks: *truncation*, its distance from the case of the same family with the most modes; *description*,
+    the distance of that one from the reference (body frame, stiffening, number of parts, the basis itself). The greater
+    of both is what fails first; notes that the frame left its range say when
+"""
+
+import logging
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cms.assessment.quality.record import plain
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.errors import ReportedError
+from fe_models.foundation.stages import Stages
+from floatframe.design.laboratory.bodies import BodyShelf
+from floatframe.design.laboratory.cases import Case
+from floatframe.design.laboratory.exact_beam import ExactBeam, with_exact_beams
+from floatframe.design.laboratory.full_model import FullModel
+from floatframe.design.laboratory.substitution import with_body
+from floatframe.errors import ModelError
+from floatframe.integrators.carry import Integrator
+from floatframe.model.system import System
+from floatframe.results.sensors import measured
+from floatframe.simulation.integration import integrate
+
+__all__ = ["CaseResult", "LaboratoryResult", "Reference", "study"]
+
+LEAST_RANGE = 1e-6  #: of a column over the greatest of its sensor, below which it is no motion
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """Columns of a reference over time, from any source."""
+
+    words: str
+    t: Array  #: (n_t,)
+    columns: Mapping[str, Array]  #: "sensor column" -> (n_t,)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A motion of the mechanism with one description of the body."""
+
+    system: System
+    columns: Mapping[str, Array]  #: of the chosen sensors
+    t: Array  #: (n_t,)
+    seconds: float  #: processor time
+    notes: tuple[str, ...]  #: that the frame left its range
+
+    def reference(self, words: str) -> Reference:
+        """Return what was measured as a reference."""
+        return Reference(words, self.t, self.columns)
+
+
+@dataclass(frozen=True, eq=False)
+class CaseResult:
+    """What came out of a case."""
+
+    case: Case
+    n_q: int = 0  #: modal coordinates, of all parts
+    n_u: int = 0  #: velocities of the system, rigid motion included
+    errors: Mapping[str, float] = field(default_factory=dict)  #: of each column, share of the range of the reference
+    truncation: float = float("nan")  #: distance from the same description with the most modes
+    description: float = float("nan")  #: distance of that one from the reference
+    seconds: float = float("nan")  #: processor time of the run
+    notes: tuple[str, ...] = ()  #: that the frame left its range
+    failure: str = ""  #: why there is no motion
+
+    @property
+    def error(self) -> float:
+        """The largest error of all columns; NaN where the case failed."""
+        return max(self.errors.values(), default=float("nan"))
+
+    @property
+    def worst(self) -> str:
+        """The column with the largest error."""
+        return max(self.errors, key=lambda name: self.errors[name], default="")
+
+    @property
+    def fails_first(self) -> str:
+        """What makes most of the error: "truncation" or "description"; "" where nothing is known."""
+        if not np.isfinite(self.description):
+            return ""
+        return "truncation" if self.truncation > self.description else "description"
+
+
+@dataclass(frozen=True, eq=False)
+class LaboratoryResult:
+    """All cases beside the reference."""
+
+    name: str
+    reference: str  #: in words
+    columns: tuple[str, ...]  #: that were compared
+    cases: tuple[CaseResult, ...]
+    settled: float | None = None  #: how far the reference itself is from its limit, as an error; None: not known
+
+    def table(self) -> list[dict[str, Any]]:
+        """Return one row a case, tidy: ready for a data frame, CSV or JSON."""
+        return [
+            {
+                "mode_set": r.case.mode_set,
+                "frame": r.case.frame,
+                "stiffening": r.case.stiffening,
+                "parts": r.case.parts,
+                "n_modes": r.case.n_modes,
+                "n_q": r.n_q,
+                "n_u": r.n_u,
+                "error": plain(r.error),
+                "worst": r.worst,
+                **{f"error {name}": plain(r.errors.get(name, float("nan"))) for name in self.columns},
+                "truncation": plain(r.truncation),
+                "description": plain(r.description),
+                "fails_first": r.fails_first,
+                "seconds": plain(r.seconds),
+                "notes": "; ".join(r.notes),
+                "failure": r.failure,
+            }
+            for r in self.cases
+        ]
+
+
+def study(
+    system: System,
+    body: str,
+    job: str | Path,
+    cases: Sequence[Case],
+    *,
+    integrator: Integrator,
+    t_end: float,
+    h: float,
+    reference: Case | FullModel | ExactBeam | Reference,
+    sensors: Sequence[str] | None = None,
+    cut: str = "rigid",
+    stages: Stages | None = None,
+    on_case: Callable[[CaseResult], None] | None = None,
+) -> LaboratoryResult:
+    """Run a mechanism with every description of one flexible body, and compare with a reference.
+
+    Parameters
+    ----------
+    system
+        The mechanism, with sensors; its body is only a place holder.
+    body
+        Name of that flexible body.
+    job
+        Job file it is reduced by; mode set, number of modes and frame come from the cases.
+    reference
+        A case that is finer than the others, the whole finite element model, geometrically exact beams (a body of
+        lines), or columns from elsewhere.
+    sensors
+        Names of the sensors that are compared; None: all.
+    cut
+        Interfaces at the cuts of parts, "rigid" or "distributing"; rigid ones keep sections plane and undistorted, so
+        that parts of a solid are somewhat stiffer than the whole.
+    on_case
+        Called with each result, for progress.
+
+    Raises
+    ------
+    ModelError
+        If the system has no such body or sensor, or the reference has no column that is compared.
+    CmsError
+        If the reference case cannot be reduced or run; other cases that fail become rows that say why.
+    """
+    stages = stages or Stages()
+    names = [sensor.name for sensor in system.sensors]
+    wanted = list(names if sensors is None else sensors)
+    unknown = [name for name in wanted if name not in names]
+    if not wanted or unknown:
+        choices, got = ", ".join(names) or "none", ", ".join(unknown) or "none"
+        raise ModelError(f"study: sensors: expected some of {choices}; got {got}")
+    if not cases:
+        raise ModelError("study: expected at least one case")
+    found: dict[Case, Run] = {}
+    settled: dict[str, float] = {}
+    every = [*cases, reference] if isinstance(reference, Case) else cases
+
+    with BodyShelf(job, cut, cases=every) as shelf, quiet():
+
+        def moved(changed: System) -> Run:
+            if not found:
+                integrate(changed, integrator, h, h)  # compiles
+            begun = time.process_time()
+            motion = integrate(changed, integrator, t_end, h)
+            seconds = time.process_time() - begun
+            chosen = [sensor for sensor in changed.sensors if sensor.name in wanted]
+            columns = {f"{name} {key}": values for name, each in measured(changed, motion, chosen).items()  # type: ignore[arg-type]
+                       for key, values in each.columns.items()}  # fmt: skip
+            notes = tuple(note.words for note in motion.validity)
+            return Run(changed, columns, np.asarray(motion.t), seconds, notes)
+
+        def run(case: Case) -> None:
+            with stages(f"reduce {case.words}, {case.n_modes} modes"):
+                changed = with_body(system, body, shelf.reduced(case), stiffening=case.stiffening)
+            with stages(f"run {case.words}, {case.n_modes} modes"):
+                found[case] = moved(changed)
+
+        if isinstance(reference, Case):
+            run(reference)
+            told = found[reference].reference(f"{reference.words}, {reference.n_modes} modes")
+        elif isinstance(reference, FullModel):
+            with stages("full model"):
+                whole = shelf.unreduced(reference)
+                told = moved(with_body(system, body, [whole], stiffening=whole.geometric is not None)).reference(
+                    f"{reference.words}, {whole.n_q} shapes"
+                )
+        elif isinstance(reference, ExactBeam):
+            coarse, fine = (with_exact_beams(system, body, shelf.model(), k * reference.elements) for k in (1, 2))
+            with stages("exact beams"):
+                before, after = moved(coarse), moved(fine)
+            told = after.reference(f"{reference.words}, twice {reference.elements} elements")
+            settled = {name: distance(before.columns[name], values, float(np.ptp(values)) or 1.0) / 3
+                       for name, values in told.columns.items()}  # fmt: skip
+            lost = [name for name in wanted if name not in {sensor.name for sensor in fine.sensors}]
+            if lost:
+                told = replace(told, words=f"{told.words} (without {', '.join(lost)}, which they do not know)")
+        else:
+            told = reference
+        failures: dict[Case, str] = {}
+        results: list[CaseResult] = []
+        for case in cases:
+            if case not in found:
+                try:
+                    run(case)
+                except ReportedError as error:
+                    failures[case] = str(error)
+            if on_case is not None:
+                on_case(CaseResult(case, failure=failures.get(case, "")))
+    compared = compared_columns(told, [each.columns for each in found.values()])
+    for case in cases:
+        if case in failures:
+            results.append(CaseResult(case, failure=failures[case]))
+            continue
+        changed, columns, t = (here := found[case]).system, here.columns, here.t
+        at = {name: np.interp(t, told.t, told.columns[name]) for name in compared}
+        scale = {name: float(np.ptp(told.columns[name])) for name in compared}
+        richest = max((each for each in found if each.family == case.family), key=lambda each: each.n_modes)
+        rich = found[richest].columns
+        results.append(
+            CaseResult(
+                case,
+                sum(flexible.reduced.n_q for flexible in changed.bodies if hasattr(flexible, "reduced")),
+                sum(6 + (flexible.reduced.n_q if hasattr(flexible, "reduced") else 0) for flexible in changed.bodies),
+                {name: distance(columns[name], at[name], scale[name]) for name in compared},
+                max(distance(columns[name], rich[name], scale[name]) for name in compared),
+                max(distance(rich[name], at[name], scale[name]) for name in compared),
+                here.seconds,
+                here.notes,
+            )
+        )
+    limit = max((settled[name] for name in compared), default=0.0) if settled else None
+    return LaboratoryResult(system.name, told.words, tuple(compared), tuple(results), limit)
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Keep notes on the range of frames and on steps to the table."""
+    log = logging.getLogger("floatframe")
+    level = log.level
+    log.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        log.setLevel(level)
+
+
+def compared_columns(reference: Reference, found: Sequence[Mapping[str, Array]]) -> list[str]:
+    """Return the columns that the reference and every case have, and that move in the reference."""
+    everywhere = [name for name in reference.columns if all(name in columns for columns in found)]
+    largest: dict[str, float] = {}
+    for name in everywhere:
+        sensor = name.rpartition(" ")[0]
+        largest[sensor] = max(largest.get(sensor, 0.0), float(np.ptp(reference.columns[name])))
+    moving = [name for name in everywhere
+              if np.ptp(reference.columns[name]) > LEAST_RANGE * largest[name.rpartition(" ")[0]]]  # fmt: skip
+    if not moving:
+        known = ", ".join(found[0]) if found else "none"
+        raise ModelError(
+            f"study: the reference has no moving column that the sensors have; it has {', '.join(reference.columns)}, "
+            f"they have {known}"
+        )
+    return moving
+
+
+def distance(a: Array, b: Array, scale: float) -> float:
+    """Return the root mean square of the difference over a scale; infinite where a motion is no number."""
+    if not (np.isfinite(a).all() and np.isfinite(b).all()):
+        return float("inf")
+    return float(np.sqrt(np.mean((a - b) ** 2)) / scale)

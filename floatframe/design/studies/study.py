@@ -1,0 +1,279 @@
+"""Parameter studies from a file: every point is a separate task, and a failed point is a row of the table.
+
+study = read_study("crank_study.toml")
+table = run_study(study)                     # rows: parameter values, and outputs or an error
+"""
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.errors import ReportedError
+from fe_models.foundation.tasks.task_map import ProcessError
+from fe_models.foundation.tasks.workers import Workers, tasks_of
+from fe_models.foundation.words import nearest, quoted
+from floatframe.analyses.driven.inverse_dynamics import inverse_dynamics
+from floatframe.analyses.driven.kinematics import kinematics
+from floatframe.analyses.equilibrium import static_equilibrium
+from floatframe.analyses.linear.linearization import linearize
+from floatframe.analyses.linear.system_modes import SystemModes, system_modes
+from floatframe.analyses.snapshot import snapshot
+from floatframe.design.studies.study_file import TAKES, Output, Study
+from floatframe.design.studies.study_journal import open_study_journal
+from floatframe.design.studies.study_row import StudyRow
+from floatframe.engine.compiling.file_frames import state_of_file
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.errors import ModelError
+from floatframe.files.system_file.run_section import RunOptions, formulation_of, required_run
+from floatframe.model.system import System
+from floatframe.results.sensors import measured, sensor_of
+from floatframe.results.trajectory import Trajectory
+from floatframe.simulation.integration import integrate
+
+__all__ = ["StudyTable", "run_study", "sendable_study"]
+
+OF_MODES = {"frequency": "Hz", "damping": "-", "real": "1/s", "imaginary": "rad/s"}
+EXTREMES: dict[str, Callable[[Array], float]] = {"least": np.nanmin, "greatest": np.nanmax}  #: over all modes
+
+
+@dataclass(frozen=True)
+class StudyTable:
+    """All points of a study, in order."""
+
+    study: Study
+    rows: tuple[StudyRow, ...]
+    n_known: int = 0  #: number of rows taken from the journal
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Units of the outputs, from the first point that has them."""
+        return next((row.units for row in self.rows if not row.error), ("",) * len(self.study.outputs))
+
+    @property
+    def n_failed(self) -> int:
+        """Number of failed points."""
+        return sum(bool(row.error) for row in self.rows)
+
+    def column(self, name: str) -> Array:
+        """Return the values of an output at all points, (n_points,); NaN if a point failed."""
+        names = [output.name for output in self.study.outputs]
+        if name not in names:
+            raise ModelError(f"study: no output {quoted(name)}{nearest(name, names)}")
+        return np.array([row.outputs[names.index(name)] for row in self.rows])
+
+
+def run_study(
+    study: Study,
+    *,
+    workers: Workers = None,
+    journal: str | os.PathLike[str] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> StudyTable:
+    """Compute all points of a study; the results do not depend on the workers.
+
+    Parameters
+    ----------
+    study
+        The study, from `read_study`.
+    workers
+        Workers that compute points (docs/cluster.md); default: those in the study, or one process per processor.
+    journal
+        A file to which every point is appended; points in it are not computed again. None: nothing is written.
+    progress
+        Called with the number of completed points and the total number.
+
+    Raises
+    ------
+    ModelError, SystemFileError
+        Before any work, if the system in its file is not valid, a parameter does not name a key of it, or an output
+        does not exist.
+    ResultsError
+        If the journal belongs to another system, other outputs or another version of the program.
+    WorkerError
+        If no workers are available.
+    """
+    from floatframe.files.system_file.read_system import read_system
+
+    points = list(study.points())
+    check(study, points[0])
+    files = read_system(study.system)[0].files
+    kept = None if journal is None else open_study_journal(Path(journal), study, files)
+    rows = {} if kept is None else {k: row for k, point in enumerate(points) if (row := kept.row(point)) is not None}
+    n_known = len(rows)
+    missing = [k for k in range(len(points)) if k not in rows]
+
+    def keep(i: int, row: StudyRow) -> None:
+        rows[missing[i]] = row
+        if kept is not None:
+            kept.append(row)
+        if progress is not None:
+            progress(len(rows), len(points))
+
+    if missing:
+        compute = StudyPoint(sendable_study(study))
+        with tasks_of(study.workers if workers is None else workers, len(missing)) as tasks:
+            tasks.map(
+                compute, [points[k] for k in missing], failed=compute.failed, done=keep,
+                files=[os.path.abspath(name) for name in files],
+            )  # fmt: skip
+    return StudyTable(study, tuple(rows[k] for k in range(len(points))), n_known)
+
+
+def sendable_study(study: Study) -> Study:
+    """Return the study as sent to workers: the system with its full path, without values, which may be many."""
+    parameters = tuple(replace(parameter, values=()) for parameter in study.parameters)
+    return replace(study, system=os.path.abspath(study.system), parameters=parameters)
+
+
+def check(study: Study, point: tuple[Any, ...]) -> None:
+    """Raise if the system, a key path or an output does not exist; run in this process before the long work."""
+    from floatframe.files.system_file.read_system import read_system
+
+    plain, run = read_system(study.system)
+    if study.analysis in MOTIONS:
+        required_run(run, study.system)
+    try:
+        system, _ = read_system(study.system, study.changes(point))
+    except ReportedError as error:
+        read_system_keys(study)
+        if "unknown key" in str(error):
+            raise
+        system = plain  # the values of this point are impossible, which gives a failed row
+    if study.analysis == "eig":
+        for output in study.outputs:
+            mode_and_part(output)
+        return
+    try:
+        placed = as_placed(system)
+    except Exception:  # a failure caused by this point is a row, if the unchanged file does not fail
+        system, placed = plain, as_placed(plain)
+    for output in study.outputs:
+        taken(output, system, placed)
+
+
+def as_placed(system: System) -> Trajectory:
+    """Return the assembled bodies as a motion with one time."""
+    compiled = compiled_system(system)
+    return snapshot(system, state_of_file(compiled, compiled.placed))
+
+
+def read_system_keys(study: Study) -> None:
+    """Raise `SystemFileError` if a key path does not exist."""
+    from fe_models.foundation.toml_file import changed, read_toml
+    from floatframe.errors import SystemFileError
+
+    content = read_toml(Path(study.system), SystemFileError)
+    for parameter in study.parameters:
+        changed(content, {parameter.path: parameter.values[0]}, study.system, SystemFileError)
+
+
+@dataclass(frozen=True)
+class StudyPoint:
+    """The function that computes a point, which can be sent to another process."""
+
+    study: Study
+
+    def __call__(self, point: tuple[Any, ...]) -> StudyRow:
+        """Return the row of a point."""
+        from floatframe.files.system_file.read_system import read_system
+
+        system, given = read_system(self.study.system, self.study.changes(point))
+        if self.study.analysis == "eig":
+            modes = system_modes(linearize(system, formulation=formulation_of(given)))
+            found = [taken_of_modes(output, modes, 1 / system.units.time) for output in self.study.outputs]
+        else:
+            motion = self.motion(system, given)
+            found = [taken(output, system, motion) for output in self.study.outputs]
+        return StudyRow(point, tuple(value for value, _ in found), tuple(unit for _, unit in found))
+
+    def failed(self, point: tuple[Any, ...], error: Exception) -> StudyRow:
+        """Return the row of a failed point, with its error as text."""
+        words = str(error) if isinstance(error, ReportedError) else f"{type(error).__name__}: {error}"
+        n = len(self.study.outputs)
+        told = " ".join(words.split()) or type(error).__name__
+        is_lasting = isinstance(error, ReportedError) and not isinstance(error, ProcessError)
+        return StudyRow(point, (float("nan"),) * n, ("",) * n, told, is_lasting)
+
+    def motion(self, system: System, given: RunOptions | None) -> Trajectory:
+        """Return the motion of the analysis; an equilibrium is a motion with one time."""
+        if self.study.analysis == "static":
+            return equilibrium_of(system, formulation_of(given))
+        return MOTIONS[self.study.analysis](system, required_run(given, self.study.system))
+
+
+def motion_of_run(system: System, run: RunOptions) -> Trajectory:
+    """Return the integrated motion."""
+    return integrate(system, run.integrator, run.t_end, run.h, output_every=run.output_every)
+
+
+def equilibrium_of(system: System, formulation: str) -> Trajectory:
+    """Return the equilibrium at rest as a motion with one time."""
+    rest = static_equilibrium(system, formulation=formulation)
+    return snapshot(system, rest.state, rest.u_dot, rest.w)
+
+
+MOTIONS: dict[str, Callable[[System, RunOptions], Trajectory]] = {
+    "run": motion_of_run,
+    "kinematics": lambda system, run: kinematics(system, run.output_times()),
+    "inverse": lambda system, run: inverse_dynamics(system, run.output_times()).motion,
+}
+
+
+def taken(output: Output, system: System, motion: Trajectory) -> tuple[float, str]:
+    """Return the value of an output and its unit; `ModelError` with the choices if there is no such column."""
+    values, unit = column_of(output, system, motion)
+    return float(TAKES[output.take](values)), unit
+
+
+def column_of(output: Output, system: System, motion: Trajectory) -> tuple[Array, str]:
+    """Return the values over time from which an output is computed, (n_t,), and their unit."""
+    coordinates = [f"{joint.name}.{name}" for joint in system.joints for name in joint.coordinates]
+    sensors = [*(sensor.name for sensor in system.sensors), *coordinates]
+    fitting = [name for name in sensors if output.of == name or output.of.startswith(name + " ")]
+    if not fitting:
+        raise ModelError(
+            f"output {output.name!r}: of = {quoted(output.of)}: no such sensor{nearest(output.of, sensors)}"
+        )
+    name = max(fitting, key=len)
+    measurement = measured(system, motion, [sensor_of(system, name)])[name]
+    column = output.of[len(name) + 1 :]
+    columns = list(measurement.columns)
+    if not column and len(columns) == 1:
+        column = columns[0]
+    if column not in columns:
+        hint = nearest(column, columns) if column else f"; expected one of its columns: {', '.join(columns)}"
+        raise ModelError(f"output {output.name!r}: of = {output.of!r}: sensor {name!r} has no column {column!r}{hint}")
+    return measurement.columns[column], measurement.units[column]
+
+
+def taken_of_modes(output: Output, modes: SystemModes, per_second: float) -> tuple[float, str]:
+    """Return the value of an output of the modes about the equilibrium, and its unit."""
+    part, which = mode_and_part(output)
+    k = which if isinstance(which, int) else 1
+    if k > len(modes.eigenvalues):
+        raise ModelError(f"output {output.name!r}: of = {output.of!r}: the system has {len(modes.eigenvalues)} modes")
+    values = {
+        "frequency": modes.frequencies * per_second,
+        "damping": modes.damping_ratios,
+        "real": modes.eigenvalues.real * per_second,
+        "imaginary": modes.eigenvalues.imag * per_second,
+    }
+    return float(EXTREMES[which](values[part]) if isinstance(which, str) else values[part][k - 1]), OF_MODES[part]
+
+
+def mode_and_part(output: Output) -> tuple[str, int | str]:
+    """Return the part and the mode ("least" or "greatest" over all) of an output; `ModelError` if it names neither."""
+    part, _, number = output.of.partition(" ")
+    if part in OF_MODES and number in EXTREMES:
+        return part, number
+    if part not in OF_MODES or not number.isdigit() or int(number) < 1:
+        raise ModelError(
+            f"output {output.name!r}: of = {output.of!r}: expected one of {', '.join(OF_MODES)} and the number of a "
+            'mode, such as "frequency 1", or of all modes the least or greatest: "damping least"'
+        )
+    return part, int(number)

@@ -1,1 +1,0 @@
-"""Steps of the conserving, decaying and variational schemes in compiled loops; formulas as in `floatframe.discrete`."""

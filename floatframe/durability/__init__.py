@@ -1,0 +1,1 @@
+"""Durability: vibration tests and fatigue."""

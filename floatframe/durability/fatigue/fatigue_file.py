@@ -1,0 +1,327 @@
+"""The fatigue file: what `floatframe fatigue` reads (docs/fatigue.md)."""
+
+import math
+import os
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, ValidationError, ValidationInfo, model_validator
+
+from fe_models.foundation.paths import near_file
+from fe_models.foundation.toml_file import Range, Table, choice, describe, read_toml, validated
+from floatframe.durability.fatigue.criteria import CRITERIA, TENSORS
+from floatframe.durability.fatigue.factors import FACTOR_METHODS
+from floatframe.durability.fatigue.history_damage import RESIDUES
+from floatframe.durability.fatigue.mean_stress import MEAN_STRESS
+from floatframe.durability.fatigue.sn_curve import BELOW
+from floatframe.durability.fatigue.spectral.spectral_methods import SPECTRAL_METHODS
+from floatframe.errors import FatigueError
+
+__all__ = ["PLACES", "STRESS_UNITS", "FatigueFile", "read_fatigue"]
+
+#: stress units of S-N curves -> [Pa]
+STRESS_UNITS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "N/mm^2": 1e6, "GPa": 1e9, "psi": 6894.757293168361,
+                "ksi": 6894757.293168361}  # fmt: skip
+
+#: which places are looked at, by name
+PLACES = {
+    "all": "nodes of the surface and stress points of elements",
+    "nodes": "nodes of the surface, whose stress is a mean over elements",
+    "points": "stress points, each of its own element",
+}
+
+Positive = Annotated[float, Field(gt=0)]
+Share = Annotated[float, Field(ge=0, lt=1)]
+
+
+def input_file(value: Any, info: ValidationInfo) -> Path:
+    """Return the path of a file that is there, relative to the fatigue file."""
+    if not isinstance(value, str) or not value:
+        raise ValueError("expected the path of a file, text")
+    path = Path(info.context or ".") / value
+    if not path.is_file():
+        raise ValueError(f"no such file: {path}{near_file(path)}")
+    return path
+
+
+def numbers(value: Any) -> Any:
+    """Return a list of the file as a tuple of numbers."""
+    return tuple(value) if isinstance(value, list) else value
+
+
+InputFile = Annotated[Path, BeforeValidator(input_file)]
+Numbers = Annotated[tuple[float, ...], BeforeValidator(numbers)]
+
+
+class CurveSection(Table):
+    """[material.sn]: a knee and slopes, or a table."""
+
+    amplitude: Positive | None = Field(None, description="a number above 0, amplitude (half the range) at the knee")
+    range: Positive | None = Field(None, description="a number above 0, range at the knee, in place of amplitude")
+    cycles: Positive | Numbers | None = Field(None, description="cycles at the knee, or those of the table")
+    slope: Annotated[float, Field(ge=1)] | None = Field(None, description="a number of 1 or more, k in N ~ S^-k")
+    second_slope: Annotated[float, Field(ge=1)] | None = Field(None, description="a number, k below the knee")
+    amplitudes: Numbers | None = Field(None, description="a list of numbers, amplitudes of the table")
+    ranges: Numbers | None = Field(None, description="a list of numbers, ranges of the table, in place of amplitudes")
+    below: choice("way below the last point", lambda: tuple(BELOW)) = Field(  # type: ignore[valid-type]
+        "elementary", description=f"one of {', '.join(BELOW)}"
+    )
+    stress_ratio: Annotated[float, Field(ge=-1, lt=1)] = Field(-1.0, description="R of the tests, -1 to below 1")
+    least_cycles: Positive = Field(1000.0, description="a number above 0, where a curve by slope begins")
+    survival: Annotated[float, Field(gt=0, lt=1)] = Field(0.5, description="survival that the curve holds for, 0 to 1")
+    log_deviation: Annotated[float, Field(ge=0)] | None = Field(
+        None, description="a number, standard deviation of log10 N"
+    )
+
+    @model_validator(mode="after")
+    def _one_way(self) -> "CurveSection":
+        by_slope = {"amplitude": self.amplitude, "range": self.range, "slope": self.slope}
+        given = [name for name, value in by_slope.items() if value is not None]
+        tables = [name for name in ("amplitudes", "ranges") if getattr(self, name) is not None]
+        if self.cycles is None:
+            raise ValueError("cycles: missing; expected the cycles of the knee, or of the table")
+        if tables:
+            if given or self.second_slope is not None or not isinstance(self.cycles, tuple):
+                raise ValueError(f"expected a table (cycles and {tables[0]}, lists) or a knee (a number of cycles and "
+                                 "amplitude or range and slope), got parts of both")  # fmt: skip
+            if len(tables) == 2:
+                raise ValueError("expected amplitudes or ranges, got both")
+            return self
+        if isinstance(self.cycles, tuple) or self.slope is None or (self.amplitude is None) == (self.range is None):
+            raise ValueError("expected cycles, slope, and either amplitude or range; or a table: cycles and amplitudes")
+        return self
+
+
+class MaterialSection(Table):
+    """[material]: strengths and the S-N curve, in one stress unit."""
+
+    name: str = Field("", description="text")
+    stress_unit: choice("stress unit", lambda: tuple(STRESS_UNITS)) = Field(  # type: ignore[valid-type]
+        description=f"the unit of all stresses of the material, one of {', '.join(STRESS_UNITS)}"
+    )
+    tensile_strength: Positive | None = Field(None, description="a number above 0")
+    yield_strength: Positive | None = Field(None, description="a number above 0")
+    fatigue_strength_coefficient: Positive | None = Field(None, description="a number above 0, sigma_f'")
+    walker_exponent: Annotated[float, Field(ge=0, le=1)] | None = Field(None, description="a number from 0 to 1")
+    mean_stress_sensitivity: Annotated[float, Field(ge=0, le=1)] | None = Field(
+        None, description="a number from 0 to 1, M"
+    )
+    sn: CurveSection = Field(description="the table [material.sn]")
+
+
+class FactorSection(Table):
+    """A factor by a formula, in place of a number."""
+
+    method: choice("formula", lambda: tuple(FACTOR_METHODS)) = Field(  # type: ignore[valid-type]
+        description=f"one of {', '.join(FACTOR_METHODS)}"
+    )
+    roughness: Annotated[float, Field(ge=0)] | None = Field(None, description="a number, Rz [micrometres]")
+    diameter: Positive | None = Field(None, description="a number above 0 [mm]")
+    group: str | None = Field(None, description="a group of materials")
+    survival: Annotated[float, Field(gt=0, lt=1)] | None = Field(None, description="a number from 0.5 to below 1")
+
+    @model_validator(mode="after")
+    def _needs(self) -> "FactorSection":
+        needs = FACTOR_METHODS[self.method].needs
+        for key in ("roughness", "diameter", "group", "survival"):
+            if (getattr(self, key) is None) == (key in needs):
+                word = "is missing" if key in needs else "has no meaning here; remove it"
+                raise ValueError(f'method "{self.method}" needs {" and ".join(needs)}: {key} {word}')
+        return self
+
+    def value(self, tensile_strength: float) -> float:
+        """Return the factor for a tensile strength [MPa]."""
+        given = {key: getattr(self, key) for key in ("roughness", "diameter", "group", "survival")}
+        return FACTOR_METHODS[self.method].value(given, tensile_strength)
+
+    @property
+    def words(self) -> str:
+        """The formula and what went in."""
+        method = FACTOR_METHODS[self.method]
+        return f"{method.words}, " + ", ".join(f"{key} {getattr(self, key)}" for key in method.needs)
+
+
+def factor(value: Any) -> Any:
+    """Return a factor as a number, or as the table of its formula."""
+    if isinstance(value, dict):
+        try:
+            return FactorSection.model_validate(value)
+        except ValidationError as problem:
+            details = problem.errors(include_url=False)
+            raise ValueError("; ".join(describe(FactorSection, detail) for detail in details)) from None
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
+        raise ValueError("expected a number above 0, or a table: method, and what its formula needs")
+    return float(value)
+
+
+Factor = Annotated[float | FactorSection, BeforeValidator(factor)]
+
+
+class PlacesSection(MaterialSection):
+    """[materials.NAME]: a material with the places that have it."""
+
+    sets: list[str] = Field([], description="a list of names of sets of nodes or elements")
+    elements: list[int | str] = Field([], description="a list of numbers of elements")
+    nodes: list[int | str] = Field([], description="a list of numbers of nodes")
+    points: list[str] = Field([], description="a list of names of stress points, or of how they begin")
+    factors: dict[str, Factor] = Field({}, description="numbers or formulas by name, beside those of [factors]")
+
+    @model_validator(mode="after")
+    def _places(self) -> "PlacesSection":
+        if not (self.sets or self.elements or self.nodes or self.points):
+            raise ValueError("expected the places that have it: sets, elements, nodes or points")
+        return self
+
+
+class CriterionSection(Table):
+    """[criterion]: what does damage, and how mean stress enters."""
+
+    name: choice("criterion", lambda: tuple(CRITERIA)) = Field(  # type: ignore[valid-type]
+        "signed-von-mises", description=f"one of {', '.join(CRITERIA)}"
+    )
+    tensor: choice("tensor", lambda: tuple(TENSORS)) = Field(  # type: ignore[valid-type]
+        "full", description=f"one of {', '.join(TENSORS)}"
+    )
+    planes: Annotated[int, Field(ge=4, le=360)] = Field(18, description="a whole number, 4 to 360, angles over 180 deg")
+    findley_k: Annotated[float, Field(ge=0, le=2)] = Field(0.3, description="a number from 0 to 2")
+    mean_stress: choice("mean stress correction", lambda: tuple(MEAN_STRESS)) = Field(  # type: ignore[valid-type]
+        "none", description=f"one of {', '.join(MEAN_STRESS)}"
+    )
+    credit_compression: bool = Field(False, description="true or false: whether a compressive mean helps")
+
+
+class CountingSection(Table):
+    """[counting]: rainflow or spectral."""
+
+    residue: choice("residue", lambda: tuple(RESIDUES)) = Field(  # type: ignore[valid-type]
+        "repeat", description=f"one of {', '.join(RESIDUES)}"
+    )
+    method: choice("spectral method", lambda: tuple(SPECTRAL_METHODS)) = Field(  # type: ignore[valid-type]
+        "dirlik", description=f"one of {', '.join(SPECTRAL_METHODS)}"
+    )
+    negligible: Share = Field(1e-3, description="a share of the greatest damage, from 0 to below 1")
+    extrapolate: bool = Field(False, description="true or false: whether stresses beyond the S-N curve are counted")
+
+
+class MatchSection(Table):
+    """match of a block: as often as a measured event does its damage."""
+
+    measured: InputFile = Field(description="a file of measured signals")
+    signal: str = Field(description="a signal of that file")
+    sensor: str = Field(description="sensor.column of the system of the results")
+    slope: Annotated[float, Field(ge=1)] = Field(description="a number of 1 or more, k of the pseudo-damage")
+
+
+class BlockSection(Table):
+    """[[blocks]]: a results file."""
+
+    name: str = Field("", description="text; default: the name of the file")
+    results: InputFile = Field(description="a results file, relative to this file")
+    body: str = Field(description="the name of the body in the results")
+    repeats: Positive = Field(1.0, description="a number above 0")
+    scale: float = Field(1.0, description="a number other than 0, of the loads")
+    times: Range | None = Field(None, description="[from, to], part of the motion")
+    gaps: bool = Field(False, description="true or false: whether long steps of time are meant")
+    match: MatchSection | None = Field(None, description="a table: measured, signal, sensor, slope")
+
+
+class SpectrumSection(Table):
+    """[[spectra]]: cross spectra of the modal coordinates."""
+
+    name: str = Field("", description="text; default: the name of the file")
+    file: InputFile | None = Field(None, description="an .npz file with frequencies, spectra, and duration, mean")
+    shake: InputFile | None = Field(None, description="a shake file with a random test, in place of file")
+    test: str | None = Field(None, description="the name of the random test of a shake file")
+    duration: Positive | None = Field(None, description="a number above 0 [s]; default: that of the file")
+    repeats: Positive = Field(1.0, description="a number above 0")
+    scale: float = Field(1.0, description="a number other than 0, of the loads")
+
+    @model_validator(mode="after")
+    def _one_source(self) -> "SpectrumSection":
+        if (self.file is None) == (self.shake is None) or (self.shake is None) != (self.test is None):
+            raise ValueError("expected either file, or shake and test")
+        return self
+
+
+class ProgrammeSection(Table):
+    """[programme]: what one pass through all blocks stands for."""
+
+    amount: Positive = Field(1.0, description="a number above 0, such as kilometres")
+    unit: str = Field("passes", description="text, such as km, flights, h")
+    target: Positive | None = Field(None, description="a number above 0, the life that is wanted, in that unit")
+
+
+class OutputsSection(Table):
+    """[outputs]: what is looked at and shown."""
+
+    worst: Annotated[int, Field(ge=1, le=10_000)] = Field(20, description="a whole number, 1 to 10000, nodes of tables")
+    set: str | None = Field(None, description="a set of the mesh; only its nodes and points are looked at")
+    places: choice("places", lambda: tuple(PLACES)) = Field(  # type: ignore[valid-type]
+        "all", description=f"one of {', '.join(PLACES)}"
+    )
+
+
+class FatigueFile(Table):
+    """A fatigue file."""
+
+    body: InputFile = Field(description="the path of a modal file, relative to this file")
+    material: MaterialSection | None = Field(None, description="the table [material]")
+    materials: dict[str, PlacesSection] = Field({}, description="tables [materials.NAME], of the places they name")
+    factors: dict[str, Factor] = Field({}, description="numbers or formulas by name, on the amplitudes of the curves")
+    survival: Annotated[float, Field(gt=0, lt=1)] | None = Field(None, description="a number from 0 to 1")
+    criterion: CriterionSection = Field(
+        default_factory=lambda: CriterionSection.model_validate({}), description="the table [criterion]"
+    )
+    counting: CountingSection = Field(
+        default_factory=lambda: CountingSection.model_validate({}), description="the table [counting]"
+    )
+    blocks: list[BlockSection] = Field([], description="tables [[blocks]]")
+    spectra: list[SpectrumSection] = Field([], description="tables [[spectra]]")
+    programme: ProgrammeSection = Field(
+        default_factory=lambda: ProgrammeSection.model_validate({}), description="the table [programme]"
+    )
+    outputs: OutputsSection = Field(
+        default_factory=lambda: OutputsSection.model_validate({}), description="the table [outputs]"
+    )
+
+    @model_validator(mode="after")
+    def _fits(self) -> "FatigueFile":
+        if bool(self.blocks) == bool(self.spectra):
+            raise ValueError("expected [[blocks]] or [[spectra]], " + ("got both" if self.blocks else "got neither"))
+        if any(each.shake for each in self.spectra) and len(self.spectra) > 1:
+            raise ValueError("[[spectra]]: a shake file has coordinates of its own: expected no other table beside it")
+        if not self.all_materials:
+            raise ValueError("material: missing; expected the table [material], or tables [materials.NAME]")
+        need = MEAN_STRESS[self.criterion.mean_stress][1]
+        for key, material in self.all_materials.items():
+            if need and getattr(material, need) is None:
+                raise ValueError(f'mean stress "{self.criterion.mean_stress}" needs {key}.{need}, which is missing')
+            own = material.factors if isinstance(material, PlacesSection) else {}
+            for name, each in {**self.factors, **own}.items():
+                if not isinstance(each, FactorSection):
+                    continue
+                if FACTOR_METHODS[each.method].needs_strength and material.tensile_strength is None:
+                    raise ValueError(f"factor {name}: {each.method} needs {key}.tensile_strength, which is missing")
+                if each.survival is not None and self.survival is not None:
+                    raise ValueError(f"factor {name} and survival count the scatter twice; take one of them")
+            if self.survival is not None and material.sn.log_deviation is None:
+                raise ValueError(f"survival: needs {key}.sn.log_deviation, the standard deviation of log10 N")
+        return self
+
+    @property
+    def all_materials(self) -> dict[str, MaterialSection]:
+        """The materials by their keys in the file, that of the rest first."""
+        rest = {} if self.material is None else {"material": self.material}
+        return {**rest, **{f"materials.{name}": each for name, each in self.materials.items()}}
+
+
+def read_fatigue(path: str | os.PathLike[str]) -> FatigueFile:
+    """Read and check a fatigue file.
+
+    Raises
+    ------
+    FatigueError
+        With every problem: key path, value, what was expected, choices and the nearest name.
+    """
+    path = Path(path)
+    return validated(FatigueFile, read_toml(path, FatigueError), path, FatigueError, context=path.parent)

@@ -1,0 +1,263 @@
+"""Damage from modal histories: stress of a few nodes at a time, over chunks of time, straight into counted cycles.
+
+sigma(x, t) = sum_k S_k(x) q_k(t) is never stored: tiles of nodes times modes are multiplied with modes times a chunk of
+times, made a scalar, and streamed through the four-point rule. Nodes come in the order of their bounds (`bounds`), the
+greatest first; the rest is left out as soon as none of it can reach the share of the greatest damage found that is
+asked for.
+"""
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, IntArray
+from floatframe.durability.fatigue.bounds import damage_bounds, envelope, stress_bounds
+from floatframe.durability.fatigue.criteria import Criterion
+from floatframe.durability.fatigue.load_blocks import LoadBlock
+from floatframe.durability.fatigue.mean_stress import NO_CORRECTION, MeanStress
+from floatframe.durability.fatigue.sn_curve import SNCurve
+from floatframe.errors import FatigueError
+
+__all__ = ["RESIDUES", "Counted", "Progress", "count_histories"]
+
+#: what becomes of the residue of a block, by name
+RESIDUES = {
+    "half": "its ranges count as half cycles, as ASTM E1049 has it",
+    "repeat": "the block follows itself without end: all cycles are whole",
+}
+TILE = 32  #: nodes at once; of criteria with planes so many fewer as they have more rows than six
+CHUNK = 1024  #: times at once
+FIRST_BATCH, LAST_BATCH = 64, 8192  #: nodes between two looks at the bounds, twice as many each time
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Counted:
+    """Damage of places from histories, one row a place; all numbers are of one pass through the programme."""
+
+    damage: Array  #: of each block with its repeats, (n_blocks, n); NaN at places that were left out
+    bound: Array  #: upper bound of the whole damage, (n,)
+    is_counted: Array  #: bool, (n,)
+    cycles: Array  #: cycles of the programme, (n,)
+    beyond: Array  #: of them, beyond the greatest amplitude of the curve, (n,)
+    largest: Array  #: largest equivalent amplitude, (n,) [Pa]
+    plane: IntArray  #: of critical-plane criteria, (n,); else 0
+
+    @property
+    def total(self) -> Array:
+        """Damage of the programme, (n,); NaN at places that were left out."""
+        return np.asarray(self.damage.sum(axis=0))
+
+
+def count_histories(
+    stress: Array,
+    blocks: Sequence[LoadBlock],
+    curve: SNCurve,
+    *,
+    criterion: Criterion = Criterion(),
+    mean_stress: MeanStress = NO_CORRECTION,
+    residue: str = "repeat",
+    frames: Array | None = None,
+    negligible: float = 1e-3,
+    greatest: float = 0.0,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> Counted:
+    """Return the damage of places with stress shapes (n, 6, n_q) [Pa per unit of q].
+
+    Parameters
+    ----------
+    blocks
+        Histories with repeats; nothing is counted between one block and the next.
+    residue
+        One of `RESIDUES`.
+    frames
+        Tangents and normal of each place, (n, 3, 3), where the criterion needs them (`surface_frames`).
+    negligible
+        Places whose damage is proved to be below this share of the greatest are left out; 0: none.
+    greatest
+        Damage that was found at other places before.
+    workers
+        Threads; None: one a processor.
+
+    Raises
+    ------
+    FatigueError
+        If blocks and shapes do not fit, or the criterion has no use for the correction.
+    """
+    check(stress, blocks, criterion, mean_stress, residue, negligible)
+    n = len(stress)
+    bound = np.zeros(n)
+    for block in blocks:
+        found = envelope(block, float(curve.slope.max()))
+        lam, total = stress_bounds(stress, found, criterion)
+        bound += block.repeats * damage_bounds(lam, total, found, criterion, curve, mean_stress)
+    order = np.argsort(-bound, kind="stable")
+    result = Counted(
+        np.full((len(blocks), n), np.nan), bound, np.zeros(n, bool), np.zeros(n), np.zeros(n), np.zeros(n),
+        np.zeros(n, np.int64),
+    )  # fmt: skip
+    histories = [np.ascontiguousarray(block.scale * np.asarray(block.q).T) for block in blocks]
+    rule = Rule(curve, mean_stress, criterion, residue, tuple(block.repeats for block in blocks))
+    size = max(1, TILE * 6 // criterion.n_rows())
+
+    def run(tile: IntArray) -> None:
+        count_tile(np.ascontiguousarray(stress[tile]), None if frames is None else frames[tile], histories, rule,
+                   result, tile)  # fmt: skip
+
+    with single_threaded_products(), ThreadPoolExecutor(workers or os.cpu_count() or 1) as pool:
+        first, step = 0, FIRST_BATCH
+        while first < n:
+            batch = order[first : first + step]
+            first, step = first + step, min(2 * step, LAST_BATCH)
+            batch = batch[(bound[batch] > 0) & (bound[batch] >= negligible * greatest)]
+            if not len(batch):
+                break
+            batch = np.sort(batch)
+            list(pool.map(run, [batch[k : k + size] for k in range(0, len(batch), size)]))
+            greatest = max(greatest, float(result.total[batch].max()))
+            if progress is not None:
+                progress(min(1.0, first / n))
+    is_zero = bound == 0  # proved
+    result.damage[:, is_zero] = 0.0
+    return result
+
+
+def check(
+    stress: Array, blocks: Sequence[LoadBlock], criterion: Criterion, mean_stress: MeanStress, residue: str,
+    negligible: float,
+) -> None:  # fmt: skip
+    """Raise `FatigueError` unless everything fits together."""
+    if not blocks:
+        raise FatigueError("fatigue: expected one load block at least")
+    if stress.ndim != 3 or stress.shape[1] != 6:
+        raise FatigueError(f"fatigue: stress shapes: expected (n, 6, n_q), got {stress.shape}")
+    if residue not in RESIDUES:
+        from fe_models.foundation.words import nearest, quoted
+
+        raise FatigueError(f"fatigue: residue: unknown {quoted(residue)}{nearest(residue, RESIDUES)}")
+    if not 0 <= negligible < 1:
+        raise FatigueError(f"fatigue: negligible: expected a share from 0 to below 1, got {negligible:g}")
+    if criterion.is_shear and mean_stress.name != "none":
+        raise FatigueError(
+            f'fatigue: criterion "{criterion.name}" with mean stress "{mean_stress.name}": shear does not know tension '
+            'from compression, and findley has the normal stress in itself; take mean stress "none"'
+        )
+    for block in blocks:
+        if block.q.shape[1] != stress.shape[2]:
+            raise FatigueError(
+                f"load block {block.name!r}: {block.q.shape[1]} modal coordinates, but stress shapes of "
+                f"{stress.shape[2]}; give the body of the run"
+            )
+
+
+@dataclass(frozen=True)
+class Rule:
+    """All that says what a history does."""
+
+    curve: SNCurve
+    mean_stress: MeanStress
+    criterion: Criterion
+    residue: str
+    repeats: tuple[float, ...]
+
+
+def count_tile(
+    stress: Array, frames: Array | None, histories: Sequence[Array], rule: Rule, result: Counted, tile: IntArray
+) -> None:
+    """Count all blocks for a few places, and put the plane of greatest damage into the result."""
+    criterion = rule.criterion
+    rows = np.ascontiguousarray(criterion.rows(stress, frames))
+    sums = [count_block(rows, q, rule) for q in histories]
+    damage = np.stack([repeats * each[0] for repeats, each in zip(rule.repeats, sums, strict=True)])  # block, n, plane
+    worst = np.argmax(damage.sum(axis=0), axis=1)
+    at = np.arange(len(tile)), worst
+    result.damage[:, tile] = damage[:, *at]
+    counts = sum(repeats * each[1][at] for repeats, each in zip(rule.repeats, sums, strict=True))
+    result.cycles[tile], result.beyond[tile] = counts[:, 0], counts[:, 1]
+    result.largest[tile] = np.max([each[2][at] for each in sums], axis=0)
+    result.plane[tile] = worst
+    result.is_counted[tile] = True
+
+
+def count_block(rows: Array, q: Array, rule: Rule) -> tuple[Array, Array, Array]:
+    """Return damage (n, n_planes), counts (n, n_planes, 2) and largest amplitudes of one pass of a history."""
+    from floatframe.durability.fatigue.kernels.cycle_kernels import close_block, cycle_rule, finish_block, push_block
+
+    if rule.criterion.is_shear:
+        return count_shear(rows, q, rule)
+    scalar, kernel_rule = rule.criterion.scalar(), cycle_rule(rule.curve, rule.mean_stress)
+    n, n_rows, n_q = rows.shape
+    n_planes = 1 if scalar is not None else n_rows
+    m = n * n_planes
+    damage, counts, largest = np.zeros(m), np.zeros((m, 2)), np.zeros(m)
+    depths = np.zeros(m, np.int64)
+    stack = np.empty((m, CHUNK + 64))
+    values, flat = np.empty((n, CHUNK)), rows.reshape(-1, n_q)
+    room = np.empty(len(flat) * CHUNK)  # used again and again: fresh memory of this size costs more than the product
+    for first in range(0, q.shape[1], CHUNK):
+        chunk = q[:, first : first + CHUNK]
+        width = chunk.shape[1]
+        components = np.matmul(flat, chunk, out=room[: len(flat) * width].reshape(len(flat), width))
+        if scalar is not None:
+            scalar(components.reshape(n, n_rows, width), values)
+            components = values[:, :width]
+        stack = wide_enough(stack, int(depths.max(initial=0)) + width + 2)
+        closed = np.empty((stack.shape[1], 2))
+        push_block(kernel_rule, components, stack, depths, closed, damage, counts, largest)
+    if rule.residue == "half":
+        finish_block(kernel_rule, stack, depths, damage, counts, largest)
+    else:
+        stack = wide_enough(stack, 2 * int(depths.max(initial=0)) + 2)
+        close_block(kernel_rule, stack, depths, np.empty((stack.shape[1], 2)), damage, counts, largest)
+    shape = (n, n_planes)
+    return damage.reshape(shape), counts.reshape(*shape, 2), largest.reshape(shape)
+
+
+def count_shear(rows: Array, q: Array, rule: Rule) -> tuple[Array, Array, Array]:
+    """Return what `count_block` does for cycles of shear with the normal stress beside them."""
+    from floatframe.durability.fatigue.kernels.cycle_kernels import cycle_rule
+    from floatframe.durability.fatigue.kernels.findley_kernels import close_findley, finish_findley, push_findley
+
+    kernel_rule, k = cycle_rule(rule.curve, rule.mean_stress), float(rule.criterion.k)
+    n, n_rows, _ = rows.shape
+    half = n_rows // 2
+    m = n * half
+    shear, normal = (np.ascontiguousarray(part).reshape(m, -1) for part in (rows[:, :half], rows[:, half:]))
+    damage, counts, largest = np.zeros(m), np.zeros((m, 2)), np.zeros(m)
+    depths = np.zeros(m, np.int64)
+    stack, most = np.empty((m, CHUNK + 64)), np.empty((m, CHUNK + 64))
+    for first in range(0, q.shape[1], CHUNK):
+        chunk = q[:, first : first + CHUNK]
+        needed = int(depths.max(initial=0)) + chunk.shape[1] + 2
+        stack, most = wide_enough(stack, needed), wide_enough(most, needed)
+        push_findley(kernel_rule, k, shear @ chunk, normal @ chunk, stack, most, depths, damage, counts, largest)
+    if rule.residue == "half":
+        finish_findley(kernel_rule, k, stack, most, depths, damage, counts, largest)
+    else:
+        needed = 2 * int(depths.max(initial=0)) + 2
+        stack, most = wide_enough(stack, needed), wide_enough(most, needed)
+        close_findley(kernel_rule, k, stack, most, depths, damage, counts, largest)
+    shape = (n, half)
+    return damage.reshape(shape), counts.reshape(*shape, 2), largest.reshape(shape)
+
+
+def wide_enough(stack: Array, width: int) -> Array:
+    """Return a stack with at least so many places a row."""
+    if stack.shape[1] >= width:
+        return stack
+    wider = np.empty((len(stack), 2 * width))
+    wider[:, : stack.shape[1]] = stack
+    return wider
+
+
+def single_threaded_products() -> Any:
+    """Return the context in which each of our threads multiplies by itself."""
+    from threadpoolctl import threadpool_limits
+
+    return threadpool_limits(1)

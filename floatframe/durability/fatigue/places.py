@@ -1,0 +1,145 @@
+"""Places that are assessed: nodes of the surface and stress points of elements, each with its material."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cms.body.reduced_body import ReducedBody
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.meshes.numbering import NONE
+from floatframe.durability.fatigue.criteria import Criterion
+from floatframe.durability.fatigue.mean_stress import NO_CORRECTION, MeanStress
+from floatframe.durability.fatigue.planes import surface_frames, surface_nodes
+from floatframe.durability.fatigue.sn_curve import SNCurve
+from floatframe.errors import FatigueError
+
+__all__ = ["FatigueMaterial", "Places", "assessed_places", "point_number"]
+
+
+@dataclass(frozen=True, eq=False)
+class FatigueMaterial:
+    """What a place is made of: its S-N curve with its factors, and how mean stress enters."""
+
+    curve: SNCurve  #: in stress units of the body
+    mean_stress: MeanStress = NO_CORRECTION
+    name: str = ""
+    nodes: IntArray | None = None  #: kept nodes that have it; None with `points` None: all that no other names
+    points: IntArray | None = None  #: rows of the stress points of the body that have it
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Places in the order of their materials; a node or point of two materials is a place of each."""
+
+    nodes: IntArray  #: kept node, -1 at a stress point, (n,)
+    points: IntArray  #: row of the stress points of the body, -1 at a node, (n,)
+    material: IntArray  #: number of its material, (n,)
+    n_left_out: int  #: nodes and points that no material names
+
+
+def point_number(body: ReducedBody) -> int:
+    """Return how many stress points a body has."""
+    return 0 if body.point_stress is None else len(body.point_stress.names)
+
+
+def assessed_places(
+    body: ReducedBody, materials: Sequence[FatigueMaterial], nodes: IntArray | None, points: IntArray | None,
+    criterion: Criterion,
+) -> Places:  # fmt: skip
+    """Return the places that are looked at.
+
+    Parameters
+    ----------
+    nodes
+        Kept nodes; None: all on the surface, as far as the body has stress there.
+    points
+        Rows of its stress points; None: all, unless nodes are chosen.
+
+    Raises
+    ------
+    FatigueError
+        If there are none, one does not exist, or the criterion needs a tangent plane that points have not.
+    """
+    n_points = point_number(body)
+    if nodes is None and n_points and body.stress is None:
+        nodes = np.zeros(0, np.int64)
+    if points is None:
+        points = np.arange(n_points) if nodes is None else np.zeros(0, np.int64)
+    nodes = surface_nodes(body) if nodes is None else np.asarray(nodes, dtype=np.int64)
+    points = np.asarray(points, dtype=np.int64)
+    for what, chosen, count in (("kept nodes", nodes, len(body.nodes)), ("stress points", points, n_points)):
+        if chosen.ndim != 1 or (len(chosen) and (chosen.min() < 0 or chosen.max() >= count)):
+            got = f"{chosen.min()} to {chosen.max()}" if chosen.size else f"{chosen.shape}"
+            raise FatigueError(f"fatigue: nodes: expected {what} 0 to {count - 1}, got {got}")
+    if not len(nodes) + len(points):
+        raise FatigueError("fatigue: nodes: expected one node or stress point at least")
+    if len(points) and criterion.needs_surface:
+        raise FatigueError(
+            f'fatigue: criterion "{criterion.name}" with tensor = "{criterion.tensor}" needs the tangent plane of the '
+            "surface, and stress points of elements have none; take signed-von-mises or principal with tensor = "
+            '"full", or look at nodes alone (outputs.places = "nodes")'
+        )
+    named = [material for material in materials if material.nodes is not None or material.points is not None]
+    rest = [material for material in materials if material.nodes is None and material.points is None]
+    if len(rest) > 1:
+        raise FatigueError("fatigue: two materials name no places; expected one at most, which is that of the rest")
+    has = [np.zeros(len(nodes), bool), np.zeros(len(points), bool)]
+    members = {}
+    for material in named:
+        own = (material.nodes, material.points)
+        mine = [np.isin(at, [] if of is None else of) for at, of in zip((nodes, points), own, strict=True)]
+        if not (mine[0].any() or mine[1].any()):
+            raise FatigueError(f"fatigue: material {material.name!r}: none of its places is looked at")
+        has = [a | b for a, b in zip(has, mine, strict=True)]
+        members[id(material)] = mine
+    for material in rest:
+        members[id(material)] = [~each for each in has]
+    if rest:
+        has = [np.ones(len(each), bool) for each in has]
+    at_nodes, at_points, of = [], [], []
+    for number, material in enumerate(materials):
+        on_nodes, on_points = (each[mine] for each, mine in zip((nodes, points), members[id(material)], strict=True))
+        at_nodes += [on_nodes, np.full(len(on_points), NONE)]
+        at_points += [np.full(len(on_nodes), NONE), on_points]
+        of.append(np.full(len(on_nodes) + len(on_points), number))
+    left_out = int(sum((~each).sum() for each in has))
+    return Places(np.concatenate(at_nodes), np.concatenate(at_points), np.concatenate(of), left_out)
+
+
+def stress_of_places(body: ReducedBody, places: Places, rows: IntArray, field: Array | None) -> Array:
+    """Return stress shapes of some places, (n, 6, n_q); without a copy where they are all the nodes.
+
+    Parameters
+    ----------
+    field
+        Stress of the kept nodes and then of the stress points over other coordinates than the modes; None: the modes.
+    """
+    nodes, points = places.nodes[rows], places.points[rows]
+    if field is not None and len(field) not in (len(body.nodes), len(body.nodes) + point_number(body)):
+        raise FatigueError(
+            f"fatigue: stress: expected rows for {len(body.nodes)} kept nodes and the stress points after them, got "
+            f"{len(field)}"
+        )
+    at_points = points != NONE
+    if not at_points.any():
+        shapes = body.stress if field is None else field[: len(body.nodes)]
+        assert shapes is not None
+        is_all = len(nodes) == len(shapes) and bool((nodes == np.arange(len(nodes))).all())
+        return np.asarray(shapes if is_all else shapes[nodes])
+    assert body.point_stress is not None
+    of_points = body.point_stress.modes if field is None else field[len(body.nodes) :]
+    if len(of_points) != point_number(body):
+        raise FatigueError("fatigue: stress: rows for the stress points are missing")
+    found = np.empty((len(nodes), 6, of_points.shape[2]))
+    found[at_points] = of_points[points[at_points]]
+    if not at_points.all():
+        shapes = body.stress if field is None else field[: len(body.nodes)]
+        assert shapes is not None
+        found[~at_points] = shapes[nodes[~at_points]]
+    return found
+
+
+def frames_of_places(body: ReducedBody, places: Places, rows: IntArray, criterion: Criterion) -> Array | None:
+    """Return the tangent planes of some places, where the criterion needs them."""
+    return surface_frames(body, places.nodes[rows]) if criterion.needs_surface else None

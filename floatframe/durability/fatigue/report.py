@@ -1,0 +1,171 @@
+"""A result as one HTML page that works offline: life first, then what it rests on."""
+
+import base64
+from itertools import cycle
+from typing import Any
+
+import numpy as np
+
+from cms.assessment.report.charts import base_layout
+from cms.assessment.report.html import Cell, Section, figure, page, table, text
+from cms.assessment.report.png import png_of
+from floatframe.durability.fatigue.assessment import Assessment
+from floatframe.durability.fatigue.criteria import CRITERIA
+from floatframe.durability.fatigue.load_spectrum import cycles_at, exceedances
+from floatframe.durability.fatigue.outputs import fatigue_record, render_fatigue
+
+__all__ = ["fatigue_html"]
+
+MOST_CYCLES = 1e10  #: that the S-N curve is drawn to
+COLORS = ("#1b1f24", "#0072B2", "#009E73", "#CC79A7", "#56B4E9")  #: of the S-N curves of materials
+
+
+def fatigue_html(made: Assessment) -> str:
+    """Return the page."""
+    record = fatigue_record(made)
+    sections = [picture_section(made), worst_section(record), curve_section(made, record), method_section(record)]
+    return page(
+        f"{record['body']}: fatigue",
+        f"{text(record['body'])}<small>fatigue</small>",
+        header(record),
+        [section for section in sections if section is not None],
+        {},
+        text("Written by floatframe fatigue. The same numbers stand in the JSON and CSV files beside this page."),
+    )
+
+
+def header(record: dict[str, Any]) -> str:
+    """Return the title, the facts, and the answer."""
+    worst = record["worst"][0] if record["worst"] else None
+    unit, target = record["life_unit"], record["programme"]["target"]
+    n_points = record["n_points"]
+    places = [f"{record['n_nodes'] - n_points} nodes on the surface"] if record["n_nodes"] > n_points else []
+    places += [f"{n_points} stress points of elements"] if n_points else []
+    facts = (
+        f"{' and '.join(places)}, {record['n_counted']} of them counted; {record['criterion']}; mean "
+        f"stress: {record['mean_stress']}; {record['method']}"
+    )
+    if worst is None or worst["life"] is None:
+        answer, kind = "No damage: no cycle reaches the S-N curve.", ""
+    else:
+        answer = f"The worst place, {worst['place']}, lasts {worst['life']:.4g} {unit}: "
+        answer += f"damage {worst['damage']:.3g} a programme."
+        kind = " none" if target is not None and worst["life"] < target else ""
+        if target is not None:
+            answer += f" The aim of {target:.4g} {unit} is {'missed' if kind else 'reached'}."
+    figures = ""
+    if worst is not None:
+        values = [
+            (f"{worst['damage']:.3g}", "damage of a programme"),
+            ("no end" if worst["life"] is None else f"{worst['life']:.4g}", f"life [{unit}]"),
+            (f"{worst['largest_amplitude']:.4g}", f"largest amplitude [{record['stress_unit']}]"),
+        ]
+        shown = "".join(f"<div><b>{text(value)}</b>{text(words)}</div>" for value, words in values)
+        figures = f'<div class="figures">{shown}</div>'
+    return (
+        f'<h1>How long does {text(record["body"])} last?</h1><p class="facts">{text(facts)}</p>'
+        f'<section class="answer{kind}"><p>{text(answer)}</p>{figures}</section>'
+    )
+
+
+def picture_section(made: Assessment) -> Section | None:
+    """Damage on the surface."""
+    drawn = png_of(lambda path: render_fatigue(made, path), "the page")
+    if drawn is None:
+        return None
+    png = base64.b64encode(drawn).decode()
+    picture = f'<img src="data:image/png;base64,{png}" alt="damage on the surface" style="width:100%">'
+    return Section(
+        "surface", "Where it fails", "Surface", picture,
+        "Damage on the surface, in powers of ten; numbers are ranks of the table below. Nodes that were left out lie "
+        "below the scale; a stress point is shown at the node nearest to it, the worst of several.",
+    )  # fmt: skip
+
+
+def worst_section(record: dict[str, Any]) -> Section:
+    """Table of the worst nodes."""
+    has_planes = any(each["plane"] for each in record["worst"])
+    names = list(record["worst"][0]["of_blocks"]) if record["worst"] else []
+    has_materials = any(each["material"] for each in record["worst"])
+    headings = ["rank>", "node", *(["material"] if has_materials else []), "place", "damage>",
+                f"life [{record['life_unit']}]>", f"largest amplitude [{record['stress_unit']}]>",
+                *(["plane"] if has_planes else []),
+                *(f"{name}>" for name in names if len(names) > 1)]  # fmt: skip
+    rows = []
+    for rank, each in enumerate(record["worst"], start=1):
+        place = f"({each['x']:.5g}, {each['y']:.5g}, {each['z']:.5g})"
+        life = "no end" if each["life"] is None else f"{each['life']:.4g}"
+        cells = [Cell(str(rank), "n"), Cell(each["node"], "name"),
+                 *([Cell(each["material"])] if has_materials else []), Cell(place), Cell(f"{each['damage']:.4g}", "n"),
+                 Cell(life, "n"), Cell(f"{each['largest_amplitude']:.4g}", "n")]  # fmt: skip
+        cells += [Cell(each["plane"])] if has_planes else []
+        shares = [value / each["damage"] if each["damage"] else 0.0 for value in each["of_blocks"].values()]
+        cells += [Cell(f"{share:.0%}", "n") for share in shares] if len(names) > 1 else []
+        rows.append(cells)
+    lead = "The worst nodes" + (", with the share of each block in their damage." if len(names) > 1 else ".")
+    return Section("worst", "Worst nodes", "Worst nodes", table(headings, rows), lead)
+
+
+def curve_section(made: Assessment, record: dict[str, Any]) -> Section:
+    """S-N curves, and the load spectrum of the worst place."""
+    unit = record["stress_unit"]
+    traces: list[dict[str, Any]] = []
+    for material, color in zip(made.result.materials, cycle(COLORS), strict=False):
+        curve = material.curve
+        low = curve.fatigue_limit or 0.2 * float(curve.bottom[curve.bottom > 0].min(initial=curve.amplitude.min()))
+        S = np.geomspace(curve.greatest, low, 240)
+        S = S[curve.life(S) <= MOST_CYCLES]
+        traces.append(
+            {"type": "scatter", "mode": "lines", "name": f"S-N curve {material.name}".strip(),
+             "x": list(map(float, curve.life(S))), "y": list(map(float, S)), "line": {"color": color, "width": 2}}
+        )  # fmt: skip
+    words = "S-N curves as they were used, with their factors, in units of the body."
+    if made.blocks and not made.result.criterion.is_shear and record["worst"]:
+        cycles = cycles_at(made.result, made.blocks, int(made.result.worst()[0]))
+        count, amplitude = exceedances(cycles)
+        traces.append(
+            {"type": "scatter", "mode": "lines",
+             "name": f"{record['worst'][0]['place']}: cycles of at least this amplitude",
+             "x": list(map(float, count)), "y": list(map(float, amplitude)), "line": {"color": "#D55E00", "width": 2}}
+        )  # fmt: skip
+        words += " Beside it the equivalent amplitudes of the worst place in one programme, mean stress included."
+    layout = base_layout("cycles", f"stress amplitude [{unit}]")
+    layout["xaxis"] |= {"type": "log", "exponentformat": "power", "dtick": 1}
+    layout["yaxis"] |= {"type": "log"}
+    return Section(
+        "curve", "S-N curve and load spectrum", "S-N curve", figure("sn", words, height=380), "",
+        {"sn": {"data": traces, "layout": {**layout, "height": 380}}},
+    )  # fmt: skip
+
+
+def method_section(record: dict[str, Any]) -> Section:
+    """What was assumed."""
+    rows = [
+        ("criterion", f"{record['criterion']}: {CRITERIA[record['criterion']]}"),
+        ("stress tensor", record["tensor"]),
+        ("mean stress", record["mean_stress"]),
+        ("counting", record["method"]),
+        ("damage", "Miner's sum of n / N; nothing is counted between one block and the next"),
+        *((f"S-N curve {each['name']}".strip(), curve_words(each, record["stress_unit"]))
+          for each in record["materials"]),
+        *((f"block {each['name']}", f"{each['repeats']:.6g} times, loads times {each['scale']:g}")
+          for each in record["blocks"]),
+        ("left out", f"{record['n_nodes'] - record['n_counted']} places whose damage is proved to be below "
+                     f"{record['negligible'] or 0:g} of the greatest"),
+        *(("note", note) for note in record["notes"]),
+    ]  # fmt: skip
+    cells = [[Cell(name, "name"), Cell(words)] for name, words in rows]
+    return Section("method", "What it rests on", "Method", table(["", ""], cells))
+
+
+def curve_words(material: dict[str, Any], unit: str) -> str:
+    """Return an S-N curve in words."""
+    curve = material["curve"]
+    slopes = ", ".join(f"{slope:.4g}" for slope in curve["slope"])
+    limit = curve["bottom"][-1]
+    words = (
+        f"slopes {slopes} from {curve['amplitude'][0]:.5g} {unit} at {curve['cycles'][0]:.4g} cycles; "
+        f"R = {curve['stress_ratio']:g}; given in {curve['given_in']}; "
+    )
+    words += f"no damage below {limit:.5g}" if limit else "no fatigue limit"
+    return words if not material["name"] else f"{words}; {material['n_places']} places"

@@ -1,0 +1,53 @@
+"""Inputs by name, and what has to be so before they are applied."""
+
+from fe_models.foundation.words import nearest, quoted
+from floatframe.durability.shaking.structure.model import DIRECTIONS, ShakenModel
+from floatframe.errors import ModelError
+
+__all__ = ["band_notes", "input_index", "require_damped"]
+
+LEAST_DAMPING = 1e-9  #: ratio below which a mode counts as undamped
+MARGIN = 1.5  #: modes up to this multiple of a band shape the response in it
+
+
+def input_index(model: ShakenModel, name: str, where: str) -> int:
+    """Return the place of an input: its name such as "base:x" or "load case a", or "x" alone where there is one base.
+
+    Raises
+    ------
+    ModelError
+        With the nearest name, if there is none.
+    """
+    short = {f"{model.bases[0].name}:{entry}": entry for entry in DIRECTIONS} if len(model.bases) == 1 else {}
+    for k, full in enumerate(model.inputs):
+        if name in (full, short.get(full)):
+            return k
+    choices = [*short.values(), *model.inputs]
+    raise ModelError(f"{where}: no base direction or force {quoted(name)}{nearest(name, choices)}")
+
+
+def require_damped(model: ShakenModel, first: float, last: float, where: str) -> None:
+    """Raise `ModelError` if a mode in a band has no damping: its response would be infinite."""
+    f, zeta = model.frequencies, model.damping_ratios
+    bare = [k for k in range(len(f) - model.n_residual) if first <= f[k] <= last and zeta[k] < LEAST_DAMPING]
+    if bare:
+        k = bare[0]
+        raise ModelError(
+            f"{where}: mode {k + 1} at {f[k]:.6g} Hz lies in the band {first:g} to {last:g} Hz and has no damping "
+            f"({len(bare)} such modes): its response there is infinite. Give damping by ratio, Q, table or band"
+        )
+
+
+def band_notes(model: ShakenModel, last: float, where: str) -> list[str]:
+    """Return what the modes leave out of a band that ends at a frequency [Hz]."""
+    f = model.frequencies[: len(model.frequencies) - model.n_residual]
+    if not len(f) or last * MARGIN <= f[-1]:
+        return []
+    relation = "below" if f[-1] < last else "near"
+    return [
+        f"{where}: the band ends at {last:g} Hz, the last mode with the bases held is at {f[-1]:.4g} Hz, {relation} "
+        "its end: "
+        f"what the structure has between there and {MARGIN * last:.4g} Hz is left out but for its static part; "
+        "reduce the "
+        "body with more modes"
+    ]

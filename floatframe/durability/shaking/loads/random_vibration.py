@@ -1,0 +1,308 @@
+"""Random tests: responses to power spectral densities of the bases, with cross spectra between them.
+
+    S_y(f) = H(f) S(f) H(f)^H,   sigma² = ∫ S_y df,   nu² = ∫ f² S_y df / sigma²
+
+S is Hermitian and positive semidefinite: densities on its diagonal, coherence gamma² and phase beside it,
+S_ab = gamma sqrt(S_aa S_bb) exp(i phase). The integrals are those of `resolved`, which bounds their error.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.durability.shaking.loads.inputs import input_index, require_damped
+from floatframe.durability.shaking.loads.levels import Level, in_model, level_rms
+from floatframe.durability.shaking.loads.uncertainty import Uncertainty
+from floatframe.durability.shaking.responses.resolved import ResolvedBand, resolved_band
+from floatframe.durability.shaking.responses.scalars import scalar_outputs, stress_groups
+from floatframe.durability.shaking.responses.stresses import (
+    VON_MISES,
+    RandomVonMises,
+    random_von_mises,
+    von_mises_density,
+)
+from floatframe.durability.shaking.structure.model import Output, ShakenModel, driven, modal_response, response
+from floatframe.errors import ModelError
+
+__all__ = ["CrossSpectrum", "Miles", "RandomRun", "RandomTest", "input_density", "random_run", "random_runs"]
+
+ROUNDING = 1e-9  #: least eigenvalue of a coherence matrix that is taken for rounding of zero
+AT_ONCE = 4_000_000  #: numbers of stress held at a time
+
+
+@dataclass(frozen=True)
+class CrossSpectrum:
+    """Coherence and phase between two inputs, the same at all frequencies."""
+
+    a: str
+    b: str
+    coherence: float  #: gamma², 0 to 1
+    phase: float = 0.0  #: of S_ab: positive where a is ahead of b [degrees]
+
+
+@dataclass(frozen=True, eq=False)
+class RandomTest:
+    """A stationary Gaussian excitation.
+
+    `level` excites one direction after the other, each a run; `levels` excite several inputs at once, a single run.
+    """
+
+    name: str
+    level: Level | None = None
+    directions: Sequence[str] = ("x", "y", "z")
+    levels: Mapping[str, Level] | None = None
+    cross: Sequence[CrossSpectrum] = ()
+    duration: float | None = None  #: for the largest value to expect [s]
+
+    def __post_init__(self) -> None:
+        where = f"shake: random {self.name!r}"
+        if (self.level is None) == (self.levels is None):
+            raise ModelError(f"{where}: expected either level (one direction after the other) or levels (all at once)")
+        for level in [self.level] if self.level is not None else list((self.levels or {}).values()):
+            if not level.is_density:
+                raise ModelError(f"{where}: unit {level.unit} is no density; expected g2/Hz, (m/s2)2/Hz, ...")
+        if self.levels is not None and not self.levels:
+            raise ModelError(f"{where}: levels: expected one input at least")
+        if self.cross and self.levels is None:
+            raise ModelError(f"{where}: cross spectra need inputs that act at once: give levels by input")
+        if self.duration is not None and not (math.isfinite(self.duration) and self.duration > 0):
+            raise ModelError(f"{where}: duration: expected seconds above 0, got {self.duration!r}")
+        for each in self.cross:
+            if not 0 <= each.coherence <= 1:
+                raise ModelError(
+                    f"{where}: coherence of {each.a} and {each.b}: expected 0 to 1, got {each.coherence!r}"
+                )
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """First and last frequency of all levels [Hz]."""
+        levels = [self.level] if self.level is not None else list((self.levels or {}).values())
+        return min(level.first for level in levels if level), max(level.last for level in levels if level)
+
+
+@dataclass(frozen=True)
+class Miles:
+    """Miles' estimate of a mode: the acceleration of a single mass on its frequency, sqrt(pi/2 f Q S(f))."""
+
+    mode: int  #: from 1
+    frequency: float  #: [Hz]
+    Q: float
+    density: float  #: of the input there [g²/Hz]
+    grms: float  #: [g]
+    share: float  #: of the mass that is effective in the direction
+
+
+@dataclass(frozen=True, eq=False)
+class RandomRun:
+    """Densities and rms of all outputs; those of von Mises' stress as in `stresses`."""
+
+    test: str
+    direction: str  #: names of the inputs
+    outputs: tuple[Output, ...]
+    band: ResolvedBand
+    level: Array  #: densities of the inputs that act, (n_f, n_act) [units of the model² per Hz]
+    inputs: tuple[str, ...]  #: their names
+    input_rms: Array  #: exact, (n_act,) [units of the model]
+    density: Array  #: (n_f, n_out) [units of the model² per Hz]
+    rms: Array  #: (n_out,)
+    error: Array  #: bound of the relative error of rms by the integration, (n_out,)
+    wide: Array  #: densities with uncertainty, (n_f, n_out): what notches keep below their limits
+    uncertain: Array  #: rms with uncertainty, (n_out,)
+    crossings: Array  #: zero crossings upwards, (n_out,) [Hz]
+    expected: Array | None  #: largest value to expect in the duration, (n_out,)
+    von_mises: Mapping[str, RandomVonMises]  #: by place
+    miles: tuple[Miles, ...]  #: of the modes in the band; () where several inputs act
+    transfer: Array  #: complex, (n_f, n_rows, n_act)
+    field: Array | None = None  #: rms of von Mises' stress at all kept nodes, (n_nodes,)
+
+
+def random_runs(model: ShakenModel, test: RandomTest, uncertainty: Uncertainty | None = None) -> list[RandomRun]:
+    """Return the runs of a test: one a direction, or one."""
+    if test.level is not None:
+        return [random_run(model, test, {direction: test.level}, uncertainty) for direction in test.directions]
+    return [random_run(model, test, dict(test.levels or {}), uncertainty)]
+
+
+def random_run(
+    model: ShakenModel, test: RandomTest, levels: Mapping[str, Level], uncertainty: Uncertainty | None = None
+) -> RandomRun:
+    """Return the responses to densities of some inputs.
+
+    Raises
+    ------
+    ModelError
+        If there is no such input, a mode in the band has no damping, or the cross spectra are no spectra.
+    """
+    where, uncertainty = f"shake: random {test.name!r}", uncertainty or Uncertainty()
+    acting = {input_index(model, name, where): (name, level) for name, level in levels.items()}
+    first = min(level.first for level in levels.values())
+    last = max(level.last for level in levels.values())
+    require_damped(model, first, last, where)
+    corners = np.concatenate([level.frequencies for level in levels.values()])
+    band = resolved_band(first, last, model.frequencies, model.damping_ratios, corners)
+    f, columns = band.frequencies, list(acting)
+    density_in = input_density(model, test, acting, f)
+    H = response(model, f)[:, :, columns]
+    root = spectral_root(density_in)
+    G = H @ root  # S_y = G G^H
+    groups = stress_groups(model)
+    density = densities(G, groups)
+    rms2 = band.integral(density)
+    rms = np.sqrt(np.maximum(rms2, 0.0))
+    crossings = np.sqrt(
+        np.divide(band.integral(f[:, None] ** 2 * density), rms2, out=np.zeros_like(rms2), where=rms2 > 0)
+    )
+    spread = uncertainty_of(uncertainty, f, G, density_in, len(columns))
+    wide = density if spread is G else densities(spread, groups)
+    of_places = {
+        model.outputs[rows.start].group: random_von_mises(
+            band.integral(np.einsum("fai,fbi->fab", G[:, rows], G[:, rows].conj()).real)
+        )
+        for rows in groups
+    }  # fmt: skip
+    single = len(columns) == 1 and model.rates[columns[0]] == 2
+    return RandomRun(
+        test=test.name,
+        direction=" and ".join(model.inputs[k] for k in columns),
+        outputs=scalar_outputs(model),
+        band=band,
+        level=np.stack([density_in[:, k, k].real for k in range(len(columns))], axis=1),
+        inputs=tuple(model.inputs[k] for k in columns),
+        input_rms=np.array([level_rms(level) * si_factor(level, model, k) for k, (_, level) in acting.items()]),
+        density=density,
+        rms=rms,
+        error=np.divide(band.error(density), 2 * rms2, out=np.zeros_like(rms2), where=rms2 > 0),
+        wide=wide,
+        uncertain=np.sqrt(np.maximum(band.integral(wide), 0.0)),
+        crossings=crossings,
+        expected=None if test.duration is None else largest(rms, crossings, test.duration),
+        von_mises=of_places,
+        miles=miles_of(model, columns[0], next(iter(levels.values()))) if single else (),
+        transfer=H,
+        field=von_mises_field(model, band, columns, root),
+    )
+
+
+def si_factor(level: Level, model: ShakenModel, k: int) -> float:
+    """Return the factor from the unit of the acceleration of a level to that of the model."""
+    one = Level(level.frequencies[:2], np.ones(2), level.unit, level.where)
+    factor = in_model(level, model.inputs[k].rpartition(":")[2], model.units)
+    return float(np.sqrt(one.in_si(level.frequencies[:1])[0] * factor))
+
+
+def input_density(model: ShakenModel, test: RandomTest, acting: Mapping[int, tuple[str, Level]], f: Array) -> Array:
+    """Return the spectral matrix of the inputs that act, (n_f, n_act, n_act) complex [units of the model² per Hz].
+
+    Raises
+    ------
+    ModelError
+        If it has a negative eigenvalue: no signals have such coherences and phases.
+    """
+    where = f"shake: random {test.name!r}"
+    columns = list(acting)
+    size = np.stack(
+        [
+            np.sqrt(level.in_si(f) * in_model(level, model.inputs[k].rpartition(":")[2], model.units))
+            for k, (_, level) in acting.items()
+        ],
+        axis=1,
+    )
+    gamma = np.eye(len(columns), dtype=complex)
+    for each in test.cross:
+        a, b = (input_index(model, name, where) for name in (each.a, each.b))
+        for name, k in ((each.a, a), (each.b, b)):
+            if k not in acting:
+                raise ModelError(f"{where}: cross spectrum with {name!r}, which has no level")
+        i, j = columns.index(a), columns.index(b)
+        if i == j:
+            raise ModelError(f"{where}: cross spectrum of {each.a!r} with itself")
+        gamma[i, j] = math.sqrt(each.coherence) * np.exp(1j * math.radians(each.phase))
+        gamma[j, i] = gamma[i, j].conj()
+    least = float(np.linalg.eigvalsh(gamma)[0])
+    if least < -ROUNDING:
+        raise ModelError(
+            f"{where}: the coherences and phases contradict each other (eigenvalue {least:.3g} of their matrix is "
+            "below 0): "
+            "no signals have them; if a follows b and b follows c, the phase from a to c is their sum"
+        )
+    return np.asarray(size[:, :, None] * gamma * size[:, None, :])
+
+
+def spectral_root(S: Array) -> Array:
+    """Return L with L L^H = S, (n_f, n, n), from its eigenvectors: S may be singular."""
+    if S.shape[1] == 1:
+        return np.sqrt(S.real).astype(complex)
+    values, axes = np.linalg.eigh(S)
+    return np.asarray(axes * np.sqrt(np.maximum(values, 0.0))[:, None, :])
+
+
+def densities(G: Array, groups: Sequence[slice]) -> Array:
+    """Return the densities of the rows of G G^H, then those of von Mises' stresses, (n_f, n_out)."""
+    extra = [von_mises_density(G[:, rows] @ G[:, rows].conj().transpose(0, 2, 1))[:, None] for rows in groups]
+    return np.concatenate([(np.abs(G) ** 2).sum(axis=2), *extra], axis=1)
+
+
+def uncertainty_of(uncertainty: Uncertainty, f: Array, G: Array, density_in: Array, n_act: int) -> Array:
+    """Return G with uncertain frequencies and factors: transfer functions widened where one input acts alone."""
+    if uncertainty.is_none:
+        return G
+    if n_act > 1:  # the spectrum of all together is widened
+        return uncertainty.widened(f, np.abs(G))
+    root = np.sqrt(density_in[:, :, 0].real)[:, :, None]
+    return np.asarray(uncertainty.widened(f, np.abs(np.divide(G, root, out=np.zeros_like(G), where=root > 0))) * root)
+
+
+def largest(rms: Array, crossings: Array, duration: float) -> Array:
+    """Return the largest value to expect of a Gaussian process, (n,): sigma (a + 0.5772/a), a = sqrt(2 ln(nu T))."""
+    a = np.sqrt(2 * np.log(np.maximum(crossings * duration, math.e)))
+    return np.asarray(rms * (a + np.euler_gamma / a))
+
+
+def miles_of(model: ShakenModel, k: int, level: Level) -> tuple[Miles, ...]:
+    """Return Miles' estimates of the modes in the band of a level."""
+    if model.inputs[k].rpartition(":")[2] not in ("x", "y", "z"):
+        return ()
+    shares = model.B[2, :, k] ** 2 / model.mass[k, k]
+    factor = in_model(level, "x", model.units)
+    found = []
+    for mode, (f, zeta) in enumerate(zip(model.frequencies, model.damping_ratios, strict=True)):
+        if level.first <= f <= level.last:
+            density = float(level.in_si(np.array([f]))[0] * factor / model.gravity**2)
+            Q = 1 / (2 * zeta)
+            found.append(
+                Miles(
+                    mode + 1, float(f), float(Q), density, math.sqrt(math.pi / 2 * f * Q * density), float(shares[mode])
+                )
+            )
+    return tuple(found)
+
+
+def von_mises_field(model: ShakenModel, band: ResolvedBand, columns: Sequence[int], root: Array) -> Array | None:
+    """Return the rms of von Mises' stress at all kept nodes, (n_nodes,), from the covariance of the modes alone."""
+    if model.field is None:
+        return None
+    of_modes, of_s = model.field
+    eta, omega = modal_response(model, band.frequencies)
+    moved = eta[:, :, columns] @ root
+    stress_modes = of_modes
+    if of_s[:, :, columns].any():
+        unit = np.zeros((3, len(columns), len(columns)))
+        unit[0] = np.eye(len(columns))
+        own = driven(unit, model.rates[list(columns)], omega) @ root
+        moved, stress_modes = (
+            np.concatenate([moved, own], axis=1),
+            np.concatenate([of_modes, of_s[:, :, columns]], axis=2),
+        )
+    covariance = np.einsum("f,fki,fli->kl", band.weights, moved, moved.conj(), optimize=True).real
+    values, axes = np.linalg.eigh(covariance)
+    L = axes * np.sqrt(np.maximum(values, 0.0))
+    n_nodes = len(stress_modes)
+    rms = np.empty(n_nodes)
+    rows = max(1, AT_ONCE // max(1, 6 * L.shape[1]))
+    for first in range(0, n_nodes, rows):
+        s = stress_modes[first : first + rows] @ L
+        rms[first : first + rows] = np.sqrt(np.maximum(np.einsum("nak,ab,nbk->n", s, VON_MISES, s, optimize=True), 0.0))
+    return rms

@@ -1,0 +1,345 @@
+"""A shake result as one record in plain types, for JSON, and as one table, for CSV. Accelerations are in g."""
+
+import csv
+import io
+from typing import Any
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.durability.shaking.loads.notching import NotchedRun
+from floatframe.durability.shaking.loads.random_vibration import RandomRun
+from floatframe.durability.shaking.loads.shock import TimeRun
+from floatframe.durability.shaking.loads.sine import SineRun
+from floatframe.durability.shaking.shake import ShakeResult
+from floatframe.durability.shaking.structure.model import Output, ShakenModel
+
+__all__ = ["COLUMNS", "NOTHING", "conversions", "in_tables", "shake_csv", "shake_record", "table_rows", "worst_nodes"]
+
+FEW = 50  #: numbers in a row, beyond which it is a curve
+DIGITS = 7  #: of the numbers of a curve
+
+NOTHING = 1e-9  #: of the largest output of a kind, below which a value is rounding
+COLUMNS = (
+    "test",
+    "kind",
+    "direction",
+    "output",
+    "place",
+    "unit",
+    "value",
+    "what",
+    "at",
+    "with uncertainty",
+    "three sigma",
+    "quasi-static",
+    "swept",
+    "notched",
+)
+WORST = 20  #: nodes of the table of largest stress
+
+
+def in_tables(model: ShakenModel, output: Output) -> tuple[float, str]:
+    """Return the factor from units of the model to those of the tables, and their unit: g for accelerations."""
+    return (1 / model.gravity, "g") if output.kind == "acceleration" else (1.0, output.unit)
+
+
+def conversions(model: ShakenModel) -> list[str]:
+    """Say what one g and one Hz are in units of the model."""
+    units = model.units
+    length, second = units.length_symbol, units.time_symbol
+    said = [
+        f"units of the model: {units.name} ({length}, {units.mass_symbol}, {second}, force {units.force_symbol}, "
+        "stress "
+        f"{units.stress_symbol})",
+        f"1 g = 9.80665 m/s² = {model.gravity:.9g} {length}/{second}²; 1 g²/Hz = {model.gravity**2:.9g} "
+        f"({length}/{second}²)²/Hz",
+        "frequencies in Hz = 1/s" + (f"; the model's unit of time is {units.time:g} s" if units.time != 1 else ""),
+        "accelerations in g, all else in units of the model; forces are those of the base on the structure",
+    ]
+    return said
+
+
+def shake_record(result: ShakeResult) -> dict[str, Any]:
+    """Return everything but the time histories in full: conversions, modes, masses, runs with their curves."""
+    model = result.model
+    masses = result.masses
+    return {
+        "format": "floatframe shake",
+        "title": result.job.title,
+        "structure": model.name,
+        "source": result.job.source,
+        "units": {"name": model.units.name, "conversions": conversions(model), "g": model.gravity},
+        "bases": [
+            {"name": base.name, "holds": list(base.holds), "point": plain(base.point), "axes": plain(base.axes)}
+            for base in model.bases
+        ],
+        "damping": result.job.damping.words,
+        "uncertainty": result.job.uncertainty.words,
+        "notes": list(result.notes),
+        "mass_matrix": plain(model.mass),
+        "modes": [
+            {
+                "mode": k + 1,
+                "frequency_hz": float(masses.frequencies[k]),
+                "damping_ratio": float(masses.damping[k]),
+                "is_static": bool(k >= len(model.omega) - model.n_residual),
+                "effective_mass": plain(masses.mass[k]),
+                "share": plain(masses.share[k]),
+                "cumulative": plain(masses.cumulative[k]),
+            }
+            for k in range(len(masses.frequencies))
+        ],
+        "mass_directions": list(masses.directions),
+        "sine": [sine_record(model, run) for run in result.sine],
+        "random": [random_record(model, run) for run in result.random],
+        "time": [time_record(model, run) for run in result.time],
+        "notched": [
+            {"kind": kind, "test": test, "direction": direction, **notched_record(model, kind, run)}
+            for (kind, test, direction), run in result.notched.items()
+        ],
+        "table": [dict(zip(COLUMNS, row, strict=True)) for row in table_rows(result)],
+    }
+
+
+def plain(values: Array) -> Any:
+    """Return numbers as lists; what is not finite as None; curves with `DIGITS` digits, as files are long."""
+    array = np.asarray(values, dtype=float)
+    if array.ndim == 2 and array.shape[1] > FEW and np.isfinite(array).all():
+        return [[float(f"{value:.{DIGITS}g}") for value in row] for row in array.tolist()]
+    listed = array.tolist()
+    if np.isfinite(array).all():
+        return listed
+    return [plain(each) for each in array] if array.ndim > 1 else [v if np.isfinite(v) else None for v in listed]
+
+
+def output_records(model: ShakenModel, outputs: tuple[Output, ...]) -> list[dict[str, str]]:
+    """Return name, kind, unit and place of outputs."""
+    return [{"name": o.name, "kind": o.kind, "unit": in_tables(model, o)[1], "place": o.place} for o in outputs]
+
+
+def factors(model: ShakenModel, outputs: tuple[Output, ...]) -> Array:
+    """Return the factors to the units of the tables, (n_out,)."""
+    return np.array([in_tables(model, output)[0] for output in outputs])
+
+
+def sine_record(model: ShakenModel, run: SineRun) -> dict[str, Any]:
+    """Return a sine run."""
+    scale = factors(model, run.outputs)
+    record = {
+        "test": run.test,
+        "direction": run.direction,
+        "outputs": output_records(model, run.outputs),
+        "frequencies_hz": plain(run.frequencies),
+        "level": plain(run.level * level_scale(model, run.direction)),
+        "amplitudes": plain((run.sizes * scale).T),
+        "with_uncertainty": plain((run.uncertain * scale).T),
+        "quasi_static": plain((run.static * scale).T),
+    }
+    if run.swept is not None:
+        record |= {"rate_octaves_per_minute": run.rate, "swept_frequencies_hz": plain(run.swept_frequencies)}
+        record["swept"] = plain((run.swept * scale).T)
+    return record
+
+
+def level_scale(model: ShakenModel, direction: str) -> float:
+    """Return the factor of a level from the model to the tables: to g; that of a rotation stays."""
+    return 1.0 if direction.rpartition(":")[2].startswith("r") else 1 / model.gravity
+
+
+def random_record(model: ShakenModel, run: RandomRun) -> dict[str, Any]:
+    """Return a random run."""
+    scale = factors(model, run.outputs)
+    own = np.array([level_scale(model, name) for name in run.inputs])
+    return {
+        "test": run.test,
+        "direction": run.direction,
+        "inputs": list(run.inputs),
+        "input_rms": plain(run.input_rms * own),
+        "outputs": output_records(model, run.outputs),
+        "frequencies_hz": plain(run.band.frequencies),
+        "level": plain((run.level * own**2).T),
+        "densities": plain((run.density * scale**2).T),
+        "rms": plain(run.rms * scale),
+        "integration_error": plain(run.error),
+        "rms_with_uncertainty": plain(run.uncertain * scale),
+        "zero_crossings_hz": plain(run.crossings),
+        "largest_expected": None if run.expected is None else plain(run.expected * scale),
+        "von_mises": {
+            name: {"rms": one.rms, "not_exceeded_99.73_percent": one.quantile, "over_rms": one.factor}
+            for name, one in run.von_mises.items()
+        },
+        "miles": [
+            {
+                "mode": m.mode,
+                "frequency_hz": m.frequency,
+                "Q": m.Q,
+                "g2_per_hz": m.density,
+                "grms": m.grms,
+                "mass_share": m.share,
+            }
+            for m in run.miles
+        ],
+        "worst_nodes": [{"node": name, "von_mises_rms": value} for name, value in worst_nodes(model, run)],
+    }
+
+
+def worst_nodes(model: ShakenModel, run: RandomRun) -> list[tuple[str, float]]:
+    """Return the nodes with the largest rms of von Mises' stress, the largest first."""
+    if run.field is None:
+        return []
+    order = np.argsort(-run.field)[:WORST]
+    return [(model.field_labels[k], float(run.field[k])) for k in order]
+
+
+def time_record(model: ShakenModel, run: TimeRun) -> dict[str, Any]:
+    """Return a run over time: peaks and spectra."""
+    scale = factors(model, run.outputs)
+    return {
+        "test": run.test,
+        "kind": run.kind,
+        "what": run.words,
+        "direction": run.direction,
+        "inputs": list(run.inputs),
+        "velocity_left": plain(run.velocity_left),
+        "displacement_left": plain(run.displacement_left),
+        "outputs": output_records(model, run.outputs),
+        "peaks": plain(run.peaks * scale),
+        "peak_times_s": plain(run.peak_times),
+        "peaks_with_uncertainty": plain(run.uncertain * scale),
+        "spectra": {
+            "kind": run.spectra_kind,
+            "frequencies_hz": plain(run.spectra_frequencies),
+            "values": {
+                name: {f"Q {Q:g}": plain(v / model.gravity) for Q, v in by_q.items()}
+                for name, by_q in run.spectra.items()
+            },
+            "unit": {"acceleration": "g", "displacement": "g s²", "pseudo-velocity": "g s"}[run.spectra_kind],
+        },
+        "synthesis": None
+        if run.synthesis is None
+        else {
+            "frequencies_hz": plain(run.synthesis.frequencies),
+            "target": plain(run.synthesis.target),
+            "reached": plain(run.synthesis.reached),
+            "largest_deviation_db": float(np.abs(run.synthesis.decibels).max()),
+        },
+    }
+
+
+def notched_record(model: ShakenModel, kind: str, run: NotchedRun) -> dict[str, Any]:
+    """Return a notched input; limits and outputs as they are compared, in units of the model."""
+    power = 1 if kind == "sine" else 2
+    return {
+        "frequencies_hz": plain(run.frequencies),
+        "level": plain(run.level / model.gravity**power),
+        "notched": plain(run.notched / model.gravity**power),
+        "input_rms": None if run.input_rms is None else run.input_rms / model.gravity,
+        "notches": [
+            {
+                "from_hz": n.first,
+                "to_hz": n.last,
+                "deepest_hz": n.deepest,
+                "depth_db": n.depth,
+                "reason": n.reason,
+                "output": n.output,
+                "limit": n.limit,
+                "without_notch": n.unnotched,
+            }
+            for n in run.notches
+        ],
+    }
+
+
+def table_rows(result: ShakeResult) -> list[tuple[Any, ...]]:
+    """Return one row an output and run, as `COLUMNS` names them; what is rounding of zero is left out."""
+    model, rows = result.model, []
+    for sine in result.sine:
+        scale, keep = factors(model, sine.outputs), told(sine.outputs, sine.peaks)
+        swept, notched = sine.swept_peaks, result.notched.get(("sine", sine.test, sine.direction))
+        static = sine.static.max(axis=0)
+        for k in keep:
+            o, s = sine.outputs[k], scale[k]
+            rows.append(
+                (
+                    sine.test,
+                    "sine",
+                    sine.direction,
+                    o.name,
+                    o.place,
+                    in_tables(model, o)[1],
+                    s * sine.peaks[k],
+                    "amplitude",
+                    f"{sine.peak_frequencies[k]:.6g} Hz",
+                    s * sine.uncertain[:, k].max(),
+                    None,
+                    s * static[k],
+                    None if swept is None else s * swept[k],
+                    None if notched is None else s * notched.sizes[:, k].max(),
+                )
+            )
+    for random in result.random:
+        scale, keep = factors(model, random.outputs), told(random.outputs, random.rms)
+        notched = result.notched.get(("random", random.test, random.direction))
+        for k in keep:
+            o, s = random.outputs[k], scale[k]
+            rms = None if notched is None or notched.rms is None else s * notched.rms[k]
+            rows.append(
+                (
+                    random.test,
+                    "random",
+                    random.direction,
+                    o.name,
+                    o.place,
+                    in_tables(model, o)[1],
+                    s * random.rms[k],
+                    "rms",
+                    f"{random.crossings[k]:.6g} crossings/s",
+                    s * random.uncertain[k],
+                    3 * s * random.rms[k],
+                    None,
+                    None,
+                    rms,
+                )
+            )
+    for run in result.time:
+        scale, keep = factors(model, run.outputs), told(run.outputs, run.peaks)
+        for k in keep:
+            o, s = run.outputs[k], scale[k]
+            rows.append(
+                (
+                    run.test,
+                    run.kind,
+                    run.direction,
+                    o.name,
+                    o.place,
+                    in_tables(model, o)[1],
+                    s * run.peaks[k],
+                    "largest",
+                    f"{run.peak_times[k]:.6g} s",
+                    s * run.uncertain[k],
+                    None,
+                    None,
+                    None,
+                    None,
+                )
+            )
+    return [tuple(float(v) if isinstance(v, np.floating) else v for v in row) for row in rows]
+
+
+def told(outputs: tuple[Output, ...], values: Array) -> list[int]:
+    """Return the outputs that are more than rounding beside others of their kind."""
+    largest: dict[str, float] = {}
+    for output, value in zip(outputs, values, strict=True):
+        largest[output.kind] = max(largest.get(output.kind, 0.0), float(value))
+    return [k for k, (o, v) in enumerate(zip(outputs, values, strict=True)) if v > NOTHING * largest[o.kind]]
+
+
+def shake_csv(result: ShakeResult) -> str:
+    """Return the table of all outputs and runs as comma-separated values."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for row in table_rows(result):
+        writer.writerow(["" if value is None else repr(value) if isinstance(value, float) else value for value in row])
+    return text.getvalue()

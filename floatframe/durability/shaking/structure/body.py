@@ -1,0 +1,360 @@
+"""A reduced body on bases: its interfaces driven, its free rigid motion beside its modes.
+
+x = (d, theta, q): translation and rotation of the body frame, which nothing but the bases holds, and its modes, with
+the mass and stiffness of docs/theory.md §6 at rest. Of a body that is held already the ground is the base: it moves
+d and
+theta.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+
+from cms.assessment.quality.reference.free_pencil import whole_pencil
+from cms.body.reduced_body import ReducedBody, ReducedInterface
+from fe_models.body.rigid_motion import rigid_motion_of_points
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.components import STRESS_COMPONENTS
+from fe_models.foundation.units import Units
+from floatframe.durability.shaking.structure.damping import Damping
+from floatframe.durability.shaking.structure.elimination import Held, held_by_bases
+from floatframe.durability.shaking.structure.model import DIRECTIONS, Base, Output, ShakenModel, rigid_rows
+from floatframe.durability.shaking.structure.places import Observed, Place, found_places, in_mesh_axes, six_rows
+from floatframe.durability.shaking.structure.recovery_rows import interface_loads, recovery_outputs, recovery_table
+from floatframe.errors import ModelError
+
+__all__ = ["bases_of_body", "force_outputs", "shaken_body"]
+
+GROUND = "ground"
+
+
+def bases_of_body(
+    body: ReducedBody, bases: Mapping[str, Sequence[str]] | str | None, points: Mapping[str, Array] | None = None
+) -> tuple[Base, ...]:
+    """Return the bases of a body, in mesh coordinates.
+
+    Parameters
+    ----------
+    bases
+        Name -> interfaces it holds; the name of one interface; None: the only interface, the ground of a held body.
+    points
+        Reference point of a base by name, mesh coordinates; default: that of its first interface.
+    """
+    where, names = f"shake: body {body.name!r}", [interface.name for interface in body.interfaces]
+    points = points or {}
+    if body.is_held:
+        if bases not in (None, GROUND, {GROUND: ()}):
+            raise ModelError(
+                f'{where} is held to the ground, which is its only base: leave base out, or write "{GROUND}"'
+            )
+        return (Base(GROUND, (), np.asarray(points.get(GROUND, body.frame.origin), dtype=float)),)
+    if bases is None:
+        if len(names) != 1:
+            raise ModelError(
+                f"{where} has the interfaces {', '.join(names) or '(none)'}: name the one that is the base"
+            )
+        bases = names[0]
+    if isinstance(bases, str):
+        bases = {bases: (bases,)}
+    found = []
+    for name, held in bases.items():
+        if not held:
+            raise ModelError(f"{where}: base {name!r}: expected one interface at least; choices: {', '.join(names)}")
+        interfaces = [body.interface(other) for other in held]
+        point = points.get(name, body.frame.origin + body.frame.axes @ interfaces[0].position)
+        found.append(Base(name, tuple(held), np.asarray(point, dtype=float)))
+    taken = [name for base in found for name in base.holds]
+    twice = sorted({name for name in taken if taken.count(name) > 1})
+    if twice:
+        raise ModelError(f"{where}: interface {twice[0]!r} is held by two bases")
+    return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class OutputRows:
+    """Some outputs over the modes and the inputs, as in `ShakenModel`."""
+
+    outputs: list[Output]
+    E: Array  #: (3, n_out, n_m)
+    D: Array  #: (3, n_out, n_s)
+
+
+@dataclass(frozen=True, eq=False)
+class OnBases:
+    """A body with its motions on bases and the loads on it."""
+
+    body: ReducedBody
+    bases: tuple[Base, ...]
+    M: Array  #: over x, axes of B, (n_x, n_x)
+    C: Array  #: zero where the damping is given by modes
+    K: Array
+    F: Array  #: loads of the forces, (n_x, n_f)
+    forces: tuple[str, ...]
+    held: Held
+
+
+def shaken_body(
+    body: ReducedBody,
+    bases: Sequence[Base],
+    damping: Damping,
+    observed: Sequence[Observed] = (),
+    forces: Sequence[str] = (),
+) -> ShakenModel:
+    """Return a body on its bases (steps 4 and 5 of `elimination`).
+
+    Parameters
+    ----------
+    forces
+        Further inputs: "interface:x" (a force, or moment for rx, ry, rz, mesh axes) or "load case NAME".
+
+    Raises
+    ------
+    ModelError
+        If the bases do not hold the body, or its modes cannot follow them; names that do not exist with the nearest.
+    """
+    where, bases = f"shake: body {body.name!r}", tuple(bases)
+    pencil = whole_pencil(body)
+    M, K = np.asarray(pencil.M), np.asarray(pencil.K)
+    G, R = held_rows(body, bases)
+    rigid = rigid_motion(body, bases[0]) if len(bases) == 1 else None
+    held = held_by_bases(where, M, K, G, R, sizes_of(body), rigid)
+    if not len(held.omega):
+        raise ModelError(f"{where}: nothing of it moves while its bases hold it: no mode with mass is left")
+    F = np.column_stack([force_column(body, name) for name in forces]) if forces else np.zeros((len(M), 0))
+    own = np.asarray(pencil.D) if damping.own else np.zeros_like(M)
+    on = OnBases(body, bases, M, own, K, F, tuple(forces), held)
+    n_s, n_f = held.T.shape[1], F.shape[1]
+    if damping.own:
+        C = held.V.T @ own @ held.V
+    else:
+        C = np.diag(2 * damping.ratios(held.omega / (2 * np.pi) / body.units.time) * held.omega)
+    B = np.zeros((3, len(held.omega), n_s + n_f))
+    B[2, :, :n_s], B[0, :, n_s:] = -held.V.T @ M @ held.T, held.V.T @ F
+    B[1, :, :n_s] = -held.V.T @ follows(on, own) if len(bases) > 1 else 0.0
+    rows = [*base_rows(on), *(row for each in observed for row in observed_rows(on, each))]
+    return ShakenModel(
+        name=body.name,
+        units=body.units,
+        bases=bases,
+        inputs=(*(f"{base.name}:{name}" for base in bases for name in DIRECTIONS), *forces),
+        rates=np.array([2] * n_s + [0] * n_f),
+        omega=held.omega,
+        C=C,
+        B=B,
+        E=np.concatenate([row.E for row in rows], axis=1),
+        D=np.concatenate([row.D for row in rows], axis=1),
+        outputs=tuple(output for row in rows for output in row.outputs),
+        mass=held.T.T @ M @ held.T,
+        field=stress_field(on),
+        field_labels=()
+        if body.stress is None
+        else (
+            *(f"node {body.node_name(row)}" for row in range(len(body.nodes))),
+            *(() if body.point_stress is None else body.point_stress.names),
+        ),
+    )
+
+
+def follows(on: OnBases, matrix: Array) -> Array:
+    """Return a matrix of stiffness or damping times T; zero, not rounding, where one base carries all rigidly."""
+    return np.zeros_like(on.held.T) if len(on.bases) == 1 else matrix @ on.held.T
+
+
+def base_rows(on: OnBases) -> list[OutputRows]:
+    """Return what the bases exert on the body, each and all together, and the mean acceleration by it (step 5)."""
+    T, V, bases = on.held.T, on.held.V, on.bases
+    n_s, n_f = T.shape[1], on.F.shape[1]
+    E = np.stack([np.zeros((n_s, V.shape[1])), follows(on, on.C).T @ V, T.T @ on.M @ V])
+    D = np.zeros((3, n_s, n_s + n_f))
+    for rate, matrix in enumerate((follows(on, on.K), follows(on, on.C), on.M @ T)):
+        D[rate, :, :n_s] = T.T @ matrix
+    D[0, :, n_s:] = -T.T @ on.F
+    units = on.body.units
+    rows = [OutputRows([o for base in bases for o in force_outputs(base.name, "about its point", units)], E, D)]
+    # power of the wrenches in a motion of all bases with the first: its force and moment
+    to_net = np.vstack(
+        [la.block_diag(base.axes, base.axes).T @ rigid_rows(base.point, bases[0]) for base in bases]
+    ).T  # fmt: skip
+    if len(bases) > 1:
+        names = force_outputs("net", f"about the point of base {bases[0].name}", units)
+        rows.append(OutputRows(names, to_net @ E, to_net @ D))
+    per_mass = to_net[:3] / float(on.body.moments.m)
+    names = [
+        Output(f"mean acceleration {axis}", "acceleration", unit_of("acceleration", units), "mean acceleration",
+               "net force of the bases over the mass")
+        for axis in DIRECTIONS[:3]
+    ]  # fmt: skip
+    rows.append(OutputRows(names, per_mass @ E, per_mass @ D))
+    return rows
+
+
+def observed_rows(on: OnBases, each: Observed) -> list[OutputRows]:
+    """Return the outputs of a place, or of the nodes of an element or set."""
+    units, n_s = on.body.units, on.held.T.shape[1]
+    if each.recovery is not None:
+        return [table_rows(on, each)]
+    found = []
+    for place in found_places(on.body, each):
+        for wish in each.quantities:
+            if wish == "acceleration":
+                found.append(rows_of(on, motion_outputs(place, wish, units), place.rows, 2, place.rows @ on.held.T))
+            elif wish == "displacement":
+                own = np.zeros((len(place.rows), n_s))
+                if len(on.bases) > 1:  # less what the first base alone would carry along; nothing is left with one base
+                    own = place.rows @ on.held.T
+                    own[:, :6] -= rigid_rows(place.point, on.bases[0])[: len(own)]
+                found.append(rows_of(on, motion_outputs(place, wish, units), place.rows, 0, own))
+            elif place.stress is not None:
+                found.append(rows_of(on, stress_outputs(place, units), place.stress, 0, place.stress @ on.held.T))
+    return found
+
+
+def table_rows(on: OnBases, each: Observed) -> OutputRows:
+    """Return the rows of a recovery table, with what the bases exert as its loads."""
+    table, bases = recovery_table(on.body, each), base_rows(on)[0]
+    by_lam, by_force = interface_loads(on.body, table, on.bases, on.forces)
+    dynamic, n_s = np.asarray(table.dynamic), on.held.T.shape[1]
+    E = dynamic @ on.held.V + by_lam @ bases.E
+    D = by_lam @ bases.D
+    follows_s = np.array(on.held.T)
+    follows_s[:, :6] -= rigid_motion(on.body, on.bases[0])  # nothing is left with one base
+    D[:2, :, :n_s] += dynamic[:2] @ follows_s
+    D[2, :, :n_s] += dynamic[2] @ on.held.T
+    D[0, :, n_s:] += by_force + dynamic[0] @ (on.held.V_0 @ (on.held.V_0.T @ on.F))
+    return OutputRows(recovery_outputs(each, table), E, D)
+
+
+def rows_of(on: OnBases, outputs: list[Output], by_x: Array, rate: int, by_s: Array) -> OutputRows:
+    """Return rows of d^rate x/dt^rate, of s by_s (n_out, 6 n_bases)."""
+    n_s, n_f, V_0 = by_s.shape[1], on.F.shape[1], on.held.V_0
+    E = np.zeros((3, len(outputs), on.held.V.shape[1]))
+    D = np.zeros((3, len(outputs), n_s + n_f))
+    E[rate], D[rate, :, :n_s] = by_x @ on.held.V, by_s
+    if rate == 0:  # shapes without mass follow forces at once; their accelerations would be rates of the forces
+        D[0, :, n_s:] = by_x @ V_0 @ (V_0.T @ on.F)
+    return OutputRows(outputs, E, D)
+
+
+def stress_field(on: OnBases) -> tuple[Array, Array] | None:
+    """Return the stress of modes and inputs at all kept nodes, then at the stress points."""
+    parts = [] if on.body.stress is None else [np.asarray(on.body.stress)]
+    if on.body.point_stress is not None and on.body.stress is not None:
+        parts.append(np.asarray(on.body.point_stress.modes))
+    if not parts:
+        return None
+    modes, n_q = parts[0] if len(parts) == 1 else np.concatenate(parts), on.body.n_q
+    of_s = np.zeros((len(modes), 6, on.held.T.shape[1] + on.F.shape[1]))
+    of_s[:, :, : on.held.T.shape[1]] = modes @ on.held.T[-n_q:]
+    of_s[:, :, on.held.T.shape[1] :] = modes @ (on.held.V_0[-n_q:] @ (on.held.V_0.T @ on.F))
+    return modes @ on.held.V[-n_q:], of_s
+
+
+def held_rows(body: ReducedBody, bases: Sequence[Base]) -> tuple[Array, Array]:
+    """Return G and R, mesh axes: what the bases hold of x, and how that follows them."""
+    G: list[Array] = []
+    R: list[Array] = []
+    for k, base in enumerate(bases):
+        if body.is_held:
+            held = [(base.point, in_mesh_axes(body, six_rows(body, base.point, np.zeros((6, body.n_q)))))]
+        else:
+            held = [point for name in base.holds for point in held_points(body, body.interface(name))]
+        for point, rows in held:
+            motion = np.zeros((len(rows), 6 * len(bases)))
+            motion[:, 6 * k : 6 * k + 6] = rigid_rows(point, base)[: len(rows)]
+            G.append(rows)
+            R.append(motion)
+    return np.concatenate(G), np.concatenate(R)
+
+
+def held_points(body: ReducedBody, interface: ReducedInterface) -> list[tuple[Array, Array]]:
+    """Return points of an interface, mesh coordinates, with the three or six rows of their motion over x, mesh axes.
+
+    The reference point; each member by itself where the interface has no reference node of its own.
+    """
+    frame = body.frame
+    if interface.kind == "nodes" and not (len(interface.members) == 1 and interface.has_rotation):
+        points, Phi = body.nodes[interface.members], body.Phi[interface.members]
+        rows = np.concatenate([rigid_motion_of_points(points, np.zeros(3)), Phi], axis=2)
+        return [(frame.origin + frame.axes @ p, frame.axes @ r) for p, r in zip(points, rows, strict=True)]
+    point = frame.origin + frame.axes @ interface.position
+    rows = in_mesh_axes(body, six_rows(body, point, np.asarray(interface.Psi)))
+    return [(point, rows if interface.has_rotation else rows[:3])]
+
+
+def sizes_of(body: ReducedBody) -> Array:
+    """Return sizes of x that move the body by about a length of one, (6 + n_q,)."""
+    length = float(np.linalg.norm(np.ptp(body.nodes, axis=0))) or 1.0
+    largest = np.abs(body.Phi).max(axis=(0, 1), initial=0.0)
+    for interface in body.interfaces:
+        largest = np.maximum(largest, np.abs(np.asarray(interface.Psi)[:3]).max(axis=0))
+        largest = np.maximum(largest, length * np.abs(np.asarray(interface.Psi)[3:]).max(axis=0))
+    return np.concatenate([np.ones(3), np.full(3, 1 / length), 1 / np.where(largest > 0, largest, 1.0)])
+
+
+def rigid_motion(body: ReducedBody, base: Base) -> Array:
+    """Return x that carries the whole body with a base, (6 + n_q, 6): no mode takes part."""
+    T = np.zeros((6 + body.n_q, 6))
+    T[:6] = la.block_diag(body.frame.axes, body.frame.axes).T @ rigid_rows(body.frame.origin, base)
+    return T
+
+
+def force_column(body: ReducedBody, name: str) -> Array:
+    """Return the load on x of a unit force, (6 + n_q,)."""
+    column = np.zeros(6 + body.n_q)
+    if name.startswith("load case "):
+        case = body.load_case(name.removeprefix("load case "))
+        column[:3], column[3:6], column[6:] = case.force, case.torque, case.h
+        return column
+    place, _, direction = name.rpartition(":")
+    if direction not in DIRECTIONS or not place:
+        raise ModelError(
+            f"shake: force {name!r}: expected interface:component with one of {', '.join(DIRECTIONS)}, or "
+            '"load case NAME"'
+        )
+    interface = body.interface(place)
+    point = body.frame.origin + body.frame.axes @ interface.position
+    return np.asarray(in_mesh_axes(body, six_rows(body, point, np.asarray(interface.Psi)))[DIRECTIONS.index(direction)])
+
+
+# Names of outputs -----------------------------------------------------------------------------------------------------
+
+
+def unit_of(kind: str, units: Units) -> str:
+    """Return the unit of a kind of output."""
+    length, force, second = units.length_symbol, units.force_symbol, units.time_symbol
+    return {
+        "acceleration": f"{length}/{second}²",
+        "angular acceleration": f"rad/{second}²",
+        "displacement": length,
+        "rotation": "rad",
+        "force": force,
+        "moment": f"{force} {length}",
+        "stress": units.stress_symbol,
+    }[kind]
+
+
+def force_outputs(name: str, place: str, units: Units) -> list[Output]:
+    """Return force and moment of a base on the structure."""
+    kinds = ("force",) * 3 + ("moment",) * 3
+    return [
+        Output(f"{name} {kind} {axis[-1]}", kind, unit_of(kind, units), f"{name} {kind}", place)
+        for kind, axis in zip(kinds, DIRECTIONS, strict=True)
+    ]
+
+
+def motion_outputs(place: Place, quantity: str, units: Units) -> list[Output]:
+    """Return the outputs of a motion: three translations, and rotations where there are any."""
+    turning = {"acceleration": "angular acceleration", "displacement": "rotation"}[quantity]
+    kinds = [quantity] * 3 + [turning] * (len(place.rows) - 3)
+    return [
+        Output(f"{place.name} {kind} {axis[-1]}", kind, unit_of(kind, units), f"{place.name} {kind}", place.words)
+        for kind, axis in zip(kinds, DIRECTIONS, strict=False)
+    ]
+
+
+def stress_outputs(place: Place, units: Units) -> list[Output]:
+    """Return the six components of a stress."""
+    group = f"{place.name} stress"
+    return [Output(f"{group} {c}", "stress", unit_of("stress", units), group, place.words) for c in STRESS_COMPONENTS]

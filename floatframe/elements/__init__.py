@@ -1,8 +1,0 @@
-"""Public elements: forces, joints and components of users and of other rooms, added without changes to the core."""
-
-from floatframe.elements.element import NOTHING, POSITION, VELOCITY, Element, ElementLaw, GapSpring, Placed
-
-__all__ = ["ELEMENTS", "NOTHING", "POSITION", "VELOCITY", "Element", "ElementLaw", "GapSpring", "Placed"]
-
-#: elements of this room, by their names in system files without "elements."
-ELEMENTS = {"expressions": "floatframe.elements.expressions:ExpressionElement"}

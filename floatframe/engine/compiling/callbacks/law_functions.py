@@ -1,0 +1,156 @@
+"""The functions of elements as C functions that the kernels call by their address.
+
+A function of numba is compiled behind a C function once for all elements that share it, whatever their numbers of
+markers and states. The machine code is kept beside the package, under a key that changes with all the function refers
+to (`law_source`); one that refers to what has no such key is compiled anew in each process.
+"""
+
+import ctypes
+from collections.abc import Callable
+from types import FunctionType
+from typing import Any
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.engine.compiling.callbacks.law_source import digest_of
+from floatframe.engine.compiling.callbacks.user_forces import Callback
+from floatframe.errors import ModelError
+from floatframe.model.elements.element import ElementLaw
+
+__all__ = ["called_law", "law_callbacks"]
+
+WHOLE, REAL = ctypes.POINTER(ctypes.c_int64), ctypes.POINTER(ctypes.c_double)
+C_FUNCTION = ctypes.CFUNCTYPE(None, WHOLE, REAL, REAL, REAL)
+SIGNATURES = {
+    "function": "function(t, x, z, lam, data, wrench, z_dot, g, seen)",
+    "tangent": "tangent(t, x, z, lam, data, slopes)",
+}
+
+#: made of functions by numba, by function and template; both are kept alive
+compiled: dict[tuple[int, str], tuple[Any, Any]] = {}
+
+
+def law_callbacks(where: str, law: ElementLaw, head: tuple[int, ...]) -> tuple[Callback, Callback]:
+    """Return the C functions of values and of derivatives of a law.
+
+    Raises
+    ------
+    ModelError
+        If a function of numba cannot be compiled for arrays of numbers.
+    """
+    value = callback(where, law.function, "value", head)
+    if callable(law.tangent):
+        return value, callback(where, law.tangent, "given", head)
+    if is_compiled(law.function):
+        return value, callback(where, law.function, law.tangent, head)
+    return value, callback(where, law.function, "difference" if law.tangent == "differences" else law.tangent, head)
+
+
+def is_compiled(function: Callable[..., None]) -> bool:
+    """Whether a function is one of numba."""
+    from numba.core.dispatcher import Dispatcher
+
+    return isinstance(function, Dispatcher)
+
+
+def callback(where: str, function: Callable[..., None], kind: str, head: tuple[int, ...]) -> Callback:
+    """Return a function of an element behind a C function, by the template of a kind."""
+    from floatframe.engine.compiling.callbacks import law_templates
+
+    templates = {
+        "value": law_templates.value_template,
+        "given": law_templates.given_template,
+        "complex": law_templates.complex_template,
+        "differences": law_templates.difference_template,
+        "difference": law_templates.difference_template,
+    }
+    if is_compiled(function):
+        return compiled_callback(where, function, kind, templates[kind])
+    return python_callback(where, function, kind, templates[kind], head)
+
+
+def compiled_callback(where: str, function: Any, kind: str, template: Callable[[int], FunctionType]) -> Callback:
+    """Return a function of numba behind a C function."""
+    from numba import cfunc, types
+    from numba.core.errors import NumbaError
+
+    key = id(function), template.__name__
+    if key not in compiled:
+        digest = digest_of(function)
+        number = types.CPointer(types.float64)
+        signature = types.void(types.CPointer(types.int64), number, number, number)
+        made = filled(template, function, 1 if digest is None else digest)
+        try:
+            try:
+                whole = cfunc(signature, cache=digest is not None, error_model="numpy")(made)
+            except RuntimeError:  # nowhere to keep the cache
+                whole = cfunc(signature, error_model="numpy")(made)
+        except (NumbaError, NotImplementedError) as error:
+            name = "tangent" if kind == "given" else "function"
+            what = "with complex numbers, " if kind == "complex" else ""
+            reason = str(error).strip().splitlines()
+            told = next((line for line in reason if line and not line.startswith(("Failed in", "-"))), reason[0])
+            raise ModelError(
+                f"{where}: its {name} cannot be compiled {what}as {SIGNATURES[name]} with arrays of numbers: {told}"
+            ) from error
+        compiled[key] = whole, function
+    whole, _ = compiled[key]
+    return Callback(where, int(whole.address or 0), whole)
+
+
+def filled(template: Callable[[int], FunctionType], function: Any, digest: int) -> FunctionType:
+    """Return the function that a template makes, with the function of the user in the place of `law`.
+
+    Its name says the digest, so that each law has an index of its own in the cache: two processes that add different
+    laws to one index at the same moment give both the same file, and the code of one law under the key of the other.
+    """
+    made = template(digest)
+    names = made.__globals__ | {"law": function}
+    named = FunctionType(made.__code__, names, made.__name__, made.__defaults__, made.__closure__)
+    named.__qualname__ = f"{made.__name__}_{digest:x}"
+    return named
+
+
+def array_at(pointer: Any, shape: Any) -> Array:
+    """Return the array at an address, as `numba.carray` does."""
+    return np.ctypeslib.as_array(pointer, shape if isinstance(shape, tuple) else (int(shape),))
+
+
+def python_callback(
+    where: str, function: Any, kind: str, template: Callable[[int], FunctionType], head: tuple[int, ...]
+) -> Callback:
+    """Return a Python function behind a C function; after an error it answers with what is no number."""
+    n, width, n_z, n_lam, n_seen, _, _, _ = head
+    n_out = 6 * n + n_z + n_lam
+    size = n_out + n_seen if kind == "value" else n_out * ((width - 6) * n + n_z + n_lam)
+    made = filled(template, function, 1)
+    made.__globals__["carray"] = array_at
+    kept_callback = Callback(where, 0, None)
+
+    def called(head_at: Any, inputs_at: Any, data_at: Any, outputs_at: Any) -> None:
+        try:
+            if kept_callback.error is None:
+                made(head_at, inputs_at, data_at, outputs_at)
+        except BaseException as error:  # it is raised again when the kernels have returned
+            kept_callback.error = error
+        if kept_callback.error is not None:
+            np.ctypeslib.as_array(outputs_at, (size,))[:] = np.nan
+
+    kept = C_FUNCTION(called)
+    kept_callback.address = ctypes.cast(kept, ctypes.c_void_p).value or 0
+    kept_callback.keeps = kept
+    return kept_callback
+
+
+def called_law(address: int, head: tuple[int, ...], data: Array, inputs: Array, n_out: int) -> Array:
+    """Return what a function of an element gives for inputs, (n_t, 1 + n 18 + n_z + n_lam): (n_t, n_out)."""
+    function = C_FUNCTION(address)
+    numbers = np.ascontiguousarray(data, dtype=float)
+    sizes = np.array(head, dtype=np.int64)
+    rows = np.ascontiguousarray(inputs, dtype=float)
+    outputs = np.zeros((len(rows), n_out))
+    for row, output in zip(rows, outputs, strict=True):
+        pointers = (each.ctypes.data_as(REAL) for each in (row, numbers, output))
+        function(sizes.ctypes.data_as(WHOLE), *pointers)
+    return outputs

@@ -1,0 +1,63 @@
+"""Derivatives of the law of an element by differences of fourth order: of its outputs, and to check its own."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.engine.compiling.callbacks.law_functions import called_law
+from floatframe.model.rotations import rotation_exp
+
+__all__ = ["difference_slopes"]
+
+STEP = 1e-4  #: of differences, relative
+LEAST = 1e-3  #: size of a state or multiplier near zero
+N_MOTIONS = 5  #: sizes of motions, before those of states
+STENCIL = ((-2, 1 / 12), (-1, -8 / 12), (1, 8 / 12), (2, -1 / 12))  #: of fourth order
+
+
+def varied(inputs: Array, n: int, width: int, k: int, step: float) -> Array:
+    """Return the inputs of a law with variation k (dr, dphi, dv, domega of each marker, states, multipliers)."""
+    y = inputs.copy()
+    per = width - 6
+    if k >= per * n:
+        y[1 + width * n + k - per * n] += step
+        return y
+    first, j = 1 + width * (k // per), k % per
+    if j < 3:
+        y[first + j] += step
+    elif j < 6:
+        A = y[first + 3 : first + 12].reshape(3, 3)
+        y[first + 3 : first + 12] = (rotation_exp(step * np.eye(3)[j - 3]) @ A).ravel()
+    else:
+        y[first + 6 + j] += step
+    return y
+
+
+def size_of(sizes: Sequence[float], inputs: Array, n: int, width: int, k: int) -> float:
+    """Return the size by which variation k is measured, of the sizes that `PlacedLaw.sizes` gives."""
+    per = width - 6
+    if k >= per * n:
+        own = sizes[N_MOTIONS + k - per * n]
+        return own or max(abs(float(inputs[1 + width * n + k - per * n])), LEAST)
+    part = k % per // 3
+    return 1.0 if part == 1 else sizes[max(part - 1, 0)]
+
+
+def difference_slopes(
+    address: int, head: tuple[int, ...], data: Array | Sequence[float], inputs: Array, sizes: Sequence[float],
+    step: float = STEP,
+) -> Array:  # fmt: skip
+    """Return d(wrenches, rates, held, outputs) by all variations at inputs, (6 n + n_z + n_lam + n_seen, n_columns).
+
+    sizes: by which inputs are measured, see `PlacedLaw.sizes`.
+    """
+    n, width, n_z, n_lam, n_seen = head[:5]
+    n_out, n_columns = 6 * n + n_z + n_lam + n_seen, (width - 6) * n + n_z + n_lam
+    slopes = np.zeros((n_out, n_columns))
+    for k in range(n_columns):
+        h = step * size_of(sizes, inputs, n, width, k)
+        rows = np.array([varied(inputs, n, width, k, steps * h) for steps, _ in STENCIL])
+        values = called_law(address, head, np.asarray(data), rows, n_out)
+        slopes[:, k] = np.array([factor for _, factor in STENCIL]) @ values / h
+    return slopes

@@ -1,0 +1,106 @@
+"""Functions of user forces as C functions that the kernels call by their address."""
+
+import ctypes
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.errors import ModelError
+from floatframe.model.forces import UserForce
+
+__all__ = ["Callback", "callback_of", "raise_errors_of"]
+
+C_FUNCTION = ctypes.CFUNCTYPE(None, ctypes.POINTER(ctypes.c_double), ctypes.POINTER(ctypes.c_double))
+
+
+@dataclass
+class Callback:
+    """A function with its address; what it raised last, since an error cannot pass through the kernels."""
+
+    name: str  #: of the force or element, in words
+    address: int
+    keeps: Any  #: what must live as long as the address is used
+    error: BaseException | None = None
+
+
+def callback_of(force: UserForce, n_coordinates: int) -> Callback:
+    """Return the C function f(inputs, outputs) of a user force with a function.
+
+    Raises
+    ------
+    ModelError
+        If a function of numba cannot be compiled for arrays of numbers.
+    """
+    from numba.core.dispatcher import Dispatcher
+
+    sizes = n_coordinates, len(force.forces), len(force.states)
+    if isinstance(force.function, Dispatcher):
+        return compiled_callback(force, *sizes)
+    return python_callback(force, *sizes)
+
+
+def compiled_callback(force: UserForce, n: int, n_forces: int, n_states: int) -> Callback:
+    """Return a function made by numba.njit behind a C function."""
+    from numba import carray, cfunc, types
+    from numba.core.errors import NumbaError
+
+    function = force.function
+    assert function is not None  # the caller knows
+    n_in, n_out = 1 + 2 * n + n_states, n_forces + n_states
+    pointer = types.CPointer(types.float64)
+
+    def called(inputs, outputs):
+        x = carray(inputs, (n_in,))
+        y = carray(outputs, (n_out,))
+        y[:] = 0.0
+        function(x[0], x[1 : 1 + n], x[1 + n : 1 + 2 * n], x[1 + 2 * n :], y[:n_forces], y[n_forces:])
+
+    try:
+        compiled = cfunc(types.void(pointer, pointer))(called)
+    except NumbaError as error:
+        reason = str(error).strip().splitlines()[0]
+        raise ModelError(
+            f"force {force.name!r}: its function cannot be compiled as function(t, x, v, z, Q, z_dot) with arrays of "
+            f"numbers: {reason}"
+        ) from error
+    return Callback(f"force {force.name!r}", int(compiled.address or 0), compiled)
+
+
+def python_callback(force: UserForce, n: int, n_forces: int, n_states: int) -> Callback:
+    """Return a Python function behind a C function; after an error it answers with what is no number."""
+    function = force.function
+    assert function is not None  # the caller knows
+    n_in, n_out = 1 + 2 * n + n_states, n_forces + n_states
+    callback = Callback(f"force {force.name!r}", 0, None)
+
+    def called(inputs: Any, outputs: Any) -> None:
+        x = np.ctypeslib.as_array(inputs, (n_in,)).copy()
+        y: Array = np.zeros(n_out)
+        try:
+            if callback.error is not None:
+                y[:] = np.nan
+            else:
+                function(x[0], x[1 : 1 + n], x[1 + n : 1 + 2 * n], x[1 + 2 * n :], y[:n_forces], y[n_forces:])
+        except BaseException as error:  # it is raised again when the kernels have returned
+            callback.error = error
+            y[:] = np.nan
+        np.ctypeslib.as_array(outputs, (n_out,))[:] = y
+
+    kept = C_FUNCTION(called)
+    callback.address = ctypes.cast(kept, ctypes.c_void_p).value or 0
+    callback.keeps = kept
+    return callback
+
+
+def raise_errors_of(callbacks: Sequence[Callback]) -> None:
+    """Raise what a user's function has raised inside the kernels."""
+    for callback in callbacks:
+        error, callback.error = callback.error, None
+        if error is None:
+            continue
+        if not isinstance(error, Exception):  # an interrupt
+            raise error
+        raise ModelError(f"{callback.name}: its function raised {type(error).__name__}: {error}") from error

@@ -1,0 +1,87 @@
+"""Between the frames in which the engine moves bodies and those of their files: states, results, small motions.
+
+Kernels, start, integrators and analyses work in the frames of the engine, where stiffened bodies move in mean axes
+(`floatframe.mean_axes`). What a user gives and gets, states, results and shapes, speaks of the frames of the files.
+"""
+
+from typing import Literal
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.engine.compiling.system import CompiledSystem
+from floatframe.engine.kernels.memory import Rows
+from floatframe.model.bodies.mean_axes import FrameMotion
+from floatframe.model.state import State
+
+__all__ = [
+    "motion_of_engine", "motion_of_file", "rows_of_file", "small_motions_of_file", "state_of_engine", "state_of_file",
+]  # fmt: skip
+
+Way = Literal["to_file", "to_mean"]
+
+
+def state_of_file(compiled: CompiledSystem, state: State) -> State:
+    """Return a state of the engine in the frames of the files."""
+    return motion_of_file(compiled, state, np.zeros_like(state.u))[0]
+
+
+def state_of_engine(compiled: CompiledSystem, state: State) -> State:
+    """Return a state in the frames of the files as the engine has it."""
+    return motion_of_engine(compiled, state, np.zeros_like(state.u))[0]
+
+
+def motion_of_file(compiled: CompiledSystem, state: State, u_dot: Array) -> tuple[State, Array]:
+    """Return a state and accelerations (n_u,) of the engine in the frames of the files."""
+    return changed_state(compiled, state, u_dot, "to_file")
+
+
+def motion_of_engine(compiled: CompiledSystem, state: State, u_dot: Array) -> tuple[State, Array]:
+    """Return a state and accelerations (n_u,) in the frames of the files as the engine has them."""
+    return changed_state(compiled, state, u_dot, "to_mean")
+
+
+def rows_of_file(compiled: CompiledSystem, rows: Rows) -> Rows:
+    """Return rows of results of the engine in the frames of the files."""
+    if not any(compiled.mean_axes):
+        return rows
+    r, p, q, u, u_dot = changed(compiled, (rows.r, rows.p, rows.q, rows.u, rows.u_dot), "to_file")
+    return rows._replace(r=r, p=p, q=q, u=u, u_dot=u_dot)
+
+
+def small_motions_of_file(compiled: CompiledSystem, q: Array) -> tuple[Array, ...]:
+    """Return small motions of each body (body axes) in its file's frame by those of the engine, at its q (n_q,)."""
+    bodies = compiled.model.bodies
+    return tuple(
+        np.eye(6 + int(bodies.n_q[i])) if axes is None else axes.small_motions(q[bodies.q0[i] : bodies.q0[i + 1]])
+        for i, axes in enumerate(compiled.mean_axes)
+    )
+
+
+def changed_state(compiled: CompiledSystem, state: State, u_dot: Array, way: Way) -> tuple[State, Array]:
+    """Return a state and accelerations in the other frames."""
+    if not any(compiled.mean_axes):
+        return state, u_dot
+    r, p, q, u, u_dot = changed(compiled, (state.r, state.p, state.q, state.u, u_dot), way)
+    return State(r, p, q, u), u_dot
+
+
+def changed(compiled: CompiledSystem, arrays: tuple[Array, ...], way: Way) -> tuple[Array, ...]:
+    """Return r (..., n_b, 3), p (..., n_b, 4), q (..., n_q), u and u_dot (..., n_u) in the other frames."""
+    r, p, q, u, u_dot = (np.array(array) for array in arrays)
+    with np.errstate(over="ignore", invalid="ignore"):  # of a motion that diverges
+        for i, axes in enumerate(compiled.mean_axes):
+            if axes is None:
+                continue
+            own_q = slice(int(compiled.model.bodies.q0[i]), int(compiled.model.bodies.q0[i + 1]))
+            u0, end = int(compiled.model.bodies.u0[i]), int(compiled.model.bodies.u0[i + 1])
+            v, omega, rates = slice(u0, u0 + 3), slice(u0 + 3, u0 + 6), slice(u0 + 6, end)
+            motion = FrameMotion(
+                r[..., i, :], p[..., i, :], q[..., own_q], u[..., v], u[..., omega], u[..., rates],
+                u_dot[..., v], u_dot[..., omega], u_dot[..., rates],
+            )  # fmt: skip
+            new = axes.to_file(motion) if way == "to_file" else axes.to_mean(motion)
+            r[..., i, :], p[..., i, :], q[..., own_q] = new.r, new.p, new.q
+            u[..., v], u[..., omega], u[..., rates] = new.v, new.omega, new.q_dot
+            u_dot[..., v], u_dot[..., omega], u_dot[..., rates] = new.v_dot, new.omega_dot, new.q_ddot
+    return r, p, q, u, u_dot

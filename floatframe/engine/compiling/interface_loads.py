@@ -1,0 +1,81 @@
+"""What acts on the interfaces of a flexible body: ends of connections, and point forces."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cms.body.reduced_body import ReducedBody
+from fe_models.foundation.arrays import Array
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.model.forces import PointForce
+from floatframe.model.system import System
+
+__all__ = ["Load", "Wrench", "amplitudes", "in_body", "interface_number", "loads_on_interfaces"]
+
+
+@dataclass(frozen=True, eq=False)
+class Wrench:
+    """Where the wrench of a connection on an interface is found."""
+
+    interface: int
+    sign: float
+    force: int  #: first column in w, -1 for none
+    moment: int  #: first column in w, -1 for none
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """A point force on an interface."""
+
+    interface: int
+    force: PointForce
+    triad: Array  #: undeformed axes of the marker in the body frame, (3, 3)
+    number: int = -1  #: among the point forces of the system
+
+
+def loads_on_interfaces(system: System, body: int) -> tuple[list[Wrench], list[Load]]:
+    """Return where the wrenches on the interfaces of a flexible body are found, and the point forces on them."""
+    model, reduced = compiled_system(system).model, system.bodies[body].moved  # type: ignore[union-attr]
+    n = reduced.n_q
+    forces = [force for force in system.forces if isinstance(force, PointForce)]
+    load_of = {int(m): k for k, m in enumerate(model.loads.marker)}
+    wrenches, loads = [], []
+    for m in np.flatnonzero((model.markers.body == body) & (model.markers.psi0 >= 0)):
+        o = int(model.markers.psi0[m])
+        own = model.markers.psi[o : o + 6 * n].reshape(6, n)
+        interface = interface_number(reduced, own, model.markers.position[m])
+        if interface < 0:  # the place where something slides along a line
+            continue
+        c = int(model.markers.connection[m])
+        if c >= 0:
+            w0 = int(model.connections.w0[c])
+            first = [w0 + int(part[m]) if part[m] >= 0 else -1 for part in (model.markers.force, model.markers.moment)]
+            wrenches.append(Wrench(interface, float(model.markers.sign[m]), *first))
+        elif int(m) in load_of:
+            k = load_of[int(m)]
+            loads.append(Load(interface, forces[k], np.asarray(model.markers.triad[m]), k))
+    return wrenches, loads
+
+
+def interface_number(reduced: ReducedBody, psi: Array, position: Array) -> int:
+    """Return the number of the interface that moves and lies so, -1 for none."""
+    same = [np.array_equal(each.Psi, psi) and np.array_equal(each.position, position) for each in reduced.interfaces]
+    return same.index(True) if any(same) else -1
+
+
+def amplitudes(load: Load, t: Array, R: Array) -> Array:
+    """Return force and moment of a point force in body axes, (n_t, 6); a follower turns with the undeformed marker."""
+    force = load.force
+    factor = np.ones(len(t)) if force.amplitude is None else np.array([force.amplitude(x) for x in t])
+    six = []
+    for vector in (force.force, force.torque):
+        if force.is_follower:
+            six.append(np.broadcast_to(load.triad @ vector, (len(t), 3)))
+        else:
+            six.append(in_body(R, np.broadcast_to(vector, (len(t), 3))))
+    return factor[:, None] * np.concatenate(six, axis=1)
+
+
+def in_body(R: Array, vectors: Array) -> Array:
+    """Return vectors in body axes, (n_t, 3)."""
+    return np.asarray(np.einsum("tba,tb->ta", R, vectors))

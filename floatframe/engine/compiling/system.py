@@ -1,0 +1,387 @@
+"""From the description of a system to the records of the kernels."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, IntArray
+from floatframe.engine.compiling.bodies import body_types, integers, offsets, type_arrays
+from floatframe.engine.compiling.callbacks import Callback
+from floatframe.engine.compiling.connections import Connections as ConnectionLists
+from floatframe.engine.compiling.connections import add_joint, add_spring
+from floatframe.engine.compiling.coordinate_elements import add_coordinate_elements
+from floatframe.engine.compiling.counted_angles import CountedAngle, angle_records, counted_angles, first_angles
+from floatframe.engine.compiling.elimination_order import plan_elimination
+from floatframe.engine.compiling.forces import Functions, body_loads, joint_forces
+from floatframe.engine.compiling.gaps import gap_record
+from floatframe.engine.compiling.lines import Lines, add_sliding
+from floatframe.engine.compiling.markers import (
+    find_marker,
+    marker_bending,
+    marker_pose,
+    marker_shapes,
+    n_q_of,
+)
+from floatframe.engine.compiling.mass_checks import require_inertia
+from floatframe.engine.compiling.pair_forces import add_pair_laws
+from floatframe.engine.compiling.public_elements import PlacedLaw, add_public_elements
+from floatframe.engine.kernels.model import Bodies, BodyTypes, Connections, JointRows, Loads, Markers, Model, Springs
+from floatframe.engine.kernels.records import filled
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.bodies.mean_axes import FrameMotion, MeanAxes
+from floatframe.model.forces import Gravity, PointForce, SpringDamper
+from floatframe.model.functions.time_functions import TimeFunction
+from floatframe.model.joints.rows import kind_of
+from floatframe.model.joints.sliding import SlidingJoint
+from floatframe.model.rotations import euler_parameters
+from floatframe.model.state import State
+from floatframe.model.system import System
+
+__all__ = ["CompiledSystem", "compiled_system"]
+
+KEPT = "_compiled"  #: attribute of a system that keeps what was compiled
+
+SOFT = 1e-9  #: by which redundant constraints give way, relative to what the mass moves in a step
+ROUNDING = 1e3 * np.finfo(float).eps  #: of the mobility of bodies, with room for what elimination adds
+MOST_SOFT = 1e-5  #: as SOFT, for angles of bodies with hardly any moment about an axis
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledSystem:
+    """A system as the kernels see it, with the names of its parts in their order."""
+
+    model: Model
+    body_names: tuple[str, ...]
+    joint_names: tuple[str, ...]
+    spring_names: tuple[str, ...]  #: of spring-dampers, then bushings and contacts
+    element_names: tuple[str, ...]  #: of couplers, then user forces, then public elements
+    laws: tuple[PlacedLaw, ...]  #: of public elements
+    callbacks: tuple[Callback, ...]  #: users' functions that the kernels call
+    owners: tuple[str, ...]  #: name of the connection of each row, (n_w,)
+    placed: State  #: the state as given, before it is made consistent, in the frames of the engine
+    mean_axes: tuple[MeanAxes | None, ...]  #: of bodies that the engine moves in another frame than their file's
+    coordinates: tuple[str, ...]  #: name of the joint coordinate to which each row belongs, "" for none, (n_w,)
+    length: float  #: size of the system as placed [m]; scales rotations against translations
+    angles: tuple[CountedAngle, ...]  #: between bodies whose turns are counted
+    angle_motions: tuple[TimeFunction | None, ...]  #: that prescribe them
+
+    @property
+    def resting_model(self) -> Model:
+        """The model with what elements say of equilibrium in the place of their laws."""
+        rest = [each.rest for each in self.laws]
+        return self.model._replace(
+            laws=self.model.laws._replace(
+                address=np.array([value.address for value, _ in rest], dtype=np.int64),
+                tangent=np.array([slopes.address for _, slopes in rest], dtype=np.int64),
+            )
+        )
+
+    @property
+    def stop_words(self) -> tuple[str, ...]:
+        """What outputs of elements say that end a run, in the order of the model."""
+        return tuple(f"element {each.element.name!r}: {text}" for each in self.laws for text in each.law.stops.values())
+
+    @property
+    def connection_names(self) -> tuple[str, ...]:
+        """Names of joints, springs, couplers and user forces: the order of connections in the model."""
+        return self.joint_names + self.spring_names + self.element_names
+
+
+def compiled_system(system: System) -> CompiledSystem:
+    """Return the flat arrays of a system: made at the first call, and kept with the system.
+
+    Raises
+    ------
+    ModelError
+        If a joint or force names what does not exist, or has two markers on one body.
+    """
+    kept = vars(system)
+    if KEPT not in kept:
+        kept[KEPT] = compile_system(system)
+    return kept[KEPT]
+
+
+def compile_system(system: System) -> CompiledSystem:
+    """Return a system as the kernels see it.
+
+    Raises
+    ------
+    ModelError
+        If a joint or force names what does not exist, or has two markers on one body.
+    """
+    require_inertia(system.bodies)
+    axes = tuple(body.mean_axes if isinstance(body, FlexibleBody) else None for body in system.bodies)
+    placed = place(system, axes)
+    types, kind = body_types(system.bodies)
+    n_q = n_q_of(system)
+    gravity = np.zeros(3)
+    for force in system.forces:
+        if isinstance(force, Gravity):
+            gravity = gravity + force.acceleration
+
+    made = ConnectionLists(placed, n_q)
+    functions = Functions()
+    lines = Lines()
+    for joint in system.joints:
+        if isinstance(joint, SlidingJoint):
+            add_sliding(system, made, lines, joint)
+        else:
+            add_joint(system, made, joint)
+    dampers = [force for force in system.forces if isinstance(force, SpringDamper)]
+    springs = filled(
+        Springs(),
+        stiffness=[spring.stiffness for spring in dampers],
+        damping=[spring.damping for spring in dampers],
+        free_length=[add_spring(system, made, spring) for spring in dampers],
+        preload=[spring.preload for spring in dampers],
+        table=[functions.index(spring.characteristic) for spring in dampers],
+    )
+    pairs = add_pair_laws(system, made, functions)
+    elements = add_coordinate_elements(system, made, functions)
+    public = add_public_elements(system, made, len(elements.states))
+    elements.states += public.states
+    markers, rows = made.markers, made.rows
+    loads = [force for force in system.forces if isinstance(force, PointForce)]
+    load_marker = []
+    for load in loads:
+        load_marker.append(made.add_marker(find_marker(system, f"force {load.name!r}: marker", load.marker)))
+    ends_of: list[list[int]] = [[] for _ in n_q]
+    for m, data in enumerate(markers):
+        if data.body >= 0 and made.connection_of[m] >= 0:
+            ends_of[data.body].append(m)
+    loaded_of: list[list[int]] = [[] for _ in n_q]
+    for m in load_marker:
+        if markers[m].body >= 0:
+            loaded_of[markers[m].body].append(m)
+    angles = counted_angles(system, placed)
+    row_motion = [functions.index(row.motion) for row in rows]
+    forces, force0 = joint_forces(system, rows, made.owner, functions)
+    arrays = type_arrays(types)
+    radii = np.sqrt(np.maximum(np.trace(arrays.J0, axis1=1, axis2=2), 0.0) / (2 * arrays.mass))[kind]
+    places = [marker_pose(marker, placed, n_q)[0] for marker in markers]
+    sizes = body_sizes(made, places, placed, radii)
+    length = system_length(sizes, places, placed)
+    public.give_lengths(radii, length)
+    elements.give_lengths(radii, length, system.units)
+    model = Model(
+        gravity=gravity,
+        bodies=filled(
+            Bodies(),
+            kind=kind,
+            n_q=n_q,
+            q0=offsets(n_q),
+            u0=offsets(n_q + 6),
+            h0=offsets((n_q + 6) ** 2),
+            size=np.where(sizes > 0, sizes, 1.0),
+            end0=offsets(integers([len(group) for group in ends_of])),
+            ends=[m for group in ends_of for m in group],
+            load0=offsets(integers([len(group) for group in loaded_of])),
+            loaded=integers([m for group in loaded_of for m in group]),
+        ),
+        body_types=arrays,
+        markers=marker_record(made, ends_of, lines, load_marker, [load.is_follower for load in loads]),
+        connections=filled(
+            Connections(),
+            size=made.sizes,
+            w0=offsets(integers(made.sizes)),
+            a=made.a_of,
+            b=made.b_of,
+            law=made.law,
+            item=made.item,
+            has_rates=made.rates,
+        ),
+        rows=filled(
+            JointRows(),
+            **{name: [getattr(row, name) for row in rows] for name in ("kind", "x", "y", "z", "u", "c", "part")},
+            **{
+                name: [getattr(kind_of(row.kind), name) for row in rows]
+                for name in ("holds", "is_length", "is_angle", "is_loaded")
+            },
+            motion=row_motion,
+            soft=np.zeros(len(rows)),
+            force0=force0[:-1],
+            force1=force0[1:],
+        ),
+        joint_forces=forces,
+        springs=springs,
+        bushings=pairs.bushings._replace(angle=integers(first_angles(system, len(angles)))),
+        contacts=pairs.contacts,
+        gaps=gap_record(made, pairs.contacts, public.placed),
+        **elements.records(),
+        laws=public.record(),
+        **lines.records(),
+        loads=filled(
+            Loads(),
+            marker=load_marker,
+            factor=[functions.index(load.amplitude) for load in loads],
+            force=[load.force for load in loads],
+            torque=[load.torque for load in loads],
+        ),
+        body_loads=body_loads(system, functions),
+        functions=functions.record(),
+        angles=angle_records([angle for angle, _ in angles]),
+        elimination=plan_elimination(made.sizes, ends_of, integers(made.connection_of)),
+    )
+    soft = row_softness(system, made, model.body_types, kind)
+    model = model._replace(rows=model.rows._replace(soft=soft))
+    return CompiledSystem(
+        model=model,
+        body_names=tuple(body.name for body in system.bodies),
+        joint_names=tuple(joint.name for joint in system.joints),
+        spring_names=tuple(spring.name for spring in dampers) + pairs.names,
+        element_names=elements.names + public.names,
+        laws=tuple(public.placed),
+        callbacks=(*elements.callbacks, *public.callbacks),
+        owners=tuple(made.owner),
+        placed=placed,
+        mean_axes=axes,
+        coordinates=tuple(row.coordinate_name for row in rows),
+        length=length,
+        angles=tuple(angle for angle, _ in angles),
+        angle_motions=tuple(motion for _, motion in angles),
+    )
+
+
+def marker_record(
+    made: ConnectionLists, ends_of: list[list[int]], lines: Lines, load_marker: list[int], is_follower: list[bool]
+) -> Markers:
+    """Return the markers as the kernels see them; those of loads come last."""
+    markers = made.markers
+    shapes = [marker.shape for marker in markers]
+    ends = [m for group in ends_of for m in group]
+    x0 = np.zeros(len(markers), np.int64)
+    x0[ends] = np.cumsum([0] + [6 + int(made.n_q[markers[m].body]) for m in ends])[:-1]
+    turns = np.zeros(len(markers), np.int64)
+    turns[load_marker] = is_follower
+    accelerated, a0 = np.full(len(markers), -1, np.int64), np.zeros(len(markers), np.int64)
+    accelerated[made.accelerated] = np.arange(len(made.accelerated))
+    moving = [m for m in made.accelerated if markers[m].body >= 0]
+    a0[moving] = np.cumsum([0] + [6 + int(made.n_q[markers[m].body]) for m in moving])[:-1]
+    psi0, psi = marker_shapes(shapes)
+    bend0, bend = marker_bending(shapes)
+    return filled(
+        Markers(),
+        body=[marker.body for marker in markers],
+        position=[shape.position for shape in shapes],
+        triad=[shape.triad for shape in shapes],
+        psi0=psi0,
+        psi=psi,
+        bend0=bend0,
+        bend=bend,
+        connection=made.connection_of,
+        sign=made.sign,
+        force=made.force,
+        moment=made.moment,
+        is_follower=turns,
+        x0=x0,
+        line=lines.of_markers(len(markers)),
+        accelerated=accelerated,
+        a0=a0,
+    )
+
+
+def row_softness(system: System, made: ConnectionLists, types: BodyTypes, kind_of_body: IntArray) -> Array:
+    """Return the compliance of held rows, relative to c_k, by which they share reactions; zero if none is asked for.
+
+    A joint shares by how its two bodies give way: SOFT times the sum of their 1/m for distances, of their 1/J for
+    angles, J the mean of the principal moments of inertia about the centre of mass. A body with a small moment about an
+    axis turns by 1/J_min, whose rounding the compliance of angles must stand above: it is at least ROUNDING/J_min, but
+    no more than MOST_SOFT/J.
+    """
+    soft = np.zeros(len(made.rows))
+    if system.redundant != "minimum-norm":
+        return soft
+    tiny = np.finfo(float).tiny
+    moments = np.maximum(principal_moments(types), tiny)
+    by_force, by_moment = 1 / types.mass, 1 / moments.mean(axis=1)
+    of_angles = np.clip(ROUNDING / moments.min(axis=1), SOFT * by_moment, MOST_SOFT * by_moment)
+    connection = np.repeat(np.arange(len(made.sizes)), made.sizes)
+    for k, row in enumerate(made.rows):
+        kind = kind_of(row.kind)
+        if kind.can_yield and row.motion is None:
+            ends = (made.markers[m[connection[k]]].body for m in (made.a_of, made.b_of))
+            t = kind_of_body[[body for body in ends if body >= 0]]
+            soft[k] = SOFT * by_force[t].sum() if kind.is_length else of_angles[t].sum()
+    return soft
+
+
+def principal_moments(types: BodyTypes) -> Array:
+    """Return the principal moments of inertia of all types of bodies about their centres of mass, (n_types, 3)."""
+    moments = []
+    for m, S, J0 in zip(types.mass, types.S, types.J0, strict=True):
+        moments.append(np.linalg.eigvalsh(J0 - (S @ S * np.eye(3) - np.outer(S, S)) / m))
+    return np.array(moments)
+
+
+def place(system: System, mean_axes: tuple[MeanAxes | None, ...]) -> State:
+    """Return the state of the bodies as given, in the frames of the engine."""
+    r: list[Array] = []
+    p: list[Array] = []
+    q: list[Array] = []
+    u: list[Array] = []
+    for body, axes in zip(system.bodies, mean_axes, strict=True):
+        if isinstance(body, FlexibleBody):
+            motion = motion_at_start(body)
+            if axes is not None:
+                motion = axes.to_mean(motion)
+            r.append(motion.r)
+            p.append(motion.p)
+            q.append(motion.q)
+            u += [motion.v, motion.omega, motion.q_dot]
+        else:
+            r.append(body.position)
+            p.append(body.orientation)
+            u += [body.velocity, body.omega_B]
+    return State(r=np.array(r), p=np.array(p), q=np.concatenate([*q, np.zeros(0)]), u=np.concatenate(u))
+
+
+def motion_at_start(body: FlexibleBody) -> FrameMotion:
+    """Return the motion of the frame of a body's file at the start, without accelerations."""
+    zero = np.zeros(3)
+    return FrameMotion(
+        body.frame_position, euler_parameters(body.frame_orientation), body.q, body.frame_velocity, body.frame_omega,
+        body.q_dot, zero, zero, np.zeros_like(body.q),
+    )  # fmt: skip
+
+
+def body_sizes(made: ConnectionLists, places: list[Array], placed: State, radii: Array) -> Array:
+    """Return the size of all that hangs together with each body, the ground left out, (n_b,).
+
+    The largest arm of a marker or radius of gyration (radii, (n_b,)), or the extent of their points and of those that
+    hold them.
+    """
+    n_b = len(radii)
+    together = np.arange(n_b)
+
+    def head(i: int) -> int:
+        while together[i] != i:
+            together[i] = together[together[i]]
+            i = int(together[i])
+        return i
+
+    bodies = [marker.body for marker in made.markers]
+    first: dict[int, int] = {}  # a body of each connection
+    for c, i in zip(made.connection_of, bodies, strict=True):
+        if c >= 0 and i >= 0:
+            together[head(i)] = head(first.setdefault(c, i))
+    size, low, high = np.zeros(n_b), np.full((n_b, 3), np.inf), np.full((n_b, 3), -np.inf)
+    for i in range(n_b):
+        k = head(i)
+        size[k] = max(size[k], radii[i])
+        low[k], high[k] = np.minimum(low[k], placed.r[i]), np.maximum(high[k], placed.r[i])
+    for marker, c, place in zip(made.markers, made.connection_of, places, strict=True):
+        i = marker.body if marker.body >= 0 else first.get(c, -1)
+        if i < 0:
+            continue
+        k = head(i)
+        if marker.body >= 0:
+            size[k] = max(size[k], float(np.linalg.norm(marker.shape.position)))
+        low[k], high[k] = np.minimum(low[k], place), np.maximum(high[k], place)
+    heads = [head(i) for i in range(n_b)]
+    return np.maximum(size, np.linalg.norm(high - low, axis=1))[heads]
+
+
+def system_length(sizes: Array, places: list[Array], placed: State) -> float:
+    """Return the largest size of what hangs together, or the extent of the whole system; 1 if all are 0."""
+    points = np.array([*places, *placed.r])
+    return max(float(sizes.max()), float(np.linalg.norm(np.ptp(points, axis=0)))) or 1.0

@@ -1,0 +1,107 @@
+"""Mobility: how many ways a system can move, and which constraints repeat others.
+
+Rows of the constraint Jacobian, turned by the Cholesky factors of the masses so that they have one unit and norm one,
+are taken joint by joint: a row that the rows before it span repeats them (Gram-Schmidt, twice for accuracy).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+
+from fe_models.foundation.arrays import Array
+from floatframe.engine.compiling.system import CompiledSystem
+from floatframe.engine.initial_conditions.newton_equations import linearized, set_iterate, with_mass_for_all
+from floatframe.engine.kernels.model import Model
+from floatframe.engine.kernels.work import Work
+from floatframe.model.joints.rows import is_held
+from floatframe.model.state import State
+
+__all__ = ["Mobility", "constraint_mobility", "scaled_constraints"]
+
+DEPENDENT = 1e-7  #: part of a row, of length one, that is left of it when rows before it are taken away
+
+
+@dataclass(frozen=True)
+class Mobility:
+    """Freedoms of a system at one state."""
+
+    n_bodies: int
+    n_modes: int
+    n_constraints: int  #: held by joints
+    n_redundant: int  #: of them repeat others, modes taken into account
+    n_redundant_rigid: int  #: would if all bodies were rigid
+    redundant: Mapping[str, int]  #: constraints that repeat those of joints before them, by joint
+
+    @property
+    def gruebler(self) -> int:
+        """Count of Gruebler: six for each body less all constraints."""
+        return 6 * self.n_bodies - self.n_constraints
+
+    @property
+    def mobility(self) -> int:
+        """Ways in which the bodies can move if they are rigid: six for each less the rank of the constraints."""
+        return self.gruebler + self.n_redundant_rigid
+
+    @property
+    def n_freedoms(self) -> int:
+        """The same with their modes."""
+        return self.gruebler + self.n_modes + self.n_redundant
+
+
+def constraint_mobility(compiled: CompiledSystem, work: Work, state: State) -> Mobility:
+    """Return the mobility at a state in which the joints are closed."""
+    model = compiled.model
+    holds = is_held(model.rows.kind)
+    owner = np.repeat(np.arange(len(model.connections.size)), model.connections.size)[holds]
+    with_modes, rigid = scaled_constraints(model, work, state)
+    repeated, repeated_rigid = dependent_rows(with_modes), dependent_rows(rigid)
+    counts = {
+        name: int(repeated[owner == c].sum())
+        for c, name in enumerate(compiled.connection_names)
+        if repeated[owner == c].any()
+    }
+    return Mobility(
+        n_bodies=len(model.bodies.kind),
+        n_modes=int(model.bodies.q0[-1]),
+        n_constraints=int(holds.sum()),
+        n_redundant=int(repeated.sum()),
+        n_redundant_rigid=int(repeated_rigid.sum()),
+        redundant=counts,
+    )
+
+
+def scaled_constraints(model: Model, work: Work, state: State) -> tuple[Array, Array]:
+    """Return G L⁻ᵀ with M = L Lᵀ, rows of length one: with the modes and for rigid bodies, dense."""
+    set_iterate(work, state)
+    parts = linearized(model, work, 1.0, 0.0, 0.0)
+    G = parts.G.toarray()[is_held(model.rows.kind)]
+    scaled, rigid = np.zeros_like(G), np.zeros((len(G), 6 * len(model.bodies.kind)))
+    for i, H in enumerate(with_mass_for_all(model, parts.H)):
+        u = slice(int(model.bodies.u0[i]), int(model.bodies.u0[i + 1]))
+        L = np.linalg.cholesky(0.5 * (H + H.T))
+        scaled[:, u] = la.solve_triangular(L, G[:, u].T, lower=True).T
+        rigid[:, 6 * i : 6 * i + 6] = la.solve_triangular(L[:6, :6], G[:, u][:, :6].T, lower=True).T
+    return unit_rows(scaled), unit_rows(rigid)
+
+
+def unit_rows(A: Array) -> Array:
+    """Return rows divided by their length; rows of zeros stay."""
+    length = np.linalg.norm(A, axis=1, keepdims=True)
+    return np.asarray(A / np.where(length > 0, length, 1.0))
+
+
+def dependent_rows(A: Array) -> Array:
+    """Return which rows the rows before them span, (n_rows,) bool."""
+    basis = np.zeros((0, A.shape[1]))
+    result = np.zeros(len(A), dtype=bool)
+    for k, row in enumerate(A):
+        left = row - basis.T @ (basis @ row)
+        left = left - basis.T @ (basis @ left)
+        size = np.linalg.norm(left)
+        if size <= DEPENDENT:
+            result[k] = True
+        else:
+            basis = np.vstack([basis, left / size])
+    return result

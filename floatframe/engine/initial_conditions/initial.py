@@ -1,0 +1,385 @@
+"""Consistent initial conditions: assembled positions, compatible velocities, accelerations and reactions.
+
+All three solve the same system with the mass matrix M of the bodies and the rows G of the joints (P, V as in
+joints/rows/kinds.py; unknown reactions w, their lines GAUGE and SPRING included):
+
+    (1) positions       W dx - Jᵀ w = 0,       G dx = -g           W = M + s K; Newton until g = 0
+    (2) velocities      W du - Jᵀ w = 0,       G du = -G u
+    (3) accelerations   M u_dot - Jᵀ w = f,    G u_dot = -d(G)/dt u
+
+W adds the stiffness, scaled, to the mass, so that (1) and (2) move bodies rather than deform them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_models.foundation.arrays import Array
+from floatframe.engine.compiling.callbacks import raise_errors_of
+from floatframe.engine.compiling.file_frames import motion_of_file, state_of_engine
+from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.initial_conditions.constraint_words import conflict_of_drives, drive_name, open_joints
+from floatframe.engine.initial_conditions.far_drives import driven_angles, led_by, stages, way_of_drives
+from floatframe.engine.initial_conditions.freedoms import Mobility, constraint_mobility, scaled_constraints
+from floatframe.engine.initial_conditions.half_turns import require_no_half_turns
+from floatframe.engine.initial_conditions.newton_equations import (
+    STIFF_START,
+    displaced,
+    in_ground_axes,
+    linearized,
+    set_iterate,
+    solve,
+    with_mass_for_all,
+    with_modal_weight,
+)
+from floatframe.engine.initial_conditions.placement import require_placed_near
+from floatframe.engine.initial_conditions.repeated_constraints import repeated_constraints
+from floatframe.engine.kernels.model import Model
+from floatframe.engine.kernels.work import Work, new_work
+from floatframe.engine.tree.kernels.tree import Tree
+from floatframe.engine.tree.topology import tree_of
+from floatframe.errors import ModelError
+from floatframe.model.bodies.rigid_body import euler_parameters_from_user
+from floatframe.model.checked_values import array_of_shape
+from floatframe.model.joints.rows import is_held, is_held_length, is_held_position
+from floatframe.model.state import State
+from floatframe.model.system import System
+
+__all__ = [
+    "ConsistentState",
+    "acceleration_rates",
+    "consistent_motion",
+    "consistent_state",
+    "known_of",
+    "mobility",
+    "require_numbers",
+    "solve_accelerations",
+    "start_unknowns",
+    "work_from",
+]
+
+ASSEMBLED = 1e-12  #: largest |g| of an assembled system, points relative to its size
+MOST_ITERATIONS = 30
+OF_STEP = 0.1  #: of a step: over which rates of accelerations are differences
+NEAR_BY = 1e-3  #: rad, and part of the size of the system: a small way from a position
+ALLOWED = 1e-10  #: singular value of what rigid bodies are held by, relative to the largest, of a motion that is free
+
+
+def mobility(system: System) -> Mobility:
+    """Return the mobility of a system as placed, its joints closed first.
+
+    Raises
+    ------
+    ModelError
+        If the joints cannot be closed from the given positions.
+    """
+    compiled = compiled_system(system)
+    work = new_work(compiled.model)
+    return constraint_mobility(compiled, work, assembled(compiled, work, compiled.placed))
+
+
+@dataclass(frozen=True, eq=False)
+class ConsistentState:
+    """A state that fulfils the joints, with the accelerations and reactions that go with it."""
+
+    state: State
+    u_dot: Array  #: (n_u,)
+    w: Array  #: wrenches of the connections on their markers A, ground axes, (n_w,)
+
+
+def consistent_state(
+    system: System, state: State | None = None, *, t: float = 0.0, known: Array | None = None
+) -> ConsistentState:
+    """Return a consistent state near a given one, or near the bodies as placed, for prescribed motions at time t.
+
+    known: wrenches and other unknowns from a motion before, (n_w,), whose turned angles of couplers and states of user
+    forces go on.
+
+    Raises
+    ------
+    ModelError
+        If the joints cannot be closed from these positions, or some constraints repeat others.
+    """
+    made = consistent_motion(system, state, t=t, known=known)
+    return ConsistentState(*motion_of_file(compiled_system(system), made.state, made.u_dot), made.w)
+
+
+def consistent_motion(
+    system: System,
+    state: State | None = None,
+    *,
+    t: float = 0.0,
+    known: Array | None = None,
+    angle: Array | None = None,
+) -> ConsistentState:
+    """Return what `consistent_state` returns, in the frames of the engine; the given state is in those of the files.
+
+    angle: counted angles of a motion before, (n_angles,), whose turned bushings go on.
+    """
+    compiled = compiled_system(system)
+    given = compiled.placed if state is None else checked(compiled, state)
+    known = known_of(compiled, state) if known is None else known
+    work = work_from(compiled.model, known)
+    work.state.time[...] = t
+    if angle is not None and len(angle):
+        work.state.angle[:] = angle
+    state = assembled(compiled, work, given, known)
+    require_placed_near(compiled, given, state)
+    require_no_half_turns(compiled, work, state)
+    require_independent_constraints(compiled, work, tree_of(system).tree, state)
+    state = with_compatible_velocities(compiled, work, state, known)
+    return ConsistentState(state, *solve_accelerations(compiled, work, state, known))
+
+
+def known_of(compiled: CompiledSystem, state: State | None) -> Array | None:
+    """Return the unknowns that a state carries, where the system has states that go on; else None.
+
+    Raises
+    ------
+    ModelError
+        If they are those of another system.
+    """
+    if state is None or state.w is None or not len(compiled.model.states.row):
+        return None
+    n_w = int(compiled.model.connections.w0[-1])
+    if state.w.shape != (n_w,):
+        raise ModelError(
+            f"state: w: expected the {n_w} unknowns of this system's joints, forces and elements, got {len(state.w)} "
+            "of another; let their states begin at their start: dataclasses.replace(state, w=None)"
+        )
+    return state.w
+
+
+def checked(compiled: CompiledSystem, state: State) -> State:
+    """Return a state given by the user in the frames of the engine; `ModelError` if it is not one of this system."""
+    p = np.empty_like(compiled.placed.p)
+    for name in ("r", "p", "q", "u"):
+        value = array_of_shape(f"state: {name}", getattr(state, name), getattr(compiled.placed, name).shape)
+        if name == "p":
+            for i, parameters in enumerate(value):
+                p[i] = euler_parameters_from_user(f"state: p of body {compiled.body_names[i]!r}", parameters)
+    return state_of_engine(compiled, State(state.r, p, state.q, state.u))
+
+
+def assembled(compiled: CompiledSystem, work: Work, state: State, known: Array | None = None) -> State:
+    """(1): return the state with all joints closed, drives of angles at the angle that is meant."""
+    model = compiled.model
+    if not is_held_position(model.rows.kind).any():
+        return state
+    w, drives, near = start_unknowns(model, known), driven_angles(model), state
+    if len(drives):
+        for left in stages(way_of_drives(model, work, state, w, drives)):
+            near, error = closed(compiled, led_by(model, drives, left), work, near, w)
+            if error.any():  # the way there leads out of reach: the drive may be within reach all the same
+                near = state
+                break
+    end, error = closed(compiled, model, work, near, w)
+    if error.any():
+        refuse_open_joints(compiled, work, end, error)
+    if len(drives):
+        missed = drives[np.abs(way_of_drives(model, work, end, w, drives)) > np.pi / 2]
+        if len(missed):
+            raise ModelError(
+                f"{' and '.join(drive_name(compiled, row) for row in missed)}: closed from the given positions half a "
+                "turn from the prescribed angle; place the bodies nearer to it"
+            )
+    return end
+
+
+def closed(compiled: CompiledSystem, model: Model, work: Work, state: State, w: Array) -> tuple[State, Array]:
+    """Return the state with the joints of a model closed, and what stays open of its rows: (n_w,), zero if none."""
+    holds = is_held_position(model.rows.kind)
+    scale = np.where(is_held_length(model.rows.kind), compiled.length, 1.0)
+    for _ in range(MOST_ITERATIONS):
+        set_iterate(work, state, w=w)
+        parts = linearized(model, work, 1.0, 0.0, 0.0)
+        raise_errors_of(compiled.callbacks)
+        require_numbers(compiled, work)
+        error = np.where(holds, work.connections.g, 0.0)
+        if np.abs(error / scale).max() <= ASSEMBLED:
+            return state, np.zeros_like(error)
+        try:
+            y, _ = solve(with_modal_weight(model, parts.H, STIFF_START), parts, np.zeros(len(work.state.u)), -error)
+        except RuntimeError:
+            break
+        if not np.isfinite(y).all():
+            break
+        state = displaced(model, state, in_ground_axes(model, state, y))
+    return state, np.where(np.abs(error / scale).max() <= 1e-9, 0.0, error)
+
+
+def refuse_open_joints(compiled: CompiledSystem, work: Work, state: State, error: Array) -> None:
+    """Raise `ModelError` naming the joints that stay open, or the drives against each other."""
+    conflict = conflict_of_drives(compiled, work, state)
+    if conflict:
+        raise ModelError(f"conflicting drives: {conflict}; take one away, or free what it drives against")
+    is_driven = (compiled.model.rows.motion[is_held_position(compiled.model.rows.kind)] >= 0).any()
+    reach = ", and that the drives stay within reach" if is_driven else ""
+    raise ModelError(
+        f"the joints cannot be closed from the given positions: {open_joints(compiled, error)}; place the bodies "
+        f"nearer to their joints, or check lengths and axes{reach}"
+    )
+
+
+def require_independent_constraints(compiled: CompiledSystem, work: Work, tree: Tree, state: State) -> None:
+    """Raise `ModelError` naming the joints if some constraints repeat others, unless these are to share their load."""
+    model = compiled.model
+    holds = is_held(model.rows.kind)
+    if not holds.any() or model.rows.soft.any():
+        return
+    n_redundant = repeated_constraints(compiled, work, tree, state)
+    if n_redundant == 0:
+        return
+    rows, _ = scaled_constraints(model, work, state)
+    if not rows.any(axis=1).all():
+        raise ModelError("a joint acts on the ground alone")
+    vectors = np.linalg.svd(rows.T)[2][::-1].T  # columns, those of the smallest first
+    conflict = conflict_of_drives(compiled, work, state)
+    if conflict:
+        raise ModelError(f"conflicting drives: {conflict}; take one away, or free what it drives against")
+    share = (vectors[:, :n_redundant] ** 2).sum(axis=1)
+    owner = np.repeat(np.arange(len(model.connections.size)), model.connections.size)[holds]
+    involved = [name for c, name in enumerate(compiled.connection_names) if share[owner == c].sum() > 1e-6]
+    if is_singular_position(compiled, work, tree, state, n_redundant):
+        raise ModelError(
+            f"a singular position: {n_redundant} of {int(holds.sum())} constraints repeat others here, but not a "
+            f"little way along the motion (see joints {', '.join(repr(name) for name in involved)}), so that it could "
+            "go on in more than one way; begin in another position"
+        )
+    counts = constraint_mobility(compiled, work, state).redundant
+    told = ", ".join(f"{count} of joint {name!r}" for name, count in counts.items())
+    raise ModelError(
+        f"{n_redundant} of {int(holds.sum())} constraints repeat others, so that reactions are not "
+        f"unique: see joints {', '.join(repr(name) for name in involved)} (in order, {told} repeat those before); "
+        "replace one by a joint that holds less (a fixed joint by a revolute, a revolute by a spherical one), or let "
+        'them share the load: redundant = "minimum-norm"'
+    )
+
+
+def is_singular_position(compiled: CompiledSystem, work: Work, tree: Tree, state: State, n_redundant: int) -> bool:
+    """Whether fewer constraints repeat others a thousandth of a radian along the motions that the joints allow."""
+    model = compiled.model
+    holds = is_held(model.rows.kind)
+    set_iterate(work, state)
+    G = linearized(model, work, 1.0, 0.0, 0.0).G.toarray()[holds]
+    modal = np.ones(G.shape[1], dtype=bool)
+    for u0 in model.bodies.u0[:-1]:
+        modal[u0 : u0 + 6] = False
+        G[:, u0 + 3 : u0 + 6] /= compiled.length
+    _, values, right = np.linalg.svd(G[:, ~modal])
+    allowed = right[int((values > ALLOWED * values.max(initial=0.0)).sum()) :]
+    if not len(allowed):
+        return False
+    y = np.zeros(G.shape[1])
+    y[~modal] = NEAR_BY * np.random.default_rng(0).normal(size=len(allowed)) @ allowed
+    for u0 in model.bodies.u0[:-1]:
+        y[u0 : u0 + 3] *= compiled.length
+    try:
+        near = assembled(compiled, work, displaced(model, state, in_ground_axes(model, state, y)))
+    except ModelError:
+        return False
+    return repeated_constraints(compiled, work, tree, near) < n_redundant
+
+
+def with_compatible_velocities(compiled: CompiledSystem, work: Work, state: State, known: Array | None = None) -> State:
+    """(2): return the state with velocities that keep the joints closed."""
+    from floatframe.engine.kernels.entry import rates_of_constraints
+
+    model = compiled.model
+    if len(work.state.w) == 0:
+        return state
+    set_iterate(work, state, w=start_unknowns(model, known))
+    parts = linearized(model, work, 1.0, 0.0, 0.0)
+    rate, _ = rates_of_constraints(model, work)
+    if not np.any(rate):
+        return state
+    y, _ = solve(with_modal_weight(model, parts.H, STIFF_START), parts, np.zeros(len(work.state.u)), -rate)
+    return State(state.r, state.p, state.q, state.u + in_ground_axes(model, state, y))
+
+
+def solve_accelerations(
+    compiled: CompiledSystem, work: Work, state: State, known: Array | None = None
+) -> tuple[Array, Array]:
+    """(3): return u_dot, (n_u,), and w, (n_w,), at a state."""
+    from floatframe.engine.kernels.entry import rates_of_constraints
+
+    model = compiled.model
+    w = start_unknowns(model, known)
+    feels_accelerations = bool((model.markers.accelerated >= 0).any())
+    y = np.zeros(len(work.state.u))
+    for _ in range(MOST_ITERATIONS):
+        set_iterate(work, state, in_ground_axes(model, state, y) if feels_accelerations else None, w)
+        parts = linearized(model, work, 1.0, 0.0, 0.0)
+        _, bias = rates_of_constraints(model, work)
+        raise_errors_of(compiled.callbacks)
+        require_numbers(compiled, work)
+        forces, known_rows = -work.bodies.residual, np.zeros(len(w))
+        if feels_accelerations:  # residuals and rows are those with the accelerations of the iterate
+            forces = forces + sp.block_diag(parts.H) @ y
+            known_rows = parts.G @ y
+        rows = np.where(is_held(model.rows.kind), -bias, known_rows - work.connections.g)
+        y, change = solve(with_mass_for_all(model, parts.H), parts, forces, rows)
+        w = w + change
+        raise_errors_of(compiled.callbacks)
+        # friction by the normal force is not linear in the reactions, nor are users' forces in states or accelerations
+        is_linear = not has_normal_friction(model) and not len(model.states.row) and not feels_accelerations
+        if is_linear or np.abs(change).max(initial=0.0) <= 1e-10 * np.abs(w).max(initial=0.0):
+            break
+    return in_ground_axes(model, state, y), w
+
+
+def work_from(model: Model, known: Array | None) -> Work:
+    """Return working arrays in which the states of user forces are held at what is known of them, or their start."""
+    work = new_work(model)
+    work.states.base[:] = start_unknowns(model, known)[model.states.row]
+    return work
+
+
+def require_numbers(compiled: CompiledSystem, work: Work) -> None:
+    """Raise `ModelError` naming the element whose law gives what is no number at the iterate."""
+    no_number = int(work.counted.no_number)
+    if no_number:
+        raise ModelError(
+            f"element {compiled.connection_names[no_number - 1]!r} gives what is no number (NaN or infinity) where it "
+            "is placed; see its law, or place its bodies where it is known"
+        )
+
+
+def start_unknowns(model: Model, known: Array | None = None) -> Array:
+    """Return the unknowns of connections before anything is known, (n_w,): states of user forces at their start.
+
+    With unknowns that are known from before: these states, and the coordinates of couplers and user forces, whose
+    angles are those next to them.
+    """
+    w = np.zeros(int(model.connections.w0[-1]))
+    w[model.states.row] = model.states.start
+    if known is not None:
+        w[model.states.row] = known[model.states.row]
+        w[model.coordinates.row] = known[model.coordinates.row]
+    return w
+
+
+def has_normal_friction(model: Model) -> bool:
+    """Whether some friction depends on the force in its joint."""
+    return bool((model.joint_forces.coefficient > 0).any())
+
+
+def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState, t: float, h: float) -> Array:
+    """Return d(u_dot)/dt at a consistent state, (n_u,), by a difference along the motion over a tenth of a step h.
+
+    Its error is of second order in h. The difference is central, but forward in time where something may depend on it,
+    since that may begin or jump at t.
+    """
+    model, state, u_dot = compiled.model, consistent.state, consistent.u_dot
+    work, s = work_from(model, consistent.w), OF_STEP * h
+
+    def u_dot_after(step: float) -> Array:
+        moved = displaced(model, state, step * state.u + 0.5 * step**2 * u_dot)
+        work.state.time[...] = t + step
+        after = State(moved.r, moved.p, moved.q, state.u + step * u_dot)
+        return solve_accelerations(compiled, work, after, consistent.w)[0]
+
+    if len(model.functions.begin) or compiled.laws or len(model.users.n_forces):
+        return (-3 * u_dot_after(0.0) + 4 * u_dot_after(s) - u_dot_after(2 * s)) / (2 * s)
+    return (u_dot_after(s) - u_dot_after(-s)) / (2 * s)

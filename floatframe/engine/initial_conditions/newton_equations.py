@@ -1,0 +1,223 @@
+"""The linearised equations at one iterate, and their solution; for everything that is done once per motion."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import splu
+
+from fe_models.foundation.arrays import Array, IntArray
+from floatframe.engine.kernels.model import MASS, STIFFNESS, Model
+from floatframe.engine.kernels.work import Work
+from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_matrix
+from floatframe.model.state import State
+
+__all__ = [
+    "Linearized",
+    "displaced",
+    "highest_frequency",
+    "in_body_axes",
+    "in_ground_axes",
+    "linearized",
+    "modal_diagonals",
+    "modal_matrix",
+    "modal_weight",
+    "set_iterate",
+    "solve",
+    "with_mass_for_all",
+    "with_modal_weight",
+]
+
+STIFF = 1e3  #: the stiffness in W is scaled so that the softest mode weighs this much more than its mass
+STIFF_START = 1e6  #: the same where a placement is closed: modes that hardly give way hardly ring after it
+MASSLESS = 10.0  #: a mode without mass gets one that puts it at this multiple of the highest frequency
+
+
+@dataclass(frozen=True, eq=False)
+class Linearized:
+    """Matrices of the system at an iterate, unknowns in body axes (dx, dtheta, dq)."""
+
+    H: tuple[Array, ...]  #: of each body, (6 + n, 6 + n)
+    J: sp.csr_array  #: wrenches to bodies: forces = J.T @ w, (n_w, n_u)
+    G: sp.csr_array  #: rows by unknowns, (n_w, n_u); of rows that feel accelerations with these
+    V: sp.csr_array  #: rows by wrenches, (n_w, n_w)
+
+
+def set_iterate(
+    work: Work, state: State, u_dot: Array | None = None, w: Array | None = None, *, R: Array | None = None
+) -> None:
+    """Write a state into the working arrays; accelerations and wrenches zero if not given, R of the state if known."""
+    work.state.r[:] = state.r
+    work.state.R[:] = rotation_matrix(state.p) if R is None else R
+    work.state.q[:] = state.q
+    work.state.u[:] = state.u
+    work.state.u_dot[:] = 0.0 if u_dot is None else u_dot
+    work.state.w[:] = 0.0 if w is None else w
+    work.state.theta[:] = 0.0
+    work.state.spins[:] = 0
+
+
+def linearized(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> Linearized:
+    """Evaluate at the iterate in `work` and return copies of all matrices."""
+    from floatframe.engine.kernels.entry import evaluate_and_linearize
+
+    evaluate_and_linearize(model, work, c_m, c_d, c_k)
+    H = []
+    for i in range(len(model.bodies.kind)):
+        n = 6 + int(model.bodies.n_q[i])
+        H.append(work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape(n, n).copy())
+    n_w, n_u = len(work.state.w), len(work.state.u)
+    J_parts: list[tuple[Array, int, int]] = []
+    G_parts: list[tuple[Array, int, int]] = []
+    for m in model.bodies.ends:
+        i, c, o = int(model.markers.body[m]), int(model.markers.connection[m]), int(model.markers.x0[m])
+        n, size = 6 + int(model.bodies.n_q[i]), int(model.connections.size[c])
+        R = work.state.R[i]  # turns each three rows of what follows
+        column = work.solver.J_column[6 * o : 6 * (o + n)].reshape(2, 3, n)
+        row = work.solver.J_row[12 * o : 12 * (o + n)].reshape(4, 3, n)
+        w0, u0 = int(model.connections.w0[c]), int(model.bodies.u0[i])
+        carried = model.markers.sign[m] * (R @ column).reshape(6, n)
+        for part, place in ((0, int(model.markers.force[m])), (3, int(model.markers.moment[m]))):
+            if place >= 0:
+                J_parts.append((carried[part : part + 3], w0 + place, u0))
+        G_parts.append((work.connections.P[m, :size] @ (R @ row).reshape(12, n), w0, u0))
+        accelerated = int(model.markers.accelerated[m])
+        if accelerated >= 0:
+            o = int(model.markers.a0[m])
+            row_a = work.solver.J_a[6 * o : 6 * (o + n)].reshape(2, 3, n)
+            G_parts.append((work.connections.P_a[accelerated, :size] @ (R @ row_a).reshape(6, n), w0, u0))
+    connections = model.connections
+    places = zip(connections.size.tolist(), connections.w0.tolist(), strict=False)
+    V = summed([(work.connections.V[c, :size, :size], w0, w0) for c, (size, w0) in enumerate(places)], (n_w, n_w))
+    V.eliminate_zeros()
+    return Linearized(tuple(H), summed(J_parts, (n_w, n_u)), summed(G_parts, (n_w, n_u)), V)
+
+
+def summed(parts: list[tuple[Array, int, int]], shape: tuple[int, int]) -> sp.csr_array:
+    """Return the sparse sum of dense blocks, each with its first row and column."""
+    if not parts:
+        return sp.csr_array(shape)
+    values, rows, columns = entries(parts)
+    return sp.csr_array(sp.coo_array((values, (rows, columns)), shape=shape))
+
+
+def entries(parts: list[tuple[Array, int, int]]) -> tuple[Array, IntArray, IntArray]:
+    """Return values, rows and columns of the entries of dense blocks, each with its first row and column."""
+    rows = [np.repeat(np.arange(first, first + len(block)), block.shape[1]) for block, first, _ in parts]
+    columns = [np.tile(np.arange(first, first + block.shape[1]), len(block)) for block, _, first in parts]
+    values = [block.ravel() for block, _, _ in parts]
+    return np.concatenate(values), np.concatenate(rows), np.concatenate(columns)
+
+
+def solve(H: tuple[Array, ...], parts: Linearized, forces: Array, rows: Array) -> tuple[Array, Array]:
+    """Solve H y - Jᵀ w = forces, G y + V w = rows; return y, (n_u,), and w, (n_w,)."""
+    n_u, n = len(forces), len(forces) + len(rows)
+    first = np.cumsum([0, *(len(block) for block in H)]).tolist()
+    values, row, column = entries([(block, k, k) for block, k in zip(H, first, strict=False)])
+    is_there = values != 0
+    J, G, V = parts.J, parts.G, parts.V
+    J_row, G_row, V_row = (np.repeat(np.arange(len(rows)), np.diff(A.indptr)) for A in (J, G, V))
+    values = np.concatenate([values[is_there], -J.data, G.data, V.data])
+    row = np.concatenate([row[is_there], J.indices, n_u + G_row, n_u + V_row])
+    column = np.concatenate([column[is_there], n_u + J_row, G.indices, n_u + V.indices])
+    solution = splu(sp.csc_array((values, (row, column)), shape=(n, n))).solve(np.concatenate([forces, rows]))
+    return solution[:n_u], solution[n_u:]
+
+
+def modal_diagonals(model: Model, i: int, which: int) -> Array:
+    """Return the diagonal of M*, K* or D* of a body, (n_q,)."""
+    n, t = int(model.bodies.n_q[i]), model.bodies.kind[i]
+    if n == 0:
+        return np.zeros(0)
+    start = model.body_types.block0[t, which]
+    step = 1 if model.body_types.is_diagonal[t, which - MASS] else n + 1
+    return model.body_types.blocks[start : start + n * step : step][:n]
+
+
+def modal_matrix(model: Model, i: int, which: int) -> Array:
+    """Return M*, K* or D* of a body, (n_q, n_q)."""
+    n, t = int(model.bodies.n_q[i]), model.bodies.kind[i]
+    if n == 0:
+        return np.zeros((0, 0))
+    start = model.body_types.block0[t, which]
+    if model.body_types.is_diagonal[t, which - MASS]:
+        return np.diag(model.body_types.blocks[start : start + n])
+    return model.body_types.blocks[start : start + n * n].reshape(n, n)
+
+
+def highest_frequency(model: Model) -> float:
+    """Return the largest sqrt(K_kk/M_kk) of all modes with mass [rad/s]; 0 without modes."""
+    highest = 0.0
+    for i in range(len(model.bodies.kind)):
+        M, K = modal_diagonals(model, i, MASS), modal_diagonals(model, i, STIFFNESS)
+        with_mass = M > 0
+        if with_mass.any():
+            highest = max(highest, float(np.sqrt(np.max(np.maximum(K[with_mass], 0) / M[with_mass]))))
+    return highest
+
+
+def modal_weight(model: Model, i: int) -> float:
+    """Return the factor s of the modal stiffness of a body in W of the module docstring."""
+    M, K = modal_diagonals(model, i, MASS), modal_diagonals(model, i, STIFFNESS)
+    elastic = (M > 0) & (K > 0)
+    softest = np.min(K[elastic] / M[elastic]) if elastic.any() else (K.max() if K.size and K.max() > 0 else 1.0)
+    return float(STIFF / softest)
+
+
+def with_modal_weight(model: Model, H: tuple[Array, ...], stiff: float = STIFF) -> tuple[Array, ...]:
+    """Return mass matrices with the modal stiffness added, scaled by `stiff` (W of the module docstring)."""
+    weighted = []
+    for i, block in enumerate(H):
+        block = block.copy()
+        block[6:, 6:] += stiff / STIFF * modal_weight(model, i) * modal_matrix(model, i, STIFFNESS)
+        weighted.append(block)
+    return tuple(weighted)
+
+
+def with_mass_for_all(model: Model, H: tuple[Array, ...]) -> tuple[Array, ...]:
+    """Return mass matrices in which modes without mass have a small one, so that they can be accelerated."""
+    omega = MASSLESS * highest_frequency(model)
+    complete = []
+    for i, block in enumerate(H):
+        M, K = modal_diagonals(model, i, MASS), modal_diagonals(model, i, STIFFNESS)
+        if (M <= 0).any():
+            scale = omega**2 if omega > 0 else max(float(K.max()), 1.0)
+            block = block + np.diag(np.concatenate([np.zeros(6), np.where(M <= 0, np.maximum(K, 0) / scale, 0.0)]))
+        complete.append(block)
+    return tuple(complete)
+
+
+def displaced(model: Model, state: State, x: Array) -> State:
+    """Return the state displaced by x = (dr in ground axes, rotation vector in body axes, dq) per body, (n_u,)."""
+    r, p, q = state.r.copy(), state.p.copy(), state.q.copy()
+    for i in range(len(model.bodies.kind)):
+        u0, u1 = model.bodies.u0[i], model.bodies.u0[i + 1]
+        r[i] += x[u0 : u0 + 3]
+        p[i] = product(p[i], euler_parameters_of_rotation_vector(x[u0 + 3 : u0 + 6]))
+        q[model.bodies.q0[i] : model.bodies.q0[i + 1]] += x[u0 + 6 : u1]
+    return State(r, p, q, state.u)
+
+
+def product(p: Array, s: Array) -> Array:
+    """Return the Hamilton product p * s of Euler parameters, of length one, (4,)."""
+    w = p[0] * s[0] - p[1:] @ s[1:]
+    result = np.array([w, *(p[0] * s[1:] + s[0] * p[1:] + np.cross(p[1:], s[1:]))])
+    return result / np.linalg.norm(result)
+
+
+def in_ground_axes(model: Model, state: State, y: Array) -> Array:
+    """Return body unknowns with their translation turned from body to ground axes, (n_u,)."""
+    x = y.copy()
+    for i, p in enumerate(state.p):
+        u0 = model.bodies.u0[i]
+        x[u0 : u0 + 3] = rotation_matrix(p) @ y[u0 : u0 + 3]
+    return x
+
+
+def in_body_axes(model: Model, state: State, x: Array) -> Array:
+    """Return body unknowns with their translation turned from ground to body axes, (n_u,)."""
+    y = x.copy()
+    for i, p in enumerate(state.p):
+        u0 = model.bodies.u0[i]
+        y[u0 : u0 + 3] = x[u0 : u0 + 3] @ rotation_matrix(p)
+    return y

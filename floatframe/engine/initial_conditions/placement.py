@@ -1,0 +1,62 @@
+"""How far the joints moved bodies from where they were placed: told where it is much, refused where it is absurd.
+
+Newton's method closes the joints from any place; from far away it can end in another configuration than the one that
+was meant (an elbow the other way round).
+"""
+
+import logging
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.engine.compiling.system import CompiledSystem
+from floatframe.errors import ModelError
+from floatframe.model.state import State
+
+__all__ = ["require_placed_near"]
+
+log = logging.getLogger(__name__)
+
+TOLD = 0.1  #: of the size of a body: a way that is told
+REFUSED = 3.0  #: of the size of the largest body: a way that is no placement of it
+
+
+def require_placed_near(compiled: CompiledSystem, placed: State, closed: State) -> None:
+    """Log which body the joints moved far, and raise `ModelError` where it was placed out of reach.
+
+    Prescribed motions may move bodies far at their beginning: with them it is told, not refused.
+
+    Parameters
+    ----------
+    compiled
+        The system.
+    placed, closed
+        The state as given, and with its joints closed; in the frames of the engine.
+    """
+    way = np.linalg.norm(closed.r - placed.r, axis=1)
+    size = body_sizes(compiled)
+    is_driven = bool((compiled.model.rows.motion >= 0).any())
+    i = int(np.argmax(way / size))
+    if way[i] <= TOLD * size[i]:
+        return
+    words = (
+        f"body {compiled.body_names[i]!r} was placed {way[i]:.3g} from where its joints hold it, "
+        f"{way[i] / size[i]:.2g} of its size"
+    )
+    if way.max() > REFUSED * size.max() and not is_driven:
+        far = int(np.argmax(way))
+        raise ModelError(
+            f"body {compiled.body_names[far]!r} was placed {way[far]:.3g} from where its joints hold it; the largest "
+            f"body has a size of {size.max():.3g}: place it at its joints, or check the units of its position"
+        )
+    log.warning("%s, and moved there; from so far it can end in another configuration: place it at its joints", words)
+
+
+def body_sizes(compiled: CompiledSystem) -> Array:
+    """Return the largest arm of a marker or the radius of gyration of each body, (n_b,) [m]; 1 if all are 0."""
+    model = compiled.model
+    kind, types, markers = model.bodies.kind, model.body_types, model.markers
+    size = np.sqrt(np.maximum(np.trace(types.J0, axis1=1, axis2=2), 0.0) / (2 * types.mass))[kind]
+    on_body = markers.body >= 0
+    np.maximum.at(size, markers.body[on_body], np.linalg.norm(markers.position[on_body], axis=1))
+    return np.where(size > 0, size, size.max(initial=0.0) or 1.0)

@@ -1,0 +1,218 @@
+"""Accelerations at the start of a motion, without what a step of the given size cannot follow.
+
+A start knows the accelerations u_dot of the equations of motion alone. Where a mode, a spring or a damper is far
+faster than the step, they throw the body on which it acts. The matrix of a Newton step tells fast from slow:
+
+    (1) z = Z y:  (M + s gamma h D + s beta h² K) z - Jᵀ mu = M y,   G z = G y
+    (2) u_dot becomes (2 Z - Z²) u_dot,   a = u_dot + (alpha_m - alpha_f) h Z d(u_dot)/dt
+
+for all unknowns alike: modes, bodies on springs, rates of joints. G z = G y keeps the accelerations those of closed
+joints. What the step follows well stays, since 2 Z - Z² = 1 - (1 - Z)²: the change is of second order in h. What the
+step does not follow goes: h² a stays of the size of what is displaced, where h² u_dot grows with (omega h)².
+
+s = gamma - 1/2, at most 1, is the numerical damping of the method. With it no restart makes a mode grow, whatever
+omega h and rho_inf are, and however often the motion begins anew; with s = 1 a mode that the method hardly damps can
+grow, by 2.5 % a restart for rho_inf = 0.98. Methods without numerical damping need no filter: the trapezoidal rule
+has a = u_dot in every step, and for rho_inf = 1 the motion of a linear system does not depend on a
+(`tests/floatframe/engine/initial_conditions/test_step_filter.py`).
+
+The velocities are changed by
+
+    (3) (M + gamma h D + beta h² K) du - Jᵀ mu = 0,   G du = -g(after)/h
+
+for the rows of positions whose rates the steps do not hold (g taken as zero in all others). `after` is where the first
+step leads with accelerations that are filtered with s = 1: so it closes the joints without a kick. The change is O(h²).
+
+Where the steps take the spin w of a body about its axis e by itself, the filter and the rates are those of axes which
+do not spin: the part w omega × e of u_dot is not filtered, and D has what it adds.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.linalg import SuperLU, splu
+
+from fe_models.foundation.arrays import Array
+from floatframe.engine.compiling.system import CompiledSystem
+from floatframe.engine.initial_conditions.initial import ConsistentState, acceleration_rates, start_unknowns, work_from
+from floatframe.engine.initial_conditions.newton_equations import (
+    in_body_axes,
+    in_ground_axes,
+    linearized,
+    set_iterate,
+    with_mass_for_all,
+)
+from floatframe.engine.kernels.model import Model
+from floatframe.model.joints.rows import is_held
+from floatframe.model.state import State
+
+__all__ = ["Beginning", "Spin", "StepFilter", "beginning_of", "closing_velocities", "spin_of", "step_filter"]
+
+
+@dataclass(frozen=True, eq=False)
+class StepFilter:
+    """Z of the module docstring at a state, with the factors of its matrix."""
+
+    compiled: CompiledSystem
+    state: State
+    mass: sp.csr_array  #: M and, below, what rows feel of accelerations, (n_u + n_w, n_u)
+    factors: SuperLU  #: of the matrix of (1)
+
+    def __call__(self, y: Array) -> Array:
+        """Return Z y, (n_u,), of accelerations or their rates, translations in ground axes."""
+        return self.solved(y)[0]
+
+    def solved(self, y: Array) -> tuple[Array, Array]:
+        """Return Z y, and mu, (n_w,)."""
+        model = self.compiled.model
+        z = self.factors.solve(self.mass @ in_body_axes(model, self.state, y))
+        return in_ground_axes(model, self.state, z[: len(y)]), z[len(y) :]
+
+    def twice(self, y: Array) -> Array:
+        """Return (2 Z - Z²) y."""
+        z = self(y)
+        return z + self(y - z)
+
+    def closing(self, gap: Array) -> Array:
+        """Return du of (3), (n_u,), for g(after)/h, (n_w,), zero in all rows that are not closed so."""
+        model, n_u = self.compiled.model, self.mass.shape[1]
+        right = np.concatenate([np.zeros(n_u), -gap])
+        return in_ground_axes(model, self.state, self.factors.solve(right)[:n_u])
+
+
+def step_filter(
+    compiled: CompiledSystem,
+    consistent: ConsistentState,
+    t: float,
+    *,
+    c_d: float,
+    c_k: float,
+    spin: "Spin | None" = None,
+) -> StepFilter:
+    """Return the filter with the matrix M + c_d D + c_k K at a state with its accelerations and wrenches, at time t.
+
+    spin: of bodies whose D is that of axes which do not spin with them.
+    K holds what forces do as they turn with the bodies. Those of modes that the step does not follow are no part of it:
+    a first filter, without any forces, tells which stay.
+    """
+    y, w = consistent.u_dot, consistent.w
+    if len(w):
+        first = filter_by(compiled, consistent, np.zeros_like(y), np.zeros_like(w), t, c_d, c_k, spin)
+        y, change = first.solved(y)
+        w = w + np.where(is_wrench(compiled.model), change, 0.0)
+    return filter_by(compiled, consistent, y, w, t, c_d, c_k, spin)
+
+
+def filter_by(
+    compiled: CompiledSystem,
+    consistent: ConsistentState,
+    u_dot: Array,
+    w: Array,
+    t: float,
+    c_d: float,
+    c_k: float,
+    spin: "Spin | None",
+) -> StepFilter:
+    """Return the filter with the matrix of a consistent state, but other accelerations and wrenches."""
+    model, state = compiled.model, consistent.state
+    work = work_from(model, consistent.w)
+    work.state.time[...] = t
+    set_iterate(work, state, u_dot, np.where(is_wrench(model), w, consistent.w))
+    if spin is not None:
+        work.state.spins[:] = spin.bodies
+    inertia = linearized(model, work, 1.0, 0.0, 0.0)
+    step = linearized(model, work, 1.0, c_d, c_k)
+    M = sp.block_diag(with_mass_for_all(model, inertia.H))
+    top = sp.block_diag(with_mass_for_all(model, step.H))
+    if not len(w):
+        return StepFilter(compiled, state, sp.csr_array(M), splu(sp.csc_array(top)))
+    held = sp.diags_array(is_held(model.rows.kind).astype(float))
+    G = held @ inertia.G + (sp.eye_array(len(w)) - held) @ step.G
+    matrix = sp.csc_array(sp.block_array([[top, -step.J.T], [G, step.V]]))
+    return StepFilter(compiled, state, sp.csr_array(sp.vstack([M, inertia.G])), splu(matrix))
+
+
+def is_wrench(model: Model) -> NDArray[np.bool_]:
+    """Return which unknowns of connections are forces, moments or multipliers, and no states or coordinates, (n_w,)."""
+    result = np.ones(int(model.connections.w0[-1]), dtype=bool)
+    for k in range(3):
+        result[model.states.row + k] = False
+    for k in range(2):
+        result[model.coordinates.row + k] = False
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class Spin:
+    """Axisymmetric bodies whose spin the steps take by itself, see `kernels.generalized_alpha`."""
+
+    bodies: NDArray[np.int64]  #: 1 for each of them, (n_b,)
+    turn: Array  #: w omega × e, the part of u_dot by which their axes e turn with the spin w, (n_u,)
+    further: Array  #: by which rates of the rest, in axes that do not spin, differ from those of u_dot, (n_u,)
+
+
+def spin_of(compiled: CompiledSystem, consistent: ConsistentState) -> Spin:
+    """Return the bodies whose spin the next step takes by itself."""
+    from floatframe.engine.kernels.generalized_alpha import STEADY
+
+    model, u, u_dot = compiled.model, consistent.state.u, consistent.u_dot
+    bodies, turn, further = np.zeros(len(model.bodies.kind), dtype=np.int64), np.zeros_like(u), np.zeros_like(u)
+    for i, e in enumerate(model.body_types.axis[model.bodies.kind]):
+        part = slice(model.bodies.u0[i] + 3, model.bodies.u0[i] + 6)
+        omega, alpha = u[part], u_dot[part]
+        by_turn = (e @ omega) * np.cross(omega, e)
+        rest = alpha - by_turn
+        if by_turn.any() and np.linalg.norm(alpha) >= STEADY * np.linalg.norm(rest):
+            bodies[i], turn[part] = 1, by_turn
+            rate_of_turn = (e @ alpha) * np.cross(omega, e) + (e @ omega) * np.cross(alpha, e)
+            further[part] = (e @ omega) * np.cross(e, rest) - rate_of_turn
+    return Spin(bodies, turn, further)
+
+
+@dataclass(frozen=True, eq=False)
+class Beginning:
+    """Accelerations with which a motion begins, and their rates, filtered with one s."""
+
+    u_dot: Array  #: (2 Z - Z²) u_dot, (n_u,)
+    rates: Array  #: Z d(u_dot)/dt along the motion with these, of bodies that spin in axes that do not, (n_u,)
+
+
+def beginning_of(
+    compiled: CompiledSystem,
+    consistent: ConsistentState,
+    t: float,
+    h: float,
+    z: StepFilter | None,
+    *,
+    spin: Spin | None = None,
+) -> Beginning:
+    """Return accelerations and rates at a state at time t for steps of size h; z None: as the equations of motion say.
+
+    spin: of bodies whose accelerations are filtered without the turn of their axes.
+    """
+    turn = np.zeros_like(consistent.u_dot) if spin is None else spin.turn
+    u_dot = consistent.u_dot if z is None else turn + z.twice(consistent.u_dot - turn)
+    rates = acceleration_rates(compiled, ConsistentState(consistent.state, u_dot, consistent.w), t, h)
+    if spin is not None:
+        rates = rates + spin.further
+    return Beginning(u_dot, rates if z is None else z(rates))
+
+
+def closing_velocities(z: StepFilter, after: State, w: Array, t: float, h: float, rows: NDArray[np.bool_]) -> Array:
+    """Return du of (3), (n_u,), for some rows, (n_w,), in a step of size h from t to `after`; z: with s = 1."""
+    model = z.compiled.model
+    work, unknowns = work_from(model, w), start_unknowns(model, w)
+    if len(model.coordinates.row):  # angles of couplers and user forces are those next to where their rates lead
+        row = model.coordinates.row
+        work.state.time[...] = t
+        set_iterate(work, z.state, w=unknowns)
+        linearized(model, work, 1.0, 0.0, 0.0)
+        g = work.connections.g
+        unknowns[row] -= g[row]
+        unknowns[row] += h * (unknowns[row + 1] - g[row + 1])
+    work.state.time[...] = t + h
+    set_iterate(work, after, w=unknowns)
+    linearized(model, work, 1.0, 0.0, 0.0)
+    return z.closing(np.where(rows, work.connections.g / h, 0.0))

@@ -1,0 +1,394 @@
+"""Equations of motion of one body, complete in the deformation (docs/theory.md §6-7), and their tangent.
+
+Components in body axes; a: acceleration of the frame origin minus gravity, alpha: angular acceleration. From
+W_ab = S_ab q, 1C(q) = 1C + K_t q, s = S + 1C q + 1/2 qᵀ K_t q (K_t, K_r: zero unless stiffened):
+
+    T_k    = (tr W_k) 1 - W_k                                  (= Σ_l 5C_lk q_l)
+    D_k    = 3C_k + T_k
+    B_k    = 2C_k + (W_zy - W_yz, W_xz - W_zx, W_yx - W_xy)_k  (= 2C_k + Σ_l 4C_kl q_l)
+    J      = J0 + G + Gᵀ,  G = Σ q_k (3C_k + T_k/2)
+    Y_k    = Σ_l 4C_kl q_dot_l
+    (1) m a + alpha × s + 1C(q) q_ddot + q_dotᵀK_t q_dot + 2 omega × (1C(q) q_dot) + omega × (omega × s)  = f
+    (2) s × a + J alpha + Σ B_k q_ddot_k + q_dotᵀK_r q_dot + 2 (Σ q_dot_k D_k) omega + omega × (J omega)  = tau
+    (3) 1C_k(q)·a + B_k·alpha + (M q_ddot)_k + 2 Y_k·omega - omegaᵀ D_k omega + (D q_dot + K q)_k         = h_k
+
+The matrices K_ab and K_r of a stiffened body are part of its S_ab (`compiling.stiffening`), so that B, D and J hold
+them as they are written here. One pass over S_ab (9 n² numbers), one over 4C (3 n²), and over K_t, K_r (6 n²) carry
+the cost.
+"""
+
+from floatframe.engine.kernels.compiler.compilation import loops, view
+from floatframe.engine.kernels.dense import add_products
+from floatframe.engine.kernels.model import C1, C2, C3, C4, DAMPING, K_ROTATION, K_TRANSLATION, MASS, S_AB, STIFFNESS
+from floatframe.engine.kernels.vector import (
+    add,
+    cross,
+    dot,
+    matrix,
+    matrix_sum,
+    product,
+    put,
+    put_matrix,
+    put_sum,
+    scaled,
+    scaled_matrix,
+    sub,
+    tilde,
+    transposed,
+    turned,
+    turned_back,
+    unit,
+    unit_matrix,
+    vector,
+)
+
+__all__ = ["body_forces", "body_mass_product", "body_tangent", "modal_term"]
+
+
+@view
+def block(types, t, which, size):
+    """Return a constant block of a type of bodies as a view of the flat store."""
+    start = types.block0[t, which]
+    return types.blocks[start : start + size]
+
+
+@loops
+def column(A, n, k):
+    """Return column k of A [a, k], flat."""
+    return A[k], A[n + k], A[2 * n + k]
+
+
+@loops
+def tensor(A, n, k):
+    """Return matrix k of A [ab, k], flat."""
+    return column(A, n, k), column(A[3 * n :], n, k), column(A[6 * n :], n, k)
+
+
+@loops
+def column_sum(A, n, x):
+    """Return Σ A[a, k] x_k."""
+    total = (0.0, 0.0, 0.0)
+    for k in range(n):
+        total = add(total, scaled(x[k], column(A, n, k)))
+    return total
+
+
+@loops
+def tensor_sum(A, n, x):
+    """Return Σ A[ab, k] x_k."""
+    return column_sum(A, n, x), column_sum(A[3 * n :], n, x), column_sum(A[6 * n :], n, x)
+
+
+@loops
+def trace_less(W):
+    """Return (tr W) 1 - W."""
+    x, y, z = W[0][0], W[1][1], W[2][2]
+    return (y + z, -W[0][1], -W[0][2]), (-W[1][0], x + z, -W[1][2]), (-W[2][0], -W[2][1], x + y)
+
+
+@loops
+def axial(W):
+    """Return (W_zy - W_yz, W_xz - W_zx, W_yx - W_xy)."""
+    return W[2][1] - W[1][2], W[0][2] - W[2][0], W[1][0] - W[0][1]
+
+
+@loops
+def modal_term(types, t, n, which, x, out):
+    """Add M x, K x or D x of a type of bodies to out, (n_q,)."""
+    if types.is_diagonal[t, which - MASS]:
+        diagonal = block(types, t, which, n)
+        for k in range(n):
+            out[k] += diagonal[k] * x[k]
+    else:
+        A = block(types, t, which, n * n)
+        for k in range(n):
+            total = 0.0
+            for j in range(n):
+                total += A[k * n + j] * x[j]
+            out[k] += total
+
+
+@loops
+def first_moments(model, work, i):
+    """Write s(q) and 1C(q) = ds/dq, and K_t q_dot, K_r q_dot of a stiffened body, into work.bodies."""
+    types, bodies = model.body_types, work.bodies
+    t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
+    put(bodies.s[i], 0, types.S[t])
+    if n == 0:
+        return
+    own = block(types, t, C1, 3 * n)
+    first = bodies.C1[3 * q0 : 3 * (q0 + n)]
+    for j in range(3 * n):
+        first[j] = own[j]
+    q = work.state.q[q0 : q0 + n]
+    if types.is_stiffened[t]:
+        q_dot = work.state.u[u0 + 6 : u0 + 6 + n]
+        K_t, K_r = block(types, t, K_TRANSLATION, 3 * n * n), block(types, t, K_ROTATION, 3 * n * n)
+        K_t_q_dot, K_r_q_dot = bodies.K_t_q_dot[3 * q0 : 3 * (q0 + n)], bodies.K_r_q_dot[3 * q0 : 3 * (q0 + n)]
+        for j in range(3 * n):
+            K_t_q_dot[j], K_r_q_dot[j] = 0.0, 0.0
+        add_products(K_t, q, first)
+        add_products(K_t, q_dot, K_t_q_dot)
+        add_products(K_r, q_dot, K_r_q_dot)
+    put_sum(bodies.s[i], 0, scaled(0.5, add(column_sum(own, n, q), column_sum(first, n, q))))
+
+
+@loops
+def products(types, t, n, q, q_dot, W, Y):
+    """Write W_ab = S_ab q and Y = 4C q_dot."""
+    for j in range(9 * n):
+        W[j] = 0.0
+    for j in range(3 * n):
+        Y[j] = 0.0
+    add_products(block(types, t, S_AB, 9 * n * n), q, W)
+    add_products(block(types, t, C4, 3 * n * n), q_dot, Y)
+
+
+@loops
+def body_forces(model, work, i):
+    """Write the left sides of (1) to (3) of body i into the residual, and s, 1C, W, Y, J, D_q_dot."""
+    types, bodies, R = model.body_types, work.bodies, work.state.R[i]
+    t, n, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.u0[i]
+    u, u_dot = work.state.u[u0 : u0 + 6 + n], work.state.u_dot[u0 : u0 + 6 + n]
+    a, omega, alpha = turned_back(R, sub(u_dot, model.gravity)), vector(u[3:]), vector(u_dot[3:])
+    put(bodies.a_B[i], 0, a)
+    first_moments(model, work, i)
+    f, tau = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    if n > 0:
+        f, tau = modal_forces(model, work, i, a)
+    else:
+        put_matrix(bodies.J[i], types.J0[t])
+        put_matrix(bodies.D_q_dot[i], (tau, tau, tau))
+    m, s, J, residual = types.mass[t], vector(bodies.s[i]), bodies.J[i], bodies.residual[u0 : u0 + 6]
+    f = add(f, add(scaled(m, a), add(cross(alpha, s), cross(omega, cross(omega, s)))))
+    tau = add(tau, add(cross(s, a), add(turned(J, alpha), cross(omega, turned(J, omega)))))
+    put(residual, 0, f)
+    put(residual, 3, tau)
+
+
+@loops
+def modal_forces(model, work, i, a):
+    """Write (3) of body i, and W, Y, J, D_q_dot; return the terms of q_dot and q_ddot in (1) and (2)."""
+    types, bodies = model.body_types, work.bodies
+    t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i] + 6
+    q, q_dot, q_ddot = work.state.q[q0 : q0 + n], work.state.u[u0 : u0 + n], work.state.u_dot[u0 : u0 + n]
+    omega, alpha = vector(work.state.u[u0 - 3 :]), vector(work.state.u_dot[u0 - 3 :])
+    W, Y, first = bodies.W[9 * q0 : 9 * (q0 + n)], bodies.Y[3 * q0 : 3 * (q0 + n)], bodies.C1[3 * q0 : 3 * (q0 + n)]
+    products(types, t, n, q, q_dot, W, Y)
+    second, third, h = block(types, t, C2, 3 * n), block(types, t, C3, 9 * n), bodies.residual[u0 : u0 + n]
+    zero = (0.0, 0.0, 0.0)
+    tau, G, D_q_dot = zero, (zero, zero, zero), (zero, zero, zero)
+    for k in range(n):
+        W_k, C_k = tensor(W, n, k), tensor(third, n, k)
+        T_k = trace_less(W_k)
+        D_k, B_k = matrix_sum(C_k, T_k), add(column(second, n, k), axial(W_k))
+        G = matrix_sum(G, scaled_matrix(q[k], matrix_sum(C_k, scaled_matrix(0.5, T_k))))
+        D_q_dot = matrix_sum(D_q_dot, scaled_matrix(q_dot[k], D_k))
+        tau = add(tau, scaled(q_ddot[k], B_k))
+        h[k] = (
+            dot(column(first, n, k), a)
+            + dot(B_k, alpha)
+            + 2 * dot(column(Y, n, k), omega)
+            - dot(omega, turned(D_k, omega))
+        )
+    put_matrix(bodies.J[i], matrix_sum(matrix(types.J0[t]), matrix_sum(G, transposed(G))))
+    put_matrix(bodies.D_q_dot[i], D_q_dot)
+    modal_term(types, t, n, MASS, q_ddot, h)
+    modal_term(types, t, n, DAMPING, q_dot, h)
+    modal_term(types, t, n, STIFFNESS, q, h)
+    f = add(column_sum(first, n, q_ddot), cross(scaled(2.0, omega), column_sum(first, n, q_dot)))
+    tau = add(tau, scaled(2.0, turned(D_q_dot, omega)))
+    if types.is_stiffened[t]:
+        f = add(f, column_sum(bodies.K_t_q_dot[3 * q0 : 3 * (q0 + n)], n, q_dot))
+        tau = add(tau, column_sum(bodies.K_r_q_dot[3 * q0 : 3 * (q0 + n)], n, q_dot))
+    return f, tau
+
+
+@loops
+def body_mass_product(model, work, i, v, out):
+    """Write generalised momenta M u of body i into out, (6 + n_q,), for v, (6 + n_q,), with v_GO in body axes.
+
+    `body_forces` has been called for this configuration.
+    """
+    types, bodies = model.body_types, work.bodies
+    t, n, q0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i]
+    s, v_O, omega, q_dot = vector(bodies.s[i]), vector(v), vector(v[3:]), v[6:]
+    first = bodies.C1[3 * q0 : 3 * (q0 + n)]
+    put(out, 0, add(scaled(types.mass[t], v_O), add(cross(omega, s), column_sum(first, n, q_dot))))
+    put(out, 3, add(cross(s, v_O), turned(bodies.J[i], omega)))
+    if n > 0:
+        W, second = bodies.W[9 * q0 : 9 * (q0 + n)], block(types, t, C2, 3 * n)
+        for k in range(n):
+            B_k = add(column(second, n, k), axial(tensor(W, n, k)))
+            put_sum(out, 3, scaled(q_dot[k], B_k))
+            out[6 + k] = dot(column(first, n, k), v_O) + dot(B_k, omega)
+        modal_term(types, t, n, MASS, q_dot, out[6:])
+
+
+@loops
+def put_block(H, row, column, A):
+    """Write a matrix into H at (row, column)."""
+    put(H[row], column, A[0])
+    put(H[row + 1], column, A[1])
+    put(H[row + 2], column, A[2])
+
+
+@loops
+def put_column(H, row, column, x):
+    """Write a vector down a column of H."""
+    H[row, column], H[row + 1, column], H[row + 2, column] = x[0], x[1], x[2]
+
+
+@loops
+def add_column(H, row, column, x):
+    """Add a vector to a column of H."""
+    H[row, column] += x[0]
+    H[row + 1, column] += x[1]
+    H[row + 2, column] += x[2]
+
+
+@loops
+def body_tangent(model, work, i, c_m, c_d, c_k, H, turn):
+    """Write the derivative of (1) to (3) into H, (6 + n, 6 + n), with weights of mass, damping, stiffness parts.
+
+    Columns are (dx, dtheta, dq) with da = c_m dx, dalpha = c_m dtheta, dq_ddot = c_m dq, domega = c_d dtheta,
+    dq_dot = c_d dq, dq: c_k dq. The derivative by the rotation of the body itself (da = a × dphi) goes
+    unweighted into turn, (6 + n, 3). `body_forces` has been called for this iterate. With v = 1C(q) q_dot
+
+        d(1) = m da - tilde(s) dalpha - (2 tilde(v) + tilde(omega × s) + tilde(omega) tilde(s)) domega + ...
+        d(2) = tilde(s) da + J dalpha + (2 Σ q_dot_k D_k + tilde(omega) J - tilde(J omega)) domega + ...
+    """
+    bodies, t, n, u0 = work.bodies, model.bodies.kind[i], model.bodies.n_q[i], model.bodies.u0[i]
+    q0, m, a, s, J = (
+        model.bodies.q0[i],
+        model.body_types.mass[t],
+        vector(bodies.a_B[i]),
+        vector(bodies.s[i]),
+        bodies.J[i],
+    )
+    omega, q_dot = vector(work.state.u[u0 + 3 :]), work.state.u[u0 + 6 : u0 + 6 + n]
+    v = column_sum(bodies.C1[3 * q0 : 3 * (q0 + n)], n, q_dot)
+    H[:, :] = 0.0
+    turn[:, :] = 0.0
+    spin = matrix_sum(tilde(add(scaled(2.0, v), cross(omega, s))), product(tilde(omega), tilde(s)))
+    gyro = matrix_sum(product(tilde(omega), J), tilde(scaled(-1.0, turned(J, omega))))
+    by_omega = matrix_sum(scaled_matrix(2.0, matrix(bodies.D_q_dot[i])), gyro)
+    put_block(H, 0, 0, scaled_matrix(c_m * m, unit_matrix()))
+    put_block(H, 3, 0, tilde(scaled(c_m, s)))
+    put_block(H, 0, 3, matrix_sum(tilde(scaled(-c_m, s)), scaled_matrix(-c_d, spin)))
+    put_block(H, 3, 3, matrix_sum(scaled_matrix(c_m, matrix(J)), scaled_matrix(c_d, by_omega)))
+    put_block(turn, 0, 0, tilde(scaled(m, a)))
+    put_block(turn, 3, 0, product(tilde(s), tilde(a)))
+    if n > 0:
+        modal_tangent(model, work, i, c_m, c_d, c_k, H, turn)
+    if work.state.spins[i] != 0:
+        spin_columns(model, work, i, c_d, H)
+
+
+@loops
+def spin_columns(model, work, i, c_d, H):
+    """Add what the rate of turn of the axis e of a body that spins adds to its angular acceleration, w dtheta × e.
+
+    w: spin; see `kernels.generalized_alpha`. The columns of alpha in (1) to (3) are -tilde(s), J, Bᵀ.
+    """
+    types, bodies = model.body_types, work.bodies
+    t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
+    e = vector(types.axis[t])
+    turn = scaled(c_d * dot(e, vector(work.state.u[u0 + 3 :])), e)
+    s = vector(bodies.s[i])
+    for r in range(3):
+        put_sum(H[r], 3, cross(turn, cross(s, unit(r))))
+        put_sum(H[3 + r], 3, cross(turn, vector(bodies.J[i, r])))
+    W, second = bodies.W[9 * q0 : 9 * (q0 + n)], block(types, t, C2, 3 * n)
+    for k in range(n):
+        put_sum(H[6 + k], 3, cross(turn, add(column(second, n, k), axial(tensor(W, n, k)))))
+
+
+@loops
+def modal_tangent(model, work, i, c_m, c_d, c_k, H, turn):
+    """Write the rows and columns of the modes; see `body_tangent`.
+
+    With b = 1C_k: (1) by q, (2) by q but for the sums over modes in `modal_columns`, (3) by a, alpha, omega.
+    """
+    types, bodies = model.body_types, work.bodies
+    t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
+    W, Y, first = bodies.W[9 * q0 : 9 * (q0 + n)], bodies.Y[3 * q0 : 3 * (q0 + n)], bodies.C1[3 * q0 : 3 * (q0 + n)]
+    second, third = block(types, t, C2, 3 * n), block(types, t, C3, 9 * n)
+    a, omega, alpha = vector(bodies.a_B[i]), vector(work.state.u[u0 + 3 :]), vector(work.state.u_dot[u0 + 3 :])
+    for k in range(n):
+        W_k, b = tensor(W, n, k), column(first, n, k)
+        D_k, B_k = matrix_sum(tensor(third, n, k), trace_less(W_k)), add(column(second, n, k), axial(W_k))
+        J_k = matrix_sum(D_k, transposed(D_k))  # dJ/dq_k
+        D_omega, J_omega, turning = turned(D_k, omega), turned(J_k, omega), cross(omega, b)
+        by_q = add(cross(alpha, b), cross(omega, turning))
+        put_column(H, 0, 6 + k, add(scaled(c_m, b), add(scaled(2 * c_d, turning), scaled(c_k, by_q))))
+        by_q = add(cross(b, a), add(turned(J_k, alpha), cross(omega, J_omega)))
+        put_column(H, 3, 6 + k, add(scaled(c_m, B_k), add(scaled(2 * c_d, D_omega), scaled(c_k, by_q))))
+        put(H[6 + k], 0, scaled(c_m, b))
+        put(H[6 + k], 3, add(scaled(c_m, B_k), scaled(c_d, sub(scaled(2.0, column(Y, n, k)), J_omega))))
+        put(turn[6 + k], 0, cross(b, a))
+    modal_columns(model, work, i, c_d, c_k, H)
+    if types.is_stiffened[t]:
+        stiffened_columns(model, work, i, c_d, c_k, H)
+    modal_block(types, t, n, MASS, c_m, H)
+    modal_block(types, t, n, DAMPING, c_d, H)
+    modal_block(types, t, n, STIFFNESS, c_k, H)
+
+
+@loops
+def modal_columns(model, work, i, c_d, c_k, H):
+    """Add what needs products over 4C and S_ab: the modal block, and the rest of (2) by q.
+
+    2 4C_kj·omega, B'_kj·alpha - omegaᵀ 5C_jk omega; Σ_k B'_kj q_ddot_k + 2 Σ_k q_dot_k 5C_jk omega, where B'_kj is the
+    derivative of B_k by q_j: 4C_kj, and K_r,kj of a stiffened body; both are in S_ab. The second is Σ A_ab S_ab,kj with
+    A = tilde(alpha) + tilde(omega) tilde(omega), less 2 4C_kj·alpha: alpha·B'_jk = alpha·B'_kj - 2 alpha·4C_kj.
+    """
+    types, t, n, u0 = model.body_types, model.bodies.kind[i], model.bodies.n_q[i], model.bodies.u0[i] + 6
+    S, four = block(types, t, S_AB, 9 * n * n), block(types, t, C4, 3 * n * n)
+    q_dot, q_ddot = work.state.u[u0 : u0 + n], work.state.u_dot[u0 : u0 + n]
+    omega, alpha = vector(work.state.u[u0 - 3 :]), vector(work.state.u_dot[u0 - 3 :])
+    f = scaled(-2.0, add(scaled(c_d, omega), scaled(c_k, alpha)))
+    A = scaled_matrix(c_k, matrix_sum(tilde(alpha), product(tilde(omega), tilde(omega))))
+    for j in range(n):
+        C_j = four[3 * n * j : 3 * n * (j + 1)]  # 4C_kj [a, k]
+        S_j = S[9 * n * j : 9 * n * (j + 1)]  # ∫ phi_a,k phi_b,j [ab, k]
+        out = H[6 + j, 6:]  # row j from column j: 4C is antisymmetric in k, j, the rest symmetric
+        for k in range(n):
+            S_jk = tensor(S_j, n, k)
+            out[k] = dot(f, column(C_j, n, k)) + (dot(A[0], S_jk[0]) + dot(A[1], S_jk[1]) + dot(A[2], S_jk[2]))
+        by_q = add(axial(tensor_sum(S_j, n, q_ddot)), scaled(2.0, turned(trace_less(tensor_sum(S_j, n, q_dot)), omega)))
+        add_column(H, 3, 6 + j, scaled(c_k, by_q))
+
+
+@loops
+def stiffened_columns(model, work, i, c_d, c_k, H):
+    """Add what K_t gives beyond s(q) and 1C(q), and the derivatives of q_dotᵀK_t q_dot, q_dotᵀK_r q_dot."""
+    n, q0, u0 = model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
+    K_t = block(model.body_types, model.bodies.kind[i], K_TRANSLATION, 3 * n * n)
+    first_dot = work.bodies.K_t_q_dot[3 * q0 : 3 * (q0 + n)]
+    turn_dot = work.bodies.K_r_q_dot[3 * q0 : 3 * (q0 + n)]
+    a, omega = scaled(c_k, work.bodies.a_B[i]), vector(work.state.u[u0 + 3 :])
+    q_ddot = work.state.u_dot[u0 + 6 : u0 + 6 + n]
+    for j in range(n):
+        K_j = K_t[3 * n * j : 3 * n * (j + 1)]  # [a, k]
+        out = H[6 + j, 6:]
+        for k in range(n):
+            out[k] += dot(a, column(K_j, n, k))
+        x = column(first_dot, n, j)
+        by_q = add(column_sum(K_j, n, q_ddot), scaled(2.0, cross(omega, x)))
+        add_column(H, 0, 6 + j, add(scaled(2 * c_d, x), scaled(c_k, by_q)))
+        add_column(H, 3, 6 + j, scaled(2 * c_d, column(turn_dot, n, j)))
+
+
+@loops
+def modal_block(types, t, n, which, factor, H):
+    """Add factor * M, K or D to the modal block of H."""
+    if types.is_diagonal[t, which - MASS]:
+        diagonal = block(types, t, which, n)
+        for k in range(n):
+            H[6 + k, 6 + k] += factor * diagonal[k]
+    else:
+        A = block(types, t, which, n * n)
+        for k in range(n):
+            for j in range(n):
+                H[6 + k, 6 + j] += factor * A[k * n + j]

@@ -1,0 +1,278 @@
+"""The lean compiler of kernels: inner functions to intermediate code only, which an entry optimises once, all together.
+
+Left alone, numba optimises each function and makes machine code of it, and optimises everything below it once more
+with each caller; it also looks up what an operator means for numbers at every single place, and looks in each function
+for closures, generators, parallel loops and array expressions. All this is three quarters of the time of a
+compilation. Inner functions are never called from Python and own no memory, so that here
+
+(1) the library of an inner function stops before optimisation and machine code: its module is read once, and linked by
+    the entries as it is;
+(2) the library of an entry links all of them and is optimised once;
+(3) while an entry is compiled, the meaning of an operator or built-in function for given types is looked up once, and
+    Python does not look for garbage; numba does not collect warnings about each statement, nor look for `with` and
+    dictionaries of arguments, and finds the variables of a statement by the exact types of its parts;
+(4) the passes of numba are those that kernels need (no closures, lists, array expressions, `raise`), see
+    kernels/compiler/passes.py;
+(5) variables, operations and calls become lean code of LLVM, see kernels/compiler/lowering.py.
+"""
+
+import gc
+import types
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+
+from llvmlite.binding import Linkage, parse_assembly
+from numba import njit
+from numba.core import cgutils
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase
+from numba.core.errors import WarningsFixer  # type: ignore[attr-defined]
+from numba.core.interpreter import Interpreter
+from numba.core.ir import Inst, Loc, Var
+from numba.core.types.functions import BaseFunction
+
+from floatframe.engine.kernels.compiler.block import Block, make_block
+from floatframe.engine.kernels.compiler.lowering import KernelContext
+from floatframe.engine.kernels.compiler.passes import ENTRY, INNER, pipeline
+
+__all__ = ["array_type", "array_value", "entry", "inner", "loops", "matrix_loops", "small", "view"]
+
+
+class WithoutEngine:
+    """Stands for the code generator of a library that is never run on its own."""
+
+    @staticmethod
+    def set_env(name, environment):
+        """Leave the environment of Python objects alone: inner functions use none."""
+
+
+class InnerLibrary(JITCodeLibrary):
+    """The intermediate code of an inner function (1)."""
+
+    def add_ir_module(self, ir_module):
+        """Read the code of the function, the only module here: it is not linked into an empty one first."""
+        self._raise_if_finalized()
+        module = parse_assembly(cgutils.normalize_ir_text(str(ir_module)))
+        module.name = ir_module.name
+        module.data_layout = self._codegen._data_layout
+        self._final_module = module
+
+    def _get_module_for_linking(self):
+        """Return the code itself, no copy: an entry links it once."""
+        self._ensure_finalized()
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == Linkage.external:
+                function.linkage = "linkonce_odr"
+        return self._final_module
+
+    def finalize(self):
+        """Take note of what is called: no linking, no optimisation, no machine code."""
+        self._raise_if_finalized()
+        for library in dict.fromkeys(self._linking_libraries):
+            self._reload_init.update(library._reload_init)
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+    def get_pointer_to_function(self, name):
+        """Return zero: there is no machine code."""
+        self._ensure_finalized()
+        return 0
+
+    @property
+    def codegen(self):
+        """Stand-in for the generator of machine code."""
+        return WithoutEngine
+
+
+class EntryLibrary(JITCodeLibrary):
+    """The code of an entry and of all that it calls (2)."""
+
+    def finalize(self):
+        """Link, optimise, make machine code."""
+        libraries: dict = {}
+        for library in self._linking_libraries:
+            with_callees(library, libraries)
+        self._linking_libraries = list(libraries)
+        super().finalize()
+
+    def _optimize_final_module(self):
+        manager, builder = self._codegen._module_pass_manager()
+        manager.run(self._final_module, builder)
+
+
+def with_callees(library, known):
+    """Add a library and all that its code calls to the known ones."""
+    if library not in known:
+        known[library] = None
+        for other in library._linking_libraries:
+            with_callees(other, known)
+
+
+def variables_in(self, part):
+    """Return the variables in a part of a statement of numba, as `Inst._rec_list_vars` does."""
+    kind = type(part)
+    if kind is Var:
+        return [part]
+    if kind in PLAIN:
+        return []
+    if isinstance(part, Inst):
+        return part.list_vars()
+    if kind is list or kind is tuple:
+        return [each for one in part for each in variables_in(self, one)]
+    if kind is dict:
+        return [each for one in part.values() for each in variables_in(self, one)]
+    return plain_variables_in(self, part)
+
+
+PLAIN = frozenset({str, int, float, bool, type(None), Loc, types.BuiltinFunctionType, types.FunctionType})
+plain_variables_in = Inst._rec_list_vars
+
+
+def without_warnings(self, filename=None, lineno=None):
+    """Return a context that does nothing, in the place of one that keeps the warnings of a statement."""
+    return nullcontext()
+
+
+def needed_rewrites(self, rewrites, code):
+    """Apply the rewrites of byte code that kernels may need: none of those of `with` and of keyword dictionaries."""
+    return plain_rewrites(self, [each for each in rewrites if each.__name__ not in NOT_NEEDED], code)
+
+
+NOT_NEEDED = ("peep_hole_delete_with_exit", "peep_hole_fuse_dict_add_updates")
+plain_rewrites = Interpreter.post_process
+
+
+@contextmanager
+def shorter_ways() -> Iterator[None]:
+    """(3), within the compiler's lock."""
+    replaced = (
+        (Inst, "_rec_list_vars", variables_in),
+        (WarningsFixer, "catch_warnings", without_warnings),
+        (Interpreter, "post_process", needed_rewrites),
+    )
+    plain = [getattr(owner, name) for owner, name, _ in replaced]
+    for owner, name, function in replaced:
+        setattr(owner, name, function)
+    try:
+        yield
+    finally:
+        for (owner, name, _), function in zip(replaced, plain, strict=True):
+            setattr(owner, name, function)
+
+
+@contextmanager
+def remembered_calls() -> Iterator[None]:
+    """(3), within the compiler's lock."""
+    plain = BaseFunction.get_call_type
+    known: dict = {}
+
+    def get_call_type(self, context, args, kws):
+        key = self, context, tuple(args), tuple(kws.items())
+        if key not in known:
+            known[key] = plain(self, context, args, kws)
+        return known[key]
+
+    BaseFunction.get_call_type = get_call_type  # type: ignore[method-assign]
+    try:
+        yield
+    finally:
+        BaseFunction.get_call_type = plain  # type: ignore[method-assign]
+
+
+@contextmanager
+def without_garbage_collection() -> Iterator[None]:
+    """(3): do not walk through the hundreds of thousands of objects of a compilation again and again."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
+
+
+class InnerCompiler(CompilerBase):
+    """The pipeline of an inner function."""
+
+    attributes: tuple[str, ...] = ("optsize",)  #: of the function in LLVM: small code, its loops are short
+
+    def define_pipelines(self):
+        """Return the one pipeline."""
+        return [pipeline(self.state, INNER)]
+
+    def compile_extra(self, func):
+        """Compile into an `InnerLibrary`."""
+        self.state.targetctx = KernelContext.of(self.state.targetctx)
+        self.state.library = InnerLibrary(self.state.targetctx.codegen(), func.__qualname__)
+        self.state.library.attributes = self.attributes
+        return super().compile_extra(func)
+
+
+class EntryCompiler(CompilerBase):
+    """The pipeline of an entry."""
+
+    def define_pipelines(self):
+        """Return the one pipeline."""
+        return [pipeline(self.state, ENTRY)]
+
+    def compile_extra(self, func):
+        """Compile into an `EntryLibrary`."""
+        self.state.library = EntryLibrary(self.state.targetctx.codegen(), func.__qualname__)
+        self.state.library.enable_object_caching()
+        with remembered_calls(), shorter_ways(), without_garbage_collection():
+            return super().compile_extra(func)
+
+
+class LoopCompiler(InnerCompiler):
+    """The same for a function whose loops run over modes or matrices: they are unrolled and made of vectors."""
+
+    attributes = ()
+
+
+class SmallCompiler(InnerCompiler):
+    """The same for a function of a few operations, or with one caller: it is written into its callers."""
+
+    attributes = ("alwaysinline",)
+
+
+class MatrixLoopCompiler(InnerCompiler):
+    """The same for such a function that is not written into its callers: it is long, and they are many."""
+
+    attributes = ("noinline",)
+
+
+def decorator(pipeline_class, **options):
+    """Return the decorator of functions that only compiled code calls.
+
+    They have no wrappers for Python, no test before each division, and no counted references (all arrays belong to
+    Python) but where options say so.
+    """
+    return njit(
+        **{"_nrt": False} | options,
+        no_cpython_wrapper=True,
+        no_cfunc_wrapper=True,
+        error_model="numpy",
+        pipeline_class=pipeline_class,
+    )
+
+
+inner = decorator(InnerCompiler)  #: for functions that only compiled code calls
+small = decorator(SmallCompiler)  #: the same for a few operations
+loops = decorator(LoopCompiler)  #: the same where loops run over modes or matrices (5)
+matrix_loops = decorator(MatrixLoopCompiler)  #: the same for long functions with many callers
+view = decorator(LoopCompiler, _nrt=True)  #: the same for a function that returns a part of an array
+
+
+def entry(function, *, cache=True):
+    """Return the compiled function that Python calls."""
+    return njit(function, cache=cache, error_model="numpy", pipeline_class=EntryCompiler)
+
+
+def array_type(dtype, ndim):
+    """Return the type of a contiguous array in kernels."""
+    return Block(dtype, ndim)
+
+
+def array_value(context, builder, kind, data, shape):
+    """Return the value of an array at an address, which belongs to Python."""
+    return make_block(context, builder, kind, data, shape)

@@ -1,0 +1,176 @@
+"""From numba's intermediate code of an inner function to LLVM's, without what kernels have no need of.
+
+Kernels own no memory and raise no errors, so that here
+
+(1) variables are not counted, not deleted and not set to zero before their first value;
+(2) a variable with one assignment is a value wherever that assignment comes first, not a place on the stack;
+(3) a call of another kernel is a call, without tests of its status;
+(4) operations on two integers or two reals, and indices of arrays, are written without a search for their meaning;
+(5) loops are unrolled and made of vector instructions only in functions that are decorated so (`loops`).
+"""
+
+import operator
+from collections import defaultdict
+
+from numba import types
+from numba.core import ir
+from numba.core.analysis import compute_cfg_from_blocks, compute_use_defs, must_use_alloca
+from numba.core.cpu import CPUContext
+from numba.core.errors import LoweringError
+from numba.core.lowering import Lower
+
+from floatframe.engine.kernels.compiler.block import Block, get_item
+
+__all__ = ["KernelContext", "KernelLower"]
+
+NO_WRAP = ("nsw",)  # integers of kernels do not overflow
+OPERATIONS = {
+    (operator.add, types.float64, types.float64): lambda builder, x, y: builder.fadd(x, y),
+    (operator.sub, types.float64, types.float64): lambda builder, x, y: builder.fsub(x, y),
+    (operator.mul, types.float64, types.float64): lambda builder, x, y: builder.fmul(x, y),
+    (operator.truediv, types.float64, types.float64): lambda builder, x, y: builder.fdiv(x, y),
+    (operator.add, types.int64, types.int64): lambda builder, x, y: builder.add(x, y, flags=NO_WRAP),
+    (operator.sub, types.int64, types.int64): lambda builder, x, y: builder.sub(x, y, flags=NO_WRAP),
+    (operator.mul, types.int64, types.int64): lambda builder, x, y: builder.mul(x, y, flags=NO_WRAP),
+}
+
+
+def single_assignments(blocks):
+    """Return the variables with one assignment, which comes before every use on all ways (2)."""
+    assigned = defaultdict(list)
+    for label, block in blocks.items():
+        for statement in block.find_insts(ir.Assign):
+            assigned[statement.target.name].append(label)
+    used = defaultdict(set)
+    for label, names in compute_use_defs(blocks).usemap.items():  # used in a block before an assignment there
+        for name in names:
+            used[name].add(label)
+    dominators = compute_cfg_from_blocks(blocks).dominators()
+    single = set()
+    for name, labels in assigned.items():
+        first = labels[0]
+        if len(labels) == 1 and all(first < label and first in dominators[label] for label in used[name]):
+            single.add(name)
+    return single - must_use_alloca(blocks)
+
+
+class KernelLower(Lower):
+    """numba's lowering of a function, for kernels."""
+
+    def _find_singly_assigned_variable(self):
+        self._singly_assigned_vars = single_assignments(self.func_ir.blocks)
+        self._blk_local_varmap = {}
+
+    def setup_function(self, fndesc):
+        """Begin a function (5)."""
+        super().setup_function(fndesc)
+        for attribute in self.library.attributes:
+            self.function.attributes.add(attribute)
+
+    def incref(self, typ, val):
+        """Count nothing (1)."""
+
+    def decref(self, typ, val):
+        """Count nothing (1)."""
+
+    def delvar(self, name):
+        """Leave the variable as it is (1)."""
+
+    def alloca_lltype(self, name, lltype, datamodel=None):
+        """Return a place on the stack, not set to zero (1)."""
+        with self.builder.goto_entry_block():
+            return self.builder.alloca(lltype, name=name)
+
+    def storevar(self, value, name, argidx=None):
+        """Give a variable a value (1, 2)."""
+        if name in self._singly_assigned_vars:
+            self._blk_local_varmap[name] = value
+        else:
+            self.builder.store(value, self.getvar(name))
+
+    def lower_assign(self, ty, inst):
+        """Return the value of an assignment; a kernel as a value is nothing."""
+        if isinstance(ty, types.Dispatcher):
+            return self.context.get_dummy_value()
+        return super().lower_assign(ty, inst)
+
+    def lower_block(self, block):
+        """Write a block of statements; an error names the line."""
+        self.pre_block(block)
+        for statement in block.body:
+            self.loc = statement.loc
+            try:
+                self.lower_inst(statement)
+            except Exception as error:
+                raise LoweringError(f"{error}, in: {statement}", loc=statement.loc) from error
+        self.post_block(block)
+
+    def lower_inst(self, inst):
+        """Write a statement (4)."""
+        if isinstance(inst, ir.Assign):
+            self.storevar(self.lower_assign(self.typeof(inst.target.name), inst), inst.target.name)
+        elif isinstance(inst, ir.StaticSetItem) and isinstance(self.typeof(inst.target.name), Block):
+            self.lower_setitem(inst.target, inst.index_var, inst.value, self.fndesc.calltypes[inst])
+        else:
+            super().lower_inst(inst)
+
+    def lower_expr(self, resty, expr):
+        """Return the value of an expression (4)."""
+        if expr.op in ("binop", "inplace_binop"):
+            signature = self.fndesc.calltypes[expr]
+            function = expr.fn if expr.op == "binop" else expr.immutable_fn
+            write = OPERATIONS.get((function, *signature.args))
+            if write is not None:
+                x, y = (self.value_as(*each) for each in zip((expr.lhs, expr.rhs), signature.args, strict=True))
+                return self.context.cast(self.builder, write(self.builder, x, y), signature.return_type, resty)
+        elif expr.op == "static_getitem" and expr.index_var is not None:
+            if isinstance(self.typeof(expr.value.name), Block):
+                return self.lower_getitem(resty, expr, expr.value, expr.index_var, self.fndesc.calltypes[expr])
+        return super().lower_expr(resty, expr)
+
+    def lower_getitem(self, resty, expr, value, index, signature):
+        """Return a part of an array (4)."""
+        if not isinstance(signature.args[0], Block):
+            return super().lower_getitem(resty, expr, value, index, signature)
+        arguments = [self.loadvar(value.name), self.value_as(index, signature.args[1])]
+        part = get_item(self.context, self.builder, signature, arguments)
+        return self.context.cast(self.builder, part, signature.return_type, resty)
+
+    def value_as(self, variable, kind):
+        """Return the value of a variable as one of another type."""
+        return self.context.cast(self.builder, self.loadvar(variable.name), self.typeof(variable.name), kind)
+
+
+def call_of_kernel(fndesc, libraries):
+    """Return what writes a call of a kernel (3); it keeps numba's convention of calls."""
+
+    def write_call(context, builder, signature, arguments):
+        function = context.declare_function(builder.module, fndesc)
+        convention = context.call_conv
+        with builder.goto_entry_block():
+            place = builder.alloca(convention.get_return_type(fndesc.restype).pointee)
+        packer = context.get_arg_packer(fndesc.argtypes)
+        error = convention._get_excinfo_argument(builder.function)
+        builder.call(function, [place, error, *packer.as_arguments(builder, arguments)])
+        model = context.data_model_manager[fndesc.restype]
+        return model.from_return(builder, builder.load(place))
+
+    write_call.signature = fndesc.argtypes  # type: ignore[attr-defined]
+    write_call.libs = tuple(libraries)  # type: ignore[attr-defined]
+    return write_call
+
+
+class KernelContext(CPUContext):
+    """numba's context of compilation in which the functions compiled are kernels."""
+
+    @classmethod
+    def of(cls, context):
+        """Return a context for kernels that shares all that the given one knows."""
+        shared = context.subtarget()
+        shared.__class__ = cls
+        return shared
+
+    def insert_user_function(self, func, fndesc, libs=()):
+        """Take note of how a kernel is called."""
+        write_call = call_of_kernel(fndesc, libs)
+        self._defns[func].append(write_call, write_call.signature)

@@ -1,0 +1,166 @@
+"""Records of arrays as the kernels see them: each is one pointer to a table of addresses and shapes.
+
+A table has for each array of a record, in its order, the address and then the shape; a record in a record has its part
+of the table. A kernel that reads `work.markers.r` gets the array back from there; one number (declared without a shape)
+is read and written as such, `work.counted.iterations += 1`. Tables and arrays belong to Python, so that the kernels
+count no references; numbers in a table do not change while a kernel runs, so that they may be kept in registers.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import from_dtype, types
+from numba.core import cgutils
+from numba.core.datamodel import models
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, lower_setattr_generic, register_model
+from numba.np.arrayobj import make_array
+
+from fe_models.foundation.arrays import Array, IntArray
+from floatframe.engine.kernels.compiler.compilation import array_type, array_value
+from floatframe.engine.kernels.records import Declared
+
+__all__ = ["Structure", "converter", "kept_table_of", "n_words", "table_of", "table_of_numbers"]
+
+WORD = ir.IntType(64)
+
+
+def n_words(declared) -> int:
+    """Return the length of the table of an array, number or record."""
+    return 1 + len(declared.shape) if isinstance(declared, Declared) else sum(map(n_words, declared))
+
+
+def type_of(declared) -> types.Type:
+    """Return the type in kernels of an array, number or record."""
+    if not isinstance(declared, Declared):
+        return Structure(declared)
+    number = from_dtype(np.dtype(declared.dtype))
+    return array_type(number, len(declared.shape)) if declared.shape else number
+
+
+class Structure(types.Type):
+    """A pointer to a table, with a named array, number or record for each field of a declaration."""
+
+    def __init__(self, declaration):
+        self.fields: dict[str, tuple[types.Type, int]] = {}  # name: (type, where its part of the table begins)
+        place = 0
+        for name, declared in zip(declaration._fields, declaration, strict=True):
+            self.fields[name] = type_of(declared), place
+            place += n_words(declared)
+        super().__init__(f"Structure({type(declaration).__name__})")
+
+
+register_model(Structure)(models.OpaqueModel)
+
+
+@infer_getattr
+class StructureFields(AttributeTemplate):
+    """Types of the fields."""
+
+    key = Structure
+
+    def generic_resolve(self, structure, name):  # type: ignore[override]
+        """Return the type of a field, None if there is none of that name."""
+        return structure.fields.get(name, (None,))[0]
+
+
+def word_of(builder, pointer, place):
+    """Return a word of a table."""
+    table = builder.bitcast(pointer, WORD.as_pointer())
+    word = builder.load(builder.gep(table, [WORD(place)], inbounds=True))
+    word.set_metadata("invariant.load", builder.module.add_metadata([]))
+    return word
+
+
+def address_of(context, builder, number, pointer, place):
+    """Return the address of numbers of a type."""
+    return builder.inttoptr(word_of(builder, pointer, place), context.get_data_type(number).as_pointer())
+
+
+@lower_getattr_generic(Structure)
+def get_field(context, builder, structure, pointer, name):
+    """Return a field: the array made of its address and shape in the table, a number, or a record."""
+    kind, place = structure.fields[name]
+    if isinstance(kind, Structure):
+        table = builder.bitcast(pointer, WORD.as_pointer())
+        return builder.bitcast(builder.gep(table, [WORD(place)], inbounds=True), cgutils.voidptr_t)
+    if not isinstance(kind, types.Array):
+        return builder.load(address_of(context, builder, kind, pointer, place))
+    data = address_of(context, builder, kind.dtype, pointer, place)
+    shape = [word_of(builder, pointer, place + 1 + k) for k in range(kind.ndim)]
+    return array_value(context, builder, kind, data, shape)
+
+
+@lower_setattr_generic(Structure)
+def set_field(context, builder, signature, arguments, name):
+    """Write a field that is a number."""
+    kind, place = signature.args[0].fields[name]
+    value = context.cast(builder, arguments[1], signature.args[1], kind)
+    builder.store(value, address_of(context, builder, kind, arguments[0], place))
+
+
+def converter(declaration):
+    """Return a compiled function from a table to the structure of a declaration."""
+    structure = Structure(declaration)
+
+    @intrinsic
+    def convert(typing_context, table):
+        def generate(context, builder, signature, arguments):
+            array = make_array(signature.args[0])(context, builder, arguments[0])
+            return builder.bitcast(array.data, cgutils.voidptr_t)
+
+        return structure(table), generate
+
+    return convert
+
+
+def add_words(record, words: list[int]) -> None:
+    """Add addresses and shapes of the arrays of a record to the words of a table."""
+    for each in record:
+        if isinstance(each, np.ndarray):
+            words.append(each.__array_interface__["data"][0])
+            words += each.shape
+        else:
+            add_words(each, words)
+
+
+def table_of(record) -> IntArray:
+    """Return addresses and shapes of the arrays, which the caller keeps alive."""
+    words: list[int] = []
+    add_words(record, words)
+    return np.array(words, np.int64)
+
+
+def table_of_numbers(declaration, values: Mapping[str, float]) -> tuple[IntArray, Array]:
+    """Return the table of a record of numbers, zero where none is given, and these, which the caller keeps alive."""
+    reals = np.zeros(len(declaration))
+    integers = reals.view(np.int64)
+    left = len(values)
+    for k, (name, declared) in enumerate(zip(declaration._fields, declaration, strict=True)):
+        if name in values:
+            (integers if declared.dtype is np.int64 else reals)[k] = values[name]
+            left -= 1
+    if left:
+        unknown = ", ".join(name for name in values if name not in declaration._fields)
+        raise TypeError(f"{type(declaration).__name__} has no numbers {unknown}")
+    return reals.__array_interface__["data"][0] + reals.itemsize * np.arange(len(declaration)), reals
+
+
+KEPT = 4  # tables of as many records
+kept: list[tuple[Any, IntArray]] = []
+
+
+def kept_table_of(record) -> IntArray:
+    """Return `table_of` a record that is used again and again, from what is kept; to make one takes as long as a step.
+
+    A record that is kept stays alive, so that what is found belongs to this very record.
+    """
+    for known, table in kept:
+        if known is record:
+            return table
+    table = table_of(record)
+    kept.insert(0, (record, table))
+    del kept[KEPT:]
+    return table

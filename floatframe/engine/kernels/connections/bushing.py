@@ -1,0 +1,272 @@
+"""A bushing: force and torque of a potential of six deformations between two markers, with damping.
+
+The axes C are those of A turned by a share of the rotation of B against A: 0 (axes of A), 1 (of B), or 1/2 (half way,
+where A and B can be exchanged). With d = r_B - r_A and theta the rotation vector of A_Aᵀ A_B, whose components are the
+same in A, B and C,
+
+    e = Cᵀ d,  xi = (e, theta),  (f, m) = dV/dxi + D xi_dot,  V = 1/2 xiᵀ K xi + preload · xi + tables of each xi_i
+
+Variations in the axes of C, a and b the rotations of A and B, u = b - a, t = |theta|:
+
+    dtheta = S u,   S = alpha 1 + beta theta thetaᵀ + sigma tilde(theta),   beta = (1 - alpha)/t²
+        axes of A, B: alpha = (t/2) cot(t/2), sigma = -1/2, 1/2;   half way: alpha = (t/2)/sin(t/2), sigma = 0
+    dc = (1 - share) a + share b - tau theta × u              the rotation of C
+        axes of A, B: tau = 0;   half way: tau = tan(t/4)/(2 t)
+    de = Cᵀ dd + e × dc
+
+so that by virtual work, with p = f × e,  F = C f is the force on A (on B the opposite), and the moments are
+
+    on A:  M = C (q - (1 - share) p)        on B:  -N = -C (q + share p)        q = tau theta × p + Sᵀ m
+
+In axes of A or B turns are counted: of all rotation vectors of A_Aᵀ A_B, theta + 2 pi n theta/t, the one is taken that
+is nearest to where the rates of the last step lead (`kernels/turns.py`). Half way t < pi.
+
+`bushing_variation` gives the exact change of F, M and N; rates follow the same formulas with velocities for variations.
+"""
+
+import math
+
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.rotation import exp_matrix
+from floatframe.engine.kernels.time_function import time_function
+from floatframe.engine.kernels.vector import (
+    add,
+    cross,
+    dot,
+    matrix,
+    norm,
+    product,
+    put,
+    put_matrix,
+    scaled,
+    sub,
+    transposed,
+    turned,
+    turned_back,
+    vector,
+)
+
+__all__ = ["bushing_energy", "bushing_power", "bushing_state", "bushing_variation", "continued", "rotation_vector"]
+
+SERIES_BELOW = 0.01  # t² at the switch
+NEAR_FULL_TURN = 1e-6  # t below which its direction is noise beside that of full turns
+A1, A2, A3, A4, A5 = 1 / 24, 7 / 5760, 31 / 967680, 127 / 154828800, 73 / 3503554560  # of alpha - 1 in t², half way
+B1, B2, B3, B4, B5 = 1 / 12, 1 / 720, 1 / 30240, 1 / 1209600, 1 / 47900160  # of 1 - alpha in t², axes of A or B
+
+
+@inner
+def rotation_vector(A, B):
+    """Return the rotation vector of R = Aᵀ B, no longer than pi, by a quaternion (w, x) of any length."""
+    R = product(transposed(A), B)
+    w = 1.0 + R[0][0] + R[1][1] + R[2][2]  # 4 w², and 4 w times x
+    x = (R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1])
+    if w < 1.0:  # more than 90 degrees: 4 times the largest of x, y, z times all of them
+        k = 0 if R[0][0] >= R[1][1] and R[0][0] >= R[2][2] else (1 if R[1][1] >= R[2][2] else 2)
+        symmetric = (
+            (2.0 + 2 * R[0][0] - w, R[0][1] + R[1][0], R[0][2] + R[2][0]),
+            (R[0][1] + R[1][0], 2.0 + 2 * R[1][1] - w, R[1][2] + R[2][1]),
+            (R[0][2] + R[2][0], R[1][2] + R[2][1], 2.0 + 2 * R[2][2] - w),
+        )
+        w, x = x[k], symmetric[k]
+        if w < 0.0:
+            w, x = -w, scaled(-1.0, x)
+    length = norm(x)
+    return scaled(2.0 * math.atan2(length, w) / length if length > 0.0 else 0.0, x)
+
+
+@inner
+def continued(theta, expected):
+    """Return theta + 2 pi n theta/t, t = |theta| <= pi, nearest to the expected rotation vector."""
+    t, size = norm(theta), norm(expected)
+    if size + t < math.pi:
+        return theta
+    if t < NEAR_FULL_TURN:
+        return add(theta, scaled(2 * math.pi * math.floor(size / (2 * math.pi) + 0.5) / size, expected))
+    n = math.floor((dot(expected, theta) / t - t) / (2 * math.pi) + 0.5)
+    return scaled(1.0 + 2 * math.pi * n / t, theta)
+
+
+@inner
+def scalars(t2, share):
+    """Return alpha, beta, alpha'/t, beta'/t, tau, tau'/t of t²."""
+    if share == 0.5:
+        return scalars_half_way(t2)
+    if t2 < SERIES_BELOW:
+        return (
+            1 - t2 * (B1 + t2 * (B2 + t2 * (B3 + t2 * (B4 + t2 * B5)))),
+            B1 + t2 * (B2 + t2 * (B3 + t2 * (B4 + t2 * B5))),
+            -(2 * B1 + t2 * (4 * B2 + t2 * (6 * B3 + t2 * (8 * B4 + t2 * 10 * B5)))),
+            2 * B2 + t2 * (4 * B3 + t2 * (6 * B4 + t2 * 8 * B5)),
+            0.0,
+            0.0,
+        )
+    t = math.sqrt(t2)
+    x = t / 2
+    s, c = math.sin(x), math.cos(x)
+    alpha = x * c / s
+    beta = (1 - alpha) / t2
+    by_t = 0.5 * (s * c - x) / (s * s * t)
+    return alpha, beta, by_t, -(by_t + 2 * beta) / t2, 0.0, 0.0
+
+
+@inner
+def scalars_half_way(t2):
+    """Return what `scalars` does, half way."""
+    if t2 < SERIES_BELOW:
+        y2 = t2 / 16
+        return (
+            1 + t2 * (A1 + t2 * (A2 + t2 * (A3 + t2 * (A4 + t2 * A5)))),
+            -(A1 + t2 * (A2 + t2 * (A3 + t2 * (A4 + t2 * A5)))),
+            2 * A1 + t2 * (4 * A2 + t2 * (6 * A3 + t2 * (8 * A4 + t2 * 10 * A5))),
+            -(2 * A2 + t2 * (4 * A3 + t2 * (6 * A4 + t2 * 8 * A5))),
+            (1 + y2 * (1 / 3 + y2 * (2 / 15 + y2 * (17 / 315 + y2 * 62 / 2835)))) / 8,
+            (2 / 3 + y2 * (8 / 15 + y2 * (102 / 315 + y2 * 496 / 2835))) / 128,
+        )
+    t = math.sqrt(t2)
+    x, y = t / 2, t / 4
+    s, c = math.sin(x), math.cos(x)
+    alpha = x / s
+    beta = (1 - alpha) / t2
+    by_t = 0.5 * (s - x * c) / (s * s * t)
+    tan = math.tan(y)
+    return alpha, beta, by_t, -(by_t + 2 * beta) / t2, tan / (2 * t), ((1 + tan * tan) / y - tan / (y * y)) / (32 * t)
+
+
+@inner
+def by_S(s, u, sigma):
+    """Return S u, Sᵀ u for the opposite sigma."""
+    theta = vector(s.xi[3:])
+    both = add(scaled(s.alpha, u), scaled(s.beta * dot(theta, u), theta))
+    return add(both, scaled(sigma, cross(theta, u)))
+
+
+@inner
+def by_dS(s, k, h, u, sigma):
+    """Return dS u for dtheta = h and k = theta · h, dSᵀ u for the opposite sigma."""
+    theta = vector(s.xi[3:])
+    along = dot(theta, u)
+    by_theta = s.beta_1 * k * along + s.beta * dot(h, u)
+    both = add(add(scaled(s.alpha_1 * k, u), scaled(by_theta, theta)), scaled(s.beta * along, h))
+    return add(both, scaled(sigma, cross(h, u)))
+
+
+@inner
+def axes_of(A, B, theta, share):
+    """Return the axes in which a bushing acts, of A, of B, or half way between them."""
+    if share == 0.0:
+        return matrix(A)
+    if share == 1.0:
+        return matrix(B)
+    return product(A, exp_matrix(scaled(share, theta)))
+
+
+@inner
+def law(row, x):
+    """Return the product of a row of stiffness or damping, (6,), by deformations or their rates, (6,)."""
+    return row[0] * x[0] + row[1] * x[1] + row[2] * x[2] + row[3] * x[3] + row[4] * x[4] + row[5] * x[5]
+
+
+@inner
+def bushing_state(model, work, c):
+    """Write what follows from the motion of bushing c into work.bushing, F, M and N into work.pair."""
+    a, b, i, markers = model.connections.a[c], model.connections.b[c], model.connections.item[c], work.markers
+    s, K, D = work.bushing, model.bushings.stiffness[i], model.bushings.damping[i]
+    share, angle = model.bushings.share[i], model.bushings.angle[i]
+    theta = rotation_vector(markers.A[a], markers.A[b])
+    if angle >= 0:
+        theta = continued(theta, vector(work.state.angle[angle:]))
+    C = axes_of(markers.A[a], markers.A[b], theta, share)
+    s.alpha, s.beta, s.alpha_1, s.beta_1, s.tau, s.tau_1 = scalars(dot(theta, theta), share)
+    s.sigma = share - 0.5
+    omega_a, omega_b = vector(markers.omega[a]), vector(markers.omega[b])
+    e = turned_back(C, sub(markers.r[b], markers.r[a]))
+    put(s.xi, 0, e)
+    put(s.xi, 3, theta)
+    v = turned_back(C, sub(markers.v[b], markers.v[a]))
+    omega = turned_back(C, sub(omega_b, omega_a))
+    mean = turned_back(C, add(scaled(1.0 - share, omega_a), scaled(share, omega_b)))
+    gamma = sub(mean, scaled(s.tau, cross(theta, omega)))
+    put(s.xi_dot, 0, add(v, cross(e, gamma)))
+    put(s.xi_dot, 3, by_S(s, omega, s.sigma))
+    for r in range(6):
+        s.force[r] = law(K[r], s.xi) + law(D[r], s.xi_dot) + model.bushings.preload[i, r]
+        s.slope[r] = 0.0
+        table = model.bushings.table[i, r]
+        if table >= 0:
+            value, s.slope[r], _ = time_function(model.functions, table, s.xi[r])
+            s.force[r] += value
+    f, m = vector(s.force), vector(s.force[3:])
+    p = cross(f, e)
+    turning = add(scaled(s.tau, cross(theta, p)), by_S(s, m, -s.sigma))
+    put_matrix(s.C, C)
+    put(s.v, 0, v)
+    put(s.omega, 0, omega)
+    put(s.mean, 0, mean)
+    put(s.gamma, 0, gamma)
+    put(s.p, 0, p)
+    put(work.pair.law, 0, turned(C, f))
+    put(work.pair.law, 3, turned(C, sub(turning, scaled(1.0 - share, p))))
+    put(work.pair.law, 6, turned(C, add(turning, scaled(share, p))))
+
+
+@inner
+def bushing_variation(model, work, c):
+    """Write the change of F, M, N for the variation of the motion in work.pair, ground axes."""
+    s, pair, i = work.bushing, work.pair, model.connections.item[c]
+    K, D, C = model.bushings.stiffness[i], model.bushings.damping[i], matrix(s.C)
+    e, theta, omega, gamma = vector(s.xi), vector(s.xi[3:]), vector(s.omega), vector(s.gamma)
+    a, b = turned_back(C, pair.motion[3:6]), turned_back(C, pair.motion[6:9])
+    u = sub(b, a)
+    share = model.bushings.share[i]
+    dc = sub(add(scaled(1.0 - share, a), scaled(share, b)), scaled(s.tau, cross(theta, u)))
+    dtheta = by_S(s, u, s.sigma)
+    k = dot(theta, dtheta)
+    de = add(turned_back(C, pair.motion[:3]), cross(e, dc))
+    # rates
+    domega_a, domega_b = turned_back(C, pair.motion[12:15]), turned_back(C, pair.motion[15:18])
+    dv = add(turned_back(C, pair.motion[9:12]), cross(s.v, dc))
+    domega = add(sub(domega_b, domega_a), cross(omega, dc))
+    dmean = add(add(scaled(1.0 - share, domega_a), scaled(share, domega_b)), cross(s.mean, dc))
+    by_turn = add(scaled(s.tau_1 * k, cross(theta, omega)), scaled(s.tau, cross(dtheta, omega)))
+    dgamma = sub(dmean, add(by_turn, scaled(s.tau, cross(theta, domega))))
+    put(s.dxi, 0, de)
+    put(s.dxi, 3, dtheta)
+    put(s.dxi_dot, 0, add(dv, add(cross(de, gamma), cross(e, dgamma))))
+    put(s.dxi_dot, 3, add(by_S(s, domega, s.sigma), by_dS(s, k, dtheta, omega, s.sigma)))
+    # force and torque in C
+    for r in range(6):
+        s.dforce[r] = law(K[r], s.dxi) + law(D[r], s.dxi_dot) + s.slope[r] * s.dxi[r]
+    f, m, p, df, dm = vector(s.force), vector(s.force[3:]), vector(s.p), vector(s.dforce), vector(s.dforce[3:])
+    dp = add(cross(df, e), cross(f, de))
+    by_turn = add(scaled(s.tau_1 * k, cross(theta, p)), scaled(s.tau, cross(dtheta, p)))
+    by_force = add(scaled(s.tau, cross(theta, dp)), by_S(s, dm, -s.sigma))
+    turning = add(add(by_turn, by_force), by_dS(s, k, dtheta, m, -s.sigma))
+    turn = turned(C, dc)
+    put(pair.change, 0, add(turned(C, df), cross(turn, pair.law)))
+    put(pair.change, 3, add(turned(C, sub(turning, scaled(1.0 - share, dp))), cross(turn, pair.law[3:])))
+    put(pair.change, 6, add(turned(C, add(turning, scaled(share, dp))), cross(turn, pair.law[6:])))
+
+
+@inner
+def bushing_energy(model, work, c):
+    """Return 1/2 xiᵀ K xi + preload · xi; tables count as forces, see `bushing_power`."""
+    s, i = work.bushing, model.connections.item[c]
+    bushing_state(model, work, c)
+    total = 0.0
+    for r in range(6):
+        total += s.xi[r] * (0.5 * law(model.bushings.stiffness[i, r], s.xi) + model.bushings.preload[i, r])
+    return total
+
+
+@inner
+def bushing_power(model, work, c):
+    """Return the power that enters by tables, and that taken by damping."""
+    s, i = work.bushing, model.connections.item[c]
+    bushing_state(model, work, c)
+    given, taken = 0.0, 0.0
+    for r in range(6):
+        taken += s.xi_dot[r] * law(model.bushings.damping[i, r], s.xi_dot)
+        if model.bushings.table[i, r] >= 0:
+            value, _, _ = time_function(model.functions, model.bushings.table[i, r], s.xi[r])
+            given -= value * s.xi_dot[r]
+    return given, taken

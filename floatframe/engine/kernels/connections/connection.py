@@ -1,0 +1,221 @@
+"""Residual rows of connections in terms of the motion of their markers.
+
+The rows of a connection have its wrench w as unknown. Those of a joint that hold something are in the unit of it; rows
+that say what the wrench is are multiplied by c_k, so that their unknown is c_k dw. Formulas of all kinds of rows are in
+kernels/joints/row_formulas.py. Held rows with `soft` s give way by s c_k times their own force, far below the tolerance
+of positions, so that redundant ones share their load.
+"""
+
+from floatframe.engine.kernels.compiler.compilation import inner, small
+from floatframe.engine.kernels.connections.coupler import (
+    coupler_derivatives,
+    coupler_rate,
+    coupler_rates,
+    coupler_rows,
+)
+from floatframe.engine.kernels.connections.element_law import law_derivatives, law_rates, law_rows
+from floatframe.engine.kernels.connections.pair_force import pair_derivatives, pair_rows
+from floatframe.engine.kernels.connections.spring_damper import spring_derivatives, spring_rows
+from floatframe.engine.kernels.connections.user_force import user_force_derivatives, user_force_rows
+from floatframe.engine.kernels.joints.relative_motion import direction, put_pair, relative_velocity
+from floatframe.engine.kernels.joints.row_formulas import (
+    held_by_place,
+    held_rates,
+    held_value,
+    wrench_derivatives,
+    wrench_value,
+)
+from floatframe.engine.kernels.marker import marker_acceleration_bias
+from floatframe.engine.kernels.model import BUSHING, CONTACT, COUPLER, ELEMENT, JOINT, SPRING, USER_FORCE
+from floatframe.engine.kernels.vector import cross, dot, put, put_sum, scaled, sub, vector
+from floatframe.model.joints.rows.kinds import DOT, NOTHING, POINT, POSITION, VELOCITY
+
+__all__ = [
+    "connection_derivatives",
+    "connection_rows",
+    "constraint_rates",
+    "has_cheap_rate",
+    "row_rates",
+    "write_held_rates",
+]
+
+
+@inner
+def connection_rows(model, work, c, c_k):
+    """Write the residual of connection c, and its wrench on its markers."""
+    law = model.connections.law[c]
+    if law == COUPLER:
+        coupler_rows(model, work, c, c_k)
+        return
+    if law == USER_FORCE:
+        user_force_rows(model, work, c, c_k)
+        return
+    if law == ELEMENT:
+        law_rows(model, work, c, c_k)
+        return
+    a, b, w0, size = model.connections.a[c], model.connections.b[c], model.connections.w0[c], model.connections.size[c]
+    w, wrench = work.state.w[w0 : w0 + size], work.markers.wrench
+    put_sum(wrench[a], 0, vector(w))
+    put_sum(wrench[b], 0, scaled(-1.0, vector(w)))
+    if model.markers.moment[a] >= 0:
+        put_sum(wrench[a], 3, vector(w[model.markers.moment[a] :]))
+    if model.markers.moment[b] >= 0:
+        put_sum(wrench[b], 3, scaled(-1.0, vector(w[model.markers.moment[b] :])))
+    if law == BUSHING or law == CONTACT:
+        pair_rows(model, work, c, c_k)
+    elif law == SPRING:
+        spring_rows(model, work, c, c_k)
+    else:
+        for k in range(w0, w0 + size):
+            joint_row(model, work, k, a, b, w, c_k)
+
+
+@small
+def joint_row(model, work, k, a, b, w, c_k):
+    """Write the residual of row k of a joint."""
+    if model.rows.holds[k] == NOTHING:
+        work.connections.g[k] = c_k * wrench_value(model.rows.kind[k], model, work, k, a, b, w)
+        return
+    g, n, _, m_b = held_value(model.rows.kind[k], model, work, k, a, b)
+    soft = model.rows.soft[k]
+    if soft > 0.0:
+        g -= soft * c_k * (dot(n, vector(w)) + dot(m_b, vector(w[model.rows.part[k] :])))
+    work.connections.g[k] = g
+
+
+@inner
+def connection_derivatives(model, work, c, c_k):
+    """Write P at the markers and V of connection c."""
+    law = model.connections.law[c]
+    if law == COUPLER:
+        coupler_derivatives(model, work, c, c_k)
+        return
+    if law == USER_FORCE:
+        user_force_derivatives(model, work, c, c_k)
+        return
+    if law == ELEMENT:
+        law_derivatives(model, work, c, c_k)
+        return
+    a, b, w0, size = model.connections.a[c], model.connections.b[c], model.connections.w0[c], model.connections.size[c]
+    P_a, P_b, V = work.connections.P[a], work.connections.P[b], work.connections.V[c]
+    for r in range(size):
+        for j in range(12):
+            P_a[r, j] = 0.0
+            P_b[r, j] = 0.0
+        for j in range(size):
+            V[r, j] = 0.0
+    if law == BUSHING or law == CONTACT:
+        pair_derivatives(model, work, c, c_k)
+    elif law == SPRING:
+        spring_derivatives(model, work, c, c_k)
+    else:
+        w = work.state.w[w0 : w0 + size]
+        for r in range(size):
+            joint_row_derivatives(model, work, w0 + r, r, a, b, w, c_k, P_a, P_b, V)
+
+
+@small
+def joint_row_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
+    """Write row r of P and V of row k of a joint.
+
+    A velocity that is held has no position: for c_k = 0, where rows stand for velocities or accelerations, its P is
+    that by the velocities. The change of a soft row's reaction with its direction is left out: of second order.
+    """
+    kind, holds = model.rows.kind[k], model.rows.holds[k]
+    if holds == NOTHING:
+        wrench_derivatives(kind, model, work, k, r, a, b, w, c_k, P_a, P_b, V)
+        return
+    _, n, m_a, m_b = held_value(kind, model, work, k, a, b)
+    first = 0
+    if holds == VELOCITY and c_k > 0.0:
+        first = 6
+        held_by_place(kind, model, work, k, r, a, b, P_a, P_b)
+    put_pair(P_a, P_b, r, first, scaled(-1.0, n))
+    put(P_a[r], first + 3, m_a)
+    put(P_b[r], first + 3, m_b)
+    soft = model.rows.soft[k]
+    if soft > 0.0:
+        put_sum(V[r], 0, scaled(-soft, n))
+        put_sum(V[r], model.rows.part[k], scaled(-soft, m_b))
+
+
+@small
+def has_cheap_rate(model, c, k):
+    """Whether row k of connection c holds a position whose rate is known without its second rate.
+
+    Not of elements: theirs asks for the law many times.
+    """
+    law = model.connections.law[c]
+    return model.rows.holds[k] == POSITION and (law == JOINT or law == COUPLER)
+
+
+@inner
+def write_held_rates(model, work, c, rate):
+    """Write the rates of the positions that joint or coupler c holds, as far as `has_cheap_rate`."""
+    law, a, b, markers = model.connections.law[c], model.connections.a[c], model.connections.b[c], work.markers
+    if law == COUPLER:
+        rate[model.elements.core[model.connections.item[c]]] = coupler_rate(model, work, c)
+        return
+    if law != JOINT:
+        return
+    v = relative_velocity(markers, a, b)
+    omega = sub(vector(markers.omega[b]), vector(markers.omega[a]))
+    for k in range(model.connections.w0[c], model.connections.w0[c + 1]):
+        kind = model.rows.kind[k]
+        if kind == POINT:
+            rate[k] = -dot(vector(model.rows.x[k]), v)
+        elif kind == DOT:  # E · D, which is held by what turns about E × D
+            E, D = direction(markers, a, model.rows.x[k]), direction(markers, b, model.rows.y[k])
+            rate[k] = -dot(cross(E, D), omega)
+        elif model.rows.holds[k] == POSITION:
+            _, n, m_a, m_b = held_value(kind, model, work, k, a, b)
+            first, _ = held_rates(kind, model, work, k, a, b)
+            first += dot(n, v) + dot(m_a, vector(markers.omega[a]))
+            rate[k] = first + dot(m_b, vector(markers.omega[b]))
+
+
+@inner
+def row_rates(model, work, k, a, b):
+    """Return the rate of what row k holds, and its second rate at zero u_dot; zero for rows that hold nothing.
+
+    Of a velocity that is held: it, and its rate. `work.markers.bias` holds the accelerations of markers at zero u_dot.
+    """
+    rows = model.rows
+    if rows.holds[k] == NOTHING:
+        return 0.0, 0.0
+    kind, markers = rows.kind[k], work.markers
+    _, n, m_a, m_b = held_value(kind, model, work, k, a, b)
+    rate, second = held_rates(kind, model, work, k, a, b)
+    rate += dot(n, relative_velocity(markers, a, b))
+    rate += dot(m_a, vector(markers.omega[a])) + dot(m_b, vector(markers.omega[b]))
+    bias_a, bias_b = markers.bias[a], markers.bias[b]
+    second += dot(n, sub(vector(bias_b), vector(bias_a)))
+    second += dot(m_a, vector(bias_a[3:])) + dot(m_b, vector(bias_b[3:]))
+    return rate, second
+
+
+@inner
+def constraint_rates(model, work):
+    """Write for every row the rate of the held quantity and its second rate at zero u_dot into `work.connections`.
+
+    `evaluate` has been called for the iterate.
+    """
+    for m in range(model.markers.body.shape[0]):
+        marker_acceleration_bias(model, work, m, work.markers.bias[m])
+    for c in range(model.connections.size.shape[0]):
+        connection_rates(model, work, c)
+
+
+@inner
+def connection_rates(model, work, c):
+    """Write what `constraint_rates` does for the rows of connection c, from accelerations in `work.markers.bias`."""
+    rate, bias = work.connections.rate, work.connections.bias
+    a, b = model.connections.a[c], model.connections.b[c]
+    for k in range(model.connections.w0[c], model.connections.w0[c + 1]):
+        rate[k], bias[k] = 0.0, 0.0
+        if model.connections.law[c] == JOINT:
+            rate[k], bias[k] = row_rates(model, work, k, a, b)
+    if model.connections.law[c] == COUPLER:
+        coupler_rates(model, work, c, rate, bias)
+    elif model.connections.law[c] == ELEMENT:
+        law_rates(model, work, c, rate, bias)

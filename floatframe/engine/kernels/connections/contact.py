@@ -1,0 +1,123 @@
+"""Contact of a sphere on B with a plane or a sphere on A: normal force with restitution, and friction.
+
+N: unit normal from A to B, of the plane (fixed in A) or along d = r_B - r_A; depth x = -gap,
+
+    gap = N · d - R_B   (plane)   or   |d| - R_A - R_B   (sphere)
+    f   = k xⁿ max(0, 1 + (h/v_0) x_dot)  for x > 0            v_0 speed of approach at the beginning of the contact
+    F_B = f N - mu f V_t/sqrt(|V_t|² + v_s²)                   V_t slip at the point rho = -R_B N from the centre of B
+
+and on the markers F = -F_B, M = (d + rho) × F on A, -N_w = -rho × F on B. v_0 is an unknown of its own: while there is
+no contact minus the speed of approach (at least the slow one), in contact the value from the beginning of the step.
+"""
+
+import math
+
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.vector import add, cross, dot, norm, put, scaled, sub, turned, vector
+
+__all__ = ["contact_energy", "contact_power", "contact_state", "contact_variation"]
+
+V_0 = 9  # place of the speed of approach among the unknowns, after F, M, N
+
+
+@inner
+def contact_state(model, work, c):
+    """Write what follows from the motion of contact c into work.contact, F, M, N and v_0 into work.pair."""
+    a, b, i, markers = model.connections.a[c], model.connections.b[c], model.connections.item[c], work.markers
+    s, own, w0 = work.contact, model.contacts, model.connections.w0[c]
+    omega_a, omega_b = vector(markers.omega[a]), vector(markers.omega[b])
+    d, d_dot = sub(markers.r[b], markers.r[a]), sub(markers.v[b], markers.v[a])
+    if own.is_sphere[i]:
+        N = scaled(1 / norm(d), d)
+        s.gap = norm(d) - own.radius_b[i] - own.radius_a[i]
+        s.rate = dot(N, d_dot)
+    else:
+        N = turned(markers.A[a], model.rows.x[w0])
+        s.gap = dot(N, d) - own.radius_b[i]
+        s.rate = dot(N, sub(d_dot, cross(omega_a, d)))
+    rho = scaled(-own.radius_b[i], N)
+    V = sub(add(d_dot, cross(omega_b, rho)), cross(omega_a, add(d, rho)))
+    V_t = sub(V, scaled(dot(N, V), N))
+    normal_force(model, work, c)
+    s.slip = math.sqrt(dot(V_t, V_t) + own.slip_speed[i] ** 2)
+    F = sub(scaled(own.friction[i] * s.f / s.slip, V_t), scaled(s.f, N))
+    put(s.N, 0, N)
+    put(s.d, 0, d)
+    put(s.rho, 0, rho)
+    put(s.V, 0, V)
+    put(s.V_t, 0, V_t)
+    put(work.pair.law, 0, F)
+    put(work.pair.law, 3, cross(add(d, rho), F))
+    put(work.pair.law, 6, cross(rho, F))
+
+
+@inner
+def normal_force(model, work, c):
+    """Write f, its derivatives by depth and rate, and v_0 with its derivative by the rate."""
+    s, own, i = work.contact, model.contacts, model.connections.item[c]
+    start, slow = work.state.w_start[model.connections.w0[c] + V_0], own.slow[i]
+    s.depth, s.f, s.f_by_depth, s.f_by_rate, s.v_0_by_rate = max(-s.gap, 0.0), 0.0, 0.0, 0.0, 0.0
+    if s.gap >= 0.0:
+        work.pair.law[V_0] = min(s.rate, -slow)
+        s.v_0_by_rate = 1.0 if s.rate < -slow else 0.0
+        return
+    v_0 = start if start > 0.0 else max(-start, slow)
+    work.pair.law[V_0] = v_0
+    n, h = own.exponent[i], own.dissipation[i] / v_0
+    spring, factor = own.stiffness[i] * s.depth**n, 1.0 - h * s.rate
+    if factor > 0.0:
+        s.f = spring * factor
+        s.f_by_depth = n * spring / s.depth * factor
+        s.f_by_rate = -spring * h
+
+
+@inner
+def contact_variation(model, work, c):
+    """Write the change of F, M, N and v_0 for the variation of the motion in work.pair, ground axes."""
+    a, b, i, markers = model.connections.a[c], model.connections.b[c], model.connections.item[c], work.markers
+    s, own, pair = work.contact, model.contacts, work.pair
+    omega_a, omega_b, d_dot = vector(markers.omega[a]), vector(markers.omega[b]), sub(markers.v[b], markers.v[a])
+    N, d, rho, V, V_t, F = vector(s.N), vector(s.d), vector(s.rho), vector(s.V), vector(s.V_t), vector(pair.law)
+    dd, dphi_a, dd_dot = vector(pair.motion), vector(pair.motion[3:]), vector(pair.motion[9:])
+    domega_a, domega_b = vector(pair.motion[12:]), vector(pair.motion[15:])
+    if own.is_sphere[i]:
+        gap = dot(N, dd)
+        dN = scaled(1 / dot(N, d), sub(dd, scaled(gap, N)))
+        rate = dot(dN, d_dot) + dot(N, dd_dot)
+    else:
+        dN = cross(dphi_a, N)
+        gap = dot(dN, d) + dot(N, dd)
+        rate = dot(dN, sub(d_dot, cross(omega_a, d)))
+        rate += dot(N, sub(dd_dot, add(cross(omega_a, dd), cross(domega_a, d))))
+    # V = d_dot + omega_B × rho - omega_A × (d + rho), V_t = V - N (N·V)
+    drho = scaled(-own.radius_b[i], dN)
+    of_a = add(cross(domega_a, add(d, rho)), cross(omega_a, add(dd, drho)))
+    dV = sub(add(dd_dot, add(cross(domega_b, rho), cross(omega_b, drho))), of_a)
+    change = dot(dN, V) + dot(N, dV)
+    dV_t = sub(dV, add(scaled(change, N), scaled(dot(N, V), dN)))
+    # F = mu f V_t / slip - f N
+    df = -s.f_by_depth * gap + s.f_by_rate * rate
+    rub, slowed = own.friction[i] / s.slip, dot(V_t, dV_t) / s.slip**2
+    friction = add(scaled(rub * (df - s.f * slowed), V_t), scaled(rub * s.f, dV_t))
+    dF = sub(friction, add(scaled(df, N), scaled(s.f, dN)))
+    put(pair.change, 0, dF)
+    put(pair.change, 3, add(cross(add(dd, drho), F), cross(add(d, rho), dF)))
+    put(pair.change, 6, add(cross(drho, F), cross(rho, dF)))
+    pair.change[V_0] = s.v_0_by_rate * rate
+
+
+@inner
+def contact_energy(model, work, c):
+    """Return k x^(n + 1)/(n + 1)."""
+    own, i = model.contacts, model.connections.item[c]
+    contact_state(model, work, c)
+    return own.stiffness[i] * work.contact.depth ** (own.exponent[i] + 1.0) / (own.exponent[i] + 1.0)
+
+
+@inner
+def contact_power(model, work, c):
+    """Return the power taken by restitution and friction."""
+    s, own, i = work.contact, model.contacts, model.connections.item[c]
+    contact_state(model, work, c)
+    spring = own.stiffness[i] * s.depth ** own.exponent[i]
+    return -(s.f - spring) * s.rate + own.friction[i] * s.f * dot(s.V_t, s.V_t) / s.slip

@@ -1,0 +1,200 @@
+"""Coordinates of joints or markers through which couplers and user forces see and move the system.
+
+A coordinate has a value x, its rate v and a force Q that acts to increase x (its power is Q v). With d = r_B - r_A and
+e an axis of A:
+
+    PUSH     x = e · d             v = e · (v_B - v_A - omega_A × d)     force Q e on B at its point
+    TWIST    x angle of B about e  v = e · (omega_B - omega_A)           torque Q e on B
+    TWIST_B  the same about an axis of B
+    SPAN     x = |d|               v = d · (v_B - v_A)/|d|               force Q d/|d| on B
+
+and the opposite on A. Rows of a coordinate, in this order: x and v as unknowns (angles then go on beyond a turn: the
+one nearest to the value before), the force or torque on A (3), and where a PUSH has A on a body the moment on A (3),
+
+    X - x = 0,   v' - v = 0,   F + Q e = 0,   M - d × F = 0.
+"""
+
+import math
+
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.joints.relative_motion import (
+    distance,
+    loaded_axis,
+    loaded_coordinate,
+    relative_velocity,
+    slip,
+    turned_angle,
+)
+from floatframe.engine.kernels.vector import add, cross, dot, norm, put, put_sum, scaled, sub, unit, vector
+from floatframe.model.joints.rows.kinds import PUSH, SPAN, TWIST_B
+
+__all__ = [
+    "coordinate_derivatives",
+    "coordinate_gradient",
+    "coordinate_motion",
+    "coordinate_rows",
+    "coordinate_second_rate",
+    "coordinate_tangent_rate",
+    "predict_coordinate",
+]
+
+
+@inner
+def force_direction(model, work, p):
+    """Return the direction in which the force of coordinate p acts, ground axes."""
+    rows, markers = model.rows, work.markers
+    a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
+    if rows.kind[k] == SPAN:
+        d = distance(markers, a, b)
+        return scaled(1 / norm(d), d)
+    return loaded_axis(rows, markers, k, a, b)
+
+
+@inner
+def relative_rotation(markers, a, b):
+    """Return omega_B - omega_A."""
+    return sub(markers.omega[b], markers.omega[a])
+
+
+@inner
+def turning_gradient(model, work, k, a, b):
+    """Return the derivative of an angle by the rotation of A; by that of B it is the opposite."""
+    _, t = turned_angle(model.rows, work.markers, k, a, b)
+    return t
+
+
+@inner
+def coordinate_motion(model, work, p):
+    """Return value and rate of coordinate p; an angle is the one nearest to the unknown X."""
+    rows, markers = model.rows, work.markers
+    a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
+    if rows.kind[k] == SPAN:
+        e = force_direction(model, work, p)
+        return dot(e, distance(markers, a, b)), dot(e, relative_velocity(markers, a, b))
+    x, v = loaded_coordinate(rows, markers, k, a, b)
+    if rows.kind[k] != PUSH:
+        x += 2 * math.pi * math.floor((work.state.w[k] - x) / (2 * math.pi) + 0.5)
+    return x, v
+
+
+@inner
+def predict_coordinate(coordinates, state, p, h):
+    """Move the unknown X of coordinate p by its rate, so that a fast angle is followed."""
+    k = coordinates.row[p]
+    state.w[k] += h * state.w[k + 1]
+
+
+@inner
+def coordinate_rows(model, work, p, Q, c_k):
+    """Write the rows of coordinate p with force Q, and its wrench on both markers."""
+    a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
+    g, w, wrench = work.connections.g, work.state.w, work.markers.wrench
+    x, v = coordinate_motion(model, work, p)
+    g[k] = c_k * (w[k] - x)
+    g[k + 1] = c_k * (w[k + 1] - v)
+    f, m = model.coordinates.force[p], model.coordinates.arm[p]
+    if f < 0:
+        return
+    F = vector(w[f:])
+    put(g, f, scaled(c_k, add(F, scaled(Q, force_direction(model, work, p)))))
+    first = 0 if model.markers.force[a] >= 0 else 3
+    put_sum(wrench[a], first, F)
+    put_sum(wrench[b], first, scaled(-1.0, F))
+    if m >= 0:
+        M = vector(w[m:])
+        put(g, m, scaled(c_k, sub(M, cross(distance(work.markers, a, b), F))))
+        put_sum(wrench[a], 3, M)
+
+
+@inner
+def add_pair(P_a, P_b, r, column, x):
+    """Add x to a row of P at A, and its opposite at B."""
+    put_sum(P_a[r], column, x)
+    put_sum(P_b[r], column, scaled(-1.0, x))
+
+
+@inner
+def coordinate_gradient(model, work, p, r, by_x, by_v):
+    """Add by_x dx + by_v dv of coordinate p to row r of P at both markers; see kernels/joints/loaded_rows.py."""
+    markers = work.markers
+    a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
+    P_a, P_b, kind = work.connections.P[a], work.connections.P[b], model.rows.kind[k]
+    e, d = force_direction(model, work, p), distance(markers, a, b)
+    if kind == SPAN:
+        v = relative_velocity(markers, a, b)
+        across = sub(v, scaled(dot(e, v), e))
+        add_pair(P_a, P_b, r, 0, sub(scaled(-by_x, e), scaled(by_v / dot(e, d), across)))
+        add_pair(P_a, P_b, r, 6, scaled(-by_v, e))
+    elif kind == PUSH:
+        omega_a = vector(markers.omega[a])
+        arm, seen = cross(e, d), slip(markers, a, b, d)
+        add_pair(P_a, P_b, r, 0, sub(scaled(by_v, cross(e, omega_a)), scaled(by_x, e)))
+        add_pair(P_a, P_b, r, 6, scaled(-by_v, e))
+        put_sum(P_a[r], 3, add(scaled(by_x, arm), scaled(by_v, cross(e, seen))))
+        put_sum(P_a[r], 9, scaled(by_v, arm))
+    else:
+        add_pair(P_a, P_b, r, 3, scaled(by_x, turning_gradient(model, work, k, a, b)))
+        add_pair(P_a, P_b, r, 9, scaled(-by_v, e))
+        P = P_b if kind == TWIST_B else P_a  # of the marker that holds the axis
+        put_sum(P[r], 3, scaled(by_v, cross(e, relative_rotation(markers, a, b))))
+
+
+@inner
+def coordinate_derivatives(model, work, c, p, Q, column, by_unknown, c_k):
+    """Write the rows of P and V of coordinate p, of connection c, whose force is Q = by_unknown w[column]."""
+    a, b, k, w0 = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p], model.connections.w0[c]
+    P_a, P_b, V = work.connections.P[a], work.connections.P[b], work.connections.V[c]
+    r = k - w0
+    V[r, r], V[r + 1, r + 1] = 1.0, 1.0
+    coordinate_gradient(model, work, p, r, -c_k, 0.0)
+    coordinate_gradient(model, work, p, r + 1, 0.0, -c_k)
+    f, m = model.coordinates.force[p], model.coordinates.arm[p]
+    if f < 0:
+        return
+    e, d, kind = force_direction(model, work, p), distance(work.markers, a, b), model.rows.kind[k]
+    P = P_b if kind == TWIST_B else P_a
+    for i in range(3):  # row of F + Q e along an axis of the ground
+        axis, r = unit(i), f - w0 + i
+        V[r, r] = 1.0
+        V[r, column - w0] = by_unknown * dot(axis, e)
+        if kind == SPAN:  # de = (1 - e eᵀ) dd / |d|
+            add_pair(P_a, P_b, r, 0, scaled(-c_k * Q / norm(d), sub(axis, scaled(dot(axis, e), e))))
+        else:  # axis · (dphi × e) = dphi · (e × axis)
+            put_sum(P[r], 3, scaled(c_k * Q, cross(e, axis)))
+    if m < 0:
+        return
+    F = vector(work.state.w[f:])
+    for i in range(3):  # row of M - d × F along an axis of the ground
+        axis, r = unit(i), m - w0 + i
+        V[r, r] = 1.0
+        put(V[r], f - w0, cross(d, axis))  # axis · (d × dF) = dF · (axis × d)
+        add_pair(P_a, P_b, r, 0, scaled(c_k, cross(F, axis)))  # axis · (dd × F) = dd · (F × axis)
+
+
+@inner
+def coordinate_tangent_rate(model, work, p):
+    """Return the rate of coordinate p as its gradient gives it; of an angle between axes not parallel it is not v."""
+    rows = model.rows
+    a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
+    if rows.kind[k] == SPAN or rows.kind[k] == PUSH:
+        _, v = coordinate_motion(model, work, p)
+        return v
+    return -dot(turning_gradient(model, work, k, a, b), relative_rotation(work.markers, a, b))
+
+
+@inner
+def coordinate_second_rate(model, work, p, bias_a, bias_b):
+    """Return the second rate of coordinate p for given accelerations (6) of both markers; angles: of parallel axes."""
+    markers = work.markers
+    a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
+    kind = model.rows.kind[k]
+    if kind != SPAN and kind != PUSH:
+        return -dot(turning_gradient(model, work, k, a, b), sub(bias_b[3:], bias_a[3:]))
+    e, d, v = force_direction(model, work, p), distance(markers, a, b), relative_velocity(markers, a, b)
+    along = dot(e, sub(bias_b, bias_a))
+    if kind == SPAN:
+        return along + (dot(v, v) - dot(e, v) ** 2) / dot(e, d)
+    omega_a = vector(markers.omega[a])
+    e_dot = cross(omega_a, e)
+    e_ddot = add(cross(omega_a, e_dot), cross(bias_a[3:], e))
+    return along + dot(e_ddot, d) + 2 * dot(e_dot, v)

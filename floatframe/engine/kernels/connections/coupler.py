@@ -1,0 +1,102 @@
+"""Coordinate couplers (gears): Σ a_p x_p - c(t) = 0 over the coordinates of a connection.
+
+The multiplier lam is the last unknown; the force along coordinate p is Q_p = a_p lam. The held row is divided by its
+largest coefficient (`row_x`), so that all rows have numbers of one size. While a coupler is not
+engaged its row is lam = 0.
+"""
+
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.connections.coordinate import (
+    coordinate_derivatives,
+    coordinate_gradient,
+    coordinate_motion,
+    coordinate_rows,
+    coordinate_second_rate,
+    coordinate_tangent_rate,
+)
+from floatframe.engine.kernels.joints.relative_motion import prescribed
+from floatframe.model.joints.rows.kinds import RELEASED
+
+__all__ = ["coupler_derivatives", "coupler_power", "coupler_rate", "coupler_rates", "coupler_rows"]
+
+
+@inner
+def coupler_rows(model, work, c, c_k):
+    """Write the residual of coupler c, and its wrenches."""
+    i = model.connections.item[c]
+    k = model.elements.core[i]
+    lam = work.state.w[k]
+    total = 0.0
+    if model.rows.kind[k] != RELEASED:
+        held, _, _ = prescribed(model, work, k)
+        total = -held
+    for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
+        factor = model.coordinates.factor[p]
+        coordinate_rows(model, work, p, factor * lam, c_k)
+        x, _ = coordinate_motion(model, work, p)
+        total += factor * x
+    work.connections.g[k] = c_k * lam if model.rows.kind[k] == RELEASED else model.rows.x[k, 0] * total
+
+
+@inner
+def coupler_derivatives(model, work, c, c_k):
+    """Write P at the markers and V of coupler c."""
+    i, size = model.connections.item[c], model.connections.size[c]
+    k = model.elements.core[i]
+    V = work.connections.V[c]
+    for r in range(size):
+        for j in range(size):
+            V[r, j] = 0.0
+        for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
+            for j in range(12):
+                work.connections.P[model.coordinates.a[p], r, j] = 0.0
+                work.connections.P[model.coordinates.b[p], r, j] = 0.0
+    for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
+        factor = model.coordinates.factor[p]
+        coordinate_derivatives(model, work, c, p, factor * work.state.w[k], k, factor, c_k)
+        if model.rows.kind[k] != RELEASED:
+            coordinate_gradient(model, work, p, k - model.connections.w0[c], factor * model.rows.x[k, 0], 0.0)
+    if model.rows.kind[k] == RELEASED:
+        V[k - model.connections.w0[c], k - model.connections.w0[c]] = 1.0
+
+
+@inner
+def coupler_rate(model, work, c):
+    """Return the rate of the held row of coupler c; zero while it is not engaged."""
+    i = model.connections.item[c]
+    k = model.elements.core[i]
+    if model.rows.kind[k] == RELEASED:
+        return 0.0
+    _, rate, _ = prescribed(model, work, k)
+    total = -rate
+    for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
+        total += model.coordinates.factor[p] * coordinate_tangent_rate(model, work, p)
+    return model.rows.x[k, 0] * total
+
+
+@inner
+def coupler_rates(model, work, c, rate, bias):
+    """Write the rate of the held row of coupler c, and its second rate at zero u_dot."""
+    i = model.connections.item[c]
+    k = model.elements.core[i]
+    rate[k], bias[k] = coupler_rate(model, work, c), 0.0
+    if model.rows.kind[k] == RELEASED:
+        return
+    _, _, second = prescribed(model, work, k)
+    second = -second
+    for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
+        factor = model.coordinates.factor[p]
+        second += factor * coordinate_second_rate(
+            model, work, p, work.markers.bias[model.coordinates.a[p]], work.markers.bias[model.coordinates.b[p]]
+        )
+    bias[k] = model.rows.x[k, 0] * second
+
+
+@inner
+def coupler_power(model, work, c):
+    """Return the power that enters where the constant of the coupler changes with time: lam dc/dt."""
+    k = model.elements.core[model.connections.item[c]]
+    if model.rows.kind[k] == RELEASED:
+        return 0.0
+    _, first, _ = prescribed(model, work, k)
+    return work.state.w[k] * first

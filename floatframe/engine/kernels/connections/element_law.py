@@ -1,0 +1,352 @@
+"""Public elements: wrenches, rates of states and what is held, as functions that are called by their address.
+
+The law of an element with n markers, states z and multipliers lam gives, from the motion x of the markers,
+
+    wrench (n, 6), z_dot = g(t, x, z, lam), h(t, x, z, lam) for each multiplier, and outputs that are only seen.
+
+Unknowns of its rows in this order: the parts of the wrenches that act, for each state its value, rate and algorithmic
+rate (`user_force`), the multipliers:
+
+    w - wrench = 0;   z - b - kappa g' = 0,   g' - g = 0,   a - b' - rho g' = 0;   h = 0
+
+A multiplier holds a position (h of places and time alone), a velocity, or nothing: then h = 0 is an equation like those
+of wrenches. Two ends whose forces are opposite share one unknown, with the factor -1 at the second.
+
+The derivatives come from one call, d(wrench, g, h)/d(dr, dphi, dv, domega [, da, dalpha] of each marker, z, lam), row
+by row. A law that asks for accelerations gets 24 numbers of each marker in place of 18.
+"""
+
+import math
+
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.compiler.user_call import call_law
+from floatframe.engine.kernels.marker import marker_acceleration
+from floatframe.engine.kernels.rotation import exp_matrix
+from floatframe.engine.kernels.vector import add, dot, matrix, norm, product, put, put_sum, scaled, vector
+from floatframe.model.joints.rows.kinds import NOTHING, POSITION, VELOCITY
+
+__all__ = ["law_derivatives", "law_power", "law_rates", "law_rows", "law_values"]
+
+MOST_LEVELS, SHORTEST, LONGER = 22, 2.0**-20, 4.0  #: of steps where the time over which a law changes is not known
+ROUNDING = 1e-15  #: of places, in differences
+REACH = 5e-3  #: way along the motion on which rates are taken, as a part of the length over which the law changes
+#: of differences of sixth order at -3 to 3
+FIRST = (-1 / 60, 9 / 60, -45 / 60, 0.0, 45 / 60, -9 / 60, 1 / 60)
+FOURTH_FIRST = (0.0, 1 / 12, -8 / 12, 0.0, 8 / 12, -1 / 12, 0.0)  #: the same of fourth order
+FOURTH_SECOND = (0.0, -1 / 12, 16 / 12, -30 / 12, 16 / 12, -1 / 12, 0.0)
+SECOND = (2 / 180, -27 / 180, 270 / 180, -490 / 180, 270 / 180, -27 / 180, 2 / 180)
+
+
+@inner
+def law_inputs(model, work, c):
+    """Write t, the motion of the markers, states and multipliers into work.laws.inputs."""
+    i, first = model.connections.item[c], model.connections.a[c]
+    n, width = model.laws.head[i, 0], model.laws.head[i, 1]
+    x, markers = work.laws.inputs, work.markers
+    x[0] = work.state.time
+    for m in range(n):
+        o = 1 + m * width
+        put(x, o, vector(markers.r[first + m]))
+        for r in range(3):
+            for k in range(3):
+                x[o + 3 + 3 * r + k] = markers.A[first + m, r, k]
+        put(x, o + 12, vector(markers.v[first + m]))
+        put(x, o + 15, vector(markers.omega[first + m]))
+        a = model.markers.accelerated[first + m]
+        if a >= 0:
+            marker_acceleration(model, work, first + m, markers.acceleration[a])
+            put(x, o + 18, vector(markers.acceleration[a]))
+            put(x, o + 21, vector(markers.acceleration[a, 3:]))
+    o = 1 + n * width
+    k = model.connections.w0[c] + model.laws.row0[i + 1] - model.laws.row0[i]
+    for s in range(model.laws.head[i, 2]):
+        x[o + s] = work.state.w[k + 3 * s]
+    o += model.laws.head[i, 2]
+    k += 3 * model.laws.head[i, 2]
+    for j in range(model.laws.head[i, 3]):
+        x[o + j] = work.state.w[k + j]
+
+
+@inner
+def law_call(model, work, i, outputs):
+    """Write what the law i gives for the inputs."""
+    data = model.laws.data[model.laws.data0[i] : model.laws.data0[i + 1]]
+    call_law(model.laws.address[i], model.laws.head[i], work.laws.inputs, data, outputs)
+
+
+@inner
+def law_values(model, work, c):
+    """Write the outputs of element c at the iterate into work.laws.outputs."""
+    law_inputs(model, work, c)
+    law_call(model, work, model.connections.item[c], work.laws.outputs)
+
+
+@inner
+def law_rows(model, work, c, c_k):
+    """Write the residual of element c, and its wrenches."""
+    i, k = model.connections.item[c], model.connections.w0[c]
+    laws, w, g, out = model.laws, work.state.w, work.connections.g, work.laws.outputs
+    for m in range(model.connections.a[c], model.connections.a[c] + laws.head[i, 0]):
+        for part in range(0, 6, 3):
+            place = model.markers.force[m] if part == 0 else model.markers.moment[m]
+            if place >= 0:
+                put_sum(work.markers.wrench[m], part, scaled(model.markers.sign[m], vector(w[k + place :])))
+    law_values(model, work, c)
+    total = 0.0
+    for j in range(laws.row0[i], laws.row0[i + 1]):
+        g[k] = c_k * (w[k] - laws.factor[j] * out[laws.source[j]])
+        total += g[k]
+        k += 1
+    o, s = 6 * laws.head[i, 0], laws.state0[i]
+    for _ in range(laws.head[i, 2]):
+        g[k] = c_k * (w[k] - work.states.base[s] - work.states.kappa[s] * w[k + 1])
+        g[k + 1] = c_k * (w[k + 1] - out[o])
+        total += g[k + 1]
+        g[k + 2] = c_k * (w[k + 2] - work.states.rate_base[s] - work.states.rho * w[k + 1])
+        o, s, k = o + 1, s + 1, k + 3
+    for _ in range(laws.head[i, 3]):
+        g[k] = out[o] * (c_k if model.rows.holds[k] == NOTHING else 1.0)
+        total += g[k]
+        o, k = o + 1, k + 1
+    if not math.isfinite(total):
+        note_what_is_no_number(model, work, c)
+
+
+@inner
+def note_what_is_no_number(model, work, c):
+    """Write down the first element of a step whose law gives what is no number for a motion that is one."""
+    head = model.laws.head[model.connections.item[c]]
+    total = 0.0
+    for k in range(6 * head[0] + head[2] + head[3]):
+        total += work.laws.outputs[k]
+    if math.isfinite(total) or work.counted.no_number > 0:
+        return
+    for k in range(1 + head[0] * head[1] + head[2] + head[3]):
+        if not math.isfinite(work.laws.inputs[k]):
+            return
+    work.counted.no_number = c + 1
+
+
+@inner
+def law_derivatives(model, work, c, c_k):
+    """Write P at the markers and V of element c.
+
+    A velocity that is held has no position: for c_k = 0, where rows stand for velocities or accelerations, its P is
+    that by the velocities.
+    """
+    i, a, w0 = model.connections.item[c], model.connections.a[c], model.connections.w0[c]
+    size = model.connections.size[c]
+    laws, V, slopes = model.laws, work.connections.V[c], work.laws.slopes
+    n, n_z, n_lam = laws.head[i, 0], laws.head[i, 2], laws.head[i, 3]
+    for r in range(size):
+        for j in range(size):
+            V[r, j] = 0.0
+    law_inputs(model, work, c)
+    data = laws.data[laws.data0[i] : laws.data0[i + 1]]
+    call_law(laws.tangent[i], laws.head[i], work.laws.inputs, data, slopes)
+    per = laws.head[i, 1] - 6  # columns of a marker
+    n_columns = per * n + n_z + n_lam
+    for m in range(a, a + n):
+        if model.markers.accelerated[m] >= 0:
+            for r in range(size):
+                for j in range(6):
+                    work.connections.P_a[model.markers.accelerated[m], r, j] = 0.0
+    r, states = 0, laws.row0[i + 1] - laws.row0[i]
+    for j in range(laws.row0[i], laws.row0[i + 1]):
+        own = slopes[laws.source[j] * n_columns : (laws.source[j] + 1) * n_columns]
+        V[r, r] = 1.0
+        add_slopes(model, work, V, a, n, n_z, n_lam, per, states, r, -c_k * laws.factor[j], -laws.factor[j], own)
+        r += 1
+    o = 6 * n
+    for s in range(laws.state0[i], laws.state0[i] + n_z):
+        own = slopes[o * n_columns : (o + 1) * n_columns]
+        V[r, r], V[r, r + 1] = 1.0, -work.states.kappa[s]
+        V[r + 1, r + 1] = 1.0
+        V[r + 2, r + 2], V[r + 2, r + 1] = 1.0, -work.states.rho
+        add_slopes(model, work, V, a, n, n_z, n_lam, per, states, r + 1, -c_k, -1.0, own)
+        for m in range(a, a + n):
+            for j in range(12):
+                work.connections.P[m, r, j], work.connections.P[m, r + 2, j] = 0.0, 0.0
+        o, r = o + 1, r + 3
+    for _ in range(n_lam):
+        own = slopes[o * n_columns : (o + 1) * n_columns]
+        holds = model.rows.holds[w0 + r]
+        if holds == NOTHING:
+            add_slopes(model, work, V, a, n, n_z, n_lam, per, states, r, c_k, 1.0, own)
+        else:
+            held_slopes(work, V, a, n, n_z, n_lam, per, states, r, holds, c_k, own)
+        o, r = o + 1, r + 1
+
+
+@inner
+def add_slopes(model, work, V, a, n, n_z, n_lam, per, states, r, by_motion, by_unknown, own):
+    """Add derivatives of one output to row r of P, P_a and V, multiplied by a factor each."""
+    for m in range(n):
+        for j in range(12):
+            work.connections.P[a + m, r, j] = by_motion * own[per * m + j]
+        accelerated = model.markers.accelerated[a + m]
+        if accelerated >= 0:
+            for j in range(6):
+                work.connections.P_a[accelerated, r, j] = by_unknown * own[per * m + 12 + j]
+    for s in range(n_z):
+        V[r, states + 3 * s] += by_unknown * own[per * n + s]
+    for j in range(n_lam):
+        V[r, states + 3 * n_z + j] += by_unknown * own[per * n + n_z + j]
+
+
+@inner
+def held_slopes(work, V, a, n, n_z, n_lam, per, states, r, holds, c_k, own):
+    """Write the derivatives of what is held into row r of P and V."""
+    for m in range(n):
+        for j in range(12):
+            if holds == POSITION:
+                slope = own[per * m + j] if j < 6 else 0.0
+            elif c_k > 0.0:
+                slope = own[per * m + j]
+            else:
+                slope = own[per * m + 6 + j] if j < 6 else 0.0
+            work.connections.P[a + m, r, j] = slope
+    if c_k > 0.0:
+        for s in range(n_z):
+            V[r, states + 3 * s] = own[per * n + s] / c_k
+        for j in range(n_lam):
+            V[r, states + 3 * n_z + j] = own[per * n + n_z + j] / c_k
+
+
+@inner
+def law_rates(model, work, c, rate, bias):
+    """Write the rates of what element c holds, and the second rates at zero u_dot, of its rows of multipliers.
+
+    From the values along the motion with the accelerations of `work.markers.bias`: differences of sixth order, by
+    steps in which neither the motion nor the time changes the law much. Where the time over which it changes is not
+    known, steps grow from short ones to those that rounding and the order of the differences disturb least.
+    """
+    i, a, w0 = model.connections.item[c], model.connections.a[c], model.connections.w0[c]
+    size = model.connections.size[c]
+    laws = model.laws
+    n, n_lam = laws.head[i, 0], laws.head[i, 3]
+    is_held = False
+    for k in range(w0 + size - n_lam, w0 + size):
+        rate[k], bias[k] = 0.0, 0.0
+        is_held = is_held or model.rows.holds[k] != NOTHING
+    if not is_held:
+        return
+    fastest = 0.0
+    for m in range(a, a + n):
+        b = work.markers.bias[m]
+        fastest = max(fastest, norm(vector(work.markers.v[m])) / laws.length[i], norm(vector(work.markers.omega[m])))
+        fastest = max(fastest, (norm(vector(b)) / laws.length[i]) ** 0.5, norm(vector(b[3:])) ** 0.5)
+    if laws.time[i] > 0.0:
+        fastest = max(fastest, 1.0 / laws.time[i])
+        rates_by_steps(model, work, c, REACH / (fastest if fastest > 0.0 else 1.0), rate, bias)
+        return
+    far = laws.length[i]
+    for m in range(a, a + n):
+        far = max(far, norm(vector(work.markers.r[m])))
+    h = SHORTEST * REACH / max(fastest, 1.0)
+    best, h_best = math.inf, h
+    for _ in range(MOST_LEVELS):
+        if h * fastest > REACH:
+            break
+        error = rates_by_steps(model, work, c, h, rate, bias) + ROUNDING * far / (h * h)
+        if error > best:
+            break
+        best, h_best = error, h
+        h *= LONGER
+    rates_by_steps(model, work, c, h_best, rate, bias)
+
+
+@inner
+def rates_by_steps(model, work, c, h, rate, bias):
+    """Write the differences of `law_rates` by steps of h; return how far those of fourth order are from them [g/s²]."""
+    i, a, w0 = model.connections.item[c], model.connections.a[c], model.connections.w0[c]
+    size = model.connections.size[c]
+    laws, fourth = model.laws, work.laws.slopes  # which derivatives overwrite
+    n, n_z, n_lam = laws.head[i, 0], laws.head[i, 2], laws.head[i, 3]
+    for j in range(n_lam):
+        rate[w0 + size - n_lam + j], bias[w0 + size - n_lam + j] = 0.0, 0.0
+        fourth[2 * j], fourth[2 * j + 1] = 0.0, 0.0
+    law_values(model, work, c)
+    first_state = 1 + n * laws.head[i, 1]
+    for p in range(7):
+        e = (p - 3) * h
+        law_inputs(model, work, c)
+        x = work.laws.inputs
+        x[0] += e
+        for m in range(a, a + n):
+            o, b = 1 + (m - a) * laws.head[i, 1], work.markers.bias[m]
+            v, omega = vector(work.markers.v[m]), vector(work.markers.omega[m])
+            put_sum(x, o, add(scaled(e, v), scaled(0.5 * e * e, vector(b))))
+            turn = exp_matrix(add(scaled(e, omega), scaled(0.5 * e * e, vector(b[3:]))))
+            A = product(turn, matrix(work.markers.A[m]))
+            for r in range(3):
+                put(x, o + 3 + 3 * r, A[r])
+            put_sum(x, o + 12, scaled(e, vector(b)))
+            put_sum(x, o + 15, scaled(e, vector(b[3:])))
+        for s in range(n_z):
+            x[first_state + s] += e * work.laws.outputs[6 * n + s]
+        law_call(model, work, i, work.laws.trial)
+        for j in range(n_lam):
+            k, value = w0 + size - n_lam + j, work.laws.trial[6 * n + n_z + j]
+            fourth[2 * j] += FOURTH_FIRST[p] * value / h
+            if model.rows.holds[k] == POSITION:
+                rate[k] += FIRST[p] * value / h
+                bias[k] += SECOND[p] * value / (h * h)
+                fourth[2 * j + 1] += FOURTH_SECOND[p] * value / (h * h)
+            elif model.rows.holds[k] == VELOCITY:
+                bias[k] += FIRST[p] * value / h
+                if p == 3:
+                    rate[k] = value
+    error = 0.0
+    for j in range(n_lam):
+        k = w0 + size - n_lam + j
+        if model.rows.holds[k] == POSITION:
+            error = max(error, abs(fourth[2 * j] - rate[k]) / h, abs(fourth[2 * j + 1] - bias[k]))
+        elif model.rows.holds[k] == VELOCITY:
+            error = max(error, abs(fourth[2 * j] - bias[k]))
+    return error
+
+
+@inner
+def power_on_bodies(model, work, c):
+    """Return the power of the wrenches of element c."""
+    first, last = model.connections.a[c], model.connections.a[c] + model.laws.head[model.connections.item[c], 0]
+    w = work.state.w[model.connections.w0[c] :]
+    total = 0.0
+    for m in range(first, last):
+        force, moment, sign = model.markers.force[m], model.markers.moment[m], model.markers.sign[m]
+        if force >= 0:
+            total += sign * dot(w[force:], work.markers.v[m])
+        if moment >= 0:
+            total += sign * dot(w[moment:], work.markers.omega[m])
+    return total
+
+
+@inner
+def law_power(model, work, c):
+    """Return the energy that element c holds, the power it gives to the system, and what it takes; at the iterate.
+
+    An output that ends the run is noted.
+
+    Power on the bodies P_b = given - lost - d(energy)/dt. An element that names no energy holds none; what it then
+    does not name follows from P_b.
+    """
+    i, laws = model.connections.item[c], model.laws
+    energy, given, lost = laws.energy[i], laws.given[i], laws.lost[i]
+    if energy < 0 and given < 0 and lost < 0 and laws.stop0[i] == laws.stop0[i + 1]:
+        return 0.0, power_on_bodies(model, work, c), 0.0
+    law_values(model, work, c)
+    seen = 6 * laws.head[i, 0] + laws.head[i, 2] + laws.head[i, 3]
+    for k in range(laws.stop0[i], laws.stop0[i + 1]):
+        if work.laws.outputs[seen + laws.stop[k]] > 0.0 and work.counted.stopped == 0:
+            work.counted.stopped = k + 1
+    P_given = work.laws.outputs[seen + given] if given >= 0 else 0.0
+    P_lost = work.laws.outputs[seen + lost] if lost >= 0 else 0.0
+    if energy >= 0:
+        return work.laws.outputs[seen + energy], P_given, P_lost
+    on_bodies = power_on_bodies(model, work, c)
+    if given < 0:
+        return 0.0, on_bodies + P_lost, P_lost
+    if lost < 0:
+        return 0.0, P_given, P_given - on_bodies
+    return 0.0, P_given, P_lost

@@ -1,0 +1,200 @@
+"""User forces: Q = f(t, x, v, z) along coordinates, and states z with z_dot = g(t, x, v, z) integrated with the motion.
+
+Rows after those of the coordinates: the forces, then for each state its value, its rate and an algorithmic rate a,
+
+    Q - f = 0;   z - b - kappa g' = 0,   g' - g = 0,   a - b' - rho g' = 0        (g': the rate as an unknown)
+
+with b, b', kappa and rho of the generalized-alpha method for first-order equations, see `begin_states`.
+"""
+
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.compiler.user_call import call_user_function
+from floatframe.engine.kernels.connections.coordinate import (
+    coordinate_derivatives,
+    coordinate_gradient,
+    coordinate_motion,
+    coordinate_rows,
+)
+from floatframe.engine.kernels.connections.tape import tape_gradient, tape_value
+
+__all__ = [
+    "begin_states", "element_of", "resize_states", "user_force_derivatives", "user_force_power", "user_force_rows",
+    "user_outputs",
+]  # fmt: skip
+
+STEP = 1e-7  # of differences of users' functions, relative to the sizes of coordinates and states
+LEAST_STEP = 1e-9  # of states
+ROUNDING = 2e-15  # of a number, below which a step is lost in it
+
+
+@inner
+def element_of(model, c):
+    """Return the number of user force c among all elements (couplers come first)."""
+    return model.connections.item[c] + model.elements.coordinate0.shape[0] - 1 - model.users.n_states.shape[0]
+
+
+@inner
+def gather_inputs(model, work, c):
+    """Write t, x, v, z into work.users.inputs; return the numbers of coordinates and of inputs."""
+    i, u = element_of(model, c), model.connections.item[c]
+    first, last = model.elements.coordinate0[i], model.elements.coordinate0[i + 1]
+    n = last - first
+    work.users.inputs[0] = work.state.time
+    for p in range(first, last):
+        x, v = coordinate_motion(model, work, p)
+        work.users.inputs[1 + p - first] = x
+        work.users.inputs[1 + n + p - first] = v
+    row = model.elements.core[i] + model.users.n_forces[u]
+    for s in range(model.users.n_states[u]):
+        work.users.inputs[1 + 2 * n + s] = work.state.w[row + 3 * s]
+    return n, 1 + 2 * n + model.users.n_states[u]
+
+
+@inner
+def user_values(model, work, c):
+    """Write forces and rates of states into work.users.outputs; return how many coordinates, inputs and outputs."""
+    n, n_in = gather_inputs(model, work, c)
+    return n, n_in, user_outputs(model, work, c)
+
+
+@inner
+def user_outputs(model, work, c):
+    """Write forces and rates of states for work.users.inputs into work.users.outputs; return how many."""
+    u = model.connections.item[c]
+    n_out = model.users.n_forces[u] + model.users.n_states[u]
+    if model.users.address[u] != 0:
+        call_user_function(model.users.address[u], work.users.inputs, work.users.outputs)
+    else:
+        for j in range(n_out):
+            f = model.users.tape0[u] + j
+            work.users.outputs[j] = tape_value(model.tapes, model.functions, f, work.users.inputs, work.tapes)
+    return n_out
+
+
+@inner
+def user_gradients(model, work, c):
+    """Write the derivatives of all outputs by all inputs into `gradients`, row by row; return numbers as above."""
+    u = model.connections.item[c]
+    n, n_in, n_out = user_values(model, work, c)
+    if model.users.address[u] == 0:
+        for j in range(n_out):
+            f, gradient = model.users.tape0[u] + j, work.users.gradients[j * n_in : (j + 1) * n_in]
+            tape_gradient(model.tapes, model.functions, f, work.users.inputs, work.tapes, gradient)
+        return n, n_in, n_out
+    first = model.elements.coordinate0[element_of(model, c)]
+    for k in range(1, n_in):  # nothing takes those by the time
+        here = work.users.inputs[k]
+        if k <= n:
+            step = STEP * model.coordinates.size[first + k - 1]
+        elif k <= 2 * n:
+            step = STEP * model.coordinates.speed[first + k - 1 - n]
+        else:
+            step = max(STEP * abs(here), LEAST_STEP)
+        step = max(step, ROUNDING * abs(here))
+        above, below = here + step, here - step
+        work.users.inputs[k] = above
+        call_user_function(model.users.address[u], work.users.inputs, work.users.trial)
+        work.users.inputs[k] = below
+        for j in range(n_out):
+            work.users.gradients[j * n_in + k] = work.users.trial[j]
+        call_user_function(model.users.address[u], work.users.inputs, work.users.trial)
+        work.users.inputs[k] = here
+        for j in range(n_out):
+            change = work.users.gradients[j * n_in + k] - work.users.trial[j]
+            work.users.gradients[j * n_in + k] = change / (above - below)
+    return n, n_in, n_out
+
+
+@inner
+def user_force_rows(model, work, c, c_k):
+    """Write the residual of user force c, and its wrenches."""
+    i, u = element_of(model, c), model.connections.item[c]
+    for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
+        coordinate_rows(model, work, p, work.state.w[model.coordinates.core[p]], c_k)
+    user_values(model, work, c)
+    k = model.elements.core[i]
+    for j in range(model.users.n_forces[u]):
+        work.connections.g[k + j] = c_k * (work.state.w[k + j] - work.users.outputs[j])
+    k += model.users.n_forces[u]
+    for s in range(model.users.n_states[u]):
+        i = model.users.state0[u] + s
+        rate = work.state.w[k + 1]
+        work.connections.g[k] = c_k * (work.state.w[k] - work.states.base[i] - work.states.kappa[i] * rate)
+        work.connections.g[k + 1] = c_k * (rate - work.users.outputs[model.users.n_forces[u] + s])
+        work.connections.g[k + 2] = c_k * (work.state.w[k + 2] - work.states.rate_base[i] - work.states.rho * rate)
+        k += 3
+
+
+@inner
+def user_force_derivatives(model, work, c, c_k):
+    """Write P at the markers and V of user force c."""
+    i, u, size, w0 = element_of(model, c), model.connections.item[c], model.connections.size[c], model.connections.w0[c]
+    first, last = model.elements.coordinate0[i], model.elements.coordinate0[i + 1]
+    V = work.connections.V[c]
+    for r in range(size):
+        for j in range(size):
+            V[r, j] = 0.0
+        for p in range(first, last):
+            for j in range(12):
+                work.connections.P[model.coordinates.a[p], r, j] = 0.0
+                work.connections.P[model.coordinates.b[p], r, j] = 0.0
+    for p in range(first, last):
+        k = model.coordinates.core[p]
+        coordinate_derivatives(model, work, c, p, work.state.w[k], k, 1.0, c_k)
+    n, n_in, n_out = user_gradients(model, work, c)
+    n_forces, n_states = model.users.n_forces[u], model.users.n_states[u]
+    core = model.elements.core[i] - w0
+    for j in range(n_out):
+        r = core + j if j < n_forces else core + n_forces + 3 * (j - n_forces) + 1
+        V[r, r] = 1.0
+        slopes = work.users.gradients[j * n_in : (j + 1) * n_in]
+        for p in range(first, last):
+            coordinate_gradient(model, work, p, r, -c_k * slopes[1 + p - first], -c_k * slopes[1 + n + p - first])
+        for s in range(n_states):
+            V[r, core + n_forces + 3 * s] -= slopes[1 + 2 * n + s]
+    for s in range(n_states):
+        r = core + n_forces + 3 * s
+        V[r, r], V[r, r + 1] = 1.0, -work.states.kappa[model.users.state0[u] + s]
+        V[r + 2, r + 2], V[r + 2, r + 1] = 1.0, -work.states.rho
+
+
+@inner
+def user_force_power(model, work, c):
+    """Return the power of user force c on the bodies."""
+    i = element_of(model, c)
+    total = 0.0
+    for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
+        if model.coordinates.force[p] >= 0:
+            _, v = coordinate_motion(model, work, p)
+            total += work.state.w[model.coordinates.core[p]] * v
+    return total
+
+
+@inner
+def begin_states(rows, states, memory, h, alpha_f):
+    """Write b, b', kappa (one for all) and rho of a step of size h, with rho_inf = alpha_f/(1 - alpha_f).
+
+    The value of each state stands at its row of w, then its rate and algorithmic rate.
+
+    z_new = z + h ((1 - th) a + th a_new),  (1 - d_m) a_new + d_m a = (1 - d_f) g_new + d_f g,  th = 1/2 + d_f - d_m,
+    d_m = (3 rho_inf - 1)/(2 (rho_inf + 1)),  d_f = rho_inf/(rho_inf + 1):  second order, stable for all h.
+    """
+    rho_inf = alpha_f / (1.0 - alpha_f)
+    d_m, d_f = (3.0 * rho_inf - 1.0) / (2.0 * (rho_inf + 1.0)), alpha_f
+    th = 0.5 + d_f - d_m
+    states.rho = (1.0 - d_f) / (1.0 - d_m)
+    for s in range(rows.shape[0]):
+        k = rows[s]
+        z, g, a = memory.w[k], memory.w[k + 1], memory.w[k + 2]
+        base = (d_f * g - d_m * a) / (1.0 - d_m)
+        states.kappa[s] = h * th * states.rho
+        states.base[s] = z + h * ((1.0 - th) * a + th * base)
+        states.rate_base[s] = base
+
+
+@inner
+def resize_states(rows, memory, ratio):
+    """Turn the algorithmic rates into those of steps that are longer by `ratio`."""
+    for s in range(rows.shape[0]):
+        k = rows[s]
+        memory.w[k + 2] = memory.w[k + 1] + ratio * (memory.w[k + 2] - memory.w[k + 1])

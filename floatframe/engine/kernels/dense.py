@@ -1,0 +1,99 @@
+"""Small dense matrices: LU factorisation with partial pivoting, and solves. Row-major, in place."""
+
+from floatframe.engine.kernels.compiler.compilation import matrix_loops
+
+__all__ = ["add_products", "lu_factor", "lu_solve", "lu_solve_columns"]
+
+
+@matrix_loops
+def add_products(A, x, out):
+    """Add Σ_k A[k, j] x_k to out_j, A flat with rows as long as out; four rows at once."""
+    n, width = x.shape[0], out.shape[0]
+    for k in range(0, n - 3, 4):
+        o = k * width
+        r0, r1 = A[o : o + width], A[o + width : o + 2 * width]
+        r2, r3 = A[o + 2 * width : o + 3 * width], A[o + 3 * width : o + 4 * width]
+        x0, x1, x2, x3 = x[k], x[k + 1], x[k + 2], x[k + 3]
+        for j in range(width):
+            out[j] += (r0[j] * x0 + r1[j] * x1) + (r2[j] * x2 + r3[j] * x3)
+    for k in range(n - n % 4, n):
+        row, y = A[k * width : (k + 1) * width], x[k]
+        for j in range(width):
+            out[j] += row[j] * y
+
+
+@matrix_loops
+def lu_factor(A, pivot):
+    """Overwrite A, (n, n), with its factors; rows are compared after scaling by their largest number.
+
+    Return False if a pivot is zero or not finite.
+    """
+    n = A.shape[0]
+    for k in range(n):
+        best, row = -1.0, k
+        for i in range(k, n):
+            size = 0.0
+            for j in range(k, n):
+                size = max(size, abs(A[i, j]))
+            if size > 0.0 and abs(A[i, k]) / size > best:
+                best = abs(A[i, k]) / size
+                row = i
+        pivot[k] = row
+        if row != k:
+            for j in range(n):
+                A[k, j], A[row, j] = A[row, j], A[k, j]
+        diagonal = A[k, k]
+        if not abs(diagonal) > 0.0:
+            return False
+        inverse = 1.0 / diagonal
+        for i in range(k + 1, n):
+            factor = A[i, k] * inverse
+            A[i, k] = factor
+            if factor != 0.0:
+                for j in range(k + 1, n):
+                    A[i, j] -= factor * A[k, j]
+    return True
+
+
+@matrix_loops
+def lu_solve(A, pivot, b):
+    """Overwrite b, (n,), with A⁻¹ b."""
+    n = A.shape[0]
+    for k in range(n):
+        row = pivot[k]
+        if row != k:
+            b[k], b[row] = b[row], b[k]
+    for i in range(1, n):
+        total = b[i]
+        for j in range(i):
+            total -= A[i, j] * b[j]
+        b[i] = total
+    for i in range(n - 1, -1, -1):
+        total = b[i]
+        for j in range(i + 1, n):
+            total -= A[i, j] * b[j]
+        b[i] = total / A[i, i]
+
+
+@matrix_loops
+def lu_solve_columns(A, pivot, B):
+    """Overwrite B, (n, m), with A⁻¹ B."""
+    n, m = B.shape
+    for k in range(n):
+        row = pivot[k]
+        if row != k:
+            for c in range(m):
+                B[k, c], B[row, c] = B[row, c], B[k, c]
+    for i in range(1, n):
+        for j in range(i):
+            factor = A[i, j]
+            for c in range(m):
+                B[i, c] -= factor * B[j, c]
+    for i in range(n - 1, -1, -1):
+        for j in range(i + 1, n):
+            factor = A[i, j]
+            for c in range(m):
+                B[i, c] -= factor * B[j, c]
+        inverse = 1.0 / A[i, i]
+        for c in range(m):
+            B[i, c] *= inverse

@@ -1,0 +1,144 @@
+"""Evaluation of the whole system at one iterate: residuals, and their derivatives body by body."""
+
+from floatframe.engine.kernels.body import body_forces, body_tangent
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.connections.connection import connection_derivatives, connection_rows
+from floatframe.engine.kernels.joints.deformed_line import slide_marker
+from floatframe.engine.kernels.marker import (
+    acceleration_columns,
+    marker_columns,
+    marker_motion,
+    marker_stiffness,
+    wrench_to_body,
+)
+from floatframe.engine.kernels.rotation import right_jacobian, split_spin, turned_about
+from floatframe.engine.kernels.time_function import time_function
+from floatframe.engine.kernels.vector import add, put, put_matrix, put_sum, scaled, sub, turned, turned_back, vector
+
+__all__ = ["evaluate", "evaluate_bodies", "evaluate_markers", "linearize", "slide_markers", "tangent_of_body"]
+
+
+@inner
+def evaluate(model, work, c_k):
+    """Write the residuals of bodies and rows for the iterate in `work`; rows of wrenches weighted by c_k."""
+    evaluate_markers(model, work)
+    for c in range(model.connections.size.shape[0]):
+        connection_rows(model, work, c, c_k)
+    evaluate_bodies(model, work)
+
+
+@inner
+def evaluate_markers(model, work):
+    """Write the motion of all markers; their wrenches are zero."""
+    for m in range(model.markers.body.shape[0]):
+        marker_motion(model, work, m)
+    slide_markers(model, work)
+
+
+@inner
+def slide_markers(model, work):
+    """Move markers that slide to where they are by now; wrenches of all markers are zero."""
+    for m in range(model.markers.body.shape[0]):
+        for k in range(6):
+            work.markers.wrench[m, k] = 0.0
+    for k in range(model.lines.marker.shape[0]):
+        slide_marker(model, work, k)
+
+
+@inner
+def evaluate_bodies(model, work):
+    """Write the residuals of bodies with loads and the wrenches that connections put on markers."""
+    for k in range(model.loads.marker.shape[0]):
+        load_wrench(model, work, k)
+    for i in range(model.bodies.kind.shape[0]):
+        body_forces(model, work, i)
+    for m in range(model.markers.body.shape[0]):
+        wrench_to_body(model, work, m)
+    for d in range(model.body_loads.body.shape[0]):
+        body_load(model, work, d)
+    work.counted.evaluations += 1
+
+
+@inner
+def load_wrench(model, work, k):
+    """Write the wrench of load k on its marker, ground axes."""
+    m = model.loads.marker[k]
+    f, t = vector(model.loads.force[k]), vector(model.loads.torque[k])
+    factor = 1.0
+    if model.loads.factor[k] >= 0:
+        factor, _, _ = time_function(model.functions, model.loads.factor[k], work.state.time)
+    if model.markers.is_follower[m]:
+        f, t = turned(work.markers.A[m], f), turned(work.markers.A[m], t)
+    put(work.markers.wrench[m], 0, scaled(factor, f))
+    put(work.markers.wrench[m], 3, scaled(factor, t))
+
+
+@inner
+def body_load(model, work, d):
+    """Subtract load case d, fixed in the axes of its body, from the residual."""
+    i, first = model.body_loads.body[d], model.body_loads.value0[d]
+    factor, _, _ = time_function(model.functions, model.body_loads.factor[d], work.state.time)
+    for k in range(6 + model.bodies.n_q[i]):
+        work.bodies.residual[model.bodies.u0[i] + k] -= factor * model.body_loads.values[first + k]
+
+
+@inner
+def tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning):
+    """Write the tangent of body i into H, (6 + n, 6 + n), with all wrenches on it held fixed in space or in markers.
+
+    turning, (3, 3): rotation of the body by its unknown dtheta, see `marker_columns`.
+    """
+    n = model.bodies.n_q[i]
+    turn = work.bodies.by_turn[: 6 + n]
+    body_tangent(model, work, i, c_m, c_d, c_k, H, turn)
+    for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):
+        marker_stiffness(model, work, model.bodies.ends[e], c_k, H, turn)
+    for e in range(model.bodies.load0[i], model.bodies.load0[i + 1]):
+        marker_stiffness(model, work, model.bodies.loaded[e], c_k, H, turn)
+    for r in range(6 + n):
+        put_sum(H[r], 3, scaled(c_k, turned_back(turning, turn[r])))
+
+
+@inner
+def turning_by_unknown(model, work, i):
+    """Return the rotation of body i by its unknown dtheta, body axes.
+
+    R exp(theta) turns by T(theta) dtheta. Where the spin is taken by itself, R exp(x) exp(xi e) with x across e and
+    unknowns in the axes of the iterate, it turns by e along e, and across it by T(x) in these axes.
+    """
+    theta = vector(work.state.theta[i])
+    if work.state.spins[i] == 0:
+        return right_jacobian(theta)
+    e = vector(model.body_types.axis[model.bodies.kind[i]])
+    along, across = split_spin(e, theta)
+    T = right_jacobian(turned_about(e, -along, across))
+    bent = sub(e, turned(T, e))
+    return (
+        add(T[0], scaled(bent[0], e)),
+        add(T[1], scaled(bent[1], e)),
+        add(T[2], scaled(bent[2], e)),
+    )
+
+
+@inner
+def linearize(model, work, c_m, c_d, c_k):
+    """Write H of every body, J_row and J_column of every end, and P, V of every connection (nothing factorised)."""
+    rate = c_d / c_k if c_k > 0.0 else 0.0
+    for i in range(model.bodies.kind.shape[0]):
+        n = 6 + model.bodies.n_q[i]
+        turning = work.bodies.T_right[i]
+        put_matrix(turning, turning_by_unknown(model, work, i))
+        H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((n, n))
+        tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning)
+        for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):
+            m = model.bodies.ends[e]
+            o = model.markers.x0[m]
+            column = work.solver.J_column[6 * o : 6 * (o + n)].reshape((6, n))
+            row = work.solver.J_row[12 * o : 12 * (o + n)].reshape((12, n))
+            marker_columns(model, work, m, rate, turning, column, row)
+            if model.markers.accelerated[m] >= 0:
+                o = model.markers.a0[m]
+                row_a = work.solver.J_a[6 * o : 6 * (o + n)].reshape((6, n))
+                acceleration_columns(model, work, m, c_m, c_d, c_k, turning, row_a)
+    for c in range(model.connections.size.shape[0]):
+        connection_derivatives(model, work, c, c_k)

@@ -1,0 +1,782 @@
+"""Time loop of the generalized-alpha method on R³ × SO(3) × Rⁿ; see `floatframe.integrators.generalized_alpha`."""
+
+import math
+
+from floatframe.engine.kernels.body import body_mass_product
+from floatframe.engine.kernels.compiler.compilation import inner, small
+from floatframe.engine.kernels.connections.gap import next_step, step_before_contact, take_ends
+from floatframe.engine.kernels.connections.user_force import resize_states
+from floatframe.engine.kernels.diagnostics import diagnose, power
+from floatframe.engine.kernels.evaluation import evaluate
+from floatframe.engine.kernels.memory import WORK_GIVEN, WORK_TAKEN
+from floatframe.engine.kernels.model import JOINT, MASS, STIFFNESS
+from floatframe.engine.kernels.past import keep_past
+from floatframe.engine.kernels.rotation import (
+    exp_matrix,
+    matrix_of_euler_parameters,
+    rotate_euler_parameters,
+    split_spin,
+    turned_about,
+)
+from floatframe.engine.kernels.schur import (
+    correction,
+    factorize_bodies,
+    renew_connections,
+    settle_accelerations,
+    share_reactions,
+    velocity_correction,
+)
+from floatframe.engine.kernels.step_start import accelerate, begin_step
+from floatframe.engine.kernels.time_function import time_function
+from floatframe.engine.kernels.turns import count_turns
+from floatframe.engine.kernels.vector import (
+    add,
+    cross,
+    dot,
+    norm,
+    product,
+    put,
+    put_matrix,
+    put_sum,
+    scaled,
+    sub,
+    turned,
+    turned_back,
+    vector,
+)
+from floatframe.model.joints.rows.kinds import NOTHING
+
+__all__ = [
+    "DIVERGED",
+    "DONE",
+    "INACCURATE",
+    "SINGULAR_BODY",
+    "SINGULAR_CONNECTION",
+    "STOPPED",
+    "TURNED",
+    "UNRESOLVED",
+    "advance",
+    "error_factor",
+    "is_resized",
+    "is_too_long",
+    "keep_iterate",
+    "load_state",
+    "mean_square",
+    "ratio_of_steps",
+    "shares",
+    "time_loop",
+    "write_row",
+]
+
+DONE, DIVERGED, SINGULAR_BODY, SINGULAR_CONNECTION, INACCURATE, STOPPED = 0, 1, 2, 3, 4, 5
+UNRESOLVED = 7  # a step is too long for a contact; 6 is `relative.kernels.steps.SINGULAR`
+TURNED = 8  # a body turns too far in a step
+MOST_TURN = 1.0  #: rad in a step, of a body on joints away from the axis: above 1.15 joints can give it energy
+OFF_AXIS = 1e-3  # of the size of the system: how far from the axis of turning a joint counts as away from it
+SLOW = 0.2  # ratio of corrections above which the factors are made anew
+OF_MOTION = 1e-5  # of the way of a step counts beside what accelerations move in it
+FAST = 0.1  # corrections that shrink this fast end a step where the next one is expected to be small enough:
+SAFE = 0.5  # this much of the one that is wanted
+OF_ROUNDOFF = 0.1  # and of roundoff
+ROUNDOFF = 2e-15  # of a position
+NOISE = 1e-7  # accelerations by rounding of positions, over those of the motion, that reach results
+SAFETY = 0.9  # of the step that would just meet the error that is allowed
+LEAST, MOST, WORTH = 0.2, 2.0, 1.2  # a step becomes this much shorter, longer at most; longer only if by this much
+STEADY = 0.1  # of an angular acceleration by its size without the turn of the axis: below, the body turns steadily
+SAME = 1e-12  # relative difference of step sizes that are one
+
+
+@inner
+def put_weights(model, work, c_k):
+    """Write the weights of the norm: mass, inertia, M + c_k K."""
+    for i in range(model.bodies.kind.shape[0]):
+        t, u0, n = model.bodies.kind[i], model.bodies.u0[i], model.bodies.n_q[i]
+        for k in range(3):
+            work.solver.weight[u0 + k] = model.body_types.mass[t]
+            work.solver.weight[u0 + 3 + k] = model.body_types.J0[t, k, k]
+        for which in (MASS, STIFFNESS):
+            start = model.body_types.block0[t, which]
+            step = 1 if model.body_types.is_diagonal[t, which - MASS] else n + 1
+            factor = 1.0 if which == MASS else c_k
+            for k in range(n):
+                if which == MASS:
+                    work.solver.weight[u0 + 6 + k] = 0.0
+                work.solver.weight[u0 + 6 + k] += factor * model.body_types.blocks[start + k * step]
+
+
+@inner
+def copy(source, target):
+    """Copy numbers."""
+    for k in range(source.shape[0]):
+        target[k] = source[k]
+
+
+@inner
+def load_state(state, memory):
+    """Copy the memory of the integrator into the iterate; rotation since the beginning of the step is zero."""
+    copy(memory.r.reshape(memory.r.size), state.r.reshape(memory.r.size))
+    copy(memory.q, state.q)
+    copy(memory.u, state.u)
+    copy(memory.u_dot, state.u_dot)
+    copy(memory.w, state.w)
+    copy(memory.angle, state.angle)
+    for i in range(memory.p.shape[0]):
+        state.spins[i] = 0
+        for k in range(3):
+            state.theta[i, k] = 0.0
+    for i in range(memory.p.shape[0]):
+        put_matrix(state.R[i], matrix_of_euler_parameters(memory.p[i]))
+
+
+@inner
+def turn_body(model, state, memory, i):
+    """Write R of body i: that of the beginning of the step, turned by theta, or by both parts of it if it spins."""
+    R_start, theta = matrix_of_euler_parameters(memory.p[i]), vector(state.theta[i])
+    if state.spins[i] == 0:
+        put_matrix(state.R[i], product(R_start, exp_matrix(theta)))
+        return
+    e = spin_axis(model, i)
+    along, across = split_spin(e, theta)
+    put_matrix(state.R[i], product(product(R_start, exp_matrix(across)), exp_matrix(scaled(along, e))))
+
+
+@small
+def spin_axis(model, i):
+    """Return the axis about which the inertia of body i is symmetric, body axes; zero: none."""
+    return vector(model.body_types.axis[model.bodies.kind[i]])
+
+
+@inner
+def turn_of_axis(model, i, omega):
+    """Return the part of the angular acceleration by which the axis e of body i carries its spin about: w omega × e."""
+    e = spin_axis(model, i)
+    return scaled(dot(e, omega), cross(omega, e))
+
+
+@inner
+def begin_spin(model, work, memory, i):
+    """Choose whether the step takes the spin of body i by itself; return what its accelerations are less then.
+
+    So it is done where its axis of symmetry does not hold still in the body's angular velocity, but in space: the
+    angular acceleration is small without w omega × e, or is not much smaller with it.
+    """
+    u0, zero = model.bodies.u0[i] + 3, (0.0, 0.0, 0.0)
+    turn, alpha = turn_of_axis(model, i, memory.u[u0:]), vector(memory.u_dot[u0:])
+    rest = sub(alpha, turn)
+    work.state.spins[i] = 0
+    if dot(turn, turn) > 0.0 and dot(alpha, alpha) >= STEADY * STEADY * dot(rest, rest):
+        work.state.spins[i] = 1
+        return turn
+    return zero
+
+
+@inner
+def take_to_body(model, state, i):
+    """Turn omega and alpha - w omega × e of body i, in axes that do not spin, into omega and alpha in its own axes.
+
+    These axes are those of the beginning of the step turned by exp(across).
+    """
+    e, u0 = spin_axis(model, i), model.bodies.u0[i] + 3
+    angle = -dot(e, vector(state.theta[i]))
+    omega = turned_about(e, angle, vector(state.u[u0:]))
+    rest = turned_about(e, angle, vector(state.u_dot[u0:]))
+    put(state.u, u0, omega)
+    put(state.u_dot, u0, add(rest, turn_of_axis(model, i, omega)))
+
+
+@inner
+def take_age(solver, n_iterations):
+    """Count a step with the present factors; new ones are due where it took longer than the mean of all of them.
+
+    The mean counts what the factors cost: to go on would raise it, and new ones come back to it.
+    """
+    solver.n_steps += 1
+    solver.n_spent += n_iterations
+    if n_iterations * solver.n_steps > solver.n_spent:
+        solver.is_due = 1
+
+
+@inner
+def predict(model, work, memory, h, order):
+    """(1): a_new = a. Return the squared size of the acceleration and of the increment, in the norm of `weight`."""
+    begin_step(model, work, memory, h, order.alpha_f)
+    size, size_x = 0.0, 0.0
+    for i in range(model.bodies.kind.shape[0]):
+        n, u0, q0 = model.bodies.n_q[i], model.bodies.u0[i], model.bodies.q0[i]
+        turn = (0.0, 0.0, 0.0)
+        work.state.spins[i] = 0
+        if order.stabilized != 0:
+            turn = begin_spin(model, work, memory, i)
+        for j in range(6 + n):
+            k = u0 + j
+            less = turn[j - 3] if 3 <= j < 6 else 0.0
+            a, u = memory.a[k] - less, memory.u[k]
+            x = h * (u + 0.5 * h * a)
+            work.state.u[k] = u + h * a
+            work.state.u_dot[k] = (a - order.alpha_f * (memory.u_dot[k] - less)) / (1 - order.alpha_f)
+            size += work.solver.weight[k] * work.state.u_dot[k] ** 2
+            size_x += work.solver.weight[k] * x * x
+            if j < 3:
+                work.state.r[i, j] = memory.r[i, j] + x
+            elif j < 6:
+                work.state.theta[i, j - 3] = x
+            else:
+                work.state.q[q0 + j - 6] = memory.q[q0 + j - 6] + x
+        if work.state.spins[i] != 0:
+            take_to_body(model, work.state, i)
+        turn_body(model, work.state, memory, i)
+    return size, size_x
+
+
+@inner
+def update(model, work, memory, by_rate, by_acceleration, c_k):
+    """Add the correction (y, mu) to the iterate; return its squared norm."""
+    total = 0.0
+    for i in range(model.bodies.kind.shape[0]):
+        n, u0, q0 = model.bodies.n_q[i], model.bodies.u0[i], model.bodies.q0[i]
+        y = work.solver.y[u0 : u0 + 6 + n]
+        for k in range(6 + n):
+            total += work.solver.weight[u0 + k] * y[k] * y[k]
+        put_sum(work.state.r[i], 0, turned(work.state.R[i], y))
+        for k in range(n):
+            work.state.q[q0 + k] += y[6 + k]
+        change_rates(model, work, i, vector(y[3:]), by_rate, by_acceleration)
+        turn_body(model, work.state, memory, i)
+    for k in range(work.solver.mu.shape[0]):
+        work.state.w[k] += work.solver.mu[k] / c_k
+    return total
+
+
+@inner
+def change_rates(model, work, i, by_theta, by_rate, by_acceleration):
+    """Add y by_rate to the velocities of body i, y by_acceleration to its accelerations, and by_theta to theta.
+
+    A body that spins has them in the axes that do not spin with it: omega and alpha - w omega × e follow y there, which
+    is that of theta or, where theta stays, of a velocity.
+    """
+    n, u0, state = model.bodies.n_q[i], model.bodies.u0[i], work.state
+    y = work.solver.y[u0 : u0 + 6 + n]
+    dx = turned(state.R[i], y)
+    put_sum(state.u, u0, scaled(by_rate, dx))
+    put_sum(state.u_dot, u0, scaled(by_acceleration, dx))
+    for k in range(6, 6 + n):
+        state.u[u0 + k] += by_rate * y[k]
+        state.u_dot[u0 + k] += by_acceleration * y[k]
+    omega, turning = vector(state.u[u0 + 3 :]), vector(y[3:])
+    if state.spins[i] == 0:
+        put_sum(state.theta[i], 0, by_theta)
+        put_sum(state.u, u0 + 3, scaled(by_rate, turning))
+        put_sum(state.u_dot, u0 + 3, scaled(by_acceleration, turning))
+        return
+    e = spin_axis(model, i)
+    rest = sub(vector(state.u_dot[u0 + 3 :]), turn_of_axis(model, i, omega))
+    put_sum(state.theta[i], 0, turned_about(e, dot(e, vector(state.theta[i])), by_theta))
+    further = -dot(e, by_theta)
+    omega = turned_about(e, further, add(omega, scaled(by_rate, turning)))
+    rest = turned_about(e, further, add(rest, scaled(by_acceleration, turning)))
+    put(state.u, u0 + 3, omega)
+    put(state.u_dot, u0 + 3, add(rest, turn_of_axis(model, i, omega)))
+
+
+@inner
+def turns_too_far(model, work, length):
+    """Return the first body that would turn by more than `MOST_TURN` and has a joint away from the axis, or -1.
+
+    A spin that is taken by itself does not count. Where all joints lie on the axis through the frame, its origin does
+    not move on a circle, and any turn is followed.
+    """
+    for i in range(model.bodies.kind.shape[0]):
+        theta = vector(work.state.theta[i])
+        if work.state.spins[i] != 0:
+            _, theta = split_spin(spin_axis(model, i), theta)
+        if dot(theta, theta) <= MOST_TURN * MOST_TURN:
+            continue
+        turn = norm(theta)
+        for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):
+            m = model.bodies.ends[e]
+            if model.connections.law[model.markers.connection[m]] == JOINT:
+                if norm(cross(theta, vector(work.markers.rho[m]))) > OFF_AXIS * length * turn:
+                    return i
+    return -1
+
+
+@inner
+def hold_velocities(model, work, by_rate, by_acceleration, c_k):
+    """Add the correction of velocities that the held positions ask for to the iterate; return its squared norm.
+
+    Accelerations change with velocities and reactions with accelerations, as in `update`. Positions stay: so forces of
+    the modal stiffness, which the factors take along, stay too, and residuals become less by them.
+    """
+    velocity_correction(model, work, by_rate)
+    total = 0.0
+    for i in range(model.bodies.kind.shape[0]):
+        n, u0, t = model.bodies.n_q[i], model.bodies.u0[i], model.bodies.kind[i]
+        y, residual = work.solver.y[u0 : u0 + 6 + n], work.bodies.residual[u0 + 6 : u0 + 6 + n]
+        for k in range(6 + n):
+            total += work.solver.weight[u0 + k] * y[k] * y[k]
+        K = model.body_types.blocks[model.body_types.block0[t, STIFFNESS] :]
+        is_diagonal = model.body_types.is_diagonal[t, STIFFNESS - MASS]
+        for k in range(n):
+            if is_diagonal:
+                residual[k] -= K[k] * y[6 + k]
+            else:
+                for j in range(n):
+                    residual[k] -= K[k * n + j] * y[6 + j]
+        change_rates(model, work, i, (0.0, 0.0, 0.0), by_rate, by_acceleration)
+    for k in range(work.solver.mu.shape[0]):
+        if model.rows.holds[k] != NOTHING and model.rows.soft[k] == 0.0:  # in soft ones rates disagree by rounding
+            work.state.w[k] += work.solver.mu[k] / c_k
+    return total
+
+
+@inner
+def is_enough(norm, last, wanted, allowed):
+    """Whether a correction is small enough, or the next one will be: they shrink by the ratio of the last two.
+
+    allowed: what is wanted and roundoff. A correction that is not made counts more than one at roundoff, for what is
+    left open in every step has the same sign.
+    """
+    left = SAFE * (wanted + OF_ROUNDOFF * (allowed - wanted))
+    return norm <= allowed or (last < math.inf and norm <= FAST * last and norm * norm <= last * left)
+
+
+@inner
+def correction_of_states(model, work, c_k):
+    """Return the largest correction of a state or of an unknown of an equation, relative to its size.
+
+    The size is the typical one, the present one, or for a state that of its change in a step.
+    """
+    largest = 0.0
+    for s in range(model.states.row.shape[0]):
+        k = model.states.row[s]
+        size = max(model.states.size[s], abs(work.state.w[k]), abs(work.states.kappa[s] * work.state.w[k + 1]))
+        change = abs(work.solver.mu[k] / c_k) / size
+        if not math.isfinite(change):
+            return math.inf
+        largest = max(largest, change)
+    for j in range(model.laws.equation.shape[0]):
+        k = model.laws.equation[j]
+        change = abs(work.solver.mu[k] / c_k) / max(model.laws.equation_size[j], abs(work.state.w[k]))
+        if not math.isfinite(change):
+            return math.inf
+        largest = max(largest, change)
+    return largest
+
+
+@inner
+def roundoff_floor(model, work, length):
+    """Return the squared norm of rounding errors of the positions."""
+    total = 0.0
+    for i in range(model.bodies.kind.shape[0]):
+        size = length
+        for k in range(3):
+            size += abs(work.state.r[i, k])
+        total += model.body_types.mass[model.bodies.kind[i]] * size * size
+    return total * ROUNDOFF * ROUNDOFF
+
+
+@inner
+def local_error(model, work, memory, order, h):
+    """Return the estimated error of the increment of a step that has converged: that of the worst body."""
+    alpha_m, alpha_f = order.alpha_m, order.alpha_f
+    largest = 0.0
+    for i in range(model.bodies.kind.shape[0]):
+        u0, n = model.bodies.u0[i], model.bodies.n_q[i]
+        jump = work.bodies.velocity[: 6 + n]
+        for k in range(6 + n):
+            mean = (1 - alpha_f) * work.state.u_dot[u0 + k] + alpha_f * memory.u_dot[u0 + k]
+            jump[k] = (mean - alpha_m * memory.a[u0 + k]) / (1 - alpha_m) - memory.a[u0 + k]
+        if work.state.spins[i] != 0:
+            e = spin_axis(model, i)
+            a, turning = angular_accelerations(model, work, memory, i, alpha_m, alpha_f)
+            put(jump, 3, turned_about(e, -dot(e, vector(work.state.theta[i])), sub(turning, a)))
+        largest = max(largest, mean_square(model, work, i, jump))
+    return error_factor(order, h) * math.sqrt(largest)
+
+
+@inner
+def error_factor(order, h):
+    """Return by what a change of the algorithmic acceleration in a step becomes the error of its increment."""
+    return abs(0.5 * order.gamma - order.beta - 1.0 / 12.0) * h * h  # 1/6 - (1/2 - gamma)/2 - beta
+
+
+@inner
+def mean_square(model, work, i, jump):
+    """Return jumpᵀ M jump of body i by its mass and the square of its size: that of its points in the mean.
+
+    A body is measured alone, so that a heavy one, or one far away, hides nothing. jump, (6 + n_q,), translation in
+    ground axes, is turned to body axes.
+    """
+    n, moved = model.bodies.n_q[i], work.bodies.momentum[: 6 + model.bodies.n_q[i]]
+    put(jump, 0, turned_back(work.state.R[i], jump))
+    body_mass_product(model, work, i, jump, moved)
+    total = 0.0
+    for k in range(6 + n):
+        total += jump[k] * moved[k]
+    return total / (model.body_types.mass[model.bodies.kind[i]] * model.bodies.size[i] ** 2)
+
+
+@inner
+def one_step(model, work, memory, order, h):
+    """Advance the memory by one step, unless its error is above the one that is allowed.
+
+    Return (status, index of what is singular, last correction by the allowed one, error; -1 if not estimated).
+    """
+    alpha_m, alpha_f, beta, gamma = order.alpha_m, order.alpha_f, order.beta, order.gamma
+    c_k = beta * h * h
+    c_d = gamma * h
+    c_m = (1 - alpha_m) / (1 - alpha_f)
+    size, size_x = predict(model, work, memory, h, order)
+    mass = 0.0
+    for i in range(model.bodies.kind.shape[0]):
+        mass += model.body_types.mass[model.bodies.kind[i]]
+    size += mass * dot(model.gravity, model.gravity)
+    wanted = order.tolerance * (c_k * math.sqrt(size) + OF_MOTION * math.sqrt(size_x))
+    allowed = wanted + math.sqrt(roundoff_floor(model, work, order.length))
+    solver = work.solver
+    if solver.c_m != c_m or solver.c_d != c_d or solver.c_k != c_k:
+        work.solver.is_due = 1
+    work.counted.no_number = 0
+    work.counted.stopped = 0
+    last, last_of_states = math.inf, math.inf
+    excess = math.inf
+    is_new = True
+    has_states = model.states.row.shape[0] + model.laws.equation.shape[0] > 0
+    for iteration in range(order.max_iterations):
+        evaluate(model, work, c_k)
+        if iteration == 0 and order.stabilized != 0:
+            body = turns_too_far(model, work, order.length)
+            if body >= 0:
+                return TURNED, body, excess, -1.0
+        if work.solver.is_due == 1:
+            body = factorize_bodies(model, work, c_m, c_d, c_k)
+            if body >= 0:
+                return SINGULAR_BODY, body, excess, -1.0
+            solver.c_m, solver.c_d, solver.c_k = c_m, c_d, c_k
+            work.solver.is_due, solver.n_steps, solver.n_spent = 0, 0, solver.price
+            is_new = True
+        connection = -1
+        if is_new and solver.mu.shape[0] > 0:
+            connection = renew_connections(model, work, c_k)
+        if connection >= 0:
+            work.solver.is_due = 1
+            return SINGULAR_CONNECTION, connection, excess, -1.0
+        of_rates = 0.0
+        if order.stabilized != 0 and solver.mu.shape[0] > 0:
+            of_rates = hold_velocities(model, work, c_d / c_k, c_m / c_k, c_k)
+        correction(model, work, c_k, False)
+        norm = math.sqrt(of_rates + update(model, work, memory, c_d / c_k, c_m / c_k, c_k))
+        work.counted.iterations += 1
+        if not math.isfinite(norm):
+            work.solver.is_due = 1
+            return DIVERGED, -1, math.inf, -1.0
+        excess = norm / allowed if allowed > 0.0 else math.inf
+        is_new = False
+        of_states = 0.0
+        if has_states:  # they follow the bodies by one iteration
+            of_states = correction_of_states(model, work, c_k) / order.tolerance
+            if not math.isfinite(of_states):
+                work.solver.is_due = 1
+                return DIVERGED, -1, math.inf, -1.0
+            if iteration == 0:
+                last, last_of_states = norm, of_states
+                is_new = of_states > 1.0
+                continue
+            is_new = of_states > max(1.0, SLOW * last_of_states)
+        is_stuck = norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2
+        is_small = is_enough(norm, last, wanted, allowed) or is_stuck
+        if is_small and (of_states <= 1.0 or (of_states <= 1e3 and of_states > 0.5 * last_of_states and iteration > 2)):
+            take_age(work.solver, iteration + 1)
+            error = -1.0
+            if is_too_long(model, work, h):
+                return UNRESOLVED, -1, excess, error
+            if order.most_error > 0.0:
+                error = local_error(model, work, memory, order, h)
+                if not error <= order.most_error:
+                    return INACCURATE, -1, excess, error
+            accept(model, work, memory, h, alpha_m, alpha_f)
+            return DONE, -1, excess, error
+        if norm > SLOW * last and not is_small:
+            work.solver.is_due = 1
+        last, last_of_states = norm, of_states
+        excess = max(excess, of_states)
+    work.solver.is_due = 1
+    return DIVERGED, -1, excess, -1.0
+
+
+@inner
+def is_too_long(model, work, h):
+    """Whether a step of size h that has converged is too long for a contact, see `connections.gap`."""
+    if model.gaps.connection.shape[0] == 0:
+        return False
+    take_ends(model, work)
+    return next_step(model, work, work.state.time, h) < h
+
+
+@inner
+def accept(model, work, memory, h, alpha_m, alpha_f):
+    """(3): write the iterate and the new algorithmic acceleration into the memory."""
+    for i in range(model.bodies.kind.shape[0]):
+        u0 = model.bodies.u0[i]
+        _, turning = angular_accelerations(model, work, memory, i, alpha_m, alpha_f)
+        for k in range(u0, u0 + 6 + model.bodies.n_q[i]):
+            mean = (1 - alpha_f) * work.state.u_dot[k] + alpha_f * memory.u_dot[k]
+            memory.a[k] = (mean - alpha_m * memory.a[k]) / (1 - alpha_m)
+        p, theta = memory.p[i], vector(work.state.theta[i])
+        if work.state.spins[i] != 0:
+            e = spin_axis(model, i)
+            along, across = split_spin(e, theta)
+            now = turn_of_axis(model, i, vector(work.state.u[u0 + 3 :]))
+            put(memory.a, u0 + 3, add(turned_about(e, -along, turning), now))
+            p[0], p[1], p[2], p[3] = rotate_euler_parameters(p, across)
+            theta = scaled(along, e)
+        p[0], p[1], p[2], p[3] = rotate_euler_parameters(p, theta)
+    keep_iterate(model, work, memory, h)
+
+
+@inner
+def angular_accelerations(model, work, memory, i, alpha_m, alpha_f):
+    """Return the algorithmic angular acceleration of body i before and after the step, in axes that do not spin."""
+    u0 = model.bodies.u0[i] + 3
+    a, before, now = vector(memory.a[u0:]), vector(memory.u_dot[u0:]), vector(work.state.u_dot[u0:])
+    if work.state.spins[i] != 0:
+        e = spin_axis(model, i)
+        turn = turn_of_axis(model, i, vector(memory.u[u0:]))
+        a, before = sub(a, turn), sub(before, turn)
+        rest = sub(now, turn_of_axis(model, i, vector(work.state.u[u0:])))
+        now = turned_about(e, dot(e, vector(work.state.theta[i])), rest)
+    mean = add(scaled(1 - alpha_f, now), scaled(alpha_f, before))
+    return a, scaled(1 / (1 - alpha_m), sub(mean, scaled(alpha_m, a)))
+
+
+@inner
+def keep_iterate(model, work, memory, h):
+    """Write the iterate, but for rotations, into the memory; count turns and sum work on by a step of size h."""
+    copy(work.state.r.reshape(memory.r.size), memory.r.reshape(memory.r.size))
+    copy(work.state.q, memory.q)
+    copy(work.state.u, memory.u)
+    copy(work.state.u_dot, memory.u_dot)
+    copy(work.state.w, memory.w)
+    count_turns(model, work, memory, h)
+    loads, dissipated = power(model, work)
+    memory.work_given += 0.5 * h * (memory.power_given + loads)
+    memory.work_taken += 0.5 * h * (memory.power_taken + dissipated)
+    memory.power_given = loads
+    memory.power_taken = dissipated
+
+
+@inner
+def write_row(model, work, memory, t, rows):
+    """Evaluate at the state in the memory and write the next row of the results."""
+    k = work.counted.rows
+    work.state.time = t
+    work.counted.rows += 1
+    load_state(work.state, memory)
+    evaluate(model, work, 1.0)
+    rows.t[k] = t
+    copy(memory.r.reshape(memory.r.size), rows.r[k].reshape(memory.r.size))
+    copy(memory.p.reshape(memory.p.size), rows.p[k].reshape(memory.p.size))
+    copy(memory.q, rows.q[k])
+    copy(memory.u, rows.u[k])
+    copy(memory.u_dot, rows.u_dot[k])
+    copy(memory.w, rows.w[k])
+    copy(memory.angle, rows.angle[k])
+    diagnose(model, work, rows.diagnostics[k], rows.drift[k])
+    rows.diagnostics[k, WORK_GIVEN] = memory.work_given
+    rows.diagnostics[k, WORK_TAKEN] = memory.work_taken
+    for j in range(model.loads.marker.shape[0]):
+        copy(work.markers.wrench[model.loads.marker[j]], rows.load[k, j])
+    for j in range(model.body_loads.body.shape[0]):
+        rows.load_case[k, j], _, _ = time_function(model.functions, model.body_loads.factor[j], t)
+    if shares(model):
+        work.solver.is_due = 1  # the factors of the step are overwritten
+        if share_reactions(model, work, memory.h * memory.h):
+            copy(work.state.w, rows.w[k])
+
+
+@inner
+def settle_row(model, work, memory, rows):
+    """Write accelerations and reactions of the row that was written last as they follow from positions and velocities.
+
+    In steps so short that they are noise otherwise: reactions of a step close its joints, whose gaps are known to
+    rounding alone, and that by h² counts beside the accelerations. Rounding of velocities does not.
+    """
+    k = work.counted.rows - 1
+    if not is_noise(model, work, memory.h):
+        return
+    load_state(work.state, memory)
+    for s in range(model.states.row.shape[0]):
+        work.states.base[s], work.states.rate_base[s] = memory.w[model.states.row[s]], 0.0
+        work.states.kappa[s] = 0.0
+    work.states.rho = 1.0
+    copy(memory.w, work.state.w_start)
+    evaluate(model, work, 1.0)
+    work.solver.is_due = 1  # the factors of the step are overwritten
+    if settle_accelerations(model, work, memory.h * memory.h):
+        copy(work.state.u_dot, rows.u_dot[k])
+        if not shares(model) or share_reactions(model, work, memory.h * memory.h):
+            copy(work.state.w, rows.w[k])
+
+
+@inner
+def is_noise(model, work, h):
+    """Whether rounding of positions by h² counts beside the accelerations."""
+    is_held, noise, size = False, 0.0, math.sqrt(dot(model.gravity, model.gravity))
+    for k in range(model.rows.holds.shape[0]):
+        is_held = is_held or model.rows.holds[k] != NOTHING
+    for i in range(model.bodies.kind.shape[0]):
+        r, u, u_dot = work.state.r[i], work.state.u[model.bodies.u0[i] :], work.state.u_dot[model.bodies.u0[i] :]
+        length, omega = model.bodies.size[i], vector(u[3:])
+        noise = max(noise, length + abs(r[0]) + abs(r[1]) + abs(r[2]))
+        turning = length * (dot(omega, omega) + math.sqrt(dot(u_dot[3:], u_dot[3:])))
+        size = max(size, turning, math.sqrt(dot(u_dot, u_dot)))
+    return is_held and ROUNDOFF * noise > NOISE * size * h * h
+
+
+@inner
+def shares(model):
+    """Whether constraints that repeat others share their reactions."""
+    for k in range(model.rows.soft.shape[0]):
+        if model.rows.soft[k] > 0.0:
+            return True
+    return False
+
+
+@inner
+def ratio_of_steps(model, memory, h):
+    """Return h over the size of the steps before, by which what `a` and u_dot differ by changes.
+
+    Zero where steps grow in a system with contacts. What they differ by is then of the contact, and in the directions
+    of joints of the scheme: it would grow with the step. So u_dot and a begin anew, from the equations of motion.
+    """
+    if model.gaps.connection.shape[0] > 0 and h > memory.h:
+        return 0.0
+    return h / memory.h
+
+
+@inner
+def resize(model, work, memory, t, h):
+    """Turn the algorithmic accelerations into those of a step of size h to t.
+
+    Their distance from u_dot is of first order. The iterate is the state of the memory where steps may begin anew.
+    """
+    ratio = ratio_of_steps(model, memory, h)
+    if ratio == 0.0:
+        work.state.time = t - h
+        accelerate(model, work, memory)
+    for k in range(memory.a.shape[0]):
+        memory.a[k] = memory.u_dot[k] + ratio * (memory.a[k] - memory.u_dot[k])
+    resize_states(model.states.row, memory, ratio)
+    memory.h = h
+
+
+@inner
+def step_after(h, error, most_error, has_failed):
+    """Return the step to take after a good one of size h: local errors grow with its cube."""
+    if most_error <= 0.0:
+        return h if has_failed else MOST * h
+    fitting = MOST * h if error <= 0.0 else SAFETY * h * (most_error / error) ** (1.0 / 3.0)
+    if fitting >= h and (has_failed or fitting < WORTH * h):
+        return h
+    return min(max(fitting, LEAST * h), MOST * h)
+
+
+def time_loop(try_step, write):
+    """Return the compiled loop over the steps of a formulation.
+
+    Parameters
+    ----------
+    try_step
+        (model, work, memory, others, order, t, h): advance the memory to t by a step of size h, unless it fails or its
+        error is too large; return (status, index of what is singular, last correction by the allowed one, error).
+    write
+        (model, work, memory, others, t, rows): write the next row of the results. others: further records of the
+        formulation.
+    """
+
+    @inner
+    def advance(model, work, memory, rows, others, order):
+        """Advance by n_steps of size h, the first of them number `first` from t0; write a row after every `every`-th.
+
+        The order is an `entry.Order`. With h_min above 0 each of these is divided into equal parts of at most the size
+        that is wanted: one that fails, or whose error is above `most_error` (if above 0), is tried again, shorter, down
+        to h_min; then parts grow again. In systems with contacts parts are as short as these want them.
+
+        Return (status, steps done, rows written, index of what is singular, last correction by the allowed one).
+        """
+        h, first, h_min, most_error = order.h, order.first, order.h_min, order.most_error
+        put_weights(model, work, order.beta * memory.h**2)
+        work.counted.rows = 0
+        work.gaps.step = math.inf
+        excess, has_gaps = 0.0, model.gaps.connection.shape[0] > 0
+        for k in range(order.n_steps):
+            end = order.t0 + (first + k + 1) * h
+            left = h
+            has_failed = False
+            while left > 0.0:
+                n_parts = 1.0
+                if h_min > 0.0:
+                    n_parts = max(1.0, math.ceil(left / memory.h_wanted * (1.0 - 1e-9)))
+                part = left / n_parts
+                if has_gaps:
+                    load_state(work.state, memory)
+                    shorter = max(step_before_contact(model, work, end - left, part), h_min)
+                    if shorter < part:
+                        part, n_parts = shorter, 2.0
+                status, index, excess, error = try_step(model, work, memory, others, order, end - (left - part), part)
+                if status == DONE:
+                    memory.n_accepted += 1
+                    if work.counted.stopped > 0:
+                        return STOPPED, k, work.counted.rows, work.counted.stopped - 1, excess
+                    left = left - part if n_parts > 1.0 else 0.0
+                    if h_min > 0.0:
+                        wanted = step_after(part, error, most_error, has_failed)
+                        if has_gaps and most_error <= 0.0 and work.gaps.n_closed == 0:
+                            wanted = h  # a contact that is ahead is seen
+                        memory.h_wanted = min(wanted, h, work.gaps.step)
+                    has_failed = False
+                    continue
+                if h_min <= 0.0 or part <= h_min:
+                    return status, k, work.counted.rows, index, excess
+                memory.n_rejected += 1
+                shorter = 0.5 * part
+                if status == INACCURATE:
+                    shorter = min(max(SAFETY * (most_error / error) ** (1.0 / 3.0), LEAST), SAFETY) * part
+                elif status == UNRESOLVED:
+                    shorter = work.gaps.step
+                memory.h_wanted = max(shorter, h_min)
+                has_failed = True
+            if (first + k + 1) % order.every == 0:
+                write(model, work, memory, others, end, rows)
+            keep_past(work.past, memory, memory.a, memory.h, work.counted.iterations)
+        return DONE, order.n_steps, work.counted.rows, -1, excess
+
+    return advance
+
+
+@inner
+def is_resized(model, work, memory, order, h):
+    """Whether steps of size h differ from those before; the weights of the norm are then those of h."""
+    if abs(h - memory.h) <= SAME * h:
+        return False
+    put_weights(model, work, order.beta * h * h)
+    return True
+
+
+@inner
+def try_absolute_step(model, work, memory, others, order, t, h):
+    """Advance the memory to t by a step of size h, see `time_loop`."""
+    if is_resized(model, work, memory, order, h):
+        resize(model, work, memory, t, h)
+    work.state.time = t
+    return one_step(model, work, memory, order, memory.h)
+
+
+@inner
+def write_absolute_row(model, work, memory, others, t, rows):
+    """Write the next row of the results."""
+    write_row(model, work, memory, t, rows)
+    settle_row(model, work, memory, rows)
+
+
+advance = time_loop(try_absolute_step, write_absolute_row)

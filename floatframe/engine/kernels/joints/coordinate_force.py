@@ -1,0 +1,72 @@
+"""Forces along joint coordinates: springs, dampers, friction, motors; see `floatframe.model.forces.joint_force`."""
+
+import math
+
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.time_function import time_function
+
+__all__ = ["coordinate_force", "coordinate_power", "coordinate_strain"]
+
+
+@inner
+def excess(forces, i, is_angle, x):
+    """Return a coordinate less its free value; of an angle the value between -pi and pi."""
+    x -= forces.free[i]
+    return x - 2 * math.pi * math.floor(x / (2 * math.pi) + 0.5) if is_angle else x
+
+
+@inner
+def coordinate_force(model, work, k, is_angle, x, v, normal):
+    """Return the force of row k that acts to increase its coordinate x, and its derivatives by x, v and `normal`.
+
+    -k x - c v + preload + motor(t) + characteristic(x) - (T + mu normal) tanh(v/v_0), summed over the forces there.
+    """
+    Q, Q_x, Q_v, Q_n = 0.0, 0.0, 0.0, 0.0
+    f, functions = model.joint_forces, model.functions
+    for i in range(model.rows.force0[k], model.rows.force1[k]):
+        d = excess(f, i, is_angle, x)
+        Q += f.preload[i] - f.stiffness[i] * d - f.damping[i] * v
+        Q_x -= f.stiffness[i]
+        Q_v -= f.damping[i]
+        if f.motor[i] >= 0:
+            value, _, _ = time_function(functions, f.motor[i], work.state.time)
+            Q += value
+        if f.table[i] >= 0:
+            value, slope, _ = time_function(functions, f.table[i], d)
+            Q += value
+            Q_x += slope
+        if f.friction[i] > 0.0 or f.coefficient[i] > 0.0:
+            ratio = math.tanh(v / f.speed[i])
+            most = f.friction[i] + f.coefficient[i] * normal
+            Q -= most * ratio
+            Q_v -= most * (1.0 - ratio * ratio) / f.speed[i]
+            Q_n -= f.coefficient[i] * ratio
+    return Q, Q_x, Q_v, Q_n
+
+
+@inner
+def coordinate_strain(model, k, is_angle, x):
+    """Return the energy in the linear springs of row k."""
+    total = 0.0
+    f = model.joint_forces
+    for i in range(model.rows.force0[k], model.rows.force1[k]):
+        total += 0.5 * f.stiffness[i] * excess(f, i, is_angle, x) ** 2
+    return total
+
+
+@inner
+def coordinate_power(model, work, k, is_angle, x, v, Q):
+    """Return the power that enters by row k, and that taken by dampers and friction; Q: its whole force."""
+    given, springs = 0.0, 0.0
+    f, functions = model.joint_forces, model.functions
+    for i in range(model.rows.force0[k], model.rows.force1[k]):
+        d = excess(f, i, is_angle, x)
+        springs -= f.stiffness[i] * d
+        given += f.preload[i]
+        if f.motor[i] >= 0:
+            value, _, _ = time_function(functions, f.motor[i], work.state.time)
+            given += value
+        if f.table[i] >= 0:
+            value, _, _ = time_function(functions, f.table[i], d)
+            given += value
+    return given * v, (given + springs - Q) * v

@@ -1,0 +1,340 @@
+"""A point that slides along the deformed centre line of a flexible body.
+
+The line leads along e (unit, body axes) through the markers of stations at s_1 < s_2 < …. Between two of them cubic
+Hermite functions of xi = (s - s_1)/h carry their displacement d and rotation th:
+
+    D(s) = a_1 d_1 + a_2 d_2 + b_1 th_1 × e + b_2 th_2 × e,   r = c(s) + D,   r' = e + D'
+    th(s) = e × D' + e (e · (l_1 th_1 + l_2 th_2)),   l linear: sections stay normal to the line
+
+Beyond the ends the line is straight. The sliding marker is where B is: (r_B - r)·r' = 0, or where its drive says; all
+that the marker needs (displacement, rotation, their rates and their derivatives by q) is the same combination of
+those of the stations. With n_0 = r'/|r'|, n_1 and n_2 normal to it, d = r_B - r and kappa the turning of its axes by s,
+
+    LINE i       n_i · d = 0                           i = 1, 2; i = 0 if it is driven
+    LINE_TURN    E · D = 0 as DOT, where A also turns with kappa s_dot
+    LINE_FREE    n_0 · F + kappa · M / |r'| = 0        no force along the line: the wrench does no work as s changes
+
+The places on A where a force acts and n_i turn with s; their change is left out of the tangent, where it is of the
+order of the reaction times the curvature, but not of the residual.
+"""
+
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.joints.held_rows import turned_twice
+from floatframe.engine.kernels.joints.relative_motion import direction, distance, prescribed, relative_velocity
+from floatframe.engine.kernels.marker import bent_bias, pose_on_body
+from floatframe.engine.kernels.rotation import left_jacobian, left_jacobian_derivative
+from floatframe.engine.kernels.vector import (
+    add,
+    cross,
+    dot,
+    norm,
+    put,
+    put_matrix,
+    scaled,
+    sub,
+    turned,
+    turned_back,
+    vector,
+)
+from floatframe.model.joints.rows.kinds import FORCE, MOMENT
+
+__all__ = [
+    "line_free_derivatives",
+    "line_free_value",
+    "line_rates",
+    "line_turn_rates",
+    "line_turn_value",
+    "line_value",
+    "slide_marker",
+]
+
+MOST, CLOSE = 30, 1e-14
+
+
+@inner
+def piece(lines, stations, k, s):
+    """Return the first of the two stations about s and their distance; before or after the line: the nearest piece."""
+    j, last = lines.station0[k], lines.station0[k + 1] - 2
+    while j < last and s > stations.s[j + 1]:
+        j += 1
+    return j, stations.s[j + 1] - stations.s[j]
+
+
+@inner
+def weights(stations, j, h, s, order):
+    """Return a_1, a_2, b_1, b_2 or their derivatives by s."""
+    x = (s - stations.s[j]) / h
+    if x < 0.0 or x > 1.0:
+        end = 1.0 if x > 1.0 else 0.0
+        by_slope = s - stations.s[j] - end * h if order == 0 else (1.0 if order == 1 else 0.0)
+        own = 1.0 if order == 0 else 0.0
+        return own * (1.0 - end), own * end, by_slope * (1.0 - end), by_slope * end
+    if order == 0:
+        a = x * x * (3 - 2 * x)
+        return 1.0 - a, a, h * x * (1 - x) * (1 - x), h * x * x * (x - 1)
+    if order == 1:
+        a = 6 * x * (1 - x) / h
+        return -a, a, 1 + x * (3 * x - 4), x * (3 * x - 2)
+    if order == 2:
+        a = (6 - 12 * x) / (h * h)
+        return -a, a, (6 * x - 4) / h, (6 * x - 2) / h
+    a = -12 / (h * h * h)
+    return -a, a, 6 / (h * h), 6 / (h * h)
+
+
+@inner
+def linear_weight(stations, j, h, s):
+    """Return l_2 and its derivative."""
+    x = (s - stations.s[j]) / h
+    if x < 0.0:
+        return 0.0, 0.0
+    if x > 1.0:
+        return 1.0, 0.0
+    return x, 1.0 / h
+
+
+@inner
+def mean(l_2, x_1, x_2):
+    """Return (1 - l_2) x_1 + l_2 x_2."""
+    return add(scaled(1 - l_2, x_1), scaled(l_2, x_2))
+
+
+@inner
+def combined(e, weight, d_1, th_1, d_2, th_2):
+    """Return a_1 d_1 + a_2 d_2 + (b_1 th_1 + b_2 th_2) × e."""
+    a_1, a_2, b_1, b_2 = weight
+    own = add(scaled(a_1, d_1), scaled(a_2, d_2))
+    return add(own, cross(add(scaled(b_1, th_1), scaled(b_2, th_2)), e))
+
+
+@inner
+def station_displacement(model, work, m):
+    """Return displacement and rotation vector of marker m, body axes."""
+    d = sub(vector(work.markers.rho[m]), vector(model.markers.position[m]))
+    return d, vector(work.markers.angle[m])
+
+
+@inner
+def displacement(model, work, k, s, order):
+    """Return D, D', D'' or D''' at s, body axes."""
+    stations = model.stations
+    j, h = piece(model.lines, stations, k, s)
+    d_1, th_1 = station_displacement(model, work, stations.marker[j])
+    d_2, th_2 = station_displacement(model, work, stations.marker[j + 1])
+    return combined(vector(model.lines.axis[k]), weights(stations, j, h, s, order), d_1, th_1, d_2, th_2)
+
+
+@inner
+def place_of(model, work, k, b):
+    """Return the place s nearest to the point of marker b."""
+    m, e = model.lines.marker[k], vector(model.lines.axis[k])
+    i = model.markers.body[m]
+    x = turned_back(work.state.R[i], sub(vector(work.markers.r[b]), vector(work.state.r[i])))
+    x = sub(x, vector(model.markers.position[m]))  # from s = 0
+    s = dot(x, e)
+    length = model.stations.s[model.lines.station0[k + 1] - 1]
+    for _ in range(MOST):
+        tangent = add(e, displacement(model, work, k, s, 1))
+        gap = sub(sub(x, scaled(s, e)), displacement(model, work, k, s, 0))
+        slope = dot(tangent, tangent) - dot(gap, displacement(model, work, k, s, 2))
+        change = dot(gap, tangent) / slope
+        s += change
+        if abs(change) <= CLOSE * length:
+            break
+    return s
+
+
+@inner
+def slide_marker(model, work, k):
+    """Put the sliding marker of line k to its place and write its motion; all other markers have theirs."""
+    m, b, row = model.lines.marker[k], model.lines.other[k], model.lines.row[k]
+    i, e, markers = model.markers.body[m], vector(model.lines.axis[k]), work.markers
+    is_driven = row >= 0
+    if is_driven:
+        s, rate, _ = prescribed(model, work, row)
+    else:
+        s, rate = place_of(model, work, k, b), 0.0
+    stations = model.stations
+    j, h = piece(model.lines, stations, k, s)
+    m_1, m_2 = stations.marker[j], stations.marker[j + 1]
+    th_1, th_2 = vector(markers.angle[m_1]), vector(markers.angle[m_2])
+    l_2, by_s = linear_weight(stations, j, h, s)
+    D, D_1, D_2 = (
+        displacement(model, work, k, s, 0),
+        displacement(model, work, k, s, 1),
+        displacement(model, work, k, s, 2),
+    )
+    put(markers.rho[m], 0, add(add(vector(model.markers.position[m]), scaled(s, e)), D))
+    angle = add(cross(e, D_1), scaled(dot(e, mean(l_2, th_1, th_2)), e))
+    by_place = add(cross(e, D_2), scaled(by_s * dot(e, sub(th_2, th_1)), e))  # th'
+    value, slopes = weights(stations, j, h, s, 0), weights(stations, j, h, s, 1)
+    v_1, v_2 = vector(markers.rho_dot[m_1]), vector(markers.rho_dot[m_2])
+    o_1, o_2 = vector(markers.angle_dot[m_1]), vector(markers.angle_dot[m_2])
+    put(markers.rho_dot[m], 0, combined(e, value, v_1, o_1, v_2, o_2))
+    D_1_dot = combined(e, slopes, v_1, o_1, v_2, o_2)
+    angle_dot = add(cross(e, D_1_dot), scaled(dot(e, mean(l_2, o_1, o_2)), e))
+    T, line = left_jacobian(angle), work.lines
+    b_1, c_1 = bent_bias(model, work, m_1, i)
+    b_2, c_2 = bent_bias(model, work, m_2, i)
+    put(line.bent[k], 0, combined(e, value, b_1, c_1, b_2, c_2))
+    bent_slope = cross(e, combined(e, slopes, b_1, c_1, b_2, c_2))
+    put(line.bent[k], 3, add(bent_slope, scaled(dot(e, mean(l_2, c_1, c_2)), e)))
+    put(markers.angle[m], 0, angle)
+    put(markers.angle_dot[m], 0, angle_dot)
+    put_matrix(markers.T_left[m], T)
+    put(markers.spin[m], 0, turned(T, angle_dot))
+    shapes(model, work, m, m_1, m_2, e, value, slopes, l_2)
+    pose_on_body(model, work, m)
+    # the line in ground axes
+    R = work.state.R[i]
+    tangent = add(e, D_1)
+    slope = norm(tangent)
+    n_0 = turned(R, scaled(1.0 / slope, tangent))
+    if not is_driven:
+        rate = dot(n_0, relative_velocity(markers, m, b)) / slope
+    line.s[k], line.s_dot[k], line.slope[k], line.by_place[k] = s, rate, slope, 0.0 if is_driven else 1.0 / slope
+    put(line.n_0[k], 0, n_0)
+    put(line.kappa[k], 0, turned(R, turned(T, by_place)))
+    put(line.curve[k], 0, turned(R, D_2))
+    omega = vector(work.state.u[model.bodies.u0[i] + 3 :])
+    put(line.slope_dot[k], 0, turned(R, add(cross(omega, tangent), D_1_dot)))
+    by_place_dot = add(cross(e, combined(e, weights(stations, j, h, s, 2), v_1, o_1, v_2, o_2)),
+                       scaled(by_s * dot(e, sub(o_2, o_1)), e))  # fmt: skip
+    bending = cross(e, displacement(model, work, k, s, 3))  # th''
+    change = turning_change(T, angle, rate, angle_dot, by_place, by_place_dot, bending)
+    put(line.turning[k], 0, turned(R, scaled(rate, add(cross(omega, turned(T, by_place)), change))))
+
+
+@inner
+def turning_change(T, th, s_dot, th_t, th_s, th_st, th_ss):
+    """Return d(T th_s)/dt + d(T th_t)/ds s_dot, both with the place, in a body that stands; _t: at one place.
+
+    What s_dot times it adds to the angular acceleration of axes that turn with T (th_t + th_s s_dot).
+    """
+    of_slope, of_rate = left_jacobian_derivative(th, th_s, 1.0), left_jacobian_derivative(th, th_t, 1.0)
+    own = add(turned(of_slope, add(th_t, scaled(s_dot, th_s))), turned(of_rate, th_s))
+    return add(own, turned(T, add(scaled(2.0, th_st), scaled(s_dot, th_ss))))
+
+
+@inner
+def column(psi, n, q):
+    """Return displacement and rotation by coordinate q of shapes [6, n]."""
+    return (psi[q], psi[n + q], psi[2 * n + q]), (psi[3 * n + q], psi[4 * n + q], psi[5 * n + q])
+
+
+@inner
+def shapes(model, work, m, m_1, m_2, e, value, slopes, l_2):
+    """Write the derivatives of displacement and rotation of the sliding marker by q."""
+    n, psi, psi0 = model.bodies.n_q[model.markers.body[m]], work.markers.psi, model.markers.psi0
+    own = psi[psi0[m] : psi0[m] + 6 * n]
+    first, second = psi[psi0[m_1] : psi0[m_1] + 6 * n], psi[psi0[m_2] : psi0[m_2] + 6 * n]
+    for q in range(n):
+        d_1, th_1 = column(first, n, q)
+        d_2, th_2 = column(second, n, q)
+        d = combined(e, value, d_1, th_1, d_2, th_2)
+        th = add(cross(e, combined(e, slopes, d_1, th_1, d_2, th_2)), scaled(dot(e, mean(l_2, th_1, th_2)), e))
+        for a in range(3):
+            own[a * n + q], own[(3 + a) * n + q] = d[a], th[a]
+
+
+@inner
+def normal(model, work, row, a):
+    """Return n_i of row k, ground axes: 0 along the line, 1 nearest to y of the marker, 2 across both."""
+    part, n_0 = model.rows.part[row], vector(work.lines.n_0[model.markers.line[a]])
+    if part == 0:
+        return n_0
+    A = work.markers.A[a]
+    y = (A[0, 1], A[1, 1], A[2, 1])
+    y = sub(y, scaled(dot(y, n_0), n_0))
+    y = scaled(1.0 / norm(y), y)
+    return y if part == 1 else cross(n_0, y)
+
+
+@inner
+def line_value(model, work, k, a, b):
+    """LINE: n_i · d; A follows the point of B, so that its axes do not count."""
+    n, zero = normal(model, work, k, a), (0.0, 0.0, 0.0)
+    return dot(n, distance(work.markers, a, b)), n, zero, zero
+
+
+@inner
+def place_rates(model, work, a):
+    """Return the rate of the place where it is prescribed, else 0; what is left of its second rate; the change of B.
+
+    r_ddot of the place = a + 2 s_dot r'_dot + s_dot² r'' + s_ddot r', A fixed in the line.
+    """
+    j, line = model.markers.line[a], work.lines
+    s_dot = line.s_dot[j]
+    own = add(scaled(-2 * s_dot, vector(line.slope_dot[j])), scaled(-s_dot * s_dot, vector(line.curve[j])))
+    if model.lines.row[j] >= 0:
+        _, _, second = prescribed(model, work, model.lines.row[j])
+        return s_dot, second, own
+    return 0.0, line.by_place[j] * dot(vector(line.n_0[j]), own), own
+
+
+@inner
+def line_rates(model, work, k, a, b):
+    """LINE."""
+    rate, second, own = place_rates(model, work, a)
+    held = dot(normal(model, work, k, a), own)
+    if model.rows.part[k] == 0:
+        slope = work.lines.slope[model.markers.line[a]]
+        return -rate * slope, held - second * slope
+    return 0.0, held
+
+
+@inner
+def line_turn_value(model, work, k, a, b):
+    """LINE_TURN: E · D; A turns also with kappa s_dot, where s follows the points."""
+    rows = model.rows
+    line, j = work.lines, model.markers.line[a]
+    E, D = direction(work.markers, a, rows.x[k]), direction(work.markers, b, rows.y[k])
+    m = cross(E, D)
+    n = scaled(line.by_place[j] * dot(m, vector(line.kappa[j])), vector(line.n_0[j]))
+    return dot(E, D), n, m, scaled(-1.0, m)
+
+
+@inner
+def line_turn_rates(model, work, k, a, b):
+    """LINE_TURN."""
+    rows = model.rows
+    line, j = work.lines, model.markers.line[a]
+    E, D = direction(work.markers, a, rows.x[k]), direction(work.markers, b, rows.y[k])
+    m, kappa, s_dot = cross(E, D), vector(line.kappa[j]), line.s_dot[j]
+    rate, second, _ = place_rates(model, work, a)
+    omega_a, p = vector(work.markers.omega[a]), vector(work.markers.omega[b])
+    o = add(omega_a, scaled(s_dot, kappa))
+    turning = second * dot(m, kappa) + dot(m, vector(line.turning[j]))
+    D_dot = cross(p, D)
+    beta = dot(turned_twice(o, E), D) + 2 * dot(cross(o, E), D_dot) + dot(E, cross(p, D_dot))
+    return rate * dot(m, kappa), turning + beta
+
+
+@inner
+def free_moment(model, work, a):
+    """Return n_0, and kappa / |r'| where the joint carries a moment, else zero."""
+    j, line = model.markers.line[a], work.lines
+    f = 1.0 / line.slope[j] if model.markers.moment[a] >= 0 else 0.0
+    return vector(line.n_0[j]), scaled(f, vector(line.kappa[j]))
+
+
+@inner
+def line_free_value(model, work, k, a, b, w):
+    """LINE_FREE: n_0 · F + kappa · M / |r'|."""
+    n_0, m = free_moment(model, work, a)
+    total = dot(n_0, vector(w))
+    if model.markers.moment[a] >= 0:
+        total += dot(m, vector(w[MOMENT:]))
+    return total
+
+
+@inner
+def line_free_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
+    """LINE_FREE."""
+    n_0, m = free_moment(model, work, a)
+    put(V[r], FORCE, n_0)
+    turn = cross(n_0, vector(w))
+    if model.markers.moment[a] >= 0:
+        put(V[r], MOMENT, m)
+        turn = add(turn, cross(m, vector(w[MOMENT:])))
+    put(P_a[r], 3, scaled(c_k, turn))

@@ -1,0 +1,79 @@
+"""Rows of free coordinates along which forces act: PUSH, TWIST and TWIST_B, e · part + Q = 0.
+
+With e the axis, d = r_B - r_A, s the slip of B seen from A and n the size of the force normal to e:
+
+    PUSH   dx = e · (dr_B - dr_A) + (e × d) · dphi_A
+           dv = e · (dv_B - dv_A) + (e × d) · domega_A - (e × omega_A) · (dr_B - dr_A) + (e × s) · dphi_A
+    TWIST  dx = t · (dphi_A - dphi_B), t as in `angle_between`
+           dv = e · (domega_B - domega_A) + (e × (omega_B - omega_A)) · dphi of the marker that holds the axis
+"""
+
+import math
+
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.joints.coordinate_force import coordinate_force
+from floatframe.engine.kernels.joints.relative_motion import (
+    distance,
+    loaded_axis,
+    loaded_coordinate,
+    put_pair,
+    slip,
+    turned_angle,
+)
+from floatframe.engine.kernels.vector import add, cross, dot, put, put_sum, scaled, sub, vector
+from floatframe.model.joints.rows.kinds import PUSH, TWIST_B
+
+__all__ = ["loaded_derivatives", "loaded_value", "normal_force"]
+
+
+@inner
+def normal_force(w, e):
+    """Return the size of the force normal to the axis, and its part along it."""
+    F = vector(w)
+    along = dot(e, F)
+    return math.sqrt(max(dot(F, F) - along * along, 0.0)), along
+
+
+@inner
+def loaded_value(model, work, k, a, b, w):
+    """PUSH, TWIST, TWIST_B: e · part + Q."""
+    rows, markers = model.rows, work.markers
+    e = loaded_axis(rows, markers, k, a, b)
+    x, v = loaded_coordinate(rows, markers, k, a, b)
+    normal, _ = normal_force(w, e)
+    Q, _, _, _ = coordinate_force(model, work, k, rows.kind[k] != PUSH, x, v, normal)
+    return dot(e, vector(w[rows.part[k] :])) + Q
+
+
+@inner
+def loaded_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
+    """PUSH, TWIST, TWIST_B."""
+    rows, markers = model.rows, work.markers
+    part, is_angle = rows.part[k], rows.kind[k] != PUSH
+    omega_a, omega_b = vector(markers.omega[a]), vector(markers.omega[b])
+    e = loaded_axis(rows, markers, k, a, b)
+    x, v = loaded_coordinate(rows, markers, k, a, b)
+    normal, along = normal_force(w, e)
+    _, Q_x, Q_v, Q_n = coordinate_force(model, work, k, is_angle, x, v, normal)
+    put(V[r], part, e)
+    turn = cross(e, vector(w[part:]))  # derivative by a rotation of the marker that holds the axis
+    if Q_n != 0.0 and normal > 0.0:
+        f, F = Q_n / normal, vector(w)
+        put_sum(V[r], 0, scaled(f, sub(F, scaled(along, e))))
+        turn = sub(turn, scaled(f * along, cross(e, F)))
+    if is_angle:
+        _, t = turned_angle(rows, markers, k, a, b)
+        put_pair(P_a, P_b, r, 3, scaled(c_k * Q_x, t))
+        put_pair(P_a, P_b, r, 9, scaled(-c_k * Q_v, e))
+        turn = add(turn, scaled(Q_v, cross(e, sub(omega_b, omega_a))))
+    else:
+        d = distance(markers, a, b)
+        arm, s = cross(e, d), slip(markers, a, b, d)
+        put_pair(P_a, P_b, r, 0, scaled(c_k, sub(scaled(Q_v, cross(e, omega_a)), scaled(Q_x, e))))
+        put_pair(P_a, P_b, r, 6, scaled(-c_k * Q_v, e))
+        put(P_a[r], 9, scaled(c_k * Q_v, arm))
+        turn = add(turn, add(scaled(Q_x, arm), scaled(Q_v, cross(e, s))))
+    if rows.kind[k] == TWIST_B:
+        put_sum(P_b[r], 3, scaled(c_k, turn))
+    else:
+        put_sum(P_a[r], 3, scaled(c_k, turn))

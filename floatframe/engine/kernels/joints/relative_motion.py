@@ -1,0 +1,114 @@
+"""Relative motion of two markers: what rows of joints and coordinates are made of."""
+
+import math
+
+from floatframe.engine.kernels.compiler.compilation import inner, small
+from floatframe.engine.kernels.time_function import time_function
+from floatframe.engine.kernels.vector import add, cross, dot, put, scaled, sub, turned, vector
+from floatframe.model.joints.rows.kinds import PUSH, TWIST_B
+
+__all__ = [
+    "angle_between",
+    "axis_between",
+    "direction",
+    "distance",
+    "loaded_axis",
+    "loaded_coordinate",
+    "prescribed",
+    "put_pair",
+    "relative_velocity",
+    "slip",
+    "turned_angle",
+]
+
+
+@inner
+def prescribed(model, work, k):
+    """Return the motion of row k at the time of the iterate, its rate and its second rate; its constant without."""
+    if model.rows.motion[k] < 0:
+        return model.rows.c[k], 0.0, 0.0
+    return time_function(model.functions, model.rows.motion[k], work.state.time)
+
+
+@small
+def direction(markers, m, x):
+    """Return the direction x of marker m in ground axes."""
+    return turned(markers.A[m], vector(x))
+
+
+@small
+def distance(markers, a, b):
+    """Return d = r_B - r_A."""
+    return sub(vector(markers.r[b]), vector(markers.r[a]))
+
+
+@small
+def relative_velocity(markers, a, b):
+    """Return v_B - v_A."""
+    return sub(vector(markers.v[b]), vector(markers.v[a]))
+
+
+@inner
+def slip(markers, a, b, d):
+    """Return the velocity of the point of B as seen from A: v_B - v_A - omega_A × d."""
+    return sub(relative_velocity(markers, a, b), cross(vector(markers.omega[a]), d))
+
+
+@inner
+def angle_between(rows, markers, k, a, b):
+    """Return the angle th of D about the axis of row k in A, and its derivative t by a rotation of A (of B: -t).
+
+    th = atan2(S, C), S = -E · D, C = Z · D;  t = -(C E × D + S Z × D)/(S² + C²).
+    """
+    E, Z = direction(markers, a, rows.x[k]), direction(markers, a, rows.z[k])
+    D = direction(markers, b, rows.y[k])
+    S, C = -dot(E, D), dot(Z, D)
+    t = scaled(-1.0 / (S * S + C * C), add(scaled(C, cross(E, D)), scaled(S, cross(Z, D))))
+    return math.atan2(S, C), t
+
+
+@small
+def axis_between(rows, markers, k, a):
+    """Return the axis x × z of row k in A, ground axes."""
+    return turned(markers.A[a], cross(vector(rows.x[k]), vector(rows.z[k])))
+
+
+@inner
+def turned_angle(rows, markers, k, a, b):
+    """Return the angle of B about an axis of A (TWIST_B: of B), and its derivative by a rotation of A.
+
+    By a rotation of B: the opposite.
+    """
+    if rows.kind[k] == TWIST_B:
+        angle, t = angle_between(rows, markers, k, b, a)
+        return -angle, t
+    return angle_between(rows, markers, k, a, b)
+
+
+@inner
+def loaded_axis(rows, markers, k, a, b):
+    """Return the axis of a coordinate with forces, ground axes."""
+    if rows.kind[k] == PUSH:
+        return direction(markers, a, rows.x[k])
+    return axis_between(rows, markers, k, b if rows.kind[k] == TWIST_B else a)
+
+
+@inner
+def loaded_coordinate(rows, markers, k, a, b):
+    """Return value and rate of a coordinate with forces.
+
+    It is a distance along an axis of A, or an angle about it (TWIST_B: about an axis of B).
+    """
+    e = loaded_axis(rows, markers, k, a, b)
+    if rows.kind[k] != PUSH:
+        angle, _ = turned_angle(rows, markers, k, a, b)
+        return angle, dot(e, sub(vector(markers.omega[b]), vector(markers.omega[a])))
+    d = distance(markers, a, b)
+    return dot(e, d), dot(e, slip(markers, a, b, d))
+
+
+@small
+def put_pair(P_a, P_b, r, column, x):
+    """Write x into a row of P at A, and its opposite at B."""
+    put(P_a[r], column, x)
+    put(P_b[r], column, scaled(-1.0, x))

@@ -1,0 +1,106 @@
+"""The formulas of each kind of row of a joint, by its code: the compiled part of the record `ROW_KINDS`.
+
+A kind that holds something brings `value` and `rates` (held_rows.py), one that says what the wrench is `value` and
+`derivatives` (wrench_rows.py). Kernels call them by the code of the row and know nothing else of it.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from floatframe.engine.kernels.joints import (
+    constant_velocity,
+    deformed_line,
+    held_rows,
+    loaded_rows,
+    rolling,
+    wrench_rows,
+)
+from floatframe.engine.kernels.joints.by_code import by_code
+from floatframe.model.joints.rows.kinds import (
+    ARM,
+    BISECTOR,
+    DISTANCE,
+    DOT,
+    EQUAL_TURN,
+    GAUGE,
+    GAUGE_B,
+    LINE,
+    LINE_FREE,
+    LINE_TURN,
+    POINT,
+    PUSH,
+    RIM,
+    RIM_HEIGHT,
+    ROD,
+    ROLL,
+    SCREW,
+    SLIDE,
+    THREAD,
+    TURN,
+    TURN_B,
+    TWIST,
+    TWIST_B,
+)
+
+__all__ = ["HELD", "WRENCH", "held_by_place", "held_rates", "held_value", "wrench_derivatives", "wrench_value"]
+
+Function = Callable[..., Any]
+
+
+class Held(NamedTuple):
+    """Of a row that holds something."""
+
+    value: Function  #: (model, work, k, a, b) -> g, n, m_a, m_b
+    rates: Function  #: (model, work, k, a, b) -> dg/dt, beta
+    by_place: Function | None = None  #: of a velocity: (model, work, k, r, a, b, P_a, P_b), its change with places
+
+
+class Wrench(NamedTuple):
+    """Of a row that says what the wrench is."""
+
+    value: Function  #: (model, work, k, a, b, w) -> number
+    derivatives: Function  #: (model, work, k, r, a, b, w, c_k, P_a, P_b, V)
+
+
+LOADED = Wrench(loaded_rows.loaded_value, loaded_rows.loaded_derivatives)
+HELD = {
+    POINT: Held(held_rows.point_value, held_rows.point_rates),
+    DOT: Held(held_rows.angle_value, held_rows.angle_rates),
+    TURN: Held(held_rows.turn_value, held_rows.turn_rates),
+    TURN_B: Held(held_rows.turn_b_value, held_rows.turn_b_rates),
+    SLIDE: Held(held_rows.slide_value, held_rows.slide_rates),
+    DISTANCE: Held(held_rows.distance_value, held_rows.distance_rates),
+    SCREW: Held(held_rows.screw_value, held_rows.screw_rates),
+    RIM_HEIGHT: Held(rolling.height_value, rolling.height_rates),
+    ROLL: Held(rolling.roll_value, rolling.roll_rates, rolling.roll_by_place),
+    EQUAL_TURN: Held(constant_velocity.equal_turn_value, constant_velocity.equal_turn_rates),
+    LINE: Held(deformed_line.line_value, deformed_line.line_rates),
+    LINE_TURN: Held(deformed_line.line_turn_value, deformed_line.line_turn_rates),
+}
+WRENCH = {
+    GAUGE: Wrench(wrench_rows.gauge_value, wrench_rows.gauge_derivatives),
+    GAUGE_B: Wrench(wrench_rows.gauge_b_value, wrench_rows.gauge_b_derivatives),
+    THREAD: Wrench(wrench_rows.thread_value, wrench_rows.thread_derivatives),
+    ARM: Wrench(wrench_rows.arm_value, wrench_rows.arm_derivatives),
+    ROD: Wrench(wrench_rows.rod_value, wrench_rows.rod_derivatives),
+    RIM: Wrench(rolling.rim_value, rolling.rim_derivatives),
+    BISECTOR: Wrench(constant_velocity.bisector_value, constant_velocity.bisector_derivatives),
+    LINE_FREE: Wrench(deformed_line.line_free_value, deformed_line.line_free_derivatives),
+    PUSH: LOADED,
+    TWIST: LOADED,
+    TWIST_B: LOADED,
+}
+
+held_value = by_code("held_value", {code: kind.value for code, kind in HELD.items()}, "model, work, k, a, b")
+held_rates = by_code("held_rates", {code: kind.rates for code, kind in HELD.items()}, "model, work, k, a, b")
+held_by_place = by_code(
+    "held_by_place",
+    {code: kind.by_place for code, kind in HELD.items() if kind.by_place is not None},
+    "model, work, k, r, a, b, P_a, P_b",
+)
+wrench_value = by_code("wrench_value", {code: kind.value for code, kind in WRENCH.items()}, "model, work, k, a, b, w")
+wrench_derivatives = by_code(
+    "wrench_derivatives",
+    {code: kind.derivatives for code, kind in WRENCH.items()},
+    "model, work, k, r, a, b, w, c_k, P_a, P_b, V",
+)

@@ -1,0 +1,397 @@
+"""Motion of a marker from that of its body, and the way of a wrench on the marker back to the body.
+
+With [rho - c; th] = Psi q - 1/2 qᵀ K_P q (K_P, (6, n, n): zero unless the body is stiffened), Psi(q) = Psi - K_P q its
+derivative (t: rows of rho, r: rows of th), E = exp(th), T' = left Jacobian at th, nu = T' th_dot, all in body axes:
+
+    position     r + R rho                        velocity          v + R (omega × rho + rho_dot)
+    axes         R E triad                        angular velocity  R (omega + nu)
+    variation    dr_P = R (dx + dphi × rho + Psi_t(q) dq),  dphi_P = R (dphi + T' Psi_r(q) dq)
+    wrench (f, m in body axes)  ->  f;  rho × f + m;  Psi_t(q)ᵀ f + (T' Psi_r(q))ᵀ m
+"""
+
+from floatframe.engine.kernels.compiler.compilation import loops, small
+from floatframe.engine.kernels.dense import add_products
+from floatframe.engine.kernels.rotation import exp_matrix, left_jacobian, left_jacobian_derivative
+from floatframe.engine.kernels.vector import (
+    add,
+    cross,
+    dot,
+    matrix,
+    product,
+    put,
+    put_matrix,
+    put_sum,
+    scaled,
+    sub,
+    turned,
+    turned_back,
+    unit,
+    vector,
+)
+
+__all__ = [
+    "acceleration_columns", "bent_bias", "marker_acceleration", "marker_acceleration_bias", "marker_columns",
+    "marker_motion", "marker_stiffness", "pose_on_body", "wrench_to_body",
+]  # fmt: skip
+
+
+@loops
+def marker_motion(model, work, m):
+    """Write place and motion of marker m."""
+    i, markers, own = model.markers.body[m], work.markers, model.markers
+    if i < 0:
+        put(markers.r[m], 0, vector(own.position[m]))
+        put(markers.v[m], 0, (0.0, 0.0, 0.0))
+        put(markers.omega[m], 0, (0.0, 0.0, 0.0))
+        put_matrix(markers.A[m], matrix(own.triad[m]))
+        return
+    put(markers.rho[m], 0, vector(own.position[m]))
+    if own.psi0[m] >= 0:
+        elastic_motion(model, work, m, i)
+    pose_on_body(model, work, m)
+
+
+@small
+def body_omega(bodies, state, i):
+    """Return the angular velocity of body i, body axes."""
+    return vector(state.u[bodies.u0[i] + 3 :])
+
+
+@loops
+def pose_on_body(model, work, m):
+    """Write place, axes and velocities of marker m in ground axes from its motion in its body."""
+    i, markers, triad = model.markers.body[m], work.markers, model.markers.triad[m]
+    R, omega = work.state.R[i], body_omega(model.bodies, work.state, i)
+    if model.markers.psi0[m] >= 0:
+        put_matrix(markers.A[m], product(R, product(exp_matrix(vector(markers.angle[m])), triad)))
+    else:
+        put_matrix(markers.A[m], product(R, triad))
+    rho = vector(markers.rho[m])
+    own = add(cross(omega, rho), vector(markers.rho_dot[m]))
+    put(markers.r[m], 0, add(vector(work.state.r[i]), turned(R, rho)))
+    put(markers.v[m], 0, add(vector(work.state.u[model.bodies.u0[i] :]), turned(R, own)))
+    put(markers.omega[m], 0, turned(R, add(omega, vector(markers.spin[m]))))
+
+
+@loops
+def elastic_motion(model, work, m, i):
+    """Add the elastic displacement to rho and write elastic rotation, rates and the left Jacobian."""
+    n, q0, u0, o = model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i], model.markers.psi0[m]
+    is_bent = model.markers.bend0[m] >= 0
+    if is_bent:
+        bent_shapes(model, work, m, i)
+    for a in range(3):
+        d, d_dot, th, th_dot = 0.0, 0.0, 0.0, 0.0
+        t = work.markers.psi[o + a * n : o + (a + 1) * n]
+        r = work.markers.psi[o + (a + 3) * n : o + (a + 4) * n]
+        if is_bent:  # Psi q - 1/2 qᵀ K_P q
+            for k in range(n):
+                d += 0.5 * (model.markers.psi[o + a * n + k] + t[k]) * work.state.q[q0 + k]
+                th += 0.5 * (model.markers.psi[o + (a + 3) * n + k] + r[k]) * work.state.q[q0 + k]
+                d_dot += t[k] * work.state.u[u0 + 6 + k]
+                th_dot += r[k] * work.state.u[u0 + 6 + k]
+        else:
+            for k in range(n):
+                d += t[k] * work.state.q[q0 + k]
+                th += r[k] * work.state.q[q0 + k]
+                d_dot += t[k] * work.state.u[u0 + 6 + k]
+                th_dot += r[k] * work.state.u[u0 + 6 + k]
+        work.markers.rho[m, a] += d
+        work.markers.rho_dot[m, a] = d_dot
+        work.markers.angle[m, a] = th
+        work.markers.angle_dot[m, a] = th_dot
+    put_matrix(work.markers.T_left[m], left_jacobian(vector(work.markers.angle[m])))
+    put(work.markers.spin[m], 0, turned(work.markers.T_left[m], vector(work.markers.angle_dot[m])))
+
+
+@loops
+def bent_shapes(model, work, m, i):
+    """Write Psi(q) = Psi - K_P q."""
+    n, q0, o, first = model.bodies.n_q[i], model.bodies.q0[i], model.markers.psi0[m], model.markers.bend0[m]
+    psi, own = work.markers.psi[o : o + 6 * n], model.markers.psi[o : o + 6 * n]
+    for j in range(6 * n):
+        psi[j] = -own[j]
+    add_products(model.markers.bend[first : first + 6 * n * n], work.state.q[q0 : q0 + n], psi)
+    for j in range(6 * n):
+        psi[j] = -psi[j]
+
+
+@loops
+def bent_rate(model, work, m, i, out):
+    """Write K_P q_dot [6, k], minus the rate of Psi(q), into out, (6 n_q,)."""
+    n, u0 = model.bodies.n_q[i], model.bodies.u0[i]
+    bent_by(model, m, n, work.state.u[u0 + 6 : u0 + 6 + n], out)
+
+
+@loops
+def bent_by(model, m, n, factors, out):
+    """Write Σ_l K_P,l factors_l [6, k] into out, (6 n_q,)."""
+    first = model.markers.bend0[m]
+    for j in range(6 * n):
+        out[j] = 0.0
+    add_products(model.markers.bend[first : first + 6 * n * n], factors, out)
+
+
+@loops
+def bent_bias(model, work, m, i):
+    """Return -q_dotᵀ K_P q_dot of marker m, displacement and rotation; of a sliding one by its stations."""
+    if model.markers.line[m] >= 0:
+        bent = work.lines.bent[model.markers.line[m]]
+        return vector(bent), vector(bent[3:])
+    if model.markers.bend0[m] < 0:
+        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    n, u0 = model.bodies.n_q[i], model.bodies.u0[i] + 6
+    bend_dot = work.markers.bend_dot[: 6 * n]
+    bent_rate(model, work, m, i, bend_dot)
+    d, th = shape_sum(bend_dot, n, work.state.u[u0 : u0 + n])
+    return scaled(-1.0, d), scaled(-1.0, th)
+
+
+@loops
+def marker_acceleration_bias(model, work, m, out):
+    """Write the acceleration (3) and angular acceleration (3) of marker m at zero u_dot, ground axes, into out.
+
+    R (omega × (omega × rho + 2 rho_dot) + b_t) and R (omega × nu + (dT'/dth [th_dot]) th_dot + T' b_r), where
+    b = -q_dotᵀ K_P q_dot.
+    """
+    out[:] = 0.0
+    i = model.markers.body[m]
+    if i < 0:
+        return
+    R, omega = work.state.R[i], body_omega(model.bodies, work.state, i)
+    rho, rho_dot = vector(work.markers.rho[m]), vector(work.markers.rho_dot[m])
+    b_t, b_r = bent_bias(model, work, m, i)
+    spun = cross(omega, add(cross(omega, rho), scaled(2.0, rho_dot)))
+    put(out, 0, turned(R, add(spun, b_t)))
+    if model.markers.psi0[m] >= 0:
+        th_dot, nu = vector(work.markers.angle_dot[m]), vector(work.markers.spin[m])
+        slope = left_jacobian_derivative(vector(work.markers.angle[m]), th_dot, 1.0)
+        own = add(turned(slope, th_dot), turned(work.markers.T_left[m], b_r))
+        put(out, 3, turned(R, add(cross(omega, nu), own)))
+
+
+@loops
+def marker_acceleration(model, work, m, out):
+    """Write the acceleration (3) and angular acceleration (3) of marker m at the iterate, ground axes, into out."""
+    marker_acceleration_bias(model, work, m, out)
+    i = model.markers.body[m]
+    if i < 0:
+        return
+    R, u_dot = work.state.R[i], work.state.u_dot[model.bodies.u0[i] :]
+    omega_dot = vector(u_dot[3:])
+    d, turn = elastic_acceleration(model, work, m, i)
+    put_sum(out, 0, add(vector(u_dot), turned(R, add(cross(omega_dot, vector(work.markers.rho[m])), d))))
+    put_sum(out, 3, turned(R, add(omega_dot, turn)))
+
+
+@loops
+def elastic_acceleration(model, work, m, i):
+    """Return what q_ddot adds to acceleration and angular acceleration of marker m of body i, body axes."""
+    o = model.markers.psi0[m]
+    if o < 0:
+        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    n, first = model.bodies.n_q[i], model.bodies.u0[i] + 6
+    d, th = shape_sum(work.markers.psi[o : o + 6 * n], n, work.state.u_dot[first : first + n])
+    return d, turned(work.markers.T_left[m], th)
+
+
+@loops
+def acceleration_columns(model, work, m, c_m, c_d, c_k, turning, row):
+    """Write c_k times the derivatives of the acceleration of marker m by the unknowns of a step, body axes.
+
+    row, (6, 6 + n). In a step du_dot = c_m/c_k of the unknowns, their velocities c_d/c_k, the body turns by `turning`
+    dtheta. In body axes, but for the acceleration of the frame origin,
+
+        a = omega_dot × rho + Psi_t q_ddot + omega × (omega × rho + 2 rho_dot) - q_dotᵀ K_P,t q_dot
+        alpha = omega_dot + T' Psi_r q_ddot + omega × nu + ...
+
+    Of alpha, the derivatives by q and q_dot of T' and its rate are left out: of the size of the elastic rotations.
+    """
+    i = model.markers.body[m]
+    n, u0, omega = model.bodies.n_q[i], model.bodies.u0[i], body_omega(model.bodies, work.state, i)
+    R, rho, rho_dot = work.state.R[i], vector(work.markers.rho[m]), vector(work.markers.rho_dot[m])
+    omega_dot, nu = vector(work.state.u_dot[u0 + 3 :]), vector(work.markers.spin[m])
+    now = work.markers.acceleration[model.markers.accelerated[m]]
+    of_frame = vector(work.state.u_dot[u0:])
+    a, alpha = turned_back(R, sub(vector(now), of_frame)), turned_back(R, vector(now[3:]))
+    row[:, :] = 0.0
+    for b in range(3):
+        t, e = scaled(c_k, (turning[0, b], turning[1, b], turning[2, b])), unit(b)
+        row[b, b] = c_m
+        by_spin = add(cross(e, add(cross(omega, rho), scaled(2.0, rho_dot))), cross(omega, cross(e, rho)))
+        put_column(row, 0, 3 + b, add(add(scaled(c_m, cross(e, rho)), scaled(c_d, by_spin)), cross(t, a)))
+        put_column(row, 3, 3 + b, add(add(scaled(c_m, e), scaled(c_d, cross(e, nu))), cross(t, alpha)))
+    o = model.markers.psi0[m]
+    if o < 0:
+        return
+    psi, T, is_bent = work.markers.psi[o : o + 6 * n], work.markers.T_left[m], model.markers.bend0[m] >= 0
+    bend_dot, bend_ddot = work.markers.bend_dot[: 6 * n], work.markers.bend_ddot[: 6 * n]
+    if is_bent:
+        bent_rate(model, work, m, i, bend_dot)
+        bent_by(model, m, n, work.state.u_dot[u0 + 6 : u0 + 6 + n], bend_ddot)
+    for k in range(n):
+        d, th = shape(psi, n, k)
+        turn = turned(T, th)
+        by_rate = scaled(2.0, cross(omega, d))
+        by_place = add(cross(omega_dot, d), cross(omega, cross(omega, d)))
+        if is_bent:
+            d_dot, _ = shape(bend_dot, n, k)
+            d_ddot, _ = shape(bend_ddot, n, k)
+            by_rate = sub(by_rate, scaled(2.0, d_dot))
+            by_place = sub(by_place, add(d_ddot, scaled(2.0, cross(omega, d_dot))))
+        put_column(row, 0, 6 + k, add(add(scaled(c_m, d), scaled(c_d, by_rate)), scaled(c_k, by_place)))
+        put_column(row, 3, 6 + k, add(scaled(c_m, turn), scaled(c_d, cross(omega, turn))))
+
+
+@small
+def shape(psi, n, k):
+    """Return displacement and rotation by coordinate k of shapes [6, n]."""
+    return (psi[k], psi[n + k], psi[2 * n + k]), (psi[3 * n + k], psi[4 * n + k], psi[5 * n + k])
+
+
+@loops
+def shape_sum(psi, n, factors):
+    """Return Σ_k factors_k of displacement and rotation of shape k, (6 n,)."""
+    d, th = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for k in range(n):
+        d_k, th_k = shape(psi, n, k)
+        d, th = add(d, scaled(factors[k], d_k)), add(th, scaled(factors[k], th_k))
+    return d, th
+
+
+@small
+def wrench_in_body(work, m, i):
+    """Return force and moment on marker m in axes of its body i."""
+    R, wrench = work.state.R[i], work.markers.wrench[m]
+    return turned_back(R, vector(wrench)), turned_back(R, vector(wrench[3:]))
+
+
+@loops
+def wrench_to_body(model, work, m):
+    """Subtract the generalised forces of the wrench on marker m from the residual of its body."""
+    i = model.markers.body[m]
+    if i < 0:
+        return
+    n, u0, residual = model.bodies.n_q[i], model.bodies.u0[i], work.bodies.residual
+    f, t = wrench_in_body(work, m, i)
+    tau = add(cross(vector(work.markers.rho[m]), f), t)
+    put_sum(residual, u0, scaled(-1.0, f))
+    put_sum(residual, u0 + 3, scaled(-1.0, tau))
+    o = model.markers.psi0[m]
+    if o >= 0:
+        psi = work.markers.psi[o : o + 6 * n]
+        s = turned_back(work.markers.T_left[m], t)
+        for k in range(n):
+            d, th = shape(psi, n, k)
+            residual[u0 + 6 + k] -= dot(d, f) + dot(th, s)
+
+
+@loops
+def marker_columns(model, work, m, rate, turning, column, row):
+    """Write the derivatives of the motion of marker m by the body unknowns (dx, dtheta, dq), in body axes.
+
+    column, (6, 6 + n): of position and rotation by velocities, whose transpose carries a wrench to the body.
+    row, (12, 6 + n): of position, rotation, velocity, angular velocity by the unknowns of a step, in which
+    domega = rate dtheta, dq_dot = rate dq, and the body turns by `turning` dtheta, (3, 3).
+    """
+    i = model.markers.body[m]
+    n, omega = model.bodies.n_q[i], body_omega(model.bodies, work.state, i)
+    rho, spin = vector(work.markers.rho[m]), add(omega, vector(work.markers.spin[m]))
+    arm_dot = add(cross(omega, rho), vector(work.markers.rho_dot[m]))
+    column[:, :] = 0.0
+    row[:, :] = 0.0
+    for b in range(3):
+        t = (turning[0, b], turning[1, b], turning[2, b])
+        e = unit(b)
+        arm = cross(e, rho)
+        column[b, b], column[3 + b, 3 + b], row[b, b], row[6 + b, b] = 1.0, 1.0, 1.0, rate
+        put_column(column, 0, 3 + b, arm)
+        put_column(row, 0, 3 + b, cross(t, rho))
+        put_column(row, 3, 3 + b, t)
+        put_column(row, 6, 3 + b, add(scaled(rate, arm), cross(t, arm_dot)))
+        put_column(row, 9, 3 + b, add(scaled(rate, e), cross(t, spin)))
+    o = model.markers.psi0[m]
+    if o < 0:
+        return
+    slope = left_jacobian_derivative(vector(work.markers.angle[m]), vector(work.markers.angle_dot[m]), 1.0)
+    psi, T = work.markers.psi[o : o + 6 * n], work.markers.T_left[m]
+    for k in range(n):
+        d, th = shape(psi, n, k)
+        turn = turned(T, th)
+        put_column(column, 0, 6 + k, d)
+        put_column(column, 3, 6 + k, turn)
+        put_column(row, 0, 6 + k, d)
+        put_column(row, 3, 6 + k, turn)
+        put_column(row, 6, 6 + k, add(cross(omega, d), scaled(rate, d)))
+        put_column(row, 9, 6 + k, add(turned(slope, th), scaled(rate, turn)))
+    if model.markers.bend0[m] >= 0:  # d(Psi(q) q_dot)/dq = -K_P q_dot
+        bend_dot = work.markers.bend_dot[: 6 * n]
+        bent_rate(model, work, m, i, bend_dot)
+        for k in range(n):
+            d, th = shape(bend_dot, n, k)
+            turn = turned(T, th)
+            for a in range(3):
+                row[6 + a, 6 + k] -= d[a]
+                row[9 + a, 6 + k] -= turn[a]
+
+
+@small
+def put_column(matrix, first, k, x):
+    """Write a vector into column k of a matrix, from row `first` on."""
+    matrix[first, k], matrix[first + 1, k], matrix[first + 2, k] = x[0], x[1], x[2]
+
+
+@small
+def take_column(matrix, first, k, x):
+    """Subtract a vector from column k of a matrix, from row `first` on."""
+    matrix[first, k] -= x[0]
+    matrix[first + 1, k] -= x[1]
+    matrix[first + 2, k] -= x[2]
+
+
+@loops
+def marker_stiffness(model, work, m, c_k, H, turn):
+    """Add the derivative of minus the generalised forces of a held wrench on marker m to H and turn.
+
+    A wrench fixed in space turns against the body (turn); one fixed in the marker turns with its elastic rotation.
+    """
+    i = model.markers.body[m]
+    n, rho = model.bodies.n_q[i], vector(work.markers.rho[m])
+    f, t = wrench_in_body(work, m, i)
+    is_follower = model.markers.is_follower[m] != 0
+    if not is_follower:
+        for b in range(3):
+            f_turned = cross(f, unit(b))
+            take_column(turn, 0, b, f_turned)
+            take_column(turn, 3, b, add(cross(rho, f_turned), cross(t, unit(b))))
+    o = model.markers.psi0[m]
+    if o < 0:
+        return
+    psi, T = work.markers.psi[o : o + 6 * n], work.markers.T_left[m]
+    if model.markers.bend0[m] >= 0:  # h = Psi(q)ᵀ [f; Tᵀ m], dPsi(q) = -K_P dq
+        s, first = turned_back(T, t), model.markers.bend0[m]
+        for j in range(n):
+            bend = model.markers.bend[first + 6 * n * j : first + 6 * n * (j + 1)]
+            out = H[6 + j, 6:]
+            for k in range(n):
+                d, th = shape(bend, n, k)
+                out[k] += c_k * (dot(f, d) + dot(s, th))
+    slope = left_jacobian_derivative(vector(work.markers.angle[m]), t, -1.0)
+    for j in range(n):
+        d, th = shape(psi, n, j)
+        turned_by = turned(T, th)  # rotation of the marker in the body
+        take_column(H, 3, 6 + j, scaled(c_k, cross(d, f)))  # tau: drho × f
+        df, ds = (0.0, 0.0, 0.0), turned(slope, th)  # h: Psi_rᵀ d(T m)
+        if is_follower:
+            df, dt = cross(turned_by, f), cross(turned_by, t)
+            take_column(H, 0, 6 + j, scaled(c_k, df))
+            take_column(H, 3, 6 + j, scaled(c_k, add(cross(rho, df), dt)))
+            ds = add(ds, turned_back(T, dt))
+        else:
+            # row of mode j: Psi_t,j · (f × dphi) + (T' Psi_r,j) · (m × dphi) = dphi · (Psi × f + ...)
+            row = add(cross(d, f), cross(turned_by, t))
+            for a in range(3):
+                turn[6 + j, a] -= row[a]
+        for k in range(n):
+            d, th = shape(psi, n, k)
+            H[6 + k, 6 + j] -= c_k * (dot(d, df) + dot(th, ds))

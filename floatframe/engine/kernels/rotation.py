@@ -1,0 +1,168 @@
+"""Rotations in the kernels: exponential map and its Jacobians, as matrices of three rows (`kernels.vector`).
+
+With t = |theta|: exp = 1 + s tilde + a tilde², right Jacobian T = 1 - a tilde + b tilde², left Jacobian Tᵀ, with
+s = sin t / t, a = (1 - cos t)/t², b = (t - sin t)/t³; below t = 1/2 their series (the next term is under 1e-17).
+"""
+
+import math
+
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.vector import add, cross, dot, scaled, sub, unit
+
+__all__ = [
+    "exp_matrix",
+    "left_jacobian",
+    "left_jacobian_derivative",
+    "matrix_of_euler_parameters",
+    "right_jacobian",
+    "rotate_euler_parameters",
+    "split_spin",
+    "turned_about",
+]
+
+SERIES_BELOW = 0.25  # t² at the switch
+
+
+@inner
+def quotient_s(x):
+    """Return sin t / t of x = t²."""
+    if x < SERIES_BELOW:
+        return 1 + x * (
+            -1 / 6 + x * (1 / 120 + x * (-1 / 5040 + x * (1 / 362880 + x * (-1 / 39916800 + x / 6227020800))))
+        )
+    t = math.sqrt(x)
+    return math.sin(t) / t
+
+
+@inner
+def quotient_a(x):
+    """Return (1 - cos t)/t² of x = t²."""
+    if x < SERIES_BELOW:
+        return 1 / 2 + x * (
+            -1 / 24 + x * (1 / 720 + x * (-1 / 40320 + x * (1 / 3628800 + x * (-1 / 479001600 + x / 87178291200))))
+        )
+    return (1 - math.cos(math.sqrt(x))) / x
+
+
+@inner
+def quotient_b(x):
+    """Return (t - sin t)/t³ of x = t²."""
+    if x < SERIES_BELOW:
+        return 1 / 6 + x * (-1 / 120 + x * (1 / 5040 + x * (-1 / 362880 + x * (1 / 39916800 - x / 6227020800))))
+    t = math.sqrt(x)
+    return (t - math.sin(t)) / (x * t)
+
+
+@inner
+def quotient_da(x):
+    """Return (da/dt)/t of x = t²."""
+    if x < SERIES_BELOW:
+        return -1 / 12 + x * (1 / 180 + x * (-1 / 6720 + x * (1 / 453600 + x * (-1 / 47900160 + x / 7264857600))))
+    t = math.sqrt(x)
+    return (t * math.sin(t) - 2 * (1 - math.cos(t))) / (x * x)
+
+
+@inner
+def quotient_db(x):
+    """Return (db/dt)/t of x = t²."""
+    if x < SERIES_BELOW:
+        return -1 / 60 + x * (1 / 1260 + x * (-1 / 60480 + x * (1 / 4989600 + x * (-1 / 622702080 + x / 108972864000))))
+    t = math.sqrt(x)
+    return ((1 - math.cos(t)) - 3 * (t - math.sin(t)) / t) / (x * x)
+
+
+@inner
+def polynomial(th, first, second):
+    """Return 1 + first tilde(th) + second tilde(th)²."""
+    x, y, z = th[0], th[1], th[2]
+    xy, xz, yz = second * x * y, second * x * z, second * y * z
+    return (
+        (1 - second * (y * y + z * z), xy - first * z, xz + first * y),
+        (xy + first * z, 1 - second * (x * x + z * z), yz - first * x),
+        (xz - first * y, yz + first * x, 1 - second * (x * x + y * y)),
+    )
+
+
+@inner
+def exp_matrix(th):
+    """Return the rotation matrix of a rotation vector."""
+    x = dot(th, th)
+    return polynomial(th, quotient_s(x), quotient_a(x))
+
+
+@inner
+def right_jacobian(th):
+    """Return T(th)."""
+    x = dot(th, th)
+    return polynomial(th, -quotient_a(x), quotient_b(x))
+
+
+@inner
+def left_jacobian(th):
+    """Return T(th)ᵀ."""
+    x = dot(th, th)
+    return polynomial(th, quotient_a(x), quotient_b(x))
+
+
+@inner
+def slope_row(e, f, b, d, a, th, v):
+    """Return row e of f thᵀ + b th vᵀ + d 1 - a tilde(v)."""
+    return add(add(scaled(dot(e, f), th), scaled(b * dot(e, th), v)), sub(scaled(d, e), scaled(a, cross(e, v))))
+
+
+@inner
+def left_jacobian_derivative(th, v, sign):
+    """Return d(Tᵀ v)/dth for sign = +1, d(T v)/dth for sign = -1, v held.
+
+    Tᵀ v = v + a c + b e with c = th × v, e = th × c = th (th·v) - v t², so that the derivative is
+
+        (da c + db e - 2 b v) thᵀ + b th vᵀ + b (th·v) 1 - a tilde(v)
+    """
+    x = dot(th, th)
+    a, b, da, db = quotient_a(x) * sign, quotient_b(x), quotient_da(x) * sign, quotient_db(x)
+    c = cross(th, v)
+    f = sub(add(scaled(da, c), scaled(db, cross(th, c))), scaled(2 * b, v))
+    d = b * dot(th, v)
+    return (
+        slope_row(unit(0), f, b, d, a, th, v),
+        slope_row(unit(1), f, b, d, a, th, v),
+        slope_row(unit(2), f, b, d, a, th, v),
+    )
+
+
+@inner
+def turned_about(e, angle, x):
+    """Return exp(angle e) x for a unit vector e."""
+    s, half = math.sin(angle), math.sin(0.5 * angle)
+    c = cross(e, x)
+    return add(x, add(scaled(s, c), scaled(2.0 * half * half, cross(e, c))))
+
+
+@inner
+def split_spin(e, th):
+    """Return the part of th along the unit vector e, as a number, and the part across it."""
+    along = dot(e, th)
+    return along, sub(th, scaled(along, e))
+
+
+@inner
+def matrix_of_euler_parameters(p):
+    """Return R_GB of p = (w, x, y, z)."""
+    w, x, y, z = p[0], p[1], p[2], p[3]
+    return (
+        (w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z),
+    )
+
+
+@inner
+def rotate_euler_parameters(p, th):
+    """Return p * exp(th/2), made of length one again."""
+    x = 0.25 * dot(th, th)
+    b, c = scaled(0.5 * quotient_s(x), th), 1 - x * quotient_a(x)
+    a = (p[1], p[2], p[3])
+    w = p[0] * c - dot(a, b)
+    v = add(add(scaled(p[0], b), scaled(c, a)), cross(a, b))
+    scale = 1 / math.sqrt(w * w + dot(v, v))
+    return scale * w, scale * v[0], scale * v[1], scale * v[2]

@@ -1,0 +1,469 @@
+"""Newton correction of the whole system: bodies eliminated one by one, connections in a small block-sparse system.
+
+    H_i y_i - Σ_ends sign J_columnᵀ R_iᵀ mu = -c_k residual_i                                    (each body)
+    Σ_ends P R_i J_row y + V mu             = -g                                                 (each connection)
+
+With z = H⁻¹(-c_k residual), X = H⁻¹ J_columnᵀ and Z = J_row X the connections have the matrix V + P R Z Rᵀ sign. H, X
+and Z do not turn with the body, so that they can serve for many steps; P, R and V are those of the iterate.
+"""
+
+import math
+
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.connections.connection import (
+    connection_derivatives,
+    constraint_rates,
+    has_cheap_rate,
+    write_held_rates,
+)
+from floatframe.engine.kernels.dense import lu_factor, lu_solve, lu_solve_columns
+from floatframe.engine.kernels.evaluation import linearize
+from floatframe.engine.kernels.model import MASS, STIFFNESS
+from floatframe.engine.kernels.vector import add, put, put_sum, scaled, turned, turned_back
+from floatframe.model.joints.rows.kinds import NOTHING
+
+__all__ = [
+    "assemble",
+    "correction",
+    "factorize_bodies",
+    "factorize_connections",
+    "factorize_tangents",
+    "renew_connections",
+    "settle_accelerations",
+    "share_reactions",
+    "velocity_correction",
+]
+
+SOFTER = 1e3  # s of `share_reactions`: well above the rounding of A
+SWEEPS = 5  # and how often: with soft 1e-9 of A, constraints of a condition of 1e4 share to 1e-10
+
+
+@inner
+def factorize_bodies(model, work, c_m, c_d, c_k):
+    """Linearise at the iterate, factorise H and write X, Z. Return the body whose H is singular, or -1."""
+    linearize(model, work, c_m, c_d, c_k)
+    return factorize_tangents(model, work)
+
+
+@inner
+def factorize_tangents(model, work):
+    """Factorise H of every body and write X, Z. Return the body whose H is singular, or -1."""
+    work.counted.factorisations += 1
+    for i in range(model.bodies.kind.shape[0]):
+        n = 6 + model.bodies.n_q[i]
+        H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((n, n))
+        if not lu_factor(H, work.solver.pivot[model.bodies.u0[i] : model.bodies.u0[i + 1]]):
+            return i
+        for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):
+            o = model.markers.x0[model.bodies.ends[e]]
+            column = work.solver.J_column[6 * o : 6 * (o + n)].reshape((6, n))
+            X = work.solver.X[6 * o : 6 * (o + n)].reshape((n, 6))
+            for r in range(n):
+                for k in range(6):
+                    X[r, k] = column[k, r]
+            lu_solve_columns(H, work.solver.pivot[model.bodies.u0[i] : model.bodies.u0[i + 1]], X)
+    for p in range(model.elimination.pair_row.shape[0]):
+        row_marker, column_marker = model.elimination.pair_row[p], model.elimination.pair_column[p]
+        n = 6 + model.bodies.n_q[model.markers.body[row_marker]]
+        o = model.markers.x0[row_marker]
+        row = work.solver.J_row[12 * o : 12 * (o + n)].reshape((12, n))
+        o = model.markers.x0[column_marker]
+        X = work.solver.X[6 * o : 6 * (o + n)].reshape((n, 6))
+        Z = work.solver.Z[p]
+        for r in range(12):
+            for k in range(6):
+                total = 0.0
+                for j in range(n):
+                    total += row[r, j] * X[j, k]
+                Z[r, k] = total
+        if model.markers.accelerated[row_marker] >= 0:
+            accelerate_pair(model, work, p, X, n)
+    return -1
+
+
+@inner
+def accelerate_pair(model, work, p, X, n):
+    """Write Z_a = J_a X of pair p."""
+    o, Z_a = model.markers.a0[model.elimination.pair_row[p]], work.solver.Z_a[p]
+    row = work.solver.J_a[6 * o : 6 * (o + n)].reshape((6, n))
+    for r in range(6):
+        for k in range(6):
+            total = 0.0
+            for j in range(n):
+                total += row[r, j] * X[j, k]
+            Z_a[r, k] = total
+
+
+@inner
+def assemble(model, work, c_k):
+    """Write the block matrix of the connections at the iterate."""
+    s = work.solver.blocks
+    for k in range(s.shape[0]):
+        s[k] = 0.0
+    for c in range(model.connections.size.shape[0]):
+        connection_derivatives(model, work, c, c_k)
+        size, o = model.connections.size[c], model.elimination.diagonal[c]
+        for r in range(size):
+            for k in range(size):
+                s[o + r * size + k] = work.connections.V[c, r, k]
+    for p in range(model.elimination.pair_row.shape[0]):
+        a, b = model.elimination.pair_row[p], model.elimination.pair_column[p]
+        c, d = model.markers.connection[a], model.markers.connection[b]
+        rows, columns, o = model.connections.size[c], model.connections.size[d], model.elimination.pair_block[p]
+        R, P, Z, sign = (
+            work.state.R[model.markers.body[a]],
+            work.connections.P[a],
+            work.solver.Z[p],
+            model.markers.sign[b],
+        )
+        n_motion = 12 if model.connections.has_rates[c] else 6
+        row = work.solver.row
+        for r in range(rows):
+            for part in range(0, n_motion, 3):  # row r of P in body axes
+                put(row, part, turned_back(R, P[r, part:]))
+            for part in range(0, 6, 3):
+                w_part = model.markers.force[b] if part == 0 else model.markers.moment[b]
+                if w_part >= 0:
+                    x = (0.0, 0.0, 0.0)
+                    for k in range(n_motion):
+                        x = add(x, scaled(row[k], Z[k, part:]))
+                    put_sum(s, o + r * columns + w_part, scaled(sign, turned(R, x)))
+            if model.markers.accelerated[a] >= 0:
+                add_accelerated(model, work, p, r, s, o + r * columns)
+
+
+@inner
+def add_accelerated(model, work, p, r, s, place):
+    """Add what row r of the first connection of pair p feels of its marker's acceleration by the wrench of the other.
+
+    place: where the row of the block begins in the store s.
+    """
+    a, b, row = model.elimination.pair_row[p], model.elimination.pair_column[p], work.solver.row
+    R, P_a = work.state.R[model.markers.body[a]], work.connections.P_a[model.markers.accelerated[a]]
+    Z_a = work.solver.Z_a[p]
+    for part in range(0, 6, 3):
+        put(row, part, turned_back(R, P_a[r, part:]))
+    for part in range(0, 6, 3):
+        w_part = model.markers.force[b] if part == 0 else model.markers.moment[b]
+        if w_part >= 0:
+            x = (0.0, 0.0, 0.0)
+            for k in range(6):
+                x = add(x, scaled(row[k], Z_a[k, part:]))
+            put_sum(s, place + w_part, scaled(model.markers.sign[b], turned(R, x)))
+
+
+@inner
+def factorize_connections(elimination, connections, solver):
+    """Block LU of the connections in the planned order. Return the connection with a singular block, or -1."""
+    s = solver.blocks
+    for step in range(elimination.order.shape[0]):
+        j = elimination.order[step]
+        n, o = connections.size[j], elimination.diagonal[j]
+        D = s[o : o + n * n].reshape((n, n))
+        pivot = solver.block_pivot[connections.w0[j] : connections.w0[j + 1]]
+        if not lu_factor(D, pivot):
+            return j
+        first, last = elimination.after0[step], elimination.after0[step + 1]
+        for e in range(first, last):
+            m = connections.size[elimination.after[e]]
+            o = elimination.after_upper[e]
+            lu_solve_columns(D, pivot, s[o : o + n * m].reshape((n, m)))
+        target = elimination.update0[step]
+        for e in range(first, last):
+            rows = connections.size[elimination.after[e]]
+            L = s[elimination.after_lower[e] : elimination.after_lower[e] + rows * n].reshape((rows, n))
+            for f in range(first, last):
+                columns = connections.size[elimination.after[f]]
+                U = s[elimination.after_upper[f] : elimination.after_upper[f] + n * columns].reshape((n, columns))
+                o = elimination.update[target]
+                target += 1
+                for r in range(rows):
+                    for k in range(columns):
+                        total = 0.0
+                        for j_ in range(n):
+                            total += L[r, j_] * U[j_, k]
+                        s[o + r * columns + k] -= total
+    return -1
+
+
+@inner
+def solve_connections(elimination, connections, solver):
+    """Overwrite mu by the solution for the right side in mu."""
+    s, mu = solver.blocks, solver.mu
+    for step in range(elimination.order.shape[0]):
+        j = elimination.order[step]
+        n, o = connections.size[j], elimination.diagonal[j]
+        own = mu[connections.w0[j] : connections.w0[j + 1]]
+        lu_solve(
+            s[o : o + n * n].reshape((n, n)),
+            solver.block_pivot[connections.w0[j] : connections.w0[j + 1]],
+            own,
+        )
+        for e in range(elimination.after0[step], elimination.after0[step + 1]):
+            i = elimination.after[e]
+            o = elimination.after_lower[e]
+            for r in range(connections.size[i]):
+                total = mu[connections.w0[i] + r]
+                for k in range(n):
+                    total -= s[o + r * n + k] * own[k]
+                mu[connections.w0[i] + r] = total
+    for step in range(elimination.order.shape[0] - 1, -1, -1):
+        j = elimination.order[step]
+        for e in range(elimination.after0[step], elimination.after0[step + 1]):
+            i = elimination.after[e]
+            o, columns = elimination.after_upper[e], connections.size[i]
+            for r in range(connections.size[j]):
+                total = mu[connections.w0[j] + r]
+                for k in range(columns):
+                    total -= s[o + r * columns + k] * mu[connections.w0[i] + k]
+                mu[connections.w0[j] + r] = total
+
+
+@inner
+def take_accelerated(model, work, m, n, y, mu):
+    """Subtract what the rows of marker m feel of its acceleration by the correction y of its body."""
+    c, o, motion = model.markers.connection[m], model.markers.a0[m], work.solver.motion
+    R, P_a = work.state.R[model.markers.body[m]], work.connections.P_a[model.markers.accelerated[m]]
+    for r in range(6):
+        total = 0.0
+        for k in range(n):
+            total += work.solver.J_a[6 * o + r * n + k] * y[k]
+        motion[r] = total
+    for part in range(0, 6, 3):
+        put(motion, part, turned(R, motion[part:]))
+    for r in range(model.connections.size[c]):
+        for k in range(6):
+            mu[model.connections.w0[c] + r] -= P_a[r, k] * motion[k]
+
+
+@inner
+def renew_connections(model, work, c_k):
+    """Assemble and factorise the connections at the iterate. Return the connection with a singular block, or -1."""
+    assemble(model, work, c_k)
+    return factorize_connections(model.elimination, model.connections, work.solver)
+
+
+@inner
+def correction(model, work, c_k, is_new):
+    """Write the correction (y, mu) for the residuals in `work`; reassemble the connections if is_new.
+
+    Return the connection with a singular block, or -1.
+    """
+    bodies, connections, solver = model.bodies, model.connections, work.solver
+    y, mu = solver.y, solver.mu
+    for i in range(bodies.kind.shape[0]):
+        n, u0 = 6 + bodies.n_q[i], bodies.u0[i]
+        for k in range(u0, u0 + n):
+            y[k] = -c_k * work.bodies.residual[k]
+        lu_solve(
+            solver.H[bodies.h0[i] : bodies.h0[i + 1]].reshape((n, n)),
+            solver.pivot[u0 : u0 + n],
+            y[u0 : u0 + n],
+        )
+    if mu.shape[0] == 0:
+        return -1
+    if is_new:
+        singular = renew_connections(model, work, c_k)
+        if singular >= 0:
+            return singular
+    for k in range(mu.shape[0]):
+        mu[k] = -work.connections.g[k]
+    take_motions(model, work)
+    solve_connections(model.elimination, connections, solver)
+    add_wrenches(model, work)
+    return -1
+
+
+@inner
+def take_motions(model, work):
+    """Subtract what the rows of connections make of the motion y of the bodies from mu."""
+    bodies, markers, connections, solver = model.bodies, model.markers, model.connections, work.solver
+    y, mu, motion = solver.y, solver.mu, solver.motion
+    for i in range(bodies.kind.shape[0]):
+        n, u0, R = 6 + bodies.n_q[i], bodies.u0[i], work.state.R[i]
+        for e in range(bodies.end0[i], bodies.end0[i + 1]):
+            m = bodies.ends[e]
+            c = markers.connection[m]
+            o, w0 = markers.x0[m], connections.w0[c]
+            n_motion = 12 if connections.has_rates[c] else 6
+            for r in range(n_motion):
+                total = 0.0
+                for k in range(n):
+                    total += solver.J_row[12 * o + r * n + k] * y[u0 + k]
+                motion[r] = total
+            for part in range(0, n_motion, 3):
+                put(motion, part, turned(R, motion[part:]))
+            for r in range(connections.size[c]):
+                total = 0.0
+                for k in range(n_motion):
+                    total += work.connections.P[m, r, k] * motion[k]
+                mu[w0 + r] -= total
+            if markers.accelerated[m] >= 0:
+                take_accelerated(model, work, m, n, y[u0 : u0 + n], mu)
+
+
+@inner
+def velocity_correction(model, work, by_rate):
+    """Write (y, mu) that takes the rates of held positions, y by_rate being the change of u.
+
+    The positions will be closed by a `correction` of their own, which changes their rates by -by_rate g. Rows of
+    positions that have no cheap rate, and all others, keep theirs. Unknowns of rotation turn a body by `T_right` of
+    them, velocities at once: y is what they turn it by.
+    """
+    y, mu, g = work.solver.y, work.solver.mu, work.connections.g
+    for c in range(model.connections.size.shape[0]):
+        w0, end = model.connections.w0[c], model.connections.w0[c + 1]
+        write_held_rates(model, work, c, mu)
+        for k in range(w0, end):
+            mu[k] = g[k] - mu[k] / by_rate if has_cheap_rate(model, c, k) else 0.0
+    for k in range(y.shape[0]):
+        y[k] = 0.0
+    solve_connections(model.elimination, model.connections, work.solver)
+    add_wrenches(model, work)
+    for i in range(model.bodies.kind.shape[0]):
+        u0 = model.bodies.u0[i] + 3
+        put(y, u0, turned(work.bodies.T_right[i], y[u0:]))
+
+
+@inner
+def add_wrenches(model, work):
+    """Add the motion X mu that wrenches mu give to the bodies to y."""
+    bodies, markers, connections, solver = model.bodies, model.markers, model.connections, work.solver
+    y, mu = solver.y, solver.mu
+    for i in range(bodies.kind.shape[0]):
+        n, u0, R = 6 + bodies.n_q[i], bodies.u0[i], work.state.R[i]
+        for e in range(bodies.end0[i], bodies.end0[i + 1]):
+            m = bodies.ends[e]
+            c = markers.connection[m]
+            o, w0, sign = markers.x0[m], connections.w0[c], markers.sign[m]
+            size = 3 if markers.moment[m] < 0 else 6
+            wrench = solver.wrench  # of the correction on the marker, body axes
+            for part in range(0, size, 3):
+                w_part = markers.force[m] if part == 0 else markers.moment[m]
+                if w_part >= 0:
+                    put(wrench, part, scaled(sign, turned_back(R, mu[w0 + w_part :])))
+                else:
+                    put(wrench, part, (0.0, 0.0, 0.0))
+            for r in range(n):
+                total = 0.0
+                for k in range(size):
+                    total += solver.X[6 * o + r * 6 + k] * wrench[k]
+                y[u0 + r] += total
+
+
+@inner
+def assemble_masses(model, work, c_k):
+    """Factorise the masses of bodies and assemble the connections as accelerations feel them; whether that goes.
+
+    Modes without mass have c_k times their stiffness.
+    """
+    bodies, types = model.bodies, model.body_types
+    linearize(model, work, 1.0, 0.0, 0.0)
+    for i in range(bodies.kind.shape[0]):
+        n, t = 6 + bodies.n_q[i], bodies.kind[i]
+        H = work.solver.H[bodies.h0[i] : bodies.h0[i + 1]].reshape((n, n))
+        step = 1 if types.is_diagonal[t, STIFFNESS - MASS] else n - 5
+        for k in range(n - 6):
+            if not H[6 + k, 6 + k] > 0.0:
+                H[6 + k, 6 + k] += c_k * types.blocks[types.block0[t, STIFFNESS] + k * step]
+    if factorize_tangents(model, work) >= 0:
+        return False
+    assemble(model, work, 0.0)
+    return True
+
+
+@inner
+def settle_accelerations(model, work, c_k):
+    """Correct accelerations and wrenches of the iterate to those of its positions and velocities; whether there are.
+
+    M u_dot - Jᵀ w = f, G u_dot = -d(G)/dt u, by one step of Newton's method from those of a step, whose accelerations
+    fulfil the second only as far as they are known by differences. `evaluate` has been called with c_k = 1.
+    """
+    solver, g = work.solver, work.connections.g
+    constraint_rates(model, work)
+    if not assemble_masses(model, work, c_k):
+        return False
+    if factorize_connections(model.elimination, model.connections, solver) >= 0:
+        return False
+    for i in range(model.bodies.kind.shape[0]):
+        u0 = model.bodies.u0[i]
+        for k in range(u0, u0 + 6 + model.bodies.n_q[i]):
+            solver.y[k] = work.state.u_dot[k]
+        put(solver.y, u0, turned_back(work.state.R[i], work.state.u_dot[u0:]))
+    for k in range(g.shape[0]):
+        solver.mu[k] = 0.0
+    take_motions(model, work)
+    total = 0.0
+    for k in range(g.shape[0]):
+        if model.rows.holds[k] != NOTHING:
+            g[k] = work.connections.bias[k] - solver.mu[k]
+    correction(model, work, 1.0, False)
+    for i in range(model.bodies.kind.shape[0]):
+        u0 = model.bodies.u0[i]
+        put_sum(work.state.u_dot, u0, turned(work.state.R[i], solver.y[u0:]))
+        for k in range(u0 + 3, u0 + 6 + model.bodies.n_q[i]):
+            work.state.u_dot[k] += solver.y[k]
+            total += solver.y[k]
+    for k in range(g.shape[0]):
+        work.state.w[k] += solver.mu[k]
+        total += solver.mu[k]
+    return math.isfinite(total)
+
+
+@inner
+def share_reactions(model, work, c_k):
+    """Share the reactions of the iterate among constraints that repeat others; whether that has an answer.
+
+    Of all wrenches w' that act on the bodies as w does, Jᵀ w' = Jᵀ w, those of the least sum of soft lambda², lambda
+    being the reaction along a row that may give way, `soft` its mobility. With A = G M⁻¹ Jᵀ and S = soft lambda of w,
+    V = -S, they are the limit of the proximal point algorithm
+
+        (A + s S) w'_j = A w + s S w'_(j-1),      w'_0 = 0          (rows that hold nothing: V w'_j = V w):
+
+    all w'_j are reactions to motions of the bodies, which no reactions that balance themselves are part of, and A w'
+    comes nearer to A w in each sweep by the ratio of s S to the least eigenvalue of A. w may hold any sum that balances
+    itself, such as the rounding of positions over c_k. Work arrays are overwritten, factors and y included.
+    """
+    rows, connections, solver = model.rows, model.connections, work.solver
+    if not assemble_masses(model, work, c_k):
+        return False
+    for c in range(connections.size.shape[0]):
+        size, o = connections.size[c], model.elimination.diagonal[c]
+        for r in range(size):
+            if rows.soft[connections.w0[c] + r] > 0.0:
+                for k in range(size):
+                    solver.blocks[o + r * size + k] += (SOFTER - 1.0) * work.connections.V[c, r, k]
+                    work.connections.V[c, r, k] *= SOFTER
+    if factorize_connections(model.elimination, connections, solver) >= 0:
+        return False
+    for k in range(solver.y.shape[0]):
+        solver.y[k] = 0.0
+    for k in range(solver.mu.shape[0]):
+        solver.mu[k] = work.state.w[k]
+    add_wrenches(model, work)  # y = M⁻¹ Jᵀ w
+    for k in range(solver.mu.shape[0]):
+        solver.mu[k] = 0.0
+    for sweep in range(SWEEPS):
+        if sweep > 0:
+            for k in range(solver.mu.shape[0]):
+                work.connections.bias[k], solver.mu[k] = solver.mu[k], 0.0
+        take_motions(model, work)
+        for c in range(connections.size.shape[0]):
+            w0 = connections.w0[c]
+            for r in range(connections.size[c]):
+                total = -solver.mu[w0 + r]
+                for k in range(connections.size[c]):
+                    if rows.holds[w0 + r] == NOTHING:
+                        total += work.connections.V[c, r, k] * work.state.w[w0 + k]
+                    elif sweep > 0:
+                        total += work.connections.V[c, r, k] * work.connections.bias[w0 + k]
+                solver.mu[w0 + r] = total
+        solve_connections(model.elimination, connections, solver)
+    total = 0.0
+    for k in range(solver.mu.shape[0]):
+        total += solver.mu[k]
+    if not math.isfinite(total):
+        return False
+    for k in range(solver.mu.shape[0]):
+        work.state.w[k] = solver.mu[k]
+    return True

@@ -1,0 +1,85 @@
+"""Angles counted through full turns, from step to step.
+
+An angle is that by which the direction y of one body has turned about the axis x × z of another, from its direction z
+towards -x (as a TWIST row has it). With E = R_h x, Z = R_h z of the holder of the axis, D = R_o y of the other body,
+and omega = omega_o - omega_h, all in ground axes,
+
+    th = atan2(S, C),  S = -E·D,  C = Z·D;      th_dot = (C S_dot - S C_dot)/(S² + C²),
+    S_dot = -E·(omega × D),  C_dot = Z·(omega × D),
+
+and of all th + 2 pi n the one is taken that is nearest to where the mean rate of the step leads from the angle before.
+Bodies are taken undeformed: elasticity adds less than half a turn.
+
+Three angles in a row may be a rotation vector instead, that of A_hᵀ A_o, axes of o as seen in axes x, z × x, z of h: of
+theta + 2 pi n theta/|theta| the one nearest to where the mean of omega, in axes of h, leads.
+"""
+
+import math
+
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.connections.bushing import continued, rotation_vector
+from floatframe.engine.kernels.vector import add, cross, dot, put, scaled, sub, transposed, turned, turned_back, vector
+
+__all__ = ["count_turns"]
+
+
+@inner
+def in_ground(state, i, x):
+    """Return a direction of body i, -1 for the ground, in ground axes."""
+    return vector(x) if i < 0 else turned(state.R[i], vector(x))
+
+
+@inner
+def spin(bodies, state, i):
+    """Return the angular velocity of body i in ground axes."""
+    if i < 0:
+        return 0.0, 0.0, 0.0
+    return turned(state.R[i], vector(state.u[bodies.u0[i] + 3 :]))
+
+
+@inner
+def angle_and_rate(angles, bodies, state, k):
+    """Return angle k, between -pi and pi, and its rate."""
+    holder, other = angles.holder[k], angles.other[k]
+    E, Z = in_ground(state, holder, angles.x[k]), in_ground(state, holder, angles.z[k])
+    D = in_ground(state, other, angles.y[k])
+    D_dot = cross(sub(spin(bodies, state, other), spin(bodies, state, holder)), D)
+    S, C = -dot(E, D), dot(Z, D)
+    S_dot, C_dot = -dot(E, D_dot), dot(Z, D_dot)
+    square = S * S + C * C
+    rate = (C * S_dot - S * C_dot) / square if square > 0.0 else 0.0
+    return math.atan2(S, C), rate
+
+
+@inner
+def count_rotation(angles, bodies, state, memory, k, h):
+    """Take the rotation vector of which k is the first part into the memory."""
+    holder, other = angles.holder[k], angles.other[k]
+    x, z = in_ground(state, holder, angles.x[k]), in_ground(state, holder, angles.z[k])
+    A = transposed((x, cross(z, x), z))
+    rows = (
+        in_ground(state, other, angles.y[k]),
+        in_ground(state, other, angles.y[k + 1]),
+        in_ground(state, other, angles.y[k + 2]),
+    )
+    rate = turned_back(A, sub(spin(bodies, state, other), spin(bodies, state, holder)))
+    mean = add(vector(memory.angle_rate[k:]), rate)
+    theta = continued(rotation_vector(A, transposed(rows)), add(vector(memory.angle[k:]), scaled(0.5 * h, mean)))
+    put(memory.angle, k, theta)
+    put(memory.angle_rate, k, rate)
+
+
+@inner
+def count_turns(model, work, memory, h):
+    """Take the angles of the iterate into the memory, a step of size h after those that are there."""
+    for k in range(memory.angle.shape[0]):
+        if model.angles.part[k] == 0:
+            count_rotation(model.angles, model.bodies, work.state, memory, k, h)
+        if model.angles.part[k] >= 0:
+            continue
+        angle, rate = angle_and_rate(model.angles, model.bodies, work.state, k)
+        sign = model.angles.sign[k]
+        angle, rate = sign * angle, sign * rate
+        expected = memory.angle[k] + 0.5 * h * (memory.angle_rate[k] + rate)
+        memory.angle[k] = angle + 2 * math.pi * math.floor((expected - angle) / (2 * math.pi) + 0.5)
+        memory.angle_rate[k] = rate

@@ -1,0 +1,159 @@
+"""Vectors of three numbers and matrices of three rows in the kernels: tuples, which the compiler keeps in registers.
+
+Where a matrix is only read, an array (3, 3) will do.
+"""
+
+import math
+
+from floatframe.engine.kernels.compiler.compilation import small
+
+__all__ = [
+    "add",
+    "cross",
+    "dot",
+    "matrix",
+    "matrix_sum",
+    "norm",
+    "product",
+    "put",
+    "put_matrix",
+    "put_sum",
+    "scaled",
+    "scaled_matrix",
+    "sub",
+    "tilde",
+    "transposed",
+    "turned",
+    "turned_back",
+    "unit",
+    "unit_matrix",
+    "vector",
+]
+
+
+@small
+def vector(x):
+    """Return the first three numbers of an array as a vector."""
+    return x[0], x[1], x[2]
+
+
+@small
+def unit(k):
+    """Return the unit vector along axis k."""
+    return 1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0
+
+
+@small
+def dot(a, b):
+    """Return a · b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@small
+def norm(a):
+    """Return |a|."""
+    return math.sqrt(dot(a, a))
+
+
+@small
+def cross(a, b):
+    """Return a × b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@small
+def add(a, b):
+    """Return a + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@small
+def sub(a, b):
+    """Return a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@small
+def scaled(f, a):
+    """Return f a."""
+    return f * a[0], f * a[1], f * a[2]
+
+
+@small
+def matrix(A):
+    """Return an array (3, 3) as three rows."""
+    return vector(A[0]), vector(A[1]), vector(A[2])
+
+
+@small
+def unit_matrix():
+    """Return 1."""
+    return (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+@small
+def tilde(x):
+    """Return the matrix of x ×."""
+    return (0.0, -x[2], x[1]), (x[2], 0.0, -x[0]), (-x[1], x[0], 0.0)
+
+
+@small
+def matrix_sum(A, B):
+    """Return A + B."""
+    return add(A[0], B[0]), add(A[1], B[1]), add(A[2], B[2])
+
+
+@small
+def scaled_matrix(f, A):
+    """Return f A."""
+    return scaled(f, A[0]), scaled(f, A[1]), scaled(f, A[2])
+
+
+@small
+def transposed(A):
+    """Return Aᵀ."""
+    return (A[0][0], A[1][0], A[2][0]), (A[0][1], A[1][1], A[2][1]), (A[0][2], A[1][2], A[2][2])
+
+
+@small
+def turned(A, x):
+    """Return A x."""
+    return dot(A[0], x), dot(A[1], x), dot(A[2], x)
+
+
+@small
+def turned_back(A, x):
+    """Return Aᵀ x."""
+    return (
+        A[0][0] * x[0] + A[1][0] * x[1] + A[2][0] * x[2],
+        A[0][1] * x[0] + A[1][1] * x[1] + A[2][1] * x[2],
+        A[0][2] * x[0] + A[1][2] * x[1] + A[2][2] * x[2],
+    )
+
+
+@small
+def product(A, B):
+    """Return A B."""
+    return turned_back(B, A[0]), turned_back(B, A[1]), turned_back(B, A[2])
+
+
+@small
+def put(row, first, x):
+    """Write a vector into an array."""
+    row[first], row[first + 1], row[first + 2] = x[0], x[1], x[2]
+
+
+@small
+def put_sum(row, first, x):
+    """Add a vector to numbers of an array."""
+    row[first] += x[0]
+    row[first + 1] += x[1]
+    row[first + 2] += x[2]
+
+
+@small
+def put_matrix(out, A):
+    """Write a matrix into an array (3, 3)."""
+    put(out[0], 0, A[0])
+    put(out[1], 0, A[1])
+    put(out[2], 0, A[2])

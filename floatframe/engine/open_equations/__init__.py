@@ -1,0 +1,21 @@
+"""Open equations of a system (residual, matrices, constraints, maps) in Python, for integrators of the user."""
+
+from floatframe.engine.open_equations.body_equations import BodyEquations, body_equations
+from floatframe.engine.open_equations.configuration import Configurations
+from floatframe.engine.open_equations.layout import Component, Layout
+from floatframe.engine.open_equations.radau import radau
+from floatframe.engine.open_equations.rattle import rattle
+from floatframe.engine.open_equations.system_equations import Equations, Tangents, open_equations
+
+__all__ = [
+    "BodyEquations",
+    "Component",
+    "Configurations",
+    "Equations",
+    "Layout",
+    "Tangents",
+    "body_equations",
+    "open_equations",
+    "radau",
+    "rattle",
+]

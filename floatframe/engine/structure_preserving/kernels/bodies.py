@@ -1,0 +1,389 @@
+"""Bodies over a step, see `floatframe.engine.structure_preserving.bodies` for the formulas."""
+
+from floatframe.engine.kernels.body import block, column, column_sum
+from floatframe.engine.kernels.compiler.compilation import inner, loops
+from floatframe.engine.kernels.dense import add_products, lu_factor, lu_solve
+from floatframe.engine.kernels.rotation import matrix_of_euler_parameters
+from floatframe.engine.kernels.vector import (
+    add,
+    cross,
+    dot,
+    matrix,
+    product,
+    put,
+    put_matrix,
+    put_sum,
+    scaled,
+    sub,
+    turned,
+    turned_back,
+    vector,
+)
+from floatframe.engine.structure_preserving.kernels.records import (
+    BENT,
+    C1,
+    C2,
+    DAMPING,
+    FILTER,
+    INERTIA,
+    MASS,
+    PRODUCTS,
+    STIFFNESS,
+    STIFFNESS_FILTER,
+    TURNED_PRODUCTS,
+    VARIATIONAL,
+)
+
+__all__ = ["begin_bodies", "body_inertia", "body_step", "end_rates", "interval", "keep_bodies", "move_bodies"]
+
+
+@inner
+def cayley(theta):
+    """Return cay(theta)."""
+    s = 1.0 / (1.0 + 0.25 * dot(theta, theta))
+    x, y, z = theta
+    a = 0.5 * s
+    return (
+        (1.0 - a * (y * y + z * z), a * x * y - s * z, a * x * z + s * y),
+        (a * x * y + s * z, 1.0 - a * (x * x + z * z), a * y * z - s * x),
+        (a * x * z - s * y, a * y * z + s * x, 1.0 - a * (x * x + y * y)),
+    )
+
+
+@loops
+def shapes(discrete, t, n, q, out):
+    """Write 1C(q) = ds/dq over the mass, [a, k]."""
+    C = block(discrete, t, C1, 3 * n)
+    for k in range(3 * n):
+        out[k] = C[k]
+    if discrete.is_bent[t]:
+        add_products(block(discrete, t, BENT, 3 * n * n), q, out[: 3 * n])
+
+
+@loops
+def center(discrete, t, n, q, C):
+    """Return s(q) over the mass, for C = shapes(q)."""
+    s = vector(discrete.center[t])
+    both = add(column_sum(block(discrete, t, C1, 3 * n), n, q), column_sum(C, n, q))
+    return add(s, scaled(0.5, both))
+
+
+@loops
+def moment(V, n, k):
+    """Return epsilon_abc V_cb,k."""
+    return V[7 * n + k] - V[5 * n + k], V[2 * n + k] - V[6 * n + k], V[3 * n + k] - V[n + k]
+
+
+@loops
+def products(discrete, t, n, q, which, out):
+    """Write V_ab,k = Σ_l S_ab,kl q_l."""
+    for k in range(9 * n):
+        out[k] = 0.0
+    add_products(block(discrete, t, which, 9 * n * n), q, out[: 9 * n])
+
+
+@loops
+def matrix_product(discrete, t, which, n, x, out):
+    """Write A x of a stored matrix, (n, n)."""
+    A = block(discrete, t, which, n * n)
+    for i in range(n):
+        total = 0.0
+        for j in range(n):
+            total += A[i * n + j] * x[j]
+        out[i] = total
+
+
+@loops
+def momenta(model, discrete, step, t, n, q, omega, q_dot, Y):
+    """Return Pi and write Y, (n,)."""
+    J = matrix(model.body_types.J0[t])
+    Pi = turned(J, omega)
+    s = vector(discrete.center[t])
+    m = model.body_types.mass[t]
+    if n == 0:
+        return sub(Pi, cross(s, scaled(m, cross(omega, s))))
+    V, C = step.V, step.C
+    products(discrete, t, n, q, PRODUCTS, V)
+    shapes(discrete, t, n, q, C)
+    s = center(discrete, t, n, q, C)
+    a = scaled(m, add(cross(omega, s), column_sum(C, n, q_dot)))
+    Pi = sub(Pi, cross(s, a))
+    C_2, J_k = block(discrete, t, C2, 3 * n), block(discrete, t, INERTIA, 9 * n)
+    matrix_product(discrete, t, MASS, n, q_dot, Y)
+    trace = 0.0
+    x, y, z = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)  # P = V q
+    for k in range(n):
+        B = add(column(C_2, n, k), moment(V, n, k))
+        Y[k] += dot(B, omega) - dot(column(C, n, k), a)
+        Pi = add(Pi, scaled(q_dot[k], B))
+        Pi = add(Pi, scaled(q[k], turned(matrix(J_k[9 * k : 9 * k + 9].reshape((3, 3))), omega)))
+        x = add(x, (V[k] * q[k], V[n + k] * q[k], V[2 * n + k] * q[k]))
+        y = add(y, (V[3 * n + k] * q[k], V[4 * n + k] * q[k], V[5 * n + k] * q[k]))
+        z = add(z, (V[6 * n + k] * q[k], V[7 * n + k] * q[k], V[8 * n + k] * q[k]))
+    trace = x[0] + y[1] + z[2]
+    P = (x, y, z)
+    both = add(turned(P, omega), turned_back(P, omega))
+    return sub(add(Pi, scaled(trace, omega)), scaled(0.5, both))
+
+
+@loops
+def inertia_force(model, discrete, step, t, n, q_0, q_1, q_mean, C_mean, omega_0, rate_0, omega_1, rate_1, out):
+    """Write N_k, (n,): 1/2 w_0ᵀ M_c,k w_1 between two configurations."""
+    m = model.body_types.mass[t]
+    V, W, C = step.V, step.W, step.C
+    products(discrete, t, n, q_mean, PRODUCTS, V)
+    J_k = block(discrete, t, INERTIA, 9 * n)
+    both = dot(omega_0, omega_1)
+    for k in range(n):
+        J = matrix(J_k[9 * k : 9 * k + 9].reshape((3, 3)))
+        A = (
+            (V[k], V[n + k], V[2 * n + k]),
+            (V[3 * n + k], V[4 * n + k], V[5 * n + k]),
+            (V[6 * n + k], V[7 * n + k], V[8 * n + k]),
+        )
+        total = dot(omega_0, turned(J, omega_1)) + 2.0 * both * (A[0][0] + A[1][1] + A[2][2])
+        out[k] = total - dot(omega_0, add(turned(A, omega_1), turned_back(A, omega_1)))
+    shapes(discrete, t, n, q_0, C)
+    s_0, a_rate_0, a_rate_1 = center(discrete, t, n, q_0, C), column_sum(C, n, rate_0), column_sum(C, n, rate_1)
+    shapes(discrete, t, n, q_1, C)
+    s_mean = scaled(0.5, add(s_0, center(discrete, t, n, q_1, C)))
+    a_rate_0 = scaled(0.5, add(a_rate_0, column_sum(C, n, rate_0)))
+    a_rate_1 = scaled(0.5, add(a_rate_1, column_sum(C, n, rate_1)))
+    for turn in range(2):
+        omega, other = (omega_0, omega_1) if turn == 0 else (omega_1, omega_0)
+        other_rate = rate_1 if turn == 0 else rate_0
+        a = scaled(m, add(cross(omega, s_mean), a_rate_0 if turn == 0 else a_rate_1))
+        products(discrete, t, n, other_rate, TURNED_PRODUCTS, W)
+        across = cross(a, other)
+        for k in range(n):
+            out[k] += dot(omega, moment(W, n, k)) - dot(column(C_mean, n, k), across)
+        if discrete.is_bent[t]:
+            for k in range(3 * n):
+                C[k] = 0.0
+            add_products(block(discrete, t, BENT, 3 * n * n), other_rate, C[: 3 * n])
+            for k in range(n):
+                out[k] -= dot(column(C, n, k), a)
+    for k in range(n):
+        out[k] *= 0.5
+
+
+@inner
+def begin_bodies(model, discrete, step, memory):
+    """Write centres of mass, velocities and momenta of all bodies at the state in the memory."""
+    for i in range(model.bodies.kind.shape[0]):
+        t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
+        R = matrix_of_euler_parameters(memory.p[i])
+        put_matrix(step.R_0[i], R)
+        for k in range(4):
+            step.p_0[i, k] = memory.p[i, k]
+        q, q_dot, omega = memory.q[q0 : q0 + n], memory.u[u0 + 6 : u0 + 6 + n], vector(memory.u[u0 + 3 :])
+        for k in range(n):
+            step.q_0[q0 + k] = q[k]
+        shapes(discrete, t, n, q, step.C)
+        s = center(discrete, t, n, q, step.C)
+        put(step.s_0[i], 0, s)
+        put(step.c_0[i], 0, add(vector(memory.r[i]), turned(R, s)))
+        a = add(cross(omega, s), column_sum(step.C, n, q_dot))
+        put(step.w_0, u0, add(vector(memory.u[u0:]), turned(R, a)))
+        for k in range(u0 + 3, u0 + 6 + n):
+            step.w_0[k] = memory.u[k]
+        put_momenta(model, discrete, step, i, q, step.w_0, step.P_0)
+
+
+@inner
+def put_momenta(model, discrete, step, i, q, w, P):
+    """Write m v, Pi and Y of body i with velocities w."""
+    t, n, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.u0[i]
+    put(P, u0, scaled(model.body_types.mass[t], vector(w[u0:])))
+    omega, q_dot = vector(w[u0 + 3 :]), w[u0 + 6 : u0 + 6 + n]
+    put(P, u0 + 3, momenta(model, discrete, step, t, n, q, omega, q_dot, P[u0 + 6 : u0 + 6 + n]))
+
+
+@inner
+def move_bodies(model, step):
+    """Take the end of the step as the configuration from which it goes on."""
+    for i in range(model.bodies.kind.shape[0]):
+        n, q0, u0 = model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
+        p, half = step.p_0[i], scaled(0.5, vector(step.z[u0 + 3 :]))
+        w, v = p[0], vector(p[1:])
+        a, b = w - dot(v, half), add(add(scaled(w, half), v), cross(v, half))
+        size = (a * a + dot(b, b)) ** 0.5
+        p[0] = a / size
+        put(p, 1, scaled(1.0 / size, b))
+        R = matrix_of_euler_parameters(p)
+        put_matrix(step.R_0[i], R)
+        put_sum(step.c_0[i], 0, vector(step.d[i]))
+        put(step.z, u0, turned_back(R, vector(step.d[i])))
+        put(step.s_0[i], 0, vector(step.s_1[i]))
+        for k in range(q0, q0 + n):
+            step.q_0[k] = step.q_1[k]
+
+
+@inner
+def keep_bodies(model, discrete, step, memory):
+    """Write the configuration with velocities w_1 into the memory."""
+    for i in range(model.bodies.kind.shape[0]):
+        t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
+        q, q_dot, omega = step.q_0[q0 : q0 + n], step.w_1[u0 + 6 : u0 + 6 + n], vector(step.w_1[u0 + 3 :])
+        for k in range(4):
+            memory.p[i, k] = step.p_0[i, k]
+        for k in range(n):
+            memory.q[q0 + k] = q[k]
+        R = matrix(step.R_0[i])
+        shapes(discrete, t, n, q, step.C)
+        s = center(discrete, t, n, q, step.C)
+        put(memory.r[i], 0, sub(vector(step.c_0[i]), turned(R, s)))
+        a = add(cross(omega, s), column_sum(step.C, n, q_dot))
+        put(memory.u, u0, sub(vector(step.w_1[u0:]), turned(R, a)))
+        for k in range(u0 + 3, u0 + 6 + n):
+            memory.u[k] = step.w_1[k]
+
+
+@inner
+def body_step(model, discrete, step, i):
+    """Write how body i moves over the step by its unknowns.
+
+    Forces of the variational scheme act at one configuration. The angular velocity there that belongs to the momentum
+    of the interval is (1 + theta²/4) theta/h (exactly, for turns about a principal axis).
+    """
+    t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
+    R, theta = matrix(step.R_0[i]), vector(step.z[u0 + 3 :])
+    put(step.d[i], 0, turned(R, vector(step.z[u0:])))
+    is_interval = step.is_still and step.is_closing < 2
+    turn = scaled(1.0 + 0.25 * dot(theta, theta), theta) if is_interval else theta
+    put(step.theta_G[i], 0, turned(R, turn))
+    if not step.is_closing:
+        put_matrix(step.R_1[i], product(R, cayley(theta)))
+    if step.is_still:
+        put_matrix(step.R_m[i], R)
+    else:
+        x, y, z = 0.5 * theta[0], 0.5 * theta[1], 0.5 * theta[2]
+        put_matrix(step.R_m[i], product(R, ((1.0, -z, y), (z, 1.0, -x), (-y, x, 1.0))))
+    for k in range(n):
+        dq = step.z[u0 + 6 + k]
+        step.dq[q0 + k] = dq
+        if not step.is_closing:
+            step.q_1[q0 + k] = step.q_0[q0 + k] + dq
+        step.q_mean[q0 + k] = step.q_0[q0 + k] + (0.0 if step.is_still else 0.5 * dq)
+    if not step.is_closing:
+        q = step.q_1[q0 : q0 + n]
+        shapes(discrete, t, n, q, step.C)
+        put(step.s_1[i], 0, center(discrete, t, n, q, step.C))
+    q, C = step.q_mean[q0 : q0 + n], step.C_mean[3 * q0 : 3 * q0 + 3 * n]
+    shapes(discrete, t, n, q, C)
+    put(step.s_mean[i], 0, center(discrete, t, n, q, C))
+
+
+@inner
+def end_rates(model, discrete, step, i):
+    """(1): write the velocities of body i at the end of a conserving step."""
+    t, n, q0, u0, h = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i], step.h
+    put(step.w_1, u0, sub(scaled(2.0 / h, vector(step.d[i])), vector(step.w_0[u0:])))
+    for k in range(3, 6 + n):
+        step.w_1[u0 + k] = 2.0 * step.z[u0 + k] / h - step.w_0[u0 + k]
+    if n == 0 or not discrete.is_filtered:
+        return
+    m, q = model.body_types.mass[t], step.q_1[q0 : q0 + n]
+    Y, x = step.vector[:n], step.w_1[u0 + 6 : u0 + 6 + n]
+    for k in range(n):
+        x[k] = 0.0
+    momenta(model, discrete, step, t, n, q, vector(step.w_1[u0 + 3 :]), x, Y)
+    for k in range(n):
+        Y[k] -= step.P_0[u0 + 6 + k]
+    shapes(discrete, t, n, q, step.C)
+    G, M, A = block(discrete, t, FILTER, n * n), block(discrete, t, MASS, n * n), step.matrix
+    for i_ in range(n):
+        total = 0.0
+        for j in range(n):
+            total += G[i_ * n + j] * Y[j]
+        x[i_] = step.dq[q0 + i_] / h - 0.5 * step.w_0[u0 + 6 + i_] - total
+    for i_ in range(n):
+        for j in range(n):
+            A[i_, j] = 0.5 if i_ == j else 0.0
+    for j in range(n):
+        c = column(step.C, n, j)
+        for l_ in range(n):
+            effective = M[l_ * n + j] - m * dot(column(step.C, n, l_), c)
+            for i_ in range(n):
+                A[i_, j] += G[i_ * n + l_] * effective
+    lu_factor(A[:n, :n], step.pivot[:n])
+    lu_solve(A[:n, :n], step.pivot[:n], x)
+
+
+@inner
+def body_inertia(model, discrete, step, i):
+    """Write the residual of body i without loads, in its axes at the beginning: h/2 times the change of momentum."""
+    t, n, q0, u0, h = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i], step.h
+    m, R, out = model.body_types.mass[t], matrix(step.R_0[i]), step.residual
+    if step.is_closing:
+        q, omega = step.q_0[q0 : q0 + n], scaled(1.0 / h, vector(step.z[u0 + 3 :]))
+        rate, Y = step.w_1[u0 + 6 : u0 + 6 + n], step.P_1[u0 + 6 : u0 + 6 + n]
+        for k in range(n):
+            rate[k] = step.z[u0 + 6 + k] / h
+        Pi = momenta(model, discrete, step, t, n, q, omega, rate, Y)
+        put(out, u0, sub(scaled(m, vector(step.z[u0:])), scaled(h, turned_back(R, vector(step.P_0[u0:])))))
+        put(out, u0 + 3, scaled(h, sub(Pi, vector(step.P_0[u0 + 3 :]))))
+        for k in range(n):
+            out[u0 + 6 + k] = h * (Y[k] - step.P_0[u0 + 6 + k])
+        return
+    d, theta, Pi_0 = vector(step.z[u0:]), vector(step.z[u0 + 3 :]), vector(step.P_0[u0 + 3 :])
+    C_mean, N = step.C_mean[3 * q0 : 3 * q0 + 3 * n], step.force
+    put(out, u0, scaled(m, sub(d, scaled(h, turned_back(R, vector(step.w_0[u0:]))))))
+    if discrete.scheme == VARIATIONAL:
+        interval(model, discrete, step, i)
+        Pi = vector(step.P_1[u0 + 3 :])
+        turning = add(add(Pi, scaled(0.5, cross(theta, Pi))), scaled(0.25 * dot(theta, Pi), theta))
+        put(out, u0 + 3, scaled(h, sub(turning, Pi_0)))
+        for k in range(n):
+            out[u0 + 6 + k] = h * (step.P_1[u0 + 6 + k] - step.P_0[u0 + 6 + k]) - 0.5 * h * h * N[k]
+        return
+    end_rates(model, discrete, step, i)
+    put_momenta(model, discrete, step, i, step.q_1[q0 : q0 + n], step.w_1, step.P_1)
+    Pi = vector(step.P_1[u0 + 3 :])
+    turning = add(sub(Pi, Pi_0), scaled(0.5, cross(theta, add(Pi, Pi_0))))
+    put(out, u0 + 3, scaled(0.5 * h, turning))
+    if n == 0:
+        return
+    q_mean = step.q_mean[q0 : q0 + n]
+    inertia_force(
+        model, discrete, step, t, n, step.q_0[q0 : q0 + n], step.q_1[q0 : q0 + n], q_mean, C_mean,
+        vector(step.w_0[u0 + 3 :]), step.w_0[u0 + 6 : u0 + 6 + n], vector(step.w_1[u0 + 3 :]),
+        step.w_1[u0 + 6 : u0 + 6 + n], N,
+    )  # fmt: skip
+    subtract_elastic(discrete, step, t, n, q_mean, step.dq[q0 : q0 + n], N)
+    for k in range(n):
+        out[u0 + 6 + k] = 0.5 * h * (step.P_1[u0 + 6 + k] - step.P_0[u0 + 6 + k]) - 0.5 * h * h * N[k]
+
+
+@loops
+def subtract_elastic(discrete, step, t, n, q_mean, dq, N):
+    """Subtract K q and D dq/h from modal forces, q with its part that dissipates."""
+    K, D, q = block(discrete, t, STIFFNESS, n * n), block(discrete, t, DAMPING, n * n), step.vector
+    for k in range(n):
+        q[k] = q_mean[k]
+    if discrete.is_filtered:
+        X = block(discrete, t, STIFFNESS_FILTER, n * n)
+        for k in range(n):
+            for j in range(n):
+                q[k] += X[k * n + j] * dq[j]
+    for k in range(n):
+        total = 0.0
+        for j in range(n):
+            total += K[k * n + j] * q[j] + D[k * n + j] * dq[j] / step.h
+        N[k] -= total
+
+
+@inner
+def interval(model, discrete, step, i):
+    """Write Pi and Y between two configurations into P_1, and the modal force there into `force`; variational."""
+    t, n, q0, u0, h = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i], step.h
+    omega, rate, q = scaled(1.0 / h, vector(step.z[u0 + 3 :])), step.w_1[u0 + 6 : u0 + 6 + n], step.middle[:n]
+    for k in range(n):
+        rate[k] = step.dq[q0 + k] / h
+        q[k] = step.q_0[q0 + k] + 0.5 * step.dq[q0 + k]
+    put(step.P_1, u0 + 3, momenta(model, discrete, step, t, n, q, omega, rate, step.P_1[u0 + 6 : u0 + 6 + n]))
+    if n:
+        C = step.C_interval
+        shapes(discrete, t, n, q, C)
+        inertia_force(model, discrete, step, t, n, q, q, q, C, omega, rate, omega, rate, step.force)
+        subtract_elastic(discrete, step, t, n, q, step.dq[q0 : q0 + n], step.force)

@@ -1,0 +1,109 @@
+"""Bushings over a step, see `floatframe.engine.structure_preserving.bushings` for the formulas."""
+
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.connections.bushing import continued, law, rotation_vector
+from floatframe.engine.kernels.rotation import exp_matrix
+from floatframe.engine.kernels.time_function import time_function
+from floatframe.engine.kernels.vector import (
+    add,
+    cross,
+    dot,
+    matrix,
+    matrix_sum,
+    product,
+    put,
+    scaled,
+    scaled_matrix,
+    sub,
+    tilde,
+    transposed,
+    turned,
+    turned_back,
+    unit,
+    vector,
+)
+from floatframe.engine.structure_preserving.kernels.coordinates import add_pair
+from floatframe.engine.structure_preserving.kernels.markers import add_direction, change, mean_jacobian, relative_cayley
+from floatframe.engine.structure_preserving.kernels.rows import mean_distance
+
+__all__ = ["bushing_load"]
+
+
+@inner
+def solved(A, x):
+    """Return A⁻¹ x by Cramer's rule."""
+    c_0, c_1, c_2 = cross(A[1], A[2]), cross(A[2], A[0]), cross(A[0], A[1])
+    both = add(scaled(x[0], c_0), add(scaled(x[1], c_1), scaled(x[2], c_2)))
+    return scaled(1.0 / dot(A[0], c_0), both)
+
+
+@inner
+def axial(A):
+    """Return x with tilde(x) = (A - Aᵀ)/2."""
+    return 0.5 * (A[2][1] - A[1][2]), 0.5 * (A[0][2] - A[2][0]), 0.5 * (A[1][0] - A[0][1])
+
+
+@inner
+def axes_change(model, discrete, step, m, mean):
+    """Return the change of the axes of a marker over the step; mean: their mean."""
+    rows = transposed(mean)
+    x = change(model, discrete, step, m, unit(0), rows[0])
+    y = change(model, discrete, step, m, unit(1), rows[1])
+    z = change(model, discrete, step, m, unit(2), rows[2])
+    return transposed((x, y, z))
+
+
+@inner
+def mean_axes(step, m):
+    """Return the mean of the axes of a marker."""
+    return scaled_matrix(0.5, matrix_sum(matrix(step.A_0[m]), matrix(step.A_f[m])))
+
+
+@inner
+def bushing_load(model, discrete, step, c):
+    """Add the loads of bushing c; return the work that its tables give, and that its damping takes."""
+    a, b, i = model.connections.a[c], model.connections.b[c], model.connections.item[c]
+    A, B, d = mean_axes(step, a), mean_axes(step, b), mean_distance(step, a, b)
+    s_0 = turned_back(step.A_0[a], sub(vector(step.x_0[b]), vector(step.x_0[a])))
+    s_1 = turned_back(step.A_f[a], sub(vector(step.x_f[b]), vector(step.x_f[a])))
+    share, angle = model.bushings.share[i], model.bushings.angle[i]
+    R_0 = product(transposed(step.A_0[a]), matrix(step.A_0[b]))
+    th_0, th_1 = rotation_vector(step.A_0[a], step.A_0[b]), rotation_vector(step.A_f[a], step.A_f[b])
+    if angle >= 0:
+        expected = vector(step.angle[angle:])
+        th_0, th_1 = continued(th_0, expected), continued(th_1, expected)
+    part_0, part_1 = scaled(-share, th_0), scaled(-share, th_1)
+    Gamma, part = mean_jacobian(th_0, th_1), mean_jacobian(part_0, part_1)
+    P = matrix_sum(R_0, product(tilde(scaled(0.5, relative_cayley(th_0, th_1))), R_0))
+    Q_0, Q_1 = exp_matrix(part_0), exp_matrix(part_1)
+    Q = scaled_matrix(0.5, matrix_sum(Q_0, Q_1))
+    arm = turned(Q, scaled(0.5, add(s_0, s_1)))
+    # the change of the deformations by the motion over the step
+    dA, dB = axes_change(model, discrete, step, a, A), axes_change(model, discrete, step, b, B)
+    turning = matrix_sum(product(transposed(dA), B), product(transposed(A), dB))
+    dtheta = solved(Gamma, axial(product(turning, transposed(P))))
+    ds = add(turned_back(dA, d), turned_back(A, sub(vector(step.dx[b]), vector(step.dx[a]))))
+    put(step.dxi, 0, add(turned(Q, ds), cross(scaled(-share, turned(part, dtheta)), arm)))
+    put(step.dxi, 3, dtheta)
+    put(step.xi, 0, scaled(0.5, add(turned(Q_0, s_0), turned(Q_1, s_1))))
+    put(step.xi, 3, scaled(0.5, add(th_0, th_1)))
+    given, taken = 0.0, 0.0
+    for r in range(6):
+        damping = law(model.bushings.damping[i, r], step.dxi) / step.h
+        taken += damping * step.dxi[r]
+        step.xi_force[r] = law(model.bushings.stiffness[i, r], step.xi) + model.bushings.preload[i, r] + damping
+        table = model.bushings.table[i, r]
+        if table >= 0:
+            value, _, _ = time_function(model.functions, table, step.xi[r])
+            step.xi_force[r] += value
+            given -= value * step.dxi[r]
+    f = vector(step.xi_force)
+    m = sub(vector(step.xi_force[3:]), scaled(share, turned_back(part, cross(arm, f))))
+    tau = solved(transposed(Gamma), m)
+    G, g = product(tilde(scaled(-0.5, tau)), P), scaled(-1.0, turned_back(Q, f))
+    on_A, on_B = transposed(product(B, transposed(G))), transposed(product(A, G))
+    for k in range(3):
+        add_direction(model, discrete, step, a, unit(k), add(on_A[k], scaled(g[k], d)))
+        add_direction(model, discrete, step, b, unit(k), on_B[k])
+    add_pair(step, a, b, turned(A, g))
+    return given, taken

@@ -1,0 +1,102 @@
+"""Contacts over a step, see `floatframe.engine.structure_preserving.contacts` for the formulas."""
+
+import math
+
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.connections.contact import V_0
+from floatframe.engine.kernels.vector import add, cross, dot, norm, scaled, sub, turned, vector
+from floatframe.engine.structure_preserving.kernels.coordinates import add_pair, span_lengths
+from floatframe.engine.structure_preserving.kernels.markers import add_direction, add_moment, turning
+from floatframe.engine.structure_preserving.kernels.rows import mean_direction, mean_distance, slip_change
+
+__all__ = ["contact_load", "gap_at", "speed_of_approach"]
+
+ALIKE = 0.02  # difference of depths over their sum below which the quotient is a mean of forces
+POINT = math.sqrt(0.6)  # of Gauss, exact to degree five
+
+
+@inner
+def gap_at(model, x, A, c):
+    """Return the gap of contact c for places x and axes A of the markers."""
+    a, b, i, own = model.connections.a[c], model.connections.b[c], model.connections.item[c], model.contacts
+    d = sub(vector(x[b]), vector(x[a]))
+    if own.is_sphere[i]:
+        return norm(d) - own.radius_a[i] - own.radius_b[i]
+    return dot(turned(A[a], vector(model.rows.x[model.connections.w0[c]])), d) - own.radius_b[i]
+
+
+@inner
+def mean_force(k, n, x_0, x_1):
+    """Return the change of k x^(n+1)/(n+1) over that of the depth, of gaps with these depths."""
+    middle, half = 0.5 * (x_0 + x_1), 0.5 * (x_1 - x_0)
+    if abs(half) <= ALIKE * middle:
+        ends = (middle - POINT * half) ** n + (middle + POINT * half) ** n
+        return k * (5.0 * ends + 8.0 * middle**n) / 18.0
+    return k * (x_1 ** (n + 1.0) - x_0 ** (n + 1.0)) / ((n + 1.0) * 2.0 * half)
+
+
+@inner
+def spring_force(k, n, gap_0, gap_1):
+    """Return f_s."""
+    x_0, x_1 = max(-gap_0, 0.0), max(-gap_1, 0.0)
+    if x_0 == 0.0 and x_1 == 0.0:
+        return 0.0
+    f = mean_force(k, n, x_0, x_1)
+    if x_0 > 0.0 and x_1 > 0.0:
+        return f
+    return f * (x_1 - x_0) / (gap_0 - gap_1)
+
+
+@inner
+def known_speed(model, step, c):
+    """Return the speed of approach v_0 of contact c."""
+    known = step.known[model.connections.w0[c] + V_0]
+    return known if known > 0.0 else max(-known, model.contacts.slow[model.connections.item[c]])
+
+
+@inner
+def contact_load(model, discrete, step, c):
+    """Add the loads of contact c; return the work that restitution and friction take."""
+    a, b, i, own = model.connections.a[c], model.connections.b[c], model.connections.item[c], model.contacts
+    gap_0, gap_1 = gap_at(model, step.x_0, step.A_0, c), gap_at(model, step.x_f, step.A_f, c)
+    f_s = spring_force(own.stiffness[i], own.exponent[i], gap_0, gap_1)
+    if f_s == 0.0:
+        return 0.0
+    x, dx = vector(model.rows.x[model.connections.w0[c]]), sub(vector(step.dx[b]), vector(step.dx[a]))
+    d = mean_distance(step, a, b)
+    l_0, l_1 = span_lengths(step, a, b)
+    if own.is_sphere[i]:
+        way = 2.0 * dot(d, dx) / (l_0 + l_1)
+    else:
+        way, _, _ = slip_change(model, discrete, step, x, a, b)
+    f = f_s * max(1.0 - own.dissipation[i] / known_speed(model, step, c) * way / step.h, 0.0)
+    taken = (f_s - f) * way
+    N = d
+    if own.is_sphere[i]:
+        add_pair(step, a, b, scaled(2.0 * f / (l_0 + l_1), d))
+    else:
+        N = mean_direction(step, a, x)
+        add_pair(step, a, b, scaled(f, N))
+        add_direction(model, discrete, step, a, x, scaled(f, d))
+    if own.friction[i] == 0.0:
+        return taken
+    N = scaled(1.0 / norm(N), N)
+    rho = scaled(-own.radius_b[i], N)
+    arm = add(d, rho)
+    slip = add(dx, sub(cross(turning(model, step, b), rho), cross(turning(model, step, a), arm)))
+    V = scaled(1.0 / step.h, slip)
+    V_t = sub(V, scaled(dot(N, V), N))
+    T = scaled(-own.friction[i] * f / math.sqrt(dot(V_t, V_t) + own.slip_speed[i] ** 2), V_t)
+    add_pair(step, a, b, T)
+    add_moment(model, step, b, cross(rho, T))
+    add_moment(model, step, a, scaled(-1.0, cross(arm, T)))
+    return taken - dot(T, V) * step.h
+
+
+@inner
+def speed_of_approach(model, step, c):
+    """Return what the next step knows of v_0: in contact v_0, else minus the speed at which the gap closes."""
+    begin, end = gap_at(model, step.x_0, step.A_0, c), gap_at(model, step.x_1, step.A_1, c)
+    if end >= 0.0:
+        return min((end - begin) / step.h, -model.contacts.slow[model.connections.item[c]])
+    return known_speed(model, step, c)

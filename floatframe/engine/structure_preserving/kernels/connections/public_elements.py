@@ -1,0 +1,376 @@
+"""Public elements over a step, see `floatframe.engine.structure_preserving.public_elements` for the formulas."""
+
+import math
+
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.connections.element_law import law_call, note_what_is_no_number
+from floatframe.engine.kernels.rotation import exp_matrix
+from floatframe.engine.kernels.vector import (
+    add,
+    cross,
+    dot,
+    matrix,
+    matrix_sum,
+    norm,
+    product,
+    put,
+    put_matrix,
+    put_sum,
+    scaled,
+    scaled_matrix,
+    sub,
+    transposed,
+    turned_back,
+    vector,
+)
+from floatframe.engine.structure_preserving.kernels.bodies import cayley
+from floatframe.engine.structure_preserving.kernels.markers import add_force, add_moment, turning
+from floatframe.model.joints.rows.kinds import POSITION, VELOCITY
+
+__all__ = ["element_gap", "element_load", "element_residual", "first_row_of_multipliers"]
+
+WAY = 1.0 / 64.0  # of the step, on which the gradient of the potential is taken
+FIRST = (-1 / 60, 9 / 60, -45 / 60, 0.0, 45 / 60, -9 / 60, 1 / 60)  # of differences of sixth order at -3 to 3
+LEAST = 1e-6  # of the length of the law: motions below it are none
+BALANCED = 1e-9  # sum of wrenches over that of their sizes
+ALONG, BEGIN, END = range(3)
+
+
+@inner
+def begin_motion(model, discrete, step, c):
+    """Write places, axes and rotations of the markers of element c in the middle of the step, or where it is still."""
+    a = model.connections.a[c]
+    for m in range(a, a + model.laws.head[model.connections.item[c], 0]):
+        put(step.d_law[m], 0, vector(step.dx[m]))
+        if step.is_still or model.markers.body[m] < 0:
+            put(step.r_law[m], 0, vector(step.x_0[m]))
+            put_matrix(step.A_law[m], matrix(step.A_0[m]))
+            put(step.turn[m], 0, turning(model, step, m))
+            continue
+        turn = vector(step.theta_G[model.markers.body[m]])
+        if discrete.turns[m]:
+            turn = way_turned(product(matrix(step.A_f[m]), transposed(matrix(step.A_0[m]))))
+        half = scaled(1.0 / (1.0 + math.sqrt(1.0 + 0.25 * dot(turn, turn))), turn)
+        put(step.turn[m], 0, turn)
+        put(step.r_law[m], 0, scaled(0.5, add(vector(step.x_0[m]), vector(step.x_f[m]))))
+        put_matrix(step.A_law[m], product(cayley(half), matrix(step.A_0[m])))
+
+
+@inner
+def way_turned(Q):
+    """Return the Cayley vector of a rotation."""
+    trace = Q[0][0] + Q[1][1] + Q[2][2]
+    return scaled(2.0 / (1.0 + trace), (Q[2][1] - Q[1][2], Q[0][2] - Q[2][0], Q[1][0] - Q[0][1]))
+
+
+@inner
+def put_inputs(model, work, discrete, step, c, t, where, s, part):
+    """Write what the law of element c is asked with: markers at a part s ALONG the step, or at its BEGIN or END.
+
+    part: of the changes of its states.
+    """
+    i, a, x = model.connections.item[c], model.connections.a[c], work.laws.inputs
+    n, width = model.laws.head[i, 0], model.laws.head[i, 1]
+    x[0] = t
+    for m in range(a, a + n):
+        o = 1 + (m - a) * width
+        turn = vector(step.turn[m])
+        if where == ALONG:
+            A = matrix(step.A_law[m]) if s == 0.0 else product(exp_matrix(scaled(s, turn)), matrix(step.A_law[m]))
+            r = add(vector(step.r_law[m]), scaled(s, vector(step.d_law[m])))
+        elif where == BEGIN:
+            r, A = vector(step.x_0[m]), matrix(step.A_0[m])
+        else:
+            r, A = vector(step.x_1[m]), matrix(step.A_1[m])
+        put(x, o, r)
+        for k in range(3):
+            put(x, o + 3 + 3 * k, A[k])
+        put(x, o + 12, scaled(1.0 / step.h, vector(step.d_law[m])))
+        put(x, o + 15, scaled(1.0 / step.h, turn))
+    o = 1 + n * width
+    change0 = step.load.shape[0] + step.f.shape[0] + model.laws.state0[i]
+    for k in range(model.laws.head[i, 2]):
+        x[o + k] = step.known[model.states.row[model.laws.state0[i] + k]] + part * step.z[change0 + k]
+    o += model.laws.head[i, 2]
+    for j in range(model.laws.head[i, 3]):
+        x[o + j] = step.f[discrete.first[c] + j]
+
+
+@inner
+def element_gap(model, work, discrete, step, g):
+    """Return gap g of an element at the end of the step."""
+    c = model.gaps.connection[g]
+    i = model.connections.item[c]
+    head = model.laws.head[i]
+    begin_motion(model, discrete, step, c)
+    put_inputs(model, work, discrete, step, c, step.t_1, END, 0.0, 1.0)
+    law_call(model, work, i, work.laws.trial)
+    return work.laws.trial[6 * head[0] + head[2] + head[3] + model.gaps.output[g]]
+
+
+@inner
+def first_row_of_multipliers(model, c):
+    """Return the first row of the multipliers of element c, the last of its rows."""
+    return model.connections.w0[c + 1] - model.laws.head[model.connections.item[c], 3]
+
+
+@inner
+def potential(model, discrete, step, c, outputs):
+    """Return the energy that outputs of element c name less the reactions times what they hold of positions."""
+    i, total = model.connections.item[c], 0.0
+    held = 6 * model.laws.head[i, 0] + model.laws.head[i, 2]
+    if model.laws.energy[i] >= 0:
+        total += outputs[held + model.laws.head[i, 3] + model.laws.energy[i]]
+    row = first_row_of_multipliers(model, c)
+    for j in range(model.laws.head[i, 3]):
+        if model.rows.holds[row + j] == POSITION:
+            total -= step.f[discrete.first[c] + j] * outputs[held + j]
+    return total
+
+
+@inner
+def has_potential(model, c):
+    """Whether element c names an energy or holds positions."""
+    for row in range(first_row_of_multipliers(model, c), model.connections.w0[c + 1]):
+        if model.rows.holds[row] == POSITION:
+            return True
+    return model.laws.energy[model.connections.item[c]] >= 0
+
+
+@inner
+def is_balanced(n, width, x, outputs):
+    """Whether the wrenches of n markers, asked with x, balance."""
+    force, moment, of_forces, of_moments = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, 0.0
+    r_0 = vector(x[1:])
+    for m in range(n):
+        F, M = vector(outputs[6 * m :]), vector(outputs[6 * m + 3 :])
+        arm = sub(vector(x[1 + m * width :]), r_0)
+        force, moment = add(force, F), add(moment, add(cross(arm, F), M))
+        of_forces += norm(F)
+        of_moments += norm(arm) * norm(F) + norm(M)
+    return norm(force) <= BALANCED * of_forces and norm(moment) <= BALANCED * of_moments
+
+
+@inner
+def potential_at(model, work, discrete, step, c, where, s):
+    """Return the potential of element c at a place on the way, and whether its wrenches balance there."""
+    i = model.connections.item[c]
+    put_inputs(model, work, discrete, step, c, step.t_force, where, s, 0.5)
+    law_call(model, work, i, work.laws.trial)
+    balances = is_balanced(model.laws.head[i, 0], model.laws.head[i, 1], work.laws.inputs, work.laws.trial)
+    return potential(model, discrete, step, c, work.laws.trial), balances
+
+
+@inner
+def marker_of_whole(model, c):
+    """Return the first marker of element c on which it acts by all that it acts by, -1 for none or one on the ground.
+
+    Also whether it acts by moments.
+    """
+    a = model.connections.a[c]
+    last = a + model.laws.head[model.connections.item[c], 0]
+    has_force, has_moment = False, False
+    for m in range(a, last):
+        has_force, has_moment = has_force or model.markers.force[m] >= 0, has_moment or model.markers.moment[m] >= 0
+    whole = -1
+    for k in range(last - a):
+        m = last - 1 - k
+        if model.markers.body[m] < 0:
+            return -1, has_moment
+        takes_force, takes_moment = model.markers.force[m] >= 0, model.markers.moment[m] >= 0
+        if takes_force == has_force and takes_moment == has_moment:
+            whole = m
+    return whole if last - a > 1 else -1, has_moment
+
+
+@inner
+def put_ways(model, step, c, balances):
+    """Write the forces and moments that are as large as the motion of the markers of element c."""
+    i, a = model.connections.item[c], model.connections.a[c]
+    last, square = a + model.laws.head[i, 0], model.laws.length[i] ** 2
+    for m in range(a, last):
+        for k in range(6):
+            step.way[m, k] = 0.0
+    whole, has_moment = marker_of_whole(model, c)
+    if not balances or whole < 0:
+        for m in range(a, last):
+            if model.markers.force[m] >= 0:
+                put(step.way[m], 0, vector(step.dx[m]))
+            if model.markers.moment[m] >= 0:
+                put(step.way[m], 3, scaled(square, vector(step.turn[m])))
+        return
+    if not has_moment:
+        for m in range(a, last):
+            for k in range(a, m):
+                d = sub(vector(step.r_law[m]), vector(step.r_law[k]))
+                is_apart = dot(d, d) > LEAST**2 * square  # two points in one place have no line
+                if is_apart and model.markers.force[m] >= 0 and model.markers.force[k] >= 0:
+                    change = dot(d, sub(vector(step.dx[m]), vector(step.dx[k]))) / dot(d, d)
+                    put_sum(step.way[k], 0, scaled(-change, d))
+                    put_sum(step.way[m], 0, scaled(change, d))
+        return
+    turn = vector(step.turn[whole])
+    for m in range(a, last):
+        if m == whole:
+            continue
+        d = sub(vector(step.r_law[m]), vector(step.r_law[whole]))
+        F, M = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        if model.markers.force[m] >= 0:
+            F = sub(sub(vector(step.dx[m]), vector(step.dx[whole])), cross(turn, d))
+        if model.markers.moment[m] >= 0:
+            M = scaled(square, sub(vector(step.turn[m]), turn))
+        put(step.way[m], 0, F)
+        put(step.way[m], 3, M)
+        put_sum(step.way[whole], 0, scaled(-1.0, F))
+        put_sum(step.way[whole], 3, scaled(-1.0, add(M, cross(d, F))))
+
+
+@inner
+def work_along(step, wrench, m):
+    """Return the work of a wrench on marker m over the step."""
+    return dot(wrench, vector(step.dx[m])) + dot(wrench[3:], vector(step.turn[m]))
+
+
+@inner
+def correct_wrenches(model, work, discrete, step, c):
+    """Add what the potential of element c lacks over the step to its wrenches."""
+    i, a = model.connections.item[c], model.connections.a[c]
+    slope = 0.0
+    for p in range(7):
+        if p != 3:
+            U, _ = potential_at(model, work, discrete, step, c, ALONG, (p - 3) * WAY)
+            slope += FIRST[p] * U / WAY
+    _, in_middle = potential_at(model, work, discrete, step, c, ALONG, 0.0)
+    U_0, at_begin = potential_at(model, work, discrete, step, c, BEGIN, 0.0)
+    U_1, at_end = potential_at(model, work, discrete, step, c, END, 0.0)
+    put_ways(model, step, c, in_middle and at_begin and at_end)
+    size = (LEAST * model.laws.length[i]) ** 2
+    for m in range(a, a + model.laws.head[i, 0]):
+        size += work_along(step, step.way[m], m)
+    factor = (slope - (U_1 - U_0)) / size
+    for m in range(a, a + model.laws.head[i, 0]):
+        for k in range(6):
+            step.wrench[m, k] += factor * step.way[m, k]
+
+
+@inner
+def add_axes_moment(model, discrete, step, m, M):
+    """Add a moment on a marker whose work is that of the rotation of the marker."""
+    i = model.markers.body[m]
+    if i < 0 or step.is_still or not discrete.turns[m]:
+        add_moment(model, step, m, M)
+        return
+    E = scaled_matrix(0.5, matrix_sum(matrix(step.A_0[m]), matrix(step.A_f[m])))
+    turn = vector(step.turn[m])
+    square = dot(turn, turn)
+    # (tr S - S)/2 with S = u uᵀ + c² (1 - u uᵀ): c² along u, (1 + c²)/2 across, c² = 1/(1 + |turn|²/4)
+    cosine = 1.0 / (1.0 + 0.25 * square)
+    inside = scaled(2.0 / (1.0 + cosine), M)
+    if square > 0.0:
+        along = dot(M, turn) / square
+        inside = add(inside, scaled(along * (1.0 / cosine - 2.0 / (1.0 + cosine)), turn))
+    put_sum(step.T[m], 0, M)
+    for k in range(3):
+        G = scaled(0.5, cross(inside, (E[0][k], E[1][k], E[2][k])))
+        eps = (step.E_mean[m, 0, k], step.E_mean[m, 1, k], step.E_mean[m, 2, k])
+        put_sum(step.m[m], 0, cross(eps, turned_back(step.R_m[i], G)))
+
+
+@inner
+def note(model, work, c):
+    """Write down an output that ends the run, and what is no number for a motion that is one."""
+    i, laws, out = model.connections.item[c], model.laws, work.laws.outputs
+    n_out = 6 * laws.head[i, 0] + laws.head[i, 2] + laws.head[i, 3]
+    for k in range(laws.stop0[i], laws.stop0[i + 1]):
+        if out[n_out + laws.stop[k]] > 0.0 and work.counted.stopped == 0:
+            work.counted.stopped = k + 1
+    total = 0.0
+    for k in range(n_out):
+        total += out[k]
+    if not math.isfinite(total):
+        note_what_is_no_number(model, work, c)
+
+
+@inner
+def element_load(model, work, discrete, step, c):
+    """Add the loads of element c; return the work that it gives and takes."""
+    i, a = model.connections.item[c], model.connections.a[c]
+    head, laws, out = model.laws.head[i], model.laws, work.laws.outputs
+    begin_motion(model, discrete, step, c)
+    put_inputs(model, work, discrete, step, c, step.t_force, ALONG, 0.0, 0.0 if step.is_still else 0.5)
+    law_call(model, work, i, out)
+    note(model, work, c)
+    for m in range(head[0]):
+        for k in range(6):
+            step.wrench[a + m, k] = out[6 * m + k]
+    if not step.is_still and has_potential(model, c):
+        correct_wrenches(model, work, discrete, step, c)
+    on_bodies = 0.0
+    for m in range(a, a + head[0]):
+        F, M = vector(step.wrench[m]), vector(step.wrench[m, 3:])
+        if model.markers.force[m] >= 0:
+            add_force(step, m, F)
+            on_bodies += dot(F, vector(step.dx[m]))
+        if model.markers.moment[m] >= 0:
+            add_axes_moment(model, discrete, step, m, M)
+            on_bodies += dot(M, vector(step.turn[m]))
+    seen = 6 * head[0] + head[2] + head[3]
+    given = step.h * out[seen + laws.given[i]] if laws.given[i] >= 0 else 0.0
+    lost = step.h * out[seen + laws.lost[i]] if laws.lost[i] >= 0 else 0.0
+    if laws.energy[i] < 0:
+        if laws.given[i] < 0:
+            given = on_bodies + lost
+        elif laws.lost[i] < 0:
+            lost = given - on_bodies
+    return given, lost
+
+
+@inner
+def element_residual(model, work, discrete, step, c):
+    """Write the equations of the states of element c, and what its multipliers hold; while velocities are closed none.
+
+    Positions are held at the end of the step, all else in its middle.
+    """
+    i, h = model.connections.item[c], step.h
+    head = model.laws.head[i]
+    n_u = step.load.shape[0]
+    state0 = n_u + step.f.shape[0] + model.laws.state0[i]
+    if step.is_closing:
+        for s in range(head[2]):
+            step.residual[state0 + s] = step.z[state0 + s]
+        return
+    if head[2] + head[3] == 0:
+        return
+    out, row, first = work.laws.trial, first_row_of_multipliers(model, c), n_u + discrete.first[c]
+    begin_in_middle(model, discrete, step, c)
+    put_inputs(model, work, discrete, step, c, 0.5 * (step.t_0 + step.t_1), ALONG, 0.0, 0.5)
+    law_call(model, work, i, out)
+    for s in range(head[2]):
+        step.residual[state0 + s] = step.z[state0 + s] - h * out[6 * head[0] + s]
+    holds_position = False
+    for j in range(head[3]):
+        holds = model.rows.holds[row + j]
+        holds_position = holds_position or holds == POSITION
+        if holds != POSITION:
+            step.residual[first + j] = (h if holds == VELOCITY else 1.0) * out[6 * head[0] + head[2] + j]
+    if not holds_position:
+        return
+    put_inputs(model, work, discrete, step, c, step.t_1, END, 0.0, 1.0)
+    law_call(model, work, i, out)
+    for j in range(head[3]):
+        if model.rows.holds[row + j] == POSITION:
+            step.residual[first + j] = out[6 * head[0] + head[2] + j]
+
+
+@inner
+def begin_in_middle(model, discrete, step, c):
+    """Write the motion of the markers of element c from the beginning to the end of the step, in its middle."""
+    a = model.connections.a[c]
+    for m in range(a, a + model.laws.head[model.connections.item[c], 0]):
+        Q = product(matrix(step.A_1[m]), transposed(matrix(step.A_0[m])))
+        turn = way_turned(Q)
+        half = scaled(1.0 / (1.0 + math.sqrt(1.0 + 0.25 * dot(turn, turn))), turn)
+        put(step.turn[m], 0, turn)
+        put(step.d_law[m], 0, sub(vector(step.x_1[m]), vector(step.x_0[m])))
+        put(step.r_law[m], 0, scaled(0.5, add(vector(step.x_0[m]), vector(step.x_1[m]))))
+        put_matrix(step.A_law[m], product(cayley(half), matrix(step.A_0[m])))

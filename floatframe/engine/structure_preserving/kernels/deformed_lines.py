@@ -1,0 +1,312 @@
+"""A point that slides along the deformed line of a body, formulas as in the module of that name above."""
+
+import math
+
+from floatframe.engine.kernels.compiler.compilation import inner, loops
+from floatframe.engine.kernels.joints.deformed_line import (
+    CLOSE,
+    MOST,
+    column,
+    combined,
+    linear_weight,
+    mean,
+    piece,
+    weights,
+)
+from floatframe.engine.kernels.rotation import exp_matrix
+from floatframe.engine.kernels.vector import (
+    add,
+    cross,
+    dot,
+    matrix,
+    matrix_sum,
+    norm,
+    product,
+    put,
+    put_matrix,
+    scaled,
+    scaled_matrix,
+    sub,
+    turned,
+    turned_back,
+    vector,
+)
+from floatframe.engine.structure_preserving.kernels.coordinates import add_pair
+from floatframe.engine.structure_preserving.kernels.markers import deformation, mean_jacobian, put_end_of_forces
+from floatframe.engine.structure_preserving.kernels.rows import add_product, held, mean_direction, product_change
+from floatframe.model.joints.rows.kinds import LINE_TURN
+
+__all__ = ["add_line_reaction", "begin_lines", "line_change", "line_rate", "line_steps", "line_value"]
+
+NEAR, FAR = 0.5 - 0.5 / math.sqrt(3.0), 0.5 + 0.5 / math.sqrt(3.0)  # points of Gauss' rule, exact to degree three
+BEGIN, END, MEAN = range(3)
+
+
+@inner
+def put_stations(model, step, k, end, q, s):
+    """Write displacements and rotations of the stations of line k at one end of the step; s: centre of mass."""
+    for j in range(model.lines.station0[k], model.lines.station0[k + 1]):
+        m = model.stations.marker[j]
+        sigma, th = deformation(model, step, m, model.markers.body[m], q, s)
+        put(step.station_d[end, j], 0, sub(add(sigma, s), vector(model.markers.position[m])))
+        put(step.station_th[end, j], 0, th)
+
+
+@inner
+def station(step, end, j):
+    """Return displacement and rotation of station j at one end of the step, or their means."""
+    if end == MEAN:
+        d = scaled(0.5, add(vector(step.station_d[BEGIN, j]), vector(step.station_d[END, j])))
+        return d, scaled(0.5, add(vector(step.station_th[BEGIN, j]), vector(step.station_th[END, j])))
+    return vector(step.station_d[end, j]), vector(step.station_th[end, j])
+
+
+@inner
+def displacement(model, step, k, end, s, order):
+    """Return D, D' or D'' at s, body axes."""
+    j, h = piece(model.lines, model.stations, k, s)
+    d_1, th_1 = station(step, end, j)
+    d_2, th_2 = station(step, end, j + 1)
+    return combined(vector(model.lines.axis[k]), weights(model.stations, j, h, s, order), d_1, th_1, d_2, th_2)
+
+
+@inner
+def twist(model, step, k, end, s, order):
+    """Return e (e · Σ l_j th_j) at s, or its derivative."""
+    e = vector(model.lines.axis[k])
+    j, h = piece(model.lines, model.stations, k, s)
+    _, th_1 = station(step, end, j)
+    _, th_2 = station(step, end, j + 1)
+    l_2, slope = linear_weight(model.stations, j, h, s)
+    if order == 0:
+        return scaled(dot(e, mean(l_2, th_1, th_2)), e)
+    return scaled(slope * dot(e, sub(th_2, th_1)), e)
+
+
+@inner
+def place_of(model, step, k, end, x):
+    """Return the place nearest to a point x from that of s = 0, body axes."""
+    e = vector(model.lines.axis[k])
+    s = dot(x, e)
+    length = model.stations.s[model.lines.station0[k + 1] - 1]
+    for _ in range(MOST):
+        tangent = add(e, displacement(model, step, k, end, s, 1))
+        gap = sub(sub(x, scaled(s, e)), displacement(model, step, k, end, s, 0))
+        change = dot(gap, tangent) / (dot(tangent, tangent) - dot(gap, displacement(model, step, k, end, s, 2)))
+        s += change
+        if abs(change) <= CLOSE * length:
+            break
+    return s
+
+
+@inner
+def found_place(model, step, k, end, t, R, center, way):
+    """Return the place of line k at one end: prescribed at t, or nearest to B, `way` from the centre of mass."""
+    if model.lines.row[k] >= 0:
+        value, _ = held(model, model.lines.row[k], t)
+        return value
+    origin = vector(model.markers.position[model.lines.marker[k]])
+    return place_of(model, step, k, end, sub(add(turned_back(R, way), center), origin))
+
+
+@inner
+def on_line(model, step, k, end, s, center):
+    """Return the point of line k at s from the centre of mass, the rotation there and r', body axes."""
+    e = vector(model.lines.axis[k])
+    D, slope = displacement(model, step, k, end, s, 0), displacement(model, step, k, end, s, 1)
+    sigma = sub(add(add(vector(model.markers.position[model.lines.marker[k]]), scaled(s, e)), D), center)
+    return sigma, add(cross(e, slope), twist(model, step, k, end, s, 0)), add(e, slope)
+
+
+@inner
+def begin_lines(model, step):
+    """Write the sliding markers where the step begins; all others are there."""
+    for k in range(model.lines.marker.shape[0]):
+        m, b = model.lines.marker[k], model.lines.other[k]
+        i = model.markers.body[m]
+        q0, R, s_c = model.bodies.q0[i], matrix(step.R_0[i]), vector(step.s_0[i])
+        put_stations(model, step, k, BEGIN, step.q_0[q0 : q0 + model.bodies.n_q[i]], s_c)
+        t = step.t_1 if step.is_closing else step.t_0
+        s = found_place(model, step, k, BEGIN, t, R, s_c, sub(vector(step.x_0[b]), vector(step.c_0[i])))
+        sigma, angle, tangent = on_line(model, step, k, BEGIN, s, s_c)
+        step.line_s[k, BEGIN] = s
+        arm, E = turned(R, sigma), product(exp_matrix(angle), matrix(model.markers.triad[m]))
+        put(step.arm_0[m], 0, arm)
+        put(step.th_0[m], 0, angle)
+        put_matrix(step.E_0[m], E)
+        put(step.x_0[m], 0, add(vector(step.c_0[i]), arm))
+        put_matrix(step.A_0[m], product(R, E))
+        put(step.line_end[k], 0, turned(R, tangent))
+
+
+@inner
+def line_steps(model, discrete, step):
+    """Write how the sliding markers move over the step; all others are known."""
+    for k in range(model.lines.marker.shape[0]):
+        line_step(model, discrete, step, k)
+
+
+@inner
+def line_step(model, discrete, step, k):
+    """Write how the sliding marker of line k moves, at its place and along the line."""
+    m, b = model.lines.marker[k], model.lines.other[k]
+    i = model.markers.body[m]
+    n, q0, R_m = model.bodies.n_q[i], model.bodies.q0[i], matrix(step.R_m[i])
+    arm_0, th_0, E_0 = vector(step.arm_0[m]), vector(step.th_0[m]), matrix(step.E_0[m])
+    arm_1, th_1, E_1, s_0 = arm_0, th_0, E_0, step.line_s[k, BEGIN]
+    s_1 = s_0
+    if not step.is_closing:
+        c_1, R_1 = add(vector(step.c_0[i]), vector(step.d[i])), matrix(step.R_1[i])
+        s_c = vector(step.s_1[i])
+        put_stations(model, step, k, END, step.q_1[q0 : q0 + n], s_c)
+        s_1 = found_place(model, step, k, END, step.t_1, R_1, s_c, sub(vector(step.x_1[b]), c_1))
+        sigma, th_1, tangent = on_line(model, step, k, END, s_1, s_c)
+        arm_1, E_1 = turned(R_1, sigma), product(exp_matrix(th_1), matrix(model.markers.triad[m]))
+        put(step.x_1[m], 0, add(c_1, arm_1))
+        put_matrix(step.A_1[m], product(R_1, E_1))
+        put(step.line_end[k], 0, turned(R_1, tangent))
+    end = MEAN
+    if step.is_still:
+        arm_1, th_1, E_1, s_1, end = arm_0, th_0, E_0, s_0, BEGIN
+    put_end_of_forces(step, m)
+    lever = scaled(0.5, add(arm_0, arm_1))
+    put(step.lever[m], 0, lever)
+    put_matrix(step.E_mean[m], scaled_matrix(0.5, matrix_sum(E_0, E_1)))
+    put_shapes(model, discrete, step, k, s_0, s_1)
+    psi, dq = step.psi[6 * discrete.psi0[m] :], step.dq[q0 : q0 + n]
+    by_q, turn_by_q = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for q in range(n):
+        d, th = column(psi, n, q)
+        by_q, turn_by_q = add(by_q, scaled(dq[q], d)), add(turn_by_q, scaled(dq[q], th))
+    Gamma = mean_jacobian(th_0, th_1)
+    put_matrix(step.Gamma[m], Gamma)
+    put(step.dpsi[m], 0, turned(Gamma, turn_by_q))
+    put(step.dx[m], 0, add(add(vector(step.d[i]), cross(vector(step.theta_G[i]), lever)), turned(R_m, by_q)))
+    T, T_r = ways_by_place(model, step, k, end, s_0, s_1)
+    put(step.line_t[k], 0, turned(R_m, T))
+    put(step.line_kappa[k], 0, turned(Gamma, T_r))
+
+
+@loops
+def put_shapes(model, discrete, step, k, s_0, s_1):
+    """Write the derivatives of place and rotation of the sliding marker by q: means of those at both places."""
+    m, e = model.lines.marker[k], vector(model.lines.axis[k])
+    n, psi = model.bodies.n_q[model.markers.body[m]], step.psi
+    own = psi[6 * discrete.psi0[m] : 6 * discrete.psi0[m] + 6 * n]
+    for q in range(6 * n):
+        own[q] = 0.0
+    for end in range(2):
+        s = s_0 if end == 0 else s_1
+        j, h = piece(model.lines, model.stations, k, s)
+        value, slopes = weights(model.stations, j, h, s, 0), weights(model.stations, j, h, s, 1)
+        l_2, _ = linear_weight(model.stations, j, h, s)
+        first = psi[6 * discrete.psi0[model.stations.marker[j]] :]
+        second = psi[6 * discrete.psi0[model.stations.marker[j + 1]] :]
+        for q in range(n):
+            d_1, th_1 = column(first, n, q)
+            d_2, th_2 = column(second, n, q)
+            d = combined(e, value, d_1, th_1, d_2, th_2)
+            slope = cross(e, combined(e, slopes, d_1, th_1, d_2, th_2))
+            th = add(slope, scaled(dot(e, mean(l_2, th_1, th_2)), e))
+            for a in range(3):
+                own[a * n + q] += 0.5 * d[a]
+                own[(3 + a) * n + q] += 0.5 * th[a]
+
+
+@inner
+def ways_by_place(model, step, k, end, s_0, s_1):
+    """Return T and T_r: by Gauss' rule with two points between the stations that are passed."""
+    e, way = vector(model.lines.axis[k]), s_1 - s_0
+    T, slope = e, (0.0, 0.0, 0.0)
+    T_r = (0.0, 0.0, 0.0)
+    done, first, n = 0.0, model.lines.station0[k], model.lines.station0[k + 1] - model.lines.station0[k]
+    for p in range(n + 1):
+        part = 1.0
+        if p < n:
+            border = model.stations.s[first + p if way > 0.0 else first + n - 1 - p] - s_0
+            if border * way <= 0.0 or abs(border) >= abs(way):
+                continue
+            part = border / way
+        half = 0.5 * (part - done)
+        for g in range(2):
+            s = s_0 + (done + (NEAR if g == 0 else FAR) * (part - done)) * way
+            T = add(T, scaled(half, displacement(model, step, k, end, s, 1)))
+            slope = add(slope, scaled(half, displacement(model, step, k, end, s, 2)))
+            T_r = add(T_r, scaled(half, twist(model, step, k, end, s, 1)))
+        done = part
+    return T, add(T_r, cross(e, slope))
+
+
+@inner
+def normal(model, k, along, y):
+    """Return the unit vector of row k: along a direction, nearest to y across it, or across both."""
+    n_0 = scaled(1.0 / norm(along), along)
+    if model.rows.part[k] == 0:
+        return n_0
+    y = sub(y, scaled(dot(y, n_0), n_0))
+    y = scaled(1.0 / norm(y), y)
+    return y if model.rows.part[k] == 1 else cross(n_0, y)
+
+
+@inner
+def line_value(model, step, k, a, b):
+    """Return the value of row k, LINE or LINE_TURN, at the end of a step."""
+    if model.rows.kind[k] == LINE_TURN:
+        E, D = turned(step.A_1[a], vector(model.rows.x[k])), turned(step.A_1[b], vector(model.rows.y[k]))
+        return dot(E, D)
+    A = step.A_1[a]
+    n = normal(model, k, vector(step.line_end[model.markers.line[a]]), (A[0, 1], A[1, 1], A[2, 1]))
+    return dot(n, sub(vector(step.x_1[b]), vector(step.x_1[a])))
+
+
+@inner
+def turn_by_place(model, step, k, a, b):
+    """Return the change of E · D by s."""
+    eps = turned(step.E_mean[a], vector(model.rows.x[k]))
+    by_s = turned(step.R_m[model.markers.body[a]], cross(vector(step.line_kappa[model.markers.line[a]]), eps))
+    return dot(mean_direction(step, b, vector(model.rows.y[k])), by_s)
+
+
+@inner
+def mean_normal(model, step, k, a):
+    """Return N of row k over the step."""
+    return normal(model, k, vector(step.line_t[model.markers.line[a]]), mean_direction(step, a, (0.0, 1.0, 0.0)))
+
+
+@inner
+def add_line_reaction(model, discrete, step, k, a, b, f):
+    """Add the loads of row k, LINE or LINE_TURN, with multiplier f."""
+    if model.rows.kind[k] != LINE_TURN:
+        add_pair(step, a, b, scaled(f, mean_normal(model, step, k, a)))
+        return
+    add_product(model, discrete, step, a, vector(model.rows.x[k]), b, vector(model.rows.y[k]), f)
+    line = model.markers.line[a]
+    if model.lines.row[line] < 0:
+        t = vector(step.line_t[line])
+        add_pair(step, a, b, scaled(f * turn_by_place(model, step, k, a, b) / dot(t, t), t))
+
+
+@inner
+def line_change(model, discrete, step, k, a, b):
+    """Return the change of row k, LINE or LINE_TURN, by the motion alone: the work of a unit multiplier."""
+    d = sub(vector(step.dx[b]), vector(step.dx[a]))
+    if model.rows.kind[k] != LINE_TURN:
+        return dot(mean_normal(model, step, k, a), d)
+    total = product_change(model, discrete, step, a, vector(model.rows.x[k]), b, vector(model.rows.y[k]))
+    line = model.markers.line[a]
+    if model.lines.row[line] < 0:
+        t = vector(step.line_t[line])
+        total += turn_by_place(model, step, k, a, b) * dot(t, d) / dot(t, t)
+    return total
+
+
+@inner
+def line_rate(model, step, k, a, b, t):
+    """Return the rate of row k while nothing moves: by the motion of the prescribed place."""
+    line = model.markers.line[a]
+    if model.lines.row[line] < 0:
+        return 0.0
+    _, rate = held(model, model.lines.row[line], t)
+    if model.rows.kind[k] == LINE_TURN:
+        return rate * turn_by_place(model, step, k, a, b)
+    return -rate * norm(vector(step.line_t[line])) if model.rows.part[k] == 0 else 0.0

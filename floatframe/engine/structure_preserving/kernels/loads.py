@@ -1,0 +1,146 @@
+"""Forces over a step, formulas as in `structure_preserving.forces`; each returns its work: given, taken."""
+
+import math
+
+from floatframe.engine.kernels.body import column
+from floatframe.engine.kernels.compiler.compilation import inner, loops
+from floatframe.engine.kernels.time_function import time_function
+from floatframe.engine.kernels.vector import (
+    add,
+    cross,
+    dot,
+    matrix,
+    matrix_sum,
+    norm,
+    put_sum,
+    scaled,
+    scaled_matrix,
+    sub,
+    turned,
+    vector,
+)
+from floatframe.engine.structure_preserving.kernels.coordinates import (
+    add_coordinate_force,
+    add_impulsive_force,
+    add_pair,
+    coordinate_change,
+    coordinate_ends,
+    coordinate_rate,
+)
+from floatframe.engine.structure_preserving.kernels.markers import add_force, add_moment, ends, turning
+from floatframe.engine.structure_preserving.kernels.rows import force_of_row
+from floatframe.model.joints.rows.kinds import PUSH
+
+__all__ = ["body_load", "coordinate_load", "normal_force", "point_load", "spring_load"]
+
+
+@inner
+def spring_load(model, step, c):
+    """Add the loads of spring-damper c."""
+    a, b, s, springs = model.connections.a[c], model.connections.b[c], model.connections.item[c], model.springs
+    k, damping, free, preload = springs.stiffness[s], springs.damping[s], springs.free_length[s], springs.preload[s]
+    d_0 = sub(vector(step.x_0[b]), vector(step.x_0[a]))
+    d_1 = sub(vector(step.x_f[b]), vector(step.x_f[a]))
+    d = scaled(0.5, add(d_0, d_1))
+    if k != 0.0 and free == 0.0 and damping == 0.0 and preload == 0.0 and springs.table[s] < 0:
+        add_pair(step, a, b, scaled(-k, d))  # through length zero
+        return 0.0, 0.0
+    both = norm(d_0) + norm(d_1)
+    change = 2.0 * dot(d, sub(vector(step.dx[b]), vector(step.dx[a]))) / both
+    tension = k * (0.5 * both - free) + preload + damping * change / step.h
+    given = 0.0
+    if springs.table[s] >= 0:
+        value, _, _ = time_function(model.functions, springs.table[s], 0.5 * both - free)
+        tension += value
+        given = -value * change
+    add_pair(step, a, b, scaled(-2.0 * tension / both, d))
+    return given, damping * change * change / step.h
+
+
+@inner
+def point_load(model, step, k):
+    """Add load k, fixed in space or in its marker; return the work given."""
+    m, factor, work = model.loads.marker[k], 1.0, 0.0
+    if model.loads.factor[k] >= 0:
+        factor, _, _ = time_function(model.functions, model.loads.factor[k], step.t_force)
+    F, T = scaled(factor, vector(model.loads.force[k])), scaled(factor, vector(model.loads.torque[k]))
+    if model.markers.is_follower[m]:
+        F_0, F_1 = ends(step, m, F)
+        T_0, T_1 = ends(step, m, T)
+        F, T = scaled(0.5, add(F_0, F_1)), scaled(0.5, add(T_0, T_1))
+    add_force(step, m, F)
+    add_moment(model, step, m, T)
+    work = dot(F, vector(step.dx[m])) + dot(T, turning(model, step, m))
+    return work
+
+
+@loops
+def body_load(model, discrete, step, k):
+    """Add load case k of a body, in its axes about its frame origin; return the work given."""
+    i, first = model.body_loads.body[k], model.body_loads.value0[k]
+    n, u0, q0 = model.bodies.n_q[i], model.bodies.u0[i], model.bodies.q0[i]
+    factor, _, _ = time_function(model.functions, model.body_loads.factor[k], step.t_force)
+    values, C = model.body_loads.values[first : first + 6 + n], step.C_mean[3 * q0 : 3 * q0 + 3 * n]
+    f, tau, s = scaled(factor, vector(values)), scaled(factor, vector(values[3:])), vector(step.s_mean[i])
+    far = matrix(step.R_0[i]) if step.is_still else matrix(step.R_1[i])
+    R = scaled_matrix(0.5, matrix_sum(matrix(step.R_0[i]), far))
+    F, T = turned(R, f), turned(R, sub(tau, cross(s, f)))
+    put_sum(step.load, u0, F)
+    put_sum(step.load, u0 + 3, T)
+    work = dot(F, vector(step.d[i])) + dot(T, vector(step.theta_G[i]))
+    for j in range(n):
+        h = factor * values[6 + j] - dot(column(C, n, j), f)
+        step.load[u0 + 6 + j] += h
+        work += h * step.dq[q0 + j]
+    return work
+
+
+@inner
+def normal_force(model, discrete, step, c, k):
+    """Return the size of the force in joint c across the axis of its row k."""
+    a, b = model.connections.a[c], model.connections.b[c]
+    F = (0.0, 0.0, 0.0)
+    for j in range(discrete.first[c], discrete.first[c + 1]):
+        row = discrete.row[j]
+        if model.rows.is_length[row]:
+            F = add(F, scaled(step.f[j], force_of_row(model, step, row, a, b)))
+    x = vector(model.rows.x[k])
+    axis = x if model.rows.kind[k] == PUSH else cross(x, vector(model.rows.z[k]))
+    E_0, E_1 = ends(step, a, axis)
+    along = dot(F, scaled(0.5, add(E_0, E_1)))
+    return math.sqrt(max(dot(F, F) - along * along, 0.0))
+
+
+@inner
+def coordinate_load(model, discrete, step, k, a, b, normal):
+    """Add the forces along the coordinate of row k (PUSH, TWIST, TWIST_B); normal: force in the joint across it.
+
+    Springs do the work of the change of their potential; the impulse of all others is h times their force.
+    """
+    is_angle = model.rows.is_angle[k]
+    change = coordinate_change(model, discrete, step, k, a, b)
+    begin, end = coordinate_ends(model, step, k, a, b, change)
+    rate, f = coordinate_rate(model, discrete, step, k, a, b), model.joint_forces
+    Q, spring, given, taken = 0.0, 0.0, 0.0, 0.0
+    for i in range(model.rows.force0[k], model.rows.force1[k]):
+        mean = 0.5 * (begin + end) - f.free[i]
+        if is_angle:
+            mean -= 2 * math.pi * math.floor(mean / (2 * math.pi) + 0.5)
+        entering = f.preload[i]
+        if f.motor[i] >= 0:
+            value, _, _ = time_function(model.functions, f.motor[i], step.t_force)
+            entering += value
+        if f.table[i] >= 0:
+            value, _, _ = time_function(model.functions, f.table[i], mean)
+            entering += value
+        resisting = f.damping[i] * rate
+        if f.friction[i] > 0.0 or f.coefficient[i] > 0.0:
+            resisting += (f.friction[i] + f.coefficient[i] * normal) * math.tanh(rate / f.speed[i])
+        Q += entering - resisting
+        spring -= f.stiffness[i] * mean
+        given += entering * rate * step.h
+        taken += resisting * rate * step.h
+    add_impulsive_force(model, discrete, step, k, a, b, Q)
+    if spring != 0.0:
+        add_coordinate_force(model, discrete, step, k, a, b, spring)
+    return given, taken

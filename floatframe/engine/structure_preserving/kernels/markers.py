@@ -1,0 +1,263 @@
+"""Markers over a step, and loads on them, see `floatframe.engine.structure_preserving.markers` for the formulas."""
+
+import math
+
+from floatframe.engine.kernels.compiler.compilation import inner, loops
+from floatframe.engine.kernels.dense import add_products
+from floatframe.engine.kernels.rotation import exp_matrix, left_jacobian
+from floatframe.engine.kernels.vector import (
+    add,
+    cross,
+    dot,
+    matrix,
+    matrix_sum,
+    product,
+    put,
+    put_matrix,
+    put_sum,
+    scaled,
+    scaled_matrix,
+    sub,
+    turned,
+    turned_back,
+    unit_matrix,
+    vector,
+)
+
+__all__ = ["add_direction", "add_force", "add_moment", "begin_markers", "change", "ends", "marker_loads", "marker_step",
+           "put_end_of_forces", "turning"]  # fmt: skip
+
+SMALL = 1e-14  # square of an elastic rotation in a step below which its Cayley vector is T dth to rounding
+NONE = (0.0, 0.0, 0.0)
+
+
+@loops
+def deformation(model, step, m, i, q, s):
+    """Return the place of marker m from the centre of mass and its elastic rotation; s: centre of mass."""
+    n, o = model.bodies.n_q[i], model.markers.psi0[m]
+    sigma = sub(vector(model.markers.position[m]), s)
+    if o < 0:
+        return sigma, NONE
+    psi = step.shape
+    bent_shapes(model, m, n, q, 0.5, psi)
+    return add(sigma, times(psi, n, q)), times(psi[3 * n :], n, q)
+
+
+@loops
+def bent_shapes(model, m, n, q, factor, psi):
+    """Write Psi - factor K_P q, [6, k]."""
+    o, first = model.markers.psi0[m], model.markers.bend0[m]
+    own = model.markers.psi[o : o + 6 * n]
+    if first < 0:
+        for k in range(6 * n):
+            psi[k] = own[k]
+        return
+    for k in range(6 * n):
+        psi[k] = -own[k] / factor
+    add_products(model.markers.bend[first : first + 6 * n * n], q, psi[: 6 * n])
+    for k in range(6 * n):
+        psi[k] *= -factor
+
+
+@loops
+def times(A, n, x):
+    """Return A x for A [3, k]."""
+    a, b, c = 0.0, 0.0, 0.0
+    for k in range(n):
+        a += A[k] * x[k]
+        b += A[n + k] * x[k]
+        c += A[2 * n + k] * x[k]
+    return a, b, c
+
+
+@inner
+def begin_markers(model, discrete, step):
+    """Write the markers at the configuration where a step begins."""
+    for m in range(model.markers.body.shape[0]):
+        i = model.markers.body[m]
+        if i < 0:
+            x, A = vector(model.markers.position[m]), matrix(model.markers.triad[m])
+            put(step.x_0[m], 0, x)
+            put(step.x_1[m], 0, x)
+            put(step.x_f[m], 0, x)
+            put_matrix(step.A_0[m], A)
+            put_matrix(step.A_1[m], A)
+            put_matrix(step.A_f[m], A)
+            put_matrix(step.E_mean[m], A)
+            put_matrix(step.Gamma[m], unit_matrix())
+            put(step.dx[m], 0, NONE)
+            put(step.dpsi[m], 0, NONE)
+            put(step.lever[m], 0, NONE)
+            continue
+        n, q0, R = model.bodies.n_q[i], model.bodies.q0[i], matrix(step.R_0[i])
+        sigma, th = deformation(model, step, m, i, step.q_0[q0 : q0 + n], vector(step.s_0[i]))
+        arm, E = turned(R, sigma), matrix(model.markers.triad[m])
+        if discrete.turns[m]:
+            E = product(exp_matrix(th), E)
+        put(step.arm_0[m], 0, arm)
+        put(step.th_0[m], 0, th)
+        put_matrix(step.E_0[m], E)
+        put(step.x_0[m], 0, add(vector(step.c_0[i]), arm))
+        put_matrix(step.A_0[m], product(R, E))
+        put(step.dpsi[m], 0, NONE)
+
+
+@loops
+def marker_step(model, discrete, step, m):
+    """Write how marker m moves over the step of its body."""
+    i = model.markers.body[m]
+    put(step.F[m], 0, NONE)
+    put(step.T[m], 0, NONE)
+    put(step.m[m], 0, NONE)
+    if i < 0:
+        return
+    n, q0, R_m = model.bodies.n_q[i], model.bodies.q0[i], matrix(step.R_m[i])
+    arm_0, th_0 = vector(step.arm_0[m]), vector(step.th_0[m])
+    E_0 = matrix(step.E_0[m])
+    arm_1, th_1, E_1 = arm_0, th_0, E_0
+    if not step.is_closing:
+        R_1 = matrix(step.R_1[i])
+        sigma, th_1 = deformation(model, step, m, i, step.q_1[q0 : q0 + n], vector(step.s_1[i]))
+        arm_1 = turned(R_1, sigma)
+        if discrete.turns[m]:
+            E_1 = product(exp_matrix(th_1), matrix(model.markers.triad[m]))
+        put(step.x_1[m], 0, add(add(vector(step.c_0[i]), vector(step.d[i])), arm_1))
+        put_matrix(step.A_1[m], product(R_1, E_1))
+    if step.is_still:
+        arm_1, th_1, E_1 = arm_0, th_0, E_0
+    put_end_of_forces(step, m)
+    lever = scaled(0.5, add(arm_0, arm_1))
+    put(step.lever[m], 0, lever)
+    dx = add(vector(step.d[i]), cross(vector(step.theta_G[i]), lever))
+    put_matrix(step.E_mean[m], scaled_matrix(0.5, matrix_sum(E_0, E_1)))
+    if n:
+        o, C, dq = model.markers.psi0[m], step.C_mean[3 * q0 : 3 * q0 + 3 * n], step.dq[q0 : q0 + n]
+        psi = step.psi[6 * discrete.psi0[m] :]
+        if o >= 0:
+            bent_shapes(model, m, n, step.q_mean[q0 : q0 + n], 1.0, psi)
+        else:
+            for k in range(6 * n):
+                psi[k] = 0.0
+        for k in range(3 * n):
+            psi[k] -= C[k]
+        dx = add(dx, turned(R_m, times(psi, n, dq)))
+        if discrete.turns[m]:
+            Gamma = mean_jacobian(th_0, th_1)
+            put_matrix(step.Gamma[m], Gamma)
+            put(step.dpsi[m], 0, turned(Gamma, times(psi[3 * n :], n, dq)))
+    put(step.dx[m], 0, dx)
+
+
+@inner
+def put_end_of_forces(step, m):
+    """Write where the forces on marker m end to act: at the end of the step, or where it begins."""
+    if step.is_still:
+        put(step.x_f[m], 0, vector(step.x_0[m]))
+        put_matrix(step.A_f[m], matrix(step.A_0[m]))
+        return
+    put(step.x_f[m], 0, vector(step.x_1[m]))
+    put_matrix(step.A_f[m], matrix(step.A_1[m]))
+
+
+@inner
+def mean_jacobian(th_0, th_1):
+    """Return Gamma: the discrete derivative of the elastic rotation."""
+    T = left_jacobian(scaled(0.5, add(th_0, th_1)))
+    dth = sub(th_1, th_0)
+    square = dot(dth, dth)
+    if square < SMALL:
+        return T
+    rest = scaled(1.0 / square, sub(relative_cayley(th_0, th_1), turned(T, dth)))
+    return add(T[0], scaled(rest[0], dth)), add(T[1], scaled(rest[1], dth)), add(T[2], scaled(rest[2], dth))
+
+
+@inner
+def relative_cayley(th_0, th_1):
+    """Return psi with exp(th_1) = cay(psi) exp(th_0)."""
+    c0, b0 = half_turn(th_0)
+    c1, b1 = half_turn(th_1)
+    both = sub(sub(scaled(c0, b1), scaled(c1, b0)), cross(b1, b0))
+    return scaled(2.0 / (c0 * c1 + dot(b0, b1)), both)
+
+
+@inner
+def half_turn(th):
+    """Return the Euler parameters of a rotation vector: scalar and vector."""
+    x = 0.25 * dot(th, th)
+    if x < 1e-4:
+        return 1 - x / 2 + x * x / 24 - x**3 / 720, scaled(0.5 * (1 - x / 6 + x * x / 120 - x**3 / 5040), th)
+    half = x**0.5
+    return math.cos(half), scaled(0.5 * math.sin(half) / half, th)
+
+
+@inner
+def ends(step, m, e):
+    """Return the direction e of a marker where its forces begin and end to act."""
+    return turned(step.A_0[m], e), turned(step.A_f[m], e)
+
+
+@inner
+def change(model, discrete, step, m, e, mean):
+    """Return how the direction e of a marker changes over the step; mean: its mean."""
+    i = model.markers.body[m]
+    if i < 0:
+        return NONE
+    result = cross(vector(step.theta_G[i]), mean)
+    if discrete.turns[m]:
+        own = cross(vector(step.dpsi[m]), turned(step.E_mean[m], e))
+        result = add(result, turned(step.R_m[i], own))
+    return result
+
+
+@inner
+def turning(model, step, m):
+    """Return the rotation of a marker over the step."""
+    i = model.markers.body[m]
+    if i < 0:
+        return NONE
+    return add(vector(step.theta_G[i]), turned(step.R_m[i], vector(step.dpsi[m])))
+
+
+@inner
+def add_force(step, m, F):
+    """Add a force at a marker."""
+    put_sum(step.F[m], 0, F)
+
+
+@inner
+def add_direction(model, discrete, step, m, e, G):
+    """Add a load on direction e of a marker: its work is G · dE."""
+    E_0, E_1 = ends(step, m, e)
+    put_sum(step.T[m], 0, cross(scaled(0.5, add(E_0, E_1)), G))
+    i = model.markers.body[m]
+    if i >= 0 and discrete.turns[m]:
+        put_sum(step.m[m], 0, cross(turned(step.E_mean[m], e), turned_back(step.R_m[i], G)))
+
+
+@inner
+def add_moment(model, step, m, T):
+    """Add a moment on a marker: its work is that by its turning."""
+    put_sum(step.T[m], 0, T)
+    i = model.markers.body[m]
+    if i >= 0:
+        put_sum(step.m[m], 0, turned_back(step.R_m[i], T))
+
+
+@loops
+def marker_loads(model, discrete, step, m):
+    """Add the loads on a marker to those of its body."""
+    i = model.markers.body[m]
+    if i < 0:
+        return
+    n, u0, F = model.bodies.n_q[i], model.bodies.u0[i], vector(step.F[m])
+    put_sum(step.load, u0, F)
+    put_sum(step.load, u0 + 3, add(vector(step.T[m]), cross(vector(step.lever[m]), F)))
+    if n == 0:
+        return
+    psi, F_B = step.psi[6 * discrete.psi0[m] :], turned_back(step.R_m[i], F)
+    for k in range(n):
+        step.load[u0 + 6 + k] += psi[k] * F_B[0] + psi[n + k] * F_B[1] + psi[2 * n + k] * F_B[2]
+    if discrete.turns[m]:
+        T = turned_back(step.Gamma[m], vector(step.m[m]))
+        for k in range(n):
+            step.load[u0 + 6 + k] += psi[3 * n + k] * T[0] + psi[4 * n + k] * T[1] + psi[5 * n + k] * T[2]

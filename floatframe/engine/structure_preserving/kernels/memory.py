@@ -1,0 +1,51 @@
+"""What connections remember between steps: angles through full turns, states, speeds of approach of contacts.
+
+In the rows of the memory that are theirs, see `discrete.constraints.Span`; other rows hold wrenches of the results.
+"""
+
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.connections.contact import V_0
+from floatframe.engine.kernels.model import CONTACT
+from floatframe.engine.structure_preserving.kernels.connections.contacts import speed_of_approach
+from floatframe.engine.structure_preserving.kernels.coordinates import ends_of_step
+
+__all__ = ["expect_angles", "keep", "recall", "remember"]
+
+
+@inner
+def recall(memory, step):
+    """Take what is remembered where the step begins."""
+    for k in range(step.known.shape[0]):
+        step.known[k] = memory.w[k]
+
+
+@inner
+def expect_angles(memory, step):
+    """Take counted angles to where their rates lead at the time of the forces."""
+    for k in range(memory.angle.shape[0]):
+        step.angle[k] = memory.angle[k] + (step.t_force - step.t_0) * memory.angle_rate[k]
+
+
+@inner
+def remember(model, discrete, step):
+    """Take what is remembered where the step ends, for its unknowns and the places of markers there."""
+    for c in range(model.connections.size.shape[0]):
+        if model.connections.law[c] == CONTACT:
+            step.known[model.connections.w0[c] + V_0] = speed_of_approach(model, step, c)
+    for p in range(model.coordinates.row.shape[0]):
+        k = model.coordinates.row[p]
+        _, step.known[k] = ends_of_step(model, step, k, model.coordinates.a[p], model.coordinates.b[p])
+    for e in range(discrete.equation.shape[0]):
+        step.known[model.laws.equation[e]] = step.f[discrete.equation[e]]
+    change0 = step.load.shape[0] + step.f.shape[0]
+    for s in range(model.states.row.shape[0]):
+        k = model.states.row[s]
+        step.known[k] += step.z[change0 + s]
+        step.known[k + 1] = step.z[change0 + s] / step.h
+
+
+@inner
+def keep(discrete, step, memory):
+    """Write what is remembered into the memory."""
+    for j in range(discrete.remembered.shape[0]):
+        memory.w[discrete.remembered[j]] = step.known[discrete.remembered[j]]

@@ -1,0 +1,289 @@
+"""Newton's method for one step, see `structure_preserving.newton`, with factors that serve for many steps.
+
+Unknowns and residuals of a body are in its axes at the beginning of the step, so that the matrix does not turn with it.
+Derivatives are differences of residuals, those of unknowns far from each other by one evaluation.
+"""
+
+import math
+
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.model import BUSHING, CONTACT, ELEMENT, JOINT, SPRING, USER_FORCE
+from floatframe.engine.kernels.vector import cross, matrix, norm, put_sum, scaled, sub, turned_back, vector
+from floatframe.engine.structure_preserving.kernels.band import band_factor, band_solve
+from floatframe.engine.structure_preserving.kernels.bodies import body_inertia, body_step
+from floatframe.engine.structure_preserving.kernels.connections.bushings import bushing_load
+from floatframe.engine.structure_preserving.kernels.connections.contacts import contact_load
+from floatframe.engine.structure_preserving.kernels.connections.public_elements import element_load, element_residual
+from floatframe.engine.structure_preserving.kernels.connections.user_forces import user_force_load, user_state_residual
+from floatframe.engine.structure_preserving.kernels.deformed_lines import line_steps
+from floatframe.engine.structure_preserving.kernels.held_rows import add_reaction, row_change, row_rate, row_value
+from floatframe.engine.structure_preserving.kernels.loads import (
+    body_load,
+    coordinate_load,
+    normal_force,
+    point_load,
+    spring_load,
+)
+from floatframe.engine.structure_preserving.kernels.markers import marker_loads, marker_step
+from floatframe.engine.structure_preserving.kernels.records import SMALL
+
+__all__ = ["CONVERGED", "NOT_CONVERGED", "NO_ACCELERATION", "SINGULAR", "STOPPED", "UNRESOLVED", "add_loads", "move",
+           "solve"]  # fmt: skip
+
+SLOW = 0.25  # ratio of corrections above which the derivatives are made anew
+MANY = 7  # iterations of a step after which the next one starts with new factors
+LEFT = 1e-2  # of what a correction may be, what is left after it may be: the factors are not those of the iterate
+ROUNDOFF = 2e-15  # of a position
+CONVERGED, NOT_CONVERGED, SINGULAR, NO_ACCELERATION, STOPPED, UNRESOLVED = range(6)
+
+
+@inner
+def move(model, discrete, step):
+    """Write the motion of bodies and markers over the step by its unknowns."""
+    for i in range(model.bodies.kind.shape[0]):
+        body_step(model, discrete, step, i)
+    for m in range(model.markers.body.shape[0]):
+        marker_step(model, discrete, step, m)
+    line_steps(model, discrete, step)
+    for k in range(step.load.shape[0]):
+        step.load[k] = 0.0
+
+
+@inner
+def add_loads(model, work, discrete, step):
+    """Add all forces but reactions to the loads on markers and bodies, and sum their work over the step."""
+    given, taken = 0.0, 0.0
+    for i in range(model.bodies.kind.shape[0]):
+        weight = scaled(model.body_types.mass[model.bodies.kind[i]], vector(model.gravity))
+        put_sum(step.load, model.bodies.u0[i], weight)
+    for k in range(model.loads.marker.shape[0]):
+        given += point_load(model, step, k)
+    for k in range(model.body_loads.body.shape[0]):
+        given += body_load(model, discrete, step, k)
+    for c in range(model.connections.size.shape[0]):
+        entering, resisting = connection_load(model, work, discrete, step, c)
+        given += entering
+        taken += resisting
+    step.given, step.taken = given, taken
+
+
+@inner
+def connection_load(model, work, discrete, step, c):
+    """Add the forces of connection c; return the work they give and take."""
+    law = model.connections.law[c]
+    if law == SPRING:
+        return spring_load(model, step, c)
+    if law == BUSHING:
+        return bushing_load(model, discrete, step, c)
+    if law == CONTACT:
+        return 0.0, contact_load(model, discrete, step, c)
+    if law == USER_FORCE:
+        return user_force_load(model, work, discrete, step, c), 0.0
+    if law == ELEMENT:
+        return element_load(model, work, discrete, step, c)
+    given, taken = 0.0, 0.0
+    if law != JOINT:
+        return given, taken
+    for k in range(model.connections.w0[c], model.connections.w0[c + 1]):
+        if model.rows.is_loaded[k]:
+            normal = 0.0
+            if has_normal(model.joint_forces, model.rows.force0[k], model.rows.force1[k]):
+                normal = normal_force(model, discrete, step, c, k)
+            a, b = model.connections.a[c], model.connections.b[c]
+            entering, resisting = coordinate_load(model, discrete, step, k, a, b, normal)
+            given += entering
+            taken += resisting
+    return given, taken
+
+
+@inner
+def has_normal(forces, first, last):
+    """Whether some forces depend on the normal force of their joint."""
+    for i in range(first, last):
+        if forces.coefficient[i] > 0.0:
+            return True
+    return False
+
+
+@inner
+def write_residual(model, work, discrete, step):
+    """Write the residual at the unknowns."""
+    n_u, h = step.load.shape[0], step.h
+    c = 0.5 * h * h
+    for j in range(step.f.shape[0]):
+        step.f[j] = step.z[n_u + j] / c
+    move(model, discrete, step)
+    if not step.is_closing:
+        add_loads(model, work, discrete, step)
+    for connection in range(model.connections.size.shape[0]):
+        if model.connections.law[connection] == ELEMENT:
+            element_residual(model, work, discrete, step, connection)
+            continue
+        for j in range(discrete.first[connection], discrete.first[connection + 1]):
+            k, soft = discrete.row[j], model.rows.soft[discrete.row[j]] * step.z[n_u + j]
+            add_reaction(model, discrete, step, connection, k, step.f[j])
+            if step.is_closing:
+                rate = row_rate(model, step, connection, k, step.t_force)
+                step.residual[n_u + j] = row_change(model, discrete, step, connection, k) + h * rate + soft
+            else:
+                step.residual[n_u + j] = row_value(model, step, connection, k) + soft
+        if model.connections.law[connection] == USER_FORCE:
+            write_state_residual(model, work, discrete, step, connection)
+    for m in range(model.markers.body.shape[0]):
+        marker_loads(model, discrete, step, m)
+    for i in range(model.bodies.kind.shape[0]):
+        n, u0, R = model.bodies.n_q[i], model.bodies.u0[i], matrix(step.R_0[i])
+        body_inertia(model, discrete, step, i)
+        put_sum(step.residual, u0, scaled(-c, turned_back(R, vector(step.load[u0:]))))
+        torque = turned_back(R, vector(step.load[u0 + 3 :]))
+        if not step.is_still:
+            torque = sub(torque, scaled(0.5, cross(vector(step.z[u0 + 3 :]), torque)))
+        put_sum(step.residual, u0 + 3, scaled(-c, torque))
+        for k in range(u0 + 6, u0 + 6 + n):
+            step.residual[k] -= c * step.load[k]
+
+
+@inner
+def write_state_residual(model, work, discrete, step, c):
+    """Write the equations of the states of connection c; while velocities are closed they do not change."""
+    if not step.is_closing:
+        user_state_residual(model, work, discrete, step, c)
+        return
+    u = model.connections.item[c]
+    first = step.load.shape[0] + step.f.shape[0]
+    for s in range(first + model.users.state0[u], first + model.users.state0[u + 1]):
+        step.residual[s] = step.z[s]
+
+
+@inner
+def put_changes(model, discrete, step):
+    """Write by how much unknowns are changed for derivatives: by SMALL of their size, so far as it is known.
+
+    A multiplier of an equation of its own, or a state, may be of any size; a change of far less than that is lost in
+    the rounding of what depends on it.
+    """
+    n_u, first_state = step.load.shape[0], step.load.shape[0] + step.f.shape[0]
+    for j in range(step.z.shape[0]):
+        size = 0.0
+        if j >= first_state:
+            size = abs(step.z[j]) + abs(step.known[model.states.row[j - first_state]])
+        elif j >= n_u:
+            size = max(abs(step.z[j]), 0.5 * step.h * step.h * step.f_size[j - n_u])
+        step.center[j] = step.z[j]
+        step.delta[j] = step.z[j] + max(discrete.delta[j], SMALL * size) - step.z[j]  # as it is in the end
+
+
+@inner
+def factorize(model, work, discrete, step, stage):
+    """Write the factors of the derivatives of the residual; return whether there are."""
+    pattern, A, n = discrete.pattern, step.band[stage], step.z.shape[0]
+    below, above = pattern.below, pattern.above
+    for i in range(n):
+        step.base[i] = step.residual[i]
+        for j in range(A.shape[1]):
+            A[i, j] = 0.0
+    put_changes(model, discrete, step)
+    for color in range(pattern.color0.shape[0] - 1):
+        first, last = pattern.color0[color], pattern.color0[color + 1]
+        for e in range(first, last):
+            step.z[pattern.column[e]] = step.center[pattern.column[e]] + step.delta[pattern.column[e]]
+        write_residual(model, work, discrete, step)
+        for e in range(first, last):
+            j = pattern.column[e]
+            step.z[j] = step.center[j]
+            factor = discrete.scale[j] / step.delta[j]
+            column, block = pattern.place[j], pattern.block[j]
+            for r in range(pattern.row0[block], pattern.row0[block + 1]):
+                i = pattern.row[r]
+                row = pattern.place[i]
+                A[row, below + column - row] = factor * discrete.row_scale[i] * (step.residual[i] - step.base[i])
+    for i in range(n):
+        step.residual[i] = step.base[i]
+    step.n_factors += 1
+    return band_factor(A, step.band_pivot[stage], below, above)
+
+
+@inner
+def correct(model, discrete, step, stage):
+    """Add Newton's correction to the unknowns; return its norm, and write the largest of states over their sizes."""
+    pattern, total, first_state = discrete.pattern, 0.0, step.load.shape[0] + step.f.shape[0]
+    step.state_change = 0.0
+    for i in range(step.z.shape[0]):
+        step.right[pattern.place[i]] = -discrete.row_scale[i] * step.residual[i]
+    band_solve(step.band[stage], step.band_pivot[stage], pattern.below, pattern.above, step.right)
+    for i in range(step.z.shape[0]):
+        change = discrete.scale[i] * step.right[pattern.place[i]]
+        step.z[i] += change
+        if i < discrete.weight.shape[0]:
+            total += discrete.weight[i] * change * change
+        elif i >= first_state:
+            s = i - first_state
+            size = abs(step.known[model.states.row[s]]) + abs(step.z[i]) + model.states.size[s]
+            step.state_change = max(step.state_change, abs(change) / size)
+    for e in range(discrete.equation.shape[0]):
+        i, c = step.load.shape[0] + discrete.equation[e], 0.5 * step.h * step.h
+        size = max(abs(step.z[i]), c * max(model.laws.equation_size[e], step.f_size[discrete.equation[e]]))
+        step.state_change = max(step.state_change, abs(discrete.scale[i] * step.right[pattern.place[i]]) / size)
+    return math.sqrt(total)
+
+
+@inner
+def size_of(discrete, step):
+    """Return the size of the increments in the norm of corrections."""
+    total = 0.0
+    for k in range(discrete.weight.shape[0]):
+        total += discrete.weight[k] * step.z[k] * step.z[k]
+    return math.sqrt(total)
+
+
+@inner
+def smallest(model, step, order):
+    """Return by how much corrections may differ from zero: tolerance times the fall in a step, and rounding."""
+    floor, mass = 0.0, 0.0
+    for i in range(model.bodies.kind.shape[0]):
+        m, size = model.body_types.mass[model.bodies.kind[i]], order.length
+        for k in range(3):
+            size += abs(step.c_0[i, k])
+        floor += m * size * size
+        mass += m
+    fall = 0.5 * step.h * step.h * norm(vector(model.gravity)) * math.sqrt(mass)
+    return order.tolerance * fall + ROUNDOFF * math.sqrt(floor)
+
+
+@inner
+def solve(model, work, discrete, step, order, stage, is_exact):
+    """Find the unknowns of a step. Return CONVERGED, NOT_CONVERGED or SINGULAR.
+
+    is_exact: with derivatives made anew in each iteration that needs them, as far as it goes.
+    """
+    least = smallest(model, step, order)
+    last = math.inf
+    step.excess = math.inf
+    if is_exact:
+        step.is_due[stage] = 1
+    for iteration in range(order.max_iterations):
+        write_residual(model, work, discrete, step)
+        if step.is_due[stage]:
+            if not factorize(model, work, discrete, step, stage):
+                return SINGULAR
+            step.is_due[stage] = 0
+        change = correct(model, discrete, step, stage)
+        step.n_iterations += 1
+        if not math.isfinite(change):
+            step.is_due[stage] = 1
+            step.excess = math.inf
+            return NOT_CONVERGED
+        allowed = order.tolerance * size_of(discrete, step) + least
+        change = max(change, step.state_change * allowed / order.tolerance)
+        step.excess = change / allowed
+        left = change * min(change / last, 1.0)  # what the next correction would be
+        is_rounding = change <= 1e3 * allowed and change > 0.5 * last and iteration > 2
+        if (change <= allowed and left <= LEFT * allowed) or is_rounding:
+            if iteration >= MANY:
+                step.is_due[stage] = 1
+            return CONVERGED
+        if change > SLOW * last or (is_exact and change > 1e-3 * last):
+            step.is_due[stage] = 1
+        last = change
+    step.is_due[stage] = 1
+    return NOT_CONVERGED

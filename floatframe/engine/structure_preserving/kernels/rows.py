@@ -1,0 +1,242 @@
+"""Constraints of joints over a step, see `floatframe.engine.structure_preserving.constraints` for the formulas."""
+
+import math
+
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.time_function import time_function
+from floatframe.engine.kernels.vector import add, cross, dot, scaled, sub, turned, vector
+from floatframe.engine.structure_preserving.kernels.markers import add_direction, add_force, change, ends
+from floatframe.model.joints.rows.kinds import DISTANCE, EQUAL_TURN, POINT, SCREW, SLIDE, TURN, TURN_B
+
+__all__ = ["add_reaction", "angle_change", "angle_loads", "angle_of", "end_angle", "force_of_row", "held",
+           "mean_direction", "mean_distance", "row_change", "row_rate", "row_value", "slip_change"]  # fmt: skip
+
+
+@inner
+def held(model, k, t):
+    """Return the value that row k holds at time t, and its rate."""
+    if model.rows.motion[k] < 0:
+        return model.rows.c[k], 0.0
+    value, rate, _ = time_function(model.functions, model.rows.motion[k], t)
+    return value, rate
+
+
+@inner
+def turn_direction(model, k, t):
+    """Return the direction of marker A (TURN_B: of B, from where A turns back) of a prescribed angle at time t."""
+    angle, _ = held(model, k, t)
+    if model.rows.kind[k] == TURN_B:
+        angle = -angle
+    return add(scaled(math.cos(angle), vector(model.rows.x[k])), scaled(math.sin(angle), vector(model.rows.z[k])))
+
+
+@inner
+def slide_axis(model, k):
+    """Return the axis in A along which row k measures a distance."""
+    x = vector(model.rows.x[k])
+    return cross(x, vector(model.rows.z[k])) if model.rows.kind[k] == SCREW else x
+
+
+@inner
+def point_axis(model, step, k, a, b):
+    """Return the direction of a POINT row in ground axes: fixed in the body of A, or of B, where the step begins."""
+    i = model.markers.body[a]
+    if i < 0:
+        i = model.markers.body[b]
+    return turned(step.R_0[i], vector(model.rows.x[k]))
+
+
+@inner
+def mean_distance(step, a, b):
+    """Return the mean of the way from A to B."""
+    d_0 = sub(vector(step.x_0[b]), vector(step.x_0[a]))
+    return scaled(0.5, add(d_0, sub(vector(step.x_f[b]), vector(step.x_f[a]))))
+
+
+@inner
+def mean_direction(step, m, e):
+    """Return the mean of the direction e of a marker."""
+    E_0, E_1 = ends(step, m, e)
+    return scaled(0.5, add(E_0, E_1))
+
+
+@inner
+def row_value(model, step, k, a, b):
+    """Return the value of row k at the end of a step."""
+    kind, x, y = model.rows.kind[k], vector(model.rows.x[k]), vector(model.rows.y[k])
+    d = sub(vector(step.x_1[b]), vector(step.x_1[a]))
+    if kind == POINT:
+        return dot(d, point_axis(model, step, k, a, b))
+    if kind == SLIDE:
+        value, _ = held(model, k, step.t_1)
+        return dot(turned(step.A_1[a], x), d) - value
+    if kind == DISTANCE:
+        value, _ = held(model, k, step.t_1)
+        return 0.5 * (dot(d, d) / value - value)
+    if kind == SCREW:
+        slope, along = model.rows.c[k], dot(turned(step.A_1[a], slide_axis(model, k)), d)
+        angle = angle_of(model, step.A_1, k, a, b)
+        turns = math.floor((along / slope - angle) / (2 * math.pi) + 0.5)
+        return along - slope * (angle + 2 * math.pi * turns)
+    if kind == TURN:
+        return dot(turned(step.A_1[a], turn_direction(model, k, step.t_1)), turned(step.A_1[b], y))
+    if kind == TURN_B:
+        return dot(turned(step.A_1[b], turn_direction(model, k, step.t_1)), turned(step.A_1[a], y))
+    if kind == EQUAL_TURN:
+        U, D = turned(step.A_1[b], vector(model.rows.u[k])), turned(step.A_1[b], y)
+        return dot(turned(step.A_1[a], x), U) - dot(turned(step.A_1[a], vector(model.rows.z[k])), D)
+    return dot(turned(step.A_1[a], x), turned(step.A_1[b], y)) - model.rows.c[k]
+
+
+@inner
+def force_of_row(model, step, k, a, b):
+    """Return the force on B of a unit multiplier of row k, which holds a distance."""
+    kind = model.rows.kind[k]
+    if kind == POINT:
+        return point_axis(model, step, k, a, b)
+    if kind == DISTANCE:
+        value, _ = held(model, k, step.t_force)
+        return scaled(1.0 / value, mean_distance(step, a, b))
+    return mean_direction(step, a, slide_axis(model, k))
+
+
+@inner
+def add_reaction(model, discrete, step, k, a, b, f):
+    """Add the loads of row k with multiplier f: their work is f times the change of the row."""
+    kind = model.rows.kind[k]
+    if model.rows.is_length[k]:
+        F = scaled(f, force_of_row(model, step, k, a, b))
+        if kind == SLIDE or kind == SCREW:
+            add_direction(model, discrete, step, a, slide_axis(model, k), scaled(f, mean_distance(step, a, b)))
+        add_force(step, b, F)
+        add_force(step, a, scaled(-1.0, F))
+        if kind == SCREW:
+            angle_loads(model, discrete, step, k, a, b, -model.rows.c[k] * f)
+        return
+    y = vector(model.rows.y[k])
+    if kind == TURN_B:
+        add_product(model, discrete, step, b, turn_direction(model, k, step.t_force), a, y, f)
+    elif kind == TURN:
+        add_product(model, discrete, step, a, turn_direction(model, k, step.t_force), b, y, f)
+    elif kind == EQUAL_TURN:
+        add_product(model, discrete, step, a, vector(model.rows.x[k]), b, vector(model.rows.u[k]), f)
+        add_product(model, discrete, step, a, vector(model.rows.z[k]), b, y, -f)
+    else:
+        add_product(model, discrete, step, a, vector(model.rows.x[k]), b, y, f)
+
+
+@inner
+def add_product(model, discrete, step, a, e, b, y, f):
+    """Add the loads of f times the product of direction e of marker a and y of marker b."""
+    E, D = mean_direction(step, a, e), mean_direction(step, b, y)
+    add_direction(model, discrete, step, a, e, scaled(f, D))
+    add_direction(model, discrete, step, b, y, scaled(f, E))
+
+
+@inner
+def product_change(model, discrete, step, a, e, b, y):
+    """Return the change of the product of direction e of marker a and y of marker b."""
+    E, D = mean_direction(step, a, e), mean_direction(step, b, y)
+    dE, dD = change(model, discrete, step, a, e, E), change(model, discrete, step, b, y, D)
+    return dot(dE, D) + dot(E, dD)
+
+
+@inner
+def row_change(model, discrete, step, k, a, b):
+    """Return the change of row k over the step, by the motion alone: the work of a unit multiplier."""
+    kind = model.rows.kind[k]
+    if kind == POINT or kind == DISTANCE:
+        F = force_of_row(model, step, k, a, b)
+        return dot(F, sub(vector(step.dx[b]), vector(step.dx[a])))
+    if kind == SLIDE or kind == SCREW:
+        slip, _, _ = slip_change(model, discrete, step, slide_axis(model, k), a, b)
+        if kind == SCREW:
+            slip -= model.rows.c[k] * angle_change(model, discrete, step, k, a, b)
+        return slip
+    y = vector(model.rows.y[k])
+    if kind == TURN_B:
+        return product_change(model, discrete, step, b, turn_direction(model, k, step.t_force), a, y)
+    if kind == TURN:
+        return product_change(model, discrete, step, a, turn_direction(model, k, step.t_force), b, y)
+    if kind == EQUAL_TURN:
+        one = product_change(model, discrete, step, a, vector(model.rows.x[k]), b, vector(model.rows.u[k]))
+        return one - product_change(model, discrete, step, a, vector(model.rows.z[k]), b, y)
+    return product_change(model, discrete, step, a, vector(model.rows.x[k]), b, y)
+
+
+@inner
+def row_rate(model, step, k, a, b, t):
+    """Return the rate of row k at the beginning of a step while nothing moves: that of a prescribed motion."""
+    kind = model.rows.kind[k]
+    if model.rows.motion[k] < 0:
+        return 0.0
+    value, rate = held(model, k, t)
+    if kind == SLIDE:
+        return -rate
+    if kind == DISTANCE:
+        d = sub(vector(step.x_0[b]), vector(step.x_0[a]))
+        return -0.5 * rate * (dot(d, d) / (value * value) + 1.0)
+    x, y, z = vector(model.rows.x[k]), vector(model.rows.y[k]), vector(model.rows.z[k])
+    if kind == TURN_B:
+        back = add(scaled(math.cos(value), z), scaled(math.sin(value), x))
+        return -rate * dot(turned(step.A_0[b], back), turned(step.A_0[a], y))
+    across = sub(scaled(math.cos(value), z), scaled(math.sin(value), x))
+    return rate * dot(turned(step.A_0[a], across), turned(step.A_0[b], y))
+
+
+@inner
+def angle_of(model, A, k, a, b):
+    """Return the angle of row k: that of D from Z towards -E; A: axes of the markers."""
+    D = turned(A[b], vector(model.rows.y[k]))
+    return math.atan2(-dot(turned(A[a], vector(model.rows.x[k])), D), dot(turned(A[a], vector(model.rows.z[k])), D))
+
+
+@inner
+def end_angle(model, step, k, a, b):
+    """Return the angle of row k where forces end to act."""
+    return angle_of(model, step.A_f, k, a, b)
+
+
+@inner
+def angle_parts(model, step, k, a, b):
+    """Return E, Z, D (means), S and C (means) and kappa of the angle of row k."""
+    E_0, E_1 = ends(step, a, vector(model.rows.x[k]))
+    Z_0, Z_1 = ends(step, a, vector(model.rows.z[k]))
+    D_0, D_1 = ends(step, b, vector(model.rows.y[k]))
+    S_0, S_1, C_0, C_1 = -dot(E_0, D_0), -dot(E_1, D_1), dot(Z_0, D_0), dot(Z_1, D_1)
+    sine, cosine = C_0 * S_1 - S_0 * C_1, C_0 * C_1 + S_0 * S_1
+    kappa = 1.0
+    if abs(sine) >= 1e-9:
+        kappa = math.atan2(sine, cosine) / sine
+    E, Z, D = scaled(0.5, add(E_0, E_1)), scaled(0.5, add(Z_0, Z_1)), scaled(0.5, add(D_0, D_1))
+    return E, Z, D, 0.5 * (S_0 + S_1), 0.5 * (C_0 + C_1), kappa
+
+
+@inner
+def angle_loads(model, discrete, step, k, a, b, f):
+    """Add the loads of a torque f along the angle of row k: their work is f times its change."""
+    E, Z, D, S, C, kappa = angle_parts(model, step, k, a, b)
+    f *= kappa
+    add_direction(model, discrete, step, a, vector(model.rows.x[k]), scaled(-f * C, D))
+    add_direction(model, discrete, step, a, vector(model.rows.z[k]), scaled(-f * S, D))
+    both = add(scaled(C, E), scaled(S, Z))
+    add_direction(model, discrete, step, b, vector(model.rows.y[k]), scaled(-f, both))
+
+
+@inner
+def angle_change(model, discrete, step, k, a, b):
+    """Return the change of the angle of row k over the step."""
+    E, Z, D, S, C, kappa = angle_parts(model, step, k, a, b)
+    dE = change(model, discrete, step, a, vector(model.rows.x[k]), E)
+    dZ = change(model, discrete, step, a, vector(model.rows.z[k]), Z)
+    dD = change(model, discrete, step, b, vector(model.rows.y[k]), D)
+    dS, dC = -(dot(dE, D) + dot(E, dD)), dot(dZ, D) + dot(Z, dD)
+    return kappa * (C * dS - S * dC)
+
+
+@inner
+def slip_change(model, discrete, step, x, a, b):
+    """Return the change of the distance along an axis x of A, the mean axis and the mean way from A to B."""
+    E, d = mean_direction(step, a, x), mean_distance(step, a, b)
+    dE = change(model, discrete, step, a, x, E)
+    return dot(dE, d) + dot(E, sub(vector(step.dx[b]), vector(step.dx[a]))), E, d

@@ -1,0 +1,356 @@
+"""The steps of the conserving and variational schemes in a compiled loop; formulas in `floatframe.integrators`."""
+
+import math
+
+from floatframe.engine.kernels.body import block
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.connections.gap import next_step, step_before_contact
+from floatframe.engine.kernels.generalized_alpha import load_state
+from floatframe.engine.kernels.past import keep_past
+from floatframe.engine.kernels.turns import count_turns
+from floatframe.engine.kernels.vector import add, cross, dot, matrix, put, scaled, sub, turned, turned_back, vector
+from floatframe.engine.structure_preserving.kernels.bodies import (
+    begin_bodies,
+    end_rates,
+    interval,
+    keep_bodies,
+    move_bodies,
+)
+from floatframe.engine.structure_preserving.kernels.connections.contacts import gap_at
+from floatframe.engine.structure_preserving.kernels.connections.public_elements import element_gap
+from floatframe.engine.structure_preserving.kernels.deformed_lines import begin_lines
+from floatframe.engine.structure_preserving.kernels.held_rows import row_change
+from floatframe.engine.structure_preserving.kernels.markers import begin_markers, marker_loads
+from floatframe.engine.structure_preserving.kernels.memory import expect_angles, keep, recall, remember
+from floatframe.engine.structure_preserving.kernels.newton import (
+    CONVERGED,
+    NO_ACCELERATION,
+    STOPPED,
+    UNRESOLVED,
+    add_loads,
+    move,
+    solve,
+)
+from floatframe.engine.structure_preserving.kernels.observation import observe
+from floatframe.engine.structure_preserving.kernels.records import CONSERVING, DAMPING
+
+__all__ = ["advance"]
+
+FADING = 0.9  # of the size of a multiplier that holds nothing, a step: one that passes zero keeps its size
+
+
+@inner
+def guess(model, step):
+    """Write the increments and multipliers from which Newton's method sets out: those of steady accelerations."""
+    h, n_u = step.h, step.load.shape[0]
+    for k in range(n_u):
+        step.z[k] = h * (step.w_0[k] + 0.5 * h * step.acceleration[k])
+    for i in range(model.bodies.kind.shape[0]):
+        u0, R = model.bodies.u0[i], matrix(step.R_0[i])
+        v = scaled(h, turned_back(R, vector(step.w_0[u0:])))
+        put(step.z, u0, add(v, scaled(0.5 * h * h, vector(step.acceleration[u0:]))))
+    for j in range(step.f.shape[0]):
+        step.z[n_u + j] = 0.5 * h * h * step.f_kept[j]
+    for s in range(model.states.row.shape[0]):
+        step.z[n_u + step.f.shape[0] + s] = h * step.known[model.states.row[s] + 1]
+
+
+@inner
+def learn(model, discrete, step):
+    """Take the change of velocities over the step for the next guess, v in body axes, and sizes of multipliers."""
+    for i in range(model.bodies.kind.shape[0]):
+        u0, n, R = model.bodies.u0[i], model.bodies.n_q[i], matrix(step.R_0[i])
+        dv = turned_back(R, sub(vector(step.w_1[u0:]), vector(step.w_0[u0:])))
+        put(step.acceleration, u0, scaled(1.0 / step.h, dv))
+        for k in range(u0 + 3, u0 + 6 + n):
+            step.acceleration[k] = (step.w_1[k] - step.w_0[k]) / step.h
+    for j in range(step.f.shape[0]):
+        step.f_kept[j] = step.f[j]
+    for e in range(discrete.equation.shape[0]):
+        j = discrete.equation[e]
+        step.f_size[j] = max(FADING * step.f_size[j], abs(step.f[j]))
+
+
+@inner
+def work_of_dampers(model, discrete, step):
+    """Return the work that modal damping takes."""
+    total = 0.0
+    for i in range(model.bodies.kind.shape[0]):
+        t, n, q0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i]
+        D = block(discrete, t, DAMPING, n * n)
+        for k in range(n):
+            for j in range(n):
+                total += step.dq[q0 + k] * D[k * n + j] * step.dq[q0 + j]
+    return total / step.h
+
+
+@inner
+def add_drives(model, discrete, step):
+    """Add to the work that is given that of prescribed motions: of their multipliers."""
+    for c in range(model.connections.size.shape[0]):
+        for j in range(discrete.first[c], discrete.first[c + 1]):
+            if discrete.is_driven[j]:
+                step.given += step.f[j] * row_change(model, discrete, step, c, discrete.row[j])
+
+
+@inner
+def begin(model, discrete, step, memory):
+    """Write what is known where the step begins."""
+    recall(memory, step)
+    expect_angles(memory, step)
+    begin_bodies(model, discrete, step, memory)
+    begin_markers(model, discrete, step)
+    begin_lines(model, step)
+
+
+@inner
+def solve_both_ways(model, work, discrete, step, order, stage):
+    """Find the unknowns with the factors that are kept, or else with new ones in each iteration."""
+    guess(model, step)
+    status = solve(model, work, discrete, step, order, stage, False)
+    if status != CONVERGED:
+        guess(model, step)
+        status = solve(model, work, discrete, step, order, stage, True)
+    return status
+
+
+@inner
+def conserving_step(model, work, discrete, step, memory, order):
+    """Advance the memory by one step of the conserving or decaying scheme; return the status."""
+    step.t_force, step.is_still, step.is_closing = 0.5 * (step.t_0 + step.t_1), 0, 0
+    begin(model, discrete, step, memory)
+    status = solve_both_ways(model, work, discrete, step, order, 0)
+    if status != CONVERGED:
+        return status
+    take_multipliers(step)
+    move(model, discrete, step)
+    if is_too_long(model, work, discrete, step):
+        return UNRESOLVED
+    step.given, step.taken = 0.0, 0.0
+    work.counted.stopped = 0
+    if discrete.is_loaded:
+        add_loads(model, work, discrete, step)
+        add_drives(model, discrete, step)
+    for i in range(model.bodies.kind.shape[0]):
+        end_rates(model, discrete, step, i)
+    memory.work_given += step.given
+    memory.work_taken += step.taken + work_of_dampers(model, discrete, step)
+    learn(model, discrete, step)
+    remember(model, discrete, step)
+    keep(discrete, step, memory)
+    move_bodies(model, step)
+    keep_bodies(model, discrete, step, memory)
+    return status
+
+
+@inner
+def take_multipliers(step):
+    """Write the multipliers of the unknowns."""
+    n_u = step.load.shape[0]
+    for j in range(step.f.shape[0]):
+        step.f[j] = 2.0 * step.z[n_u + j] / (step.h * step.h)
+
+
+@inner
+def variational_step(model, work, discrete, step, memory, order):
+    """Advance the memory by one step of the variational scheme; return the status."""
+    step.t_force, step.is_still, step.is_closing = step.t_0, 1, 0
+    h = step.h
+    begin(model, discrete, step, memory)
+    status = solve_both_ways(model, work, discrete, step, order, 0)
+    if status != CONVERGED:
+        return status
+    take_multipliers(step)
+    move(model, discrete, step)
+    if is_too_long(model, work, discrete, step):
+        return UNRESOLVED
+    work.counted.stopped = 0
+    add_loads(model, work, discrete, step)
+    add_drives(model, discrete, step)
+    dampers = work_of_dampers(model, discrete, step)
+    given, taken = step.given, step.taken
+    learn_multipliers(step)
+    remember(model, discrete, step)
+    for i in range(model.bodies.kind.shape[0]):
+        interval(model, discrete, step, i)
+        put_elastic(model, step, i)
+    move_bodies(model, step)
+    step.t_force = step.t_1
+    expect_angles(memory, step)
+    step.is_closing = 1
+    begin_markers(model, discrete, step)
+    begin_lines(model, step)
+    move(model, discrete, step)
+    add_loads(model, work, discrete, step)
+    for m in range(model.markers.body.shape[0]):
+        marker_loads(model, discrete, step, m)
+    given, taken = given + step.given, taken + step.taken
+    for j in range(step.f.shape[0]):
+        step.f[j] = 0.0
+    for c in range(model.connections.size.shape[0]):
+        for j in range(discrete.first[c], discrete.first[c + 1]):
+            if discrete.is_driven[j]:
+                step.change[j] = row_change(model, discrete, step, c, discrete.row[j])
+    for i in range(model.bodies.kind.shape[0]):
+        u0, n, R = model.bodies.u0[i], model.bodies.n_q[i], matrix(step.R_0[i])
+        m, theta, Pi = model.body_types.mass[model.bodies.kind[i]], vector(step.z[u0 + 3 :]), vector(step.P_1[u0 + 3 :])
+        force, torque = vector(step.load[u0:]), turned_back(R, vector(step.load[u0 + 3 :]))
+        put(step.P_0, u0, add(scaled(m / h, vector(step.d[i])), scaled(0.5 * h, force)))
+        turning = add(sub(Pi, scaled(0.5, cross(theta, Pi))), scaled(0.25 * dot(theta, Pi), theta))
+        put(step.P_0, u0 + 3, add(turning, scaled(0.5 * h, torque)))
+        for k in range(u0 + 6, u0 + 6 + n):
+            step.P_0[k] = step.P_1[k] + 0.5 * h * (step.elastic[k] + step.load[k])
+    step.is_closing = 2
+    status = solve(model, work, discrete, step, order, 1, False)
+    if status != CONVERGED:
+        for k in range(step.z.shape[0]):
+            step.z[k] = 0.0
+        status = solve(model, work, discrete, step, order, 1, True)
+        if status != CONVERGED:
+            return status
+    take_multipliers(step)
+    for j in range(step.f.shape[0]):
+        if discrete.is_driven[j]:
+            given += step.f[j] * step.change[j]
+    for i in range(model.bodies.kind.shape[0]):
+        u0, n, R = model.bodies.u0[i], model.bodies.n_q[i], matrix(step.R_0[i])
+        put(step.w_1, u0, scaled(1.0 / h, turned(R, vector(step.z[u0:]))))
+        for k in range(u0 + 3, u0 + 6 + n):
+            step.w_1[k] = step.z[k] / h
+    memory.work_given += 0.5 * given
+    memory.work_taken += 0.5 * taken + dampers
+    learn(model, discrete, step)
+    for j in range(step.f.shape[0]):
+        step.f_kept[j] = step.kept[j]
+    keep(discrete, step, memory)
+    keep_bodies(model, discrete, step, memory)
+    return status
+
+
+@inner
+def learn_multipliers(step):
+    """Keep the multipliers of positions, from which those of the next step set out."""
+    for j in range(step.f.shape[0]):
+        step.kept[j] = step.f[j]
+
+
+@inner
+def put_elastic(model, step, i):
+    """Keep the modal forces of the middle of the step."""
+    u0, n = model.bodies.u0[i], model.bodies.n_q[i]
+    for k in range(n):
+        step.elastic[u0 + 6 + k] = step.force[k]
+
+
+@inner
+def is_too_long(model, work, discrete, step):
+    """Whether the step, whose unknowns are found, is too long for a contact; see `kernels.connections.gap`."""
+    if model.gaps.connection.shape[0] == 0:
+        return False
+    for g in range(model.gaps.connection.shape[0]):
+        if model.gaps.output[g] < 0:
+            work.gaps.end[g] = gap_at(model, step.x_1, step.A_1, model.gaps.connection[g])
+        else:
+            work.gaps.end[g] = element_gap(model, work, discrete, step, g)
+    return next_step(model, work, step.t_0, step.h) < step.h
+
+
+@inner
+def begin_iterate(model, work, step, memory):
+    """Take the state of the memory for the iterate, with the mean accelerations of the step before.
+
+    Not those of the memory, which are those of the last output: outputs do not change a motion.
+    """
+    load_state(work.state, memory)
+    for i in range(model.bodies.kind.shape[0]):
+        t, n, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.u0[i]
+        s, omega = scaled(1.0 / model.body_types.mass[t], vector(model.body_types.S[t])), vector(memory.u[u0 + 3 :])
+        of_center = add(cross(vector(step.acceleration[u0 + 3 :]), s), cross(omega, cross(omega, s)))
+        put(work.state.u_dot, u0, turned(work.state.R[i], sub(vector(step.acceleration[u0:]), of_center)))
+        for k in range(u0 + 3, u0 + 6 + n):
+            work.state.u_dot[k] = step.acceleration[k]
+
+
+@inner
+def take_size(step, h):
+    """Take a size of the step."""
+    if step.h != h:
+        step.h = h
+        step.is_due[0], step.is_due[1] = 1, 1
+
+
+@inner
+def take_parts(model, work, discrete, step, memory, order, t_0, t_1):
+    """Advance the memory from t_0 to t_1 by one step, with contacts by parts that these want; return the status.
+
+    With h_min above 0 a part that fails is tried again, shorter, down to it.
+    """
+    h, has_gaps, left, has_failed = order.h, model.gaps.connection.shape[0] > 0, order.h, False
+    if memory.h_wanted <= 0.0 or memory.h_wanted > h:
+        memory.h_wanted = h
+    while left > 0.0:
+        part, is_last = left, True
+        if order.h_min > 0.0:
+            part = left / max(1.0, math.ceil(left / memory.h_wanted * (1.0 - 1e-9)))
+            if has_gaps:
+                begin_iterate(model, work, step, memory)
+                part = max(step_before_contact(model, work, t_1 - left, part), order.h_min)
+            is_last = part >= left
+            part = min(part, left)
+        step.t_0, step.t_1 = t_0 if left == h else t_1 - left, t_1 if is_last else t_1 - (left - part)
+        take_size(step, part)
+        if discrete.scheme == CONSERVING:
+            status = conserving_step(model, work, discrete, step, memory, order)
+        else:
+            status = variational_step(model, work, discrete, step, memory, order)
+        if status == CONVERGED:
+            count_angles(model, work, memory, part)
+            memory.n_accepted += 1
+            left = 0.0 if is_last else left - part
+            wanted = part if has_failed else 2.0 * part
+            if has_gaps:
+                wanted = min(h if work.gaps.n_closed == 0 else wanted, work.gaps.step)
+            memory.h_wanted = min(wanted, h)
+            has_failed = False
+            if work.counted.stopped > 0:
+                return STOPPED
+            continue
+        if part <= order.h_min or order.h_min <= 0.0:
+            return status
+        memory.n_rejected += 1
+        memory.h_wanted = max(work.gaps.step if status == UNRESOLVED else 0.5 * part, order.h_min)
+        has_failed = True
+    return CONVERGED
+
+
+@inner
+def advance(model, work, discrete, step, memory, rows, order):
+    """Advance by n_steps of size h, the first of them number `first` from t0; keep the state after every `every`-th.
+
+    Return (status, good steps, rows written). A step is good where its output can be made: after NO_ACCELERATION the
+    memory has gone one step further.
+    """
+    h = order.h
+    work.counted.rows = 0
+    for k in range(order.n_steps):
+        work.counted.no_number = 0
+        t_0, t_1 = order.t0 + (order.first + k) * h, order.t0 + (order.first + k + 1) * h
+        status = take_parts(model, work, discrete, step, memory, order, t_0, t_1)
+        if status != CONVERGED:
+            return status, k, work.counted.rows
+        if (order.first + k + 1) % order.every == 0:
+            if not observe(model, work, discrete, step, memory, t_1, rows):
+                return NO_ACCELERATION, k, work.counted.rows
+            if work.counted.stopped > 0:  # at the end of the step, whose row goes as the step does
+                return STOPPED, k, work.counted.rows - 1
+        keep_past(work.past, memory, step.f_kept, h, step.n_iterations)
+    return CONVERGED, order.n_steps, work.counted.rows
+
+
+@inner
+def count_angles(model, work, memory, h):
+    """Count turns of angles on."""
+    if memory.angle.shape[0] == 0:
+        return
+    load_state(work.state, memory)
+    count_turns(model, work, memory, h)

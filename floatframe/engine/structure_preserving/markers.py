@@ -1,0 +1,201 @@
+"""Markers over a step: where they are, how they turn, and how loads on them act on their bodies, exactly in work.
+
+Over a step (see rotation.py), with the lever l = (R_0 sigma_0 + R_1 sigma_1)/2 from the centre of mass, and for a
+direction E = R exp(Psi_r q) e = R eps of a marker,
+
+    dx = d + theta_G × l + R_m Psi_sigma dq,        dE = theta_G × (E_0 + E_1)/2 + R_m (psi × (eps_0 + eps_1)/2)
+
+where sigma(q) and th(q) are of degree two in q at most (a stiffened body bends its interfaces, theory.md §7), so that
+their changes are Psi_sigma dq and Psi_r dq with the derivatives at the mean of q, and psi = Gamma Psi_r dq is the
+Cayley vector of the elastic rotation. A force F with work F·dx acts by F, l × F and Psi_sigmaᵀ R_mᵀ F; a load G with
+work G·dE by the torque E_mean × G and (Gamma Psi_r)ᵀ (eps_mean × R_mᵀ G).
+Gamma = T + (psi - T dth) dthᵀ/|dth|², T the left Jacobian at the mean of th = Psi_r q: the discrete derivative of
+Gonzalez (1996), Journal of Nonlinear Science 6, 449-467, of the map th -> exp(th).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.engine.kernels.model import Model
+from floatframe.engine.structure_preserving.bodies import BodyStep, CentralBody
+from floatframe.engine.structure_preserving.rotation import relative_cayley
+from floatframe.model.bodies.marker_shape import MarkerShape
+from floatframe.model.rotations import cross, dot, left_jacobian, rotation_exp, turned
+
+__all__ = ["BodyMarker", "Load", "MarkerStep", "body_marker", "marker_step"]
+
+SMALL = 1e-14  #: square of an elastic rotation in a step below which its Cayley vector is T dth to rounding
+
+
+@dataclass(frozen=True, eq=False)
+class BodyMarker:
+    """Constants of a marker; body -1 is the ground."""
+
+    body: int
+    constants: CentralBody | None
+    shape: MarkerShape  #: from the frame origin
+
+    @property
+    def turns(self) -> bool:
+        """Whether it turns in its body."""
+        psi, bend = self.shape.psi, self.shape.bend
+        return psi is not None and (bool(np.any(psi[3:])) or bend is not None)
+
+    def shapes(self, q: Array) -> tuple[Array, Array]:
+        """Return Psi_sigma(q) and Psi_r(q), (..., 3, n)."""
+        assert self.constants is not None
+        Psi = self.shape.shapes(q)
+        return Psi[..., :3, :] - self.constants.shapes(q), Psi[..., 3:, :]
+
+    def deformation(self, q: Array) -> tuple[Array, Array]:
+        """Return sigma(q), from the centre of mass, and th(q), (..., 3)."""
+        assert self.constants is not None
+        d = self.shape.deformation(q)
+        return self.shape.position + d[..., :3] - self.constants.center(q), d[..., 3:]
+
+
+def body_marker(model: Model, bodies: tuple[CentralBody, ...], m: int) -> BodyMarker:
+    """Return the constants of marker m of a model."""
+    i = int(model.markers.body[m])
+    if i < 0:
+        return BodyMarker(-1, None, MarkerShape(model.markers.position[m], model.markers.triad[m]))
+    body, first, bend0 = bodies[i], int(model.markers.psi0[m]), int(model.markers.bend0[m])
+    n = body.n
+    psi = model.markers.psi[first : first + 6 * n].reshape(6, n) if first >= 0 else None
+    bend = model.markers.bend[bend0 : bend0 + 6 * n * n].reshape(n, 6, n) if bend0 >= 0 else None  # [l, a, k]
+    if bend is not None:
+        bend = np.ascontiguousarray(np.moveaxis(bend, 0, 2))
+    return BodyMarker(i, body, MarkerShape(model.markers.position[m], model.markers.triad[m], psi, bend))
+
+
+class Load:
+    """Generalised forces on one body, added up: force and torque about the centre of mass (ground axes), modal."""
+
+    def __init__(self, n: int, shape: tuple[int, ...], kind: type) -> None:
+        self.force: Array = np.zeros((*shape, 3), kind)
+        self.torque: Array = np.zeros((*shape, 3), kind)
+        self.modal: Array = np.zeros((*shape, n), kind)
+
+    def work(self, step: BodyStep) -> Array:
+        """Return the work over a step."""
+        return dot(self.force, step.d) + dot(self.torque, step.theta_G) + dot(self.modal, step.dq)
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerStep:
+    """A marker over a step of its body; step None: on the ground."""
+
+    marker: BodyMarker
+    step: BodyStep | None
+    x_0: Array
+    x_1: Array
+    lever: Array
+    dx: Array
+    rotation_0: Array  #: exp(th) in the body, (..., 3, 3)
+    rotation_1: Array
+    Gamma: Array | None  #: (..., 3, 3)
+    dpsi: Array | None  #: Cayley vector of the elastic rotation, body axes, (..., 3)
+    Psi_sigma: Array  #: derivative of sigma by q at the mean, (..., 3, n)
+    Psi_r: Array  #: derivative of th, (..., 3, n)
+
+    @property
+    def x_mean(self) -> Array:
+        """Mean position."""
+        return 0.5 * (self.x_0 + self.x_1)
+
+    def ends(self, e: Array) -> tuple[Array, Array]:
+        """Return the direction e of the marker, ground axes, at both ends."""
+        e = self.marker.shape.triad @ e
+        if self.step is None:
+            return e, e
+        return turned(self.step.R_0, self.rotation_0 @ e), turned(self.step.R_1, self.rotation_1 @ e)
+
+    def change(self, e: Array, E_mean: Array) -> Array:
+        """Return dE of direction e."""
+        if self.step is None:
+            return np.zeros(3)
+        change = cross(self.step.theta_G, E_mean)
+        if self.dpsi is not None:
+            change = change + turned(self.step.R_m, cross(self.dpsi, self.eps_mean(e)))
+        return change
+
+    def turning(self) -> Array:
+        """Return the rotation of the marker over the step, ground axes."""
+        if self.step is None:
+            return np.zeros(3)
+        if self.dpsi is None:
+            return self.step.theta_G
+        return self.step.theta_G + turned(self.step.R_m, self.dpsi)
+
+    def eps_mean(self, e: Array) -> Array:
+        """Return the mean of direction e in the body."""
+        return 0.5 * (self.rotation_0 + self.rotation_1) @ (self.marker.shape.triad @ e)
+
+    def add_force(self, load: Load | None, F: Array) -> None:
+        """Add a force at the marker, with work F·dx."""
+        if self.step is None or load is None:
+            return
+        load.force += F
+        load.torque += cross(self.lever, F)
+        F_B = turned(np.swapaxes(self.step.R_m, -1, -2), F)
+        load.modal += turned(np.swapaxes(self.Psi_sigma, -1, -2), F_B)
+
+    def add_direction(self, load: Load | None, e: Array, G: Array) -> None:
+        """Add a load on direction e, with work G·dE."""
+        if self.step is None or load is None:
+            return
+        E_0, E_1 = self.ends(e)
+        load.torque += cross(0.5 * (E_0 + E_1), G)
+        if self.Gamma is not None:
+            m = cross(self.eps_mean(e), turned(np.swapaxes(self.step.R_m, -1, -2), G))
+            self.add_elastic(load, m)
+
+    def add_moment(self, load: Load | None, T: Array) -> None:
+        """Add a moment, with work T·turning."""
+        if self.step is None or load is None:
+            return
+        load.torque += T
+        if self.Gamma is not None:
+            self.add_elastic(load, turned(np.swapaxes(self.step.R_m, -1, -2), T))
+
+    def add_elastic(self, load: Load, m: Array) -> None:
+        """Add a moment m on the elastic rotation, body axes."""
+        assert self.Gamma is not None
+        load.modal += turned(np.swapaxes(self.Psi_r, -1, -2), turned(np.swapaxes(self.Gamma, -1, -2), m))
+
+
+def marker_step(marker: BodyMarker, step: BodyStep | None) -> MarkerStep:
+    """Return a marker over a step of its body."""
+    if step is None:
+        zero, none, place = np.zeros(3), np.zeros((3, 0)), marker.shape.position
+        return MarkerStep(marker, None, place, place, zero, zero, np.eye(3), np.eye(3), None, None, none, none)
+    (sigma_0, th_0), (sigma_1, th_1) = marker.deformation(step.q_0), marker.deformation(step.q_1)
+    Psi_sigma, Psi_r = marker.shapes(0.5 * (step.q_0 + step.q_1))
+    arm_0, arm_1 = turned(step.R_0, sigma_0), turned(step.R_1, sigma_1)
+    lever = 0.5 * (arm_0 + arm_1)
+    dx = step.d + cross(step.theta_G, lever) + turned(step.R_m, turned(Psi_sigma, step.dq))
+    rotation_0 = rotation_1 = np.eye(3)
+    Gamma = dpsi = None
+    if marker.turns:
+        rotation_0, rotation_1 = rotation_exp(th_0), rotation_exp(th_1)
+        Gamma = mean_jacobian(th_0, th_1)
+        dpsi = turned(Gamma, turned(Psi_r, step.dq))
+    return MarkerStep(
+        marker, step, step.c_0 + arm_0, step.c_1 + arm_1, lever, dx, rotation_0, rotation_1, Gamma, dpsi, Psi_sigma,
+        Psi_r,
+    )  # fmt: skip
+
+
+def mean_jacobian(th_0: Array, th_1: Array) -> Array:
+    """Return Gamma, (..., 3, 3)."""
+    T = left_jacobian(0.5 * (th_0 + th_1))
+    dth = th_1 - th_0
+    square = dot(dth, dth)
+    is_small = np.abs(square) < SMALL
+    if np.all(is_small):
+        return T
+    rest = relative_cayley(th_0, th_1) - turned(T, dth)
+    factor = np.where(is_small, 0.0, 1.0 / np.where(is_small, 1.0, square))
+    return T + rest[..., :, None] * dth[..., None, :] * factor[..., None, None]

@@ -1,0 +1,35 @@
+"""Rotations of a step, for stacks of vectors and complex numbers.
+
+cay(theta) = (1 - tilde/2)⁻¹ (1 + tilde/2), the rotation by 2 atan(|theta|/2) about theta. With R_1 = R_0 cay(theta) and
+theta_G = R_0 theta
+
+    R_1 a_1 - R_0 a_0 = theta_G × (R_0 a_0 + R_1 a_1)/2 + R_m (a_1 - a_0),    R_m = R_0 (1 + tilde(theta)/2):
+
+the change of a vector that turns with a body and changes in it, exact for a step of any size.
+"""
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.engine.initial_conditions.newton_equations import product
+from floatframe.model.rotations import cross, dot, euler_parameters_of_rotation_vector, tilde
+
+__all__ = ["cayley", "cayley_parameters", "relative_cayley"]
+
+
+def cayley(theta: Array) -> Array:
+    """Return cay(theta), (..., 3, 3)."""
+    S = tilde(theta)
+    return np.eye(3) + (S + 0.5 * S @ S) / (1 + 0.25 * dot(theta, theta))[..., None, None]
+
+
+def cayley_parameters(p: Array, theta: Array) -> Array:
+    """Return the Euler parameters of R(p) cay(theta), (4,)."""
+    return product(p, np.array([1.0, *(0.5 * theta)]) / np.sqrt(1 + 0.25 * theta @ theta))
+
+
+def relative_cayley(theta_0: Array, theta_1: Array) -> Array:
+    """Return psi with exp(theta_1) = cay(psi) exp(theta_0), (..., 3)."""
+    p_0, p_1 = (euler_parameters_of_rotation_vector(theta) for theta in (theta_0, theta_1))
+    (c0, b0), (c1, b1) = ((p[..., :1], p[..., 1:]) for p in (p_0, p_1))
+    return 2 * (c0 * b1 - c1 * b0 - cross(b1, b0)) / (c0 * c1 + dot(b0, b1)[..., None])

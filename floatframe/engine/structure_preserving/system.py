@@ -1,0 +1,331 @@
+"""A compiled system as the discrete schemes see it, and the loads of its joints and forces over a step."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, IntArray
+from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.kernels.model import BUSHING, CONTACT, COUPLER, ELEMENT, JOINT, USER_FORCE, Model
+from floatframe.engine.kernels.model import SPRING as SPRING_LAW
+from floatframe.engine.structure_preserving.bodies import BodyStep, CentralBody, central_bodies
+from floatframe.engine.structure_preserving.bushings import bushing_load
+from floatframe.engine.structure_preserving.constraints import (
+    Loads,
+    Pair,
+    Span,
+    add_reaction,
+    constraint_value,
+    rate_in_time,
+    reaction_direction,
+)
+from floatframe.engine.structure_preserving.contacts import V_0, contact_load, speed_of_approach
+from floatframe.engine.structure_preserving.coordinates import coordinate_ends, counted
+from floatframe.engine.structure_preserving.couplers import add_coupler_reaction, coordinates_of, coupler_value
+from floatframe.engine.structure_preserving.deformed_lines import (
+    DeformedLine,
+    Slide,
+    add_line_reaction,
+    deformed_line,
+    line_rate_in_time,
+    line_value,
+)
+from floatframe.engine.structure_preserving.forces import Given, body_load, coordinate_load, point_load, spring_load
+from floatframe.engine.structure_preserving.functions import value_of
+from floatframe.engine.structure_preserving.markers import BodyMarker, Load, MarkerStep, body_marker, marker_step
+from floatframe.engine.structure_preserving.public_elements import (
+    element_load,
+    element_rates,
+    element_states,
+    element_values,
+    multiplier_rows,
+)
+from floatframe.engine.structure_preserving.rolling import (
+    add_height_reaction,
+    add_roll_reaction,
+    height_value,
+    roll_value,
+)
+from floatframe.engine.structure_preserving.user_forces import element_of, state_rows, user_force_load, user_state_rates
+from floatframe.errors import ModelError
+from floatframe.model.joints.rows import COUPLE, PUSH, RIM_HEIGHT, ROLL, is_held_length, is_held_velocity, kind_of
+from floatframe.model.rotations import dot
+from floatframe.model.system import System
+
+__all__ = ["Connection", "DiscreteSystem", "Ends", "discrete_system"]
+
+
+@dataclass(frozen=True, eq=False)
+class Connection:
+    """A joint, force or coupler between markers A and B; of couplers and user forces those of each coordinate."""
+
+    number: int
+    ends: tuple[BodyMarker, ...]
+    held: tuple[int, ...]  #: rows that hold something
+    loaded: tuple[int, ...]  #: rows with forces along their coordinate
+    first: int  #: first multiplier
+    states: tuple[int, ...]  #: rows of its states
+    first_state: int  #: number of the first of them among all
+    line: DeformedLine | None = None  #: along which marker A slides
+
+    @property
+    def bodies(self) -> tuple[int, ...]:
+        """Numbers of its bodies, each once."""
+        return tuple(sorted({end.body for end in self.ends} - {-1}))
+
+
+@dataclass(frozen=True, eq=False)
+class Ends:
+    """The markers of a connection over a step, and the loads on their bodies."""
+
+    markers: list[MarkerStep]
+    loads: list[Load | None]
+    slide: Slide | None = None  #: of a marker A that slides along a line
+
+    @property
+    def pairs(self) -> list[Pair]:
+        """The markers A and B of each coordinate."""
+        return list(zip(self.markers[::2], self.markers[1::2], strict=True))
+
+    @property
+    def of_loads(self) -> list[Loads]:
+        """The loads of these."""
+        return list(zip(self.loads[::2], self.loads[1::2], strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class DiscreteSystem:
+    """Constants of a system."""
+
+    model: Model
+    bodies: tuple[CentralBody, ...]
+    connections: tuple[Connection, ...]
+    loads: tuple[tuple[tuple[int, BodyMarker], ...], ...]  #: point forces on each body: number, marker
+    cases: tuple[tuple[int, ...], ...]  #: load cases on each body
+    n_held: int
+    n_states: int
+    length: float
+    markers: tuple[BodyMarker, ...]  #: all
+
+    @property
+    def held(self) -> IntArray:
+        """The rows that hold something, one for each multiplier."""
+        return np.array([k for c in self.connections for k in c.held], dtype=np.int64)
+
+    def own_loads(self, i: int, step: BodyStep, load: Load, span: Span) -> Given:
+        """Add gravity, point forces and load cases on body i; gravity has a potential and gives no work."""
+        body = self.bodies[i]
+        load.force += body.m * self.model.gravity
+        given: Array | float = 0.0
+        for k, marker in self.loads[i]:
+            given = given + point_load(self.model, k, marker_step(marker, step), load, span).given
+        for k in self.cases[i]:
+            given = given + body_load(self.model, k, body, step, load, span).given
+        return Given(given)
+
+    def connection_loads(
+        self, connection: Connection, ends: Ends, span: Span, f: Array, dz: Array, *, is_middle: bool
+    ) -> Given:
+        """Add reactions with multipliers f, (..., n_held of it), and the forces of a connection.
+
+        dz, (..., n_states of it): changes of its states; is_middle: whether forces act in the middle of the step.
+        """
+        model, c = self.model, connection.number
+        law = int(model.connections.law[c])
+        if law == ELEMENT:
+            return Given(*element_load(model, c, ends.markers, ends.loads, span, dz, f, is_middle=is_middle))
+        pair, loads = ends.pairs[0], ends.of_loads[0]
+        if law == SPRING_LAW:
+            return spring_load(model, c, pair, loads, span)
+        if law == BUSHING:
+            return Given(*bushing_load(model, c, pair, loads, span))
+        if law == CONTACT:
+            return Given(0.0, contact_load(model, c, pair, loads, span))
+        if law == USER_FORCE:
+            return Given(user_force_load(model, c, ends.pairs, ends.of_loads, span, dz, is_middle=is_middle))
+        for j, k in enumerate(connection.held):
+            self.add_row(connection, k, ends, span, f[..., j])
+        given: Array | float = 0.0
+        taken: Array | float = 0.0
+        for k in connection.loaded:
+            normal = normal_force(model, k, connection, pair, f, span)
+            part = coordinate_load(model, k, pair, loads, span, normal)
+            given, taken = given + part.given, taken + part.taken
+        return Given(given, taken)
+
+    def add_row(self, connection: Connection, k: int, ends: Ends, span: Span, f: Array) -> None:
+        """Add the loads of held row k with multiplier f, (...,); those of elements are among their forces."""
+        kind, pair, loads = int(self.model.rows.kind[k]), ends.pairs[0], ends.of_loads[0]
+        if ends.slide is not None:
+            add_line_reaction(self.model, k, pair, loads, ends.slide, f)
+        elif kind == COUPLE:
+            add_coupler_reaction(self.model, connection.number, ends.pairs, ends.of_loads, f)
+        elif kind == RIM_HEIGHT:
+            add_height_reaction(self.model, k, pair, loads, f)
+        elif kind == ROLL:
+            add_roll_reaction(self.model, k, pair, loads, f)
+        else:
+            add_reaction(self.model, k, pair, loads, span, f)
+
+    def values(self, connection: Connection, ends: Ends, span: Span, dz: Array, f: Array) -> list[Array]:
+        """Return the held rows of a connection at the end of a step."""
+        if self.model.connections.law[connection.number] == ELEMENT:
+            return element_values(self.model, connection.number, ends.markers, span, dz, f)
+        return [self.value(connection, k, ends, span) for k in connection.held]
+
+    def value(self, connection: Connection, k: int, ends: Ends, span: Span) -> Array:
+        """Return held row k of a joint or coupler at the end of a step."""
+        kind, pair = int(self.model.rows.kind[k]), ends.pairs[0]
+        if ends.slide is not None:
+            return line_value(self.model, k, pair, ends.slide)
+        if kind == COUPLE:
+            return coupler_value(self.model, connection.number, ends.pairs, span)
+        if kind == RIM_HEIGHT:
+            return height_value(self.model, k, pair)
+        if kind == ROLL:
+            return roll_value(self.model, k, pair)
+        return constraint_value(self.model, k, pair, span)
+
+    def rate_in_time(self, k: int, ends: Ends, t: float) -> float:
+        """Return the rate of held row k at one configuration while nothing moves."""
+        if ends.slide is not None:
+            return line_rate_in_time(self.model, k, ends.pairs[0], ends.slide, t)
+        if int(self.model.rows.kind[k]) != COUPLE:
+            return rate_in_time(self.model, k, ends.pairs[0], t)
+        motion = int(self.model.rows.motion[k])
+        return 0.0 if motion < 0 else -float(self.model.rows.x[k, 0]) * value_of(self.model, motion, t)[1]
+
+    def is_driven(self, connection: Connection, k: int) -> bool:
+        """Whether held row k of a connection does the work of a prescribed motion."""
+        driven = connection.line is not None and connection.line.row >= 0
+        return driven or bool(self.model.rows.motion[k] >= 0)
+
+    def state_residual(
+        self, connection: Connection, ends: Ends, span: Span, dz: Array, f: Array, *, is_along: bool
+    ) -> Array:
+        """Return the equations of the states of a connection for their changes, (..., n_states of it).
+
+        is_along: whether forces act along the step, with the mean angular velocities.
+        """
+        if self.model.connections.law[connection.number] == ELEMENT:
+            rates = element_rates(self.model, connection.number, ends.markers, span, dz, f)
+        else:
+            rates = user_state_rates(self.model, connection.number, ends.pairs, span, dz, is_along=is_along)
+        return dz - span.h * rates
+
+    def remembered(self, ends: list[Ends], span: Span, dz: Array) -> Array:
+        """Return what connections remember at the end of a step, (n_w,), by their ends over it."""
+        model, w = self.model, span.w.copy()
+        for connection, own in zip(self.connections, ends, strict=True):
+            c = connection.number
+            law = int(model.connections.law[c])
+            if law == CONTACT:
+                w[int(model.connections.w0[c]) + V_0] = speed_of_approach(model, c, own.pairs[0], span)
+            if law in (COUPLER, USER_FORCE):
+                element = int(model.connections.item[c]) if law == COUPLER else element_of(model, c)
+                for p, pair in zip(coordinates_of(model, c, element), own.pairs, strict=True):
+                    k = int(model.coordinates.row[p])
+                    w[k] = float(counted(model, k, coordinate_ends(model, k, pair)[1], span.w[k]))
+            for s, k in enumerate(connection.states, start=connection.first_state):
+                w[k] += dz[s]
+        return w
+
+
+def normal_force(model: Model, k: int, connection: Connection, pair: Pair, f: Array, span: Span) -> Array:
+    """Return the size of the force in a joint across the axis of its row k."""
+    a, _ = pair
+    F = np.zeros((*f.shape[:-1], 3), f.dtype)
+    for j, row in enumerate(connection.held):
+        if is_held_length(model.rows.kind[row]):
+            F = F + f[..., j, None] * reaction_direction(model, row, pair, span)
+    axis = model.rows.x[k] if int(model.rows.kind[k]) == PUSH else np.cross(model.rows.x[k], model.rows.z[k])
+    E_0, E_1 = a.ends(axis)
+    E = 0.5 * (E_0 + E_1)
+    square = dot(F, F) - dot(F, E) ** 2
+    is_zero = np.real(square) <= 0
+    return np.where(is_zero, 0.0, np.sqrt(np.where(is_zero, 1.0, square)))
+
+
+def discrete_system(system: System, scheme: str) -> DiscreteSystem:
+    """Return the constants of a system.
+
+    Raises
+    ------
+    ModelError
+        If a joint or force is of a kind that the scheme does not know, or a mode has no mass.
+    """
+    compiled = compiled_system(system)
+    model = compiled.model
+    require_known(compiled, scheme)
+    bodies = central_bodies(model, compiled.body_names, scheme)
+    markers = tuple(body_marker(model, bodies, m) for m in range(len(model.markers.body)))
+    connections, n_held, n_states = [], 0, 0
+    for c in range(len(model.connections.size)):
+        rows = range(int(model.connections.w0[c]), int(model.connections.w0[c + 1]))
+        law = int(model.connections.law[c])
+        held = tuple(k for k in rows if kind_of(model.rows.kind[k]).holds)
+        if law == ELEMENT:
+            held = multiplier_rows(model, c)
+        loaded = tuple(k for k in rows if kind_of(model.rows.kind[k]).is_loaded and law == JOINT)
+        ends = tuple(markers[m] for m in ends_of(model, c))
+        states = state_rows(model, c) if law == USER_FORCE else element_states(model, c) if law == ELEMENT else ()
+        number = int(model.markers.line[model.connections.a[c]]) if law == JOINT else -1
+        line = deformed_line(model, markers, number) if number >= 0 else None
+        connections.append(Connection(c, ends, held, loaded, n_held, states, n_states, line))
+        n_held, n_states = n_held + len(held), n_states + len(states)
+    point_forces: list[list[tuple[int, BodyMarker]]] = [[] for _ in bodies]
+    cases: list[list[int]] = [[] for _ in bodies]
+    for k, m in enumerate(model.loads.marker):
+        marker = markers[int(m)]
+        if marker.body >= 0:
+            point_forces[marker.body].append((k, marker))
+    for k, i in enumerate(model.body_loads.body):
+        cases[int(i)].append(k)
+    return DiscreteSystem(
+        model, bodies, tuple(connections), tuple(map(tuple, point_forces)), tuple(map(tuple, cases)), n_held,
+        n_states, compiled.length, markers,
+    )  # fmt: skip
+
+
+def ends_of(model: Model, c: int) -> list[int]:
+    """Return the markers of connection c."""
+    law, item = int(model.connections.law[c]), int(model.connections.item[c])
+    if law == ELEMENT:
+        first = int(model.connections.a[c])
+        return list(range(first, first + int(model.laws.head[item, 0])))
+    if law not in (COUPLER, USER_FORCE):
+        return [int(model.connections.a[c]), int(model.connections.b[c])]
+    element = item if law == COUPLER else element_of(model, c)
+    own = coordinates_of(model, c, element)
+    return [int(m) for p in own for m in (model.coordinates.a[p], model.coordinates.b[p])]
+
+
+def require_known(compiled: CompiledSystem, scheme: str) -> None:
+    """Raise `ModelError` naming the joint or element that the scheme does not know."""
+    model = compiled.model
+    for c, name in enumerate(compiled.connection_names):
+        kinds = model.rows.kind[model.connections.w0[c] : model.connections.w0[c + 1]]
+        if model.connections.law[c] == ELEMENT:
+            require_known_element(model, c, name, scheme)
+            continue
+        if scheme == "Variational" and is_held_velocity(kinds).any():
+            raise ModelError(
+                f"{scheme}: joint {name!r} holds velocities that come from no positions, which no variational "
+                "principle gives; use energy-momentum or generalized-alpha"
+            )
+
+
+def require_known_element(model: Model, c: int, name: str, scheme: str) -> None:
+    """Raise `ModelError` if element c is one that the scheme does not know."""
+    first = int(model.connections.a[c])
+    markers = range(first, first + int(model.laws.head[int(model.connections.item[c]), 0]))
+    if (model.markers.accelerated[list(markers)] >= 0).any():
+        raise ModelError(
+            f"{scheme}: element {name!r} feels accelerations, and a step of this scheme has none, only changes of "
+            "momenta; use generalized-alpha"
+        )
+    if scheme == "Variational" and multiplier_rows(model, c):
+        raise ModelError(
+            f"{scheme}: element {name!r} has multipliers of its own, which would act at both ends of a step with two "
+            "values, in a law that need not be linear in them; use energy-momentum or generalized-alpha"
+        )

@@ -1,0 +1,124 @@
+"""Charts of joints: their coordinates as columns of motion of marker B as seen from marker A (docs/relative.md §2)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.model.joints import (
+    ConstantOrientation,
+    CylindricalJoint,
+    FixedJoint,
+    PlanarJoint,
+    PrismaticJoint,
+    RevoluteJoint,
+    ScrewJoint,
+    SphericalJoint,
+    UniversalJoint,
+)
+from floatframe.model.joints.axis_frame import axis_in_b, normals_of
+
+__all__ = ["CHARTS", "FREE", "SIDE_A", "SIDE_B", "Column", "chart_of"]
+
+SIDE_A, SIDE_B = 0, 1
+ZERO = np.zeros(3)
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """One coordinate: unit rate moves B by a screw that is fixed in A (through its point) or in B."""
+
+    name: str  #: of the coordinate, "" where the joint has no name for it
+    tau: Array = field(default_factory=lambda: ZERO)  #: velocity of the point of B as seen from A, axes of A, (3,)
+    alpha: Array = field(default_factory=lambda: ZERO)  #: angular velocity, axes of the side, (3,)
+    side: int = SIDE_A
+    unit: str = "rad"  #: of the coordinate
+    #: of this coordinate by another name of it (a screw: angle = 1/slope distance)
+    factors: tuple[tuple[str, float], ...] = ()
+
+
+def turns_in_b() -> tuple[Column, ...]:
+    """Return free rotation: three columns fixed in B, the group of rotations."""
+    return tuple(Column(f"turn {axis}", alpha=e, side=SIDE_B) for axis, e in zip("xyz", np.eye(3), strict=True))
+
+
+def moves_in_a() -> tuple[Column, ...]:
+    """Return free translation along the axes of A."""
+    return tuple(Column(axis, tau=e, unit="m") for axis, e in zip("xyz", np.eye(3), strict=True))
+
+
+def revolute(joint: RevoluteJoint, A_a: Array, A_b: Array) -> tuple[Column, ...]:
+    """Angle about the axis of A."""
+    return (Column("angle", alpha=joint.axis),)
+
+
+def prismatic(joint: PrismaticJoint, A_a: Array, A_b: Array) -> tuple[Column, ...]:
+    """Distance along the axis of A."""
+    return (Column("distance", tau=joint.axis, unit="m"),)
+
+
+def cylindrical(joint: CylindricalJoint, A_a: Array, A_b: Array) -> tuple[Column, ...]:
+    """Distance along the axis of A and angle about it."""
+    return (Column("distance", tau=joint.axis, unit="m"), Column("angle", alpha=joint.axis))
+
+
+def screw(joint: ScrewJoint, A_a: Array, A_b: Array) -> tuple[Column, ...]:
+    """Angle about the axis of A, with lead/(2 pi) along it."""
+    slope = joint.lead / (2 * np.pi)
+    return (Column("angle", tau=slope * joint.axis, alpha=joint.axis, factors=(("distance", 1 / slope),)),)
+
+
+def universal(joint: UniversalJoint, A_a: Array, A_b: Array) -> tuple[Column, ...]:
+    """Angle of the cross about the axis of A, of B about that of B."""
+    return (Column("angle", alpha=joint.axis), Column("angle_b", alpha=joint.axis_b, side=SIDE_B))
+
+
+def planar(joint: PlanarJoint, A_a: Array, A_b: Array) -> tuple[Column, ...]:
+    """Two distances in the plane of A, and the angle about the normal through the point of B."""
+    first, second = normals_of(joint.axis)
+    normal = axis_in_b(joint.axis, joint.axis_b, A_a, A_b)
+    return (
+        Column("first", tau=first, unit="m"),
+        Column("second", tau=second, unit="m"),
+        Column("angle", alpha=normal, side=SIDE_B),
+    )
+
+
+def spherical(joint: SphericalJoint, A_a: Array, A_b: Array) -> tuple[Column, ...]:
+    """Rotation of B."""
+    return turns_in_b()
+
+
+def fixed(joint: FixedJoint, A_a: Array, A_b: Array) -> tuple[Column, ...]:
+    """Nothing."""
+    return ()
+
+
+def constant_orientation(joint: ConstantOrientation, A_a: Array, A_b: Array) -> tuple[Column, ...]:
+    """Translation along the axes of A."""
+    return moves_in_a()
+
+
+#: chart of each joint that has one; all others stay constraints
+CHARTS: dict[type, Callable[[Any, Array, Array], tuple[Column, ...]]] = {
+    RevoluteJoint: revolute,
+    PrismaticJoint: prismatic,
+    CylindricalJoint: cylindrical,
+    ScrewJoint: screw,
+    UniversalJoint: universal,
+    PlanarJoint: planar,
+    SphericalJoint: spherical,
+    FixedJoint: fixed,
+    ConstantOrientation: constant_orientation,
+}
+
+#: of a body that hangs at nothing: translation along ground axes, rotation about its own
+FREE = (*moves_in_a(), *turns_in_b())
+
+
+def chart_of(joint: object, A_a: Array, A_b: Array) -> tuple[Column, ...] | None:
+    """Return the columns of a joint whose marker axes are A_a, A_b, (3, 3), as placed; None if it has no chart."""
+    chart = CHARTS.get(type(joint))
+    return None if chart is None else chart(joint, A_a, A_b)

@@ -1,0 +1,257 @@
+"""The compiled entry of relative coordinates, and a plain function for each thing it does."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+
+from fe_models.foundation.arrays import Array, IntArray
+from floatframe.engine.kernels.compiler.choice import is_lean
+from floatframe.engine.kernels.compiler.compilation import kept_entry
+from floatframe.engine.kernels.compiler.sources import source_digest
+from floatframe.engine.kernels.compiler.structure import converter, kept_table_of, table_of
+from floatframe.engine.kernels.diagnostics import power
+from floatframe.engine.kernels.entry import NO_ROWS, Order, Outcome, no_memory
+from floatframe.engine.kernels.generalized_alpha import DONE
+from floatframe.engine.kernels.memory import Memory, Rows, new_rows
+from floatframe.engine.kernels.model import Model
+from floatframe.engine.kernels.records import filled, zeros
+from floatframe.engine.kernels.work import Work
+from floatframe.engine.tree.kernels.accelerations import accelerate, constrain
+from floatframe.engine.tree.kernels.evaluation import evaluate_tree
+from floatframe.engine.tree.kernels.kinematics import joint_motion, move_joints, place_bodies
+from floatframe.engine.tree.kernels.projection import put_reactions
+from floatframe.engine.tree.kernels.steps import SINGULAR, advance_tree, correct, renew, write_tree_row
+from floatframe.engine.tree.kernels.tangent import assemble, write_tangent
+from floatframe.engine.tree.kernels.tree import JointWork, TangentWork, Tree, new_tangent_work
+
+__all__ = [
+    "accelerations",
+    "advance_tree_steps",
+    "constraints",
+    "motion_of_bodies",
+    "motion_of_joints",
+    "moved",
+    "mover",
+    "newton_matrix",
+    "newton_step",
+    "observe_tree",
+    "projected",
+]
+
+MOTION_OF_JOINTS, MOTION_OF_BODIES, MOVE, PROJECT, TANGENT, OBSERVE, ADVANCE, CORRECT, CONSTRAIN, ACCELERATE = range(10)
+
+
+as_model, as_work, as_tree = converter(Model()), converter(Work()), converter(Tree())
+as_joints, as_order = converter(JointWork()), converter(Order())
+as_memory, as_rows = converter(Memory()), converter(Rows())
+as_tangent = converter(TangentWork())
+
+
+def make_entry(digest):
+    """Return the cached entry; the digest of the sources enters its key."""
+
+    def run(model_table, work_table, tree_table, joint_table, tangent_table, memory_table, rows_table, order_table):
+        if digest == 0:
+            return DONE, 0, 0, -1, 0.0
+        model, work, tree = as_model(model_table), as_work(work_table), as_tree(tree_table)
+        joints, tangent, order = as_joints(joint_table), as_tangent(tangent_table), as_order(order_table)
+        memory, rows = as_memory(memory_table), as_rows(rows_table)
+        what = order.what
+        if what == ADVANCE:
+            return advance_tree(model, work, memory, rows, (tree, joints, tangent), order)
+        if what == OBSERVE:
+            work.counted.rows = 0
+            write_tree_row(model, work, memory, tree, joints, order.t0, rows)
+            memory.power_given, memory.power_taken = power(model, work)
+        elif what == MOTION_OF_JOINTS:
+            joint_motion(model, work, tree, joints)
+        elif what == MOTION_OF_BODIES:
+            place_bodies(model, work, tree, joints)
+        elif what == MOVE:
+            move_joints(tree, joints)
+            place_bodies(model, work, tree, joints)
+        elif what == PROJECT:
+            evaluate_tree(model, work, tree, joints, order.c_k)
+            put_reactions(model, work, tree, joints)
+        elif what == CONSTRAIN:
+            constrain(model, work, tree, joints, tangent, order.n_steps == 1)
+        elif what == ACCELERATE:
+            if not accelerate(model, work, tree, joints, tangent):
+                return SINGULAR, 0, 0, -1, 0.0
+        elif what == CORRECT:
+            c_m, c_d, c_k = order.c_m, order.c_d, order.c_k
+            evaluate_tree(model, work, tree, joints, c_k)
+            tangent.is_kept, tangent.exactly = 0, 1 - order.n_steps
+            if not renew(model, work, tree, joints, tangent, c_m, c_d, c_k):
+                return SINGULAR, 0, 0, -1, 0.0
+            correct(model, work, tree, joints, tangent, c_k)
+        else:
+            c_m, c_d, c_k = order.c_m, order.c_d, order.c_k
+            evaluate_tree(model, work, tree, joints, c_k if c_k > 0.0 else 1.0)
+            write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k)
+            assemble(model, work, tree, tangent, c_d, c_k)
+        return DONE, 0, 0, -1, 0.0
+
+    return kept_entry(run)
+
+
+run = make_entry(source_digest(__name__, "lean" if is_lean else "plain"))
+SIGNATURE = (types.Array(types.int64, 1, "C"),) * 8
+NOTHING = zeros(Order(), {})
+
+
+NO_TANGENT = zeros(
+    TangentWork(),
+    dict.fromkeys(
+        (
+            "n_b",
+            "n_s",
+            "jets",
+            "n_q",
+            "n_most",
+            "kept rows",
+            "numbers of L",
+            "numbers of fronts",
+            "unknowns and motions",
+            "n_dense",
+        ),
+        0,
+    ),
+)
+
+
+def call(
+    model: Model,
+    work: Work,
+    tree: Tree,
+    joints: JointWork,
+    tangent: TangentWork = NO_TANGENT,
+    memory: Memory | None = None,
+    rows: Rows = NO_ROWS,
+    **order: float,
+) -> Outcome:
+    """Run the entry with an order, what it does not name being zero; all arrays live until it returns."""
+    if not run.signatures:
+        run.compile(SIGNATURE)
+    ordered = filled(Order(), **(NOTHING._asdict() | order))
+    kept = (kept_table_of(record) for record in (model, work, tree, joints))
+    others = (tangent, no_memory() if memory is None else memory, rows, ordered)
+    return Outcome(*run(*kept, *(table_of(record) for record in others)))
+
+
+def motion_of_joints(model: Model, work: Work, tree: Tree, joints: JointWork) -> None:
+    """Write poses, rates and accelerations of all joints from the absolute iterate in `work`."""
+    call(model, work, tree, joints, what=MOTION_OF_JOINTS)
+
+
+def motion_of_bodies(model: Model, work: Work, tree: Tree, joints: JointWork) -> None:
+    """Write the absolute iterate from poses, rates and accelerations of joints, and modal coordinates."""
+    call(model, work, tree, joints, what=MOTION_OF_BODIES)
+
+
+def moved(model: Model, work: Work, tree: Tree, joints: JointWork, x: Array) -> None:
+    """Write the absolute iterate with joints moved by x, (n_columns,), from d_start, Q_start."""
+    joints.x[:] = np.asarray(x)
+    call(model, work, tree, joints, what=MOVE)
+
+
+@dataclass(frozen=True, eq=False)
+class Mover:
+    """What `moved` does by the increments in `joints.x`, for motions at many instants."""
+
+    records: tuple[NamedTuple, ...]  #: of the entry, kept alive
+    tables: tuple[IntArray, ...]  #: of them, found once, which takes longer than a motion
+
+    def __call__(self) -> None:
+        """Write the absolute iterate."""
+        run(*self.tables)
+
+
+def mover(model: Model, work: Work, tree: Tree, joints: JointWork) -> Mover:
+    """Return a function that does what `moved` does by the increments in `joints.x`."""
+    if not run.signatures:
+        run.compile(SIGNATURE)
+    ordered = filled(Order(), **(NOTHING._asdict() | {"what": MOVE}))
+    records = (model, work, tree, joints, NO_TANGENT, no_memory(), NO_ROWS, ordered)
+    return Mover(records, tuple(table_of(record) for record in records))
+
+
+def projected(model: Model, work: Work, tree: Tree, joints: JointWork, c_k: float = 1.0) -> Array:
+    """Return the projected residual, (n_s,), of the iterate; reactions of joints go into `work.state.w`."""
+    call(model, work, tree, joints, what=PROJECT, c_k=c_k)
+    return joints.residual.copy()
+
+
+def newton_matrix(model: Model, work: Work, tree: Tree, joints: JointWork, c_m: float, c_d: float, c_k: float) -> Array:
+    """Return the Newton matrix at the iterate, unknowns and kept wrenches (times c_k), (n_s + n_rows,) squared."""
+    tangent = new_tangent_work(model, tree, is_dense=True)
+    call(model, work, tree, joints, tangent, what=TANGENT, c_m=c_m, c_d=c_d, c_k=c_k)
+    return tangent.K
+
+
+def newton_step(
+    model: Model,
+    work: Work,
+    tree: Tree,
+    joints: JointWork,
+    c_m: float,
+    c_d: float,
+    c_k: float,
+    *,
+    is_exact: bool = True,
+) -> tuple[Array, Array]:
+    """Return Newton's correction of unknowns, (n_s,), and of kept wrenches times c_k, (n_rows,), at the iterate.
+
+    is_exact: with the exact matrix, else with that of `kernels.kept_factors`. Not a number where it is singular.
+    """
+    tangent = new_tangent_work(model, tree)
+    outcome = call(
+        model, work, tree, joints, tangent, what=CORRECT, c_m=c_m, c_d=c_d, c_k=c_k, n_steps=int(not is_exact)
+    )
+    if outcome.status == SINGULAR:
+        tangent.step[:], tangent.mu[:] = np.nan, np.nan
+    return tangent.step, tangent.mu
+
+
+def constraints(
+    model: Model, work: Work, tree: Tree, joints: JointWork, tangent: TangentWork, *, by_increments: bool
+) -> None:
+    """Write what kept rows hold, its rates and C, by increments x or by rates, with joints moved by `joints.x`."""
+    call(model, work, tree, joints, tangent, what=CONSTRAIN, n_steps=int(by_increments))
+
+
+def accelerations(model: Model, work: Work, tree: Tree, joints: JointWork, tangent: TangentWork) -> bool:
+    """Write accelerations of joints and bodies, and kept wrenches; whether positions and rates have them.
+
+    Joints are moved by `joints.x`, which is zero after it.
+    """
+    return call(model, work, tree, joints, tangent, what=ACCELERATE).status == DONE
+
+
+def observe_tree(model: Model, work: Work, tree: Tree, joints: JointWork, memory: Memory, t: float) -> Rows:
+    """Return the results at the state in the memory; the power at it goes into the memory."""
+    rows = new_rows(model, 1)
+    call(model, work, tree, joints, NO_TANGENT, memory, rows, what=OBSERVE, t0=t)
+    return rows
+
+
+def advance_tree_steps(
+    model: Model,
+    work: Work,
+    tree: Tree,
+    joints: JointWork,
+    tangent: TangentWork,
+    memory: Memory,
+    rows: Rows,
+    *,
+    coefficients: tuple[float, float, float, float],
+    **order: float,
+) -> Outcome:
+    """Advance the memory by steps of the generalized-alpha method in relative coordinates."""
+    alpha_m, alpha_f, beta, gamma = coefficients
+    return call(
+        model, work, tree, joints, tangent, memory, rows, what=ADVANCE, alpha_m=alpha_m, alpha_f=alpha_f, beta=beta,
+        gamma=gamma, **order,
+    )  # fmt: skip

@@ -1,0 +1,46 @@
+"""Evaluation of a system in relative coordinates at one iterate: motion of bodies, their residuals, projection."""
+
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.connections.connection import connection_rows
+from floatframe.engine.kernels.evaluation import evaluate_bodies, evaluate_markers, slide_markers
+from floatframe.engine.kernels.marker import marker_motion
+from floatframe.engine.tree.kernels.projection import project
+
+__all__ = ["evaluate_placed", "evaluate_tree"]
+
+
+@inner
+def evaluate_tree(model, work, tree, joints, c_k):
+    """Write residuals of bodies and rows, wrenches of the joints of the tree, and the projected residual.
+
+    As `kernels.evaluation.evaluate`, rows of joints of the tree being zero; `joints.own` keeps the residuals of the
+    bodies without these joints.
+    """
+    evaluate_markers(model, work)
+    project_residuals(model, work, tree, joints, c_k)
+
+
+@inner
+def evaluate_placed(model, work, tree, joints, c_k):
+    """Do the same right after `place_bodies`, which knows how the ends of the joints of the tree have moved."""
+    for m in range(model.markers.body.shape[0]):
+        c, i = model.markers.connection[m], model.markers.body[m]
+        if c < 0 or tree.is_kept[c] != 0 or i < 0:
+            marker_motion(model, work, m)
+    slide_markers(model, work)
+    project_residuals(model, work, tree, joints, c_k)
+
+
+@inner
+def project_residuals(model, work, tree, joints, c_k):
+    """Write what `evaluate_tree` does with the motion of all markers in `work`."""
+    for c in range(model.connections.size.shape[0]):
+        if tree.is_kept[c] != 0:
+            connection_rows(model, work, c, c_k)
+        else:
+            for k in range(model.connections.w0[c], model.connections.w0[c + 1]):
+                work.connections.g[k] = 0.0
+    evaluate_bodies(model, work)
+    for k in range(joints.own.shape[0]):
+        joints.own[k] = work.bodies.residual[k]
+    project(model, work, tree, joints)

@@ -1,0 +1,207 @@
+"""Variations of the motion of bodies by the unknowns, with their rates (docs/relative.md §5).
+
+A variation xi = (delta of the point at O, rotation), a spatial vector about a point O at rest, is that of a body and of
+all that hangs at it: xi of a body = xi of its parent + those of the columns of its joint, of the modes of the parent at
+the near marker, less those of its own modes at the far marker. With V the spatial velocity of the frame in which a
+screw S is fixed, V' its rate, a variation S theta has
+
+    xi = S theta      xi_dot = S theta_dot + V × S theta
+    xi_ddot = S theta_ddot + 2 V × S theta_dot + (V' × S + V × (V × S)) theta
+
+where V × S = (omega × S_v + v × S_w, omega × S_w). In a step theta, theta_dot, theta_ddot are c_k, c_d, c_m times the
+correction of the unknown. For the group of rotations, of which the unknown is the vector x with Q = Q_start exp(x),
+theta = T(x) dx, and the rates z_dot, z_ddot, in axes of B, change by d(z_dot) = theta_dot + z_dot × theta.
+"""
+
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.marker import bent_by, bent_rate, shape
+from floatframe.engine.kernels.rotation import left_jacobian_derivative, right_jacobian
+from floatframe.engine.kernels.vector import add, cross, put, scaled, sub, turned, vector
+from floatframe.engine.tree.kernels.elastic_turning import deformation_accelerations, second_turning
+from floatframe.engine.tree.kernels.kinematics import end_acceleration, end_motion
+from floatframe.engine.tree.kernels.spatial import (
+    pair_sum,
+    put_pair_of,
+    scaled_pair,
+    spatial_cross,
+    spatial_motion,
+    world_screw,
+)
+from floatframe.engine.tree.kernels.tree import COLUMN, FAR_MODE, NEAR_MODE
+
+__all__ = ["carrier", "mode_rate", "mode_screw", "mode_screws", "put_jets", "put_mode_jet", "write_jets"]
+
+
+@inner
+def put_jets(out, S_0, S_1, S_2, V, V_dot):
+    """Write xi, xi_dot, xi_ddot, (18,), of a variation with S theta = S_0, S theta_dot = S_1, S theta_ddot = S_2."""
+    turned_once = spatial_cross(V, S_0)
+    put_pair_of(out, 0, S_0)
+    put_pair_of(out, 6, pair_sum(S_1, turned_once))
+    own = pair_sum(scaled_pair(2.0, spatial_cross(V, S_1)), spatial_cross(V_dot, S_0))
+    put_pair_of(out, 12, pair_sum(S_2, pair_sum(own, spatial_cross(V, turned_once))))
+
+
+@inner
+def put_reach(out, S_0, S_1, V):
+    """Write xi and xi_dot, (12,)."""
+    put_pair_of(out, 0, S_0)
+    put_pair_of(out, 6, pair_sum(S_1, spatial_cross(V, S_0)))
+
+
+@inner
+def mode_screw(model, work, m, i, k):
+    """Return the screw of mode k at marker m about the frame origin of body i: (Psi_t + rho × b, b), b = T' Psi_r."""
+    d, th = shape(work.markers.psi[model.markers.psi0[m] :], model.bodies.n_q[i], k)
+    b = turned(work.markers.T_left[m], th)
+    return add(d, cross(vector(work.markers.rho[m]), b)), b
+
+
+@inner
+def mode_rate(model, work, m, i, k):
+    """Return the screw of `mode_screw` and its rate as the body sees them.
+
+    `work.markers.bend_dot` has been written for the marker.
+    """
+    markers, n, o = work.markers, model.bodies.n_q[i], model.markers.psi0[m]
+    T, rho, rho_1 = markers.T_left[m], vector(markers.rho[m]), vector(markers.rho_dot[m])
+    s, b = mode_screw(model, work, m, i, k)
+    _, th = shape(markers.psi[o : o + 6 * n], n, k)
+    slope = left_jacobian_derivative(vector(markers.angle[m]), th, 1.0)
+    b_1 = turned(slope, vector(markers.angle_dot[m]))
+    s_1 = (0.0, 0.0, 0.0)
+    if model.markers.bend0[m] >= 0:  # the rate of Psi(q)
+        d_1, th_1 = shape(markers.bend_dot, n, k)
+        s_1, b_1 = sub(s_1, d_1), sub(b_1, turned(T, th_1))
+    return (s, b), (add(s_1, add(cross(rho_1, b), cross(rho, b_1))), b_1)
+
+
+@inner
+def mode_second_rate(model, work, m, i, k, screw, screw_1, rho_2, angle_2):
+    """Return the second rate of the screw of `mode_rate`; rho_2, angle_2 as of `deformation_accelerations`.
+
+    `work.markers.bend_ddot` has been written for the marker too.
+    """
+    markers, n, o = work.markers, model.bodies.n_q[i], model.markers.psi0[m]
+    T, rho, rho_1 = markers.T_left[m], vector(markers.rho[m]), vector(markers.rho_dot[m])
+    angle, angle_1, b, b_1 = vector(markers.angle[m]), vector(markers.angle_dot[m]), screw[1], screw_1[1]
+    _, th = shape(markers.psi[o : o + 6 * n], n, k)
+    slope = left_jacobian_derivative(angle, th, 1.0)
+    b_2 = second_turning(angle, angle_1, vector(markers.spin[m]), th, b, turned(slope, angle_1))
+    b_2, s_2 = add(b_2, turned(slope, angle_2)), (0.0, 0.0, 0.0)
+    if model.markers.bend0[m] >= 0:
+        _, th_1 = shape(markers.bend_dot, n, k)
+        d_2, th_2 = shape(markers.bend_ddot, n, k)
+        by_bending = turned(left_jacobian_derivative(angle, th_1, 1.0), angle_1)
+        s_2, b_2 = sub(s_2, d_2), sub(b_2, add(scaled(2.0, by_bending), turned(T, th_2)))
+    return add(s_2, add(cross(rho_2, b), add(scaled(2.0, cross(rho_1, b_1)), cross(rho, b_2)))), b_2
+
+
+@inner
+def write_jets(model, work, tree, joints, tangent, c_m, c_d, c_k, rate):
+    """Write screws, jets with the weights c_m, c_d, c_k, and reaches with 1 and `rate`, of all joints."""
+    put(tangent.origin, 0, vector(work.state.r[tree.order[0]]))
+    for i in range(tree.parent.shape[0]):
+        column_jets(model, work, tree, joints, tangent, i, c_m, c_d, c_k, rate)
+        mode_jets(model, work, tree, tangent, i, NEAR_MODE, tree.near[i], 1.0, c_m, c_d, c_k, rate)
+        mode_jets(model, work, tree, tangent, i, FAR_MODE, tree.far[i], -1.0, c_m, c_d, c_k, rate)
+
+
+@inner
+def mode_jets(model, work, tree, tangent, i, kind, m, sign, c_m, c_d, c_k, rate):
+    """Write screws, jets and reaches of the modes at marker m of the joint of body i."""
+    if m < 0 or model.markers.psi0[m] < 0:
+        return
+    body = model.markers.body[m]
+    held = carrier(model, work, tangent, m, body)
+    for j in range(tree.jet0[i], tree.jet0[i + 1]):
+        if tree.jet_kind[j] != kind:
+            continue
+        s, s_1, s_2 = mode_screws(model, work, m, body, tree.jet_item[j], held)
+        S, S_1, S_2 = scaled_pair(sign, s), scaled_pair(sign, s_1), scaled_pair(sign, s_2)
+        put_pair_of(tangent.screw[j], 0, S)
+        put_mode_jet(tangent.jet[j], S, S_1, S_2, held, c_m, c_d, c_k)
+        put_reach(tangent.reach[j], S, pair_sum(scaled_pair(rate, S), S_1), held[2])
+
+
+@inner
+def carrier(model, work, tangent, m, i):
+    """Return R, p, V, V' of the frame of body i, which carries marker m, and the second rates of its deformation there.
+
+    What `mode_screws` asks for has been written for the marker then.
+    """
+    r, R, v, omega = end_motion(model, work, -1, i)
+    a, alpha = end_acceleration(model, work, -1, i)
+    p = sub(r, vector(tangent.origin))
+    V, V_dot = spatial_motion(p, v, omega, a, alpha)
+    rho_2, angle_2 = deformation_accelerations(model, work, m, i)
+    if model.markers.bend0[m] >= 0:
+        n, u0 = model.bodies.n_q[i], model.bodies.u0[i] + 6
+        bent_rate(model, work, m, i, work.markers.bend_dot[: 6 * n])
+        bent_by(model, m, n, work.state.u_dot[u0 : u0 + n], work.markers.bend_ddot[: 6 * n])
+    return R, p, V, V_dot, rho_2, angle_2
+
+
+@inner
+def mode_screws(model, work, m, i, k, held):
+    """Return the screw of mode k at marker m and its rates as body i sees them, ground axes; held: its `carrier`."""
+    R, p, _, _, rho_2, angle_2 = held
+    s, s_1 = mode_rate(model, work, m, i, k)
+    s_2 = mode_second_rate(model, work, m, i, k, s, s_1, rho_2, angle_2)
+    return world_screw(R, p, s), world_screw(R, p, s_1), world_screw(R, p, s_2)
+
+
+@inner
+def put_mode_jet(out, S, S_1, S_2, held, c_m, c_d, c_k):
+    """Write the jet of a mode with the screws that `mode_screws` returns."""
+    by_rate = pair_sum(scaled_pair(c_d, S), scaled_pair(c_k, S_1))
+    by_second = pair_sum(scaled_pair(c_m, S), pair_sum(scaled_pair(2 * c_d, S_1), scaled_pair(c_k, S_2)))
+    put_jets(out, scaled_pair(c_k, S), by_rate, by_second, held[2], held[3])
+
+
+@inner
+def column_jets(model, work, tree, joints, tangent, i, c_m, c_d, c_k, rate):
+    """Write screws, jets and reaches of the columns of the joint of body i."""
+    if tree.column0[i] == tree.column0[i + 1]:
+        return
+    origin, zero = vector(tangent.origin), (0.0, 0.0, 0.0)
+    r_a, A_a, v_a, omega_a = end_motion(model, work, tree.near[i], tree.parent[i])
+    a_a, alpha_a = end_acceleration(model, work, tree.near[i], tree.parent[i])
+    r_b, A_b, v_b, omega_b = end_motion(model, work, tree.far[i], i)
+    a_b, alpha_b = end_acceleration(model, work, tree.far[i], i)
+    if tree.is_reversed[i] != 0:
+        r_a, A_a, v_a, omega_a, r_b, A_b, v_b, omega_b = r_b, A_b, v_b, omega_b, r_a, A_a, v_a, omega_a
+        a_a, alpha_a, a_b, alpha_b = a_b, alpha_b, a_a, alpha_a
+    p_a, p_b = sub(r_a, origin), sub(r_b, origin)
+    V_a, V_a_dot = spatial_motion(p_a, v_a, omega_a, a_a, alpha_a)
+    V_b, V_b_dot = spatial_motion(p_b, v_b, omega_b, a_b, alpha_b)
+    x, spin, spin_dot = zero, zero, zero  # of the rotations fixed in B, axes of B
+    for k in range(tree.column0[i], tree.column0[i + 1]):
+        if tree.side[k] != 0:
+            alpha = vector(tree.alpha[k])
+            x = add(x, scaled(joints.x[k], alpha))
+            spin = add(spin, scaled(joints.rate[k], alpha))
+            spin_dot = add(spin_dot, scaled(joints.acceleration[k], alpha))
+    T = right_jacobian(x)
+    sense = -1.0 if tree.is_reversed[i] != 0 else 1.0
+    for j in range(tree.jet0[i], tree.jet0[i + 1]):
+        if tree.jet_kind[j] != COLUMN:
+            continue
+        k = tree.jet_item[j]
+        alpha = scaled(sense, vector(tree.alpha[k]))
+        screw, jet, reach = tangent.screw[j], tangent.jet[j], tangent.reach[j]
+        if tree.side[k] == 0:
+            S = world_screw(A_a, p_a, (scaled(sense, vector(tree.tau[k])), alpha))
+            put_pair_of(screw, 0, S)
+            put_jets(jet, scaled_pair(c_k, S), scaled_pair(c_d, S), scaled_pair(c_m, S), V_a, V_a_dot)
+            put_reach(reach, S, scaled_pair(rate, S), V_a)
+        else:
+            theta = turned(T, alpha)
+            put_pair_of(screw, 0, world_screw(A_b, p_b, (zero, alpha)))
+            th_1 = sub(scaled(c_d, alpha), scaled(c_k, cross(spin, theta)))
+            th_2 = sub(sub(scaled(c_m, alpha), scaled(c_k, cross(spin_dot, theta))), cross(spin, th_1))
+            S_0 = world_screw(A_b, p_b, (zero, scaled(c_k, theta)))
+            S_1, S_2 = world_screw(A_b, p_b, (zero, th_1)), world_screw(A_b, p_b, (zero, th_2))
+            put_jets(jet, S_0, S_1, S_2, V_b, V_b_dot)
+            th_1 = sub(scaled(rate, alpha), cross(spin, theta))
+            put_reach(reach, world_screw(A_b, p_b, (zero, theta)), world_screw(A_b, p_b, (zero, th_1)), V_b)

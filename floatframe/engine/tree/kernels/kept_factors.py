@@ -1,0 +1,377 @@
+"""Newton's correction over the tree with matrices of bodies that are kept over steps (docs/relative.md §6).
+
+An approximation of `kernels.tree_factors`, six wide instead of eighteen and symmetric: a body turns and moves as a
+whole, so that its own matrix H, mass, damping and stiffness weighted, is constant in its axes but for its deformation;
+its symmetric part is made once and kept for many steps. The screws of modes at the joints and the poses of bodies are
+renewed with the factors. Left out are the terms that come from the rates and accelerations of the screws and from the
+turning of forces: they are weighted with h and h² and cost an iteration where they count, never accuracy. With X the
+motion of a body, Y that of what holds it, u its columns, q its modes, S those of its far, S_c those of its near marker
+for child c, all in its axes about its origin,
+
+    (1)  X = Y + J u - S q: its matrix [A B; Bᵀ E] by (X, q) becomes by (Y + J u, q)  A, B' = B - A S, E - SᵀB' - BᵀS
+    (2)  X_c = Ad_c (Y + J u + T q), T = S_c - S: each child adds P', P' T, TᵀP' T to them, P' = Ad_cᵀ P_c Ad_c
+    (3)  the front of (q, u, Y), [E B'ᵀJ B'ᵀ; . JᵀA J JᵀA; . . A], is factorised by Cholesky for q and u: P is left at Y
+
+Fronts are upper halves, their rows Uᵀ of the factors with inverse diagonals.
+"""
+
+import math
+
+from floatframe.engine.kernels.body import put_block, put_column
+from floatframe.engine.kernels.compiler.compilation import inner, loops, matrix_loops, view
+from floatframe.engine.kernels.evaluation import tangent_of_body
+from floatframe.engine.kernels.marker import shape
+from floatframe.engine.kernels.vector import (
+    add,
+    cross,
+    matrix,
+    matrix_sum,
+    product,
+    put,
+    put_matrix,
+    scaled,
+    scaled_matrix,
+    sub,
+    tilde,
+    transposed,
+    turned,
+    turned_back,
+    unit_matrix,
+    vector,
+)
+from floatframe.engine.tree.kernels.projection import force_slopes
+
+__all__ = ["factorize_poses", "keep_bodies", "solve_kept"]
+
+
+@inner
+def keep_bodies(model, work, tree, c_m, c_d, c_k):
+    """Write the matrices of bodies that are kept; `evaluate_tree` has been called."""
+    for i in range(tree.parent.shape[0]):
+        n = model.bodies.n_q[i]
+        turning = work.bodies.T_right[i]
+        put_matrix(turning, scaled_matrix(0.0, unit_matrix()))
+        H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((6 + n, 6 + n))
+        tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning)
+        symmetrise(H)
+
+
+@matrix_loops
+def symmetrise(H):
+    """Leave the symmetric part of a matrix."""
+    for r in range(H.shape[0]):
+        for k in range(r):
+            mean = 0.5 * (H[r, k] + H[k, r])
+            H[r, k] = mean
+            H[k, r] = mean
+
+
+@inner
+def factorize_poses(model, work, tree, joints, tangent, c_d, c_k):
+    """Factorise with the kept matrices at the poses of the iterate; whether all unknowns have their equation."""
+    for i in range(tree.parent.shape[0]):
+        n, m = model.bodies.n_q[i], tree.far[i]
+        H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((6 + n, 6 + n))
+        if n > 0:
+            put_screws(model, work, m, n, tangent.S[i])
+        F = front(tree, tangent, i)
+        write_front(H, tangent.S[i], tangent.Z, F, n, tree.s0[i + 1] - tree.s0[i])
+    for place in range(tree.order.shape[0] - 1, -1, -1):
+        i = tree.order[place]
+        n_l, n = tree.s0[i + 1] - tree.s0[i], model.bodies.n_q[i]
+        F, J = front(tree, tangent, i), tangent.J[tree.s0[i] : tree.m0[i]]
+        pose_columns(work, tree, joints, tangent, i)
+        add_columns(F, J, n)
+        for k in range(tree.column0[i], tree.column0[i + 1]):
+            s = tree.unknown[k]
+            if s >= 0 and tree.row[k] >= 0:
+                _, Q_x, Q_v = force_slopes(model, work, tree, i, tree.row[k])
+                c = n + s - tree.s0[i]
+                F[c, c] -= c_k * Q_x + c_d * Q_v
+        if not factorize_front(F, n_l):
+            return False
+        parent = tree.parent[i]
+        if parent >= 0:
+            relative_pose(work, tangent, i, parent)
+            move_inwards(F, tangent.turn[i], tangent.shift[i], tangent.P)
+            above, T = model.bodies.n_q[parent], tangent.T[i]
+            if above > 0:
+                put_screws(model, work, tree.near[i], above, T)
+                take_away(T, tangent.S[parent], above)
+            add_child(tangent.P, T, tangent.Z, front(tree, tangent, parent), above)
+    return True
+
+
+@view
+def front(tree, tangent, i):
+    """Return the front of body i, (n_l + 6, n_l + 6)."""
+    size = tree.s0[i + 1] - tree.s0[i] + 6
+    return tangent.front[tree.front0[i] : tree.front0[i + 1]].reshape((size, size))
+
+
+@loops
+def put_screws(model, work, m, n, S):
+    """Write the screws, as of `jets.mode_screw`, of all modes of its body at marker m, (6, n), body axes."""
+    if m < 0 or model.markers.psi0[m] < 0:
+        for r in range(6):
+            for k in range(n):
+                S[r, k] = 0.0
+        return
+    psi = work.markers.psi[model.markers.psi0[m] : model.markers.psi0[m] + 6 * n]
+    T, rho = matrix(work.markers.T_left[m]), vector(work.markers.rho[m])
+    for k in range(n):
+        d, th = shape(psi, n, k)
+        b = turned(T, th)
+        put_column(S, 0, k, add(d, cross(rho, b)))
+        put_column(S, 3, k, b)
+
+
+@loops
+def take_away(T, S, n):
+    """T -= S."""
+    for r in range(6):
+        for k in range(n):
+            T[r, k] -= S[r, k]
+
+
+@matrix_loops
+def write_front(H, S, Z, F, n, n_l):
+    """Write (1) into the front; columns are still to come."""
+    for r in range(6):
+        for e in range(6):
+            F[n_l + r, n_l + e] = H[r, e]
+    for r in range(6):
+        for k in range(n):
+            Z[r, k] = H[r, 6 + k]
+        for e in range(6):
+            a = H[r, e]
+            for k in range(n):
+                Z[r, k] -= a * S[e, k]
+    for k in range(n):
+        for l in range(n):  # noqa: E741
+            F[k, l] = H[6 + k, 6 + l]
+        for e in range(6):
+            s, b = S[e, k], H[e, 6 + k]
+            F[k, n_l + e] = Z[e, k]
+            for l in range(n):  # noqa: E741
+                F[k, l] -= s * Z[e, l] + b * S[e, l]
+
+
+@inner
+def pose_columns(work, tree, joints, tangent, i):
+    """Write by which screws the columns of the joint of body i move it, body axes about its origin."""
+    near, far = tree.near[i], tree.far[i]
+    R, origin = work.state.R[i], vector(work.state.r[i])
+    at_near, at_far = (0.0, 0.0, 0.0), origin
+    if near >= 0:
+        at_near = vector(work.markers.r[near])
+    if far >= 0:
+        at_far = vector(work.markers.r[far])
+    sense = -1.0 if tree.is_reversed[i] != 0 else 1.0
+    for k in range(tree.column0[i], tree.column0[i + 1]):
+        s = tree.unknown[k]
+        if s < 0:
+            continue
+        is_far = tree.side[k] != tree.is_reversed[i]
+        point = at_far if is_far else at_near
+        a = scaled(sense, vector(joints.a[k]))
+        t = cross(a, sub(origin, point))
+        if tree.side[k] == 0:
+            t = add(t, scaled(sense, vector(joints.t[k])))
+        put(tangent.J[s], 0, turned_back(R, t))
+        put(tangent.J[s], 3, turned_back(R, a))
+
+
+@matrix_loops
+def add_columns(F, J, n):
+    """Write the rows and columns of the joint into the front (3)."""
+    n_u = J.shape[0]
+    o = n + n_u
+    for c in range(n_u):
+        for r in range(6):
+            total = 0.0
+            for e in range(6):
+                total += J[c, e] * F[o + e, o + r]
+            F[n + c, o + r] = total
+        for d in range(n_u):
+            total = 0.0
+            for r in range(6):
+                total += F[n + c, o + r] * J[d, r]
+            F[n + c, n + d] = total
+        for k in range(n):
+            total = 0.0
+            for r in range(6):
+                total += F[k, o + r] * J[c, r]
+            F[k, n + c] = total
+
+
+@matrix_loops
+def factorize_front(F, n_l):
+    """Eliminate the first n_l unknowns of a front; whether all their pivots are positive."""
+    size = F.shape[0]
+    for k in range(n_l):
+        pivot = F[k, k]
+        if not 0.0 < pivot < math.inf:
+            return False
+        inverse = 1.0 / math.sqrt(pivot)
+        F[k, k] = inverse
+        for j in range(k + 1, size):
+            F[k, j] *= inverse
+        for i in range(k + 1, size):
+            factor = F[k, i]
+            for j in range(i, size):
+                F[i, j] -= factor * F[k, j]
+    return True
+
+
+@inner
+def relative_pose(work, tangent, i, parent):
+    """Write axes and origin of body i in those of its parent."""
+    R = matrix(work.state.R[parent])
+    put_matrix(tangent.turn[i], product(transposed(R), matrix(work.state.R[i])))
+    put(tangent.shift[i], 0, turned_back(R, sub(vector(work.state.r[i]), vector(work.state.r[parent]))))
+
+
+@loops
+def upper_part(F, row, column):
+    """Return a block of three rows of the upper half of a symmetric matrix."""
+    if row == column:
+        x, y, z = F[row, column + 1], F[row, column + 2], F[row + 1, column + 2]
+        return (F[row, row], x, y), (x, F[row + 1, row + 1], z), (y, z, F[row + 2, row + 2])
+    return vector(F[row, column:]), vector(F[row + 1, column:]), vector(F[row + 2, column:])
+
+
+@loops
+def move_inwards(F, turn, shift, P):
+    """Write Adᵀ P Ad of what is left of a front, in axes and about the origin of the parent."""
+    o, R, arm = F.shape[0] - 6, matrix(turn), tilde(vector(shift))
+    back, minus = transposed(R), scaled_matrix(-1.0, arm)
+    vv = product(product(R, upper_part(F, o, o)), back)
+    vw = product(product(R, upper_part(F, o, o + 3)), back)
+    ww = product(product(R, upper_part(F, o + 3, o + 3)), back)
+    wv = matrix_sum(transposed(vw), product(arm, vv))
+    put_block(P, 0, 0, vv)
+    put_block(P, 3, 0, wv)
+    put_block(P, 0, 3, transposed(wv))
+    put_block(P, 3, 3, matrix_sum(ww, matrix_sum(product(arm, vw), product(wv, minus))))
+
+
+@matrix_loops
+def add_child(P, T, Z, F, n):
+    """Add (2) of a child to the front of its parent."""
+    o = F.shape[0] - 6
+    for r in range(6):
+        for e in range(6):
+            F[o + r, o + e] += P[r, e]
+    for r in range(6):
+        for k in range(n):
+            Z[r, k] = 0.0
+        for e in range(6):
+            p = P[r, e]
+            for k in range(n):
+                Z[r, k] += p * T[e, k]
+    for k in range(n):
+        for r in range(6):
+            t = T[r, k]
+            F[k, o + r] += Z[r, k]
+            for l in range(n):  # noqa: E741
+                F[k, l] += t * Z[r, l]
+
+
+@loops
+def solve_kept(model, tree, joints, tangent, c_k):
+    """Write the corrections of the unknowns into tangent.step, those of bodies, axes of each, into tangent.X.
+
+    From the leaves inwards minus the force of a subtree at rest, `b`, and the right sides z = U⁻ᵀ (q, u); then outwards
+    Y, q, u, and X.
+    """
+    x, b = tangent.step, tangent.b
+    for s in range(x.shape[0]):
+        x[s] = 0.0
+    for i in range(b.shape[0]):
+        for r in range(6):
+            b[i, r] = 0.0
+    for place in range(tree.order.shape[0] - 1, -1, -1):
+        i = tree.order[place]
+        n_l, n, parent = tree.s0[i + 1] - tree.s0[i], model.bodies.n_q[i], tree.parent[i]
+        z = tangent.z[tree.s0[i] + 6 * i : tree.s0[i + 1] + 6 * i + 6]
+        for k in range(n):  # what children have left here is in x
+            z[k] = x[tree.m0[i] + k] - c_k * joints.residual[tree.m0[i] + k]
+        for s in range(tree.s0[i], tree.m0[i]):
+            total = -c_k * joints.residual[s]
+            for r in range(6):
+                total += tangent.J[s, r] * b[i, r]
+            z[n + s - tree.s0[i]] = total
+        for r in range(6):
+            z[n_l + r] = b[i, r]
+        reduce_right_side(front(tree, tangent, i), z, n_l)
+        if parent >= 0:
+            f = turned(tangent.turn[i], z[n_l:])
+            m = add(turned(tangent.turn[i], z[n_l + 3 :]), cross(vector(tangent.shift[i]), f))
+            add_force(tangent.T[i], b[parent], x[tree.m0[parent] :], f, m, model.bodies.n_q[parent])
+    for place in range(tree.order.shape[0]):
+        i = tree.order[place]
+        n_l, n, parent = tree.s0[i + 1] - tree.s0[i], model.bodies.n_q[i], tree.parent[i]
+        z = tangent.z[tree.s0[i] + 6 * i : tree.s0[i + 1] + 6 * i + 6]
+        Y, held = z[n_l:], tangent.Y[i]
+        for r in range(6):
+            Y[r] = 0.0
+        if parent >= 0:
+            hold(tangent.T[i], tangent.Y[parent], x[tree.m0[parent] :], Y, model.bodies.n_q[parent])
+            turn = vector(Y[3:])
+            put(Y, 0, turned_back(tangent.turn[i], add(vector(Y), cross(turn, vector(tangent.shift[i])))))
+            put(Y, 3, turned_back(tangent.turn[i], turn))
+        finish_solution(front(tree, tangent, i), z, n_l)
+        for r in range(6):
+            held[r] = Y[r]
+        for s in range(tree.s0[i], tree.m0[i]):
+            x[s] = z[n + s - tree.s0[i]]
+            for r in range(6):
+                held[r] += tangent.J[s, r] * x[s]
+        for k in range(n):
+            x[tree.m0[i] + k] = z[k]
+        for r in range(6):
+            total = held[r]
+            for k in range(n):
+                total -= tangent.S[i, r, k] * z[k]
+            tangent.X[i, r] = total
+
+
+@loops
+def add_force(T, b, x, f, m, n):
+    """Add the force (f, m) of a child to that of its parent and to the right sides of its modes."""
+    for a in range(3):
+        b[a] += f[a]
+        b[3 + a] += m[a]
+    for k in range(n):
+        x[k] += (T[0, k] * f[0] + T[1, k] * f[1] + T[2, k] * f[2]) + (T[3, k] * m[0] + T[4, k] * m[1] + T[5, k] * m[2])
+
+
+@loops
+def hold(T, above, q, Y, n):
+    """Write the motion of what holds a body: that of its parent, with its modes."""
+    for r in range(6):
+        total = above[r]
+        for k in range(n):
+            total += T[r, k] * q[k]
+        Y[r] = total
+
+
+@matrix_loops
+def reduce_right_side(F, z, n_l):
+    """Overwrite (q, u) of z by U⁻ᵀ of them, and take their part from the force at Y."""
+    for k in range(n_l):
+        y = z[k] * F[k, k]
+        z[k] = y
+        for j in range(k + 1, z.shape[0]):
+            z[j] -= y * F[k, j]
+
+
+@matrix_loops
+def finish_solution(F, z, n_l):
+    """Overwrite (q, u) of z by the solution, Y being there."""
+    for k in range(n_l - 1, -1, -1):
+        total = z[k]
+        for j in range(k + 1, z.shape[0]):
+            total -= F[k, j] * z[j]
+        z[k] = total * F[k, k]

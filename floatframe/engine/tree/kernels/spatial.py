@@ -1,0 +1,67 @@
+"""Spatial vectors: pairs ((3,), (3,)) of the motion of the point at an origin at rest and a rotation."""
+
+from floatframe.engine.kernels.compiler.compilation import inner, small
+from floatframe.engine.kernels.vector import add, cross, dot, put, scaled, sub, turned, vector
+
+__all__ = [
+    "pair",
+    "pair_sum",
+    "put_pair_of",
+    "scaled_pair",
+    "spatial_cross",
+    "spatial_motion",
+    "turned_power",
+    "world_screw",
+]
+
+
+@small
+def pair(x):
+    """Return an array of six as a spatial vector."""
+    return vector(x), vector(x[3:])
+
+
+@small
+def spatial_cross(V, S):
+    """Return V × S of spatial motions."""
+    return add(cross(V[1], S[0]), cross(V[0], S[1])), cross(V[1], S[1])
+
+
+@small
+def pair_sum(S, U):
+    """Return S + U."""
+    return add(S[0], U[0]), add(S[1], U[1])
+
+
+@small
+def scaled_pair(f, S):
+    """Return f S."""
+    return scaled(f, S[0]), scaled(f, S[1])
+
+
+@small
+def put_pair_of(out, first, S):
+    """Write a spatial vector into an array."""
+    put(out, first, S[0])
+    put(out, first + 3, S[1])
+
+
+@inner
+def spatial_motion(p, v, omega, a, alpha):
+    """Return spatial velocity and its rate of a frame at p from the origin that moves as given."""
+    V = (sub(v, cross(omega, p)), omega)
+    return V, (sub(sub(a, cross(alpha, p)), cross(omega, v)), alpha)
+
+
+@small
+def world_screw(R, p, S):
+    """Return a spatial vector of a frame with axes R at p from the origin, given about its own point and axes."""
+    ang = turned(R, S[1])
+    return add(turned(R, S[0]), cross(p, ang)), ang
+
+
+@small
+def turned_power(xi, screw, F):
+    """Return (xi × J) · F, the screw J and F as arrays of six."""
+    S = spatial_cross(xi, pair(screw))
+    return dot(S[0], F) + dot(S[1], F[3:])

@@ -1,0 +1,400 @@
+"""Time loop of the generalized-alpha method in relative coordinates; see `floatframe.integrators.relative`.
+
+What is remembered from step to step is absolute (`kernels.memory.Memory`), but for the algorithmic accelerations: those
+of an unknown stand where `Tree.slot` says. Joints are found from the bodies at the beginning of each step.
+"""
+
+import math
+
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.connections.user_force import resize_states
+from floatframe.engine.kernels.generalized_alpha import (
+    DIVERGED,
+    DONE,
+    INACCURATE,
+    OF_MOTION,
+    SLOW,
+    UNRESOLVED,
+    copy,
+    correction_of_states,
+    error_factor,
+    is_enough,
+    is_resized,
+    is_too_long,
+    keep_iterate,
+    load_state,
+    mean_square,
+    ratio_of_steps,
+    roundoff_floor,
+    settle_row,
+    time_loop,
+    write_row,
+)
+from floatframe.engine.kernels.step_start import hold_states
+from floatframe.engine.tree.kernels.accelerations import accelerate
+from floatframe.engine.tree.kernels.evaluation import evaluate_placed, evaluate_tree
+from floatframe.engine.tree.kernels.kept_factors import factorize_poses, keep_bodies, solve_kept
+from floatframe.engine.tree.kernels.kinematics import joint_motion, move_joints, place_bodies
+from floatframe.engine.tree.kernels.predictor import learn, predict
+from floatframe.engine.tree.kernels.projection import put_reactions
+from floatframe.engine.tree.kernels.tangent import write_tangent
+from floatframe.engine.tree.kernels.tree_factors import factorize_tree, solve_newton
+from floatframe.engine.tree.kernels.weights import sizes_of_step, squared_size, weigh
+
+__all__ = ["SINGULAR", "advance_tree", "correct", "renew", "write_tree_row"]
+
+SINGULAR = 6  #: status: the Newton matrix is
+MANY = 4  # iterations of a step after which the next one starts with new factors
+EXACT_STEPS = 4  # steps that take exact matrices after those that are kept have failed
+MOST_PATIENCE = 31  # steps that make their own factors before older ones are tried again
+
+
+@inner
+def begin(model, work, tree, joints, memory):
+    """Take the iterate from the memory; write motion of the joints at the beginning of a step if it is not known."""
+    load_state(work.state, memory)
+    if joints.is_known == 0:
+        joint_motion(model, work, tree, joints)
+        start_here(tree, joints)
+    for k in range(joints.x.shape[0]):
+        joints.x[k] = 0.0
+
+
+@inner
+def start_here(tree, joints):
+    """Take the motion of the joints for that at the beginning of a step."""
+    for i in range(tree.parent.shape[0]):
+        for a in range(3):
+            joints.d_start[i, a] = joints.d[i, a]
+            for b in range(3):
+                joints.Q_start[i, a, b] = joints.Q[i, a, b]
+    copy(joints.rate, joints.rate_start)
+    copy(joints.acceleration, joints.acceleration_start)
+    joints.is_known = 1
+
+
+@inner
+def resize(model, work, tree, joints, tangent, memory, t, h):
+    """Turn the algorithmic accelerations into those of a step of size h to t; iterate and joints are of the memory."""
+    ratio = ratio_of_steps(model, memory, h)
+    if ratio == 0.0:
+        begin_anew(model, work, tree, joints, tangent, memory, t - h)
+    for s in range(tree.slot.shape[0]):
+        k = tree.slot[s]
+        now = memory.u_dot[k] if tree.mode[s] >= 0 else joints.acceleration_start[tree.column[s]]
+        memory.a[k] = now + ratio * (memory.a[k] - now)
+    resize_states(model.states.row, memory, ratio)
+    memory.h = h
+
+
+@inner
+def begin_anew(model, work, tree, joints, tangent, memory, t):
+    """Take the accelerations of the equations of motion at the state in the memory, where there are some."""
+    work.state.time = t
+    hold_states(model, work, memory)
+    if accelerate(model, work, tree, joints, tangent):
+        copy(joints.acceleration, joints.acceleration_start)
+        copy(work.state.u_dot, memory.u_dot)
+    begin(model, work, tree, joints, memory)
+
+
+@inner
+def renew(model, work, tree, joints, tangent, c_m, c_d, c_k):
+    """Make the factors of the Newton matrix anew; whether all unknowns have their equation.
+
+    Exact ones where wrenches are kept or `tangent.exactly` asks for them, else those of `kernels.kept_factors`.
+    """
+    weigh(model, work, tree, joints, tangent)
+    if tangent.V.shape[0] > 0 or tangent.exactly > 0:
+        tangent.is_exact, tangent.is_kept = 1, 0
+        write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k)
+        return factorize_tree(model, work, tree, tangent, c_d, c_k)
+    tangent.is_exact = 0
+    if tangent.is_kept == 0:
+        keep_bodies(model, work, tree, c_m, c_d, c_k)
+        tangent.is_kept = 1
+    if factorize_poses(model, work, tree, joints, tangent, c_d, c_k):
+        return True
+    tangent.exactly = EXACT_STEPS
+    tangent.is_exact, tangent.is_kept = 1, 0
+    write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k)
+    return factorize_tree(model, work, tree, tangent, c_d, c_k)
+
+
+@inner
+def correct(model, work, tree, joints, tangent, c_k):
+    """Write the corrections for the residual of the iterate with the factors that `renew` has made."""
+    if tangent.is_exact != 0:
+        solve_newton(work, tree, joints, tangent, c_k)
+    else:
+        solve_kept(model, tree, joints, tangent, c_k)
+
+
+@inner
+def update(model, work, tree, joints, tangent, by_rate, by_acceleration, c_k):
+    """Add the correction to the iterate; return its squared norm."""
+    total, step, state = squared_size(model, work, tree, tangent), tangent.step, work.state
+    for s in range(tree.slot.shape[0]):
+        k, slot, x = tree.column[s], tree.slot[s], step[s]
+        joints.increment[s] += x
+        if k >= 0:
+            joints.x[k] += x
+            joints.rate[k] += by_rate * x
+            joints.acceleration[k] += by_acceleration * x
+        else:
+            state.q[tree.mode[s]] += x
+            state.u[slot] += by_rate * x
+            state.u_dot[slot] += by_acceleration * x
+    for k in range(tree.kept_row.shape[0]):
+        work.solver.mu[k] = tangent.mu[tree.kept_row[k]] if tree.kept_row[k] >= 0 else 0.0
+        state.w[k] += work.solver.mu[k] / c_k
+    move_joints(tree, joints)
+    place_bodies(model, work, tree, joints)
+    return total
+
+
+@inner
+def local_error(model, work, tree, joints, tangent, memory, order, h):
+    """Return the estimated error of the increment of a step that has converged, as the absolute method does.
+
+    Accelerations of bodies are affine in those of the unknowns, so that the change of these in a step, added to them,
+    gives that of the bodies; then they are as before.
+    """
+    alpha_m, alpha_f, u_dot = order.alpha_m, order.alpha_f, work.state.u_dot
+    for i in range(tree.parent.shape[0]):
+        for k in range(6):
+            tangent.X[i, k] = u_dot[model.bodies.u0[i] + k]
+    for s in range(tree.slot.shape[0]):
+        now, before = accelerations(work, tree, joints, memory, s)
+        a = memory.a[tree.slot[s]]
+        jump = ((1 - alpha_f) * now + alpha_f * before - alpha_m * a) / (1 - alpha_m) - a
+        tangent.step[s] = now
+        put_acceleration(work, tree, joints, s, now + jump)
+    place_bodies(model, work, tree, joints)
+    largest = 0.0
+    for i in range(tree.parent.shape[0]):
+        u0, n = model.bodies.u0[i], model.bodies.n_q[i]
+        change = work.bodies.velocity[: 6 + n]
+        for k in range(6):
+            change[k] = u_dot[u0 + k] - tangent.X[i, k]
+        for k in range(n):
+            change[6 + k] = u_dot[u0 + 6 + k] - tangent.step[tree.m0[i] + k]
+        largest = max(largest, mean_square(model, work, i, change))
+    for s in range(tree.slot.shape[0]):
+        put_acceleration(work, tree, joints, s, tangent.step[s])
+    place_bodies(model, work, tree, joints)
+    return error_factor(order, h) * math.sqrt(largest)
+
+
+@inner
+def put_acceleration(work, tree, joints, s, value):
+    """Write the acceleration of an unknown."""
+    if tree.column[s] >= 0:
+        joints.acceleration[tree.column[s]] = value
+    else:
+        work.state.u_dot[tree.slot[s]] = value
+
+
+@inner
+def accelerations(work, tree, joints, memory, s):
+    """Return the acceleration of an unknown at the iterate and at the beginning of the step."""
+    k = tree.column[s]
+    if k >= 0:
+        return joints.acceleration[k], joints.acceleration_start[k]
+    return work.state.u_dot[tree.slot[s]], memory.u_dot[tree.slot[s]]
+
+
+@inner
+def one_step(model, work, memory, tree, joints, tangent, order, h):
+    """Advance the memory by one step, unless its error is above the one that is allowed.
+
+    Return (status, last correction by the allowed one, error; -1 if not estimated). Factors of an earlier step serve as
+    long as corrections shrink fast with them; where they do not, the step is begun anew with its own, and the more
+    steps have theirs at once the more often that happens (long chains: their mass matrix changes much with the shape).
+    A step that does not converge so is begun once more, with exact factors in every iteration: what approximate ones
+    have led far away does not come back.
+    """
+    alpha_m, alpha_f, beta, gamma = order.alpha_m, order.alpha_f, order.beta, order.gamma
+    c_k = beta * h * h
+    c_d = gamma * h
+    c_m = (1 - alpha_m) / (1 - alpha_f)
+    work.counted.no_number = 0
+    work.counted.stopped = 0
+    last, last_of_states, excess, wanted, allowed = math.inf, math.inf, math.inf, 0.0, 0.0
+    solver, iteration = work.solver, 0
+    if solver.c_m != c_m or solver.c_d != c_d or solver.c_k != c_k:
+        work.solver.is_due = 1
+        tangent.patience, tangent.left, tangent.is_kept, tangent.exactly = 0, 0, 0, 0
+        tangent.n_known = 0
+    elif tangent.left > 0:
+        work.solver.is_due = 1
+        tangent.left -= 1
+    if tangent.exactly > 0:
+        tangent.exactly -= 1
+    is_old, made, begun = work.solver.is_due == 0, -1, 0  # iterations at which factors were made, the step begun anew
+    is_last_try = False
+    predict(model, work, tree, joints, tangent, memory, order, h)
+    factorisations = work.counted.factorisations
+    is_open = tangent.V.shape[0] == 0  # wrenches that are kept are not in the norm
+    has_states = model.states.row.shape[0] + model.laws.equation.shape[0] > 0
+    while iteration < order.max_iterations:
+        evaluate_placed(model, work, tree, joints, c_k)
+        if work.solver.is_due == 1:
+            made = iteration
+            work.counted.factorisations += 1
+            work.solver.is_due = 0
+            solver.c_m, solver.c_d, solver.c_k = c_m, c_d, c_k
+            if not renew(model, work, tree, joints, tangent, c_m, c_d, c_k):
+                work.solver.is_due = 1
+                return SINGULAR, excess, -1.0
+        correct(model, work, tree, joints, tangent, c_k)
+        if iteration == 0:
+            size, size_x = sizes_of_step(model, work, memory, h)
+            wanted = order.tolerance * (c_k * math.sqrt(size) + OF_MOTION * math.sqrt(size_x))
+            allowed = wanted + math.sqrt(roundoff_floor(model, work, order.length))
+        norm = math.sqrt(update(model, work, tree, joints, tangent, c_d / c_k, c_m / c_k, c_k))
+        work.counted.iterations += 1
+        if is_old and work.counted.factorisations > factorisations:
+            is_old = False
+        if is_old and not norm <= max(SLOW * last, allowed):
+            work.solver.is_due = 1
+            is_old = False
+            tangent.patience = min(2 * tangent.patience + 1, MOST_PATIENCE)
+            tangent.left = tangent.patience
+            predict(model, work, tree, joints, tangent, memory, order, h)
+            last, last_of_states = math.inf, math.inf
+            iteration += 1
+            begun = iteration
+            continue
+        if (
+            tangent.is_exact == 0
+            and not norm <= last
+            and (begun < made < iteration or iteration < begun + 2 or not math.isfinite(norm))
+        ):
+            work.solver.is_due = 1
+            tangent.exactly = EXACT_STEPS
+            tangent.n_known = 0
+            predict(model, work, tree, joints, tangent, memory, order, h)
+            last, last_of_states = math.inf, math.inf
+            iteration += 1
+            begun = iteration
+            continue
+        if not math.isfinite(norm) and is_last_try:
+            work.solver.is_due = 1
+            return DIVERGED, math.inf, -1.0
+        excess = norm / allowed if allowed > 0.0 else math.inf
+        of_states = 0.0
+        if has_states:
+            of_states = correction_of_states(model, work, c_k) / order.tolerance
+            if not math.isfinite(of_states) and is_last_try:
+                work.solver.is_due = 1
+                return DIVERGED, math.inf, -1.0
+        is_small = is_enough(norm, last, wanted, allowed) if is_open else norm <= allowed
+        is_small = is_small or (norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2)
+        if is_small and (of_states <= 1.0 or (of_states <= 1e3 and of_states > 0.5 * last_of_states and iteration > 2)):
+            if iteration >= MANY:
+                work.solver.is_due = 1
+            error = -1.0
+            if is_too_long(model, work, h):
+                return UNRESOLVED, excess, error
+            if order.most_error > 0.0:
+                error = local_error(model, work, tree, joints, tangent, memory, order, h)
+                if not error <= order.most_error:
+                    return INACCURATE, excess, error
+            accept(model, work, memory, tree, joints, h, alpha_m, alpha_f)
+            return DONE, excess, error
+        if norm > SLOW * last and not is_small and (tangent.is_exact != 0 or made < iteration):
+            work.solver.is_due = 1
+            if tangent.is_exact == 0:
+                tangent.is_kept = 0
+                if begun < made < iteration:  # those of an iterate near to the solution are not good enough either
+                    tangent.exactly = EXACT_STEPS
+        if of_states > max(1.0, SLOW * last_of_states) or iteration >= MANY:
+            work.solver.is_due = 1
+        last, last_of_states = norm, of_states
+        excess = max(excess, of_states)
+        iteration += 1
+        if not is_last_try and (iteration == order.max_iterations or not math.isfinite(norm + of_states)):
+            is_last_try, is_old, tangent.exactly, tangent.n_known = True, False, EXACT_STEPS, 0
+            predict(model, work, tree, joints, tangent, memory, order, h)
+            last, last_of_states, iteration, begun, made = math.inf, math.inf, 0, 0, -1
+        if is_last_try:
+            work.solver.is_due = 1
+    work.solver.is_due = 1
+    return DIVERGED, excess, -1.0
+
+
+@inner
+def accept(model, work, memory, tree, joints, h, alpha_m, alpha_f):
+    """(3): write the iterate and the new algorithmic accelerations into the memory."""
+    put_reactions(model, work, tree, joints)
+    for s in range(tree.slot.shape[0]):
+        now, before = accelerations(work, tree, joints, memory, s)
+        slot = tree.slot[s]
+        memory.a[slot] = ((1 - alpha_f) * now + alpha_f * before - alpha_m * memory.a[slot]) / (1 - alpha_m)
+    for i in range(model.bodies.kind.shape[0]):
+        put_euler_parameters(work.state.R[i], memory.p[i])
+    keep_iterate(model, work, memory, h)
+    start_here(tree, joints)
+
+
+@inner
+def put_euler_parameters(R, p):
+    """Write the Euler parameters of a rotation matrix, of the two signs that nearer to those that are there.
+
+    The largest of w², x², y², z² by the diagonal; the others from sums and differences across it.
+    """
+    trace = R[0, 0] + R[1, 1] + R[2, 2]
+    w, x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], 0.0
+    if trace >= R[0, 0] and trace >= R[1, 1] and trace >= R[2, 2]:
+        w, x, y, z = 1.0 + trace, w, x, y
+    elif R[0, 0] >= R[1, 1] and R[0, 0] >= R[2, 2]:
+        w, x, y, z = w, 1.0 + R[0, 0] - R[1, 1] - R[2, 2], R[1, 0] + R[0, 1], R[0, 2] + R[2, 0]
+    elif R[1, 1] >= R[2, 2]:
+        w, x, y, z = x, R[1, 0] + R[0, 1], 1.0 + R[1, 1] - R[0, 0] - R[2, 2], R[2, 1] + R[1, 2]
+    else:
+        w, x, y, z = y, R[0, 2] + R[2, 0], R[2, 1] + R[1, 2], 1.0 + R[2, 2] - R[0, 0] - R[1, 1]
+    scale = 1.0 / math.sqrt(w * w + x * x + y * y + z * z)
+    if w * p[0] + x * p[1] + y * p[2] + z * p[3] < 0.0:
+        scale = -scale
+    p[0], p[1], p[2], p[3] = scale * w, scale * x, scale * y, scale * z
+
+
+@inner
+def write_tree_row(model, work, memory, tree, joints, t, rows):
+    """Write the next row of the results, with the reactions of the tree at the very state in the memory."""
+    work.state.time = t
+    begin(model, work, tree, joints, memory)
+    evaluate_tree(model, work, tree, joints, 1.0)
+    put_reactions(model, work, tree, joints)
+    copy(work.state.w, memory.w)
+    write_row(model, work, memory, t, rows)
+
+
+@inner
+def try_tree_step(model, work, memory, others, order, t, h):
+    """Advance the memory to t by a step of size h, see `kernels.generalized_alpha.time_loop`."""
+    tree, joints, tangent = others
+    begin(model, work, tree, joints, memory)
+    if is_resized(model, work, memory, order, h):
+        resize(model, work, tree, joints, tangent, memory, t, h)
+        tangent.n_known = 0
+    work.state.time = t
+    status, excess, error = one_step(model, work, memory, tree, joints, tangent, order, memory.h)
+    if status == DONE:
+        learn(tree, tangent, memory)
+    return status, -1, excess, error
+
+
+@inner
+def write_next_row(model, work, memory, others, t, rows):
+    """Write the next row of the results; gaps of loops are known to rounding, as those of all joints in bodies' own."""
+    tree, joints, tangent = others
+    write_tree_row(model, work, memory, tree, joints, t, rows)
+    if tree.kept.shape[0] > 0:
+        settle_row(model, work, memory, rows)
+    if work.solver.is_due == 1:
+        tangent.is_kept = 0  # its factors of the bodies are overwritten
+
+
+advance_tree = time_loop(try_tree_step, write_next_row)

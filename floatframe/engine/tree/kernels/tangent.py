@@ -1,0 +1,415 @@
+"""The Newton matrix in relative coordinates, exact (docs/relative.md §5).
+
+With the force F_i of body i (its residual as a spatial vector about O), F the sum over a subtree, J the screw of an
+unknown, residuals are ρ = J · F for columns, and those of modes with the same sums at their markers. Then
+
+    d rho = J · dF + (xi × J) · F        dF = D jet,   D the sum of the bodies of the subtree, (6, 18)
+
+since all bodies of a subtree move alike by what moves its first. Derivatives of the projection, of the kinematics and
+of the forces that stay in axes of bodies or ground are all there.
+"""
+
+from floatframe.engine.kernels.body import axial, block, column, column_sum, put_block, tensor, trace_less
+from floatframe.engine.kernels.compiler.compilation import inner, loops, small
+from floatframe.engine.kernels.connections.connection import connection_derivatives
+from floatframe.engine.kernels.evaluation import tangent_of_body
+from floatframe.engine.kernels.marker import bent_rate, shape
+from floatframe.engine.kernels.model import C2, C3
+from floatframe.engine.kernels.rotation import left_jacobian_derivative
+from floatframe.engine.kernels.vector import (
+    add,
+    cross,
+    dot,
+    matrix,
+    matrix_sum,
+    product,
+    put,
+    put_matrix,
+    scaled,
+    scaled_matrix,
+    sub,
+    tilde,
+    transposed,
+    turned,
+    turned_back,
+    unit_matrix,
+    vector,
+)
+from floatframe.engine.tree.kernels.jets import carrier, mode_rate, mode_screws, put_mode_jet, write_jets
+from floatframe.engine.tree.kernels.projection import force_slopes
+from floatframe.engine.tree.kernels.spatial import pair, pair_sum, scaled_pair, spatial_cross, turned_power, world_screw
+from floatframe.engine.tree.kernels.tree import COLUMN, NEAR_MODE
+
+__all__ = [
+    "add_second_order",
+    "assemble",
+    "inner_product",
+    "product_of",
+    "rigid_columns",
+    "unit_of",
+    "write_tangent",
+]
+
+
+@loops
+def rigid_columns(model, work, i, A):
+    """Write the derivative of the residual of body i by a, alpha, omega, body axes, into A, (6 + n, 9).
+
+    As `kernels.body.body_tangent`, column by column.
+    """
+    bodies, t, n, u0 = work.bodies, model.bodies.kind[i], model.bodies.n_q[i], model.bodies.u0[i]
+    q0, s, J = model.bodies.q0[i], vector(bodies.s[i]), bodies.J[i]
+    first = bodies.C1[3 * q0 : 3 * (q0 + n)]
+    omega, q_dot = vector(work.state.u[u0 + 3 :]), work.state.u[u0 + 6 : u0 + 6 + n]
+    v = column_sum(first, n, q_dot)
+    spin = matrix_sum(tilde(add(scaled(2.0, v), cross(omega, s))), product(tilde(omega), tilde(s)))
+    gyro = matrix_sum(product(tilde(omega), J), tilde(scaled(-1.0, turned(J, omega))))
+    put_block(A, 0, 0, scaled_matrix(model.body_types.mass[t], unit_matrix()))
+    put_block(A, 0, 3, tilde(scaled(-1.0, s)))
+    put_block(A, 0, 6, scaled_matrix(-1.0, spin))
+    put_block(A, 3, 0, tilde(s))
+    put_block(A, 3, 3, matrix(J))
+    put_block(A, 3, 6, matrix_sum(scaled_matrix(2.0, matrix(bodies.D_q_dot[i])), gyro))
+    if n > 0:
+        W, Y = bodies.W[9 * q0 : 9 * (q0 + n)], bodies.Y[3 * q0 : 3 * (q0 + n)]
+        second, third = block(model.body_types, t, C2, 3 * n), block(model.body_types, t, C3, 9 * n)
+        for k in range(n):
+            W_k = tensor(W, n, k)
+            D_k, B_k = matrix_sum(tensor(third, n, k), trace_less(W_k)), add(column(second, n, k), axial(W_k))
+            J_omega = turned(matrix_sum(D_k, transposed(D_k)), omega)
+            put(A[6 + k], 0, column(first, n, k))
+            put(A[6 + k], 3, B_k)
+            put(A[6 + k], 6, sub(scaled(2.0, column(Y, n, k)), J_omega))
+
+
+@inner
+def write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k):
+    """Write jets, derivatives of the bodies, and P, V of the connections that are kept.
+
+    `evaluate_tree` has been called for the iterate; wrenches of joints of the tree are taken away.
+    """
+    rate = c_d / c_k if c_k > 0.0 else 0.0
+    write_jets(model, work, tree, joints, tangent, c_m, c_d, c_k, rate)
+    for i in range(tree.parent.shape[0]):
+        for m in (tree.near[i], tree.far[i]):
+            if m >= 0:
+                for k in range(6):
+                    work.markers.wrench[m, k] = 0.0
+    for i in range(tree.parent.shape[0]):
+        of_body(model, work, joints, tangent, i, c_m, c_d, c_k)
+    for e in range(tree.kept.shape[0]):
+        connection_derivatives(model, work, tree.kept[e], c_k)
+    for r in range(tangent.V.shape[0]):
+        for k in range(tangent.V.shape[0]):
+            tangent.V[r, k] = 0.0
+        for k in range(tangent.C.shape[1]):
+            tangent.C[r, k] = 0.0
+            tangent.B[r, k] = 0.0
+    for e in range(tree.kept.shape[0]):
+        c = tree.kept[e]
+        for r in range(model.connections.size[c]):
+            for k in range(model.connections.size[c]):
+                first = tree.kept_row[model.connections.w0[c]]
+                tangent.V[first + r, first + k] = work.connections.V[c, r, k]
+    for m in range(model.markers.body.shape[0]):
+        c = model.markers.connection[m]
+        if c >= 0 and model.markers.body[m] >= 0 and tree.is_kept[c] != 0 and model.connections.size[c] > 0:
+            first = tree.kept_row[model.connections.w0[c]]
+            kept_marker(model, work, tree, tangent, m, first, rate)
+            if model.markers.accelerated[m] >= 0:
+                accelerated_marker(model, work, tree, tangent, m, first, c_m, c_d, c_k)
+
+
+@inner
+def of_body(model, work, joints, tangent, i, c_m, c_d, c_k):
+    """Write D, F and the derivatives of the modal residual of body i alone, and H with the columns of its modes."""
+    n, u0, q0 = model.bodies.n_q[i], model.bodies.u0[i], model.bodies.q0[i]
+    turning = work.bodies.T_right[i]
+    put_matrix(turning, unit_matrix())
+    H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((6 + n, 6 + n))
+    tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning)
+    A, turn = tangent.rigid, work.bodies.by_turn
+    rigid_columns(model, work, i, A)
+    R, residual = matrix(work.state.R[i]), joints.own[u0 : u0 + 6 + n]
+    p = sub(vector(work.state.r[i]), vector(tangent.origin))
+    v, omega = vector(work.state.u[u0:]), turned(R, work.state.u[u0 + 3 :])
+    a = vector(work.state.u_dot[u0:])
+    f, tau = turned(R, residual), turned(R, residual[3:])
+    put(tangent.F[i], 0, f)
+    put(tangent.F[i], 3, add(tau, cross(p, f)))
+    y, out, D = tangent.y, tangent.by_jet, tangent.D[i]
+    for e in range(18):
+        xi, xi_w = unit_of(e, 0), unit_of(e, 3)
+        _, one_w, two, two_w = unit_of(e, 6), unit_of(e, 9), unit_of(e, 12), unit_of(e, 15)
+        change = add(add(two, cross(two_w, p)), add(scaled(2.0, cross(one_w, v)), cross(xi_w, a)))
+        put(y, 0, turned_back(R, change))
+        put(y, 3, turned_back(R, sub(two_w, cross(omega, one_w))))
+        put(y, 6, turned_back(R, one_w))
+        put(y, 9, turned_back(R, xi_w))
+        for r in range(6 + n):
+            total = turn[r, 0] * y[9] + turn[r, 1] * y[10] + turn[r, 2] * y[11]
+            for k in range(9):
+                total += A[r, k] * y[k]
+            out[r] = total
+        moved = add(xi, cross(xi_w, p))
+        df = add(cross(xi_w, f), turned(R, out))
+        dm = add(add(cross(xi_w, tau), turned(R, out[3:])), add(cross(moved, f), cross(p, df)))
+        D[0, e], D[1, e], D[2, e] = df[0], df[1], df[2]
+        D[3, e], D[4, e], D[5, e] = dm[0], dm[1], dm[2]
+        for k in range(n):
+            tangent.modal[q0 + k, e] = out[6 + k]
+
+
+@small
+def unit_of(e, first):
+    """Return the part from `first` on of the unit vector e of a jet."""
+    return 1.0 if e == first else 0.0, 1.0 if e == first + 1 else 0.0, 1.0 if e == first + 2 else 0.0
+
+
+@inner
+def product_of(A, x, out):
+    """Write A x into out."""
+    for r in range(A.shape[0]):
+        total = 0.0
+        for k in range(A.shape[1]):
+            total += A[r, k] * x[k]
+        out[r] = total
+
+
+@inner
+def inner_product(x, y):
+    """Return x · y of vectors of six numbers."""
+    return dot(x, y) + dot(x[3:], y[3:])
+
+
+@inner
+def assemble(model, work, tree, tangent, c_d, c_k):
+    """Write the matrix K of the unknowns and of the wrenches that are kept; sums over subtrees overwrite D and F."""
+    K = tangent.K
+    for r in range(K.shape[0]):
+        for s in range(K.shape[0]):
+            K[r, s] = 0.0
+    for place in range(tree.order.shape[0] - 1, -1, -1):
+        i = tree.order[place]
+        of_modes(model, work, tree, tangent, i)
+        of_subtree(tree, tangent, i)
+        turning_columns(model, tree, tangent, i)
+        turning_modes(model, work, tree, tangent, i, c_k)
+        loaded_columns(model, work, tree, tangent, i, c_d, c_k)
+        parent = tree.parent[i]
+        if parent >= 0:
+            for r in range(6):
+                tangent.F[parent, r] += tangent.F[i, r]
+                for e in range(18):
+                    tangent.D[parent, r, e] += tangent.D[i, r, e]
+    n_s = tree.s0[tree.s0.shape[0] - 1]
+    for r in range(tangent.V.shape[0]):
+        for k in range(tangent.V.shape[0]):
+            K[n_s + r, n_s + k] = tangent.V[r, k]
+        for k in range(n_s):
+            K[n_s + r, k] = tangent.C[r, k]
+            K[k, n_s + r] = tangent.B[r, k]
+
+
+@inner
+def of_modes(model, work, tree, tangent, i):
+    """Add rows and columns of the modes of body i, its frame and that of the bodies on it held or moved by jets."""
+    n, q0, m0, K = model.bodies.n_q[i], model.bodies.q0[i], tree.m0[i], tangent.K
+    if n == 0:
+        return
+    H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((6 + n, 6 + n))
+    R, p, f = work.state.R[i], sub(vector(work.state.r[i]), vector(tangent.origin)), tangent.f
+    for k in range(n):
+        df = turned(R, (H[0, 6 + k], H[1, 6 + k], H[2, 6 + k]))
+        put(f, 0, df)
+        put(f, 3, add(turned(R, (H[3, 6 + k], H[4, 6 + k], H[5, 6 + k])), cross(p, df)))
+        b = i
+        while b >= 0:
+            for j in range(tree.jet0[b], tree.jet0[b + 1]):
+                K[tree.jet_s[j], m0 + k] += inner_product(tangent.screw[j], f)
+                total = 0.0
+                for e in range(18):
+                    total += tangent.modal[q0 + k, e] * tangent.jet[j, e]
+                K[m0 + k, tree.jet_s[j]] += total
+            b = tree.parent[b]
+        for l in range(n):  # noqa: E741
+            K[m0 + k, m0 + l] += H[6 + k, 6 + l]
+
+
+@inner
+def of_subtree(tree, tangent, i):
+    """Add J · D jet of all pairs of which one belongs to the joint of body i, the other to it or one before."""
+    K, f, D = tangent.K, tangent.f, tangent.D[i]
+    b = i
+    while b >= 0:
+        for j in range(tree.jet0[b], tree.jet0[b + 1]):
+            product_of(D, tangent.jet[j], f)
+            for k in range(tree.jet0[i], tree.jet0[i + 1]):
+                K[tree.jet_s[k], tree.jet_s[j]] += inner_product(tangent.screw[k], f)
+            if b == i:
+                a = tree.parent[i]
+                while a >= 0:
+                    for k in range(tree.jet0[a], tree.jet0[a + 1]):
+                        K[tree.jet_s[k], tree.jet_s[j]] += inner_product(tangent.screw[k], f)
+                    a = tree.parent[a]
+        b = tree.parent[b]
+
+
+@inner
+def turning_columns(model, tree, tangent, i):
+    """Add (xi × J) · F of the columns of the joint of body i, xi that of the frame in which J is fixed."""
+    K, F = tangent.K, tangent.F[i]
+    for j in range(tree.jet0[i], tree.jet0[i + 1]):
+        if tree.jet_kind[j] != COLUMN:
+            continue
+        s, screw = tree.jet_s[j], tangent.screw[j]
+        is_far = tree.side[tree.jet_item[j]] != tree.is_reversed[i]  # fixed in the marker on the body
+        b = i
+        while b >= 0:
+            for k in range(tree.jet0[b], tree.jet0[b + 1]):
+                of_marker = b != i or tree.jet_kind[k] == NEAR_MODE or (is_far and tree.jet_kind[k] == COLUMN)
+                if of_marker:
+                    K[s, tree.jet_s[k]] += turned_power(pair(tangent.jet[k]), screw, F)
+            b = tree.parent[b]
+
+
+@inner
+def turning_modes(model, work, tree, tangent, i, c_k):
+    """Add what the screws of modes at both ends of the joint of body i change by, times the force of the subtree."""
+    K, F = tangent.K, tangent.F[i]
+    for j in range(tree.jet0[i], tree.jet0[i + 1]):
+        if tree.jet_kind[j] == COLUMN:
+            continue
+        s, screw, k = tree.jet_s[j], tangent.screw[j], tree.jet_item[j]
+        is_near = tree.jet_kind[j] == NEAR_MODE
+        body = tree.parent[i] if is_near else i
+        b = body
+        while b >= 0:
+            for e in range(tree.jet0[b], tree.jet0[b + 1]):
+                K[s, tree.jet_s[e]] += turned_power(pair(tangent.jet[e]), screw, F)
+            b = tree.parent[b]
+        m, sign = (tree.near[i], 1.0) if is_near else (tree.far[i], -1.0)
+        add_second_order(model, work, tangent, body, m, k, sign * c_k, F, K[s, tree.m0[body] :])
+
+
+@inner
+def add_second_order(model, work, tangent, i, m, k, factor, F, row):
+    """Add the change of the screw of mode k at marker m of body i by all its modes, as the body sees it, times F.
+
+    With b = T' Psi_r,k, its derivative slope, and f, m' the force and its moment about the marker, body axes:
+    Psi_t,l · (b × f) + Psi_r,l · (slopeᵀ m') - K_t,kl · f - K_r,kl · (T'ᵀ m').
+    """
+    n, o, first = model.bodies.n_q[i], model.markers.psi0[m], model.markers.bend0[m]
+    R, p = work.state.R[i], sub(vector(work.state.r[i]), vector(tangent.origin))
+    f, T = turned_back(R, F), work.markers.T_left[m]
+    moment = sub(turned_back(R, sub(vector(F[3:]), cross(p, vector(F)))), cross(vector(work.markers.rho[m]), f))
+    psi = work.markers.psi[o : o + 6 * n]
+    _, th_k = shape(psi, n, k)
+    slope = left_jacobian_derivative(vector(work.markers.angle[m]), th_k, 1.0)
+    by_place, by_turn, of_turn = cross(turned(T, th_k), f), turned_back(slope, moment), turned_back(T, moment)
+    for l in range(n):  # noqa: E741
+        d, th = shape(psi, n, l)
+        total = dot(d, by_place) + dot(th, by_turn)
+        if first >= 0:
+            d, th = shape(model.markers.bend[first + 6 * n * l : first + 6 * n * (l + 1)], n, k)
+            total -= dot(d, f) + dot(th, of_turn)
+        row[l] += factor * total
+
+
+@inner
+def loaded_columns(model, work, tree, tangent, i, c_d, c_k):
+    """Subtract the derivatives of forces along the coordinates of the joint of body i."""
+    for k in range(tree.column0[i], tree.column0[i + 1]):
+        s = tree.unknown[k]
+        if s >= 0 and tree.row[k] >= 0:
+            _, Q_x, Q_v = force_slopes(model, work, tree, i, tree.row[k])
+            tangent.K[s, s] -= c_k * Q_x + c_d * Q_v
+
+
+@inner
+def kept_marker(model, work, tree, tangent, m, first, rate):
+    """Add rows and columns of the connection of marker m, whose rows begin at `first`, by what moves the marker."""
+    i, c = model.markers.body[m], model.markers.connection[m]
+    p = sub(vector(work.markers.r[m]), vector(tangent.origin))
+    v, omega = vector(work.markers.v[m]), vector(work.markers.omega[m])
+    b = i
+    while b >= 0:
+        for j in range(tree.jet0[b], tree.jet0[b + 1]):
+            reach, screw = tangent.reach[j], tangent.screw[j]
+            xi, xi_dot = pair(reach), pair(reach[6:])
+            kept_pair(model, work, tangent, m, c, first, tree.jet_s[j], xi, xi_dot, pair(screw), p, v, omega)
+        b = tree.parent[b]
+    if model.markers.psi0[m] < 0:
+        return
+    state, u0 = work.state, model.bodies.u0[i]
+    R, origin = state.R[i], sub(vector(state.r[i]), vector(tangent.origin))
+    spin = turned(R, state.u[u0 + 3 :])
+    V = sub(vector(state.u[u0:]), cross(spin, origin)), spin
+    if model.markers.bend0[m] >= 0:
+        bent_rate(model, work, m, i, work.markers.bend_dot[: 6 * model.bodies.n_q[i]])
+    for k in range(model.bodies.n_q[i]):
+        s, s_1 = mode_rate(model, work, m, i, k)
+        unit = world_screw(R, origin, s)
+        own = world_screw(R, origin, s_1)
+        xi_dot = pair_sum(pair_sum(scaled_pair(rate, unit), own), spatial_cross(V, unit))
+        kept_pair(model, work, tangent, m, c, first, tree.m0[i] + k, unit, xi_dot, unit, p, v, omega)
+
+
+@inner
+def kept_pair(model, work, tangent, m, c, first, s, xi, xi_dot, unit, p, v, omega):
+    """Add row and column of unknown s, which moves marker m of connection c by xi, xi_dot; unit: its screw."""
+    C, B, motion, P = tangent.C, tangent.B, tangent.motion, work.connections.P[m]
+    put(motion, 0, add(xi[0], cross(xi[1], p)))
+    put(motion, 3, xi[1])
+    put(motion, 6, add(add(xi_dot[0], cross(xi_dot[1], p)), cross(xi[1], v)))
+    put(motion, 9, add(xi_dot[1], cross(xi[1], omega)))
+    for r in range(model.connections.size[c]):
+        total = 0.0
+        for k in range(12):
+            total += P[r, k] * motion[k]
+        C[first + r, s] += total
+    sign = model.markers.sign[m]
+    moved = add(unit[0], cross(unit[1], p))
+    if model.markers.force[m] >= 0:
+        o = first + model.markers.force[m]
+        for a in range(3):
+            B[o + a, s] -= sign * moved[a]
+    if model.markers.moment[m] >= 0:
+        o = first + model.markers.moment[m]
+        for a in range(3):
+            B[o + a, s] -= sign * unit[1][a]
+
+
+@inner
+def accelerated_marker(model, work, tree, tangent, m, first, c_m, c_d, c_k):
+    """Add to the rows of the connection of marker m, from `first` on, what they change by its acceleration."""
+    i = model.markers.body[m]
+    b = i
+    while b >= 0:
+        for j in range(tree.jet0[b], tree.jet0[b + 1]):
+            accelerated_pair(model, work, tangent, m, first, tree.jet_s[j], tangent.jet[j])
+        b = tree.parent[b]
+    if model.markers.psi0[m] < 0:
+        return
+    held = carrier(model, work, tangent, m, i)
+    for k in range(model.bodies.n_q[i]):
+        S, S_1, S_2 = mode_screws(model, work, m, i, k, held)
+        put_mode_jet(tangent.own, S, S_1, S_2, held, c_m, c_d, c_k)
+        accelerated_pair(model, work, tangent, m, first, tree.m0[i] + k, tangent.own)
+
+
+@inner
+def accelerated_pair(model, work, tangent, m, first, s, jet):
+    """Add P_a times the change of the acceleration of marker m by the jet (xi, xi_dot, xi_ddot) of unknown s.
+
+        da = xi_ddot_v + xi_ddot_w × p + 2 xi_dot_w × v + xi_w × a
+        dalpha = xi_ddot_w + xi_dot_w × omega + xi_w × alpha
+    """
+    accelerated = model.markers.accelerated[m]
+    P_a, now = work.connections.P_a[accelerated], work.markers.acceleration[accelerated]
+    p, v = sub(vector(work.markers.r[m]), vector(tangent.origin)), vector(work.markers.v[m])
+    xi_w, xi_dot_w, xi_ddot_w = vector(jet[3:]), vector(jet[9:]), vector(jet[15:])
+    da = add(add(vector(jet[12:]), cross(xi_ddot_w, p)), add(scaled(2.0, cross(xi_dot_w, v)), cross(xi_w, vector(now))))
+    dalpha = add(xi_ddot_w, add(cross(xi_dot_w, vector(work.markers.omega[m])), cross(xi_w, vector(now[3:]))))
+    for r in range(model.connections.size[model.markers.connection[m]]):
+        tangent.C[first + r, s] += dot(da, P_a[r]) + dot(dalpha, P_a[r, 3:])

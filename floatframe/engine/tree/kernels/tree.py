@@ -1,0 +1,175 @@
+"""The tree of bodies as a record, and what the recursions write.
+
+A joint of the tree has marker A and marker B, of which one is on the body (far), the other on its parent (near). Its
+columns, one for each coordinate rate z_dot_k, say how B moves as seen from A (docs/relative.md §2):
+
+    v_B - v_A - omega_A × d = Σ A_A tau_k z_dot_k        omega_B - omega_A = Σ a_k z_dot_k
+
+with a_k = A_A alpha_k for side 0 (a screw fixed in A, through its point), A_B alpha_k for side 1 (fixed in B). Bodies
+that hang at nothing have a chart of six columns: marker A is the ground frame, marker B the frame of the body.
+
+Sizes beside those of `kernels.model`: n_k columns; n_s unknowns = columns that are not prescribed, and modes, body by
+body: those of body i are s0[i]:s0[i + 1], first its joint.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, IntArray
+from floatframe.engine.kernels.model import Model, n_b, n_c, n_w
+from floatframe.engine.kernels.records import Size, integer, real, zeros
+
+__all__ = ["COLUMN", "FAR_MODE", "NEAR_MODE", "JointWork", "TangentWork", "Tree", "new_joint_work", "new_tangent_work"]
+
+COLUMN, NEAR_MODE, FAR_MODE = range(3)  #: kinds of jets
+
+n_k, n_s, n_kept, n_j, n_rows = (Size(name) for name in ("columns", "n_s", "kept", "jets", "kept rows"))
+
+
+class Tree(NamedTuple):
+    """Bodies and the joints between them that are coordinates."""
+
+    order: IntArray = integer(n_b)  #: bodies, depth first, each after its parent
+    parent: IntArray = integer(n_b)  #: of each body, -1 for the ground
+    joint: IntArray = integer(n_b)  #: connection that carries the body, -1 for a free body
+    near: IntArray = integer(n_b)  #: marker on the parent, -1 for the ground frame of a free body
+    far: IntArray = integer(n_b)  #: marker on the body, -1 for the frame of a free body
+    is_reversed: IntArray = integer(n_b)  #: whether the parent holds marker B
+    column0: IntArray = integer(n_b + 1)  #: first column of the joint of each body
+    s0: IntArray = integer(n_b + 1)  #: first unknown of each body
+    m0: IntArray = integer(n_b)  #: first of its modes among the unknowns
+    column: IntArray = integer(n_s)  #: of each unknown, -1 for a mode
+    mode: IntArray = integer(n_s)  #: place in q of each unknown, -1 for a coordinate
+    slot: IntArray = integer(n_s)  #: place of its algorithmic acceleration among those of the bodies, of a mode its own
+    tau: Array = real(n_k, 3, unit="1 or m/rad")  #: translation, axes of A
+    alpha: Array = real(n_k, 3)  #: rotation, axes of the side
+    side: IntArray = integer(n_k)  #: 0: fixed in A, 1: fixed in B
+    unknown: IntArray = integer(n_k)  #: number among the unknowns, -1 for a prescribed coordinate
+    motion: IntArray = integer(n_k)  #: function of time of a prescribed coordinate, -1 for none
+    factor: Array = real(n_k)  #: of the coordinate by what the function prescribes
+    row: IntArray = integer(n_k)  #: row of the joint that belongs to it, -1 for none
+    kept: IntArray = integer(n_kept)  #: connections that are no joints of the tree
+    is_kept: IntArray = integer(n_c)  #: whether a connection is among them
+    kept_row: IntArray = integer(n_w)  #: number of a row among those of connections that are kept, -1 for others
+    #: first of what moves a body with its subtree against its parent: columns that are unknown, modes of the parent at
+    #: the near marker, modes of the body at the far marker
+    jet0: IntArray = integer(n_b + 1)
+    jet_kind: IntArray = integer(n_j)  #: COLUMN, NEAR_MODE or FAR_MODE
+    jet_item: IntArray = integer(n_j)  #: number of the column, or of the mode in its body
+    jet_s: IntArray = integer(n_j)  #: number among the unknowns
+    own_jet: IntArray = integer(n_s)  #: jet of each unknown at the joint of its own body, -1 for none
+    l0: IntArray = integer(n_b + 1)  #: where the matrix of the unknowns of each body begins in a flat store
+    front0: IntArray = integer(n_b + 1)  #: where its front begins in one, see kernels/kept_factors.py
+
+
+class JointWork(NamedTuple):
+    """Joints of the tree in a step; overwritten by every evaluation."""
+
+    d: Array = real(n_b, 3, unit="m")  #: from A to B, axes of A
+    Q: Array = real(n_b, 3, 3)  #: A_Aᵀ A_B
+    d_start: Array = real(n_b, 3, unit="m")  #: the same at the beginning of a step
+    Q_start: Array = real(n_b, 3, 3)
+    x: Array = real(n_k, unit="m or rad")  #: increments of coordinates since then
+    rate: Array = real(n_k, unit="m/s or rad/s")  #: z_dot
+    acceleration: Array = real(n_k, unit="m/s² or rad/s²")  #: z_ddot
+    rate_start: Array = real(n_k, unit="m/s or rad/s")  #: z_dot at the beginning of a step
+    acceleration_start: Array = real(n_k, unit="m/s² or rad/s²")
+    is_known: IntArray = integer()  #: whether the beginning of a step is the motion in the memory
+    increment: Array = real(n_s)  #: of all unknowns since then
+    t: Array = real(n_k, 3)  #: A_A tau, ground axes
+    a: Array = real(n_k, 3)  #: rotation, ground axes
+    near: Array = real(n_b, 12, unit="m/s², rad/s², m/s, rad/s")  #: accelerations and velocities of the marker there
+    force: Array = real(n_b, 6, unit="N, N m")  #: wrench of the joint on its marker B, ground axes
+    residual: Array = real(n_s, unit="N, N m")  #: of the projected equations
+    own: Array = real(Size("n_u"), unit="N, N m")  #: residual of the bodies without the joints of the tree
+
+
+class TangentWork(NamedTuple):
+    """The Newton matrix in relative coordinates, see kernels/tangent.py; spatial vectors about the point `origin`."""
+
+    origin: Array = real(3, unit="m")
+    screw: Array = real(n_j, 6)  #: by which a jet moves bodies with unit rate
+    jet: Array = real(n_j, 18)  #: variations xi, xi_dot, xi_ddot, weighted
+    reach: Array = real(n_j, 12)  #: xi, xi_dot by an increment of the step
+    D: Array = real(n_b, 6, 18)  #: derivative of the force of a body, with its subtree, by jets
+    F: Array = real(n_b, 6, unit="N, N m")  #: force of a body with its subtree
+    modal: Array = real(Size("n_q"), 18)  #: derivative of the modal residual by jets
+    rigid: Array = real(Size("n_most") + 6, 9)  #: residual of one body by accelerations and angular velocity
+    y: Array = real(12)
+    by_jet: Array = real(Size("n_most") + 6)
+    f: Array = real(6)
+    motion: Array = real(12)
+    own: Array = real(18)  #: jet of a mode at a marker of its body
+    C: Array = real(n_rows, n_s)  #: rows that are kept by unknowns
+    B: Array = real(n_rows, n_s)  #: equations of unknowns by wrenches that are kept, transposed; then K⁻¹ of them
+    V: Array = real(n_rows, n_rows)  #: rows that are kept by their wrenches; then the factors of V - C K⁻¹ B
+    V_pivot: IntArray = integer(n_rows)
+    by_mode: Array = real(Size("n_q"), 6)  #: force of a body, with its subtree, by its own modes
+    L: Array = real(Size("numbers of L"))  #: equations by unknowns of each body, then their factors, flat
+    L_pivot: IntArray = integer(n_s)
+    G: Array = real(n_s, 18)  #: unknowns of a body by the jet of its near marker
+    W: Array = real(n_s, 6)  #: force of a subtree by the unknowns of its first body
+    b: Array = real(n_b, 6, unit="N, N m")  #: force of subtrees in a solution
+    #: of kernels/kept_factors.py, in axes of each body about its origin
+    front: Array = real(Size("numbers of fronts"))  #: matrices of modes, columns and motion, then their factors, flat
+    S: Array = real(n_b, 6, Size("n_most"))  #: screws of the modes at the far marker
+    T: Array = real(n_b, 6, Size("n_most"))  #: those of the parent's modes at the near, less those at its far marker
+    Z: Array = real(6, Size("n_most"))
+    J: Array = real(n_s, 6)  #: screws of columns
+    P: Array = real(6, 6)  #: force of a subtree by the motion of what holds it
+    z: Array = real(
+        Size("unknowns and motions")
+    )  #: modes, columns and motion of what holds a body, one body after the other
+    turn: Array = real(n_b, 3, 3)  #: axes of a body in those of its parent
+    shift: Array = real(n_b, 3, unit="m")  #: its origin
+    is_exact: IntArray = integer()  #: whether the factors are those of the exact matrix
+    is_kept: IntArray = integer()  #: whether the matrices of bodies are there
+    exactly: IntArray = integer()  #: steps still to be made with exact matrices
+    #: algorithmic accelerations of the unknowns after the last steps, of one size each after the other
+    a_last: Array = real(n_s)
+    a_before: Array = real(n_s)
+    a_first: Array = real(n_s)
+    n_known: IntArray = integer()  #: how many of the three are there
+    degree: IntArray = integer()  #: of the polynomial through them that would have led nearest to the last
+    X: Array = real(n_b, 18)  #: jets of bodies in a solution; of kept factors their motion, axes of each
+    Y: Array = real(n_b, 18)  #: of what holds them
+    patience: IntArray = integer()  #: steps that make their own factors after the next that finds old ones too old
+    left: IntArray = integer()  #: of them, still to come
+    mass: Array = real(n_b, 6, 6, unit="kg, kg m, kg m²")  #: of subtrees
+    weight: Array = real(n_s, unit="kg, kg m²")  #: of the norm of corrections
+    step: Array = real(n_s)  #: right side, then the correction of the unknowns
+    mu: Array = real(n_rows)  #: that of the wrenches that are kept, times c_k
+    K: Array = real(Size("n_dense"), Size("n_dense"))  #: [unknowns, wrenches that are kept], where it is asked for
+
+
+def new_joint_work(model: Model, tree: Tree) -> JointWork:
+    """Return working arrays for the joints of a tree."""
+    sizes = {
+        "n_b": len(tree.parent),
+        "columns": len(tree.side),
+        "n_s": int(tree.s0[-1]),
+        "n_u": int(model.bodies.u0[-1]),
+    }
+    work = zeros(JointWork(), sizes)
+    work.Q[:] = np.eye(3)
+    work.Q_start[:] = np.eye(3)
+    return work
+
+
+def new_tangent_work(model: Model, tree: Tree, *, is_dense: bool = False) -> TangentWork:
+    """Return working arrays for the Newton matrix of a tree; is_dense: with room for all of it as one matrix."""
+    n_s, n_rows = int(tree.s0[-1]), int((tree.kept_row >= 0).sum())
+    sizes = {
+        "n_b": len(tree.parent),
+        "jets": len(tree.jet_s),
+        "n_q": int(model.bodies.q0[-1]),
+        "n_most": int(max(model.bodies.n_q, default=0)),
+        "n_s": n_s,
+        "kept rows": n_rows,
+        "numbers of L": int(tree.l0[-1]),
+        "numbers of fronts": int(tree.front0[-1]),
+        "unknowns and motions": n_s + 6 * len(tree.parent),
+        "n_dense": n_s + n_rows if is_dense else 0,
+    }
+    return zeros(TangentWork(), sizes)

@@ -1,0 +1,246 @@
+"""Newton's correction in relative coordinates, in time that grows with the number of bodies (docs/relative.md §5).
+
+With Y the jet of the near marker of a joint, x the unknowns of its body (columns, modes), b the force that bodies
+further out bring along and A its derivative by the jet X of the body,
+
+    X = Y + j x,   dF = A X + H x + b          (H: by the modes of the body)
+    L x + R Y = r                              (equations of columns and modes, b taken to the right)
+    x = G Y + g,   dF = P Y + p,   P = A + W G,  p = b + W g,  W = A j + H
+
+from the leaves inwards, each adding P and p to its parent: to the force of the body, and by its screws J to the
+equations of the modes that move the near marker. Outwards Y = X of the parent + j of its modes there, and x follows.
+Wrenches that are kept are found from V - C K⁻¹ B, a column of K⁻¹ B being one more solution.
+"""
+
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.dense import lu_factor, lu_solve, lu_solve_columns
+from floatframe.engine.kernels.vector import add, cross, put, sub, turned, vector
+from floatframe.engine.tree.kernels.projection import force_slopes
+from floatframe.engine.tree.kernels.spatial import pair, turned_power
+from floatframe.engine.tree.kernels.tangent import add_second_order, inner_product, product_of, unit_of
+from floatframe.engine.tree.kernels.tree import COLUMN, NEAR_MODE
+
+__all__ = ["factorize_tree", "solve_bordered", "solve_newton"]
+
+
+@inner
+def factorize_tree(model, work, tree, tangent, c_d, c_k):
+    """Factorise the Newton matrix whose parts `write_tangent` has written; whether all unknowns have their equation."""
+    for place in range(tree.order.shape[0] - 1, -1, -1):  # forces of subtrees, before the matrices need them
+        i = tree.order[place]
+        if tree.parent[i] >= 0:
+            for r in range(6):
+                tangent.F[tree.parent[i], r] += tangent.F[i, r]
+    for i in range(tree.parent.shape[0]):
+        modal_forces(model, work, tangent, i)
+    for place in range(tree.order.shape[0] - 1, -1, -1):
+        if not factorize_joint(model, work, tree, tangent, tree.order[place], c_d, c_k):
+            return False
+    n_rows, n_s = tangent.V.shape[0], tree.slot.shape[0]
+    for r in range(n_rows):
+        solve_tree(tree, tangent, tangent.B[r])
+    for r in range(n_rows):
+        for k in range(n_rows):
+            total = 0.0
+            for s in range(n_s):
+                total += tangent.C[r, s] * tangent.B[k, s]
+            tangent.V[r, k] -= total
+    return n_rows == 0 or lu_factor(tangent.V, tangent.V_pivot)
+
+
+@inner
+def modal_forces(model, work, tangent, i):
+    """Write the force of body i by its own modes."""
+    n, q0 = model.bodies.n_q[i], model.bodies.q0[i]
+    H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((6 + n, 6 + n))
+    R, p = work.state.R[i], sub(vector(work.state.r[i]), vector(tangent.origin))
+    for k in range(n):
+        df = turned(R, (H[0, 6 + k], H[1, 6 + k], H[2, 6 + k]))
+        put(tangent.by_mode[q0 + k], 0, df)
+        put(tangent.by_mode[q0 + k], 3, add(turned(R, (H[3, 6 + k], H[4, 6 + k], H[5, 6 + k])), cross(p, df)))
+
+
+@inner
+def add_turning(row, screw, F):
+    """Add (xi × J) · F to a row over jets, xi their first part."""
+    for e in range(6):
+        row[e] += turned_power((unit_of(e, 0), unit_of(e, 3)), screw, F)
+
+
+@inner
+def factorize_joint(model, work, tree, tangent, i, c_d, c_k):
+    """Eliminate the unknowns of body i; add what is left to its parent. Whether its matrix could be factorised."""
+    s0, n_l, m0, q0 = tree.s0[i], tree.s0[i + 1] - tree.s0[i], tree.m0[i], model.bodies.q0[i]
+    n = model.bodies.n_q[i]
+    A, F = tangent.D[i], tangent.F[i]
+    H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((6 + n, 6 + n))
+    L = tangent.L[tree.l0[i] : tree.l0[i + 1]].reshape((n_l, n_l))
+    R, W = tangent.G[s0 : s0 + n_l], tangent.W[s0 : s0 + n_l]
+    for k in range(n_l):
+        j, s = tree.own_jet[s0 + k], s0 + k
+        for e in range(6):
+            W[k, e] = tangent.by_mode[q0 + s - m0, e] if s >= m0 else 0.0
+        if j >= 0:
+            for r in range(6):
+                for e in range(18):
+                    W[k, r] += A[r, e] * tangent.jet[j, e]
+    for k in range(n_l):
+        j, s = tree.own_jet[s0 + k], s0 + k
+        row = R[k]
+        for e in range(18):
+            row[e] = tangent.modal[q0 + s - m0, e] if s >= m0 else 0.0
+        for l in range(n_l):  # noqa: E741
+            L[k, l] = H[6 + s - m0, 6 + s0 + l - m0] if s >= m0 and s0 + l >= m0 else 0.0
+        if j >= 0:
+            screw = tangent.screw[j]
+            own_mode = s >= m0
+            if own_mode:
+                add_turning(row, screw, F)  # with the jet of the body
+                add_second_order(model, work, tangent, i, tree.far[i], s - m0, -c_k, F, L[k, m0 - s0 :])
+            for l in range(n_l):  # noqa: E741
+                o = tree.own_jet[s0 + l]
+                if o >= 0:
+                    for e in range(18):
+                        L[k, l] += row[e] * tangent.jet[o, e]
+                L[k, l] += inner_product(screw, W[l])
+            for e in range(18):
+                for r in range(6):
+                    row[e] += screw[r] * A[r, e]
+            if not own_mode:
+                add_turning(row, screw, F)
+                turning_far(tree, tangent, i, j, k, L, F)
+        else:
+            for l in range(n_l):  # noqa: E741
+                o = tree.own_jet[s0 + l]
+                if o >= 0:
+                    for e in range(18):
+                        L[k, l] += row[e] * tangent.jet[o, e]
+    for k in range(tree.column0[i], tree.column0[i + 1]):
+        s = tree.unknown[k]
+        if s >= 0 and tree.row[k] >= 0:
+            _, Q_x, Q_v = force_slopes(model, work, tree, i, tree.row[k])
+            L[s - s0, s - s0] -= c_k * Q_x + c_d * Q_v
+    if n_l > 0:
+        if not lu_factor(L, tangent.L_pivot[s0 : s0 + n_l]):
+            return False
+        for k in range(n_l):
+            for e in range(18):
+                R[k, e] = -R[k, e]
+        lu_solve_columns(L, tangent.L_pivot[s0 : s0 + n_l], R)
+        for k in range(n_l):  # P = A + W G
+            for r in range(6):
+                for e in range(18):
+                    A[r, e] += W[k, r] * R[k, e]
+    if tree.parent[i] >= 0:
+        add_to_parent(model, work, tree, tangent, i, c_k)
+    return True
+
+
+@inner
+def turning_far(tree, tangent, i, j, k, L, F):
+    """Add (xi × J) · F by the columns of the joint where J is fixed in the marker on the body."""
+    if tree.side[tree.jet_item[j]] == tree.is_reversed[i]:
+        return
+    for o in range(tree.jet0[i], tree.jet0[i + 1]):
+        if tree.jet_kind[o] == COLUMN:
+            L[k, tree.jet_s[o] - tree.s0[i]] += turned_power(pair(tangent.jet[o]), tangent.screw[j], F)
+
+
+@inner
+def add_to_parent(model, work, tree, tangent, i, c_k):
+    """Add P of the joint of body i to its parent: to the force of it, and to that and the equations of its modes."""
+    parent, P, F = tree.parent[i], tangent.D[i], tangent.F[i]
+    n, q0 = model.bodies.n_q[parent], model.bodies.q0[parent]
+    H = work.solver.H[model.bodies.h0[parent] : model.bodies.h0[parent + 1]].reshape((6 + n, 6 + n))
+    f = tangent.f
+    for j in range(tree.jet0[i], tree.jet0[i + 1]):
+        if tree.jet_kind[j] != NEAR_MODE:
+            continue
+        k, screw = tree.jet_item[j], tangent.screw[j]
+        row = tangent.modal[q0 + k]
+        for e in range(18):
+            for r in range(6):
+                row[e] += screw[r] * P[r, e]
+        add_turning(row, screw, F)
+        product_of(P, tangent.jet[j], f)
+        for r in range(6):
+            tangent.by_mode[q0 + k, r] += f[r]
+        for o in range(tree.jet0[i], tree.jet0[i + 1]):
+            if tree.jet_kind[o] == NEAR_MODE:
+                H[6 + tree.jet_item[o], 6 + k] += inner_product(tangent.screw[o], f)
+        add_second_order(model, work, tangent, parent, tree.near[i], k, c_k, F, H[6 + k, 6:])
+    for r in range(6):
+        for e in range(18):
+            tangent.D[parent, r, e] += P[r, e]
+
+
+@inner
+def solve_tree(tree, tangent, x):
+    """Overwrite x, (n_s,), by the solution for the right side in it."""
+    b, X = tangent.b, tangent.X
+    for i in range(b.shape[0]):
+        for r in range(6):
+            b[i, r] = 0.0
+    for place in range(tree.order.shape[0] - 1, -1, -1):
+        i = tree.order[place]
+        s0, n_l, parent = tree.s0[i], tree.s0[i + 1] - tree.s0[i], tree.parent[i]
+        for s in range(s0, s0 + n_l):
+            if tree.own_jet[s] >= 0:
+                x[s] -= inner_product(tangent.screw[tree.own_jet[s]], b[i])
+        if n_l > 0:
+            L = tangent.L[tree.l0[i] : tree.l0[i + 1]].reshape((n_l, n_l))
+            lu_solve(L, tangent.L_pivot[s0 : s0 + n_l], x[s0 : s0 + n_l])
+        for s in range(s0, s0 + n_l):
+            for r in range(6):
+                b[i, r] += tangent.W[s, r] * x[s]
+        if parent >= 0:
+            for r in range(6):
+                b[parent, r] += b[i, r]
+            for j in range(tree.jet0[i], tree.jet0[i + 1]):
+                if tree.jet_kind[j] == NEAR_MODE:
+                    x[tree.jet_s[j]] -= inner_product(tangent.screw[j], b[i])
+    for place in range(tree.order.shape[0]):
+        i = tree.order[place]
+        parent, Y = tree.parent[i], tangent.Y[i]
+        for e in range(18):
+            Y[e] = X[parent, e] if parent >= 0 else 0.0
+        for j in range(tree.jet0[i], tree.jet0[i + 1]):
+            if tree.jet_kind[j] == NEAR_MODE:
+                for e in range(18):
+                    Y[e] += tangent.jet[j, e] * x[tree.jet_s[j]]
+        for s in range(tree.s0[i], tree.s0[i + 1]):
+            for e in range(18):
+                x[s] += tangent.G[s, e] * Y[e]
+        for s in range(tree.s0[i], tree.s0[i + 1]):
+            if tree.own_jet[s] >= 0:
+                for e in range(18):
+                    Y[e] += tangent.jet[tree.own_jet[s], e] * x[s]
+        for e in range(18):
+            X[i, e] = Y[e]
+
+
+@inner
+def solve_newton(work, tree, joints, tangent, c_k):
+    """Write the corrections of unknowns and of kept wrenches, these times c_k, into tangent.step and tangent.mu."""
+    for s in range(tree.slot.shape[0]):
+        tangent.step[s] = -c_k * joints.residual[s]
+    for k in range(tree.kept_row.shape[0]):
+        if tree.kept_row[k] >= 0:
+            tangent.mu[tree.kept_row[k]] = -work.connections.g[k]
+    solve_bordered(tree, tangent)
+
+
+@inner
+def solve_bordered(tree, tangent):
+    """Overwrite tangent.step and tangent.mu, right sides of unknowns and of rows that are kept, by the solution."""
+    step, mu, n_s, n_rows = tangent.step, tangent.mu, tree.slot.shape[0], tangent.V.shape[0]
+    solve_tree(tree, tangent, step)
+    if n_rows == 0:
+        return
+    for r in range(n_rows):
+        for s in range(n_s):
+            mu[r] -= tangent.C[r, s] * step[s]
+    lu_solve(tangent.V, tangent.V_pivot, mu)
+    for r in range(n_rows):
+        for s in range(n_s):
+            step[s] -= tangent.B[r, s] * mu[r]

@@ -1,0 +1,114 @@
+"""Norms in relative coordinates: of corrections that of the bodies, and of unknowns by the mass that a unit moves.
+
+Corrections are measured as in absolute coordinates, by how bodies and modes move, so that a tolerance means the same: a
+turn of a joint near the root that those behind it take back is no large one.
+"""
+
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.vector import (
+    add,
+    cross,
+    dot,
+    matrix,
+    matrix_sum,
+    product,
+    put,
+    put_sum,
+    scaled,
+    scaled_matrix,
+    sub,
+    tilde,
+    transposed,
+    turned,
+    turned_back,
+    vector,
+)
+
+__all__ = ["sizes_of_step", "squared_size", "weigh"]
+
+
+@inner
+def weigh(model, work, tree, joints, tangent):
+    """Write the weights of the norm of unknowns: what of the mass a unit of a coordinate moves, M + c_k K of a mode.
+
+    Mass m, first moment S and inertia J of subtrees about tangent.origin, ground axes: rows 0, 1 and 3 to 5 of mass.
+    """
+    mass, origin = tangent.mass, vector(work.state.r[tree.order[0]])
+    for i in range(tree.parent.shape[0]):
+        R, p, m = matrix(work.state.R[i]), sub(work.state.r[i], origin), model.body_types.mass[model.bodies.kind[i]]
+        s, arm = turned(R, work.bodies.s[i]), tilde(p)
+        J = product(product(R, matrix(work.bodies.J[i])), transposed(R))
+        cross_terms = matrix_sum(product(arm, tilde(s)), product(tilde(s), arm))
+        J = matrix_sum(J, scaled_matrix(-1.0, matrix_sum(cross_terms, scaled_matrix(m, product(arm, arm)))))
+        mass[i, 0, 0] = m
+        put(mass[i, 1], 0, add(scaled(m, p), s))
+        for a in range(3):
+            put(mass[i, 3 + a], 0, J[a])
+    for place in range(tree.order.shape[0] - 1, -1, -1):
+        i = tree.order[place]
+        near, far, parent = tree.near[i], tree.far[i], tree.parent[i]
+        m, S, J = mass[i, 0, 0], vector(mass[i, 1]), mass[i, 3:]
+        for k in range(tree.column0[i], tree.column0[i + 1]):
+            if tree.unknown[k] < 0:
+                continue
+            point = vector(work.state.r[i]) if far < 0 else vector(work.markers.r[far])
+            if tree.side[k] == tree.is_reversed[i]:
+                point = (0.0, 0.0, 0.0) if near < 0 else vector(work.markers.r[near])
+            a = vector(joints.a[k])
+            v = cross(a, sub(origin, point))
+            if tree.side[k] == 0:
+                v = add(v, joints.t[k])
+            total = m * dot(v, v) + 2.0 * dot(v, cross(a, S)) + dot(a, turned(J, a))
+            tangent.weight[tree.unknown[k]] = abs(total)
+        if parent >= 0:
+            mass[parent, 0, 0] += m
+            put_sum(mass[parent, 1], 0, S)
+            for a in range(3):
+                put_sum(mass[parent, 3 + a], 0, J[a])
+    for i in range(tree.parent.shape[0]):
+        for k in range(model.bodies.n_q[i]):
+            tangent.weight[tree.m0[i] + k] = work.solver.weight[model.bodies.u0[i] + 6 + k]
+
+
+@inner
+def squared_size(model, work, tree, tangent):
+    """Return the squared norm of the correction in tangent.step by what it moves, in the weights of `work.solver`."""
+    if tangent.is_exact != 0:
+        move_by_screws(work, tree, tangent)
+    total, weight, step = 0.0, work.solver.weight, tangent.step
+    for i in range(tree.parent.shape[0]):
+        u0, X = model.bodies.u0[i], tangent.X[i]
+        for k in range(6):
+            total += weight[u0 + k] * X[k] * X[k]
+        for k in range(model.bodies.n_q[i]):
+            x = step[tree.m0[i] + k]
+            total += weight[u0 + 6 + k] * x * x
+    return total
+
+
+@inner
+def move_by_screws(work, tree, tangent):
+    """Write how bodies move by the correction, axes of each about its origin, into tangent.X; Y: about one point."""
+    for place in range(tree.order.shape[0]):
+        i = tree.order[place]
+        parent, Y = tree.parent[i], tangent.Y[i]
+        for r in range(6):
+            Y[r] = tangent.Y[parent, r] if parent >= 0 else 0.0
+        for j in range(tree.jet0[i], tree.jet0[i + 1]):
+            for r in range(6):
+                Y[r] += tangent.screw[j, r] * tangent.step[tree.jet_s[j]]
+        R, arm = work.state.R[i], sub(vector(work.state.r[i]), vector(tangent.origin))
+        put(tangent.X[i], 0, turned_back(R, add(vector(Y), cross(vector(Y[3:]), arm))))
+        put(tangent.X[i], 3, turned_back(R, Y[3:]))
+
+
+@inner
+def sizes_of_step(model, work, memory, h):
+    """Return the squared size of the accelerations of the iterate, gravity included, and of the way of a step."""
+    size, size_x, mass = 0.0, 0.0, 0.0
+    for k in range(memory.u.shape[0]):
+        size += work.solver.weight[k] * work.state.u_dot[k] ** 2
+        size_x += work.solver.weight[k] * (h * memory.u[k]) ** 2
+    for i in range(model.bodies.kind.shape[0]):
+        mass += model.body_types.mass[model.bodies.kind[i]]
+    return size + mass * dot(model.gravity, model.gravity), size_x

@@ -1,0 +1,249 @@
+"""Articulated bodies: M x = b of a tree in a time that grows with the number of bodies, factors kept.
+
+In ground axes, each node about its own origin, S the motion by its rates, H = [[I, ..]] of a flexible body
+(composite.py) with articulated instead of composite bodies in it:
+
+    (1) from the tips  U = I S, D = Sᵀ U, what the node shows its parent: I - U D⁻¹ Uᵀ, shifted; of a flexible body
+                       U = top of H T, G = Tᵀ H T, T = [[S], [0, 1]] over rates of the joint and modes
+    (2) solve          from the tips u = b - Sᵀ w (and, of modes, less what hangs on their markers), w + U D⁻¹ u goes up
+                       from the base x = D⁻¹ (u - Uᵀ a), a + S x goes on
+
+Forward dynamics is b = forces - inverse dynamics without accelerations. Sources: Featherstone (2008), chapter 7;
+Rodriguez, Jain & Kreutz-Delgado (1992) write the same as a factorisation of M.
+"""
+
+from floatframe.engine.kernels.compiler.compilation import loops, small
+from floatframe.engine.kernels.dense import lu_factor, lu_solve, lu_solve_columns
+from floatframe.engine.kernels.vector import (
+    add,
+    cross,
+    dot,
+    matrix,
+    matrix_sum,
+    product,
+    put,
+    put_matrix,
+    put_sum,
+    scaled,
+    sub,
+    tilde,
+    transposed,
+    turned,
+    vector,
+)
+from floatframe.engine.tree.recursion.composite import (
+    add_carried,
+    along,
+    along_rate,
+    flexible_column,
+    moments_in_ground,
+    shifted_blocks,
+)
+
+__all__ = ["articulate", "solve_articulated", "solve_columns"]
+
+
+@small
+def outer(a, b):
+    """Return a bᵀ."""
+    return scaled(a[0], b), scaled(a[1], b), scaled(a[2], b)
+
+
+@small
+def less(A, B):
+    """Return A - B."""
+    return sub(A[0], B[0]), sub(A[1], B[1]), sub(A[2], B[2])
+
+
+@small
+def inverse(A):
+    """Return the inverse of a matrix, and its determinant."""
+    x, y, z = cross(A[1], A[2]), cross(A[2], A[0]), cross(A[0], A[1])
+    d = dot(A[0], x)
+    f = 1.0 / d
+    return transposed((scaled(f, x), scaled(f, y), scaled(f, z))), d
+
+
+@loops
+def one_rate(work, k, v, A, B, C):
+    """Eliminate the one rate of a joint; return the blocks left, and the inertia along it."""
+    move, w = vector(work.S[v]), vector(work.S[v, 3:])
+    f, t = add(turned(A, move), turned(B, w)), add(turned(transposed(B), move), turned(C, w))
+    d = dot(move, f) + dot(w, t)
+    inverse_d = 1.0 / d
+    work.D[k, 0, 0] = inverse_d
+    put(work.U[v], 0, f)
+    put(work.U[v], 3, t)
+    f_d, t_d = scaled(inverse_d, f), scaled(inverse_d, t)
+    return less(A, outer(f_d, f)), less(B, outer(f_d, t)), less(C, outer(t_d, t)), d
+
+
+@loops
+def three_rates(work, k, v, A, B, C):
+    """Eliminate the three rates of a joint; return the blocks left, and the determinant of the inertia along them."""
+    L = transposed((vector(work.S[v]), vector(work.S[v + 1]), vector(work.S[v + 2])))
+    W = transposed((vector(work.S[v, 3:]), vector(work.S[v + 1, 3:]), vector(work.S[v + 2, 3:])))
+    F = matrix_sum(product(A, L), product(B, W))
+    T = matrix_sum(product(transposed(B), L), product(C, W))
+    D, d = inverse(matrix_sum(product(transposed(L), F), product(transposed(W), T)))
+    put_matrix(work.D[k], D)
+    F_t, T_t = transposed(F), transposed(T)
+    for j in range(3):
+        put(work.U[v + j], 0, F_t[0] if j == 0 else (F_t[1] if j == 1 else F_t[2]))
+        put(work.U[v + j], 3, T_t[0] if j == 0 else (T_t[1] if j == 1 else T_t[2]))
+    F_D, T_D = product(F, D), product(T, D)
+    return less(A, product(F_D, F_t)), less(B, product(F_D, T_t)), less(C, product(T_D, T_t)), d
+
+
+@loops
+def flexible(nodes, work, k):
+    """Eliminate rates and modes of a flexible body; return the blocks left, and whether it could be done."""
+    n, v0, size = nodes.n_q[k], nodes.v0[k], nodes.n_z[k] + nodes.n_q[k]
+    H = work.H[nodes.h0[k] : nodes.h0[k + 1]].reshape((6 + n, 6 + n))
+    G = work.G[nodes.g0[k] : nodes.g0[k + 1]].reshape((size, size))
+    for j in range(size):
+        flexible_column(nodes, work, H, k, j)
+        for i in range(size):
+            G[i, j] = along_rate(nodes, work, k, i)
+    pivot = work.pivot[v0 : v0 + size]  # rates of joint and modes stand one after the other
+    fine = lu_factor(G, pivot)
+    X = work.V[v0 : v0 + size]
+    for i in range(size):
+        for a in range(6):
+            X[i, a] = work.U[v0 + i, a]
+    lu_solve_columns(G, pivot, X)
+    for a in range(6):
+        for b in range(6):
+            total = H[a, b]
+            for i in range(size):
+                total -= work.U[v0 + i, a] * X[i, b]
+            H[a, b] = total
+    return fine
+
+
+@loops
+def top_blocks(H):
+    """Return the blocks of the first six rows and columns of H."""
+    A = vector(H[0]), vector(H[1]), vector(H[2])
+    B = vector(H[0, 3:]), vector(H[1, 3:]), vector(H[2, 3:])
+    C = vector(H[3, 3:]), vector(H[4, 3:]), vector(H[5, 3:])
+    return A, B, C
+
+
+@loops
+def articulate(nodes, work, model, marker_work):
+    """Factorise M of the nodes, placed in the ground; return the node without inertia along its rates, or -1."""
+    n_n = nodes.parent.shape[0]
+    for k in range(n_n):
+        moments_in_ground(nodes, work, model, marker_work, k)
+        m, s, J = work.mass[k], vector(work.s[k]), matrix(work.J[k])
+        put_matrix(work.I_ff[k], ((m, 0.0, 0.0), (0.0, m, 0.0), (0.0, 0.0, m)))
+        put_matrix(work.I_ft[k], tilde(scaled(-1.0, s)))
+        put_matrix(work.I_tt[k], J)
+    singular = -1
+    for k in range(n_n - 1, -1, -1):
+        A, B, C = matrix(work.I_ff[k]), matrix(work.I_ft[k]), matrix(work.I_tt[k])
+        n, n_z, v0, above = nodes.n_q[k], nodes.n_z[k], nodes.v0[k], nodes.parent[k]
+        d = 1.0
+        if n > 0:
+            if not flexible(nodes, work, k):
+                d = 0.0
+            H = work.H[nodes.h0[k] : nodes.h0[k + 1]].reshape((6 + n, 6 + n))
+            A, B, C = top_blocks(H)
+        elif n_z == 1:
+            A, B, C, d = one_rate(work, k, v0, A, B, C)
+        elif n_z == 3:
+            A, B, C, d = three_rates(work, k, v0, A, B, C)
+        if not abs(d) > 0.0:
+            singular = k
+        if above >= 0:
+            p = sub(vector(work.r_G[k]), vector(work.r_G[above]))
+            if nodes.n_q[above] > 0:
+                size = 6 + nodes.n_q[above]
+                H = work.H[nodes.h0[above] : nodes.h0[above + 1]].reshape((size, size))
+                add_carried(H, A, B, C, p, work.above[nodes.c0[k] : nodes.c0[k + 1]])
+            else:
+                A, B, C = shifted_blocks(A, B, C, p)
+                for a in range(3):
+                    put_sum(work.I_ff[above, a], 0, A[0] if a == 0 else (A[1] if a == 1 else A[2]))
+                    put_sum(work.I_ft[above, a], 0, B[0] if a == 0 else (B[1] if a == 1 else B[2]))
+                    put_sum(work.I_tt[above, a], 0, C[0] if a == 0 else (C[1] if a == 1 else C[2]))
+    return singular
+
+
+@loops
+def local_solve(nodes, work, k, first, size):
+    """Overwrite the right side of the rates of node k by D⁻¹ or G⁻¹ times it."""
+    b = work.right[first : first + size]
+    if nodes.n_q[k] > 0:
+        G = work.G[nodes.g0[k] : nodes.g0[k + 1]].reshape((size, size))
+        lu_solve(G, work.pivot[first : first + size], b)
+    elif size == 1:
+        b[0] *= work.D[k, 0, 0]
+    elif size == 3:
+        put(b, 0, turned(work.D[k], vector(b)))
+
+
+@loops
+def solve_articulated(nodes, work):
+    """Overwrite `right`, (n_v,), by M⁻¹ of it."""
+    n_n, b = nodes.parent.shape[0], work.right
+    for k in range(n_n):
+        for j in range(6):
+            work.wrench[k, j] = 0.0
+    for k in range(n_n - 1, -1, -1):
+        first, size, above = nodes.v0[k], nodes.n_z[k] + nodes.n_q[k], nodes.parent[k]
+        f, t = vector(work.wrench[k]), vector(work.wrench[k, 3:])
+        for v in range(first, first + size):
+            b[v] -= along(work.S[v], f, t)
+        local_solve(nodes, work, k, first, size)
+        if above >= 0:
+            for v in range(first, first + size):
+                f, t = add(f, scaled(b[v], vector(work.U[v]))), add(t, scaled(b[v], vector(work.U[v, 3:])))
+            n, vq, c0 = nodes.n_q[above], nodes.vq[above], nodes.c0[k]
+            if n > 0:
+                for j in range(n):
+                    b[vq + j] -= along(work.above[c0 + j], f, t)
+            t = add(t, cross(sub(vector(work.r_G[k]), vector(work.r_G[above])), f))
+            put_sum(work.wrench[above], 0, f)
+            put_sum(work.wrench[above], 3, t)
+    for k in range(n_n):
+        first, size, above = nodes.v0[k], nodes.n_z[k] + nodes.n_q[k], nodes.parent[k]
+        a, alpha = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        if above >= 0:
+            a, alpha = vector(work.motion[above]), vector(work.motion[above, 3:])
+            a = add(a, cross(alpha, sub(vector(work.r_G[k]), vector(work.r_G[above]))))
+            n, vq, c0 = nodes.n_q[above], nodes.vq[above], nodes.c0[k]
+            for j in range(n):
+                x = b[vq + j]
+                a = add(a, scaled(x, vector(work.above[c0 + j])))
+                alpha = add(alpha, scaled(x, vector(work.above[c0 + j, 3:])))
+            if nodes.n_q[k] > 0:
+                for v in range(first, first + size):
+                    b[v] -= along(work.V[v], a, alpha)
+            elif size == 1:
+                b[first] -= work.D[k, 0, 0] * along(work.U[first], a, alpha)
+            elif size == 3:
+                y = (
+                    along(work.U[first], a, alpha),
+                    along(work.U[first + 1], a, alpha),
+                    along(work.U[first + 2], a, alpha),
+                )
+                put_sum(b, first, scaled(-1.0, turned(work.D[k], y)))
+        for v in range(first, first + size):
+            a = add(a, scaled(b[v], vector(work.S[v])))
+            alpha = add(alpha, scaled(b[v], vector(work.S[v, 3:])))
+        put(work.motion[k], 0, a)
+        put(work.motion[k], 3, alpha)
+
+
+@loops
+def solve_columns(nodes, work, columns):
+    """Overwrite the rows of columns, (m, n_v), by M⁻¹ of each: right sides in, accelerations out."""
+    n = work.right.shape[0]
+    for i in range(columns.shape[0]):
+        for j in range(n):
+            work.right[j] = columns[i, j]
+        solve_articulated(nodes, work)
+        for j in range(n):
+            columns[i, j] = work.right[j]

@@ -1,0 +1,106 @@
+"""How the frames of nodes move with the rates, ground axes, each at its own origin (docs/recursive.md §3).
+
+    V_k = shift(V_parent) + above q_dot of a flexible parent + S z_dot of the joint + S q_dot of its own modes
+
+where (v, w) shifted by p is (v + w × p, w). The marker above moves by Psi_t, T Psi_r with each mode; the frame of a
+flexible body moves against its own marker, which the joint holds.
+"""
+
+from floatframe.engine.kernels.compiler.compilation import loops, small
+from floatframe.engine.kernels.marker import shape
+from floatframe.engine.kernels.vector import add, cross, matrix, product, put, scaled, sub, turned, vector
+from floatframe.engine.tree.recursion.nodes import ROTATION, SCREW, TRANSLATION
+
+__all__ = ["motion_in_ground", "rate_columns"]
+
+
+@small
+def column_of(A, j):
+    """Return column j of a matrix."""
+    return A[0][j], A[1][j], A[2][j]
+
+
+@loops
+def joint_columns(nodes, work, k, arm):
+    """Write S of the rates of a joint; arm: from the origin of its outer frame to that of the node."""
+    kind, v0 = nodes.kind[k], nodes.v0[k]
+    R = matrix(work.R_G[k])
+    if nodes.own[k] >= 0:
+        R = product(R, work.R_own[k])
+    if kind == SCREW:
+        e = column_of(R, 2)
+        turn = scaled(nodes.turn[k], e)
+        put(work.S[v0], 0, add(scaled(nodes.slide[k], e), cross(turn, arm)))
+        put(work.S[v0], 3, turn)
+    elif kind == ROTATION:
+        sign = 1.0
+        if nodes.is_near[k]:
+            sign, above = -1.0, nodes.parent[k]
+            R = matrix(work.A[k]) if above < 0 else product(work.R_G[above], work.A[k])
+        for j in range(3):
+            turn = scaled(sign, column_of(R, j))
+            put(work.S[v0 + j], 0, cross(turn, arm))
+            put(work.S[v0 + j], 3, turn)
+    elif kind == TRANSLATION:
+        for j in range(3):
+            put(work.S[v0 + j], 0, scaled(nodes.slide[k], column_of(R, j)))
+            put(work.S[v0 + j], 3, (0.0, 0.0, 0.0))
+
+
+@loops
+def marker_columns_in_ground(model, marker_work, m, R, arm, sign, out):
+    """Write sign times the motion by each mode of a point at arm from marker m, out (n, 6); R: axes of the body."""
+    o, n = model.markers.psi0[m], out.shape[0]
+    if o < 0:
+        out[:, :] = 0.0
+        return
+    psi, T = marker_work.markers.psi[o : o + 6 * n], marker_work.markers.T_left[m]
+    for k in range(n):
+        d, th = shape(psi, n, k)
+        turn = scaled(sign, turned(R, turned(T, th)))
+        put(out[k], 0, add(scaled(sign, turned(R, d)), cross(turn, arm)))
+        put(out[k], 3, turn)
+
+
+@loops
+def rate_columns(nodes, work, model, marker_work):
+    """Write S and above of all nodes, which are placed in the ground."""
+    for k in range(nodes.parent.shape[0]):
+        n, m, above = nodes.n_q[k], nodes.own[k], nodes.parent[k]
+        arm = (0.0, 0.0, 0.0)
+        if n > 0:
+            out = work.S[nodes.vq[k] : nodes.vq[k] + n]
+            if m >= 0:
+                arm = scaled(-1.0, turned(work.R_G[k], vector(marker_work.markers.rho[m])))
+                marker_columns_in_ground(model, marker_work, m, work.R_G[k], arm, -1.0, out)
+            else:
+                out[:, :] = 0.0
+        joint_columns(nodes, work, k, arm)
+        m = nodes.above[k]
+        if m >= 0:
+            R = work.R_G[above]
+            r_P = add(vector(work.r_G[above]), turned(R, vector(work.rho[k])))
+            arm = sub(vector(work.r_G[k]), r_P)
+            out = work.above[nodes.c0[k] : nodes.c0[k + 1]]
+            marker_columns_in_ground(model, marker_work, m, R, arm, 1.0, out)
+
+
+@loops
+def motion_in_ground(nodes, work):
+    """Write the velocity of all nodes, at their origins, from S and above."""
+    for k in range(nodes.parent.shape[0]):
+        above, c0 = nodes.parent[k], nodes.c0[k]
+        v, w = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        if above >= 0:
+            v, w = vector(work.motion[above]), vector(work.motion[above, 3:])
+            v = add(v, cross(w, sub(vector(work.r_G[k]), vector(work.r_G[above]))))
+            for j in range(nodes.c0[k + 1] - c0):
+                rate = work.v[nodes.vq[above] + j]
+                v = add(v, scaled(rate, vector(work.above[c0 + j])))
+                w = add(w, scaled(rate, vector(work.above[c0 + j, 3:])))
+        for j in range(nodes.n_z[k] + nodes.n_q[k]):
+            i = nodes.v0[k] + j
+            v = add(v, scaled(work.v[i], vector(work.S[i])))
+            w = add(w, scaled(work.v[i], vector(work.S[i, 3:])))
+        put(work.motion[k], 0, v)
+        put(work.motion[k], 3, w)

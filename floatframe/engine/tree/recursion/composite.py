@@ -1,0 +1,285 @@
+"""Composite bodies: the mass matrix of a tree, and the matrices of flexible bodies with what they carry.
+
+In ground axes, of each node k about its own origin, p from the origin of the parent:
+
+    (1) m, s, J of the subtree, joints and modes held: those of the body and of the subtrees that it carries
+    (2) of a flexible body H, (6 + n, 6 + n): its own mass matrix, and Σ Cᵀ I C of the subtrees, C = [shift, above]
+    (3) F = I S of each rate of the joint; of a flexible body F = H [S; e] of each rate of joint and modes
+    (4) M: F along the rates of the node itself, then of all nodes above, the wrench going up by shifts
+
+Sources: Walker & Orin (1982); Featherstone (2008), chapter 6.
+"""
+
+from floatframe.engine.kernels.body import axial, block, body_forces, column, modal_term, tensor
+from floatframe.engine.kernels.compiler.compilation import loops, small
+from floatframe.engine.kernels.model import C2, MASS
+from floatframe.engine.kernels.vector import (
+    add,
+    cross,
+    dot,
+    matrix,
+    matrix_sum,
+    product,
+    put,
+    put_matrix,
+    put_sum,
+    scaled,
+    sub,
+    tilde,
+    transposed,
+    turned,
+    vector,
+)
+
+__all__ = [
+    "add_carried",
+    "along",
+    "along_rate",
+    "congruent",
+    "evaluate_flexible",
+    "flexible_column",
+    "mass_matrix",
+    "moments_in_ground",
+    "moved_inertia",
+    "shifted_blocks",
+]
+
+
+@small
+def congruent(R, J):
+    """Return R J Rᵀ."""
+    return product(product(R, J), transposed(R))
+
+
+@loops
+def moments_in_ground(nodes, work, model, marker_work, k):
+    """Write mass, s, J of the body of node k alone, and H of a flexible one; its forces have been evaluated."""
+    R = matrix(work.R_G[k])
+    if nodes.n_q[k] > 0:
+        i = nodes.body[k]
+        work.mass[k] = model.body_types.mass[model.bodies.kind[i]]
+        put(work.s[k], 0, turned(R, vector(marker_work.bodies.s[i])))
+        put_matrix(work.J[k], congruent(R, matrix(marker_work.bodies.J[i])))
+        flexible_mass(nodes, work, model, marker_work, k)
+    elif nodes.body[k] >= 0:
+        work.mass[k] = nodes.mass[k]
+        put(work.s[k], 0, turned(R, vector(nodes.s[k])))
+        put_matrix(work.J[k], congruent(R, matrix(nodes.J[k])))
+    else:
+        zero = (0.0, 0.0, 0.0)
+        work.mass[k] = 0.0
+        put(work.s[k], 0, zero)
+        put_matrix(work.J[k], (zero, zero, zero))
+
+
+@loops
+def flexible_mass(nodes, work, model, marker_work, k):
+    """Write H of the flexible body of node k alone, ground axes."""
+    i, n = nodes.body[k], nodes.n_q[k]
+    types, t, q0 = model.body_types, model.bodies.kind[i], nodes.q0[k]
+    H = work.H[nodes.h0[k] : nodes.h0[k + 1]].reshape((6 + n, 6 + n))
+    H[:, :] = 0.0
+    m, s_tilde = work.mass[k], tilde(vector(work.s[k]))
+    for a in range(3):
+        H[a, a] = m
+        put(H[a], 3, scaled(-1.0, s_tilde[a]))
+        put(H[3 + a], 0, s_tilde[a])
+        put(H[3 + a], 3, vector(work.J[k, a]))
+    first = marker_work.bodies.C1[3 * q0 : 3 * (q0 + n)]
+    W, second, R = marker_work.bodies.W[9 * q0 : 9 * (q0 + n)], block(types, t, C2, 3 * n), work.R_G[k]
+    unit = work.local
+    for j in range(n):
+        b, B = turned(R, column(first, n, j)), turned(R, add(column(second, n, j), axial(tensor(W, n, j))))
+        put(H[6 + j], 0, b)
+        put(H[6 + j], 3, B)
+        for a in range(3):
+            H[a, 6 + j], H[3 + a, 6 + j] = b[a], B[a]
+            unit[a] = 0.0
+        for a in range(n):
+            unit[a] = 0.0
+        unit[j] = 1.0
+        modal_term(types, t, n, MASS, unit, H[6 + j, 6:])
+
+
+@small
+def times_inertia(m, s, J, v, w):
+    """Return force and moment by the acceleration v, w of composite m, s, J."""
+    return add(scaled(m, v), cross(w, s)), add(cross(s, v), turned(J, w))
+
+
+@small
+def rigid_blocks(m, s, J):
+    """Return the blocks A, B, C of composite m, s, J: f = A v + B w, t = Bᵀ v + C w."""
+    return ((m, 0.0, 0.0), (0.0, m, 0.0), (0.0, 0.0, m)), tilde(scaled(-1.0, s)), J
+
+
+@loops
+def shifted_blocks(A, B, C, p):
+    """Return the blocks about a point from which p leads to the one before: B - A p~ and C + p~ (B - A p~) - Bᵀ p~."""
+    P = tilde(p)
+    B_p = matrix_sum(B, product(A, tilde(scaled(-1.0, p))))
+    C_p = matrix_sum(C, matrix_sum(product(P, B_p), product(transposed(B), tilde(scaled(-1.0, p)))))
+    return A, B_p, C_p
+
+
+@loops
+def add_carried(H, A, B, C, p, above):
+    """Add Jᵀ I J to H of a flexible parent, J = [shift, above], above (n, 6)."""
+    n = above.shape[0]
+    A_p, B_p, C_p = shifted_blocks(A, B, C, p)
+    for a in range(3):
+        put_sum(H[a], 0, A_p[a])
+        put_sum(H[a], 3, B_p[a])
+        put_sum(H[3 + a], 0, (B_p[0][a], B_p[1][a], B_p[2][a]))
+        put_sum(H[3 + a], 3, C_p[a])
+    for j in range(n):
+        v, w = vector(above[j]), vector(above[j, 3:])
+        f, t = add(turned(A, v), turned(B, w)), add(turned(transposed(B), v), turned(C, w))
+        for i in range(n):
+            H[6 + i, 6 + j] += dot(f, vector(above[i])) + dot(t, vector(above[i, 3:]))
+        t = add(t, cross(p, f))
+        put_sum(H[6 + j], 0, f)
+        put_sum(H[6 + j], 3, t)
+        for a in range(3):
+            H[a, 6 + j] += f[a]
+            H[3 + a, 6 + j] += t[a]
+
+
+@small
+def moved_inertia(m, s, J, p):
+    """Return first moment and inertia about a point from which p leads to the one before."""
+    y = add(s, scaled(0.5 * m, p))
+    d = 2.0 * dot(p, y)
+    rows = (
+        sub(J[0], add(scaled(y[0], p), scaled(p[0], y))),
+        sub(J[1], add(scaled(y[1], p), scaled(p[1], y))),
+        sub(J[2], add(scaled(y[2], p), scaled(p[2], y))),
+    )
+    return add(s, scaled(m, p)), matrix_sum(rows, ((d, 0.0, 0.0), (0.0, d, 0.0), (0.0, 0.0, d)))
+
+
+@loops
+def add_to_parent(nodes, work, k):
+    """Add the composite of node k to its parent (1), (2)."""
+    above = nodes.parent[k]
+    p = sub(vector(work.r_G[k]), vector(work.r_G[above]))
+    m, s, J = work.mass[k], vector(work.s[k]), matrix(work.J[k])
+    if nodes.n_q[above] > 0:
+        n = 6 + nodes.n_q[above]
+        H = work.H[nodes.h0[above] : nodes.h0[above + 1]].reshape((n, n))
+        A, B, C = rigid_blocks(m, s, J)
+        add_carried(H, A, B, C, p, work.above[nodes.c0[k] : nodes.c0[k + 1]])
+    s_p, J_p = moved_inertia(m, s, J, p)
+    work.mass[above] += m
+    put_sum(work.s[above], 0, s_p)
+    put_matrix(work.J[above], matrix_sum(matrix(work.J[above]), J_p))
+
+
+@small
+def along(S, f, t):
+    """Return the generalised force of a wrench along a motion."""
+    return dot(vector(S), f) + dot(vector(S[3:]), t)
+
+
+@loops
+def go_up(nodes, work, M, k, v, f, t):
+    """Write M of rate v of node k with the rates of all nodes above (4)."""
+    S = work.S
+    while True:
+        above = nodes.parent[k]
+        if above < 0:
+            return
+        first = nodes.c0[k]
+        n, vq = nodes.n_q[above], nodes.vq[above]
+        if nodes.above[k] >= 0:
+            for j in range(n):
+                M[v, vq + j] = along(work.above[first + j], f, t)
+        t = add(t, cross(sub(vector(work.r_G[k]), vector(work.r_G[above])), f))
+        if n > 0:
+            for j in range(n):
+                M[v, vq + j] += along(S[vq + j], f, t)
+                M[vq + j, v] = M[v, vq + j]
+        v0, n_z = nodes.v0[above], nodes.n_z[above]
+        for j in range(v0, v0 + n_z):
+            M[v, j] = along(S[j], f, t)
+            M[j, v] = M[v, j]
+        k = above
+
+
+@loops
+def flexible_column(nodes, work, H, k, j):
+    """Write F = H [S; e] of rate j of a flexible body, joint first, then modes, into `local`, and its wrench into U.
+
+    Return the number of the rate.
+    """
+    n, n_z, F = nodes.n_q[k], nodes.n_z[k], work.local
+    v = rate_of(nodes, k, j)
+    for a in range(6 + n):
+        total = H[a, 6 + j - n_z] if j >= n_z else 0.0
+        for b in range(6):
+            total += H[a, b] * work.S[v, b]
+        F[a] = total
+    put(work.U[v], 0, vector(F))
+    put(work.U[v], 3, vector(F[3:]))
+    return v
+
+
+@small
+def rate_of(nodes, k, j):
+    """Return the number of rate j of a flexible body, joint first, then modes."""
+    return nodes.v0[k] + j if j < nodes.n_z[k] else nodes.vq[k] + j - nodes.n_z[k]
+
+
+@loops
+def along_rate(nodes, work, k, i):
+    """Return F, which `flexible_column` has written, along rate i of the same body."""
+    n_z, F = nodes.n_z[k], work.local
+    total = along(work.S[rate_of(nodes, k, i)], vector(F), vector(F[3:]))
+    return total + F[6 + i - n_z] if i >= n_z else total
+
+
+@loops
+def flexible_columns(nodes, work, M, k):
+    """Write U of the rates of a flexible body and their part of M (3)."""
+    n, size = nodes.n_q[k], nodes.n_z[k] + nodes.n_q[k]
+    H = work.H[nodes.h0[k] : nodes.h0[k + 1]].reshape((6 + n, 6 + n))
+    for j in range(size):
+        v = flexible_column(nodes, work, H, k, j)
+        for i in range(size):
+            M[rate_of(nodes, k, i), v] = along_rate(nodes, work, k, i)
+
+
+@loops
+def mass_matrix(nodes, work, M, model, marker_work):
+    """Write the mass matrix; nodes are placed in the ground, flexible bodies evaluated."""
+    n_n, S = nodes.parent.shape[0], work.S
+    for k in range(n_n):
+        moments_in_ground(nodes, work, model, marker_work, k)
+    M[:, :] = 0.0
+    for k in range(n_n - 1, -1, -1):
+        v0, n_z, n = nodes.v0[k], nodes.n_z[k], nodes.n_q[k]
+        if n > 0:
+            flexible_columns(nodes, work, M, k)
+            for j in range(n):
+                v = nodes.vq[k] + j
+                go_up(nodes, work, M, k, v, vector(work.U[v]), vector(work.U[v, 3:]))
+        else:
+            m, s, J = work.mass[k], vector(work.s[k]), matrix(work.J[k])
+            for v in range(v0, v0 + n_z):
+                f, t = times_inertia(m, s, J, vector(S[v]), vector(S[v, 3:]))
+                put(work.U[v], 0, f)
+                put(work.U[v], 3, t)
+                for j in range(v0, v0 + n_z):
+                    M[j, v] = along(S[j], f, t)
+        for v in range(v0, v0 + n_z):
+            go_up(nodes, work, M, k, v, vector(work.U[v]), vector(work.U[v, 3:]))
+        if nodes.parent[k] >= 0:
+            add_to_parent(nodes, work, k)
+
+
+@loops
+def evaluate_flexible(nodes, model, marker_work):
+    """Write moments and coupling of all flexible bodies at their modal coordinates."""
+    for k in range(nodes.parent.shape[0]):
+        if nodes.n_q[k] > 0:
+            body_forces(model, marker_work, nodes.body[k])

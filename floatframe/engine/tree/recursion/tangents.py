@@ -1,0 +1,401 @@
+"""Derivatives of inverse dynamics by positions and rates, recursive and exact (docs/recursive.md §5).
+
+All in ground axes about the origin of the ground. A rate j moves all that hangs at it by S_j. Seen from there (turning
+along), the velocities of all these bodies change by one motion Y_j, and their accelerations A, as spatial ones, by
+X_j - V × Y_j with one motion X_j. Of a joint with its inner frame at V_P, A_P and its outer frame at V_Q, A_Q
+
+    by position   Y = V_P × S,  X = A_P × S + V_P × Y       (rotations taken back: V_Q, A_Q in the place of V_P, A_P)
+    by rate       Y = S,        X = V_P × S + V_Q × S
+
+and of a mode what its markers do (elastic_tangents.py), with minus that of its own marker for the body itself. The
+forces of a subtree, seen from itself, then change by I X + N Y, N = [[0, -2 p~], [0, Q]] (p its momentum, force by
+turning), and seen from the ground by S ×* f more. So
+
+    (1) S, Y, X of all rates, p, Q, I, f of all subtrees
+    (2) rows      force along rate i by what all above it does:  a_i·X + b_i·Y,  a = I S, b = Nᵀ S; a mode adds its row
+                  of the equations of the body, and the rows of its markers at the subtrees
+    (3) columns   wrench of all below j: I X + N Y + S ×* f, along the rates above; a mode adds the tangent of its body
+    (4) the body of the modes: rows times columns, and the change of Psi(q), T along what hangs at each marker
+
+Sources: Carpentier & Mansard (2018); Singh, Russell & Wensing (2022) for rigid bodies; derived anew for flexible ones.
+"""
+
+from floatframe.engine.kernels.body import axial, block, body_tangent, column, column_sum, tensor, trace_less
+from floatframe.engine.kernels.compiler.compilation import loops, small
+from floatframe.engine.kernels.model import C2, C3
+from floatframe.engine.kernels.vector import (
+    add,
+    cross,
+    dot,
+    matrix,
+    matrix_sum,
+    product,
+    put,
+    put_matrix,
+    put_sum,
+    scaled,
+    scaled_matrix,
+    sub,
+    tilde,
+    transposed,
+    turned,
+    turned_back,
+    vector,
+)
+from floatframe.engine.tree.kernels.spatial import pair_sum, put_pair_of, spatial_cross, spatial_motion
+from floatframe.engine.tree.recursion.columns import marker_columns_in_ground
+from floatframe.engine.tree.recursion.composite import along, congruent, moved_inertia
+from floatframe.engine.tree.recursion.elastic_tangents import carried_change, put_marker_changes
+from floatframe.engine.tree.recursion.newton_euler import elastic_carrier
+
+__all__ = ["force_tangents"]
+
+
+@loops
+def node_motion(work, k):
+    """Return V, A of node k."""
+    R, r = work.R_G[k], vector(work.r_G[k])
+    alpha, a = turned(R, vector(work.alpha[k])), turned(R, vector(work.acc[k]))
+    return spatial_motion(r, vector(work.motion[k]), vector(work.motion[k, 3:]), a, alpha)
+
+
+@loops
+def marker_in_body(model, marker_work, m, work, k):
+    """Return v, omega, a, alpha of marker m of flexible node k and omega, alpha of its body, body axes."""
+    R = work.R_G[k]
+    omega, alpha, a = vector(work.omega[k]), vector(work.alpha[k]), vector(work.acc[k])
+    omega_P, alpha_P, a_P = elastic_carrier(model, marker_work, m, omega, alpha, a)
+    rho, rho_dot = vector(marker_work.markers.rho[m]), vector(marker_work.markers.rho_dot[m])
+    v = add(turned_back(R, vector(work.motion[k])), add(cross(omega, rho), rho_dot))
+    return v, omega_P, a_P, alpha_P, omega, alpha
+
+
+@loops
+def marker_motion(model, marker_work, m, work, k):
+    """Return V, A of marker m of flexible node k."""
+    R = work.R_G[k]
+    v, omega, a, alpha, _, _ = marker_in_body(model, marker_work, m, work, k)
+    r = add(vector(work.r_G[k]), turned(R, vector(marker_work.markers.rho[m])))
+    return spatial_motion(r, turned(R, v), turned(R, omega), turned(R, a), turned(R, alpha))
+
+
+@loops
+def inner_motion(nodes, work, model, marker_work, k):
+    """Return V, A of the inner frame of the joint of node k."""
+    above, m = nodes.parent[k], nodes.above[k]
+    zero = (0.0, 0.0, 0.0)
+    if above < 0:
+        return (zero, zero), (scaled(-1.0, vector(work.gravity)), zero)
+    if m >= 0:
+        return marker_motion(model, marker_work, m, work, above)
+    return node_motion(work, above)
+
+
+@loops
+def joint_changes(nodes, work, dense, model, marker_work, k):
+    """Write S, Y, X of the rates of a joint (1)."""
+    inner_V, inner_A = inner_motion(nodes, work, model, marker_work, k)
+    m, r = nodes.own[k], vector(work.r_G[k])
+    outer_V, outer_A = node_motion(work, k)
+    if m >= 0:
+        outer_V, outer_A = marker_motion(model, marker_work, m, work, k)
+    V, A = inner_V, inner_A
+    if nodes.is_near[k]:
+        V, A = outer_V, outer_A
+    for j in range(nodes.v0[k], nodes.v0[k] + nodes.n_z[k]):
+        w = vector(work.S[j, 3:])
+        S = sub(vector(work.S[j]), cross(w, r)), w
+        Y = spatial_cross(V, S)
+        put_pair_of(dense.S[j], 0, S)
+        put_pair_of(dense.change[j], 0, Y)
+        put_pair_of(dense.change[j], 6, pair_sum(spatial_cross(A, S), spatial_cross(V, Y)))
+        put_pair_of(dense.change[j], 12, spatial_cross(pair_sum(inner_V, outer_V), S))
+
+
+@loops
+def mode_changes(nodes, work, dense, model, marker_work, k):
+    """Write S, Y, X of the modes of a flexible body by its own marker, and of those of its parent by that above (1)."""
+    n, m, above = nodes.n_q[k], nodes.own[k], nodes.parent[k]
+    if n > 0:
+        S, change = dense.S[nodes.vq[k] : nodes.vq[k] + n], dense.change[nodes.vq[k] : nodes.vq[k] + n]
+        S[:, :] = 0.0
+        change[:, :] = 0.0
+        if m >= 0:
+            R = work.R_G[k]
+            arm = scaled(-1.0, add(vector(work.r_G[k]), turned(R, vector(marker_work.markers.rho[m]))))
+            body = marker_in_body(model, marker_work, m, work, k)
+            marker_columns_in_ground(model, marker_work, m, R, arm, -1.0, S)
+            put_marker_changes(model, marker_work, m, body, R, arm, -1.0, change, dense.scratch)
+    m = nodes.above[k]
+    if m >= 0:
+        R = work.R_G[above]
+        arm = scaled(-1.0, add(vector(work.r_G[above]), turned(R, vector(work.rho[k]))))
+        S, change = dense.above[nodes.c0[k] : nodes.c0[k + 1]], dense.above_change[nodes.c0[k] : nodes.c0[k + 1]]
+        body = marker_in_body(model, marker_work, m, work, above)
+        marker_columns_in_ground(model, marker_work, m, R, arm, 1.0, S)
+        put_marker_changes(model, marker_work, m, body, R, arm, 1.0, change, dense.scratch)
+
+
+@loops
+def body_by_turning(nodes, work, dense, model, marker_work, k):
+    """Write p and Q of the body of node k alone, and the wrench, inertia of its subtree (1)."""
+    R, r, v, omega = work.R_G[k], vector(work.r_G[k]), vector(work.motion[k]), vector(work.motion[k, 3:])
+    zero = (0.0, 0.0, 0.0)
+    m, s, J, D, p = 0.0, zero, (zero, zero, zero), (zero, zero, zero), zero
+    i = nodes.body[k]
+    if nodes.n_q[k] > 0:
+        n, q0, u0 = nodes.n_q[k], nodes.q0[k], nodes.u0[k] + 6
+        m = model.body_types.mass[model.bodies.kind[i]]
+        s, J = turned(R, vector(marker_work.bodies.s[i])), congruent(R, matrix(marker_work.bodies.J[i]))
+        D = congruent(R, matrix(marker_work.bodies.D_q_dot[i]))
+        q_dot = marker_work.state.u[u0 : u0 + n]
+        p = turned(R, column_sum(marker_work.bodies.C1[3 * q0 : 3 * (q0 + n)], n, q_dot))
+    elif i >= 0:
+        m, s, J = nodes.mass[k], turned(R, vector(nodes.s[k])), congruent(R, matrix(nodes.J[k]))
+    p = add(p, add(scaled(m, v), cross(omega, s)))
+    W = tilde(omega)
+    JW = product(J, W)
+    Q = matrix_sum(scaled_matrix(-2.0, product(tilde(s), tilde(v))), scaled_matrix(-1.0, JW))
+    Q = matrix_sum(Q, matrix_sum(product(W, J), tilde(scaled(-1.0, turned(J, omega)))))
+    Q = matrix_sum(Q, scaled_matrix(2.0, D))
+    Q = matrix_sum(Q, scaled_matrix(-2.0, product(tilde(r), tilde(p))))
+    put(dense.momentum[k], 0, p)
+    put_matrix(dense.Q[k], Q)
+    f = turned(R, vector(work.f[k]))
+    put(dense.wrench[k], 0, f)
+    put(dense.wrench[k], 3, add(turned(R, vector(work.t[k])), cross(r, f)))
+    s, J = moved_inertia(work.mass[k], vector(work.s[k]), matrix(work.J[k]), r)
+    put(dense.s[k], 0, s)
+    put_matrix(dense.J[k], J)
+
+
+@small
+def wrench_of(m, s, J, p, Q, x, x_w, y_w):
+    """Return I X + N Y."""
+    f = add(add(scaled(m, x), cross(x_w, s)), scaled(2.0, cross(y_w, p)))
+    t = add(add(cross(s, x), turned(J, x_w)), turned(Q, y_w))
+    return f, t
+
+
+@small
+def by_turning(p, Q, v, w):
+    """Return Nᵀ (v, w), its part along rotations."""
+    return add(scaled(2.0, cross(p, v)), turned_back(Q, w))
+
+
+@small
+def force_cross(v, w, f, t):
+    """Return (v, w) ×* (f, t): the change of a wrench that moves along."""
+    return cross(w, f), add(cross(w, t), cross(v, f))
+
+
+@loops
+def mode_rows(nodes, work, dense, model, marker_work, k):
+    """Write the rows of the modes of flexible node k by what moves its body alone (2)."""
+    i, n, vq, q0 = nodes.body[k], nodes.n_q[k], nodes.vq[k], nodes.q0[k]
+    types, t, bodies = model.body_types, model.bodies.kind[i], marker_work.bodies
+    R, r = work.R_G[k], vector(work.r_G[k])
+    v, omega = turned_back(R, vector(work.motion[k])), vector(work.omega[k])
+    W, Y, first = bodies.W[9 * q0 : 9 * (q0 + n)], bodies.Y[3 * q0 : 3 * (q0 + n)], bodies.C1[3 * q0 : 3 * (q0 + n)]
+    second, third = block(types, t, C2, 3 * n), block(types, t, C3, 9 * n)
+    for j in range(n):
+        W_j, b = tensor(W, n, j), column(first, n, j)
+        D, B = matrix_sum(tensor(third, n, j), trace_less(W_j)), add(column(second, n, j), axial(W_j))
+        turning = turned(matrix_sum(D, transposed(D)), omega)
+        # 2 b·(y × v) - B·(omega × y) + 2 Y·y - omega·(D + Dᵀ) y
+        row = add(scaled(2.0, cross(v, b)), sub(scaled(2.0, column(Y, n, j)), add(cross(B, omega), turning)))
+        b, B = turned(R, b), turned(R, B)
+        put(dense.row_a[vq + j], 0, b)
+        put(dense.row_a[vq + j], 3, add(B, cross(r, b)))
+        put(dense.row_b[vq + j], 0, turned(R, row))
+
+
+@small
+def row_times(dense, i, change, first, turning):
+    """Return a_i·X + b_i·Y of a row, X at `first` in a change, Y's rotation at `turning` of it."""
+    a, b = dense.row_a[i], vector(dense.row_b[i])
+    return along(a, vector(change[first:]), vector(change[first + 3 :])) + dot(b, vector(turning))
+
+
+@small
+def put_rows(dense, k, v, m, s, J):
+    """Add the row of what moves node k along S_v (2)."""
+    S, w = vector(dense.S[v]), vector(dense.S[v, 3:])
+    put_sum(dense.row_a[v], 0, add(scaled(m, S), cross(w, s)))
+    put_sum(dense.row_a[v], 3, add(cross(s, S), turned(J, w)))
+    put_sum(dense.row_b[v], 0, by_turning(vector(dense.momentum[k]), dense.Q[k], S, w))
+
+
+@loops
+def change_of_wrench(dense, k, S, change, m, s, J):
+    """Return the wrench of subtree k by S and its Y, X: seen from the ground, by position; by rate (3)."""
+    p, Q, f, t = vector(dense.momentum[k]), dense.Q[k], vector(dense.wrench[k]), vector(dense.wrench[k, 3:])
+    v, w = vector(S), vector(S[3:])
+    f_z, t_z = wrench_of(m, s, J, p, Q, vector(change[6:]), vector(change[9:]), vector(change[3:]))
+    f_more, t_more = force_cross(v, w, f, t)
+    f_d, t_d = wrench_of(m, s, J, p, Q, vector(change[12:]), vector(change[15:]), w)
+    return add(f_z, f_more), add(t_z, t_more), f_d, t_d
+
+
+@loops
+def go_up_tangents(nodes, dense, k, v, f_z, t_z, f_d, t_d):
+    """Write both triangles between rate v of node k and the rates of all nodes above."""
+    S, change, by_z, by_rate = dense.S, dense.change, dense.by_z, dense.by_rate
+    a, a_w, b = vector(dense.row_a[v]), vector(dense.row_a[v, 3:]), vector(dense.row_b[v])
+    while True:
+        above = nodes.parent[k]
+        if above < 0:
+            return
+        n, vq, c0 = nodes.n_q[above], nodes.vq[above], nodes.c0[k]
+        for j in range(nodes.v0[above], nodes.v0[above] + nodes.n_z[above]):
+            C = change[j]
+            by_z[j, v] = along(S[j], f_z, t_z)
+            by_rate[j, v] = along(S[j], f_d, t_d)
+            by_z[v, j] = along(C[6:], a, a_w) + dot(b, vector(C[3:]))
+            by_rate[v, j] = along(C[12:], a, a_w) + dot(b, vector(S[j, 3:]))
+        for j in range(n):
+            i, C, E, T = vq + j, change[vq + j], dense.above_change[c0 + j], dense.above[c0 + j]
+            by_z[i, v] = along(S[i], f_z, t_z) + along(T, f_z, t_z)
+            by_rate[i, v] = along(S[i], f_d, t_d) + along(T, f_d, t_d)
+            turning = add(vector(C[3:]), vector(E[3:]))
+            by_z[v, i] = along(C[6:], a, a_w) + along(E[6:], a, a_w) + dot(b, turning)
+            turning = add(vector(S[i, 3:]), vector(T[3:]))
+            by_rate[v, i] = along(C[12:], a, a_w) + along(E[12:], a, a_w) + dot(b, turning)
+        k = above
+
+
+@small
+def wrench_in_body(dense, k, R, r):
+    """Return the wrench of subtree k about r in axes R."""
+    f, t = vector(dense.wrench[k]), vector(dense.wrench[k, 3:])
+    return turned_back(R, f), turned_back(R, sub(t, cross(r, f)))
+
+
+@loops
+def tangent_columns(nodes, work, dense, model, marker_work, k, c_d, c_k, first):
+    """Add the tangent of the equations of flexible body k by its modes (c_k = 1) or their rates (c_d = 1) (4)."""
+    n, vq = nodes.n_q[k], nodes.vq[k]
+    H = work.H[nodes.h0[k] : nodes.h0[k + 1]].reshape((6 + n, 6 + n))
+    body_tangent(model, marker_work, nodes.body[k], 0.0, c_d, c_k, H, marker_work.bodies.by_turn[: 6 + n])
+    R, r = work.R_G[k], vector(work.r_G[k])
+    out = dense.by_z if first == 0 else dense.by_rate
+    for j in range(n):
+        c = 6 + j
+        f = turned(R, (H[0, c], H[1, c], H[2, c]))
+        t = add(turned(R, (H[3, c], H[4, c], H[5, c])), cross(r, f))
+        put_sum(dense.by_mode[vq + j], first, f)
+        put_sum(dense.by_mode[vq + j], first + 3, t)
+        for i in range(n):
+            out[vq + i, vq + j] += H[6 + i, c]
+
+
+@loops
+def flexible_tangents(nodes, work, dense, model, marker_work, k):
+    """Write the columns of the modes of node k (4), and complete their rows."""
+    n, vq, v0, n_z, own = nodes.n_q[k], nodes.vq[k], nodes.v0[k], nodes.n_z[k], nodes.own[k]
+    tangent_columns(nodes, work, dense, model, marker_work, k, 0.0, 1.0, 0)
+    tangent_columns(nodes, work, dense, model, marker_work, k, 1.0, 0.0, 6)
+    m, s, J = work.mass[k], vector(dense.s[k]), matrix(dense.J[k])
+    R, f, t = work.R_G[k], (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    if own >= 0:
+        f, t = wrench_in_body(dense, k, R, add(vector(work.r_G[k]), turned(R, vector(marker_work.markers.rho[own]))))
+    for j in range(n):
+        v = vq + j
+        C, S, more = dense.change[v], dense.S[v], dense.by_mode[v]
+        f_z, t_z, f_d, t_d = change_of_wrench(dense, k, S, C, m, s, J)
+        f_z, t_z = add(f_z, vector(more)), add(t_z, vector(more[3:]))
+        f_d, t_d = add(f_d, vector(more[6:])), add(t_d, vector(more[9:]))
+        for i in range(n):
+            row = vq + i
+            dense.by_z[row, v] += row_times(dense, row, C, 6, C[3:]) + along(dense.S[row], f_z, t_z)
+            dense.by_rate[row, v] += row_times(dense, row, C, 12, S[3:]) + along(dense.S[row], f_d, t_d)
+            if own >= 0:
+                dense.by_z[row, v] -= carried_change(model, marker_work, own, f, t, i, j, n)
+        for row in range(v0, v0 + n_z):
+            dense.by_z[row, v] = along(dense.S[row], f_z, t_z)
+            dense.by_rate[row, v] = along(dense.S[row], f_d, t_d)
+        put(more, 0, f_z)
+        put(more, 3, t_z)
+        put(more, 6, f_d)
+        put(more, 9, t_d)
+    for j in range(n):
+        put_rows(dense, k, vq + j, m, s, J)
+        more = dense.by_mode[vq + j]
+        go_up_tangents(nodes, dense, k, vq + j, vector(more), vector(more[3:]), vector(more[6:]), vector(more[9:]))
+
+
+@loops
+def joint_tangents(nodes, work, dense, k):
+    """Write rows and columns of the rates of the joint of node k (2), (3)."""
+    m, s, J = work.mass[k], vector(dense.s[k]), matrix(dense.J[k])
+    v0, n_z, n, vq = nodes.v0[k], nodes.n_z[k], nodes.n_q[k], nodes.vq[k]
+    for v in range(v0, v0 + n_z):
+        put_rows(dense, k, v, m, s, J)
+    for v in range(v0, v0 + n_z):
+        C, S = dense.change[v], dense.S[v]
+        f_z, t_z, f_d, t_d = change_of_wrench(dense, k, S, C, m, s, J)
+        for row in range(v0, v0 + n_z):
+            dense.by_rate[row, v] = row_times(dense, row, C, 12, S[3:])
+            if nodes.is_near[k]:
+                dense.by_z[row, v] = along(dense.S[row], f_z, t_z)
+            else:
+                dense.by_z[row, v] = row_times(dense, row, C, 6, C[3:])
+        for row in range(vq, vq + n):
+            dense.by_z[row, v] = row_times(dense, row, C, 6, C[3:])
+            dense.by_rate[row, v] = row_times(dense, row, C, 12, S[3:])
+        go_up_tangents(nodes, dense, k, v, f_z, t_z, f_d, t_d)
+
+
+@loops
+def give_to_flexible_parent(nodes, work, dense, model, marker_work, k):
+    """Add what subtree k says to rows, columns and block of the modes of its parent (2), (4)."""
+    above, marker, c0 = nodes.parent[k], nodes.above[k], nodes.c0[k]
+    n, vq, R = nodes.n_q[above], nodes.vq[above], work.R_G[above]
+    m, s, J = work.mass[k], vector(dense.s[k]), matrix(dense.J[k])
+    p, Q = vector(dense.momentum[k]), dense.Q[k]
+    f, t = wrench_in_body(dense, k, R, add(vector(work.r_G[above]), turned(R, vector(work.rho[k]))))
+    for j in range(n):
+        S, C, more = dense.above[c0 + j], dense.above_change[c0 + j], dense.by_mode[vq + j]
+        v, w = vector(S), vector(S[3:])
+        put_sum(dense.row_a[vq + j], 0, add(scaled(m, v), cross(w, s)))
+        put_sum(dense.row_a[vq + j], 3, add(cross(s, v), turned(J, w)))
+        put_sum(dense.row_b[vq + j], 0, by_turning(p, Q, v, w))
+        f_z, t_z = wrench_of(m, s, J, p, Q, vector(C[6:]), vector(C[9:]), vector(C[3:]))
+        f_d, t_d = wrench_of(m, s, J, p, Q, vector(C[12:]), vector(C[15:]), w)
+        for i in range(n):
+            T = dense.above[c0 + i]
+            dense.by_z[vq + i, vq + j] += along(T, f_z, t_z) + carried_change(model, marker_work, marker, f, t, i, j, n)
+            dense.by_rate[vq + i, vq + j] += along(T, f_d, t_d)
+        f_more, t_more = force_cross(v, w, vector(dense.wrench[k]), vector(dense.wrench[k, 3:]))
+        put_sum(more, 0, add(f_z, f_more))
+        put_sum(more, 3, add(t_z, t_more))
+        put_sum(more, 6, f_d)
+        put_sum(more, 9, t_d)
+
+
+@loops
+def force_tangents(nodes, work, dense, model, marker_work):
+    """Write the derivatives of the forces by positions and rates; inverse dynamics and the mass matrix are there."""
+    n_n = nodes.parent.shape[0]
+    dense.by_z[:, :] = 0.0
+    dense.by_rate[:, :] = 0.0
+    dense.by_mode[:, :] = 0.0
+    dense.row_a[:, :] = 0.0
+    dense.row_b[:, :] = 0.0
+    for k in range(n_n):
+        joint_changes(nodes, work, dense, model, marker_work, k)
+        mode_changes(nodes, work, dense, model, marker_work, k)
+        body_by_turning(nodes, work, dense, model, marker_work, k)
+        if nodes.n_q[k] > 0:
+            mode_rows(nodes, work, dense, model, marker_work, k)
+    for k in range(n_n - 1, -1, -1):
+        above = nodes.parent[k]
+        if nodes.n_q[k] > 0:
+            flexible_tangents(nodes, work, dense, model, marker_work, k)
+        joint_tangents(nodes, work, dense, k)
+        if above >= 0:
+            if nodes.n_q[above] > 0:
+                give_to_flexible_parent(nodes, work, dense, model, marker_work, k)
+            put_sum(dense.momentum[above], 0, vector(dense.momentum[k]))
+            for a in range(3):
+                put_sum(dense.Q[above, a], 0, vector(dense.Q[k, a]))

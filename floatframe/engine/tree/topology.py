@@ -1,0 +1,312 @@
+"""From a system to its tree: which joints become coordinates, which stay constraints (docs/relative.md §1).
+
+The graph has bodies (and the ground) as nodes and joints with a chart as edges. Its spanning tree is that of least
+freedoms, Prim's algorithm from the ground: a cut joint of f freedoms leaves 6 - f constraints and a joint of the tree f
+coordinates, so that joints with many freedoms are the ones to cut. Of equal ones the joint at the body nearest to the
+ground is taken, then the first as given, so that loops open in their middle and the tree is the same every time. A part
+that hangs at no joint of the tree begins with a free body, its heaviest.
+"""
+
+import heapq
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, IntArray
+from floatframe.engine.compiling.markers import joint_markers, marker_pose, n_q_of
+from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.kernels.model import Model
+from floatframe.engine.kernels.records import filled
+from floatframe.engine.tree.charts import FREE, Column, chart_of
+from floatframe.engine.tree.kernels.tree import COLUMN, FAR_MODE, NEAR_MODE, Tree
+from floatframe.model.functions.time_functions import TimeFunction
+from floatframe.model.system import System
+
+__all__ = ["CoordinateName", "SystemTree", "tree_of"]
+
+KEPT = "_tree"  #: attribute of a system that keeps its tree
+
+
+@dataclass(frozen=True)
+class CoordinateName:
+    """A column of the tree in words."""
+
+    joint: str  #: "" for a free body
+    body: str  #: that it carries
+    coordinate: str
+    unit: str
+    is_driven: bool
+
+    @property
+    def name(self) -> str:
+        """Joint (or body) and coordinate."""
+        return f"{self.joint or self.body}/{self.coordinate}"
+
+
+@dataclass(frozen=True, eq=False)
+class SystemTree:
+    """A system as a tree, and what its coordinates are called."""
+
+    tree: Tree
+    columns: tuple[CoordinateName, ...]
+    motions: tuple[TimeFunction | None, ...]  #: that prescribe the columns
+    cut: tuple[str, ...]  #: joints that would have a chart, but close a loop
+    constrained: tuple[str, ...]  #: joints without a chart, or with a law that keeps them constraints
+
+    @property
+    def is_tree(self) -> bool:
+        """Whether every joint is one of the tree, and no coupler or element is beside it: nothing closes a loop."""
+        return not len(self.tree.kept)
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates that are unknown, in their order."""
+        return tuple(each.name for each in self.columns if not each.is_driven)
+
+
+@dataclass(frozen=True)
+class Branch:
+    """A body, and the joint that carries it."""
+
+    body: int
+    parent: int
+    joint: int  #: number among the joints, -1 for a free body
+    columns: tuple[Column, ...]
+
+
+def tree_of(system: System) -> SystemTree:
+    """Return the tree of a system: made at the first call, and kept with the system."""
+    kept = vars(system)
+    if KEPT not in kept:
+        kept[KEPT] = make_tree(system)
+    return kept[KEPT]
+
+
+def make_tree(system: System) -> SystemTree:
+    """Return the tree of a system."""
+    compiled = compiled_system(system)
+    charts = charts_of(system, compiled)
+    branches = spanning_tree(system, compiled.model, charts)
+    taken = {branch.joint for branch in branches}
+    names = compiled.joint_names
+    return SystemTree(
+        tree_record(compiled, branches),
+        tuple(
+            CoordinateName(
+                "" if each.joint < 0 else names[each.joint],
+                compiled.body_names[each.body],
+                column.name,
+                column.unit,
+                each.joint >= 0 and driving_row(compiled, each.joint, column)[0] >= 0,
+            )
+            for each in sorted(branches, key=lambda branch: branch.body)
+            for column in each.columns
+        ),
+        tuple(
+            driving_motion(system, compiled, each, column)
+            for each in sorted(branches, key=lambda branch: branch.body)
+            for column in each.columns
+        ),
+        tuple(names[k] for k in charts if k not in taken),
+        tuple(names[k] for k in range(len(names)) if k not in charts),
+    )
+
+
+def charts_of(system: System, compiled: CompiledSystem) -> dict[int, tuple[Column, ...]]:
+    """Return the columns of the joints that may be part of a tree, by their number.
+
+    Friction that grows with the normal force needs the reaction of its joint, so that this one stays a constraint.
+    """
+    charts = {}
+    model, n_q = compiled.model, n_q_of(system)
+    for k, joint in enumerate(system.joints):
+        a, b = joint_markers(system, joint, compiled.placed) if type(joint).__name__ != "SlidingJoint" else (None, None)
+        if a is None or b is None:
+            continue
+        axes = (marker_pose(marker, compiled.placed, n_q)[1] for marker in (a, b))
+        columns = chart_of(joint, *axes)
+        rows = range(model.connections.w0[k], model.connections.w0[k + 1])
+        has_normal_friction = any(
+            model.joint_forces.coefficient[model.rows.force0[row] : model.rows.force1[row]].any() for row in rows
+        )
+        if columns is not None and not has_normal_friction:
+            charts[k] = columns
+    return charts
+
+
+def spanning_tree(system: System, model: Model, charts: dict[int, tuple[Column, ...]]) -> list[Branch]:
+    """Return the branches of the tree of least freedoms, each after its parent."""
+    ends = {
+        k: (int(model.markers.body[model.connections.a[k]]), int(model.markers.body[model.connections.b[k]]))
+        for k in charts
+    }
+    at: dict[int, list[int]] = {}
+    for k, pair in ends.items():
+        for body in pair:
+            at.setdefault(body, []).append(k)
+    n_b = len(model.bodies.kind)
+    mass = model.body_types.mass[model.bodies.kind]
+    depth = {-1: 0}
+    branches: list[Branch] = []
+    heap: list[tuple[int, int, int, int]] = []  # freedoms, depth, joint, body from which it leads
+
+    def reach(body: int) -> None:
+        for k in at.get(body, []):
+            heapq.heappush(heap, (len(charts[k]), depth[body], k, body))
+
+    reach(-1)
+    while len(branches) < n_b:
+        while heap:
+            _, _, k, parent = heapq.heappop(heap)
+            a, b = ends[k]
+            body = b if a == parent else a
+            if body not in depth:
+                depth[body] = depth[parent] + 1
+                branches.append(Branch(body, parent, k, charts[k]))
+                reach(body)
+        left = [i for i in range(n_b) if i not in depth]
+        if left:
+            body = max(left, key=lambda i: (mass[i], -i))
+            depth[body] = 1
+            branches.append(Branch(body, -1, -1, FREE))
+            reach(body)
+    return branches
+
+
+def driving_row(compiled: CompiledSystem, joint: int, column: Column) -> tuple[int, float]:
+    """Return the row that prescribes a coordinate of a joint and the factor of its motion; (-1, 1) if none does."""
+    model = compiled.model
+    by = {column.name: 1.0, **dict(column.factors)}
+    for row in range(model.connections.w0[joint], model.connections.w0[joint + 1]):
+        if model.rows.motion[row] >= 0 and compiled.coordinates[row] in by:
+            return row, by[compiled.coordinates[row]]
+    return -1, 1.0
+
+
+def driving_motion(system: System, compiled: CompiledSystem, each: Branch, column: Column) -> TimeFunction | None:
+    """Return the motion that prescribes a coordinate, None for none."""
+    row = -1 if each.joint < 0 else driving_row(compiled, each.joint, column)[0]
+    if row < 0:
+        return None
+    return system.joints[each.joint].motions[compiled.coordinates[row]]  # type: ignore[union-attr]
+
+
+def own_row(compiled: CompiledSystem, joint: int, column: Column) -> int:
+    """Return the row of a joint along whose coordinate forces act, -1 if none do."""
+    model = compiled.model
+    for row in range(model.connections.w0[joint], model.connections.w0[joint + 1]):
+        if model.rows.is_loaded[row] and compiled.coordinates[row] == column.name:
+            return row
+    return -1
+
+
+def depth_first(branches: list[Branch]) -> list[int]:
+    """Return the bodies depth first, children in the order of their numbers."""
+    children: dict[int, list[int]] = {}
+    for each in branches:
+        children.setdefault(each.parent, []).append(each.body)
+    order: list[int] = []
+    stack = [-1]
+    while stack:
+        body = stack.pop()
+        order.append(body)
+        stack += sorted(children.get(body, []), reverse=True)
+    return order[1:]
+
+
+def jets_of(
+    model: Model,
+    ordered: list[Branch],
+    near: list[int],
+    far: list[int],
+    unknown: list[int],
+    column0: list[int],
+    m0: list[int],
+) -> tuple[list[int], list[tuple[int, int, int]]]:
+    """Return where the jets of each body begin, and kind, item and unknown of each, see `Tree`."""
+    jet0, jets = [0], []
+    for i, each in enumerate(ordered):
+        jets += [(COLUMN, k, unknown[k]) for k in range(column0[i], column0[i + 1]) if unknown[k] >= 0]
+        if each.parent >= 0 and near[i] >= 0 and model.markers.psi0[near[i]] >= 0:
+            jets += [(NEAR_MODE, k, m0[each.parent] + k) for k in range(int(model.bodies.n_q[each.parent]))]
+        if far[i] >= 0 and model.markers.psi0[far[i]] >= 0:
+            jets += [(FAR_MODE, k, m0[i] + k) for k in range(int(model.bodies.n_q[i]))]
+        jet0.append(len(jets))
+    return jet0, jets
+
+
+def tree_record(compiled: CompiledSystem, branches: list[Branch]) -> Tree:
+    """Return the tree as the kernels see it."""
+    model = compiled.model
+    ordered = sorted(branches, key=lambda branch: branch.body)
+    near, far, is_reversed = [], [], []
+    lists: dict[str, list] = {name: [] for name in ("tau", "alpha", "side", "unknown", "motion", "factor", "row")}
+    column0, s0, m0 = [0], [0], []
+    unknowns: list[tuple[int, int, int]] = []  # column, mode, slot
+    for each in ordered:
+        n_free = 0
+        n_q, q0 = int(model.bodies.n_q[each.body]), int(model.bodies.q0[each.body])
+        u0 = int(model.bodies.u0[each.body])
+        a, b = (
+            (-1, -1) if each.joint < 0 else (int(model.connections.a[each.joint]), int(model.connections.b[each.joint]))
+        )
+        holds_b = each.joint < 0 or int(model.markers.body[b]) == each.body
+        near.append(a if holds_b else b)
+        far.append(b if holds_b else a)
+        is_reversed.append(0 if holds_b else 1)
+        for column in each.columns:
+            driver, factor = (-1, 1.0) if each.joint < 0 else driving_row(compiled, each.joint, column)
+            row = -1 if each.joint < 0 else own_row(compiled, each.joint, column)
+            lists["tau"].append(column.tau)
+            lists["alpha"].append(column.alpha)
+            lists["side"].append(column.side)
+            lists["unknown"].append(-1 if driver >= 0 else s0[-1] + n_free)
+            if driver < 0:
+                unknowns.append((len(lists["unknown"]) - 1, -1, u0 + n_free))
+            lists["motion"].append(-1 if driver < 0 else int(model.rows.motion[driver]))
+            lists["factor"].append(factor)
+            lists["row"].append(row)
+            n_free += int(driver < 0)
+        column0.append(column0[-1] + len(each.columns))
+        m0.append(s0[-1] + n_free)
+        s0.append(m0[-1] + n_q)
+        unknowns += [(-1, q0 + k, u0 + 6 + k) for k in range(n_q)]
+    jet0, jets = jets_of(model, ordered, near, far, lists["unknown"], column0, m0)
+    own_jet = np.full(s0[-1], -1)
+    for j, (kind, _, s) in enumerate(jets):
+        if kind != NEAR_MODE:
+            own_jet[s] = j
+    taken = {each.joint for each in branches}
+    kept = [c for c in range(len(model.connections.size)) if c not in taken]
+    is_kept: IntArray = np.isin(np.arange(len(model.connections.size)), kept).astype(np.int64)
+    row_is_kept = np.repeat(is_kept, model.connections.size) > 0
+    tau: Array = np.array(lists.pop("tau")).reshape(-1, 3)
+    alpha: Array = np.array(lists.pop("alpha")).reshape(-1, 3)
+    return filled(
+        Tree(),
+        order=depth_first(branches),
+        parent=[each.parent for each in ordered],
+        joint=[each.joint for each in ordered],
+        near=near,
+        far=far,
+        is_reversed=is_reversed,
+        column0=column0,
+        s0=s0,
+        m0=m0,
+        column=[column for column, _, _ in unknowns],
+        mode=[mode for _, mode, _ in unknowns],
+        slot=[slot for _, _, slot in unknowns],
+        tau=tau,
+        alpha=alpha,
+        **lists,
+        kept=kept,
+        is_kept=is_kept,
+        kept_row=np.where(row_is_kept, np.cumsum(row_is_kept) - 1, -1),
+        jet0=jet0,
+        jet_kind=[kind for kind, _, _ in jets],
+        jet_item=[item for _, item, _ in jets],
+        jet_s=[s for _, _, s in jets],
+        own_jet=own_jet,
+        l0=np.concatenate([[0], np.cumsum(np.diff(s0) ** 2)]),
+        front0=np.concatenate([[0], np.cumsum((np.diff(s0) + 6) ** 2)]),
+    )

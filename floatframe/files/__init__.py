@@ -1,0 +1,1 @@
+"""Files: systems, signals, models of other programs, and co-simulation."""

@@ -1,0 +1,212 @@
+"""Writing an FMU: model description, binaries that host Python, and all the unit needs in its resources."""
+
+import hashlib
+import html
+import io
+import json
+import re
+import zipfile
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from importlib.metadata import PackageNotFoundError, distribution, version
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+
+from fe_models.foundation.extras import extra_module
+from fe_models.foundation.paths import replace_file
+from floatframe.errors import ModelError
+from floatframe.files.cosimulation.hosted import SETTINGS, SYSTEM
+from floatframe.files.cosimulation.interface import Variable, content_of, interface, parameter_paths, read_unit
+from floatframe.files.cosimulation.model_description import NEEDS, Description, model_description
+from floatframe.files.cosimulation.slave_scripts import slave_script
+
+__all__ = ["WrittenFmu", "write_fmu"]
+
+PACKAGES = {2: "pythonfmu", 3: "pythonfmu3"}  #: whose binaries and classes an FMU takes along
+VERSIONS = tuple(PACKAGES)
+#: module in the resources: its own for each version, since a process that loads both imports each once
+SCRIPT = "floatframe_unit_fmi{}"
+#: on the page of documentation
+PAGE = """<p>The first run compiles code, a minute or less, once for each installation. Its binary is that of
+{package}.</p>
+<p>Time is in seconds. Force inputs are held over a communication step; a drive takes its value, rate and
+acceleration, and follows them without jumps. The motion is that of the system file alone where the communication step
+is a multiple of its step, {step!r} s, and inputs are held. Parameters are set before the initialisation ends.
+States can be kept, restored and serialised.</p>"""
+EPOCH = (1980, 1, 1, 0, 0, 0)  #: of all files in an FMU: the same system makes the same bytes
+
+
+@dataclass(frozen=True)
+class WrittenFmu:
+    """What was written."""
+
+    path: Path
+    variables: tuple[Variable, ...]
+    platforms: tuple[str, ...]  #: folders of binaries, such as linux64
+
+
+def write_fmu(
+    system: Path,
+    path: Path,
+    *,
+    fmi: int = 2,
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
+    parameters: Mapping[str, str] | None = None,
+) -> WrittenFmu:
+    """Write the FMU of a system file, for co-simulation.
+
+    Parameters
+    ----------
+    system
+        The system file; it needs a table [run], whose method and step the unit takes.
+    path
+        The FMU.
+    fmi
+        Version, 2 or 3.
+    inputs, outputs
+        Names of inputs (`held_inputs.input_choices`) and of sensors or joint coordinates; None: those of the table
+        [fmu], and without it the tables [inputs.NAME], all constant forces and drives, and all sensors.
+    parameters
+        Key paths of the system file by name; None: those of the table [fmu], and without it all numbers of bodies,
+        forces, couplers and gravity.
+
+    Raises
+    ------
+    FloatframeError
+        If the system is impossible, or a name does not exist.
+    MissingExtraError
+        If PythonFMU, or PythonFMU3 for version 3, is not installed.
+    """
+    if fmi not in PACKAGES:
+        raise ModelError(f"write_fmu: fmi: expected one of {', '.join(map(str, VERSIONS))}, got {fmi!r}")
+    package = extra_module(PACKAGES[fmi], extra="fmi", purpose=f"an FMU of version {fmi}")
+    content = content_of(system)
+    told = content.get("fmu")
+    named = told if isinstance(told, dict) else {}  # else refused when the file is read
+    unit, run = read_unit(
+        system,
+        inputs=named.get("inputs") if inputs is None else inputs,
+        outputs=named.get("outputs") if outputs is None else outputs,
+    )
+    paths = parameter_paths(content, named.get("parameters") if parameters is None else parameters, str(system))
+    unit.begin()
+    variables = interface(unit, content, paths, str(system))
+    seconds = unit.system.units.time
+    files = resource_files(system, content)
+    settings = {
+        "inputs": [each.name for each in unit.held],
+        "outputs": [sensor.name for sensor in unit.sensors],
+        "seconds": seconds,
+        "variables": [asdict(each) for each in variables],
+    }
+    files[SETTINGS] = json.dumps(settings, indent=1, ensure_ascii=False).encode()
+    script = SCRIPT.format(fmi)
+    files["slavemodule.txt"] = script.encode()
+    files[f"{script}.py"] = slave_script(fmi).encode()
+    token = hashlib.sha256(b"".join(name.encode() + files[name] for name in sorted(files)))
+    about = Description(
+        unit.system.name, identifier_of(unit.system.name), f"{{{token.hexdigest()[:32]}}}", f"floatframe {release()}",
+        unit.system.units, run.t_end * seconds, run.h * seconds,
+        f"Flexible multibody system {unit.system.name}. {NEEDS}",
+    )  # fmt: skip
+    package_folder = Path(str(package.__file__)).parent
+    for each in sorted(package_folder.glob("*.py")):
+        files[f"{package_folder.name}/{each.name}"] = each.read_bytes()
+    binaries = binaries_of(package_folder, about.identifier)
+    archive = {"modelDescription.xml": model_description(about, variables, fmi)} | binaries
+    page = PAGE.format(package=package_folder.name, step=about.step)
+    archive |= {f"resources/{name}": data for name, data in files.items()}
+    archive["documentation/index.html"] = documentation(about, variables, page).encode()
+    archive |= licences(package_folder.name)
+    replace_file(path, zipped(archive))
+    return WrittenFmu(path, variables, tuple(sorted({name.split("/")[1] for name in binaries})))
+
+
+def resource_files(system: Path, content: Mapping[str, Any]) -> dict[str, bytes]:
+    """Return the system file, with modal files and signals beside it, and these files, by name."""
+    files: dict[str, bytes] = {}
+    changed = json.loads(json.dumps(content))
+    taken: dict[Path, str] = {}
+    for kind in ("bodies", "signals"):
+        for section in changed.get(kind, {}).values():
+            if "file" in section:
+                source = (system.parent / section["file"]).resolve()
+                if source not in taken:
+                    word = "body" if kind == "bodies" else "signal"
+                    taken[source] = f"{word}_{len(taken) + 1}_{identifier_of(source.stem)}{source.suffix}"
+                    files[taken[source]] = source.read_bytes()
+                section["file"] = taken[source]
+    for table in ("fmu", "fmus", "cosimulation"):
+        changed.pop(table, None)
+    changed.setdefault("system", {}).setdefault("name", system.stem)
+    files[SYSTEM] = tomlkit.dumps(changed).encode()
+    return files
+
+
+def identifier_of(name: str) -> str:
+    """Return a name as C takes it."""
+    plain = re.sub(r"\W", "_", name, flags=re.ASCII)
+    return plain if plain[:1].isalpha() else f"unit_{plain}"
+
+
+def binaries_of(package: Path, identifier: str) -> dict[str, bytes]:
+    """Return the libraries of PythonFMU under the name of the model, by their place in an FMU."""
+    folder = package / "resources" / "binaries"
+    found = {
+        f"binaries/{each.parent.name}/{identifier}{each.suffix}": each.read_bytes()
+        for each in sorted(folder.rglob("*"))
+        if each.suffix in (".so", ".dll", ".dylib")
+    }
+    if not found:
+        raise ModelError(f"write_fmu: the installed {package.name} has no binaries in {folder}; install it anew")
+    return found
+
+
+def release() -> str:
+    """Return the version of this program."""
+    try:
+        return version("floatframe")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def licences(package: str) -> dict[str, bytes]:
+    """Return the licence texts of the binaries and classes that an FMU takes along."""
+    try:
+        files = distribution(package).files or ()
+    except PackageNotFoundError:
+        return {}
+    texts = [each for each in files if each.name.upper().startswith(("LICENSE", "LICENCE", "NOTICE"))]
+    return {f"documentation/licenses/{package}-{each.name}.txt": each.locate().read_bytes() for each in texts}  # type: ignore[attr-defined]
+
+
+def documentation(about: Description, variables: Sequence[Variable], page: str) -> str:
+    """Return the page of documentation in an FMU; page: paragraphs of its own, HTML."""
+    rows = "\n".join(
+        "<tr>" + "".join(f"<td>{html.escape(text)}</td>" for text in (v.name, v.causality, v.unit, v.words)) + "</tr>"
+        for v in variables
+    )
+    return f"""<!DOCTYPE html>
+<html><head><meta charset="utf-8"><title>{html.escape(about.name)}</title></head><body>
+<h1>{html.escape(about.name)}</h1>
+<p>{html.escape(about.words)} Written by {html.escape(about.tool)}.</p>
+{page}
+<table><tr><th>variable</th><th>kind</th><th>unit</th><th>what</th></tr>
+{rows}
+</table></body></html>
+"""
+
+
+def zipped(files: Mapping[str, bytes]) -> bytes:
+    """Return a zip file of the files, the same for the same files."""
+    data = io.BytesIO()
+    with zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in sorted(files):
+            info = zipfile.ZipInfo(name, EPOCH)
+            info.compress_type = zipfile.ZIP_DEFLATED
+            info.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
+            archive.writestr(info, files[name])
+    return data.getvalue()

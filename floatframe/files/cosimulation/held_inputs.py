@@ -1,0 +1,185 @@
+"""Inputs of a system that another program sets: force factors, motors and drives as functions of time that are held.
+
+Each input is a function of time of one piece in the compiled system, whose numbers a unit writes anew at every
+communication point; nothing is compiled again.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.words import nearest, quoted
+from floatframe.analyses.linear.channels import channel_unit, inputs_of
+from floatframe.engine.compiling.system import CompiledSystem
+from floatframe.errors import ModelError
+from floatframe.model.forces import BodyLoad, JointForce, PointForce
+from floatframe.model.functions.time_functions import TimeFunction, constant
+from floatframe.model.system import System
+from floatframe.results.sensors.channels import Channel, CoordinateChannel
+from floatframe.results.sensors.measurement import unit_words
+
+__all__ = ["HeldInput", "function_numbers", "input_choices", "with_held_inputs", "write_function"]
+
+
+@dataclass(frozen=True)
+class HeldInput:
+    """A number that acts on a system from outside: what it is called, where it enters, and its value at the start."""
+
+    name: str  #: such as forces.push.amplitude, joints.hub.angle, or the name of a table [inputs.NAME]
+    unit: str  #: in the symbols of the system, "1" for a factor
+    words: str  #: what it is
+    start: float  #: value at t = 0
+    is_drive: bool = False  #: a prescribed coordinate, given with its first two rates
+    is_own: bool = True  #: in the file it is constant, so that it is an input unless others are named
+
+    def variables(self, time_symbol: str) -> list[tuple[str, str]]:
+        """Return names and units of the variables: one, or value, rate and acceleration of a drive."""
+        if not self.is_drive:
+            return [(self.name, self.unit)]
+        per_time = (f"{self.unit}/{time_symbol}", f"{self.unit}/{time_symbol}²")
+        return [(self.name, self.unit), (f"{self.name}.rate", per_time[0]), (f"{self.name}.acceleration", per_time[1])]
+
+
+def force_channels(system: System) -> list[Channel | CoordinateChannel]:
+    """Return the inputs of a system that are forces; its drives are inputs by themselves, bases have none in time."""
+    return [each for each in inputs_of(system.inputs) if isinstance(each, Channel | CoordinateChannel)]
+
+
+def is_constant(function: TimeFunction | float | None) -> bool:
+    """Return whether a function of time is the same number always."""
+    return not isinstance(function, TimeFunction) or (len(function.begins) == 1 and not function.pieces[0, 1:7].any())
+
+
+def value_at_start(function: TimeFunction | float | None, default: float) -> float:
+    """Return a function of time at t = 0."""
+    return default if function is None else function(0.0) if isinstance(function, TimeFunction) else float(function)
+
+
+def input_choices(system: System) -> dict[str, HeldInput]:
+    """Return all that can be an input of a system, by name."""
+    return {each.name: each for each in found_inputs(system)}
+
+
+def found_inputs(system: System) -> Iterator[HeldInput]:
+    """Yield the inputs that forces, drives and channels of a system offer."""
+    for channel in force_channels(system):
+        unit = channel_unit(system, channel)
+        yield HeldInput(channel.name, unit, f"force or torque of the input {channel.name}", 0.0)
+    for force in system.forces:
+        if isinstance(force, PointForce | BodyLoad):
+            begin, own = value_at_start(force.amplitude, 1.0), is_constant(force.amplitude)
+            yield HeldInput(f"forces.{force.name}.amplitude", "1", f"factor of {force.name}", begin, is_own=own)
+        elif isinstance(force, JointForce):
+            begin, own = value_at_start(force.motor, 0.0), is_constant(force.motor)
+            what = "moment" if is_angle(system, force.joint, force.coordinate) else "force"
+            unit = unit_words(system.units, what)
+            yield HeldInput(f"forces.{force.name}.motor", unit, f"motor {what} of {force.name}", begin, is_own=own)
+    for joint in system.joints:
+        for coordinate, motion in getattr(joint, "motions", {}).items():
+            what = "angle" if is_angle(system, joint.name, coordinate) else "length"
+            words, begin = f"prescribed {coordinate} of joint {joint.name}", value_at_start(motion, 0.0)
+            name, own = f"joints.{joint.name}.{coordinate}", is_constant(motion)
+            yield HeldInput(name, unit_words(system.units, what), words, begin, is_drive=True, is_own=own)
+
+
+def is_angle(system: System, joint: str, coordinate: str) -> bool:
+    """Return whether a joint coordinate is an angle; distances and places along axes are not."""
+    return coordinate.startswith("angle")
+
+
+def with_held_inputs(system: System, names: Sequence[str] | None = None) -> tuple[System, tuple[HeldInput, ...]]:
+    """Return a system whose inputs are functions of one piece, and the inputs.
+
+    Parameters
+    ----------
+    system
+        The system.
+    names
+        Inputs, of `input_choices`; None: the tables [inputs.NAME], and all that is constant in the system.
+
+    Raises
+    ------
+    ModelError
+        If a name is not one of the choices, with the nearest.
+    """
+    choices = input_choices(system)
+    for name in names or ():
+        if name not in choices:
+            prescribed = " (a coordinate is an input where the file prescribes it: [joints.NAME.motions.COORDINATE])"
+            hint = prescribed if name.startswith("joints.") else ""
+            raise ModelError(f"system {system.name!r}: no input {quoted(name)}{nearest(name, choices)}{hint}")
+    taken = [each for each in choices.values() if (each.is_own if names is None else each.name in names)]
+    held = {each.name: constant(each.start) for each in taken}
+    forces: list[Any] = []
+    for force in system.forces:
+        for key in ("amplitude", "motor"):
+            name = f"forces.{getattr(force, 'name', '')}.{key}"
+            if name in held:
+                force = replace(force, **{key: held[name]})  # type: ignore[arg-type]
+        forces.append(force)
+    joints: list[Any] = []
+    for joint in system.joints:
+        motions = dict(getattr(joint, "motions", {}))
+        driven = {c: held[f"joints.{joint.name}.{c}"] for c in motions if f"joints.{joint.name}.{c}" in held}
+        joints.append(replace(joint, motions=motions | driven) if driven else joint)  # type: ignore[arg-type]
+    for channel in force_channels(system):
+        if channel.name in held:
+            forces += channel_forces(channel, held[channel.name])
+    return replace(system, forces=forces, joints=joints, inputs=()), tuple(taken)
+
+
+def channel_forces(channel: Any, function: TimeFunction) -> list[PointForce | JointForce]:
+    """Return the forces of a channel of a linearised system, of the size of a function of time."""
+    if not isinstance(channel, Channel):
+        return [JointForce(f"inputs.{channel.name}", channel.joint, channel.coordinate, motor=function)]
+    key = "force" if channel.quantity == "translation" else "torque"
+    ends = [(f"inputs.{channel.name}", channel.marker, 1.0)]
+    if channel.relative_to is not None:
+        ends.append((f"inputs.{channel.name}.against", channel.relative_to, -1.0))
+    return [
+        PointForce(name, marker, **{key: sign * channel.direction}, amplitude=function)  # type: ignore[arg-type]
+        for name, marker, sign in ends
+    ]
+
+
+def function_numbers(system: System, compiled: CompiledSystem, held: HeldInput) -> list[int]:
+    """Return the numbers of the functions in the compiled system that an input is."""
+    model = compiled.model
+    names = {held.name, f"inputs.{held.name}", f"inputs.{held.name}.against"}
+    names |= {held.name.removeprefix("forces.").removesuffix(end) for end in (".amplitude", ".motor")}
+    found: list[int] = []
+    if held.is_drive:
+        rows = zip(compiled.owners, compiled.coordinates, model.rows.motion, strict=True)
+        return [int(f) for owner, coordinate, f in rows if f >= 0 and f"joints.{owner}.{coordinate}" == held.name]
+    for kind, factors in ((PointForce, model.loads.factor), (BodyLoad, model.body_loads.factor)):
+        forces = [force for force in system.forces if isinstance(force, kind)]
+        found += [int(f) for force, f in zip(forces, factors, strict=True) if force.name in names and f >= 0]
+    return found + [int(f) for f in motors_of(system, compiled, names) if f >= 0]
+
+
+def motors_of(system: System, compiled: CompiledSystem, names: set[str]) -> Iterator[int]:
+    """Yield the functions of motors by name of the force: forces of a row stand in the order of the system."""
+    model = compiled.model
+    for k, (owner, coordinate) in enumerate(zip(compiled.owners, compiled.coordinates, strict=True)):
+        forces = [
+            f for f in system.forces if isinstance(f, JointForce) and (f.joint, f.coordinate) == (owner, coordinate)
+        ]
+        first, last = int(model.rows.force0[k]), int(model.rows.force1[k])
+        if first == last:
+            continue
+        for force, motor in zip(forces, model.joint_forces.motor[first:last], strict=True):
+            if force.name in names:
+                yield int(motor)
+
+
+def write_function(compiled: CompiledSystem, number: int, begin: float, coefficients: Array) -> None:
+    """Write a function of one piece anew: Σ_k c_k (t - begin)^k, up to six coefficients."""
+    functions = compiled.model.functions
+    piece = int(functions.piece0[number])
+    row = np.zeros(functions.piece.shape[1])
+    row[: len(coefficients)] = coefficients
+    functions.begin[piece] = begin
+    functions.piece[piece] = row

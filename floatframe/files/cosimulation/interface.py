@@ -1,0 +1,166 @@
+"""What a unit shows to other programs: its parameters, inputs and outputs as variables with units and starts."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fe_models.foundation.toml_file import first_key, read_toml
+from fe_models.foundation.words import nearest, quoted
+from floatframe.errors import FloatframeError, ModelError, SystemFileError
+from floatframe.files.cosimulation.unit import Unit
+from floatframe.files.system_file.read_system import read_system
+from floatframe.files.system_file.run_section import RunOptions, required_run
+from floatframe.model.system import System
+from floatframe.results.sensors import (
+    AngleSensor,
+    DisplacementSensor,
+    ElongationSensor,
+    ModeSensor,
+    MomentumSensor,
+    PlaceSensor,
+    StrainGauge,
+    StressSensor,
+    VonMisesSensor,
+)
+
+__all__ = ["Variable", "interface", "parameter_paths", "read_unit", "value_at"]
+
+#: sensors that measure the state alone; a force changes accelerations, and forces elsewhere, at once
+OF_THE_STATE = (
+    AngleSensor, DisplacementSensor, ElongationSensor, ModeSensor, MomentumSensor, StrainGauge, StressSensor,
+    VonMisesSensor,
+)  # fmt: skip
+COLUMNS_OF_THE_STATE = ("value", "rate")  #: of a joint coordinate, beside the force along it
+TABLES_OF_NUMBERS = ("bodies", "forces", "couplers")  #: whose numbers are parameters without being named
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A real variable of a unit."""
+
+    name: str
+    causality: str  #: parameter, input, output, local or independent
+    unit: str = ""  #: in the symbols of the system; "": none
+    words: str = ""  #: what it is
+    start: float = 0.0
+    path: str = ""  #: key path in the system file, of a parameter
+    feeds_through: bool = False  #: of an output: whether it follows force inputs at once
+    is_drive: bool = False  #: of an input: of a prescribed motion
+    is_tunable: bool = False  #: of a parameter: whether it may change in a motion
+    is_state: bool = False  #: whether it is a continuous state, which begins at its start
+    derivative_of: str = ""  #: name of the state whose derivative it is
+    depends_on: tuple[str, ...] | None = None  #: names of states and inputs; None: force inputs if it feeds through
+
+
+def value_at(content: Mapping[str, Any], path: str, where: str) -> float:
+    """Return the number at a key path of a system file; `SystemFileError` if there is none."""
+    here: Any = content
+    left = path
+    while True:
+        key, rest = first_key(here, left)
+        if rest is None:
+            key = int(left) if isinstance(here, list) and left.isdigit() else left
+            break
+        if key is None or not isinstance(here[key], dict | list):
+            raise SystemFileError(
+                f"{where}: parameter {path!r}: there is no such key{nearest(path, paths_in(content))}"
+            )
+        here, left = here[key], rest
+    try:
+        value = here[key]
+    except (KeyError, IndexError):
+        raise SystemFileError(
+            f"{where}: parameter {path!r}: there is no such key{nearest(path, paths_in(content))}"
+        ) from None
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise SystemFileError(f"{where}: parameter {path!r}: expected a number, got {quoted(str(value))}")
+    return float(value)
+
+
+def paths_in(content: Mapping[str, Any]) -> list[str]:
+    """Return the key paths of the numbers that are parameters without being named."""
+    found = [f"system.gravity.{k}" for k in range(len(content.get("system", {}).get("gravity", ())))]
+    for table in TABLES_OF_NUMBERS:
+        for name, section in content.get(table, {}).items():
+            for part, keys in (("", section), ("parameters.", section.get("parameters", {}))):
+                numbers = (key for key, x in keys.items() if isinstance(x, int | float) and not isinstance(x, bool))
+                found += [f"{table}.{name}.{part}{key}" for key in numbers]
+    return found
+
+
+def parameter_paths(content: Mapping[str, Any], given: Mapping[str, str] | None, where: str) -> dict[str, str]:
+    """Return key paths of the parameters by name: those given, or all numbers of bodies, forces, couplers, gravity."""
+    paths = {path: path for path in paths_in(content)} if given is None else dict(given)
+    for path in paths.values():
+        value_at(content, path, where)
+    return paths
+
+
+def read_unit(
+    path: Path,
+    *,
+    changes: Mapping[str, float] | None = None,
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
+) -> tuple[Unit, RunOptions]:
+    """Read a system file as a unit, with numbers changed by key path.
+
+    Raises
+    ------
+    FloatframeError
+        If the file or a value is impossible, or an input or output does not exist.
+    """
+    system, given = read_system(path, changes)
+    run = required_run(given, path)
+    try:
+        return Unit(system, run.integrator, run.h, inputs, outputs), run
+    except FloatframeError as error:
+        raise SystemFileError(f"{path}: {error}") from error
+
+
+def interface(unit: Unit, content: Mapping[str, Any], paths: Mapping[str, str], where: str) -> tuple[Variable, ...]:
+    """Return the variables of a unit at its beginning: time, parameters, inputs, outputs; names are used once.
+
+    Raises
+    ------
+    ModelError
+        If two variables have one name.
+    """
+    system = unit.system
+    found = [Variable("time", "independent", system.units.time_symbol, "time")]
+    for name, path in paths.items():
+        symbol = system.units.mass_symbol if path.startswith("bodies.") and path.endswith(".mass") else ""
+        words = f"{path} of the system file, in its units ({system.units.name})"
+        found.append(Variable(name, "parameter", symbol, words, value_at(content, path, where), path))
+    for held in unit.held:
+        for k, (name, symbol) in enumerate(held.variables(system.units.time_symbol)):
+            start = held.start if k == 0 else 0.0
+            found.append(Variable(name, "input", symbol, held.words, start, is_drive=held.is_drive))
+    found += output_variables(unit, system)
+    seen: set[str] = set()
+    for each in found:
+        if each.name in seen:
+            raise ModelError(f"{where}: two variables are called {each.name!r}; rename a sensor, input or parameter")
+        seen.add(each.name)
+    return tuple(found)
+
+
+def output_variables(unit: Unit, system: System) -> Iterator[Variable]:
+    """Yield the outputs of a unit that has begun."""
+    for sensor, measurement in zip(unit.sensors, unit.measured(), strict=True):
+        is_of_state = isinstance(sensor, OF_THE_STATE) or (
+            isinstance(sensor, PlaceSensor) and sensor.quantity != "acceleration"
+        )
+        kind = type(sensor).__name__
+        for column, values in measurement.columns.items():
+            feeds = not (is_of_state or (kind == "CoordinateSensor" and column in COLUMNS_OF_THE_STATE))
+            name, words = f"{sensor.name}.{column}", f"{column} of sensor {sensor.name}"
+            unit_words = measurement.units[column]
+            symbol = "" if unit_words in ("-", "number in the mesh") else unit_words
+            yield Variable(name, "output", symbol, words, float(values[-1]), feeds_through=feeds)
+
+
+def content_of(path: Path) -> dict[str, Any]:
+    """Return the tables of a system file."""
+    return dict(read_toml(path, SystemFileError))

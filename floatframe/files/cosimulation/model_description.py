@@ -1,0 +1,179 @@
+"""The model description of a unit: modelDescription.xml of FMI 2.0 and FMI 3.0, from one list of variables."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+from fe_models.foundation.units import Units
+from floatframe.files.cosimulation.interface import Variable
+from floatframe.files.cosimulation.unit_words import base_unit
+
+__all__ = ["NEEDS", "Description", "model_description"]
+
+#: what an FMU needs where it runs
+NEEDS = (
+    "Needs Python with floatframe where it runs: the program that loads it must be Python itself (FMPy), or find the "
+    "library of a Python in which floatframe is installed (Linux: LD_PRELOAD=libpython3.x.so; Windows: python3x.dll on "
+    "PATH, PYTHONHOME set)."
+)
+CATEGORIES = {"logAll": "all messages", "logStatusWarning": "warnings", "logStatusError": "errors"}
+
+
+@dataclass(frozen=True)
+class Description:
+    """What a model description says besides the variables."""
+
+    name: str  #: of the model
+    identifier: str  #: of its binaries, a name in C
+    token: str  #: guid, instantiation token
+    tool: str
+    units: Units
+    stop_time: float  #: [s]
+    step: float  #: [s]
+    words: str  #: what it is
+    is_hosted: bool = True  #: whether it needs a program of its own where it runs
+    has_derivatives: bool = False  #: whether it can be solved by others (model exchange)
+    sources: tuple[str, ...] = ()  #: its files of C, which FMI 2.0 names here
+
+
+def model_description(about: Description, variables: Sequence[Variable], fmi: int) -> bytes:
+    """Return modelDescription.xml of version 2 or 3; the value reference of a variable is its place."""
+    root = Element(
+        "fmiModelDescription",
+        {
+            "fmiVersion": "2.0" if fmi == 2 else "3.0",
+            "modelName": about.name,
+            "guid" if fmi == 2 else "instantiationToken": about.token,
+            "description": about.words,
+            "generationTool": about.tool,
+            "variableNamingConvention": "flat",
+        },
+    )
+    if fmi == 2 and about.has_derivatives:
+        root.set("numberOfEventIndicators", "0")
+    for kind in ("ModelExchange", "CoSimulation") if about.has_derivatives else ("CoSimulation",):
+        add_interface(root, kind, about, fmi)
+    add_units(root, about.units, variables)
+    categories = SubElement(root, "LogCategories")
+    for name, words in CATEGORIES.items():
+        SubElement(categories, "Category", {"name": name, "description": words})
+    SubElement(
+        root,
+        "DefaultExperiment",
+        {"startTime": "0.0", "stopTime": repr(about.stop_time), "stepSize": repr(about.step)},
+    )
+    (add_variables_2 if fmi == 2 else add_variables_3)(root, variables)
+    indent(root)
+    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, encoding="utf-8") + b"\n"
+
+
+def add_interface(root: Element, kind: str, about: Description, fmi: int) -> None:
+    """Add what a unit can do in one kind of use."""
+    state = "FMUstate" if fmi == 2 else "FMUState"
+    can = {"modelIdentifier": about.identifier}
+    if about.is_hosted:
+        can["needsExecutionTool"] = "true"
+    if kind == "CoSimulation":
+        can["canHandleVariableCommunicationStepSize"] = "true"
+    element = SubElement(root, kind, can | {f"canGetAndSet{state}": "true", f"canSerialize{state}": "true"})
+    if about.sources and fmi == 2:
+        files = SubElement(element, "SourceFiles")
+        for name in about.sources:
+            SubElement(files, "File", {"name": name})
+
+
+def add_units(root: Element, units: Units, variables: Sequence[Variable]) -> None:
+    """Add the units of the variables, with their factors to SI where FMI can hold them."""
+    symbols = sorted({each.unit for each in variables if each.unit})
+    if not symbols:
+        return
+    definitions = SubElement(root, "UnitDefinitions")
+    for symbol in symbols:
+        unit = SubElement(definitions, "Unit", {"name": symbol})
+        found = base_unit(units, symbol)
+        if found is not None:
+            powers = {name: str(k) for name, k in zip(("kg", "m", "s", "rad"), found[1:], strict=True) if k}
+            SubElement(unit, "BaseUnit", powers | ({"factor": repr(found.factor)} if found.factor != 1.0 else {}))
+
+
+def attributes(each: Variable) -> dict[str, str]:
+    """Return the attributes of a variable that both versions have."""
+    variability = "continuous"
+    if each.causality == "parameter":
+        variability = "tunable" if each.is_tunable else "fixed"
+    found = {"name": each.name, "causality": each.causality, "variability": variability}
+    if each.is_state:
+        found["initial"] = "exact"
+    if each.words:
+        found["description"] = each.words
+    return found
+
+
+def known_places(variables: Sequence[Variable], each: Variable) -> list[int]:
+    """Return the places of the states and inputs that an output or derivative follows at once.
+
+    Of outputs that feed through without a list of their own these are all inputs of forces, not those of drives.
+    """
+    if each.depends_on is not None:
+        return [k for k, other in enumerate(variables) if other.name in each.depends_on]
+    if not each.feeds_through:
+        return []
+    return [k for k, other in enumerate(variables) if other.causality == "input" and not other.is_drive]
+
+
+def has_start(each: Variable) -> bool:
+    """Whether a variable begins at a value that can be given."""
+    return each.is_state or each.causality in ("parameter", "input")
+
+
+def structure_of(variables: Sequence[Variable]) -> tuple[list[int], list[int], list[int]]:
+    """Return the places of outputs, of derivatives in the order of their states, and of unknowns of the beginning."""
+    outputs = [k for k, each in enumerate(variables) if each.causality == "output"]
+    places = {each.derivative_of: k for k, each in enumerate(variables) if each.derivative_of}
+    derivatives = [places[each.name] for each in variables if each.is_state]
+    return outputs, derivatives, [k for k in outputs if not variables[k].is_state] + derivatives
+
+
+def add_variables_2(root: Element, variables: Sequence[Variable]) -> None:
+    """Add variables and structure in the form of FMI 2.0, where places count from 1."""
+    listed = SubElement(root, "ModelVariables")
+    places = {each.name: k + 1 for k, each in enumerate(variables)}
+    for k, each in enumerate(variables):
+        scalar = SubElement(listed, "ScalarVariable", attributes(each) | {"valueReference": str(k)})
+        real = SubElement(scalar, "Real", {"unit": each.unit} if each.unit else {})
+        if has_start(each):
+            real.set("start", repr(each.start))
+        if each.derivative_of:
+            real.set("derivative", str(places[each.derivative_of]))
+    structure = SubElement(root, "ModelStructure")
+    for part, unknowns in zip(("Outputs", "Derivatives", "InitialUnknowns"), structure_of(variables), strict=True):
+        if not unknowns:
+            continue
+        listed = SubElement(structure, part)
+        for k in unknowns:
+            unknown = SubElement(listed, "Unknown", {"index": str(k + 1)})
+            if part != "InitialUnknowns":
+                unknown.set("dependencies", " ".join(str(f + 1) for f in known_places(variables, variables[k])))
+
+
+def add_variables_3(root: Element, variables: Sequence[Variable]) -> None:
+    """Add variables and structure in the form of FMI 3.0."""
+    listed = SubElement(root, "ModelVariables")
+    places = {each.name: k for k, each in enumerate(variables)}
+    for k, each in enumerate(variables):
+        real = SubElement(listed, "Float64", attributes(each) | {"valueReference": str(k)})
+        if each.unit:
+            real.set("unit", each.unit)
+        if has_start(each):
+            real.set("start", repr(each.start))
+        if each.derivative_of:
+            real.set("derivative", str(places[each.derivative_of]))
+    structure = SubElement(root, "ModelStructure")
+    outputs, derivatives, initial = structure_of(variables)
+    for part, unknowns in (("Output", outputs), ("ContinuousStateDerivative", derivatives)):
+        for k in unknowns:
+            found = {"valueReference": str(k)}
+            found["dependencies"] = " ".join(str(f) for f in known_places(variables, variables[k]))
+            SubElement(structure, part, found)
+    for k in initial:
+        SubElement(structure, "InitialUnknown", {"valueReference": str(k)})

@@ -1,0 +1,312 @@
+"""A system as a unit of a co-simulation: communication steps with held inputs, outputs of sensors, a way back."""
+
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.engine.compiling.callbacks import raise_errors_of
+from floatframe.engine.compiling.file_frames import rows_of_file
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.kernels.memory import Rows
+from floatframe.engine.kernels.work import Work, new_work
+from floatframe.errors import ConvergenceError, ModelError, ResultsError
+from floatframe.files.cosimulation.held_inputs import HeldInput, function_numbers, with_held_inputs, write_function
+from floatframe.integrators.carry import Carry, Integrator
+from floatframe.model.system import System
+from floatframe.results.results_file import MemorySource
+from floatframe.results.sensors import Measurement, sensor_of, sensors_of
+from floatframe.results.trajectory import Trajectory
+from floatframe.results.writer import arrays_of
+from floatframe.simulation.events import events_of
+from floatframe.simulation.integration import head_of, number_of_steps
+from floatframe.simulation.jumps import jumps_of_steps, over_jumps
+from floatframe.simulation.restart import carry_of_record, restart_record
+from floatframe.simulation.switch_events import switch_events
+from floatframe.simulation.validity_watch import ValidityWatch
+
+__all__ = ["Unit", "UnitState", "quintic", "sensor_names"]
+
+ROUNDING = 1e-9  #: of a step, by which times of another program may differ
+JUMP = 1e-9  #: of an input, as in `TimeFunction.jumps`: changes below it are roundings of another program
+
+
+@dataclass(frozen=True, eq=False)
+class UnitState:
+    """All a unit remembers: time, what the integrator carries, inputs, and the pieces of its drives."""
+
+    t: float
+    carry: Carry
+    inputs: Mapping[str, float]
+    acting: Mapping[str, float]  #: values of force inputs that act
+    drives: Mapping[str, Array]  #: value, rate and second rate at t, (3,) each
+
+    def to_bytes(self) -> bytes:
+        """Return it as bytes (npz)."""
+        data = io.BytesIO()
+        record = {f"carry.{name}": array for name, array in restart_record(self.carry, 0).items()}
+        for part in ("inputs", "acting"):
+            record |= {f"{part}.{name}": np.array(value) for name, value in getattr(self, part).items()}
+        record |= {f"drives.{name}": value for name, value in self.drives.items()}
+        np.savez(data, t=np.array(self.t), **record)  # type: ignore[arg-type]
+        return data.getvalue()
+
+    @staticmethod
+    def from_bytes(content: bytes, system: System) -> "UnitState":
+        """Return what `to_bytes` wrote; `ResultsError` if it is of another system."""
+        try:
+            with np.load(io.BytesIO(content), allow_pickle=False) as file:
+                record = dict(file)
+        except (ValueError, OSError, EOFError) as error:
+            raise ResultsError(f"state of a unit: these bytes are not one that was serialised ({error})") from error
+        parts: dict[str, dict[str, Any]] = {"carry": {}, "inputs": {}, "acting": {}, "drives": {}}
+        for key, value in record.items():
+            part, _, name = key.partition(".")
+            if part in parts:
+                parts[part][name] = value
+        carry, _ = carry_of_record(parts["carry"], system)
+        inputs, acting = ({k: float(v) for k, v in parts[part].items()} for part in ("inputs", "acting"))
+        return UnitState(float(record["t"]), carry, inputs, acting, parts["drives"])
+
+
+def quintic(begin: Array, end: Array, duration: float) -> Array:
+    """Return c, (6,), of Σ c_k s^k with value, rate and second rate `begin` at s = 0 and `end` at s = duration.
+
+    The first three follow from the beginning; with e the end less what they make of it, as (e0, e1 T, e2 T²),
+    c_3 T³ = 10 e0 - 4 e1 T + e2 T²/2,  c_4 T⁴ = -15 e0 + 7 e1 T - e2 T²,  c_5 T⁵ = 6 e0 - 3 e1 T + e2 T²/2.
+    """
+    T = duration
+    x, v, a = begin
+    e0 = end[0] - (x + v * T + a * T**2 / 2)
+    e1, e2 = (end[1] - (v + a * T)) * T, (end[2] - a) * T**2
+    return np.array(
+        [
+            x, v, a / 2,
+            (10 * e0 - 4 * e1 + e2 / 2) / T**3,
+            (-15 * e0 + 7 * e1 - e2) / T**4,
+            (6 * e0 - 3 * e1 + e2 / 2) / T**5,
+        ]
+    )  # fmt: skip
+
+
+def sensor_names(system: System, outputs: Sequence[str] | None) -> list[str]:
+    """Return the sensors whose columns are outputs: those named, else all of the system, else all joint coordinates."""
+    if outputs is not None:
+        return [sensor_of(system, name).name for name in outputs]
+    named = [sensor.name for sensor in sensors_of(system)]
+    return named or [f"{joint.name}.{coordinate}" for joint in system.joints for coordinate in joint.coordinates]
+
+
+@dataclass
+class Unit:
+    """A motion that another program leads: it sets inputs, asks for a step, reads outputs, and may go back.
+
+    Force inputs keep their values over a communication step; where one changes, the motion begins anew from the state
+    (as `integrate` does where a force jumps), so that no impulse is lost. A drive is led from where it is to the value,
+    rate and acceleration that its three inputs promise for the end of the step (x + v H + a H²/2, v + a H, a), by a
+    polynomial of degree five: a motion without jumps of the second rate, exact where the inputs are those of x(t) with
+    a constant acceleration. A step depends on the state and the inputs alone, bit for bit.
+    """
+
+    system: System
+    integrator: Integrator
+    h: float  #: longest step of the integrator [s]
+    names: Sequence[str] | None = None  #: of inputs; None: those that `with_held_inputs` takes
+    outputs: Sequence[str] | None = None  #: sensors or joint coordinates; None: those of `sensor_names`
+    inputs: dict[str, float] = field(init=False)  #: values that were set
+    notes: list[str] = field(init=False, default_factory=list)  #: words on bodies that left their linear range
+    t: float = field(init=False, default=0.0)
+    steps: list[Rows] = field(init=False, default_factory=list)  #: results of the steps of the last communication step
+
+    def __post_init__(self) -> None:
+        if self.system.fmus:
+            raise ModelError(
+                f"system {self.system.name!r}: units of other programs act beside it (fmus), which cannot be a part of "
+                "a unit; take them out and let the master connect them"
+            )
+        if events_of(self.system):
+            raise ModelError(
+                f"system {self.system.name!r}: its table [events] cannot be a part of a co-simulation; leave it out "
+                "and let the master switch"
+            )
+        stops = [coupler.name for coupler in self.system.couplers if coupler.limits is not None]
+        if stops:
+            raise ModelError(
+                f"system {self.system.name!r}: coupler {stops[0]!r} has limits, which cannot be a part of a "
+                "co-simulation; take a force with a table for the stop"
+            )
+        if switches := switch_events(self.system):
+            raise ModelError(
+                f"system {self.system.name!r}: the zeros of {switches[0].name!r} switch a law, which cannot be a part "
+                "of a co-simulation"
+            )
+        self.system, self.held = with_held_inputs(self.system, self.names)
+        compiled = compiled_system(self.system)
+        self.numbers = {each.name: function_numbers(self.system, compiled, each) for each in self.held}
+        for name, found in self.numbers.items():
+            assert found, f"input {name} is not in the compiled system"
+        self.sensors = [sensor_of(self.system, name) for name in sensor_names(self.system, self.outputs)]
+        self.inputs = {}
+        for each in self.held:
+            start = (each.start, 0.0, 0.0)
+            variables = each.variables(self.system.units.time_symbol)
+            self.inputs |= {name: x for (name, _), x in zip(variables, start, strict=False)}
+        self.carry: Carry | None = None
+        self.acting: dict[str, float] = {}
+        self.drives: dict[str, Array] = {}
+        self.row: Rows | None = None
+        self.work: Work = new_work(compiled.model)
+        self.watch = ValidityWatch(self.system, ())
+
+    def set(self, name: str, value: float) -> None:
+        """Set an input; it acts from the time reached on."""
+        if name not in self.inputs:
+            raise ModelError(f"unit {self.system.name!r}: no input {name!r}; expected one of {', '.join(self.inputs)}")
+        if not np.isfinite(value):
+            raise ModelError(f"unit {self.system.name!r}: input {name!r}: expected a finite number, got {value}")
+        self.inputs[name] = float(value)
+
+    def begin(self, t: float = 0.0) -> None:
+        """Close the joints and begin the motion at t, with the inputs that are set."""
+        compiled = compiled_system(self.system)
+        self.t = t
+        for each in self.held:
+            if each.is_drive:
+                x, v, a = self.drive_inputs(each)
+                self.drives[each.name] = np.array([x, v, a])
+                self.write(each, t, np.array([x, v, a / 2]))
+            else:
+                self.acting[each.name] = self.inputs[each.name]
+                self.write(each, t, np.array([self.inputs[each.name]]))
+        self.head = head_of(self.system, self.integrator, t, t + self.h, self.h, 1)
+        self.head = replace(self.head, angles=compiled.angles)
+        self.work = new_work(compiled.model)
+        self.carry = self.integrator.start(self.system, t)
+        self.carry, self.row = self.integrator.observe(self.system, t, self.carry, self.work)
+        raise_errors_of(compiled.callbacks)
+
+    def drive_inputs(self, each: HeldInput) -> list[float]:
+        """Return value, rate and acceleration that are set for a drive."""
+        return [self.inputs[name] for name, _ in each.variables(self.system.units.time_symbol)]
+
+    def write(self, each: HeldInput, t: float, coefficients: Array) -> None:
+        """Write the functions of time that an input is."""
+        for number in self.numbers[each.name]:
+            write_function(compiled_system(self.system), number, t, coefficients)
+
+    def settle(self) -> None:
+        """Let the force inputs act that have changed: where one jumps, the motion goes on with it from the state."""
+        assert self.carry is not None
+        jumps = False
+        for each in self.held:
+            if each.is_drive or self.acting[each.name] == self.inputs[each.name]:
+                continue
+            old, new = self.acting[each.name], self.inputs[each.name]
+            jumps |= abs(new - old) > JUMP * max(abs(new), abs(old))
+            self.acting[each.name] = new
+            self.write(each, self.t, np.array([new]))
+        if jumps:
+            self.carry, self.row = self.integrator.after_jump(self.system, self.t, self.carry, self.work)
+
+    def step(self, t: float, size: float) -> None:
+        """Take a communication step from t to t + size with the inputs held, in equal steps of up to h.
+
+        Raises
+        ------
+        ConvergenceError
+            If a step fails; the unit is then where it was before.
+        ModelError
+            If the unit is at another time, or size is not above 0.
+        """
+        if self.carry is None:
+            raise ModelError(f"unit {self.system.name!r}: a step before its beginning")
+        if not 0.0 < size < np.inf:
+            raise ModelError(f"unit {self.system.name!r}: expected a communication step above 0, got {size}")
+        if abs(t - self.t) > ROUNDING * max(size, self.h) + 1e-12 * abs(self.t):
+            raise ModelError(
+                f"unit {self.system.name!r}: the step is to begin at t = {t:.12g}, but it is at {self.t:.12g}"
+            )
+        before = self.state()
+        try:
+            self.advance(size)
+        except ConvergenceError:
+            self.restore(before)
+            raise
+
+    def advance(self, size: float) -> None:
+        """Take the steps of a communication step."""
+        self.settle()
+        n = number_of_steps(0.0, size, self.h)
+        h, t = size / n, self.t
+        assert self.carry is not None
+        if abs(h - self.carry.h) <= ROUNDING * h:  # a rounding of the master's clock is no other step size
+            h = self.carry.h
+        drives: dict[str, Array] = {}
+        for each in self.held:
+            if each.is_drive:
+                x, v, a = self.drive_inputs(each)
+                end = np.array([x + v * size + a * size**2 / 2, v + a * size, a])
+                self.write(each, t, quintic(self.drives[each.name], end, n * h))
+                drives[each.name] = end
+        self.work.solver.c_k[...] = 0.0  # factors are made anew: a step depends on the state alone
+        jumps = jumps_of_steps(self.system, t, h, n)
+        k, steps = 0, []
+        while k < n:
+            n_smooth = min((j - k for j in jumps if j >= k), default=n - k)
+            if n_smooth:
+                self.carry, rows, n_good, failure = self.integrator.advance(
+                    self.system, self.carry, self.work, t0=t, h=h, first=k, n_steps=n_smooth, every=1
+                )
+            else:
+                self.carry, rows, self.work, failure = over_jumps(
+                    self.integrator, self.system, self.carry, self.work, t=t + k * h, h=h, jumps=jumps[k]
+                )
+                n_good = int(failure is None)
+            k += n_good
+            raise_errors_of(compiled_system(self.system).callbacks)
+            if failure is not None:
+                words = (
+                    f"system {self.system.name!r}: the step of {h:g} from t = {t + k * h:.9g} failed: {failure.words}"
+                )
+                raise ConvergenceError(words, t=t + k * h, h=h, residual=failure.residual)
+            self.notes += [note.words for note in self.watch.observe(rows)]
+            steps += [Rows(*(array[j : j + 1] for array in rows)) for j in range(len(rows.t))]
+            self.row = steps[-1]
+        self.t, self.drives, self.steps = t + size, drives, steps
+
+    def measured(self) -> list[Measurement]:
+        """Return what the sensors measure now, with the inputs that are set."""
+        if self.carry is None:
+            raise ModelError(f"unit {self.system.name!r}: outputs before its beginning")
+        self.settle()
+        assert self.row is not None
+        arrays = arrays_of([rows_of_file(compiled_system(self.system), self.row)])
+        arrays["drift"] = arrays["drift"][:, : len(self.head.joints)]
+        motion = Trajectory(self.head, MemorySource(arrays), is_complete=False)
+        return [sensor.measure(self.system, motion) for sensor in self.sensors]
+
+    def values(self) -> dict[str, float]:
+        """Return the outputs by name, sensor.column."""
+        return {f"{m.sensor}.{name}": float(column[-1]) for m in self.measured() for name, column in m.columns.items()}
+
+    def state(self) -> UnitState:
+        """Return all the unit remembers."""
+        if self.carry is None:
+            raise ModelError(f"unit {self.system.name!r}: its state before its beginning")
+        return UnitState(self.t, self.carry, dict(self.inputs), dict(self.acting), dict(self.drives))
+
+    def restore(self, state: UnitState) -> None:
+        """Go back, or on, to a state of this unit."""
+        self.t, self.carry = state.t, state.carry
+        self.inputs, self.acting, self.drives = dict(state.inputs), dict(state.acting), dict(state.drives)
+        for each in self.held:
+            if each.is_drive:
+                x, v, a = self.drives[each.name]
+                self.write(each, self.t, np.array([x, v, a / 2]))
+            else:
+                self.write(each, self.t, np.array([self.acting[each.name]]))
+        self.work = new_work(compiled_system(self.system).model)
+        self.carry, self.row = self.integrator.observe(self.system, self.t, self.carry, self.work)

@@ -1,0 +1,287 @@
+"""URDF, the description of robots of ROS, read into a `Robot`.
+
+Elements and attributes are those of its specification (docs/robots.md has the table). What it does not name is listed
+in `Robot.notes`; what it names and is not valid is refused with its line. Nothing is completed: a link without
+<inertial> has no mass, and a number that is missing has the default of the specification or is asked for.
+"""
+
+import os
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.words import quoted
+from floatframe.errors import ModelError, UrdfError
+from floatframe.files.importers.robot import (
+    JOINT_TYPES,
+    WITH_AXIS,
+    Inertial,
+    JointLimits,
+    Link,
+    MeshFile,
+    Mimic,
+    Picture,
+    Pose,
+    Robot,
+    RobotJoint,
+)
+from floatframe.files.importers.xml_tree import Element, read_xml
+from floatframe.model.shapes import Box, Cylinder, Sphere
+
+__all__ = ["read_urdf"]
+
+Color = tuple[float, float, float, float]
+
+READ = {  #: elements that are read, by the one they stand in
+    "robot": ("link", "joint", "material"),
+    "link": ("inertial", "visual", "collision"),
+    "joint": ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic"),
+    "inertial": ("origin", "mass", "inertia"),
+    "visual": ("origin", "geometry", "material"),
+    "collision": ("origin", "geometry"),
+    "geometry": ("box", "cylinder", "sphere", "mesh"),
+    "material": ("color",),
+}
+TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+
+def read_urdf(path: str | os.PathLike[str]) -> Robot:
+    """Read a URDF file.
+
+    Raises
+    ------
+    UrdfError
+        If it is not valid, or a xacro file that has not been expanded; with the line.
+    """
+    return Reader(Path(path)).robot()
+
+
+class Reader:
+    """Reads one file; keeps its materials, and counts what is not read."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.colors: dict[str, Color] = {}
+        self.unread: Counter[str] = Counter()
+
+    def robot(self) -> Robot:
+        """Return the robot."""
+        top = read_xml(self.path, "robot")
+        self.refuse_macros(top)
+        for element in top.all("material"):
+            color = self.color(element)
+            if color is not None:
+                self.colors[self.text(element, "name")] = color
+        links = [self.link(element) for element in top.all("link")]
+        joints = [self.joint(element) for element in top.all("joint")]
+        self.count_unread(top)
+        notes = tuple(f"{count} × <{tag}> not read" for tag, count in sorted(self.unread.items()))
+        return Robot(self.text(top, "name"), links, joints, str(self.path), notes)
+
+    def refuse_macros(self, top: Element) -> None:
+        """Raise `UrdfError` if a file is to be expanded by xacro first."""
+        left = [top]
+        while left:
+            element = left.pop()
+            left += element.children
+            is_macro = element.tag.startswith("xacro:") or any("${" in value for value in element.attributes.values())
+            if is_macro:
+                raise UrdfError(
+                    f"{self.path}, line {element.line}: a macro of xacro, which is not URDF yet; expand the file "
+                    "first: xacro robot.urdf.xacro > robot.urdf"
+                )
+
+    def count_unread(self, element: Element, within: str = "") -> None:
+        """Count elements that are not read."""
+        known = READ.get(element.tag)
+        for child in element.children:
+            if known is not None and child.tag not in known:
+                self.unread[child.tag] += 1
+            elif known is not None:
+                self.count_unread(child)
+
+    def error(self, element: Element, words: str) -> UrdfError:
+        """Return the error about an element."""
+        return UrdfError(f"{self.path}, line {element.line}: <{element.tag}>: {words}")
+
+    # Numbers and words -----------------------------------------------------------------------------------------------
+
+    def text(self, element: Element, key: str) -> str:
+        """Return an attribute that has to be there and is no empty text."""
+        value = element.attributes.get(key, "").strip()
+        if not value:
+            raise self.error(element, f"expected the attribute {key}, a text, got none")
+        return value
+
+    def numbers(self, element: Element, key: str, n: int, default: Array | None = None) -> Array:
+        """Return the n numbers of an attribute, (n,)."""
+        if key not in element.attributes and default is not None:
+            return default
+        words = self.text(element, key).split()
+        try:
+            values = np.array([float(word) for word in words])
+        except ValueError:
+            values = np.full(1, np.nan)
+        if len(values) != n or not np.isfinite(values).all():
+            found = quoted(element.attributes[key])
+            many = "a finite number" if n == 1 else f"{n} finite numbers"
+            raise self.error(element, f"{key}: expected {many}, got {found}")
+        return values
+
+    def number(self, element: Element, key: str, default: float | None = None) -> float:
+        """Return the number of an attribute."""
+        return float(self.numbers(element, key, 1, None if default is None else np.array([default]))[0])
+
+    def optional(self, element: Element | None, key: str) -> float | None:
+        """Return the number of an attribute, None if it or the element is not there."""
+        return None if element is None or key not in element.attributes else self.number(element, key)
+
+    def one(self, element: Element, tag: str) -> Element | None:
+        """Return the element of a tag in it, None if there is none; `UrdfError` if there are several."""
+        found = element.all(tag)
+        if len(found) > 1:
+            raise self.error(element, f"expected one <{tag}>, got {len(found)}")
+        return found[0] if found else None
+
+    def needed(self, element: Element, tag: str) -> Element:
+        """Return the one element of a tag in it."""
+        found = self.one(element, tag)
+        if found is None:
+            raise self.error(element, f"expected <{tag}> in it, got none")
+        return found
+
+    def pose(self, element: Element) -> Pose:
+        """Return the <origin> of an element."""
+        origin = self.one(element, "origin")
+        if origin is None:
+            return Pose()
+        zero = np.zeros(3)
+        return Pose(self.numbers(origin, "xyz", 3, zero), self.numbers(origin, "rpy", 3, zero))
+
+    # Links -----------------------------------------------------------------------------------------------------------
+
+    def link(self, element: Element) -> Link:
+        """Return a <link>."""
+        inertial = self.one(element, "inertial")
+        return Link(
+            self.text(element, "name"),
+            None if inertial is None else self.inertial(inertial),
+            tuple(self.picture(each) for each in element.all("visual")),
+            tuple(self.picture(each) for each in element.all("collision")),
+            element.line,
+        )
+
+    def inertial(self, element: Element) -> Inertial:
+        """Return an <inertial>."""
+        at = self.needed(element, "mass")
+        mass = self.number(at, "value")
+        if mass < 0:
+            raise self.error(at, f"expected a mass of 0 or more, got {mass:g}")
+        at = self.needed(element, "inertia")
+        xx, xy, xz, yy, yz, zz = (self.number(at, key) for key in TENSOR)
+        return Inertial(mass, self.pose(element), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+
+    def picture(self, element: Element) -> Picture:
+        """Return a <visual> or <collision>."""
+        at = self.needed(element, "geometry")
+        shapes = [child for child in at.children if child.tag in READ["geometry"]]
+        if len(shapes) != 1:
+            choices = ", ".join(f"<{tag}>" for tag in READ["geometry"])
+            got = ", ".join(f"<{child.tag}>" for child in at.children) or "none"
+            raise self.error(at, f"expected one of {choices}, got {got}")
+        material = self.one(element, "material") if element.tag == "visual" else None
+        color = None
+        if material is not None:
+            color = self.color(material)
+            name = material.attributes.get("name", "")
+            if color is None and name in self.colors:
+                color = self.colors[name]
+            elif color is None and not material.all("texture"):
+                raise self.error(material, f"there is no material {quoted(name)} with a color in this file")
+            if color is not None and name:
+                self.colors.setdefault(name, color)  # as other readers do: it may be used again below
+        return Picture(self.geometry(shapes[0]), self.pose(element), color, element.attributes.get("name", ""))
+
+    def geometry(self, element: Element) -> Box | Cylinder | Sphere | MeshFile:
+        """Return what is in a <geometry>."""
+        try:
+            if element.tag == "box":
+                return Box(self.numbers(element, "size", 3))
+            if element.tag == "cylinder":
+                return Cylinder(self.number(element, "radius"), self.number(element, "length"))
+            if element.tag == "sphere":
+                return Sphere(self.number(element, "radius"))
+        except ModelError as error:
+            raise self.error(element, str(error)) from None
+        scale = self.numbers(element, "scale", 3, np.ones(3))
+        if not scale.all():
+            raise self.error(element, f"scale: expected numbers other than zero, got {element.attributes['scale']!r}")
+        return MeshFile(self.text(element, "filename"), scale)
+
+    def color(self, element: Element) -> Color | None:
+        """Return the <color> of a <material>, None if it has none."""
+        at = self.one(element, "color")
+        if at is None:
+            return None
+        rgba = self.numbers(at, "rgba", 4)
+        if rgba.min() < 0 or rgba.max() > 1:
+            raise self.error(at, f"rgba: expected numbers from 0 to 1, got {at.attributes['rgba']!r}")
+        red, green, blue, opacity = rgba.tolist()
+        return red, green, blue, opacity
+
+    # Joints ----------------------------------------------------------------------------------------------------------
+
+    def joint(self, element: Element) -> RobotJoint:
+        """Return a <joint>."""
+        kind = self.text(element, "type")
+        if kind not in JOINT_TYPES:
+            raise self.error(element, f"type: expected one of {', '.join(JOINT_TYPES)}, got {quoted(kind)}")
+        limit, dynamics, mimic = (self.one(element, tag) for tag in ("limit", "dynamics", "mimic"))
+        if kind == "revolute" and limit is None:
+            raise self.error(
+                element, 'a revolute joint has limits: expected <limit lower="..." upper="...">, got none; one without '
+                "limits is of the type continuous"
+            )  # fmt: skip
+        if kind == "continuous" and limit is not None and {"lower", "upper"} & set(limit.attributes):
+            self.unread["limit lower/upper of a continuous joint"] += 1
+        if kind in ("planar", "floating", "fixed") and dynamics is not None:
+            self.unread[f"dynamics of a {kind} joint"] += 1
+        return RobotJoint(
+            self.text(element, "name"),
+            kind,
+            self.text(self.needed(element, "parent"), "link"),
+            self.text(self.needed(element, "child"), "link"),
+            self.pose(element),
+            self.axis(element, kind),
+            self.limits(limit, kind),
+            damping=0.0 if dynamics is None else self.number(dynamics, "damping", 0.0),
+            friction=0.0 if dynamics is None else self.number(dynamics, "friction", 0.0),
+            mimic=None if mimic is None else self.mimic(mimic),
+            line=element.line,
+        )
+
+    def axis(self, element: Element, kind: str) -> Array:
+        """Return the axis of a joint, (3,), of length one; x without <axis>."""
+        at = self.one(element, "axis")
+        if at is None or kind not in WITH_AXIS:
+            return np.array([1.0, 0.0, 0.0])
+        axis = self.numbers(at, "xyz", 3)
+        length = float(np.linalg.norm(axis))
+        if length == 0:
+            raise self.error(at, "xyz: expected a direction, got the zero vector")
+        return axis if abs(length - 1) < 1e-15 else axis / length
+
+    def limits(self, element: Element | None, kind: str) -> JointLimits:
+        """Return the limits of a joint; of a revolute or prismatic one a number that is missing is 0, as specified."""
+        effort, velocity = self.optional(element, "effort"), self.optional(element, "velocity")
+        if element is None or kind not in ("revolute", "prismatic"):
+            return JointLimits(None, None, effort, velocity)
+        return JointLimits(self.number(element, "lower", 0.0), self.number(element, "upper", 0.0), effort, velocity)
+
+    def mimic(self, element: Element) -> Mimic:
+        """Return a <mimic>."""
+        return Mimic(
+            self.text(element, "joint"), self.number(element, "multiplier", 1.0), self.number(element, "offset", 0.0)
+        )

@@ -1,0 +1,312 @@
+"""A robot as URDF describes it: links in a tree of joints. What the file says, checked, in its own terms.
+
+A link has one frame; the frame of a joint stands at `pose` in that of its parent link, and is that of its child link
+where the joint is at zero. Lengths are in m, masses in kg, angles in rad.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.words import nearest, quoted, shortened
+from floatframe.errors import UrdfError
+from floatframe.model.checked_values import array_of_shape, number, unit_vector
+from floatframe.model.shapes import Box, Cylinder, Sphere
+
+__all__ = [
+    "JOINT_TYPES",
+    "Inertial",
+    "JointLimits",
+    "Link",
+    "MeshFile",
+    "Mimic",
+    "Picture",
+    "Pose",
+    "Robot",
+    "RobotJoint",
+]
+
+JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "planar", "floating")
+WITH_AXIS = ("revolute", "continuous", "prismatic", "planar")
+WITH_VALUE = ("revolute", "continuous", "prismatic")  #: whose position is one number
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """A place and a turn, as URDF writes them."""
+
+    xyz: Array = field(default_factory=lambda: np.zeros(3))  #: (3,) [m]
+    rpy: Array = field(default_factory=lambda: np.zeros(3))  #: roll, pitch, yaw about fixed x, y, z, (3,) [rad]
+
+    def __post_init__(self) -> None:
+        for name in ("xyz", "rpy"):
+            object.__setattr__(self, name, array_of_shape(name, getattr(self, name), (3,)))
+
+    @cached_property
+    def rotation(self) -> Array:
+        """R = R_z(yaw) R_y(pitch) R_x(roll), (3, 3): from the axes of the pose to those it is given in."""
+        (cr, cp, cy), (sr, sp, sy) = np.cos(self.rpy), np.sin(self.rpy)
+        return np.array(
+            [
+                [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+                [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+                [-sp, cp * sr, cp * cr],
+            ]
+        )
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class Inertial:
+    """Mass properties of a link."""
+
+    mass: float  #: [kg]
+    pose: Pose  #: centre of mass, and the axes of the tensor, in the frame of the link
+    tensor: Array  #: about the centre of mass, in the axes of the pose, (3, 3) [kg m²]
+
+
+@dataclass(frozen=True, eq=False)
+class MeshFile:
+    """A surface in a file, as the description names it."""
+
+    file: str  #: as written: package://..., file://..., a path relative to the description
+    scale: Array = field(default_factory=lambda: np.ones(3))  #: of its three coordinates, (3,)
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """What a link looks like (visual), or what it touches with (collision)."""
+
+    geometry: Box | Cylinder | Sphere | MeshFile
+    pose: Pose = field(default_factory=Pose)
+    color: tuple[float, float, float, float] | None = None  #: red, green, blue, opacity, 0 to 1 each
+    name: str = ""
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class Link:
+    """A link."""
+
+    name: str
+    inertial: Inertial | None = None  #: None: it has no mass
+    visuals: tuple[Picture, ...] = ()
+    collisions: tuple[Picture, ...] = ()
+    line: int = 0  #: of the file, 0: none
+
+    @property
+    def mass(self) -> float:
+        """Its mass, 0 without inertia [kg]."""
+        return 0.0 if self.inertial is None else self.inertial.mass
+
+
+@dataclass(frozen=True)
+class JointLimits:
+    """Limits of a joint; what is None is not said."""
+
+    lower: float | None = None  #: [rad or m]
+    upper: float | None = None
+    effort: float | None = None  #: [N m or N]
+    velocity: float | None = None  #: [rad/s or m/s]
+
+
+@dataclass(frozen=True)
+class Mimic:
+    """A joint follows another: value = multiplier × that of the other + offset."""
+
+    joint: str
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class RobotJoint:
+    """A joint between two links."""
+
+    name: str
+    type: str  #: one of `JOINT_TYPES`
+    parent: str
+    child: str
+    pose: Pose = field(default_factory=Pose)  #: of its frame in that of the parent link
+    axis: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))  #: in its frame, (3,), of length one
+    limits: JointLimits = field(default_factory=JointLimits)
+    damping: float = 0.0  #: [N m s/rad or N s/m]
+    friction: float = 0.0  #: of Coulomb [N m or N]
+    mimic: Mimic | None = None
+    line: int = 0  #: of the file, 0: none
+
+    @property
+    def has_value(self) -> bool:
+        """Whether its position is one number."""
+        return self.type in WITH_VALUE
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A robot: links, and joints that make one tree of them.
+
+    Raises
+    ------
+    UrdfError
+        If a name is used twice, a joint names a link that does not exist, a link has two parents, the links are no
+        tree with one root, a limit or a joint that is followed is impossible. Masses are judged where bodies are made.
+    """
+
+    name: str
+    links: Sequence[Link]
+    joints: Sequence[RobotJoint] = ()
+    source: str = ""  #: path of its file, "": made in Python
+    notes: Sequence[str] = ()  #: what the file holds that is not read
+
+    def __post_init__(self) -> None:
+        for name in ("links", "joints", "notes"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        if not self.links:
+            raise UrdfError(f"{self.where()}: expected at least one link, got none")
+        for kind, parts in (("link", self.links), ("joint", self.joints)):
+            seen: dict[str, int] = {}
+            for part in parts:
+                if part.name in seen:
+                    raise UrdfError(
+                        f"{self.where(part.line)}: there are two {kind}s {quoted(part.name)}; give each its own name"
+                    )
+                seen[part.name] = part.line
+        for joint in self.joints:
+            self.check_joint(joint)
+        self.check_tree()
+
+    def where(self, line: int = 0) -> str:
+        """Return the beginning of a message about a line of the file."""
+        place = self.source or f"robot {self.name!r}"
+        return f"{place}, line {line}" if line else place
+
+    def check_joint(self, joint: RobotJoint) -> None:
+        """Raise `UrdfError` if a joint is impossible."""
+        where = f"{self.where(joint.line)}: joint {quoted(joint.name)}"
+        if joint.type not in JOINT_TYPES:
+            raise UrdfError(f"{where}: unknown type {quoted(joint.type)}{nearest(joint.type, JOINT_TYPES)}")
+        for what, name in (("parent", joint.parent), ("child", joint.child)):
+            if name not in self.by_link:
+                raise UrdfError(f"{where}: {what}: there is no link {quoted(name)}{nearest(name, self.by_link)}")
+        lower, upper = joint.limits.lower, joint.limits.upper
+        if lower is not None and upper is not None and lower > upper:
+            raise UrdfError(f"{where}: limits: expected lower up to upper, got {lower:g} and {upper:g}")
+        for what in ("effort", "velocity"):
+            value = getattr(joint.limits, what)
+            if value is not None and value < 0:
+                raise UrdfError(f"{where}: limits: {what}: expected 0 or more, got {value:g}")
+        for what in ("damping", "friction"):
+            if getattr(joint, what) < 0:
+                raise UrdfError(f"{where}: {what}: expected 0 or more, got {getattr(joint, what):g}")
+        if joint.mimic is not None:
+            self.check_mimic(where, joint)
+
+    def check_mimic(self, where: str, joint: RobotJoint) -> None:
+        """Raise `UrdfError` if a joint cannot follow the one that it names."""
+        assert joint.mimic is not None
+        if not joint.has_value:
+            raise UrdfError(f"{where}: mimic: a {joint.type} joint has no single value that could follow another")
+        leader = self.by_joint.get(joint.mimic.joint)
+        if leader is None:
+            choices = [each.name for each in self.joints if each.has_value]
+            raise UrdfError(
+                f"{where}: mimic: there is no joint {quoted(joint.mimic.joint)}{nearest(joint.mimic.joint, choices)}"
+            )
+        if not leader.has_value:
+            raise UrdfError(f"{where}: mimic: joint {quoted(leader.name)} is {leader.type}, it has no single value")
+        seen = {joint.name}
+        while leader is not None:
+            if leader.name in seen:
+                raise UrdfError(f"{where}: mimic: joints follow each other in a ring: {', '.join(sorted(seen))}")
+            seen.add(leader.name)
+            leader = None if leader.mimic is None else self.by_joint.get(leader.mimic.joint)
+
+    def check_tree(self) -> None:
+        """Raise `UrdfError` unless joints and links are one tree."""
+        parent: dict[str, RobotJoint] = {}
+        for joint in self.joints:
+            if joint.child in parent:
+                raise UrdfError(
+                    f"{self.where(joint.line)}: link {quoted(joint.child)} is the child of two joints, "
+                    f"{quoted(parent[joint.child].name)} and {quoted(joint.name)}; URDF describes trees: close the "
+                    "loop in the system, by a joint between two of its bodies"
+                )
+            parent[joint.child] = joint
+        roots = [link.name for link in self.links if link.name not in parent]
+        if len(roots) != 1:
+            told = shortened(", ".join(map(repr, roots))) or "none: its joints form a ring"
+            raise UrdfError(f"{self.where()}: expected one link that is no child, the root, got {told}")
+        if len(self.order) != len(self.links):
+            left = sorted(set(self.by_link) - set(self.order))
+            raise UrdfError(
+                f"{self.where()}: no way leads from the root {roots[0]!r} to {shortened(', '.join(map(repr, left)))}: "
+                "their joints form a ring"
+            )
+
+    @cached_property
+    def by_link(self) -> dict[str, Link]:
+        """Links by name."""
+        return {link.name: link for link in self.links}
+
+    @cached_property
+    def by_joint(self) -> dict[str, RobotJoint]:
+        """Joints by name."""
+        return {joint.name: joint for joint in self.joints}
+
+    @cached_property
+    def parent_joint(self) -> dict[str, RobotJoint]:
+        """The joint of which each link but the root is the child, by name of the link."""
+        return {joint.child: joint for joint in self.joints}
+
+    @property
+    def root(self) -> str:
+        """Name of the link that is no child."""
+        return next(link.name for link in self.links if link.name not in self.parent_joint)
+
+    @cached_property
+    def order(self) -> tuple[str, ...]:
+        """Names of the links, the root first, each after its parent and before the links beside it (depth first)."""
+        children: dict[str, list[str]] = {}
+        for joint in self.joints:
+            children.setdefault(joint.parent, []).append(joint.child)
+        order, left = [], [self.root]
+        while left:
+            order.append(left.pop())
+            left += reversed(children.get(order[-1], []))
+        return tuple(order)
+
+    def link(self, name: str) -> Link:
+        """Return a link; `UrdfError` with the choices if there is none of that name."""
+        if name not in self.by_link:
+            raise UrdfError(f"{self.where()}: there is no link {quoted(name)}{nearest(name, self.by_link)}")
+        return self.by_link[name]
+
+    def joint(self, name: str) -> RobotJoint:
+        """Return a joint; `UrdfError` with the choices if there is none of that name."""
+        if name not in self.by_joint:
+            raise UrdfError(f"{self.where()}: there is no joint {quoted(name)}{nearest(name, self.by_joint)}")
+        return self.by_joint[name]
+
+
+def checked_axis(where: str, values: Array) -> Array:
+    """Return an axis of length one; `UrdfError` if it has no direction."""
+    try:
+        return unit_vector(where, values)
+    except ValueError as error:
+        raise UrdfError(str(error)) from None
+
+
+def checked_number(where: str, value: float) -> float:
+    """Return a finite number; `UrdfError` if it is none."""
+    try:
+        return number(where, value)
+    except ValueError as error:
+        raise UrdfError(str(error)) from None

@@ -1,0 +1,187 @@
+"""Gaps of measured histories: times that do not rise, steps that change, samples that are missing or no numbers.
+
+Each is refused in one message with the place in the file; gaps up to a stated length are filled by interpolation, and
+said.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.words import quoted
+from floatframe.errors import SignalError
+from floatframe.files.signals.signals import equidistant_step
+
+__all__ = ["without_gaps"]
+
+FEW = 20  #: samples below which steps that differ are taken as meant
+MOST_STEPS = 4  #: different steps that are a change of the rate; more are a step that follows something
+COMMON = 0.9  #: of the steps that must be alike for the others to be gaps
+MOST_COUNTED = 1e12  #: samples of a gap
+ALIKE = 0.02  #: of a step by which rounded times may let it differ
+
+
+def without_gaps(
+    time: Array,
+    values: Array,
+    names: Sequence[str],
+    place: Callable[[int], str],
+    *,
+    fill: float = 0.0,
+    uneven: bool = False,
+) -> tuple[Array, Array, tuple[str, ...]]:
+    """Return times and values without gaps, and what was done in words.
+
+    Parameters
+    ----------
+    time
+        (n_t,) [s], as read; NaN where it is missing.
+    values
+        (n_t, n_channels), NaN where a sample is missing.
+    names
+        Of the channels.
+    place
+        Words for the place of sample k in the file, such as "road.csv, line 17".
+    fill
+        Longest gap that is filled by a monotone cubic (PCHIP) between the samples beside it [s].
+    uneven
+        Let steps of several sizes stand.
+
+    Raises
+    ------
+    SignalError
+        For the first gap that is longer, with its place.
+    """
+    time, values = np.array(time, dtype=float), np.array(values, dtype=float)
+    require_rising(time, place)
+    step = usual_step(time)
+    notes: list[str] = []
+    if step is not None and equidistant_step(time) is None:
+        lost = np.flatnonzero(np.diff(time) > (1 + 10 * ALIKE) * step)
+        require_whole_steps(time, lost, step, place, uneven=uneven)
+        if not uneven or fill > 0:
+            time, values, told = with_lost_samples(time, values, step, fill, place)
+            notes += told
+    elif step is None and not uneven:
+        require_one_rate(time, place)
+    values, told = with_numbers(time, values, names, fill, place)
+    return time, values, (*notes, *told)
+
+
+def require_rising(time: Array, place: Callable[[int], str]) -> None:
+    """Raise `SignalError` at the first time that is no number, or does not rise."""
+    bad = np.flatnonzero(~np.isfinite(time))
+    if len(bad):
+        raise SignalError(f"{place(int(bad[0]))}: the time is missing or no number; expected rising times")
+    bad = np.flatnonzero(np.diff(time) <= 0)
+    if len(bad):
+        k = int(bad[0]) + 1
+        more = f" ({len(bad)} such places)" if len(bad) > 1 else ""
+        raise SignalError(
+            f"{place(k)}: expected times that rise, got {time[k]:.9g} after {time[k - 1]:.9g}{more}; is this column "
+            f"the "
+            "time? A table without times needs its rate"
+        )
+
+
+def usual_step(time: Array) -> float | None:
+    """Return the step that nearly all samples have, None if there is none."""
+    if len(time) < FEW:
+        return None
+    dt = np.diff(time)
+    step = float(np.median(dt))
+    alike = np.abs(dt - step) <= ALIKE * step
+    return float(dt[alike].mean()) if alike.mean() >= COMMON else None
+
+
+def require_whole_steps(time: Array, lost: IntArray, step: float, place: Callable[[int], str], *, uneven: bool) -> None:
+    """Raise `SignalError` where a step is no multiple of the usual one: the rate changes there."""
+    dt = np.diff(time)
+    odd = np.flatnonzero((np.abs(dt - step) > 10 * ALIKE * step) & (np.abs(dt / step - np.round(dt / step)) > 0.1))
+    if len(odd) and not uneven:
+        k = int(odd[0])
+        raise SignalError(
+            f"{place(k + 1)}: the step is {dt[k]:.6g} s, elsewhere {step:.6g} s, and no multiple of it ({len(odd)} "
+            f"such "
+            "places); resample it (resample = ..., or uneven steps allowed)"
+        )
+
+
+def with_lost_samples(
+    time: Array, values: Array, step: float, fill: float, place: Callable[[int], str]
+) -> tuple[Array, Array, list[str]]:
+    """Return times with those that are missing between, and NaN as their values."""
+    counts = np.minimum(np.round(np.diff(time) / step), MOST_COUNTED).astype(np.int64)
+    wide = np.flatnonzero(counts > 1)
+    if not len(wide):
+        return time, values, []
+    longest = int(wide[np.argmax(counts[wide])])
+    length = float(time[longest + 1] - time[longest])
+    n_lost = int((counts[wide] - 1).sum())
+    if length > fill * (1 + 1e-9):
+        k = next(int(i) for i in wide if time[i + 1] - time[i] > fill * (1 + 1e-9))
+        raise SignalError(
+            f"{place(k + 1)}: samples are missing between t = {time[k]:.9g} and {time[k + 1]:.9g} s, at steps of "
+            f"{step:.6g} s ({n_lost} samples in {len(wide)} gaps, the longest {length:.6g} s); gaps up to a length are "
+            f"filled by interpolation if asked for (fill = {length:.3g})"
+        )
+    row = np.concatenate([[0], np.cumsum(np.maximum(counts, 1))])
+    whole = np.full((int(row[-1]) + 1, values.shape[1]), np.nan)
+    whole[row] = values
+    times = np.interp(np.arange(len(whole)), row, time)
+    return times, whole, [f"{n_lost} missing samples in {len(wide)} gaps, the longest {length:.6g} s"]
+
+
+def require_one_rate(time: Array, place: Callable[[int], str]) -> None:
+    """Raise `SignalError` if the record changes between a few rates."""
+    if len(time) < FEW:
+        return
+    dt = np.diff(time)
+    kinds: list[float] = []
+    for size in dt:  # until there are too many: then the step follows something, and is meant
+        if all(abs(size - kind) > 10 * ALIKE * kind for kind in kinds):
+            kinds.append(float(size))
+            if len(kinds) > MOST_STEPS:
+                return
+    if len(kinds) > 1:
+        k = int(np.flatnonzero(np.abs(dt - dt[0]) > 10 * ALIKE * dt[0])[0])
+        raise SignalError(
+            f"{place(k + 1)}: the step changes from {dt[0]:.6g} to {dt[k]:.6g} s ({len(kinds)} different steps in the "
+            "record); resample it (resample = ..., or uneven steps allowed)"
+        )
+
+
+def with_numbers(
+    time: Array, values: Array, names: Sequence[str], fill: float, place: Callable[[int], str]
+) -> tuple[Array, list[str]]:
+    """Return values with gaps filled; `SignalError` for the first that is too long, or at an end."""
+    from scipy.interpolate import PchipInterpolator
+
+    notes = []
+    for column, name in enumerate(names):
+        bad = ~np.isfinite(values[:, column])
+        if not bad.any():
+            continue
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], bad, [False]]).astype(np.int8)))
+        begins, ends = edges[::2], edges[1::2]  # of the runs, the ends not in them
+        for first, end in zip(begins, ends, strict=True):
+            where = f"{place(int(first))}: channel {quoted(name)}"
+            if first == 0 or end == len(time):
+                at = "begins" if first == 0 else "ends"
+                raise SignalError(f"{where} {at} without numbers; expected a number in every sample there: cut it off")
+            length = float(time[end] - time[first - 1])
+            if length > fill * (1 + 1e-9):
+                raise SignalError(
+                    f"{where}: {end - first} samples are no numbers, from t = {time[first]:.9g} s on ({int(bad.sum())} "
+                    f"in the channel, in {len(begins)} gaps); gaps up to a length are filled by interpolation if asked "
+                    f"for (fill = {length:.3g})"
+                )
+        good = ~bad
+        values[bad, column] = PchipInterpolator(time[good], values[good, column])(time[bad])
+        longest = float((time[ends] - time[begins - 1]).max())
+        notes.append(
+            f"channel {name}: {int(bad.sum())} samples in {len(begins)} gaps filled by interpolation, the longest "
+            f"{longest:.6g} s"
+        )
+    return values, notes

@@ -1,0 +1,167 @@
+"""Reading of the system file, as `floatframe run` does it (docs/system_file.md).
+
+    system, run = read_system("swing.toml")
+    trajectory = integrate(system, run.integrator, run.t_end, run.h, output="swing.h5", output_every=run.output_every,
+                           progress=callback)          # callback(Progress(t, t_end, n_steps, n_total, n_iterations))
+    trajectory = read_results("swing.h5")
+
+All of them raise `FloatframeError`, whose text is a message for the user.
+"""
+
+import logging
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from cms.body.reduced_body import ReducedBody
+from cms.errors import CmsError
+from fe_models.foundation.toml_file import Table, Vector3, changed, choice, read_toml, validated
+from fe_models.foundation.units import UNIT_SYSTEMS, unit_system
+from fe_models.foundation.words import nearest
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.errors import FloatframeError, SystemFileError
+from floatframe.files.system_file.bodies import BodySection, body_of
+from floatframe.files.system_file.channel_section import InputSection, OutputSection
+from floatframe.files.system_file.cosimulation_section import CosimulationSection, FmuSection, ForeignSection
+from floatframe.files.system_file.element_section import element_of
+from floatframe.files.system_file.event_section import EventSection
+from floatframe.files.system_file.forces import ForceSection, force_of
+from floatframe.files.system_file.joints import CouplerSection, JointSection, coupler_of, joint_of
+from floatframe.files.system_file.keys import Name
+from floatframe.files.system_file.run_section import RunOptions, RunSection
+from floatframe.files.system_file.sensor_section import SensorSection
+from floatframe.files.system_file.shape_section import ShapeSection
+from floatframe.files.system_file.signal_section import SignalSection, signal_functions
+from floatframe.files.system_file.unit_hints import unit_hints
+from floatframe.model.bodies.ground import GROUND
+from floatframe.model.forces import (
+    Force,
+    Gravity,
+)
+from floatframe.model.system import REDUNDANT, System
+from floatframe.simulation.events import require_events
+
+__all__ = ["RunOptions", "read_system"]
+
+log = logging.getLogger(__name__)
+
+
+class SystemSection(Table):
+    """[system]: name, units and gravity of the system."""
+
+    name: Name | None = Field(None, description="the name of the system, text; default: the name of the file")
+    units: choice("unit system", lambda: tuple(UNIT_SYSTEMS)) = Field(  # type: ignore[valid-type]
+        description=f"the unit system of all numbers, one of {', '.join(UNIT_SYSTEMS)}"
+    )
+    gravity: Vector3 = Field((0.0, 0.0, 0.0), description="the acceleration of free fall, [x, y, z]")
+    redundant: choice("way with redundant constraints", lambda: REDUNDANT) = Field(  # type: ignore[valid-type]
+        "refuse", description=f"one of {', '.join(REDUNDANT)}"
+    )
+
+
+class SystemFile(Table):
+    """A system and its run."""
+
+    system: SystemSection = Field(description="a table [system] with units and gravity")
+    bodies: dict[str, BodySection] = Field(description="tables [bodies.NAME]")
+    joints: dict[str, JointSection] = Field({}, description="tables [joints.NAME]")
+    couplers: dict[str, CouplerSection] = Field({}, description="tables [couplers.NAME]")
+    forces: dict[str, ForceSection] = Field({}, description="tables [forces.NAME]")
+    elements: dict[str, dict[str, Any]] = Field({}, description="tables [elements.NAME]")
+    signals: dict[str, SignalSection] = Field({}, description="tables [signals.NAME]")
+    sensors: dict[str, SensorSection] = Field({}, description="tables [sensors.NAME]")
+    inputs: dict[str, InputSection] = Field({}, description="tables [inputs.NAME]")
+    outputs: dict[str, OutputSection] = Field({}, description="tables [outputs.NAME]")
+    events: dict[str, EventSection] = Field({}, description="tables [events.NAME]")
+    fmu: FmuSection | None = Field(None, description="a table [fmu] with inputs, outputs and parameters")
+    fmus: dict[str, ForeignSection] = Field({}, description="tables [fmus.NAME]")
+    cosimulation: CosimulationSection | None = Field(None, description="a table [cosimulation] with step and scheme")
+    scene: list[ShapeSection] = Field([], description="tables [[scene]], the surroundings: ground, road, track")
+    run: RunSection | None = Field(None, description="a table [run] with t_end and h")
+
+    @model_validator(mode="after")
+    def _names_bodies(self) -> "SystemFile":
+        choices = [GROUND.name, *self.bodies]
+        terms = {f"{name}.terms": term for name, coupler in self.couplers.items() for term in coupler.terms}
+        coordinates = {
+            f"{name}.coordinates.{key}": section
+            for name, force in self.forces.items()
+            for key, section in (force.coordinates or {}).items()
+        }
+        for kind, sections in (("joints", self.joints), ("forces", self.forces), ("sensors", self.sensors),
+                               ("couplers", terms), ("forces", coordinates),
+                               ("inputs", self.inputs), ("outputs", self.outputs)):  # fmt: skip
+            for name, section in sections.items():
+                for key in ("body", "body_a", "body_b", "relative_to"):
+                    body = getattr(section, key, None)
+                    if body is not None and body not in choices:
+                        hint = nearest(body, choices)
+                        raise ValueError(f'{kind}.{name}.{key} = "{body}": there is no such body{hint}')
+        return self
+
+
+def read_system(
+    path: str | os.PathLike[str], changes: Mapping[str, Any] | None = None
+) -> tuple[System, RunOptions | None]:
+    """Read and validate a system file and its modal files; return the system and, if there is a table [run], its run.
+
+    Parameters
+    ----------
+    path
+        The system file.
+    changes
+        Values that replace those in the file, by key path, such as {"bodies.rod.mass": 2.0}.
+
+    Raises
+    ------
+    SystemFileError
+        If the file is not valid. The message lists every problem, with key path, value, expected value and nearest
+        name.
+    """
+    path = Path(path)
+    content = changed(read_toml(path, SystemFileError), changes or {}, str(path), SystemFileError)
+    data = validated(SystemFile, content, path, SystemFileError, context=path.parent)
+    files: dict[Any, ReducedBody] = {}
+    try:
+        units = unit_system(data.system.units)
+        bodies = [body_of(name, section, files, units) for name, section in data.bodies.items()]
+        signals = signal_functions(data.signals, units)
+        joints = [joint_of(name, section, signals) for name, section in data.joints.items()]
+        couplers = [coupler_of(name, section, signals) for name, section in data.couplers.items()]
+        forces: list[Force] = [force_of(name, section, signals) for name, section in data.forces.items()]
+        element_files: list[str] = []
+        elements = [
+            element_of(name, table, path.parent, signals, element_files) for name, table in data.elements.items()
+        ]
+        if any(data.system.gravity):
+            forces.insert(0, Gravity(np.array(data.system.gravity)))
+        name = data.system.name or path.stem
+        sensors = [section.sensor(key) for key, section in data.sensors.items()]
+        system = System(
+            bodies, joints, forces, units, name, data.system.redundant, couplers, elements=elements, sensors=sensors,
+            inputs=[section.channel(key) for key, section in data.inputs.items()],
+            outputs=[section.output(key, sensors) for key, section in data.outputs.items()],
+            events=[section.event(key) for key, section in data.events.items()],
+            fmus=[section.unit(key, path.parent) for key, section in data.fmus.items()],
+            scene=[section.shape for section in data.scene],
+            source=str(path.resolve()),
+            data_files=tuple(dict.fromkeys([*(str(each.file) for each in data.signals.values()), *element_files])),
+        )  # fmt: skip
+        _ = compiled_system(system)  # looks up all markers and interfaces
+        require_events(system)
+        for signal in signals.values():
+            if signal.notes:
+                log.warning("%s: signal %s: %s", path, signal.name, "; ".join(signal.notes))
+        for hint in unit_hints(system):
+            log.warning("%s: %s", path, hint)
+    except (FloatframeError, CmsError) as error:
+        raise SystemFileError(f"{path}: {error}") from error
+    if data.run is None:
+        return system, None
+    coupling = None if data.cosimulation is None else data.cosimulation.coupling()
+    return system, replace(data.run.options(), coupling=coupling)

@@ -1,0 +1,141 @@
+"""The table [run] of a system file: the integrator of the motion and its options."""
+
+import os
+from dataclasses import dataclass
+from inspect import signature
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.toml_file import Table, choice
+from fe_models.foundation.words import nearest
+from floatframe.engine.tree.formulation import FORMULATIONS
+from floatframe.errors import SystemFileError
+from floatframe.integrators import INTEGRATORS
+from floatframe.integrators.carry import Integrator
+from floatframe.integrators.generalized_alpha import GeneralizedAlpha, hht, newmark, trapezoidal
+from floatframe.integrators.relative import RelativeGeneralizedAlpha, in_formulation
+from floatframe.simulation.foreign_units import Coupling
+from floatframe.simulation.step_watch import WATCHES
+
+__all__ = ["RunOptions", "RunSection", "formulation_of", "required_run"]
+
+MOST_TIMES = 1e8  #: largest number of output times of a driven motion
+NOT_OF_A_METHOD = ("t_end", "h", "output_every", "scheme", "formulation", "watch")
+#: schemes that also work in joint coordinates
+OF_BOTH_FORMULATIONS = (GeneralizedAlpha, hht, newmark, trapezoidal)
+
+
+def keys_of(scheme: str) -> tuple[str, ...]:
+    """Return the keys of the method of that name; a special case of generalized-alpha has its keys too."""
+    names = [name for name in signature(INTEGRATORS[scheme]).parameters if name not in ("options", "parameters")]
+    if "options" in signature(INTEGRATORS[scheme]).parameters:
+        names += [name for name in signature(GeneralizedAlpha).parameters if name not in ("rho_inf", "parameters")]
+    return tuple(names)
+
+
+class RunSection(Table):
+    """[run]: the integrator and its options."""
+
+    t_end: Annotated[float, Field(gt=0)] = Field(description="a number above 0, the end time")
+    h: Annotated[float, Field(gt=0)] = Field(description="a number above 0, the step size")
+    output_every: Annotated[int, Field(ge=1)] = Field(
+        1, description="a whole number above 0: results are written after every so many steps"
+    )
+    scheme: choice("scheme", lambda: tuple(INTEGRATORS)) = Field(  # type: ignore[valid-type]
+        "generalized-alpha", description=f"one of {', '.join(INTEGRATORS)}"
+    )
+    formulation: choice("formulation", lambda: FORMULATIONS) = Field(  # type: ignore[valid-type]
+        "absolute", description=f"one of {', '.join(FORMULATIONS)}: coordinates of bodies, or of joints"
+    )
+    rho_inf: Annotated[float, Field(ge=0, le=1)] | None = Field(
+        None, description="a number between 0 and 1, the spectral radius at infinite frequency"
+    )
+    alpha: Annotated[float, Field(ge=-1 / 3, le=0)] | None = Field(
+        None, description="a number between -1/3 and 0, numerical damping of the scheme hht"
+    )
+    beta: Annotated[float, Field(gt=0)] | None = Field(
+        None, description="a number above 0, a parameter of the scheme newmark"
+    )
+    gamma: Annotated[float, Field(ge=0.5)] | None = Field(
+        None, description="a number, 1/2 or more, a parameter of the scheme newmark"
+    )
+    rtol: Annotated[float, Field(gt=0, lt=1)] | None = Field(
+        None, description="a number between 0 and 1, the relative tolerance of the scheme ida"
+    )
+    atol: Annotated[float, Field(gt=0, lt=1)] | None = Field(
+        None, description="a number between 0 and 1, the absolute tolerance of the scheme ida"
+    )
+    tolerance: Annotated[float, Field(gt=0, lt=1)] | None = Field(
+        None, description="a number between 0 and 1, the tolerance of Newton's method"
+    )
+    max_iterations: Annotated[int, Field(ge=1)] | None = Field(
+        None, description="a whole number above 0, the most iterations of Newton's method in a step"
+    )
+    error_tolerance: Annotated[float, Field(gt=0)] | None = Field(
+        None,
+        description="a number above 0, error of a body in a step over the size of its assembly; none: fixed steps",
+    )
+    h_min: Annotated[float, Field(gt=0)] | None = Field(
+        None,
+        description="a number above 0, the smallest step when one that fails or meets a contact is divided",
+    )
+
+    watch: choice("watch", lambda: WATCHES) = Field(  # type: ignore[valid-type]
+        "stop",
+        description="stop, tell or off: what a run does if its steps distort the motion or add energy to it",
+    )
+
+    @model_validator(mode="after")
+    def _fits_the_scheme(self) -> "RunSection":
+        allowed = keys_of(self.scheme)
+        if self.formulation != "absolute" and INTEGRATORS[self.scheme] not in OF_BOTH_FORMULATIONS:
+            raise ValueError(f"the scheme {self.scheme} works in absolute coordinates alone; take away formulation")
+        for key in type(self).model_fields:
+            if key not in NOT_OF_A_METHOD and getattr(self, key) is not None and key not in allowed:
+                raise ValueError(f"the scheme {self.scheme} has no key {key}{nearest(key, allowed)}")
+        return self
+
+    def options(self) -> "RunOptions":
+        """Return the options that the table describes."""
+        parameters: dict[str, Any] = {
+            key: getattr(self, key) for key in keys_of(self.scheme) if getattr(self, key, None) is not None
+        }
+        integrator = in_formulation(INTEGRATORS[self.scheme](**parameters), self.formulation)
+        return RunOptions(self.t_end, self.h, self.output_every, integrator, watch=self.watch)
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """The options in the table [run]."""
+
+    t_end: float
+    h: float
+    output_every: int
+    integrator: Integrator
+    coupling: Coupling | None = None  #: coupling to FMUs of other programs; None: explicit, in steps of h
+    watch: str = "stop"  #: what a run does if its steps distort the motion, see `integrate`
+
+    def output_times(self) -> Array:
+        """Return the output times of a run, (n_t,) [s]; `SystemFileError` if there are too many for the memory."""
+        wanted = self.t_end / (self.h * self.output_every)
+        if not wanted <= MOST_TIMES:
+            raise SystemFileError(
+                f"run: t_end = {self.t_end:g} with h = {self.h:g} and output_every = {self.output_every} are "
+                f"{wanted:.1e} times, expected up to {MOST_TIMES:.0e}; choose a smaller t_end or a greater h"
+            )
+        return np.linspace(0.0, self.t_end, max(1, round(wanted)) + 1)
+
+
+def formulation_of(run: RunOptions | None) -> str:
+    """Return the formulation of a run, which its analyses use too; "absolute" if there is no run."""
+    return "relative" if run is not None and isinstance(run.integrator, RelativeGeneralizedAlpha) else "absolute"
+
+
+def required_run(run: RunOptions | None, path: str | os.PathLike[str]) -> RunOptions:
+    """Return the run of a system file; `SystemFileError` if it has none."""
+    if run is None:
+        raise SystemFileError(f"{path}: run: missing; expected a table [run] with t_end and h, for a motion over time")
+    return run

@@ -1,9 +1,0 @@
-"""Alternatives to a single floating frame for flexible parts; each consists of several bodies, joints and forces."""
-
-from floatframe.flexible_parts.exact_beams import exact_beams
-from floatframe.flexible_parts.finite_segments import finite_segments
-from floatframe.flexible_parts.flexible_part import FlexiblePart, PartMaker
-from floatframe.flexible_parts.floating_parts import floating_parts
-from floatframe.flexible_parts.superelement import corotational
-
-__all__ = ["FlexiblePart", "PartMaker", "corotational", "exact_beams", "finite_segments", "floating_parts"]

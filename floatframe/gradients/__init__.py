@@ -1,5 +1,0 @@
-"""Gradients: derivatives of motions, equilibria and vibrations by parameters, direct and adjoint."""
-
-from floatframe.gradients.sensitivities import Sensitivities, sensitivities
-
-__all__ = ["Sensitivities", "sensitivities"]

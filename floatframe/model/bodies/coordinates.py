@@ -1,0 +1,72 @@
+"""Coordinates of the motion for couplers and user forces; each has a force that acts to increase it."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
+from floatframe.errors import ModelError
+from floatframe.model.bodies.markers import Marker
+from floatframe.model.checked_values import unit_vector
+
+__all__ = ["AxialAngle", "AxialDistance", "Coordinate", "JointCoordinate", "PointDistance", "coordinate_words"]
+
+
+@dataclass(frozen=True)
+class JointCoordinate:
+    """A coordinate of a joint, a distance or an angle, free or prescribed."""
+
+    joint: str  #: name of the joint
+    coordinate: str  #: name of its coordinate, such as "angle"
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class AxialDistance:
+    """Distance of the point of marker B from that of marker A along an axis of A; its force acts at the point of B."""
+
+    marker_a: Marker
+    marker_b: Marker
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axis", unit_vector("AxialDistance: axis", self.axis))
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class AxialAngle:
+    """Angle of marker B about an axis of A, zero as assembled; its rate is the angular velocity along the axis.
+
+    It is intended for markers that rotate relative to each other about that axis. If the axis of B tilts by a small
+    angle, value and rate are inconsistent by the square of this angle.
+    """
+
+    marker_a: Marker
+    marker_b: Marker
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axis", unit_vector("AxialAngle: axis", self.axis))
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class PointDistance:
+    """Distance between the points of two markers; its force acts along the line between them."""
+
+    marker_a: Marker
+    marker_b: Marker
+
+
+Coordinate = JointCoordinate | AxialDistance | AxialAngle | PointDistance
+
+
+def coordinate_words(where: str, value: object) -> Coordinate:
+    """Return a coordinate unchanged; `ModelError` if it is not a coordinate."""
+    if not isinstance(value, Coordinate):
+        raise ModelError(
+            f"{where}: expected a JointCoordinate, AxialDistance, AxialAngle or PointDistance, got {value!r}"
+        )
+    return value

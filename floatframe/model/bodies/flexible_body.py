@@ -1,0 +1,132 @@
+"""A flexible body: a reduced body (modal file) with initial position and motion."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from cms.body.reduced_body import ReducedBody
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
+from floatframe.errors import ModelError
+from floatframe.model.bodies.mean_axes import MeanAxes, mean_axes
+from floatframe.model.bodies.rigid_body import euler_parameters_from_user
+from floatframe.model.checked_values import array_of_shape
+from floatframe.model.rotations import rotation_matrix
+from floatframe.model.shapes.shape import Geometry, Shape, shape_tuple
+
+__all__ = ["FlexibleBody"]
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class FlexibleBody:
+    """An instance of a reduced body; several instances can share its data.
+
+    Position and motion are those of the *mesh* axes. A body therefore stands where its mesh was drawn unless it is
+    moved, and the input does not change if the same part is reduced in another body frame (nodal or Tisserand).
+
+    Raises
+    ------
+    ModelError
+        If a number is not finite or an array has a wrong shape.
+    """
+
+    name: str
+    reduced: ReducedBody
+    position: Array = field(default_factory=lambda: np.zeros(3))  #: of the mesh origin, in ground axes, (3,) [m]
+    #: Euler parameters of the mesh axes, (4,)
+    orientation: Array = field(default_factory=lambda: np.array([1.0, 0, 0, 0]))
+    #: of the body point at the mesh origin, in ground axes, (3,) [m/s]
+    velocity: Array = field(default_factory=lambda: np.zeros(3))
+    #: angular velocity in mesh axes, (3,) [rad/s]
+    omega_B: Array = field(default_factory=lambda: np.zeros(3))  # noqa: N815
+    q: Array = field(default_factory=lambda: np.zeros(0))  #: initial modal coordinates, (n_q,); empty: undeformed
+    #: initial rates of the modal coordinates, (n_q,); empty: zero
+    q_dot: Array = field(default_factory=lambda: np.zeros(0))
+    source: str = ""  #: path of the modal file, stored in results and used for films
+    #: whether to use the geometric stiffness, by which loads stiffen or soften the body (theory.md §7); "auto": if
+    #: present
+    stiffening: bool | Literal["auto"] = "auto"
+    #: whether to neglect inertia terms that the reduced body lacks (`Moments.missing`); the motion is then exact to
+    #: first order in speeds and deformation. False: a body without them is refused
+    leave_out_missing: bool = False
+    #: shapes drawn besides its surface, in mesh axes or in those of interfaces
+    shapes: Sequence[Shape | Geometry] = field(default=(), kw_only=True)
+
+    def __post_init__(self) -> None:
+        where = f"flexible body {self.name!r}"
+        if self.reduced.is_held:
+            raise ModelError(
+                f"{where}: the reduced body {self.reduced.name!r} is held to the ground, and a floating frame "
+                "carries a "
+                "body that is free; reduce it anew without its supports, and hold it here by joints or bushings"
+            )
+        put = object.__setattr__
+        for name in ("position", "velocity", "omega_B"):
+            put(self, name, array_of_shape(f"{where}: {name}", getattr(self, name), (3,)))
+        put(self, "orientation", euler_parameters_from_user(f"{where}: orientation", self.orientation))
+        interfaces = [interface.name for interface in self.reduced.interfaces]
+        put(self, "shapes", shape_tuple(where, self.shapes, interfaces))
+        n = self.reduced.n_q
+        for name in ("q", "q_dot"):
+            value = getattr(self, name) if np.size(getattr(self, name)) else np.zeros(n)
+            put(self, name, array_of_shape(f"{where}: {name}", value, (n,)))
+        if not (isinstance(self.stiffening, bool) or self.stiffening == "auto"):
+            raise ModelError(f"{where}: stiffening: expected true, false or 'auto', got {self.stiffening!r}")
+        if self.stiffening is True and self.reduced.geometric is None:
+            raise ModelError(
+                f"{where}: stiffening is asked for, but the reduced body {self.reduced.name!r} holds no geometric "
+                "stiffness; reduce it anew with geometric stiffness from a body with an element model, or leave "
+                "stiffening out"
+            )
+        missing = self.reduced.moments.missing
+        if not isinstance(self.leave_out_missing, bool):
+            raise ModelError(f"{where}: leave_out_missing: expected true or false, got {self.leave_out_missing!r}")
+        if missing and self.reduced.n_q and not self.leave_out_missing:
+            raise ModelError(
+                f"{where}: a motion needs the inertia terms {', '.join(missing)}, which the reduced body "
+                f"{self.reduced.name!r} does not hold: the program that reduced it did not say them. Import it again "
+                "with its full mass matrix, its nodal masses, or its mesh and density beside (cms import); or say "
+                f"leave_out_missing = true: {self.reduced.moments.trust}"
+            )
+        if self.reduced.moments.m <= 0:
+            raise ModelError(f"{where}: expected a mass above zero, got {self.reduced.moments.m:g}")
+
+    @property
+    def is_stiffened(self) -> bool:
+        """Whether the geometric stiffness of the reduced body is used."""
+        return self.stiffening is not False and self.reduced.geometric is not None
+
+    @property
+    def mean_axes(self) -> MeanAxes | None:
+        """Mean axes in which a stiffened body with another frame is computed; None: in the frame of its file."""
+        return mean_axes(self.reduced) if self.is_stiffened else None
+
+    @property
+    def moved(self) -> ReducedBody:
+        """The reduced body in the frame in which its motion is computed."""
+        axes = self.mean_axes
+        return self.reduced if axes is None else axes.reduced
+
+    @property
+    def frame_orientation(self) -> Array:
+        """R_GB of the body frame at the start, (3, 3)."""
+        return rotation_matrix(self.orientation) @ self.reduced.frame.axes
+
+    @property
+    def frame_position(self) -> Array:
+        """Position of the frame origin at the start, in ground axes, (3,) [m]."""
+        return self.position + rotation_matrix(self.orientation) @ self.reduced.frame.origin
+
+    @property
+    def frame_velocity(self) -> Array:
+        """Velocity of the frame origin at the start, in ground axes, (3,) [m/s]."""
+        arm = np.cross(self.omega_B, self.reduced.frame.origin)
+        return self.velocity + rotation_matrix(self.orientation) @ arm
+
+    @property
+    def frame_omega(self) -> Array:
+        """Angular velocity at the start, in axes of the body frame, (3,) [rad/s]."""
+        return self.reduced.frame.axes.T @ self.omega_B

@@ -1,0 +1,82 @@
+"""A rigid body, defined by its mass properties."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
+from floatframe.errors import ModelError
+from floatframe.model.checked_values import array_of_shape, number
+from floatframe.model.shapes.shape import Geometry, Shape, shape_tuple
+
+__all__ = ["RigidBody"]
+
+#: relative excess of one principal moment over the sum of the other two, up to which it is taken as rounding
+TRIANGLE_DEFECT = 1e-6
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class RigidBody:
+    """A rigid body with its initial position and motion.
+
+    Raises
+    ------
+    ModelError
+        If mass or inertia is impossible, or a number is not finite.
+    """
+
+    name: str
+    mass: float  #: [kg]
+    inertia: Array  #: about the centre of mass, body axes, (3, 3) [kg m²]
+    center_of_mass: Array = field(default_factory=lambda: np.zeros(3))  #: in the body frame, (3,) [m]
+    position: Array = field(default_factory=lambda: np.zeros(3))  #: of the frame origin, in ground axes, (3,) [m]
+    orientation: Array = field(default_factory=lambda: np.array([1.0, 0, 0, 0]))  #: Euler parameters p of R_GB, (4,)
+    velocity: Array = field(default_factory=lambda: np.zeros(3))  #: of the frame origin, in ground axes, (3,) [m/s]
+    #: angular velocity in body axes, (3,) [rad/s]
+    omega_B: Array = field(default_factory=lambda: np.zeros(3))  # noqa: N815
+    shapes: Sequence[Shape | Geometry] = field(default=(), kw_only=True)  #: drawn shapes, in the body frame
+
+    def __post_init__(self) -> None:
+        where = f"rigid body {self.name!r}"
+        put = object.__setattr__
+        put(self, "mass", number(f"{where}: mass", self.mass, above=0.0))
+        put(self, "inertia", array_of_shape(f"{where}: inertia", self.inertia, (3, 3)))
+        for name in ("center_of_mass", "position", "velocity", "omega_B"):
+            put(self, name, array_of_shape(f"{where}: {name}", getattr(self, name), (3,)))
+        put(self, "orientation", euler_parameters_from_user(f"{where}: orientation", self.orientation))
+        put(self, "shapes", shape_tuple(where, self.shapes))
+        scale = np.abs(self.inertia).max()
+        if np.abs(self.inertia - self.inertia.T).max() > 1e-9 * scale:
+            raise ModelError(f"{where}: inertia: expected a symmetric tensor, got {self.inertia.tolist()}")
+        low, middle, high = np.linalg.eigvalsh(self.inertia)
+        if low < 0 or high > (low + middle) * (1 + TRIANGLE_DEFECT):
+            raise ModelError(
+                f"{where}: inertia: no mass distribution has the principal moments {low:.6g}, "
+                f"{middle:.6g}, {high:.6g}: none may be negative or exceed the sum of the other two; "
+                "give the tensor about the centre of mass, products of inertia with their sign"
+            )
+        if high == 0:
+            raise ModelError(
+                f"{where}: inertia: expected moments above zero, got none; give a point mass a small extent"
+            )
+
+    @property
+    def inertia_about_origin(self) -> Array:
+        """Inertia tensor about the frame origin, body axes, (3, 3) [kg m²] (Huygens-Steiner)."""
+        c = self.center_of_mass
+        return self.inertia + self.mass * (c @ c * np.eye(3) - np.outer(c, c))
+
+
+def euler_parameters_from_user(where: str, values: Array) -> Array:
+    """Return unit Euler parameters, (4,); `ModelError` if their length differs from one by more than 1e-6."""
+    p = array_of_shape(where, values, (4,))
+    length = float(np.linalg.norm(p))
+    if abs(length - 1) > 1e-6:
+        raise ModelError(
+            f"{where}: expected Euler parameters (w, x, y, z) of length 1, got {p.tolist()} of length "
+            f"{length:.6g}; make them with floatframe.model.rotations.euler_parameters_of_rotation_vector"
+        )
+    return array_of_shape(where, p / length, (4,))

@@ -1,0 +1,111 @@
+"""Elements by name: "wheels.magic-formula-tyre" is an entry in `ELEMENTS` of the package `wheels`.
+
+A package of elements, of the project or of a user, defines in its `__init__`
+
+    ELEMENTS = {"magic-formula-tyre": "wheels.magic_formula:MagicFormulaTyre"}
+
+The package is imported when one of its names is used, and the module of an element when the element is used.
+"""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from types import ModuleType
+
+from fe_models.foundation.words import nearest, quoted
+from floatframe.errors import ModelError
+from floatframe.model.elements.element import Element
+
+__all__ = ["element_class"]
+
+#: wings of floatframe in which packages of elements are sought first
+OWN = ("floatframe.components", "floatframe.model")
+
+
+def element_class(name: str, folder: Path | None = None) -> type[Element]:
+    """Return the class of an element by the name of its type.
+
+    Parameters
+    ----------
+    name
+        "PACKAGE.ELEMENT"; the package is one of floatframe, or one on the Python path.
+    folder
+        Folder of the system file, in which modules are sought last.
+
+    Raises
+    ------
+    ModelError
+        If there is no such package or element, or the package cannot be imported.
+    """
+    package, _, element = name.rpartition(".")
+    if not package or not element:
+        raise ModelError(f'type of element {quoted(name)}: expected "PACKAGE.ELEMENT", such as "wheels.linear-tyre"')
+    with searched(folder):
+        module = package_named(name, package)
+        known = getattr(module, "ELEMENTS", None)
+        if not isinstance(known, dict):
+            raise ModelError(f"type of element {quoted(name)}: package {module.__name__} names no elements: {EXPECTED}")
+        if element not in known:
+            raise ModelError(
+                f"type of element {quoted(name)}: package {module.__name__} has no element {quoted(element)}"
+                f"{nearest(element, list(known))}"
+            )
+        return class_at(name, str(known[element]), module.__name__)
+
+
+EXPECTED = 'expected ELEMENTS = {"name": "module:Class"} in its __init__.py'
+
+
+@contextmanager
+def searched(folder: Path | None) -> Iterator[None]:
+    """Append a folder to the module search path of Python within a `with` block."""
+    added = None if folder is None else str(folder.resolve())
+    if added is None or added in sys.path:
+        yield
+        return
+    sys.path.append(added)
+    try:
+        yield
+    finally:
+        sys.path.remove(added)
+
+
+def package_named(name: str, package: str) -> ModuleType:
+    """Return the imported package of elements."""
+    where = f"type of element {quoted(name)}"
+    for each in (*(f"{wing}.{package}" for wing in OWN), package):
+        try:
+            is_there = find_spec(each) is not None
+        except (ImportError, ValueError):
+            is_there = False
+        if not is_there:
+            continue
+        try:
+            return import_module(each)
+        except Exception as error:
+            raise ModelError(f"{where}: package {each} cannot be imported: {type(error).__name__}: {error}") from error
+    raise ModelError(
+        f"{where}: there is no package {quoted(package)}, neither in {OWN} nor where Python finds packages; install "
+        "it, put it beside the system file, or name its folder in PYTHONPATH"
+    )
+
+
+def class_at(name: str, place: str, package: str) -> type[Element]:
+    """Return the class at "module:Class"."""
+    where = f"type of element {quoted(name)}"
+    module_name, _, class_name = place.partition(":")
+    try:
+        module = import_module(module_name)
+    except Exception as error:
+        raise ModelError(
+            f"{where}: module {module_name} of package {package} cannot be imported: {type(error).__name__}: {error}"
+        ) from error
+    found = getattr(module, class_name, None)
+    if not (isinstance(found, type) and issubclass(found, Element)):
+        raise ModelError(
+            f"{where}: {place}: expected a class that derives from floatframe.model.elements.Element, got {found!r}"
+        )
+    return found

@@ -1,0 +1,94 @@
+"""An element that is switched off by an event; its rows remain, but it does nothing.
+
+Its wrenches and state rates are zero, unless its law defines by `off` what it does then (a closed valve, a dragging
+clutch). Its constraints are released, and its multipliers are zero.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from fe_models.foundation.arrays import Array
+from floatframe.model.bodies.markers import Marker
+from floatframe.model.elements.element import NOTHING, Element, ElementLaw, Placed, markers_of
+
+__all__ = ["SwitchedOff", "law_switched_off", "off_at_start", "times_off"]
+
+
+@dataclass(frozen=True, eq=False)
+class SwitchedOff(Element):
+    """Replaces an element, with the same markers and unknowns; it does nothing."""
+
+    element: Element
+
+    if not TYPE_CHECKING:
+
+        @property
+        def name(self) -> str:
+            """Its name."""
+            return self.element.name
+
+    @property
+    def markers(self) -> tuple[Marker, ...]:
+        """Its markers."""
+        return markers_of(self.element)
+
+    def law(self, placed: Placed) -> ElementLaw:
+        """Return its law while it is off."""
+        return law_switched_off(self.element.law(placed))
+
+    def events(self) -> Any:
+        """Return its events, which may switch it on."""
+        return self.element.events()
+
+    def drawn(self) -> Any:
+        """Return its shapes."""
+        return self.element.drawn()
+
+
+def law_switched_off(law: ElementLaw) -> ElementLaw:
+    """Return the law of an element while it is off, with the same rows."""
+    if law.off is not None:
+        tangent = "differences" if callable(law.tangent) else law.tangent
+        return replace(law, function=law.off, tangent=tangent, rest=None)
+    let_go = (NOTHING,) * len(law.multipliers)
+    return replace(law, function=still, tangent=slopes_of_still, rest=None, stops={}, holds=let_go, held_units=())
+
+
+def off_at_start(events: Sequence[Any]) -> frozenset[str]:
+    """Return the forces, couplers and elements that the first event which names them switches on."""
+    first: dict[str, bool] = {}
+    for event in events:
+        for name in event.switch_on:
+            first.setdefault(name, True)
+        for name in event.switch_off:
+            first.setdefault(name, False)
+    return frozenset(name for name, is_off in first.items() if is_off)
+
+
+def times_off(events: Sequence[Any], happened: Sequence[Mapping[str, Any]], t: Array, name: str) -> NDArray[np.bool_]:
+    """Return, for each of the times t, (n_t,), whether an element is switched off by the events that have happened."""
+    is_off = np.full(len(t), name in off_at_start(events))
+    for event in happened:
+        if name in (*event["switch_on"], *event["switch_off"]):
+            is_off[t >= event["t"]] = name in event["switch_off"]
+    return is_off
+
+
+@njit
+def still(t, x, z, lam, data, wrench, z_dot, g, seen):
+    """Write the outputs of an element that does nothing."""
+    for k in range(lam.shape[0]):
+        g[k] = lam[k]
+
+
+@njit
+def slopes_of_still(t, x, z, lam, data, slopes):
+    """Write the derivatives of `still`."""
+    n_lam = lam.shape[0]
+    for k in range(n_lam):
+        slopes[slopes.shape[0] - n_lam + k, slopes.shape[1] - n_lam + k] = 1.0

@@ -1,0 +1,35 @@
+"""Forces: one file for each; `FORCES` is the registry for the system file."""
+
+from floatframe.model.forces.body_load import BodyLoad
+from floatframe.model.forces.bushing import Bushing
+from floatframe.model.forces.gravity import Gravity
+from floatframe.model.forces.joint_force import JointForce
+from floatframe.model.forces.point_force import PointForce
+from floatframe.model.forces.sphere_contact import SphereContact
+from floatframe.model.forces.spring_damper import SpringDamper
+from floatframe.model.forces.user_force import UserForce
+
+__all__ = [
+    "FORCES",
+    "BodyLoad",
+    "Bushing",
+    "Force",
+    "Gravity",
+    "JointForce",
+    "PointForce",
+    "SphereContact",
+    "SpringDamper",
+    "UserForce",
+]
+
+Force = BodyLoad | Bushing | Gravity | JointForce | PointForce | SphereContact | SpringDamper | UserForce
+
+FORCES = {
+    "body-load": BodyLoad,
+    "bushing": Bushing,
+    "joint-force": JointForce,
+    "point-force": PointForce,
+    "sphere-contact": SphereContact,
+    "spring-damper": SpringDamper,
+    "user-force": UserForce,
+}

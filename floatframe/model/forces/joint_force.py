@@ -1,0 +1,62 @@
+"""Forces along the coordinate of a joint: torsional springs, dampers, motors, friction."""
+
+from dataclasses import dataclass, field
+
+from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.units import SPEED, Quantity
+from floatframe.errors import ModelError
+from floatframe.model.checked_values import number
+from floatframe.model.functions.time_functions import NOT_OF_TIME, TimeFunction
+
+__all__ = ["JointForce"]
+
+FRICTION_SPEED = Quantity(1e-3, SPEED)
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class JointForce:
+    """A force or torque that acts to increase a free coordinate x of a joint (a distance or an angle).
+
+    Q = -k (x - x_0) - c x_dot + preload + motor(t) + characteristic(x - x_0) - (T + mu N) tanh(x_dot/v_0)
+
+    N is the magnitude of the joint force normal to its axis. An angle is taken between -pi and pi from its free value.
+    Regularised Coulomb friction creeps: it holds a load only while x_dot stays below v_0.
+    """
+
+    name: str
+    joint: str  #: name of the joint
+    coordinate: str  #: name of the coordinate of the joint, such as "angle"
+    stiffness: float = 0.0  #: k [N/m, N m/rad]
+    free: float = 0.0  #: x_0 [m, rad]
+    damping: float = 0.0  #: c [N s/m, N m s/rad]
+    preload: float = 0.0  #: [N, N m]
+    motor: TimeFunction | None = None  #: a function of time [N, N m]
+    #: a function of x - x_0, such as a table [N, N m]
+    characteristic: TimeFunction | None = field(default=None, metadata=NOT_OF_TIME)
+    friction: float = 0.0  #: Coulomb friction T [N, N m]
+    friction_coefficient: float = 0.0  #: coefficient mu; for an angle, mu times the bearing radius [1, m]
+    #: v_0, the speed at which friction reaches tanh(1) of its value [m/s, rad/s]
+    friction_speed: float = FRICTION_SPEED
+
+    @property
+    def is_angular(self) -> bool:
+        """Whether the coordinate is an angle, which joints indicate in its name."""
+        return self.coordinate.startswith("angle")
+
+    def __post_init__(self) -> None:
+        where = f"force {self.name!r}"
+        for name in ("stiffness", "damping", "friction", "friction_coefficient"):
+            object.__setattr__(self, name, number(f"{where}: {name}", getattr(self, name), at_least=0.0))
+        for name in ("free", "preload"):
+            object.__setattr__(self, name, number(f"{where}: {name}", getattr(self, name)))
+        speed = number(f"{where}: friction_speed", self.friction_speed, above=0.0)
+        object.__setattr__(self, "friction_speed", speed)
+        for name in ("motor", "characteristic"):
+            if not isinstance(getattr(self, name), TimeFunction | None):
+                raise ModelError(
+                    f"{where}: {name}: expected a function of functions.time_functions, got {getattr(self, name)!r}"
+                )
+        numbers = self.stiffness, self.damping, self.preload, self.friction, self.friction_coefficient
+        if not any(numbers) and self.motor is None and self.characteristic is None:
+            raise ModelError(f"{where}: expected at least one part above zero, got none")

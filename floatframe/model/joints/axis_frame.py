@@ -1,0 +1,71 @@
+"""Axes of joints: a common direction of both markers, and its normals."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.errors import ModelError
+from floatframe.model.checked_values import unit_vector
+from floatframe.model.functions.time_functions import TimeFunction, constant
+
+__all__ = ["axis_in_b", "checked_axes", "checked_motions", "normals_of", "turning_frame"]
+
+
+def normals_of(axis: Array) -> tuple[Array, Array]:
+    """Return two unit vectors, each (3,), normal to the axis and to each other; with the axis they are right-handed."""
+    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    first = np.cross(axis, helper)
+    first /= np.linalg.norm(first)
+    return first, np.cross(axis, first)
+
+
+def axis_in_b(axis: Array, axis_b: Array | None, A_a: Array, A_b: Array) -> Array:
+    """Return the axis in the axes of marker B, (3,): as given, or the same direction in the assembled position."""
+    return A_b.T @ A_a @ axis if axis_b is None else axis_b
+
+
+def turning_frame(axis: Array, axis_b: Array, A_a: Array, A_b: Array) -> tuple[Array, Array, Array]:
+    """Return directions x, z of A with x × z = axis, and y of B, which lies along z at angle zero (as assembled).
+
+    If a given axis of B has another direction as assembled, y is the direction normal to it that is nearest to z.
+    """
+    x, z = normals_of(axis)
+    y = A_b.T @ A_a @ z
+    y = y - (y @ axis_b) * axis_b
+    if np.linalg.norm(y) < 1e-3:
+        y = normals_of(axis_b)[0]
+    return x, z, y / np.linalg.norm(y)
+
+
+def checked_axes(joint: Any) -> None:
+    """Make `axis` and `axis_b` of a joint unit vectors; raise `ModelError` for a zero vector."""
+    for name in ("axis", "axis_b"):
+        if getattr(joint, name, None) is not None:  # not every joint has an axis on B
+            object.__setattr__(joint, name, unit_vector(f"joint {joint.name!r}: {name}", getattr(joint, name)))
+
+
+def checked_motions(joint: Any) -> None:
+    """Convert `motions` of a joint to `TimeFunction`s by coordinate; raise `ModelError` for unknown coordinates."""
+    where = f"joint {joint.name!r}: motions"
+    if not isinstance(joint.motions, Mapping):
+        raise ModelError(f"{where}: expected a dict from coordinates to functions of time, got {joint.motions!r}")
+    motions = {}
+    for name, motion in joint.motions.items():
+        if name not in joint.coordinates:
+            raise ModelError(f"{where}: no coordinate {name!r}; choices: {', '.join(joint.coordinates)}")
+        motions[name] = constant(motion) if isinstance(motion, int | float) else motion
+        if not isinstance(motions[name], TimeFunction):
+            raise ModelError(
+                f"{where}: {name}: expected a function of functions.time_functions or a number, got {motion!r}; a "
+                "Python function can be sampled with floatframe.model.functions.time_functions.sampled"
+            )
+        for order, what in enumerate(("value", "rate")):
+            times, sizes = motions[name].jumps(order)
+            if len(times):
+                raise ModelError(
+                    f"{where}: {name}: the {what} jumps by {sizes[0]:.6g} at t = {times[0]:.6g}, which no body can "
+                    "follow; let its pieces meet"
+                )
+    object.__setattr__(joint, "motions", motions)

@@ -1,0 +1,128 @@
+"""A system: bodies, joints and forces in one coherent set of units."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, is_dataclass
+from typing import Protocol
+
+from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.units import Units, unit_system
+from fe_models.foundation.words import nearest, quoted
+from floatframe.errors import ModelError
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.bodies.ground import GROUND
+from floatframe.model.bodies.rigid_body import RigidBody
+from floatframe.model.default_units import in_units_of
+from floatframe.model.elements.element import Element
+from floatframe.model.forces import Force, Gravity
+from floatframe.model.joints import Joint
+from floatframe.model.joints.coordinate_coupler import CoordinateCoupler
+from floatframe.model.shapes.shape import Geometry, Shape, shape_tuple
+
+__all__ = ["Body", "Named", "System"]
+
+Body = RigidBody | FlexibleBody
+REDUNDANT = ("refuse", "minimum-norm")
+
+
+class Named(Protocol):
+    """A sensor, channel or event, which a system carries for measurement, linearisation or a run."""
+
+    @property
+    def name(self) -> str:
+        """Unique name."""
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class System:
+    """Bodies, the joints between them and the forces on them.
+
+    Raises
+    ------
+    ModelError
+        If there is no body; if a name is missing or used twice; if a flexible body is in other units; or if (when the
+        system is first compiled) a joint or force names a body, interface or place that does not exist.
+    """
+
+    bodies: Sequence[Body]
+    joints: Sequence[Joint] = ()  #: couplers among them are moved to `couplers`
+    forces: Sequence[Force] = ()
+    units: Units = field(default_factory=lambda: unit_system("m-kg-s"))
+    name: str = "system"
+    #: redundant constraints: "refuse" rejects them with their names, "minimum-norm" distributes their reactions
+    redundant: str = "refuse"
+    couplers: Sequence[CoordinateCoupler] = ()  #: couplers between coordinates of joints
+    elements: Sequence[Element] = field(default=(), kw_only=True)  #: public elements, see `floatframe.model.elements`
+    sensors: Sequence[Named] = field(default=(), kw_only=True)  #: quantities measured on its motions
+    #: forces that act as inputs when the system is linearised
+    inputs: Sequence[Named] = field(default=(), kw_only=True)
+    outputs: Sequence[Named] = field(default=(), kw_only=True)  #: observed quantities of the linearised system
+    events: Sequence[Named] = field(default=(), kw_only=True)  #: actions of a run when a value passes a level
+    fmus: Sequence[Named] = field(default=(), kw_only=True)  #: units of other programs, see `co_simulate`
+    scene: Sequence[Shape | Geometry] = field(default=(), kw_only=True)  #: surroundings: ground, road, track
+    #: path of the system file, for the record; "": the system was made in Python
+    source: str = field(default="", kw_only=True)
+    data_files: Sequence[str] = field(default=(), kw_only=True)  #: paths of the signals, tyres and roads that were used
+
+    def __post_init__(self) -> None:
+        for part in (
+            "bodies", "joints", "forces", "couplers", "elements", "sensors", "inputs", "outputs", "events", "fmus",
+            "data_files",
+        ):  # fmt: skip
+            object.__setattr__(self, part, tuple(getattr(self, part)))
+        if self.units.name != "m-kg-s":
+            for part in ("joints", "forces", "couplers", "elements"):
+                known = (in_units_of(self.units, each) if is_dataclass(each) else each for each in getattr(self, part))
+                object.__setattr__(self, part, tuple(known))
+        among = tuple(joint for joint in self.joints if isinstance(joint, CoordinateCoupler))
+        object.__setattr__(self, "couplers", (*self.couplers, *among))
+        object.__setattr__(self, "joints", tuple(joint for joint in self.joints if joint not in among))
+        where = f"system {self.name!r}"
+        object.__setattr__(self, "scene", shape_tuple(f"{where}: scene", self.scene))
+        if self.redundant not in REDUNDANT:
+            raise ModelError(f"{where}: redundant: expected one of {', '.join(REDUNDANT)}, got {self.redundant!r}")
+        if not self.bodies:
+            raise ModelError(f"{where}: expected at least one body, got none")
+        require_names(f"{where}: bodies", [body.name for body in self.bodies], taken=(GROUND.name,))
+        named = [force.name for force in self.forces if not isinstance(force, Gravity)]
+        for element in self.elements:
+            if not isinstance(element, Element):
+                raise ModelError(f"{where}: elements: expected a floatframe.model.elements.Element, got {element!r}")
+        named += [element.name for element in self.elements]
+        require_names(
+            f"{where}: joints, forces and elements", [joint.name for joint in (*self.joints, *self.couplers)] + named
+        )
+        for kind in ("sensors", "inputs", "outputs", "events", "fmus"):
+            require_names(f"{where}: {kind}", [each.name for each in getattr(self, kind)])
+        for body in self.bodies:
+            if isinstance(body, FlexibleBody) and body.reduced.units != self.units:
+                raise ModelError(
+                    f"{where}: flexible body {body.name!r} is in units {body.reduced.units.name!r}, but "
+                    f"the system in {self.units.name!r}; give the system the units of the body, or read the body in "
+                    f"those of the system: cms.read(file, units={self.units.name!r})"
+                )
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Files of the system: the system file, modal files of bodies, signals, files of elements."""
+        sources = [body.source for body in self.bodies if isinstance(body, FlexibleBody)]
+        return tuple(source for source in (self.source, *sources, *self.data_files) if source)
+
+    def body(self, name: str) -> Body:
+        """Return the body of that name; raise `ModelError` with the known names if there is none."""
+        for body in self.bodies:
+            if body.name == name:
+                return body
+        choices = [body.name for body in self.bodies]
+        raise ModelError(f"system {self.name!r}: no body {quoted(name)}{nearest(name, choices)}")
+
+
+def require_names(where: str, names: Iterable[str], *, taken: Iterable[str] = ()) -> None:
+    """Raise `ModelError` unless every name is unique and valid as a group name in a results file."""
+    seen = set(taken)
+    for name in names:
+        if not isinstance(name, str) or not name.strip() or "/" in name or name in (".", ".."):
+            raise ModelError(f"{where}: expected a name without '/', got {name!r}")
+        if name in seen:
+            raise ModelError(f"{where}: the name {name!r} is used twice, or reserved; give each its own")
+        seen.add(name)

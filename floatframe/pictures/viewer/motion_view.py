@@ -1,0 +1,367 @@
+"""A page with a motion or an equilibrium."""
+
+import logging
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cms.body.modal_file.file import digest
+from cms.body.reduced_body import ReducedBody
+from cms.errors import CmsError
+from fe_models.foundation.paths import replace_file
+from fe_models.foundation.units import Units
+from floatframe.analyses.equilibrium import Equilibrium
+from floatframe.analyses.snapshot import snapshot
+from floatframe.errors import ResultsError
+from floatframe.files.system_file.recorded_system import recorded_system
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.bodies.rigid_body import RigidBody
+from floatframe.model.system import System
+from floatframe.pictures.animation import bodies_of, diagonal
+from floatframe.pictures.body_colors import BODY_COLORS
+from floatframe.pictures.film_times import film_times, round_below
+from floatframe.pictures.viewer.curves import Panel, motion_panels, sensor_panels
+from floatframe.pictures.viewer.flexible import FlexibleSurface, flexible_surface, nodes_within
+from floatframe.pictures.viewer.packing import Block
+from floatframe.pictures.viewer.page import fixed_size, page_of
+from floatframe.pictures.viewer.record import Shown, colors_record, stage_record
+from floatframe.pictures.viewer.timeline import Timeline, evenly, timeline
+from floatframe.results.recovery import require_same_modes
+from floatframe.results.sensor_choice import chosen_measurements
+from floatframe.results.sensors import measured
+from floatframe.results.trajectory import Trajectory, read_results
+
+__all__ = ["LARGEST", "Page", "bytes_for_numbers", "require_color", "source_record", "view", "written"]
+
+log = logging.getLogger(__name__)
+
+LARGEST = 10.0  #: largest size of a page [MB]
+PLOTTED = 1200  #: number of rows of the plots
+SHARE_OF_ROWS = 0.4  #: fraction of the numbers of a page for the rows of the motion; the rest is for surfaces
+#: as in films: fraction of a body's size from which deformation is visible; fraction to which it is magnified
+VISIBLE, DRAWN = 0.02, 0.06
+
+
+@dataclass(frozen=True)
+class Page:
+    """A written page."""
+
+    path: Path
+    size: int  #: bytes
+    notes: tuple[str, ...]  #: omissions, as listed in the page
+
+
+def view(
+    motion: Trajectory | Equilibrium | str | os.PathLike[str],
+    path: str | os.PathLike[str],
+    *,
+    system: System | None = None,
+    sensors: Sequence[str] = (),
+    color: str = "displacement",
+    magnification: float | None = None,
+    largest: float = LARGEST,
+) -> Page:
+    """Write a motion or an equilibrium as a single page that works offline, in 3D with plots.
+
+    Parameters
+    ----------
+    motion
+        A motion, the path of a results file, or an equilibrium of the system.
+    path
+        File whose name ends in .html.
+    system
+        Its system; None: from the system file that the results name.
+    sensors
+        Sensors to plot, as for `floatframe plot --sensor`; none: all sensors, positions, loads and energies.
+    color
+        Initial colour of flexible bodies: "displacement" or "von-mises".
+    magnification
+        Initial factor of the elastic displacement as drawn; None: 1, or a larger one that makes it visible.
+    largest
+        Largest size of the page in megabytes; surfaces are thinned and rows omitted until it fits.
+
+    Raises
+    ------
+    ResultsError
+        If a body does not match the motion, stress is requested but not available, or the page cannot be that small.
+    """
+    require_color(color)
+    trajectory = motion_of(motion, system)
+    if len(trajectory.t) == 0:
+        raise ResultsError("view: the motion has no rows")
+    if system is None:
+        system = known_system(trajectory)
+    bodies = bodies_in(trajectory, system)
+    reduced = {name: body.reduced for name, body in bodies.items() if isinstance(body, FlexibleBody)}
+    reduced |= {name: body for name, body in loose_bodies(trajectory, system).items()}
+    for name, body in reduced.items():
+        require_same_modes(trajectory, name, body)
+    if color == "von-mises" and not any(body.stress is not None for body in reduced.values()):
+        raise ResultsError(
+            "view: von Mises' stress is asked for, but no body of the motion has stress modes"
+            + (f" ({', '.join(reduced)})" if reduced else ": all are rigid")
+            + "; reduce them again with stress, or colour by displacement"
+        )
+    panels, plotted = panels_of_motion(trajectory, system, reduced, sensors)
+    n_bytes = bytes_for_numbers(largest) - 4 * sum(len(panel.curves) for panel in panels) * len(plotted)
+    kept = timeline(trajectory, max(2, int(SHARE_OF_ROWS * n_bytes / bytes_of_row(trajectory, system))))
+    shown = Shown(trajectory, system, bodies, reduced, kept.rows)
+    block = Block()
+    surfaces = surfaces_of(shown, 0.85 * (n_bytes - len(kept.rows) * bytes_of_row(trajectory, system)))
+    record, _ = stage_record(shown, surfaces, block)
+    units = trajectory.units
+    record |= {
+        "kind": "motion",
+        "title": trajectory.head.system,
+        "facts": facts_of(shown, motion),
+        "notes": notes_of(shown, kept, surfaces),
+        "sources": source_record(trajectory),
+        "units": unit_record(trajectory),
+        "panel_time": block.real(trajectory.t[plotted]),
+        "panels": panel_record(block, panels),
+        "speed": speed_of(trajectory),
+        "colors": colors_of(units, surfaces),
+        "color": color,
+        "magnification": magnification_of(surfaces, reduced) if magnification is None else float(magnification),
+    }
+    return written(path, record, block, largest)
+
+
+def require_color(color: str) -> None:
+    """Raise `ResultsError` unless bodies can be coloured by this quantity."""
+    if color not in BODY_COLORS:
+        raise ResultsError(f"view: color: expected one of {', '.join(BODY_COLORS)}, got {color!r}")
+
+
+def motion_of(motion: Trajectory | Equilibrium | str | os.PathLike[str], system: System | None) -> Trajectory:
+    """Return the shown motion; an equilibrium becomes a motion with one time."""
+    if isinstance(motion, Trajectory):
+        return motion
+    if isinstance(motion, Equilibrium):
+        if system is None:
+            raise ResultsError("view: an equilibrium is shown with its system; give system=")
+        return snapshot(system, motion)
+    return read_results(motion)
+
+
+def known_system(trajectory: Trajectory) -> System | None:
+    """Return the system of a motion from the file its results name, if that is unchanged."""
+    try:
+        return recorded_system(trajectory)
+    except ResultsError as error:
+        log.warning("joints, shapes and sensors are left out: %s", error)
+        return None
+
+
+def bodies_in(trajectory: Trajectory, system: System | None) -> dict[str, RigidBody | FlexibleBody | None]:
+    """Return the bodies of a motion, by name, from the system; modal files must be those of the run."""
+    if system is None:
+        return dict.fromkeys(trajectory.body_names)
+    names = tuple(body.name for body in system.bodies)
+    if names != trajectory.body_names:
+        raise ResultsError(
+            f"view: the bodies of the system are {', '.join(names)}, but those of the motion "
+            f"{', '.join(trajectory.body_names)}; give the system of the motion"
+        )
+    for entry in trajectory.head.bodies:
+        if entry.source and entry.digest and Path(entry.source).is_file() and digest(entry.source) != entry.digest:
+            raise ResultsError(
+                f"body {entry.name!r}: {entry.source} has changed since the motion was computed; run it again"
+            )
+    return {body.name: body for body in system.bodies}
+
+
+def loose_bodies(trajectory: Trajectory, system: System | None) -> Mapping[str, ReducedBody]:
+    """Return the reduced bodies of a motion without a known system, read from their modal files."""
+    if system is not None:
+        return {}
+    try:
+        return bodies_of(trajectory)
+    except CmsError as error:
+        raise ResultsError(
+            f"view: a flexible body cannot be shown: {error}; put the modal file back to where the run had it"
+        ) from error
+
+
+def bytes_for_numbers(largest: float) -> float:
+    """Return the bytes of numbers that fit into a page of a size in megabytes, as text without compression.
+
+    Raises
+    ------
+    ResultsError
+        If the page would be too small for its programs.
+    """
+    left = 1e6 * largest - fixed_size()
+    if not np.isfinite(largest) or left < 3e5:
+        raise ResultsError(
+            f"view: a page of {largest:g} MB is too small: its programs alone take {fixed_size() / 1e6:.2f} MB; "
+            f"expected {np.ceil(10 * (fixed_size() + 3e5) / 1e6) / 10:g} MB or more"
+        )
+    return 0.72 * left
+
+
+def bytes_of_row(trajectory: Trajectory, system: System | None) -> float:
+    """Return the approximate number of bytes of a row of a motion."""
+    n_modes = sum(entry.n_q for entry in trajectory.head.bodies)
+    n_markers = 0 if system is None else 2 * (len(system.joints) + len(system.forces))
+    return 4 + 28 * len(trajectory.head.bodies) + 2 * n_modes + (12 * n_markers if n_modes else 6 * n_markers)
+
+
+def surfaces_of(shown: Shown, n_bytes: float) -> list[FlexibleSurface]:
+    """Return the surfaces of all flexible bodies within a number of bytes."""
+    trajectory = shown.trajectory
+    most = nodes_within(max(n_bytes, 0.0), shown.reduced, with_stress=True)
+    return [
+        flexible_surface(
+            i, shown.reduced[name], trajectory.body(name).q[shown.rows], most[name],
+            is_stiffened=trajectory.entry(name)[1].is_stiffened, with_stress=True,
+        )
+        for i, name in enumerate(trajectory.body_names)
+        if name in most
+    ]  # fmt: skip
+
+
+def panels_of_motion(
+    trajectory: Trajectory, system: System | None, reduced: Mapping[str, ReducedBody], sensors: Sequence[str]
+) -> tuple[list[Panel], np.ndarray]:
+    """Return the plots and their rows."""
+    rows = evenly(trajectory.t, PLOTTED)
+    if len(trajectory.t) < 2:
+        return [], rows
+    if sensors:
+        if system is None:
+            raise ResultsError("view: sensors: the system file of the run is gone, or the run was made in Python")
+        return sensor_panels(chosen_measurements(system, trajectory, sensors), rows), rows
+    own = [] if system is None else sensor_panels([*measured(system, trajectory).values()], rows)
+    return own + motion_panels(trajectory, reduced, rows), rows
+
+
+def panel_record(block: Block, panels: Sequence[Panel]) -> list[dict[str, Any]]:
+    """Return the plots."""
+    return [
+        {
+            "title": panel.title,
+            "unit": panel.unit,
+            "n_all": panel.n_all,
+            "curves": [{"name": name, "values": block.real(values)} for name, values in panel.curves.items()],
+        }
+        for panel in panels
+    ]
+
+
+def colors_of(units: Units, surfaces: Sequence[FlexibleSurface]) -> list[dict[str, Any]]:
+    """Return the quantities by which surfaces can be coloured."""
+    if not surfaces:
+        return []
+    stresses = [each.largest_stress for each in surfaces if each.stress is not None]
+    return colors_record(units, max(each.largest_displacement for each in surfaces), max(stresses, default=None))
+
+
+def magnification_of(surfaces: Sequence[FlexibleSurface], reduced: Mapping[str, ReducedBody]) -> float:
+    """Return 1 if the deformation is visible as it is, else the round number that makes it 2.4 to 6 % of a body."""
+    sizes = [diagonal(body) for body in reduced.values() if len(body.surface)]
+    share = max((s.largest_displacement / size for s, size in zip(surfaces, sizes, strict=True)), default=1.0)
+    return 1.0 if share >= VISIBLE or share == 0 else round_below(DRAWN / share)
+
+
+def speed_of(trajectory: Trajectory) -> float:
+    """Return the initial seconds of motion per second of the page, as in films."""
+    return film_times(trajectory.t * trajectory.units.time, fps=25.0, speed=None).speed
+
+
+def facts_of(shown: Shown, motion: object) -> list[str]:
+    """Return a description of the shown motion."""
+    trajectory = shown.trajectory
+    flexible = [entry for entry in trajectory.head.bodies if entry.n_q]
+    count = len(trajectory.body_names)
+    bodies = f"{count} {'body' if count == 1 else 'bodies'}"
+    if flexible:
+        bodies += f", {len(flexible)} flexible with {sum(entry.n_q for entry in flexible)} modes"
+    if isinstance(motion, Equilibrium):
+        return ["equilibrium", bodies]
+    t = trajectory.t
+    words = [f"{t[-1] - t[0]:.6g} {trajectory.units.time_symbol} of motion" if len(t) > 1 else "one instant", bodies]
+    if not trajectory.is_complete:
+        words.append("the run did not reach its end")
+    return words
+
+
+def notes_of(shown: Shown, kept: Timeline, surfaces: Sequence[FlexibleSurface]) -> list[str]:
+    """Return the omissions of the page as text."""
+    trajectory, notes = shown.trajectory, []
+    n, n_all = len(kept.rows), len(trajectory.t)
+    if n < n_all:
+        notes.append(f"{n:,} of {n_all:,} rows of the results are in this page, evenly spaced in time.")
+    if n > 1:
+        notes.append("Between rows positions and modal coordinates are interpolated linearly, rotations along the arc.")
+    if kept.turns_too_far:
+        notes.append(
+            f"A body turns by {kept.largest_turn:.3g} rad from row to row: it may seem to turn the other way; write "
+            "results more often."
+        )
+    notes += surface_notes(trajectory.body_names, surfaces)
+    for note in trajectory.validity:
+        notes.append(
+            f"{note.body} left the range of its linear frame: {note.action}."
+            if note.is_of_a_frame
+            else f"{note.words}."
+        )
+    return notes
+
+
+def surface_notes(names: Sequence[str], surfaces: Sequence[FlexibleSurface]) -> list[str]:
+    """Return a description of the shown flexible surfaces."""
+    notes = []
+    for each in surfaces:
+        shown, whole = len(each.surface.rows), each.surface.n_nodes
+        words = f"{names[each.body]}: surface of {shown:,} nodes"
+        words += f", thinned from {whole:,}; none is moved, so that modes stay exact there" if shown < whole else ""
+        if len(each.shapes) < each.n_modes:
+            words += f"; {each.n_modes - len(each.shapes)} of {each.n_modes} modes stay too small to be seen"
+        notes.append(f"{words}.")
+    if any(len(each.surface.rows) < each.surface.n_nodes for each in surfaces):
+        notes.append("Largest values of colours are those of the nodes shown.")
+    return notes
+
+
+def source_record(trajectory: Trajectory) -> list[tuple[str, str]]:
+    """Return the origin of the motion."""
+    run = trajectory.head.run
+    found = [("program", f"floatframe {run.get('floatframe', '')}")]
+    if run.get("integrator") and run.get("h") and run["integrator"] != "Snapshot":
+        found.append(("integrator", f"{run['integrator']}, step {run['h']:.6g} {trajectory.units.time_symbol}"))
+    found.append(("units", trajectory.units.name))
+    if trajectory.path is not None:
+        found.append(("results", trajectory.path.name))
+    if run.get("system_file"):
+        found.append(("system file", Path(str(run["system_file"])).name))
+    found += [
+        (f"modal file of {entry.name}", f"{Path(entry.source).name}, sha256 {entry.digest[:12]}")
+        for entry in trajectory.head.bodies
+        if entry.source
+    ]
+    return found
+
+
+def unit_record(trajectory: Trajectory) -> dict[str, Any]:
+    """Return symbols of the units."""
+    units = trajectory.units
+    symbols = {"time": units.time_symbol, "length": units.length_symbol, "force": units.force_symbol}
+    return {**symbols, "seconds": units.time}
+
+
+def written(path: str | os.PathLike[str], record: dict[str, Any], block: Block, largest: float) -> Page:
+    """Write the page; `ResultsError` if it is larger than it may be."""
+    target = Path(path)
+    content = page_of(record, block).encode()
+    if len(content) > 1e6 * largest:
+        raise ResultsError(
+            f"view: the page would have {len(content) / 1e6:.1f} MB, more than {largest:g} MB, though surfaces are "
+            "thinned; name fewer sensors, leave shapes of large surfaces out, or allow more megabytes"
+        )
+    replace_file(target, content)
+    return Page(target, len(content), tuple(record["notes"]))

@@ -1,0 +1,199 @@
+"""Small motions about an equilibrium or a steady rotation, for sensors and channels.
+
+The unknowns are x = (xi, s). xi consists, for each body, of translation and rotation of its frame in body axes and its
+modal coordinates, in the frame in which the engine computes it. s are the motions prescribed by inputs, of bases (the
+ground side of connections) and of drives. All quantities are in axes that rotate with the steady motion and coincide
+with ground axes now. In these axes, a point p = p_0 + J x has the absolute velocity p' + Omega × p and the acceleration
+p'' + 2 Omega × p' + Omega × (Omega × p).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.words import nearest, quoted
+from floatframe.engine.compiling.file_frames import small_motions_of_file
+from floatframe.engine.compiling.markers import MarkerData, marker_pose, n_q_of
+from floatframe.engine.compiling.system import CompiledSystem
+from floatframe.engine.kernels.work import Work
+from floatframe.errors import ModelError
+from floatframe.model.rotations import rotation_matrix, tilde
+from floatframe.model.state import State
+from floatframe.model.system import System
+from floatframe.results.small_motions.joint_rates import coordinate_rows
+from floatframe.results.small_motions.marker_jacobian import marker_jacobian
+from floatframe.results.small_motions.rows import Rows
+from floatframe.results.trajectory import Trajectory
+
+__all__ = ["BaseColumn", "InputForce", "SmallMotions", "SmallPlace"]
+
+
+@dataclass(frozen=True, eq=False)
+class BaseColumn:
+    """The motion that an input prescribes: a rigid motion of the ground side of some connections (none for a drive)."""
+
+    moved: frozenset[str] = frozenset()  #: names of connections
+    translation: Array | None = None  #: in ground axes, (3,); None: zero
+    rotation: Array | None = None  #: rotation vector, ground axes, (3,); None: zero
+    about: Array | None = None  #: a point that the rotation leaves at rest, in ground axes, (3,); None: the origin
+
+    def at(self, point: Array) -> Array:
+        """Return translation and rotation at a point, ground axes, (6,)."""
+        d = np.zeros(3) if self.translation is None else self.translation
+        turn = np.zeros(3) if self.rotation is None else self.rotation
+        arm = point - (np.zeros(3) if self.about is None else self.about)
+        return np.concatenate([d + np.cross(turn, arm), turn])
+
+
+@dataclass(frozen=True, eq=False)
+class InputForce:
+    """Force and moment of a unit input at an interface of a flexible body, or a load case of the body."""
+
+    body: str
+    interface: str  #: empty for a load case
+    wrench: Array  #: ground axes, (6,)
+    load_case: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class SmallPlace:
+    """A point with axes, and its linearised motion."""
+
+    position: Array  #: ground axes, (3,)
+    axes: Array  #: columns, (3, 3)
+    moved: Rows  #: its translation, as three rows
+    turned: Rows  #: rotation of its axes in ground axes, as three rows
+
+
+@dataclass(frozen=True, eq=False)
+class SmallMotions:
+    """A steady motion, and the small motions about it."""
+
+    system: System
+    compiled: CompiledSystem
+    work: Work  #: working arrays, evaluated at the steady motion
+    state: State  #: state in the frames of the engine
+    omega: Array  #: of the steady rotation, ground axes, (3,) [rad/s]
+    now: Trajectory  #: the steady motion as a trajectory with one time, which sensors measure
+    bases: tuple[BaseColumn, ...] = ()  #: for each input
+    forces: tuple[tuple[InputForce, ...], ...] = ()  #: at interfaces, for each input
+
+    @property
+    def n_u(self) -> int:
+        """Number of small motions of the bodies."""
+        return int(self.compiled.model.bodies.u0[-1])
+
+    @property
+    def n_x(self) -> int:
+        """Number of small motions of bodies and inputs."""
+        return self.n_u + len(self.bases)
+
+    @property
+    def n_w(self) -> int:
+        """Number of wrench components."""
+        return int(self.compiled.model.connections.w0[-1])
+
+    @property
+    def is_turning(self) -> bool:
+        """Whether the steady motion is a rotation."""
+        return bool(self.omega.any())
+
+    @property
+    def speed_scale(self) -> float:
+        """Largest speed of the steady motion, zero at rest [length/s]."""
+        return float(np.linalg.norm(self.omega)) * self.compiled.length
+
+    def by_motion(self, x: Array) -> Rows:
+        """Return rows of small motions from coefficients of body motions, (n, n_u), or of all motions, (n, n_x)."""
+        x = np.atleast_2d(x)
+        whole = np.zeros((len(x), self.n_x))
+        whole[:, : x.shape[1]] = x
+        zero = np.zeros_like(whole)
+        return Rows(whole, zero, zero, np.zeros((len(x), self.n_w)))
+
+    def by_wrench(self, rows: Sequence[int] | slice, factor: float = 1.0) -> Rows:
+        """Return rows of wrench components multiplied by a factor."""
+        w = factor * np.eye(self.n_w)[rows]
+        zero = np.zeros((len(w), self.n_x))
+        return Rows(zero, zero, zero, w)
+
+    def velocity(self, rows: Rows) -> Rows:
+        """Return rows of the absolute velocity of a point from rows of its translation."""
+        return rows.rate + rows.turned(tilde(self.omega))
+
+    def acceleration(self, rows: Rows) -> Rows:
+        """Return rows of the absolute acceleration of a point from rows of its translation."""
+        return self.velocity(self.velocity(rows))
+
+    def pose(self, end: MarkerData) -> tuple[Array, Array]:
+        """Return position (3,) and axes (3, 3) of a marker, ground axes."""
+        return marker_pose(end, self.state, n_q_of(self.system))
+
+    def place(self, end: MarkerData, connection: str = "") -> SmallPlace:
+        """Return a marker with its linearised motion; on the ground, it moves with the bases of its connection."""
+        position, axes = self.pose(end)
+        x = np.zeros((6, self.n_x))
+        if end.body >= 0:
+            x[:, self.unknowns(end.body)] = marker_jacobian(self.compiled, self.work, end)
+        else:
+            for k, base in enumerate(self.bases):
+                if connection in base.moved:
+                    x[:, self.n_u + k] = base.at(position)
+        rows = self.by_motion(x)
+        return SmallPlace(position, axes, rows[:3], rows[3:])
+
+    def unknowns(self, body: int) -> slice:
+        """Return the range of the small motions of a body."""
+        u0 = self.compiled.model.bodies.u0
+        return slice(int(u0[body]), int(u0[body + 1]))
+
+    def of_file(self, name: str) -> tuple[Rows, Array]:
+        """Return rows of the small motions, (6 + n_q), of a body in the frame of its file, and R_GB of that frame."""
+        i = self.compiled.body_names.index(name)
+        x = np.zeros((6 + int(self.compiled.model.bodies.n_q[i]), self.n_x))
+        x[:, self.unknowns(i)] = small_motions_of_file(self.compiled, self.state.q)[i]
+        return self.by_motion(x), rotation_matrix(self.now.body(name).p[0])
+
+    def coordinates(self, name: str) -> Rows:
+        """Return n_q rows of the modal coordinates of a body in the frame of its file."""
+        return self.of_file(name)[0][6:]
+
+    def frame_place(self, name: str) -> SmallPlace:
+        """Return the frame of a body's file with its linearised motion."""
+        rows, R = self.of_file(name)
+        return SmallPlace(self.now.body(name).r[0], R, rows[:3].turned(R), rows[3:6].turned(R))
+
+    def joint_coordinate(self, joint: str, coordinate: str, where: str) -> Rows:
+        """Return one row of the change of a joint coordinate; `ModelError` with the nearest name if there is none."""
+        rows = coordinate_rows(self.system, self.compiled, self.work, self.state)
+        name = f"{joint}.{coordinate}"
+        if name not in rows:
+            raise ModelError(f"{where}: no joint coordinate {quoted(name)}{nearest(name, list(rows))}")
+        x = np.zeros(self.n_x)
+        x[: self.n_u] = rows[name]
+        for k, base in enumerate(self.bases):
+            if joint in base.moved:  # a motion of both sides does not change it
+                x[self.n_u + k] = -rows[name] @ self.rigid(base)
+        return self.by_motion(x)
+
+    def rigid(self, base: BaseColumn) -> Array:
+        """Return the small motions, (n_u,), of all bodies that move rigidly with a base."""
+        x = np.zeros(self.n_u)
+        for i, (r, R) in enumerate(zip(self.work.state.r, self.work.state.R, strict=True)):
+            u0 = self.unknowns(i).start
+            motion = base.at(r)
+            x[u0 : u0 + 3], x[u0 + 3 : u0 + 6] = R.T @ motion[:3], R.T @ motion[3:]
+        return x
+
+    def wrench(self, connection: str) -> slice:
+        """Return the range of the wrench of a connection in all wrenches."""
+        c = self.compiled.connection_names.index(connection)
+        w0 = self.compiled.model.connections.w0
+        return slice(int(w0[c]), int(w0[c + 1]))
+
+    @property
+    def largest_wrench(self) -> float:
+        """Largest component of all wrenches now, relative to which rounding errors are judged."""
+        return float(np.abs(self.work.state.w).max(initial=0.0))

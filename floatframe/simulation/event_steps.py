@@ -1,0 +1,618 @@
+"""Steps with events: values watched after each of many steps, and the step refined to where one passes its level.
+
+Steps are taken by the compiled loop in blocks, and what is watched is measured for a whole block at once. Where
+something happens in a step it is found by steps of other sizes from the memory before that step, which the loop kept:
+nothing is taken twice, and a motion that events only record goes on as if there were none, bit for bit.
+"""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, IntArray
+from floatframe.engine.compiling.file_frames import rows_of_file, state_of_file
+from floatframe.engine.compiling.public_elements import PlacedLaw
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.initial_conditions.impact import impact
+from floatframe.engine.initial_conditions.initial import consistent_motion
+from floatframe.engine.kernels.memory import KINETIC, SPRINGS, WORK_GIVEN, WORK_TAKEN, Rows
+from floatframe.engine.kernels.work import Work, new_work
+from floatframe.errors import ModelError
+from floatframe.integrators.carry import Carry, Failure, Integrator, carry_of_past, coasted, counted_on
+from floatframe.integrators.generalized_alpha import GeneralizedAlpha
+from floatframe.integrators.ida import Ida
+from floatframe.integrators.relative_ode import RelativeOde
+from floatframe.model.joints.rows import NOTHING, POSITION
+from floatframe.model.state import State
+from floatframe.model.system import System
+from floatframe.results.head import Head
+from floatframe.results.results_file import MemorySource
+from floatframe.results.sensors import sensor_of
+from floatframe.results.trajectory import Trajectory
+from floatframe.results.writer import arrays_of
+from floatframe.simulation.events import Event, events_of, off_at_start, require_events, switched
+from floatframe.simulation.passage import MOST_NEIGHBOURS, expected_passage, passage
+from floatframe.simulation.stop_events import (
+    INWARD,
+    StopEvent,
+    coupled_sum,
+    just_inside,
+    require_within_limits,
+    stop_events,
+    stop_values,
+    sum_rows,
+)
+from floatframe.simulation.switch_events import SwitchEvent, beyond_zero, sign_of, switch_events, with_signs
+from floatframe.simulation.watched_values import direct_values
+
+__all__ = ["EventWatch"]
+
+BLOCK = 400  #: most steps between which what is watched is not measured; blocks end where a multiple of it does
+STANDS = 1e-9  #: change of what is watched in a step, relative to its level or 1, below which it is held or at rest
+SHORT = 1e-7  #: of a step: a rest after an event that is no step of its own, whose accelerations were rounding alone
+MOST_NUMBERS = 2**23  #: in the results of a block
+SHUT = 1e-6  #: of the length of the system, or rad: what a coupler may close that takes hold of a value
+MOST_MADE = 8  #: systems that are kept to switch to
+MOST_IN_A_STEP = 100  #: events in one step; more mean that events switch each other without end
+
+
+class Ended(NamedTuple):
+    """What a step led to."""
+
+    carry: Callable[[], Carry]  #: the memory after it
+    row: Rows | None  #: None: not written
+    values: Array  #: of the events, (n_events,)
+
+
+class Place(NamedTuple):
+    """A place in a step where event j happens."""
+
+    part: float  #: of the step
+    j: int
+    carry: Carry
+    row: Rows
+    failure: Failure | None  #: of the step that leads there
+
+
+def same(carry: Carry) -> Carry:
+    """Return a memory that is known."""
+    return carry
+
+
+def joined_rows(parts: list[Rows]) -> Rows:
+    """Return rows of results one after the other."""
+    return Rows(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+
+def past_rows(work: Work, n_steps: int, t0: float, h: float, first: int) -> Rows:
+    """Return times and angles after each of n_steps that were kept, without the other results."""
+    empty = Rows(*(np.zeros(0) for _ in Rows._fields))
+    times: Array = t0 + h * np.arange(first + 1, first + n_steps + 1, dtype=float)
+    return empty._replace(t=times, angle=work.past.angle[:n_steps])
+
+
+def one_of(rows: Rows, k: int) -> Rows:
+    """Return one of several rows of results."""
+    return Rows(*(array[k : k + 1] for array in rows))
+
+
+@dataclass
+class EventWatch:
+    """The events of a run: what is watched, what is switched off, what stops hold, and what has happened."""
+
+    full: System  #: with all forces
+    head: Head
+    system: System = field(init=False)  #: with some off
+    #: systems by what is off and what is held: a stop that is struck again and again needs no new ones
+    made: dict[tuple, System] = field(init=False, default_factory=dict)
+    events: tuple[Event, ...] = field(init=False)  #: those of the system, then those of its stops
+    off: frozenset[str] = field(init=False)  #: forces at zero, couplers not engaged, elements that do nothing
+    caught: dict[str, float] = field(default_factory=dict)  #: what couplers that have been engaged hold
+    resting: dict[str, str] = field(default_factory=dict)  #: side of the limits at which couplers hold
+    signs: dict[str, int] = field(default_factory=dict)  #: that switching functions have in a step, by their events
+    values: Array = field(init=False)  #: of the events at the last time, angles without jumps, (n_events,)
+    row: Rows | None = field(init=False, default=None)  #: results at the last time, where sensors measure
+    #: the last two rows that were measured, each with itself in the frames of the files
+    told: tuple[tuple[Rows, Rows], ...] = field(init=False, default=())
+    happened: list[dict[str, Any]] = field(default_factory=list)
+    recorded: list[Rows] = field(default_factory=list)  #: results at events since they were last taken
+    has_stopped: bool = False
+    #: for each event what it watches straight from rows of results; None: by its sensor
+    direct: list[Callable[[Rows], Array] | None] = field(init=False)
+    due: int = -1  #: number of the step in which something is known to happen
+    trial: tuple[System, Work] | None = field(init=False, default=None)  #: working arrays of steps that lead no further
+    calm: int = BLOCK  #: most steps of the next block: few after an event that changed the motion, perhaps one of many
+    changed: int = 0  #: number of the step with which the last of these ended
+
+    def __post_init__(self) -> None:
+        require_events(self.full)
+        self.events = (*events_of(self.full), *stop_events(self.full), *switch_events(self.full))
+        released = {coupler.name for coupler in self.full.couplers if not coupler.engaged}
+        self.switch(off_at_start(events_of(self.full)) | released)
+        self.values = np.zeros(len(self.events))
+        is_own = [isinstance(each, StopEvent | SwitchEvent) for each in self.events]
+        each_event = zip(self.events, is_own, strict=True)
+        self.direct = [None if own else direct_values(self.full, each) for each, own in each_event]
+
+    def switch(self, off: frozenset[str]) -> None:
+        """Take these forces and couplers off, all others on, with what couplers have caught and stops hold."""
+        self.off = off
+        self.caught = {name: value for name, value in self.caught.items() if name not in off}
+        limits = {coupler.name: coupler.limits for coupler in self.full.couplers}
+        stops = {name: float(getattr(limits[name], side)) for name, side in self.resting.items()}
+        held = self.caught | stops
+        key = off, tuple(sorted(held.items())), tuple(self.signs.items())
+        if key not in self.made:
+            if len(self.made) >= MOST_MADE:
+                self.made.clear()
+            self.made[key] = switched(with_signs(self.full, self.signs), off, held)
+        self.system = self.made[key]
+
+    def begin(self, row: Rows) -> None:
+        """Take the results at the time from which steps go on."""
+        is_first = self.row is None
+        self.row = row
+        if is_first and not self.happened:
+            self.values = self.measured(row, row)[0]
+            require_within_limits(compiled_system(self.full), self.events, self.values)
+            pairs = zip(self.events, self.values, strict=True)
+            self.signs = {each.name: sign_of(float(x)) for each, x in pairs if isinstance(each, SwitchEvent)}
+            self.switch(self.off)
+            self.take_inside()
+
+    def measured(self, *rows: Rows) -> Array:
+        """Return what each event watches at the times of rows of results, (n_times, n_events)."""
+        compiled = compiled_system(self.full)
+        motion, columns = None, []
+        for event, direct in zip(self.events, self.direct, strict=True):
+            if isinstance(event, StopEvent):
+                columns.append(stop_values(compiled, event, self.resting, rows))
+                continue
+            if isinstance(event, SwitchEvent) and event.values is not None:
+                columns.append(event.values(rows))
+                continue
+            if direct is not None:
+                columns.append(np.concatenate([direct(row) for row in rows]))
+                continue
+            if motion is None:
+                arrays = arrays_of([self.in_files(row) for row in rows])
+                arrays["drift"] = arrays["drift"][:, : len(self.head.joints)]
+                head = replace(self.head, summary={"events": self.happened})
+                motion = Trajectory(head, MemorySource(arrays), is_complete=False)
+            found = sensor_of(self.full, event.watch).measure(self.full, motion).columns
+            name = event.column or next(iter(found))
+            if name not in found:
+                raise ModelError(f"event {event.name!r}: column: expected one of {', '.join(found)}, got {name!r}")
+            columns.append(found[name])
+        return np.array(columns).T
+
+    def in_files(self, row: Rows) -> Rows:
+        """Return results in the frames of the files; those after one step are those before the next."""
+        for known, told in self.told:
+            if known is row:
+                return told
+        told = rows_of_file(compiled_system(self.full), row)
+        if len(row.t) == 1:
+            self.told = (*self.told[-1:], (row, told))
+        return told
+
+    def values_after(self, row: Rows) -> Array:
+        """Return what is watched at a later time."""
+        if self.is_direct:
+            return np.asarray(self.measured(row)[0])
+        assert self.row is not None
+        return np.asarray(self.measured(self.row, row)[1])
+
+    @property
+    def is_direct(self) -> bool:
+        """Whether all that is watched stands in the memories of the method."""
+        return None not in self.direct
+
+    def happens(self, event: Event, before: float, after: float) -> bool:
+        """Whether an event happens from one value to the next.
+
+        One that only switches, and finds all as it wants it, does not where rounding alone passes its level: what a
+        latch holds stays there.
+        """
+        if not event.happens(before, after):
+            return False
+        only_switches = bool(event.switch_on or event.switch_off) and not event.stop
+        changes = bool(self.off.intersection(event.switch_on)) or not self.off.issuperset(event.switch_off)
+        return changes or not only_switches or abs(after - before) > STANDS * max(1.0, abs(event.level_passed))
+
+    def near_levels(self, values: Array) -> IntArray:
+        """Return the steps in which a value, (n_times, n_events), may pass its level: it is not on one side of it."""
+        beyond = values - np.array([event.level_passed for event in self.events])
+        return np.flatnonzero(~(beyond[1:] * beyond[:-1] > 0.0).all(axis=1))
+
+    def any_happens(self, before: Array, after: Array) -> bool:
+        """Whether an event happens from values to the next, (n_events,)."""
+        each = zip(self.events, before, after, strict=True)
+        return any(self.happens(event, float(first), float(then)) for event, first, then in each)
+
+    def new_work(self) -> Work:
+        """Return working arrays for the system as it is switched, with room for the memories of a block."""
+        return new_work(compiled_system(self.system).model, min(BLOCK, self.longest))
+
+    @property
+    def longest(self) -> int:
+        """Most steps of a block, so that its results do not fill the memory."""
+        state = compiled_system(self.full).placed
+        numbers = 8 * state.r.size + 5 * len(state.u) + len(compiled_system(self.full).owners)
+        return max(1, MOST_NUMBERS // (numbers + 1))
+
+    def trial_work(self) -> Work:
+        """Return working arrays of steps that lead no further; those of the run keep their factors."""
+        if self.trial is None or self.trial[0] is not self.system:
+            self.trial = self.system, new_work(compiled_system(self.system).model)
+        return self.trial[1]
+
+    def steps(
+        self, integrator: Integrator, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int,
+        every: int,
+    ) -> tuple[Carry, Rows, Work, int, Failure | None]:  # fmt: skip
+        """Take steps of size h, the first of them number `first` from t0, as many as make a block, n_steps at most.
+
+        Return the results after every `every`-th of them (and at a stop, if the run ends there), and how many are done.
+
+        (1) the steps of a block by one call, which keeps the memory after each; what is watched, after each
+        (2) where something happens in a step, it is found by steps from the memory before it (`settled`)
+        (3) the motion is the same after it: the steps that were taken stay as they are
+        (4) it is another one: the block ends with that step
+        A method that does not keep its memories takes the steps before anew, and the one in question alone.
+        """
+        keeps_past = not isinstance(integrator, Ida | RelativeOde)
+        is_single = first == self.due or isinstance(integrator, Ida)  # each call of Ida begins anew
+        n = 1 if is_single else min(n_steps, BLOCK - first % BLOCK, self.calm, self.longest)
+        # others complete their memories where results are written
+        every_row = every if self.is_direct and isinstance(integrator, GeneralizedAlpha) else 1
+        begin, before = carry, self.row
+        work.past.n[...] = 0
+        carry, rows, n_good, failure = integrator.advance(
+            self.system, begin, work, t0=t0, h=h, first=first, n_steps=n, every=every_row
+        )
+        if every_row == 1:
+            assert before is not None
+            found = self.measured(before, rows)[1:]
+        else:
+            found = self.measured(past_rows(work, n_good, t0, h, first))
+        values = np.concatenate([self.values[None], found])
+        for k in map(int, self.near_levels(values)):
+            if not self.any_happens(values[k], values[k + 1]):
+                continue
+            if n > 1 and not keeps_past:
+                self.due = first + k
+                if k == 0:
+                    return self.steps(integrator, begin, work, t0=t0, h=h, first=first, n_steps=1, every=every)
+                n_good, values = k, values[: k + 1]
+                carry, rows, _, failure = integrator.advance(
+                    self.system, begin, work, t0=t0, h=h, first=first, n_steps=n_good, every=1
+                )
+                break
+            self.values = values[k]
+            if every_row == 1:
+                self.row = before if k == 0 else one_of(rows, k - 1)
+            after = partial(carry_of_past, work, carry, k) if keeps_past else partial(same, carry)
+            ended = Ended(after, one_of(rows, k) if every_row == 1 else None, values[k + 1])
+            close = slice(max(0, k + 1 - MOST_NEIGHBOURS), k + 1 + MOST_NEIGHBOURS)
+            settled = self.settled(
+                integrator,
+                begin if k == 0 else carry_of_past(work, carry, k - 1),
+                ended,
+                work,
+                t=t0 + (first + k) * h,
+                t_end=t0 + (first + k + 1) * h,
+                h=h,
+                neighbours=(k - close.start, values[close]),
+            )
+            if settled is not None:
+                carry, row, work, failure = settled
+                n_good = k + int(failure is None)
+                rows = Rows(*(array[: (first + k) // every_row - first // every_row] for array in rows))
+                if failure is None and (self.has_stopped or (first + n_good) % every_row == 0):
+                    rows = joined_rows([rows, row])
+                self.calm = max(1, (first + n_good - self.changed) // 2)
+                self.changed = first + n_good
+                return carry, self.due_of(rows, first, every // every_row), work, n_good, failure
+        self.values = values[n_good]
+        if n_good and every_row == 1:
+            self.row = one_of(rows, n_good - 1)
+        self.calm = min(2 * self.calm, BLOCK)
+        return carry, self.due_of(rows, first, every // every_row), work, n_good, failure
+
+    def due_of(self, rows: Rows, first: int, every: int) -> Rows:
+        """Return of the results after steps from `first` on every `every`-th, and those at a stop."""
+        if every == 1:
+            return rows
+        is_due = (first + 1 + np.arange(len(rows.t))) % every == 0
+        if self.has_stopped:
+            is_due[-1:] = True
+        return Rows(*(array[is_due] for array in rows))
+
+    def step(
+        self, integrator: Integrator, carry: Carry, work: Work, *, t0: float, h: float, k: int
+    ) -> tuple[Carry, Rows, Work, Failure | None]:
+        """Take step k of size h from t0 + k h, with the events in it; return the results at its end, or at the stop."""
+        after, row, _, failure = integrator.advance(self.system, carry, work, t0=t0, h=h, first=k, n_steps=1, every=1)
+        if failure is not None:
+            return carry, row, work, failure
+        ended = Ended(partial(same, after), row, self.values_after(row))
+        settled = self.settled(integrator, carry, ended, work, t=t0 + k * h, t_end=t0 + (k + 1) * h, h=h)
+        return (after, row, work, None) if settled is None else settled
+
+    def settled(
+        self, integrator: Integrator, begin: Carry, ended: "Ended", work: Work, *, t: float, t_end: float, h: float,
+        neighbours: tuple[int, Array] | None = None,
+    ) -> tuple[Carry, Rows, Work, Failure | None] | None:  # fmt: skip
+        """Settle what happens in a step of size h from t; None if the motion is the same after it.
+
+        Else return memory, results and working arrays at its end, or at the stop, and why it failed, if it did.
+        begin, ended: the memory before the step, and what it led to. neighbours: values at steps around it, (n_times,
+        n_events), the first of them so many steps before it.
+        """
+        size, reached_end = h, None
+        for _ in range(MOST_IN_A_STEP):
+            events, values = self.events, ended.values
+            passed = [j for j, e in enumerate(events) if self.happens(e, float(self.values[j]), float(values[j]))]
+            if not passed:
+                self.values, self.row = values, ended.row
+                return reached_end
+            found = sorted(
+                (self.located(integrator, begin, ended, t, size, j, neighbours) for j in passed),
+                key=lambda place: (place.part, place.j),
+            )
+            acting = next((place for place in found if events[place.j].is_active), None)
+            last = 1.0 if acting is None else acting.part
+            noted = [place for place in found if not events[place.j].is_active and place.part <= last]
+            failure = next((place.failure for place in (*noted, acting) if place and place.failure is not None), None)
+            if failure is not None:
+                return begin, found[0].row, work, failure
+            for place in noted:
+                self.note(place, t + place.part * size)
+            if acting is None:
+                self.values, self.row = values, ended.row
+                return reached_end
+            event, carry = events[acting.j], acting.carry
+            t = t + acting.part * size if event.at is None else event.at
+            row = acting.row._replace(t=np.array([t]))
+            reached = self.values_after(row)
+            for i in (acting.j, *(place.j for place in noted)):  # has passed its level, whatever rounding says
+                level = events[i].level_passed
+                if (reached[i] - level) * (self.values[i] - level) > 0.0:
+                    reached[i] = level
+            for place in found:  # what acts at the same time has its turn after this one
+                if place.j != acting.j and events[place.j].is_active and place.part <= acting.part:
+                    reached[place.j] = self.values[place.j]
+            self.values, self.row = reached, row
+            before = self.system
+            if isinstance(event, StopEvent):
+                state = self.strike(carry, event, t, h)
+            elif isinstance(event, SwitchEvent):
+                self.add(event, t)
+                self.signs[event.name] = -self.signs[event.name]
+                self.switch(self.off)
+                state = carry.state
+            else:
+                self.add(event, t)
+                if event.record and not event.stop:
+                    self.recorded.append(row)
+                if event.stop:
+                    self.has_stopped = True
+                    return carry, row, work, None
+                state = self.engage(event, carry, t)
+            begin, row, work = self.begun_anew(integrator, before, carry, state, row, t)
+            self.row = row
+            self.take_inside()
+            size, neighbours = t_end - t, None
+            if size <= SHORT * h:
+                begin, row = coasted(integrator, self.system, t, size, begin, work)
+                self.row = row._replace(t=np.array([t_end]))
+                return begin, self.row, work, None
+            carry, row, _, failure = integrator.advance(
+                self.system, begin, work, t0=t, h=size, first=0, n_steps=1, every=1
+            )
+            if failure is not None:
+                return begin, row, work, failure
+            ended = Ended(partial(same, carry), row, self.values_after(row))
+            reached_end = carry, row, work, None
+        words = f"{MOST_IN_A_STEP} events happened in one step: {', '.join(e['name'] for e in self.happened[-3:])}, ..."
+        return carry, row, work, Failure(words, np.inf)
+
+    def begun_anew(
+        self, integrator: Integrator, system: System, carry: Carry, state: State, row: Rows, t: float
+    ) -> tuple[Carry, Rows, Work]:
+        """Return memory, results and working arrays of the motion that goes on at t from a state of the engine.
+
+        system: as it was switched before t. The motion begins anew where velocities or what is held have changed, and
+        goes on where forces alone have. The energy that springs bring or take with them is work given; what an impact
+        takes is work taken.
+        """
+        is_struck = state is not carry.state
+        before, work_done, work = row.diagnostics[-1], carry.work, self.new_work()
+        if is_struck or not holds_alike(system, self.system):
+            told = state_of_file(compiled_system(self.full), state)
+            fresh = counted_on(integrator.start(self.system, t, told, before=carry), carry)
+            carry, row = integrator.observe(self.system, t, fresh, work)
+        else:
+            carry, row = integrator.after_jump(self.system, t, carry, work)
+        after = row.diagnostics[-1]
+        taken = float(before[KINETIC] - after[KINETIC]) if is_struck else 0.0
+        change = np.array([float(after[SPRINGS] - before[SPRINGS]), taken])
+        after[WORK_GIVEN] += change[0]
+        after[WORK_TAKEN] += change[1]
+        return replace(carry, work=work_done + change), row, work
+
+    def engage(self, event: Event, carry: Carry, t: float) -> State:
+        """Switch by an event; return the state of the engine with the velocities after it."""
+        compiled = compiled_system(self.full)
+        couplers = {coupler.name: coupler for coupler in self.full.couplers}
+        engaged = [name for name in event.switch_on if name in couplers and name in self.off]
+        for name in engaged:
+            caught, constant = coupled_sum(compiled, name, carry.w), couplers[name].constant
+            if constant is None:
+                self.caught[name] = caught
+                continue
+            wanted = float(constant(t))  # type: ignore[operator]
+            if abs(caught - wanted) > SHUT * max(1.0, compiled.length):
+                raise ModelError(
+                    f"event {event.name!r} at t = {t:g}: coupler {name!r} is to hold {wanted:.6g}, but finds "
+                    f"{caught:.6g}; leave its constant out, so that it holds what it catches, or let the event watch it"
+                )
+        holding = [
+            placed
+            for placed in compiled.laws
+            if placed.element.name in self.off.intersection(event.switch_on)
+            and any(each != NOTHING for each in placed.law.holds)
+        ]
+        self.switch((self.off | set(event.switch_off)) - set(event.switch_on))
+        if not engaged and not holding:
+            return carry.state
+        hit = impact(compiled_system(self.system), carry.state, t=t, known=carry.w, restitution={})
+        for placed in holding:
+            require_shut(event, placed, hit.gap, t, compiled.length)
+        cores = [sum_rows(compiled, name)[2] for name in engaged]
+        impulse = {name: float(hit.impulse[k]) for name, k in zip(engaged, cores, strict=True)}
+        for placed in holding:
+            for name, row in zip(placed.law.multipliers, placed.multipliers, strict=True):
+                impulse[f"{placed.element.name}.{name}"] = float(hit.impulse[row])
+        self.happened[-1]["impulse"] = impulse
+        return hit.state
+
+    def strike(self, carry: Carry, event: StopEvent, t: float, h: float) -> State:
+        """Meet a limit, or leave it; return the state of the engine with the velocities after it."""
+        self.add(event, t)
+        happened = self.happened[-1]
+        if event.side == "release":
+            del self.resting[event.coupler]
+            self.switch(self.off)
+            return carry.state
+        limits = next(each.limits for each in self.full.couplers if each.name == event.coupler)
+        assert limits is not None  # it has events
+        _, factors, core = sum_rows(compiled_system(self.full), event.coupler)
+        self.resting[event.coupler] = event.side
+        self.switch(self.off)
+        holding = compiled_system(self.system)
+        hit = impact(holding, carry.state, t=t, known=carry.w, restitution={})
+        speed = float(hit.rate[core]) * float(np.abs(factors).max())  # rows of couplers have a largest coefficient of 1
+        told = state_of_file(compiled_system(self.full), hit.state)
+        pressed = INWARD[event.side] * float(consistent_motion(self.system, told, t=t, known=carry.w).w[core])
+        thrown = 2 * limits.restitution * abs(float(hit.impulse[core]))  # pressed by this for the time of the flight
+        happened["speed before"], happened["speed after"] = speed, 0.0
+        if pressed > 0.0 and thrown <= pressed * h:
+            happened["impulse"] = {event.coupler: float(hit.impulse[core])}
+            return hit.state
+        if limits.restitution > 0.0:
+            restitution = {core: limits.restitution}
+            hit = impact(holding, carry.state, t=t, known=carry.w, restitution=restitution)
+            happened["speed after"] = -limits.restitution * speed
+        happened["impulse"] = {event.coupler: float(hit.impulse[core])}
+        del self.resting[event.coupler]
+        self.switch(self.off)
+        return hit.state
+
+    def take_inside(self) -> None:
+        """Let limits that are reached, and on which nothing rests, be reached anew by whatever goes beyond them.
+
+        So for the zeros of switching functions, which have the sign of the law.
+        """
+        for j, event in enumerate(self.events):
+            if isinstance(event, StopEvent) and event.side in INWARD and event.coupler not in self.resting:
+                self.values[j] = just_inside(event, float(self.values[j]))
+            elif isinstance(event, SwitchEvent):
+                self.values[j] = beyond_zero(float(self.values[j]), self.signs[event.name])
+
+    def add(self, event: Event, t: float) -> None:
+        """Take an event into what has happened."""
+        self.happened.append({"name": event.name, "t": t, "stop": event.stop, "switch_on": list(event.switch_on),
+                              "switch_off": list(event.switch_off)})  # fmt: skip
+
+    def note(self, place: "Place", t: float) -> None:
+        """Record the results at an event that does not change the motion, found by a step that leads no further."""
+        event = self.events[place.j]
+        self.add(event, t if event.at is None else event.at)
+        self.recorded.append(place.row if event.at is None else place.row._replace(t=np.array([event.at])))
+
+    def taken(self) -> list[Rows]:
+        """Return the results recorded at events since the last call."""
+        rows, self.recorded = self.recorded, []
+        return rows
+
+    def located(
+        self, integrator: Integrator, begin: Carry, ended: "Ended", t: float, size: float, j: int,
+        neighbours: tuple[int, Array] | None,
+    ) -> "Place":  # fmt: skip
+        """Return the part of a step of size `size` from t after which event j has just happened, and what is there.
+
+        Places are tried by steps of their size from the beginning of the step.
+        """
+        event, work = self.events[j], self.trial_work()
+        tried: dict[float, Place] = {}
+
+        def at(part: float) -> Place:
+            if part == 1.0:
+                carry, row = ended.carry(), ended.row
+                if row is None:
+                    _, row = integrator.observe(self.system, t + size, carry, work)
+                return Place(part, j, carry, row, None)
+            if part <= 0.0:  # at once, as after another event at this time
+                begun, row = integrator.observe(self.system, t, begin, work)
+                return Place(0.0, j, begun, row, None)
+            if part not in tried:
+                work.solver.c_k[...] = 0.0  # without the factors of other places
+                carry, row, _, failure = integrator.advance(
+                    self.system, begin, work, t0=t, h=part * size, first=0, n_steps=1, every=1
+                )
+                tried[part] = Place(part, j, carry, row, failure)
+            return tried[part]
+
+        if event.at is not None:
+            return at((event.at - t) / size)
+        first, last = float(self.values[j]) - event.level, float(ended.values[j]) - event.level
+        sign = float(np.sign(last) or -np.sign(first))
+
+        def beyond(part: float) -> float:
+            place = at(part)
+            if place.failure is not None:
+                raise ModelError(f"event {event.name!r}: its time in the step from t = {t:g} was not found")
+            return sign * (float(self.values_after(place.row)[j]) - event.level)
+
+        before, values = (0, np.array([first, last])) if neighbours is None else neighbours
+        if neighbours is not None:
+            values = values[:, j] - event.level
+        guess = expected_passage([float(k - before) for k in range(len(values))], [sign * float(x) for x in values])
+        return at(passage(beyond, sign * first, max(sign * last, 0.0), event.tolerance, guess))
+
+    def record(self) -> dict[str, Array]:
+        """Return what a run needs to go on."""
+        names = ("happened", "caught", "resting", "signs", "calm", "changed", "due")
+        words = json.dumps({"off": sorted(self.off)} | {name: getattr(self, name) for name in names})
+        return {"event_values": self.values, "events": np.frombuffer(words.encode(), dtype=np.uint8)}
+
+    def restore(self, record: Mapping[str, Array]) -> None:
+        """Go on from a record."""
+        data = json.loads(np.asarray(record["events"], dtype=np.uint8).tobytes().decode())
+        self.caught, self.resting, self.signs = (data.get(name, {}) for name in ("caught", "resting", "signs"))
+        self.calm = data.get("calm", BLOCK)
+        self.changed, self.due = data.get("changed", 0), data.get("due", -1)
+        self.switch(frozenset(data["off"]))
+        self.happened = data["happened"]
+        self.values = np.array(record["event_values"], dtype=float)
+
+
+def holds_alike(a: System, b: System) -> bool:
+    """Whether two systems that differ in what is switched hold the same positions and velocities."""
+    return np.array_equal(compiled_system(a).model.rows.kind, compiled_system(b).model.rows.kind)
+
+
+def require_shut(event: Event, placed: PlacedLaw, gap: Array, t: float, length: float) -> None:
+    """Raise `ModelError` if an element that is switched on is to hold a position which the motion does not have."""
+    for name, row, holds in zip(placed.law.multipliers, placed.multipliers, placed.law.holds, strict=True):
+        if holds == POSITION and abs(gap[row]) > SHUT * max(1.0, length):
+            raise ModelError(
+                f"event {event.name!r} at t = {t:g}: element {placed.element.name!r} is to hold the position of its "
+                f"multiplier {name!r}, but finds it open by {gap[row]:.6g}; let the event watch what it holds"
+            )

@@ -1,0 +1,210 @@
+"""Events: what a run does when a sensor or joint coordinate passes a level, or at a time.
+
+Event("caught", "hinge.angle", level=np.pi / 2, direction="rising", stop=True)
+Event("release", "drop", column="y", level=0.2, direction="falling", switch_off=("rope",))
+Event("brake", at=1.5, switch_on=("brake",))
+Event("crossing", "place", column="x", record=True)
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+import numpy as np
+
+from fe_models.foundation.words import nearest, quoted
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.errors import ModelError
+from floatframe.model.checked_values import number
+from floatframe.model.elements.element import Element
+from floatframe.model.elements.switched_off import SwitchedOff, off_at_start
+from floatframe.model.forces import BodyLoad, Bushing, Force, JointForce, PointForce, SpringDamper
+from floatframe.model.functions.time_functions import constant
+from floatframe.model.joints.coordinate_coupler import CoordinateCoupler
+from floatframe.model.system import System
+from floatframe.results.sensors import sensor_of
+
+__all__ = [
+    "DIRECTIONS",
+    "Event",
+    "events_of",
+    "has_events",
+    "off_at_start",
+    "require_events",
+    "require_times_of_events",
+    "switched",
+]
+
+DIRECTIONS = {"rising": 1, "falling": -1, "both": 0}
+
+#: the same force without any load, which keeps its place in the system; one with nothing at all is refused, hence the
+#: functions that are zero
+SILENT: dict[type, dict[str, Any]] = {
+    PointForce: {"force": np.zeros(3), "torque": np.zeros(3)},
+    SpringDamper: {"stiffness": 0.0, "damping": 0.0, "preload": 0.0, "characteristic": constant(0.0)},
+    JointForce: {
+        "stiffness": 0.0,
+        "damping": 0.0,
+        "preload": 0.0,
+        "friction": 0.0,
+        "friction_coefficient": 0.0,
+        "motor": constant(0.0),
+        "characteristic": None,
+    },
+    BodyLoad: {"amplitude": constant(0.0)},
+    Bushing: {
+        "stiffness": np.zeros((6, 6)),
+        "damping": np.zeros((6, 6)),
+        "preload": np.zeros(6),
+        "characteristics": {"x": constant(0.0)},
+    },
+}
+
+
+@dataclass(frozen=True)
+class Event:
+    """What happens when a measured value passes a level, or at a time.
+
+    The time where a value passes its level is found to `tolerance` by steps of other sizes. A force or an element is
+    off at the start if the first event that names it switches it on; a coupler (a latch, a clutch) if it is not
+    `engaged`. An event that only records does not change the motion, bit for bit.
+    """
+
+    name: str
+    watch: str = ""  #: name of a sensor of the system, or "joint.coordinate"; "": the event has a time
+    level: float = 0.0  #: in the unit of what is watched
+    direction: str = "both"  #: "rising", "falling" or "both"
+    column: str = ""  #: of the sensor, such as "x" or "rate"; "": its first
+    stop: bool = False  #: end the run there
+    switch_on: tuple[str, ...] = ()  #: names of forces, couplers and elements
+    switch_off: tuple[str, ...] = ()
+    tolerance: float = 1e-9  #: of the time, in parts of the step
+    at: float | None = None  #: instead of `watch`: the time of the event, after the start of the run [s]
+    record: bool = False  #: keep the results at this time, besides those of the output times
+
+    @property
+    def is_active(self) -> bool:
+        """Whether the motion is another one after it."""
+        return self.stop or bool(self.switch_on) or bool(self.switch_off)
+
+    @property
+    def level_passed(self) -> float:
+        """The level of what is watched, or the time."""
+        return self.level if self.at is None else self.at
+
+    def __post_init__(self) -> None:
+        where = f"event {self.name!r}"
+        object.__setattr__(self, "level", number(f"{where}: level", self.level))
+        object.__setattr__(self, "tolerance", number(f"{where}: tolerance", self.tolerance, above=0.0))
+        for name in ("switch_on", "switch_off"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        if self.direction not in DIRECTIONS:
+            hint = nearest(self.direction, list(DIRECTIONS))
+            raise ModelError(
+                f"{where}: direction: expected one of {', '.join(DIRECTIONS)}, got {self.direction!r}{hint}"
+            )
+        if bool(self.watch) == (self.at is not None):
+            given = "both" if self.watch else "neither"
+            raise ModelError(
+                f"{where}: expected either watch (a sensor or joint coordinate) or at (a time), got {given}"
+            )
+        if self.at is not None:
+            object.__setattr__(self, "at", number(f"{where}: at", self.at))
+            if self.column or self.level != 0.0 or self.direction != "both":
+                raise ModelError(f"{where}: an event at a time has no column, level or direction; they belong to watch")
+        if not (self.is_active or self.record):
+            raise ModelError(
+                f"{where}: expected stop, switch_on, switch_off or record, got an event without consequence"
+            )
+
+    def happens(self, before: float, after: float) -> bool:
+        """Whether the value (for an event at a time: the time) passes the level from one value to the next."""
+        if self.at is not None:
+            return before < self.at <= after
+        a, b = before - self.level, after - self.level
+        rises, falls = a < 0 <= b, a > 0 >= b
+        return {1: rises, -1: falls, 0: rises or falls}[DIRECTIONS[self.direction]]
+
+
+def require_events(system: System) -> None:
+    """Raise `ModelError` if an event watches or switches what does not exist, or cannot be switched."""
+    forces = {getattr(force, "name", ""): force for force in system.forces}
+    elements = {element.name for element in system.elements}
+    couplers = {coupler.name: coupler for coupler in system.couplers}
+    first_on = off_at_start(events_of(system))
+    for event in events_of(system):
+        where = f"event {event.name!r}"
+        if event.watch:
+            try:
+                sensor_of(system, event.watch)
+            except ModelError as error:
+                raise ModelError(f"{where}: watch: {error}") from error
+        for name in (*event.switch_on, *event.switch_off):
+            if name in couplers:
+                require_switched(where, couplers[name], is_first_on=name in first_on)
+                continue
+            if name in elements:
+                continue
+            if name not in forces or not name:
+                choices = [key for key in (*forces, *couplers, *elements) if key]
+                raise ModelError(f"{where}: no force, coupler or element {quoted(name)}{nearest(name, choices)}")
+            if type(forces[name]) not in SILENT:
+                raise ModelError(f"{where}: a force of the kind {type(forces[name]).__name__} cannot be switched")
+
+
+def require_switched(where: str, coupler: CoordinateCoupler, *, is_first_on: bool) -> None:
+    """Raise `ModelError` if a coupler cannot be switched by events, or waits for one without saying so."""
+    if coupler.limits is not None:
+        raise ModelError(
+            f"{where}: coupler {coupler.name!r} has limits and is switched by them alone; take another coupler for the "
+            "event"
+        )
+    if is_first_on and coupler.engaged:
+        raise ModelError(
+            f"{where}: coupler {coupler.name!r} is switched on, but it is engaged at the start; say engaged = false"
+        )
+
+
+def events_of(system: System) -> tuple[Event, ...]:
+    """Return the events that a system carries, whose names alone it knows, and those that its elements bring."""
+    return cast(tuple[Event, ...], (*system.events, *(event for each in system.elements for event in each.events())))
+
+
+def has_events(system: System) -> bool:
+    """Whether something may be switched during a motion: events, stops that are struck, laws that jump with it."""
+    return (
+        bool(events_of(system))
+        or any(coupler.limits is not None for coupler in system.couplers)
+        or any(getattr(force, "switches", ()) for force in system.forces)
+        or any(placed.law.switches for placed in compiled_system(system).laws)
+    )
+
+
+def require_times_of_events(system: System, t_start: float) -> None:
+    """Raise `ModelError` if an event would happen before the run."""
+    for event in events_of(system):
+        if event.at is not None and event.at <= t_start:
+            words = f"expected a time after the start of the run, {t_start:g}, got {event.at:g}"
+            raise ModelError(f"event {event.name!r}: at: {words}")
+
+
+def switched(system: System, off: frozenset[str], held: Mapping[str, float]) -> System:
+    """Return the system with these forces at zero, couplers not engaged, elements off, and the same columns of results.
+
+    held: what couplers that have been switched on hold, by name.
+    """
+    if not off and not held:
+        return system
+    forces: list[Force] = []
+    for force in system.forces:
+        is_off = getattr(force, "name", "") in off
+        forces.append(replace(force, **SILENT[type(force)]) if is_off else force)
+    couplers = []
+    for coupler in system.couplers:
+        if coupler.name in off:
+            coupler = replace(coupler, engaged=False)
+        elif coupler.name in held:
+            coupler = replace(coupler, engaged=True, limits=None, constant=held[coupler.name])
+        couplers.append(coupler)
+    elements: list[Element] = [SwitchedOff(each) if each.name in off else each for each in system.elements]
+    return replace(system, forces=forces, couplers=couplers, elements=elements)

@@ -1,0 +1,55 @@
+"""Units of other programs beside a system: which FMU, what it is given and acts on, and how steps are coupled."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from fe_models.foundation.copies import FrozenMapping, frozen_copies
+from floatframe.errors import ModelError
+from floatframe.model.checked_values import number
+
+__all__ = ["SCHEMES", "Coupling", "ForeignUnit"]
+
+SCHEMES = ("explicit", "iterated")
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class ForeignUnit:
+    """An FMU for co-simulation that acts beside a system: a controller, a tyre, hydraulics."""
+
+    name: str
+    file: str  #: path of the FMU
+    inputs: Mapping[str, str] = field(default_factory=dict)  #: its inputs by sensors of the system, "tip.x"
+    outputs: Mapping[str, str] = field(default_factory=dict)  #: its outputs by inputs of the system, on which they act
+    parameters: Mapping[str, float] = field(default_factory=dict)  #: its parameters by values
+
+    def __post_init__(self) -> None:
+        for part in ("inputs", "outputs", "parameters"):
+            object.__setattr__(self, part, FrozenMapping(dict(getattr(self, part))))
+        if not self.inputs and not self.outputs:
+            raise ModelError(f"unit {self.name!r}: expected inputs or outputs, got neither: it would act on nothing")
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """How a system and its foreign units take their steps together.
+
+    explicit: all take a macro-step with the inputs of its beginning, held; the error is of first order in the step.
+    iterated: all take it again, from kept states, with the means of the inputs at its beginning and its end, until
+    these no longer change; the error is of second order, and the coupling may be stiffer.
+    """
+
+    step: float | None = None  #: macro-step [s], a multiple of the step of the system; None: that step
+    scheme: str = "explicit"
+    tolerance: float = 1e-9  #: of the iteration, relative to the size of each signal
+    max_iterations: int = 50
+
+    def __post_init__(self) -> None:
+        if self.step is not None:
+            number("Coupling: step", self.step, above=0.0)
+        if self.scheme not in SCHEMES:
+            raise ModelError(f"Coupling: scheme: expected one of {', '.join(SCHEMES)}, got {self.scheme!r}")
+        if not 0.0 < self.tolerance < 1.0:
+            raise ModelError(f"Coupling: tolerance: expected 0 < tolerance < 1, got {self.tolerance}")
+        if self.max_iterations < 2:
+            raise ModelError(f"Coupling: max_iterations: expected at least 2, got {self.max_iterations}")

@@ -1,0 +1,615 @@
+"""The time loop: an integrator advanced in compiled batches, with output, progress and errors."""
+
+import logging
+import os
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass, field, fields, replace
+from importlib.metadata import PackageNotFoundError, version
+from math import ceil
+from typing import Any
+
+import numpy as np
+
+from fe_models.foundation.digest import file_digest
+from fe_models.foundation.tasks.interrupts import heeded_interrupts
+from fe_models.foundation.words import nearest
+from floatframe.engine.compiling.callbacks import raise_errors_of
+from floatframe.engine.compiling.file_frames import rows_of_file
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.initial_conditions.begun_drives import words_of_begun_drives
+from floatframe.engine.initial_conditions.mass_positivity import indefinite_mass_words, indefinite_masses
+from floatframe.engine.kernels.memory import Rows
+from floatframe.engine.kernels.work import new_work
+from floatframe.errors import ConvergenceError, ModelError, ResultsError
+from floatframe.integrators import CLASSES, in_formulation
+from floatframe.integrators.carry import Carry, Integrator
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.checked_values import number
+from floatframe.model.forces import BodyLoad, PointForce
+from floatframe.model.state import State
+from floatframe.model.system import System
+from floatframe.results.head import BodyEntry, Head
+from floatframe.results.results_file import MemorySource, validity_text
+from floatframe.results.sensors import measured
+from floatframe.results.sensors.taken_places import taken_places
+from floatframe.results.trajectory import Trajectory, read_results
+from floatframe.results.validity import ValidityNote, notes_from_json, notes_to_json
+from floatframe.results.writer import ResultsPlace, ResultsWriter, arrays_of, last_restart
+from floatframe.simulation.energy_watch import EnergyWatch
+from floatframe.simulation.event_steps import EventWatch
+from floatframe.simulation.events import has_events, require_times_of_events
+from floatframe.simulation.jumps import jumps_of_steps, over_jumps
+from floatframe.simulation.knots import knot_words
+from floatframe.simulation.law_watch import LawWatch
+from floatframe.simulation.restart import RESTART_STEPS, carry_of_record, restart_record, system_digest
+from floatframe.simulation.step_advice import frequency_words, step_advice
+from floatframe.simulation.step_watch import WATCHES, StepWatch, has_second_order, has_steps_of_one_size
+from floatframe.simulation.validity_watch import ValidityWatch
+
+__all__ = ["Progress", "integrate", "resume"]
+
+log = logging.getLogger(__name__)
+
+BATCH_STEPS = 400  #: steps per call of the compiled loop
+FIRST_STEPS = 100  #: of a run, in which a failure may come from how its drives begin
+LOOK_ROWS, LOOK_SECONDS = 1000, 0.2  #: rows of results are looked at when they are so many, or so much time has gone
+SEGMENT_SECONDS = 2.0  #: a segment of the results is closed after this time
+TIMES = ("t_start", "t_end", "h", "output_every")  #: of the run, in the head
+MOST_STEPS = 1e12  #: of a run: months of computing
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a run is."""
+
+    t: float  #: time reached [s]
+    t_end: float
+    n_steps: int  #: done
+    n_total: int
+    n_iterations: int  #: of Newton's method, so far
+    notes: tuple[ValidityNote, ...] = ()  #: of the run about itself, so far
+    n_rejected: int = 0  #: steps that were tried in vain, so far
+
+
+def integrate(
+    system: System,
+    integrator: Integrator,
+    t_end: float,
+    h: float,
+    *,
+    t_start: float = 0.0,
+    state: State | None = None,
+    output: str | os.PathLike[str] | None = None,
+    output_every: int = 1,
+    batch_steps: int = BATCH_STEPS,
+    progress: Callable[[Progress], None] | None = None,
+    formulation: str | None = None,
+    watch: str = "stop",
+) -> Trajectory:
+    """Compute a motion from t_start to t_end.
+
+    Parameters
+    ----------
+    system
+        The system; its bodies as placed are made consistent first.
+    integrator
+        The method, such as `GeneralizedAlpha(rho_inf=0.8)`.
+    t_end
+        End time [s].
+    h
+        Step size [s], or distance of outputs and largest step where the integrator controls its step; made smaller by
+        less than one step in the whole run where it does not divide it.
+    t_start
+        Time at the beginning [s].
+    state
+        State to begin from, instead of the bodies as placed.
+    output
+        Results file; None keeps the motion in memory.
+    output_every
+        Write the results of every so many steps; the start is always written.
+    batch_steps
+        Steps per call of the compiled loop; the motion does not depend on it, bit for bit.
+    progress
+        Called after every batch. What it raises ends the run; closed results stay.
+    formulation
+        "absolute", or "relative": in the coordinates of joints (docs/relative.md), with results of the same form; None:
+        that of the integrator.
+    watch
+        Where the steps put the motion off by 3 %, or add 5 % of its energy, the motion says so (`validity`) and the log
+        too. "stop": a run ends where half of its energy comes from its steps; "tell": it goes on; "off":
+        neither is looked for.
+
+    Returns
+    -------
+    Trajectory
+        The motion; with `output` it is read from the file when asked for.
+
+    Raises
+    ------
+    ModelError
+        If an argument or the system is impossible.
+    ConvergenceError
+        If a step fails, or half of the energy comes from the steps; it carries the trajectory so far.
+    ResultsError
+        If the results cannot be written.
+    """
+    if watch not in WATCHES:
+        raise ModelError(
+            f"integrate: watch: expected one of {', '.join(WATCHES)}, got {watch!r}{nearest(watch, WATCHES)}"
+        )
+    t_start, t_end = number("integrate: t_start", t_start), number("integrate: t_end", t_end)
+    h = number("integrate: h", h, above=0.0)
+    integrator = in_formulation(integrator, formulation)
+    if t_end <= t_start:
+        raise ModelError(f"integrate: expected t_end above t_start = {t_start:g}, got {t_end:g}")
+    if output_every < 1 or batch_steps < 1:
+        raise ModelError(
+            f"integrate: expected output_every and batch_steps of at least 1, got {output_every} and {batch_steps}"
+        )
+    require_no_units(system)
+    n_total = number_of_steps(t_start, t_end, h)
+    step = (t_end - t_start) / n_total
+    if abs(step - h) > 1e-9 * h:
+        log.info("h = %g does not divide the time from %g to %g: h = %.9g is used", h, t_start, t_end, step)
+    advice = step_advice(system, step)
+    if advice is not None and advice.n_followed == 0:
+        log.warning("system %r: %s", system.name, advice.words)
+    is_fixed = has_steps_of_one_size(integrator)
+    frequencies = frequency_words(system, t_start, step, n_total, has_steps_of_one_size=is_fixed)
+    acting = [ValidityNote.of_law("knots", words, t_start) for words in knot_words(system, t_start, step, n_total)]
+    acting += [ValidityNote.of_law("frequency", words, t_start) for words in frequencies]
+    for note in acting:
+        log.warning("system %r: %s", system.name, note.words)
+    head = head_of(system, integrator, t_start, t_end, step, output_every)
+    head = replace(head, angles=compiled_system(system).angles, run=dict(head.run) | {"watch": watch})
+    events = EventWatch(system, head) if has_events(system) else None
+    require_times_of_events(system, t_start)
+    begun = system if events is None else events.system
+    with ExitStack() as held:  # the place of the results, from before the work until its end
+        place = None if output is None else held.enter_context(ResultsPlace(output, inputs=system.files))
+        carry = integrator.start(begun, t_start, state)
+        work = new_work(compiled_system(begun).model)
+        carry, rows = integrator.observe(begun, t_start, carry, work)
+        require_sensors(system, head, rows)
+        if events is not None:
+            events.begin(rows)
+        writer = None if place is None else ResultsWriter(place, head)
+        run = Run(
+            system, integrator, head, t_start, t_end, step, n_total, output_every, writer, tuple(acting), events=events
+        )  # fmt: skip
+        run.words_of_start = lambda: words_of_begun_drives(begun, t_start, state, step)
+        run.steps.begin(carry.state)
+        run.energy.observe(system, rows, is_switched=False)
+        run.keep(rows)
+        run.close_segment(run.record(carry, 0))
+        raise_if_interrupted = held.enter_context(heeded_interrupts())
+        return run.advance(carry, 0, batch_steps, progress, raise_if_interrupted)
+
+
+def require_no_units(system: System) -> None:
+    """Raise `ModelError` if units of other programs act beside a system, which a run alone would leave out."""
+    if system.fmus:
+        names = ", ".join(unit.name for unit in system.fmus)
+        raise ModelError(
+            f"system {system.name!r}: units of other programs act beside it (fmus: {names}): use floatframe run, or "
+            "floatframe.co_simulate in place of integrate; such a run cannot be resumed"
+        )
+
+
+def number_of_steps(t_start: float, t_end: float, h: float) -> int:
+    """Return how many steps lead from t_start to t_end; `ModelError` if no computer would take them."""
+    wanted = (t_end - t_start) / h
+    if not wanted <= MOST_STEPS:
+        raise ModelError(
+            f"integrate: from t = {t_start:g} to {t_end:g} with h = {h:g} these are {wanted:.1e} steps, expected up to "
+            f"{MOST_STEPS:.0e}; take t_end nearer, or a greater h"
+        )
+    return max(1, ceil(wanted * (1 - 1e-12) - 1e-9))
+
+
+def require_sensors(system: System, head: Head, rows: Rows) -> None:
+    """Raise `ModelError` or `ResultsError` before the run if a sensor of the system cannot measure its start."""
+    if system.sensors:
+        told = rows_of_file(compiled_system(system), rows)
+        measured(system, Trajectory(head, MemorySource(joint_rows(system, [told])), is_complete=False))
+
+
+def resume(
+    system: System,
+    output: str | os.PathLike[str],
+    *,
+    progress: Callable[[Progress], None] | None = None,
+) -> Trajectory:
+    """Go on with a run that was interrupted, to the motion it would have become, bit for bit.
+
+    Parameters
+    ----------
+    system
+        The system that was run.
+    output
+        The results file the run was to write; its segments are beside it.
+    progress
+        As in `integrate`.
+
+    Raises
+    ------
+    ResultsError
+        If there is nothing to resume, or the segments are those of another system.
+    ConvergenceError
+        If a step fails.
+    """
+    require_no_units(system)
+    with ResultsPlace(output, inputs=system.files, is_begun=True) as place:
+        head, record = last_restart(place.folder)
+        run = dict(head.run)
+        kind = CLASSES.get(str(run.get("integrator")))
+        if kind is None or any(name not in run for name in (*TIMES, *(part.name for part in fields(kind)))):
+            raise ResultsError(f"{output}: the interrupted run is of another version of this program; run it anew")
+        integrator = kind(**{part.name: run[part.name] for part in fields(kind)})
+        if run.get("digest") != system_digest(system, integrator):
+            raise ResultsError(
+                f"{output}: the interrupted run was of another system than {system.name!r}, or that or this program "
+                "has changed since; resume it with the files and the version it was begun with, or run it anew"
+            )
+        if record is None:
+            raise ResultsError(f"{output}: the interrupted run has no restart record; run it anew")
+        carry, n_done = carry_of_record(record, system)
+        watch = EventWatch(system, head) if has_events(system) else None
+        if watch is not None:
+            watch.restore(record)
+        writer = ResultsWriter(place, head, goes_on=True)
+        n_total = round((run["t_end"] - run["t_start"]) / run["h"])
+        again = Run(
+            system, integrator, head, run["t_start"], run["t_end"], run["h"], n_total, run["output_every"], writer,
+            notes=notes_from_json(validity_text(place.folder)),
+            seconds_before=float(record.get("seconds", 0.0)),
+            events=watch,
+        )  # fmt: skip
+        again.steps.restore(record, again.notes)
+        again.energy.restore(record, again.notes)
+        with heeded_interrupts() as raise_if_interrupted:
+            return again.advance(carry, n_done, BATCH_STEPS, progress, raise_if_interrupted)
+
+
+@dataclass
+class Run:
+    """One motion being computed, and where its results go."""
+
+    system: System
+    integrator: Integrator
+    head: Head
+    t_start: float
+    t_end: float
+    h: float
+    n_total: int
+    output_every: int
+    writer: ResultsWriter | None
+    notes: tuple[ValidityNote, ...] = ()  #: known before, or of the part that is done
+    kept: list[Rows] = field(default_factory=list)
+    seconds_before: float = 0.0  #: that the run has taken before it was interrupted
+    began: float = field(default_factory=time.perf_counter)
+    events: EventWatch | None = None
+    words_of_start: Callable[[], str] = lambda: ""  #: what may be wrong where the first steps fail
+
+    @property
+    def seconds(self) -> float:
+        """Time the run has taken so far [s]."""
+        return self.seconds_before + time.perf_counter() - self.began
+
+    def record(self, carry: Carry, n_done: int) -> dict[str, np.ndarray]:
+        """Return what is needed to go on from here."""
+        self.tell(self.energy.flush(self.system))
+        events = {} if self.events is None else self.events.record()
+        watches = self.steps.record() | self.energy.record()
+        return restart_record(carry, n_done) | {"seconds": np.array(self.seconds)} | events | watches
+
+    def record_where_due(self, carry: Carry, n_done: int) -> dict[str, np.ndarray] | None:
+        """Return what is needed to go on from here, None where a run does not go on."""
+        return self.record(carry, n_done) if self.writer is not None and n_done % RESTART_STEPS == 0 else None
+
+    def summary(self, carry: Carry) -> dict[str, Any]:
+        """Return what the run took, and its events."""
+        events = {} if self.events is None else {"events": self.events.happened}
+        return events | {
+            "n_steps": carry.n_steps,
+            "n_rejected": carry.n_rejected,
+            "n_iterations": carry.n_iterations,
+            "wall_time": self.seconds,
+        }
+
+    def __post_init__(self) -> None:
+        self.watch = ValidityWatch(self.system, self.notes)
+        self.watching = str(self.head.run.get("watch", "off"))
+        is_on = self.watching != "off" and has_second_order(self.integrator)
+        self.steps = StepWatch(self.integrator, self.n_total, is_on)
+        self.energy = EnergyWatch(self.output_every, self.h)
+        self.closed = self.looked = time.monotonic()  # when the last segment was, and rows were looked at
+        self.waiting: list[Rows] = []
+
+    def wanted(self, rows: Rows, n_done: int, n_good: int, has_stopped: bool) -> Rows:
+        """Return of the results after each of n_good steps those at output times, and those at a stop."""
+        is_due = (n_done + 1 + np.arange(n_good)) % self.output_every == 0
+        if has_stopped:
+            is_due[-1:] = True
+        return Rows(*(array[:n_good][is_due] for array in rows))
+
+    def keep(self, rows: Rows) -> None:
+        """Take rows of results, which wait for others: a look at a few costs as much as one at a thousand."""
+        if len(rows.t):
+            self.waiting.append(rows)
+        if sum(len(each.t) for each in self.waiting) >= LOOK_ROWS or time.monotonic() - self.looked > LOOK_SECONDS:
+            self.look()
+
+    def look(self) -> None:
+        """Hand on the rows that wait; tell when a body leaves the range of its linear frame."""
+        self.looked = time.monotonic()
+        if self.writer is not None:
+            self.writer.validity = notes_to_json(self.watch.notes)
+        if not self.waiting:
+            return
+        rows = Rows(*(np.concatenate(arrays) for arrays in zip(*self.waiting, strict=True)))
+        self.waiting = []
+        for note in self.watch.observe(rows):
+            log.warning("%s", note.words)
+        told = rows_of_file(compiled_system(self.system), rows)
+        if self.writer is None:
+            self.kept.append(told)
+        else:
+            self.writer.validity = notes_to_json(self.watch.notes)
+            self.writer.append(told)
+
+    def tell(self, note: ValidityNote | None) -> None:
+        """Keep what the watches of steps and energy have found; log a note that is new."""
+        for found in (self.steps.note, self.energy.note):
+            if found is not None:
+                self.watch.found[found.key] = found
+        if note is not None:
+            log.warning("system %r: %s", self.system.name, note.words)
+
+    def close_segment(self, record: dict[str, np.ndarray] | None = None) -> None:
+        """Close a segment of the results, if they go to a file, with a record to go on from."""
+        self.look()
+        self.closed = time.monotonic()
+        if self.writer is not None:
+            self.writer.close_segment(record)
+
+    def advance(
+        self,
+        carry: Carry,
+        n_done: int,
+        batch_steps: int,
+        progress: Callable[[Progress], None] | None,
+        raise_if_interrupted: Callable[[], None],
+    ) -> Trajectory:
+        """Take the steps that are left, in batches that end where a run can go on; return the motion."""
+        begun = self.acting
+        work = new_work(compiled_system(begun).model) if self.events is None else self.events.new_work()
+        t_begun = self.t_start + n_done * self.h
+        _, row = self.integrator.observe(begun, t_begun, carry, work)  # the iterate to begin from
+        if self.events is not None:
+            self.events.begin(row)
+        jumps = jumps_of_steps(self.system, self.t_start, self.h, self.n_total)
+        laws = LawWatch(self.system, self.t_start, self.h, jumps, n_done)
+        failure, has_stopped, is_beyond, n_told = None, False, False, n_done
+        safe = self.record_where_due(carry, n_done)  # while a block runs its events are ahead of its memory
+        try:
+            while n_done < self.n_total and failure is None and not has_stopped and not is_beyond:
+                raise_if_interrupted()
+                if n_done % RESTART_STEPS == 0:
+                    work.solver.c_k[...] = 0.0  # factors are made anew, as after a resumption
+                    if n_done and time.monotonic() - self.closed > SEGMENT_SECONDS:
+                        self.close_segment(self.record(carry, n_done))
+                n_batch = min(batch_steps, self.steps.room(n_done, batch_steps), self.n_total - n_done)
+                n_batch = min(n_batch, RESTART_STEPS - n_done % RESTART_STEPS)
+                begin, n_happened = carry, self.n_happened
+                n_smooth = min((k - n_done for k in jumps if k >= n_done), default=n_batch)
+                if n_smooth == 0:
+                    carry, rows, work, failure = over_jumps(
+                        self.integrator, self.acting, carry, work, t=self.t_start + n_done * self.h, h=self.h,
+                        jumps=jumps[n_done], events=self.events,
+                    )  # fmt: skip
+                    n_good = int(failure is None)
+                elif self.events is None:
+                    carry, rows, n_good, failure = self.integrator.advance(
+                        self.system, carry, work, t0=self.t_start, h=self.h, first=n_done,
+                        n_steps=min(n_batch, n_smooth), every=self.output_every,
+                    )  # fmt: skip
+                else:
+                    carry, rows, work, n_good, failure = self.events.steps(
+                        self.integrator, carry, work, t0=self.t_start, h=self.h, first=n_done,
+                        n_steps=min(n_batch, n_smooth), every=self.output_every,
+                    )  # fmt: skip
+                if self.events is not None:
+                    has_stopped = self.events.has_stopped
+                if n_smooth == 0:
+                    rows = self.wanted(rows, n_done, n_good, has_stopped)
+                if self.events is not None:
+                    rows = in_order([*self.events.taken(), rows])
+                self.keep(rows)
+                is_switched = self.n_happened > n_happened
+                if self.watching != "off":
+                    is_last = n_done + n_good >= self.n_total or failure is not None or has_stopped
+                    note = self.energy.observe(self.system, rows, is_switched=is_switched, is_last=is_last)
+                    self.tell(note)
+                    is_beyond = self.energy.is_beyond and self.watching == "stop"
+                if n_smooth and n_good and failure is None and not is_switched:
+                    note = self.steps.take(
+                        self.acting, begin, carry, t0=self.t_start, h=self.h, first=n_done, n_steps=n_good
+                    )
+                    self.tell(note)
+                else:
+                    self.steps.interrupt(self.h)
+                n_done += n_good
+                if self.watching != "off" and failure is None:
+                    for words in laws.observe(carry, n_done, is_last=n_done == self.n_total or has_stopped):
+                        found = ValidityNote.of_law("law", words, self.t_start + n_done * self.h)
+                        self.watch.found[found.key] = found
+                        log.warning("system %r: %s", self.system.name, words)
+                safe = self.record_where_due(carry, n_done)
+                if n_done == self.n_total or failure is not None or has_stopped or is_beyond:
+                    self.tell(self.steps.conclude(self.acting, carry, n_done, self.t_start, self.h))
+                    self.look()
+                is_batch = n_done % RESTART_STEPS == 0 or n_done - n_told >= batch_steps or n_done == self.n_total
+                if progress is not None and (is_batch or not n_good or self.events is not None):
+                    t, n_told = self.t_start + n_done * self.h, n_done
+                    counts = carry.n_iterations, self.watch.notes, carry.n_rejected
+                    progress(Progress(t, self.t_end, n_done, self.n_total, *counts))
+        except BaseException:
+            self.close_segment(safe)
+            raise
+        for each in (self.system, self.acting):
+            raise_errors_of(compiled_system(each).callbacks)
+        if is_beyond and failure is None:
+            assert self.energy.note is not None
+            raise energetic(self, self.t_start + n_done * self.h)
+        if failure is not None:
+            begins = self.words_of_start() if n_done < FIRST_STEPS else ""
+            if begins:
+                failure = replace(failure, words=f"{failure.words}; {begins}")
+            raise stopped(
+                self.system,
+                self.head,
+                self.kept,
+                self.writer,
+                failure,
+                self.t_start + n_done * self.h,
+                self.h,
+                self.watch.notes,
+                carry.state,
+            )
+        return self.finished(carry)
+
+    @property
+    def acting(self) -> System:
+        """The system as it is switched."""
+        return self.system if self.events is None else self.events.system
+
+    @property
+    def n_happened(self) -> int:
+        """How many events have happened."""
+        return 0 if self.events is None else len(self.events.happened)
+
+    def close_segment_when_due(self) -> None:
+        """Close a segment of the results without a record to go on from, when the last one is old enough."""
+        if time.monotonic() - self.closed > SEGMENT_SECONDS:
+            self.close_segment()
+
+    def finished(self, carry: Carry) -> Trajectory:
+        """Return the motion, all of whose steps have been kept."""
+        self.look()
+        if self.writer is None:
+            head = replace(self.head, summary=self.summary(carry))
+            arrays = MemorySource(joint_rows(self.system, self.kept))
+            return Trajectory(head, arrays, is_complete=True, validity=self.watch.notes)
+        self.writer.finish(self.summary(carry))
+        return read_results(self.writer.path)
+
+
+def in_order(parts: list[Rows]) -> Rows:
+    """Return rows of results in the order of time; of two at one time, that of an earlier part first."""
+    if len(parts) == 1:
+        return parts[0]
+    rows = Rows(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+    order = np.argsort(rows.t, kind="stable")
+    return Rows(*(array[order] for array in rows))
+
+
+def stopped(system, head, kept, writer, failure, t: float, h: float, notes, state: State) -> ConvergenceError:
+    """Return the error of a failed step, with the motion so far."""
+    words = f"system {system.name!r}: the step of {h:g} from t = {t:.9g} failed: {failure.words}"
+    advice = step_advice(system, h)
+    if advice is not None:
+        words += f"; {advice.words}"
+    words += "".join(f"; {note.words}" for note in notes)
+    lost = indefinite_mass_words(indefinite_masses(system, state))
+    words += f"; {lost}" if lost else ""
+    trajectory, where = motion_so_far(system, head, kept, writer, notes)
+    return ConvergenceError(words + where, t=t, h=h, residual=failure.residual, trajectory=trajectory)
+
+
+def energetic(run: Run, t: float) -> ConvergenceError:
+    """Return the error of a run that ends because its energy comes from its steps, with the motion so far."""
+    assert run.energy.note is not None
+    words = (
+        f"system {run.system.name!r}: stopped at t = {t:.9g} with steps of {run.h:g}: {run.energy.note.words}; "
+        'watch = "tell" goes on in spite of it'
+    )
+    trajectory, where = motion_so_far(run.system, run.head, run.kept, run.writer, run.watch.notes)
+    return ConvergenceError(words + where, t=t, h=run.h, residual=float("inf"), trajectory=trajectory)
+
+
+def motion_so_far(
+    system: System, head: Head, kept: list[Rows], writer: ResultsWriter | None, notes: tuple[ValidityNote, ...]
+) -> tuple[Trajectory, str]:
+    """Return the motion of a run that ends before its time, and where it is, in words; "" for one in memory."""
+    if writer is None:
+        return Trajectory(head, MemorySource(joint_rows(system, kept)), is_complete=False, validity=notes), ""
+    writer.close_segment()
+    return read_results(writer.folder), f"; the motion so far is in {str(writer.folder)!r}"
+
+
+def joint_rows(system: System, kept: list[Rows]) -> dict[str, np.ndarray]:
+    """Return the datasets of a motion in memory."""
+    arrays = arrays_of(kept)
+    arrays["drift"] = arrays["drift"][:, : len(compiled_system(system).joint_names)]
+    return arrays
+
+
+def head_of(system: System, integrator: Integrator, t_start: float, t_end: float, h: float, every: int) -> Head:
+    """Return the head of the results of a run."""
+    compiled = compiled_system(system)
+    entries = []
+    sources = [body.source if isinstance(body, FlexibleBody) else "" for body in system.bodies]
+    digests = {source: digest_of(source) for source in set(sources)}  # files of many bodies are read once
+    for i, (body, source) in enumerate(zip(system.bodies, sources, strict=True)):
+        entries.append(
+            BodyEntry(
+                body.name,
+                int(compiled.model.bodies.n_q[i]),
+                int(compiled.model.bodies.q0[i]),
+                int(compiled.model.bodies.u0[i]),
+                source,
+                digests[source],
+                isinstance(body, FlexibleBody) and body.is_stiffened,
+            )
+        )
+    try:
+        release = version("floatframe")
+    except PackageNotFoundError:
+        release = "unknown"
+    run = {
+        "integrator": type(integrator).__name__,
+        **asdict(integrator),  # type: ignore[call-overload]
+        "t_start": t_start,
+        "t_end": t_end,
+        "h": h,
+        "output_every": every,
+        "gravity": [float(x) for x in compiled.model.gravity],
+        "system_file": system.source,
+        "system_file_digest": file_digest(system.source),
+        "digest": system_digest(system, integrator),
+        "floatframe": release,
+    }
+    return Head(
+        system.name,
+        system.units.name,
+        tuple(entries),
+        compiled.joint_names,
+        compiled.spring_names,
+        tuple(int(k) for k in compiled.model.connections.w0),
+        run,
+        places=taken_places(system),
+        loads=tuple(force.name for force in system.forces if isinstance(force, PointForce)),
+        load_cases=tuple(force.name for force in system.forces if isinstance(force, BodyLoad)),
+    )
+
+
+def digest_of(source: str) -> str:
+    """Return the digest of a modal file, "" for a body made in memory."""
+    if not source:
+        return ""
+    from cms.body.modal_file.file import digest
+
+    return digest(source)

@@ -1,0 +1,120 @@
+"""Steps over times at which a force jumps: one that ends there and one that begins there, so that no impulse is lost.
+
+A method of steps takes a force from both ends of a step; a jump between them, or at one of them, would count for too
+much or too little of the step (an error of the impulse of order h). So the step is cut just before the jump, and the
+motion goes on from the state at it with the accelerations of the force after it. Where a state of an element (the
+current of a motor) follows the jump in less than the step, the step begins with short parts that grow.
+"""
+
+from math import ceil
+
+import numpy as np
+
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.compiling.time_laws import functions_of_time, parts_of_time
+from floatframe.engine.kernels.memory import Rows
+from floatframe.engine.kernels.work import Work
+from floatframe.integrators.carry import Carry, Failure, Integrator
+from floatframe.model.functions.time_switches import switch_times
+from floatframe.model.system import System
+from floatframe.simulation.event_steps import EventWatch
+from floatframe.simulation.step_watch import has_steps_of_one_size
+
+__all__ = ["jump_times", "jumps_of_steps", "over_jumps"]
+
+PER_STEP = 4  #: places in a step between which expressions of t are compared
+MOST_PLACES = 1_000_000  #: in a run
+N_PARTS = 10  #: halvings of a step after a jump that states follow faster
+FOLLOWED, FELT = 2.0, 0.05  #: change of a state by its rate at the jump, over its change in the step; over its size
+SHORT = 1e-9  #: of a step: what is left out before a jump, and a rest that is none
+
+
+def jump_times(system: System, t_start: float, h: float, n_steps: int) -> list[float]:
+    """Return the times after the start of a run, to its end, at which a force or the law of an element jumps, rising.
+
+    (1) jumps of the values of functions of time
+    (2) switches of expressions, found between places in the steps
+    (3) knots that user forces and laws declare
+    """
+    times = {
+        float(t) for each in functions_of_time(system) if not each.is_motion for t in each.function.jumps(0)[0]
+    }  # (1)
+    switches = [switch for _, each in parts_of_time(system) for switch in each.parts_of_time().switches]
+    if switches:  # (2)
+        n_places = min(PER_STEP * n_steps, MOST_PLACES) + 1
+        times |= set(switch_times(switches, np.linspace(t_start, t_start + n_steps * h, n_places)))
+    times |= {float(t) for force in system.forces for t in getattr(force, "knots", ())}  # (3)
+    times |= {float(t) for placed in compiled_system(system).laws for t in placed.law.knots}
+    return sorted(t for t in times if t_start < t <= t_start + n_steps * h * (1 + 1e-12))
+
+
+def jumps_of_steps(system: System, t_start: float, h: float, n_steps: int) -> dict[int, list[float]]:
+    """Return the times of jumps in each step k, from t_start + k h (not there) to t_start + (k + 1) h (there too)."""
+    found: dict[int, list[float]] = {}
+    for t in jump_times(system, t_start, h, n_steps):
+        k = max(ceil((t - t_start) / h - SHORT) - 1, 0)  # next to the start: the motion begins anew at once
+        if k < n_steps:
+            found.setdefault(k, []).append(t)
+    return found
+
+
+def over_jumps(
+    integrator: Integrator,
+    system: System,
+    carry: Carry,
+    work: Work,
+    *,
+    t: float,
+    h: float,
+    jumps: list[float],
+    events: EventWatch | None = None,
+) -> tuple[Carry, Rows, Work, Failure | None]:
+    """Take a step of size h from t, cut at jumps; return the memory and the results at its end, or at the stop."""
+    where, end, begin = t, t + h, carry
+    rows: Rows | None = None
+    is_after = False  # a jump
+    for number, until in enumerate([*jumps, end]):
+        is_last = number == len(jumps)
+        size = until - where - (0.0 if is_last else SHORT * h)
+        if size > SHORT * h:
+            acting = system if events is None else events.system
+            n_parts = n_settling_parts(integrator, acting, carry, work, where, size) if is_after else 0
+            done = 0.0
+            for part in range(n_parts + 1):  # each as long as all before it
+                until_part = size * 2.0 ** (part - n_parts)
+                at, own = where + done, until_part - done
+                if events is None:
+                    carry, rows, _, failure = integrator.advance(
+                        system, carry, work, t0=at, h=own, first=0, n_steps=1, every=1
+                    )
+                else:
+                    carry, rows, work, failure = events.step(integrator, carry, work, t0=at, h=own, k=0)
+                if failure is not None:
+                    return begin, rows, work, failure
+                if events is not None and events.has_stopped:
+                    return carry, rows, work, None
+                done = until_part
+        if not is_last:
+            acting = system if events is None else events.system
+            carry, rows = integrator.after_jump(acting, until, carry, work)
+            is_after = True
+        where = until
+    assert rows is not None
+    return carry, rows._replace(t=np.full_like(rows.t, end)), work, None
+
+
+def n_settling_parts(integrator: Integrator, system: System, carry: Carry, work: Work, t: float, size: float) -> int:
+    """Return how often a step of this size after a jump is to be halved at its beginning.
+
+    A step is tried: a state whose rate at its beginning would lead much further than the step does settles in less.
+    """
+    rows = compiled_system(system).model.states.row
+    if not len(rows) or not has_steps_of_one_size(integrator):
+        return 0
+    after, _, n_good, _ = integrator.advance(system, carry, work, t0=t, h=size, first=0, n_steps=1, every=2)
+    if not n_good:
+        return N_PARTS
+    z, z_after = carry.w[rows], after.w[rows]
+    way = size * np.abs(carry.w[rows + 1])
+    is_fast = (way > FOLLOWED * np.abs(z_after - z)) & (way > FELT * np.maximum(np.abs(z), np.abs(z_after)))
+    return N_PARTS if is_fast.any() else 0

@@ -1,0 +1,80 @@
+"""Restart records: all an integrator remembers, kept with the results, so that an interrupted run can go on.
+
+A record belongs to a step whose number is a multiple of `RESTART_STEPS`. There every run makes its Newton factors
+anew, so that a resumed run takes the same steps as one that was never interrupted, bit for bit.
+"""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.kernels.records import leaves
+from floatframe.errors import ResultsError
+from floatframe.integrators.carry import Carry, Integrator
+from floatframe.model.state import State
+from floatframe.model.system import System
+from floatframe.simulation.events import events_of
+
+__all__ = ["RESTART_STEPS", "carry_of_record", "restart_record", "system_digest"]
+
+RESTART_STEPS = 400
+STATE = ("r", "p", "q", "u")
+ARRAYS = ("u_dot", "a", "w", "work", "power", "angle", "angle_rate")
+STEPS = ("h", "h_next")
+COUNTS = ("n_iterations", "n_steps", "n_rejected")
+
+
+def restart_record(carry: Carry, n_done: int) -> dict[str, Array]:
+    """Return the memory of the integrator after n_done steps as arrays by name."""
+    record = {name: np.asarray(getattr(carry.state, name)) for name in STATE}
+    record |= {name: np.asarray(getattr(carry, name)) for name in ARRAYS}
+    return record | {
+        **{name: np.array(getattr(carry, name)) for name in STEPS + COUNTS},
+        "n_done": np.array(n_done),
+    }
+
+
+def carry_of_record(record: Mapping[str, Array], system: System) -> tuple[Carry, int]:
+    """Return the memory of the integrator and the number of steps done; `ResultsError` if it is of another system."""
+    placed, model = compiled_system(system).placed, compiled_system(system).model
+    shapes = {name: getattr(placed, name).shape for name in STATE}
+    shapes |= {
+        "u_dot": placed.u.shape,
+        "w": (int(model.connections.w0[-1]),),
+        "work": (2,),
+        "power": (2,),
+        "angle": model.angles.sign.shape,
+        "angle_rate": model.angles.sign.shape,
+    }
+    shapes |= dict.fromkeys((*STEPS, *COUNTS, "n_done"), ())
+    for name, shape in shapes.items():
+        if name not in record or record[name].shape != shape:
+            raise ResultsError("restart: the record is of a system with other bodies; resume the system that was run")
+    if "a" not in record or record["a"].ndim != 1:  # accelerations, or multipliers in the conserving schemes
+        raise ResultsError("restart: the record lacks the memory of the method; run the system again")
+    values: dict[str, Any] = {name: np.asarray(record[name], dtype=float) for name in ARRAYS}
+    values |= {name: float(record[name]) for name in STEPS} | {name: int(record[name]) for name in COUNTS}
+    carry = Carry(State(*(np.asarray(record[name], dtype=float) for name in STATE)), **values)
+    return carry, int(record["n_done"])
+
+
+def system_digest(system: System, integrator: Integrator) -> str:
+    """Return the sha256 of everything the motion follows from: compiled system, its start, method and parameters."""
+    digest = hashlib.sha256(repr((type(integrator).__name__, asdict(integrator))).encode())  # type: ignore[call-overload]
+    if events_of(system):
+        digest.update(repr(events_of(system)).encode())
+    compiled = compiled_system(system)
+    for each in compiled.laws:
+        digest.update(repr(each.digest).encode())
+    arrays = dict(leaves(compiled.model)) | {name: getattr(compiled.placed, name) for name in STATE}
+    for name in ("users.address", "laws.address", "laws.tangent"):  # addresses change from process to process
+        del arrays[name]
+    for part in arrays.values():
+        array = np.ascontiguousarray(part)
+        digest.update(repr((array.shape, array.dtype.str)).encode() + array.tobytes())
+    return digest.hexdigest()

@@ -1,0 +1,115 @@
+"""What a step size can follow of the modes of a system, and of its supplies, loads and drives, in numbers."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.compiling.time_laws import functions_of_time, parts_of_time
+from floatframe.engine.initial_conditions.newton_equations import modal_diagonals
+from floatframe.engine.kernels.model import MASS, STIFFNESS
+from floatframe.model.system import System
+
+__all__ = ["StepAdvice", "frequency_words", "step_advice"]
+
+FOLLOWED = 20.0  #: steps in a period with which generalized-alpha follows a mode within about 1 % of its period
+N_PLACES = 2000  #: in a run, at which frequencies that change are looked at
+SEEN = 2.0  #: steps in a period below which a mode cannot be seen in the results at all
+
+
+@dataclass(frozen=True)
+class StepAdvice:
+    """Modes of bodies against a step size; frequencies are those of the body alone, in its frame."""
+
+    h: float  #: step size [s]
+    n_modes: int  #: modes with mass and stiffness, of all bodies
+    n_followed: int  #: with 20 steps in a period or more
+    n_unseen: int  #: with less than two
+    slowest: float  #: frequency [Hz]
+    fastest: float  #: frequency [Hz]
+    fastest_body: str
+    fastest_mode: int  #: of that body, from 1
+
+    @property
+    def h_slowest(self) -> float:
+        """Step size that follows the slowest mode [s]."""
+        return 1 / (FOLLOWED * self.slowest)
+
+    @property
+    def h_fastest(self) -> float:
+        """Step size that follows the fastest mode [s]."""
+        return 1 / (FOLLOWED * self.fastest)
+
+    @property
+    def words(self) -> str:
+        """Say in one sentence what the step size follows, and what would follow more."""
+        return (
+            f"h = {self.h:.3g} follows {self.n_followed} of {self.n_modes} modes ({FOLLOWED:g} steps in a period); the "
+            f"fastest, mode {self.fastest_mode} of body {self.fastest_body!r}, has {1 / (self.h * self.fastest):.2g} "
+            f"steps in its period of {1 / self.fastest:.3g}: h = {self.h_slowest:.2g} follows the slowest mode, "
+            f"h = {self.h_fastest:.2g} all of them"
+        )
+
+
+def step_advice(system: System, h: float) -> StepAdvice | None:
+    """Return what a step size follows of the modes; None for a system without modes."""
+    model = compiled_system(system).model
+    frequencies, owners = [], []
+    for i, name in enumerate(compiled_system(system).body_names):
+        M, K = modal_diagonals(model, i, MASS), modal_diagonals(model, i, STIFFNESS)
+        for k in np.flatnonzero((M > 0) & (K > 0)):
+            frequencies.append(float(np.sqrt(K[k] / M[k])) / (2 * np.pi))
+            owners.append((name, int(k) + 1))
+    if not frequencies:
+        return None
+    steps = 1 / (h * np.array(frequencies))
+    fastest = int(np.argmin(steps))
+    return StepAdvice(
+        h=h,
+        n_modes=len(steps),
+        n_followed=int((steps >= FOLLOWED * (1 - 1e-9)).sum()),
+        n_unseen=int((steps < SEEN).sum()),
+        slowest=min(frequencies),
+        fastest=max(frequencies),
+        fastest_body=owners[fastest][0],
+        fastest_mode=owners[fastest][1],
+    )
+
+
+def frequency_words(
+    system: System, t_start: float, h: float, n_steps: int, *, has_steps_of_one_size: bool = True
+) -> tuple[str, ...]:
+    """Return in words which supplies, loads and drives have a frequency that the steps of a run do not follow.
+
+    A method that controls its steps is told of those alone of which it may see nothing: two steps in a period.
+    """
+    words = []
+    most = FOLLOWED if has_steps_of_one_size else SEEN
+    for where, frequency in highest_frequencies(system, np.linspace(t_start, t_start + n_steps * h, N_PLACES)):
+        if frequency > 0.0 and 1 / (h * frequency) < most * (1 - 1e-9):
+            words.append(
+                f"{where}: steps of {h:.6g} do not follow its frequency: {1 / (h * frequency):.3g} steps in its period "
+                f"of {1 / frequency:.4g}; h = {1 / (FOLLOWED * frequency):.2g} has {FOLLOWED:g}"
+            )
+    return tuple(words)
+
+
+def highest_frequencies(system: System, t: Array) -> Iterator[tuple[str, float]]:
+    """Yield the highest frequencies of what acts over time in a run at times t, (n_t,), and where they stand [1/s].
+
+    Sines in functions of time, in expressions of time alone, and what elements say by `frequencies`.
+    """
+    for each in functions_of_time(system):
+        function = each.function
+        acts = (function.begins < t[-1]) & (np.append(function.begins[1:], np.inf) > t[0])
+        acts[0] |= function.begins[0] >= t[0]  # the first piece holds before its beginning
+        has_sine = acts & (function.pieces[:, 6] != 0.0)
+        yield each.where, float(np.abs(function.pieces[has_sine, 7]).max(initial=0.0)) / (2 * np.pi)
+    for where, part in parts_of_time(system):
+        rates = [np.abs(np.diff(phase(t)) / np.diff(t)).max() for phase in part.parts_of_time().phases]
+        yield where, float(max(rates, default=0.0)) / (2 * np.pi)
+    for element in system.elements:
+        if hasattr(element, "frequencies"):
+            yield f"elements.{element.name}", float(np.abs(element.frequencies(t)).max())

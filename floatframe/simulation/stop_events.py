@@ -1,0 +1,124 @@
+"""Events of stops: couplers with limits that are struck, hold while they are pressed, and let go."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, IntArray
+from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.kernels.memory import Rows
+from floatframe.errors import ModelError
+from floatframe.model.system import System
+from floatframe.simulation.events import Event
+
+__all__ = [
+    "INWARD",
+    "StopEvent",
+    "coupled_sum",
+    "just_inside",
+    "require_off_stops",
+    "require_within_limits",
+    "stop_events",
+    "stop_values",
+    "sum_rows",
+]
+
+INWARD = {"lower": 1.0, "upper": -1.0}  #: sign of the force of a stop along what it stops
+BEYOND = 1e-9  #: how far beyond a stop a motion may begin, in radians or in parts of the length of the system
+
+
+@dataclass(frozen=True)
+class StopEvent(Event):
+    """A coupler reaches one of its limits, or is no longer pressed against it."""
+
+    coupler: str = ""
+    side: str = ""  #: "lower", "upper" or "release"
+
+    @property
+    def is_active(self) -> bool:
+        """Always."""
+        return True
+
+
+def stop_events(system: System) -> tuple[StopEvent, ...]:
+    """Return the events of all couplers with limits."""
+    events = []
+    for coupler in system.couplers:
+        if coupler.limits is None:
+            continue
+        for side, direction in (("lower", "falling"), ("upper", "rising")):
+            level = getattr(coupler.limits, side)
+            if level is not None:
+                name = f"{coupler.name} {side}"
+                events.append(
+                    StopEvent(name, coupler.name, level, direction=direction, coupler=coupler.name, side=side)
+                )
+        name = f"{coupler.name} release"
+        events.append(StopEvent(name, coupler.name, 0.0, direction="falling", coupler=coupler.name, side="release"))
+    return tuple(events)
+
+
+def sum_rows(compiled: CompiledSystem, name: str) -> tuple[IntArray, Array, int]:
+    """Return rows of the coordinates of a coupler, their coefficients, and the row of its multiplier."""
+    model = compiled.model
+    k = compiled.element_names.index(name)
+    places = slice(int(model.elements.coordinate0[k]), int(model.elements.coordinate0[k + 1]))
+    return model.coordinates.row[places], model.coordinates.factor[places], int(model.elements.core[k])
+
+
+def coupled_sum(compiled: CompiledSystem, name: str, w: Array) -> float:
+    """Return the sum of a coupler from the unknowns of connections, (n_w,)."""
+    rows, factors, _ = sum_rows(compiled, name)
+    return float(factors @ w[rows])
+
+
+def stop_values(compiled: CompiledSystem, event: StopEvent, resting: Mapping[str, str], rows: Sequence[Rows]) -> Array:
+    """Return what the event of a stop watches, at the times of rows of results, (n_times,).
+
+    A limit on which the sum rests is not reached again; one on which it does not rest cannot let go.
+    """
+    side, w = resting.get(event.coupler), np.concatenate([row.w for row in rows])
+    if event.side == "release":
+        if side is None:
+            return np.ones(len(w))
+        _, _, core = sum_rows(compiled, event.coupler)
+        return INWARD[side] * w[:, core]
+    if side is not None:
+        return np.full(len(w), event.level + INWARD[event.side])
+    held, factors, _ = sum_rows(compiled, event.coupler)
+    return np.sum(factors[:, None] * w[:, held].T, axis=0)  # term by term, the same for one row as for many
+
+
+def require_within_limits(compiled: CompiledSystem, events: Sequence[Event], values: Array) -> None:
+    """Raise `ModelError` if a motion begins beyond a stop."""
+    for event, value in zip(events, values, strict=True):
+        if isinstance(event, StopEvent) and event.side in INWARD:
+            beyond = -INWARD[event.side] * (value - event.level)
+            if beyond > BEYOND * max(1.0, compiled.length, abs(event.level)):
+                raise ModelError(
+                    f"coupler {event.coupler!r}: the motion begins at {value:.6g}, beyond its {event.side} limit "
+                    f"{event.level:.6g}; begin within the limits"
+                )
+
+
+def require_off_stops(system: System, w: Array) -> None:
+    """Raise `ModelError` if an equilibrium with unknowns w, (n_w,), found without stops, lies beyond one."""
+    compiled = compiled_system(system)
+    for event in stop_events(system):
+        if event.side in INWARD:
+            value = coupled_sum(compiled, event.coupler, w)
+            if INWARD[event.side] * (value - event.level) < -BEYOND * max(1.0, compiled.length, abs(event.level)):
+                raise ModelError(
+                    f"coupler {event.coupler!r}: the equilibrium would be at {value:.6g}, beyond its {event.side} "
+                    f"limit {event.level:.6g}, where it rests on the stop: for statics give the coupler "
+                    f"constant = {event.level:g} in place of its limits"
+                )
+
+
+def just_inside(event: StopEvent, value: float) -> float:
+    """Return a value that can reach the limit anew: one at or beyond it is taken for the last number within."""
+    inward = INWARD[event.side]
+    if inward * (value - event.level) > 0.0:
+        return value
+    return float(np.nextafter(event.level, inward * np.inf))

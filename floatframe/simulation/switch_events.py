@@ -1,0 +1,109 @@
+"""Switching functions: a law jumps with its motion where one passes zero; its sign stands still in every step.
+
+A step that ends beyond the zero with the sign of its beginning finds a smooth motion, so that the time of the zero is
+found by steps of other sizes, as that of an event. There the sign changes, and the motion goes on with the
+accelerations after the jump.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, IntArray
+from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.kernels.memory import Rows
+from floatframe.model.elements.held_signs import HeldSigns
+from floatframe.model.forces import UserForce
+from floatframe.model.functions.expressions import compile_expression
+from floatframe.model.functions.time_switches import time_parts
+from floatframe.model.system import System
+from floatframe.simulation.events import Event
+
+__all__ = ["SwitchEvent", "beyond_zero", "sign_of", "switch_events", "unknowns_of_force", "with_signs"]
+
+
+@dataclass(frozen=True)
+class SwitchEvent(Event):
+    """A switching function passes zero."""
+
+    #: its values at rows of results, (n_times,); None: an output of an element, which a sensor measures
+    values: Callable[[Sequence[Rows]], Array] | None = None
+
+    @property
+    def is_active(self) -> bool:
+        """Always."""
+        return True
+
+
+def switch_events(system: System) -> tuple[SwitchEvent, ...]:
+    """Return the events of the switching functions of all user forces and elements."""
+    compiled = compiled_system(system)
+    found = []
+    forces = [force for force in system.forces if isinstance(force, UserForce)]
+    for u, force in enumerate(forces):
+        for key in force.switches:
+            values = partial(values_of_expression, compiled, force, u, len(system.couplers) + u, key)
+            found.append(SwitchEvent(f"{force.name}.{key}", f"{force.name}.{key}", values=values))
+    for placed in compiled.laws:
+        names = (f"{placed.element.name}.{key}" for key in placed.law.switches)
+        found += [SwitchEvent(name, name) for name in names]
+    return tuple(found)
+
+
+def values_of_expression(
+    compiled: CompiledSystem, force: UserForce, u: int, i: int, key: str, rows: Sequence[Rows]
+) -> Array:
+    """Return a switching function of user force u, element i among couplers and user forces, at rows, (n_times,)."""
+    t, w = (np.concatenate([getattr(row, name) for row in rows]) for name in ("t", "w"))
+    columns = w[:, unknowns_of_force(compiled, u, i)].T
+    numbers = {name: k for k, name in enumerate(force.functions)}
+    where = f"force {force.name!r}: switches: {key}"
+    text = force.switches[key]
+    tape = compile_expression(where, text, force.inputs, parameters=force.parameters, functions=numbers)
+    inputs = {0: np.asarray} | {1 + k: partial(column_at, column) for k, column in enumerate(columns)}
+    value = time_parts(tape, inputs, list(force.functions.values())).value
+    assert value is not None  # all inputs are known
+    with np.errstate(all="ignore"):
+        return np.asarray(value(t), dtype=float)
+
+
+def column_at(column: Array, t: Array) -> Array:
+    """Return what is known at the times t."""
+    return column
+
+
+def unknowns_of_force(compiled: CompiledSystem, u: int, i: int) -> IntArray:
+    """Return the unknowns that user force u sees, element i among couplers and user forces: values, rates, states."""
+    users, elements = compiled.model.users, compiled.model.elements
+    rows = compiled.model.coordinates.row[elements.coordinate0[i] : elements.coordinate0[i + 1]]
+    states = int(elements.core[i]) + int(users.n_forces[u]) + 3 * np.arange(int(users.n_states[u]))
+    return np.concatenate([rows, rows + 1, states])
+
+
+def with_signs(system: System, signs: Mapping[str, int]) -> System:
+    """Return a system whose switching functions have these signs, by the names of their events, whatever moves."""
+    if not signs:
+        return system
+    forces = []
+    for force in system.forces:
+        if isinstance(force, UserForce) and force.switches:
+            held = {key: str(signs[f"{force.name}.{key}"]) for key in force.switches}
+            force = replace(force, switches=held)
+        forces.append(force)
+    elements = []
+    for element in system.elements:
+        own = tuple(sign for name, sign in signs.items() if name.rpartition(".")[0] == element.name)
+        elements.append(HeldSigns(element, own) if own else element)
+    return replace(system, forces=forces, elements=elements)
+
+
+def sign_of(value: float) -> int:
+    """Return the sign of a switching function: 1 at zero and above, else -1."""
+    return -1 if value < 0.0 else 1
+
+
+def beyond_zero(value: float, sign: int) -> float:
+    """Return a value on the side of a sign: one that is not is taken for the first number there."""
+    return value if sign * value > 0.0 else float(np.nextafter(0.0, sign))

@@ -1,0 +1,318 @@
+"""Watches a motion row by row, whether every flexible body stays in the range of its linear frame.
+
+The stiffness of a body under its loads is K + Σ lambda_j K_j, with the amplitudes lambda of the unit loads (theory.md
+§7): acceleration of the frame origin minus gravity, angular acceleration, products of the angular velocity, wrenches on
+the interfaces, all in body axes. In units of K its change is A = Σ lambda_j K^(-1/2) K_j K^(-1/2): the loads are
+-min(eig A) of those that buckle the body, and a linear frame is wrong in stiffness by max |eig A|.
+
+Where the body has no matrices, those of the interface loads are estimated from the rotations of the interfaces.
+
+The eigenvalues are found once per batch of rows, where Σ |lambda_j| |K_j| is largest, and only if that bound is above
+the limit and what was seen before.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import scipy.linalg as la
+
+from cms.body.geometric_stiffness import SPIN_PAIRS
+from cms.body.linear_range import LEFT_OUT, LINEAR, STIFFENED, Limits
+from cms.body.reduced_body import ReducedBody
+from cms.errors import CmsError
+from cms.reduction.basis.frames import TisserandFrame
+from cms.reduction.frame_conversion import converted
+from fe_models.foundation.arrays import Array
+from floatframe.engine.compiling.file_frames import rows_of_file
+from floatframe.engine.compiling.interface_loads import Load, Wrench, amplitudes, in_body, loads_on_interfaces
+from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.initial_conditions.newton_equations import linearized, modal_matrix, set_iterate
+from floatframe.engine.kernels.memory import Rows
+from floatframe.engine.kernels.model import JOINT, STIFFNESS
+from floatframe.engine.kernels.work import new_work
+from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.joints.rows import is_held
+from floatframe.model.system import System
+from floatframe.results.validity import ValidityNote
+from floatframe.simulation.small_angles import ANGLES_LIMIT, angle_measures
+
+__all__ = ["ValidityWatch"]
+
+MOST_CONVERTED = 80  #: modes of a body of which the rotations against mean axes are found
+ADVICE = {
+    "angles": "let it turn far about one axis alone, or take a joint for what turns far, a bearing for a shaft",
+    "tilt": "take a joint for what turns far",
+}
+N_INERTIAL = 12  #: amplitudes of inertial loads: 3 accelerations, 3 angular accelerations, 6 products
+
+
+@dataclass(eq=False)
+class Watched:
+    """What is known of one flexible body."""
+
+    index: int
+    body: FlexibleBody
+    limits: Limits
+    frequency: float  #: lowest angular frequency with one of its joints held, or free [rad/s]
+    Psi_r: Array  #: rotations of the interfaces by q, (3 n, n_q)
+    scaled: Array  #: K^(-1/2) K_j K^(-1/2) of all unit loads, (n_loads, n_q²); no rows where K is singular
+    norms: Array  #: their largest |eigenvalue|, (n_loads,)
+    by_mean_axes: Array | None = None  #: rotations of the interfaces against mean axes by q, made when it is asked for
+    wrenches: list[Wrench] = field(default_factory=list)
+    loads: list[Load] = field(default_factory=list)
+
+
+class ValidityWatch:
+    """The notes of a motion; `observe` takes its rows in order."""
+
+    def __init__(self, system: System, notes: tuple[ValidityNote, ...] = ()) -> None:
+        """Begin with a system, and the notes of the part of the motion that is already done."""
+        self.system = system
+        self.found = {note.key: note for note in notes}
+        elastic = [
+            (i, body) for i, body in enumerate(system.bodies) if isinstance(body, FlexibleBody) and is_elastic(body)
+        ]
+        frequencies = held_frequencies(compiled_system(system), [i for i, _ in elastic]) if elastic else []
+        self.angles = list(angle_measures(system))
+        self.bodies = [watched(i, body, omega) for (i, body), omega in zip(elastic, frequencies, strict=True)]
+        for part in self.bodies:
+            if len(part.norms):
+                part.wrenches, part.loads = loads_on_interfaces(system, part.index)
+
+    @property
+    def notes(self) -> tuple[ValidityNote, ...]:
+        """What has been found, in the order of time."""
+        return tuple(sorted(self.found.values(), key=lambda note: note.t_first))
+
+    def observe(self, rows: Rows) -> tuple[ValidityNote, ...]:
+        """Take rows of results; return the notes that are new with them."""
+        if len(rows.t) == 0:
+            return ()
+        told = rows_of_file(compiled_system(self.system), rows)
+        new = self.observe_angles(rows)
+        for part in self.bodies:
+            for kind, values in self.measures(part, rows, told):
+                limit = getattr(part.limits, kind)
+                if not (values > limit).any():
+                    continue
+                k = int(np.nanargmax(values)) if np.isfinite(values).any() else 0
+                largest = float(values[k])
+                if not largest > limit:
+                    continue
+                key, t = (part.body.name, kind), float(rows.t[k])
+                remedied = in_mean_axes(part, self.coordinates(part, rows)) if kind == "rotation" else -1.0
+                if key not in self.found:
+                    first = float(rows.t[int(np.argmax(values > limit))])
+                    has_matrices = part.body.reduced.geometric is not None
+                    self.found[key] = ValidityNote(
+                        *key, limit, largest, first, t, part.body.is_stiffened, has_matrices, remedied
+                    )  # fmt: skip
+                    new.append(self.found[key])
+                elif largest > self.found[key].largest:
+                    most = max(self.found[key].in_mean_axes, remedied)
+                    self.found[key] = replace(self.found[key], largest=largest, t_largest=t, in_mean_axes=most)
+        return tuple(new)
+
+    def observe_angles(self, rows: Rows) -> list[ValidityNote]:
+        """Take rows of results; return what is new about the angles of bushings and bearings."""
+        new = []
+        for where, kind, measure in self.angles:
+            values = measure(rows)
+            k = int(np.argmax(values))
+            largest, t, key = float(values[k]), float(rows.t[k]), (where, kind)
+            if not largest > ANGLES_LIMIT:
+                continue
+            if key not in self.found:
+                first = float(rows.t[int(np.argmax(values > ANGLES_LIMIT))])
+                self.found[key] = ValidityNote(where, kind, ANGLES_LIMIT, largest, first, t, advice=ADVICE[kind])
+                new.append(self.found[key])
+            elif largest > self.found[key].largest:
+                self.found[key] = replace(self.found[key], largest=largest, t_largest=t)
+        return new
+
+    def measures(self, part: Watched, rows: Rows, told: Rows) -> list[tuple[str, Array]]:
+        """Return what is compared, each over the rows of the engine, told in the frames of the files, (n_t,).
+
+        A rotation is that against the frame in which the engine moves the body, a load that of the frame of its file.
+        """
+        model = compiled_system(self.system).model
+        i, u0 = part.index, int(model.bodies.u0[part.index])
+        q = self.coordinates(part, rows)
+        omega = rows.u[:, u0 + 3 : u0 + 6]
+        speed = np.linalg.norm(omega, axis=1) / part.frequency
+        found = [("speed", speed)]
+        if part.body.reduced.moments.missing:
+            found.append(("inertia", speed))
+        if len(part.Psi_r):
+            angles = (q @ part.Psi_r.T).reshape(len(q), -1, 3)
+            found.append(("rotation", np.linalg.norm(angles, axis=2).max(axis=1)))
+        if len(part.norms):
+            found.append(("load", self.load_measure(part, told, i, u0)))
+        return found
+
+    def coordinates(self, part: Watched, rows: Rows) -> Array:
+        """Return the modal coordinates of a body over the rows, (n_t, n_q)."""
+        q0 = int(compiled_system(self.system).model.bodies.q0[part.index])
+        return rows.q[:, q0 : q0 + part.body.reduced.n_q]
+
+    def load_measure(self, part: Watched, rows: Rows, i: int, u0: int) -> Array:
+        """Return the change of the stiffness by the loads; -1 in the rows where it is not looked for."""
+        R, omega = rotations(rows.p[:, i]), rows.u[:, u0 + 3 : u0 + 6]
+        lam = np.zeros((len(rows.t), len(part.norms)))
+        acceleration = rows.u_dot[:, u0 : u0 + 3] - compiled_system(self.system).model.gravity
+        lam[:, :3] = in_body(R, acceleration)
+        lam[:, 3:6] = rows.u_dot[:, u0 + 3 : u0 + 6]
+        for k, (a, b) in enumerate(SPIN_PAIRS):
+            lam[:, 6 + k] = (1 if a == b else 2) * omega[:, a] * omega[:, b]
+        for wrench in part.wrenches:
+            o = N_INERTIAL + 6 * wrench.interface
+            if wrench.force >= 0:
+                lam[:, o : o + 3] += wrench.sign * in_body(R, rows.w[:, wrench.force : wrench.force + 3])
+            if wrench.moment >= 0:
+                lam[:, o + 3 : o + 6] += wrench.sign * in_body(R, rows.w[:, wrench.moment : wrench.moment + 3])
+        for load in part.loads:
+            o = N_INERTIAL + 6 * load.interface
+            lam[:, o : o + 6] += amplitudes(load, rows.t, R)
+        values = np.full(len(rows.t), -1.0)
+        bound = np.abs(lam) @ part.norms
+        if not np.isfinite(bound).all():
+            bound = np.nan_to_num(np.abs(lam)) @ part.norms
+        k = int(np.argmax(bound))
+        seen = self.found.get((part.body.name, "load"))
+        if bound[k] > max(part.limits.load, seen.largest if seen else 0.0) and np.isfinite(lam[k]).all():
+            n = part.body.reduced.n_q
+            change = la.eigvalsh((lam[k] @ part.scaled).reshape(n, n))
+            values[k] = -change[0] if part.body.is_stiffened else np.abs(change).max()
+        return values
+
+
+def in_mean_axes(part: Watched, q: Array) -> float:
+    """Return the largest rotation of an interface against mean axes at coordinates (n_t, n_q) [rad]; -1: not known.
+
+    Not known where the body has mean axes already, has many modes (the way there takes long), or cannot go there.
+    """
+    reduced = part.body.reduced
+    if part.body.is_stiffened or reduced.frame.kind == "tisserand" or reduced.n_q > MOST_CONVERTED:
+        return -1.0
+    if part.by_mean_axes is None:
+        x, y, z = ((float(a), float(b), float(c)) for a, b, c in reduced.frame.axes.T)
+        try:
+            mean, change = converted(reduced, TisserandFrame(axes=(x, y, z)))
+        except CmsError:
+            return -1.0
+        turning = [np.asarray(interface.Psi[3:]) for interface in mean.interfaces if interface.has_rotation]
+        part.by_mean_axes = np.concatenate(turning) @ np.linalg.inv(change.Z)
+    angles = (q @ part.by_mean_axes.T).reshape(len(q), -1, 3)
+    return float(np.linalg.norm(angles, axis=2).max())
+
+
+def is_elastic(body: FlexibleBody) -> bool:
+    """Whether a body has a mode with mass."""
+    return bool(np.isfinite(body.reduced.frequencies).any() and (body.reduced.frequencies > 0).any())
+
+
+def held_frequencies(compiled: CompiledSystem, bodies: list[int]) -> list[float]:
+    """Return of bodies the lowest angular frequency above zero with one joint held, whichever makes it least [rad/s].
+
+    What a joint holds stands still then, so that a body that is clamped by one of its joints has the frequency of a
+    cantilever whatever the frame of its file; a body without joints has that of the free body. None above zero: inf.
+    """
+    model, work = compiled.model, new_work(compiled.model)
+    set_iterate(work, compiled.placed)
+    parts = linearized(model, work, 1.0, 0.0, 0.0)
+    rows = parts.G.tocsr()
+    found = []
+    for i in bodies:
+        u = slice(int(model.bodies.u0[i]), int(model.bodies.u0[i + 1]))
+        K = np.zeros_like(parts.H[i])
+        K[6:, 6:] = modal_matrix(model, i, STIFFNESS)
+        lowest = []
+        for c in np.flatnonzero(model.connections.law == JOINT):
+            own = np.arange(model.connections.w0[c], model.connections.w0[c + 1])
+            G = rows[own[is_held(model.rows.kind)[own]]][:, u].toarray()
+            if G.any():
+                lowest.append(lowest_frequency(parts.H[i], K, G))
+        found.append(min(lowest) if lowest else lowest_frequency(parts.H[i], K, np.zeros((0, len(K)))))
+    return found
+
+
+def lowest_frequency(M: Array, K: Array, G: Array) -> float:
+    """Return the lowest angular frequency above zero of motions with G x = 0; motions of a rigid body come first in x.
+
+    The pencil (M, K + s M) has no singular side: its eigenvalues are 1/(omega² + s), the largest of them those of the
+    rigid-body motions that G leaves free.
+    """
+    Z = la.null_space(G) if len(G) else np.eye(len(K))
+    n_rigid = 6 - (np.linalg.matrix_rank(G[:, :6]) if len(G) else 0)
+    M, K = Z.T @ M @ Z, Z.T @ K @ Z
+    s = np.trace(K) / np.trace(M) / len(K)
+    values = la.eigvalsh((M + M.T) / 2, (K + K.T) / 2 + s * (M + M.T) / 2)[::-1]
+    elastic = values[n_rigid:]
+    if not len(elastic) or not elastic[0] > 0:
+        return float("inf")
+    return float(np.sqrt(max(1 / elastic[0] - s, 0.0))) or float("inf")
+
+
+def watched(index: int, body: FlexibleBody, frequency: float) -> Watched:
+    """Return what is known of a body before the motion."""
+    reduced = body.reduced
+    turning = [np.asarray(interface.Psi[3:]) for interface in body.moved.interfaces if interface.has_rotation]
+    scaled, norms = scaled_unit_loads(reduced)
+    return Watched(
+        index=index,
+        body=body,
+        limits=replace(
+            STIFFENED if body.is_stiffened else LINEAR, inertia=LEFT_OUT if reduced.moments.missing else np.inf
+        ),
+        frequency=frequency,
+        Psi_r=np.concatenate(turning) if turning else np.zeros((0, reduced.n_q)),
+        scaled=scaled,
+        norms=norms,
+    )
+
+
+def scaled_unit_loads(reduced: ReducedBody) -> tuple[Array, Array]:
+    """Return K^(-1/2) K_j K^(-1/2) of all unit loads, (n_loads, n_q²), and their norms; empty where K is singular."""
+    n, geometric = reduced.n_q, reduced.geometric
+    values, vectors = la.eigh(reduced.K)
+    if not values[0] > 0:
+        return np.zeros((0, n * n)), np.zeros(0)
+    root = vectors / np.sqrt(values)
+    if geometric is None:
+        K = np.concatenate([np.zeros((N_INERTIAL, n, n)), estimated_interface_loads(reduced).reshape(-1, n, n)])
+    else:
+        of_interfaces = np.zeros((len(reduced.interfaces), 6, n, n))
+        if not all(geometric.is_loaded):
+            of_interfaces[:] = estimated_interface_loads(reduced)
+        of_interfaces[geometric.loaded] = geometric.interfaces
+        K = np.concatenate([geometric.translation, geometric.rotation, geometric.spin, of_interfaces.reshape(-1, n, n)])
+    scaled = root.T @ K @ root
+    return scaled.reshape(len(K), n * n), np.abs(np.linalg.eigvalsh(scaled)).max(axis=1)
+
+
+def estimated_interface_loads(reduced: ReducedBody) -> Array:
+    """Return an estimate of the matrices of unit wrenches at interfaces, (n_interfaces, 6, n, n), for a body without.
+
+    A force N along the line e of length l from the centre of mass to an interface does the work -N l/2 times the mean
+    square of the slopes between them. Half the square of the slope at the interface is that of a half sine.
+    """
+    n, center = reduced.n_q, reduced.moments.center_of_mass
+    K = np.zeros((len(reduced.interfaces), 6, n, n))
+    for own, interface in zip(K, reduced.interfaces, strict=True):
+        arm = np.asarray(interface.position) - center
+        length = float(np.linalg.norm(arm))
+        if length > 0:
+            e = arm / length
+            slopes = np.cross(e, np.asarray(interface.Psi[3:]), axisb=0)
+            own[:3] = e[:, None, None] * (length / 2 * slopes @ slopes.T)
+    return K
+
+
+def rotations(p: Array) -> Array:
+    """Return R_GB of Euler parameters over time, (n_t, 3, 3)."""
+    w, x, y, z = p.T
+    return np.stack([
+        1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
+        2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+        2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y),
+    ], axis=1).reshape(-1, 3, 3)  # fmt: skip

@@ -1,0 +1,99 @@
+"""Bodies of decks of Nastran, and the assembler that stands beside them: bars with released ends and offsets."""
+
+import numpy as np
+
+from cms.jobs.body_of_job import coupled_body, uncoupled_body
+from cms.jobs.decks.job_text import JobRequest, job_text
+from cms.jobs.job import read_job
+from fe_models.files.decks.read_deck import read_deck
+from fe_models.foundation.stages import Stages
+
+E, NU, RHO = 2e11, 0.3, 7800.0
+G = E / 2 / (1 + NU)
+A, I1, I2, J = 2e-3, 3e-6, 1e-6, 2e-6
+MATERIAL = "MAT1,1,2.+11,,.3,7800.\n"
+SECTION = "PBAR,1,1,2.-3,3.-6,1.-6,2.-6\n"
+
+
+def body_of(tmp_path, text, head="BEGIN BULK\n", *, is_coupled=False, **options):
+    path = tmp_path / "model.bdf"
+    path.write_text(f"{head}{text}\nENDDATA\n")
+    deck = read_deck(path)
+    job = job_text(deck, JobRequest("m-kg-s", {}, **options), path.name)
+    path.with_suffix(".toml").write_text(job.replace("[body]", '[body]\naccept = ["parts"]'))
+    made = read_job(path.with_suffix(".toml"))
+    body = uncoupled_body(made, Stages())
+    return coupled_body(made, body) if is_coupled else body, deck
+
+
+def dofs_of(body, points):
+    """Return the dofs of the six components of the nodes at these points, (6 n,)."""
+    found = []
+    for point in points:
+        here = np.flatnonzero(np.linalg.norm(body.nodes - point, axis=1) < 1e-9)
+        node = next(k for k in here if (body.dofs[:, 0] == k).sum() == 6)  # not the released end, which follows
+        found += [int(np.flatnonzero((body.dofs == (node, c)).all(axis=1))[0]) for c in range(6)]
+    return found
+
+
+def bar_stiffness(length, area=A, i1=I1, i2=I2, j=J):
+    """Return K of an Euler-Bernoulli bar in its own axes, (12, 12); i1 bends in the x-y plane."""
+    K = np.zeros((12, 12))
+    for pair, k in (((0, 6), E * area / length), ((3, 9), G * j / length)):
+        K[np.ix_(pair, pair)] += k * np.array([[1, -1], [-1, 1]])
+    a = length
+    for dofs, sign, inertia in (((1, 5, 7, 11), 1, i1), ((2, 4, 8, 10), -1, i2)):
+        s = sign
+        K[np.ix_(dofs, dofs)] += E * inertia / a**3 * np.array(
+            [[12, s * 6 * a, -12, s * 6 * a], [s * 6 * a, 4 * a * a, -s * 6 * a, 2 * a * a],
+             [-12, -s * 6 * a, 12, -s * 6 * a], [s * 6 * a, 2 * a * a, -s * 6 * a, 4 * a * a]]
+        )  # fmt: skip
+    return K
+
+
+def axes_of(x, v):
+    x = x / np.linalg.norm(x)
+    y = v - (v @ x) * x
+    y = y / np.linalg.norm(y)
+    return np.array([x, y, np.cross(x, y)])  # rows
+
+
+def arm(r):
+    """Return the motion of a point at r from a node by that of the node, (6, 6)."""
+    T = np.eye(6)
+    T[:3, 3:] = [[0, r[2], -r[1]], [-r[2], 0, r[0]], [r[1], -r[0], 0]]
+    return T
+
+
+def released(K, dofs):
+    """Return K with released dofs condensed out, zero in their rows."""
+    keep = [k for k in range(len(K)) if k not in dofs]
+    out = np.zeros_like(K)
+    out[np.ix_(keep, keep)] = K[np.ix_(keep, keep)] - K[np.ix_(keep, dofs)] @ np.linalg.solve(
+        K[np.ix_(dofs, dofs)], K[np.ix_(dofs, keep)]
+    )
+    return out
+
+
+GA, GB, V = np.array([0.1, 0.2, 0.3]), np.array([1.3, 0.9, 0.2]), np.array([0.2, 0.3, 1.0])
+GRIDS = "".join(f"GRID,{k},,{','.join(map(str, p))}\n" for k, p in ((1, GA), (2, GB)))
+ORIENTED = "CBAR,1,1,1,2," + ",".join(map(str, V))
+
+
+def expected_bar(w_a=(0, 0, 0), w_b=(0, 0, 0), pins=()):
+    """Return K of the bar at its grid points, (12, 12), basic axes."""
+    w = np.array([w_a, w_b], dtype=float)
+    R = axes_of(GB + w[1] - GA - w[0], V)
+    T = np.kron(np.eye(4), R)
+    K = bar_stiffness(np.linalg.norm(GB + w[1] - GA - w[0]))
+    K = T.T @ (released(K, list(pins)) if pins else K) @ T
+    arms = np.zeros((12, 12))
+    arms[:6, :6], arms[6:, 6:] = arm(w[0]), arm(w[1])
+    return arms.T @ K @ arms
+
+
+def condensed(body, points):
+    b = dofs_of(body, points)
+    K = body.K.toarray()
+    i = [k for k in range(len(K)) if k not in b]
+    return K[np.ix_(b, b)] - K[np.ix_(b, i)] @ np.linalg.pinv(K[np.ix_(i, i)]) @ K[np.ix_(i, b)]

@@ -1,0 +1,317 @@
+"""Cards of Nastran beside an assembler of this file: released and offset bars, sections, scalar elements, plates."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import eigh
+
+from tests.cms.jobs.decks.nastran_bodies import (
+    GA,
+    GB,
+    GRIDS,
+    I1,
+    I2,
+    MATERIAL,
+    ORIENTED,
+    RHO,
+    SECTION,
+    A,
+    E,
+    G,
+    J,
+    V,
+    axes_of,
+    body_of,
+    condensed,
+    expected_bar,
+)
+
+
+@pytest.mark.parametrize(
+    ("card", "expected"),
+    [
+        (f"{ORIENTED}\n", {}),
+        (f"{ORIENTED}\n,,56\n", {"pins": (10, 11)}),
+        (f"{ORIENTED}\n,45,6\n", {"pins": (3, 4, 11)}),
+        (f"{ORIENTED}\n,,1\n", {"pins": (6,)}),
+        (f"{ORIENTED}\n,,,.1,.2,-.1,.1,.2,-.1\n", {"w_a": (0.1, 0.2, -0.1), "w_b": (0.1, 0.2, -0.1)}),
+        (f"{ORIENTED}\n,,,.1,.2,-.1,-.2,.1,.3\n", {"w_a": (0.1, 0.2, -0.1), "w_b": (-0.2, 0.1, 0.3)}),
+        (f"{ORIENTED}\n,3,,.1,.2,-.1,.1,.2,-.1\n", {"w_a": (0.1, 0.2, -0.1), "w_b": (0.1, 0.2, -0.1), "pins": (2,)}),
+        (f"{ORIENTED}\n,,56,,,,-.2,.1,.3\n", {"w_b": (-0.2, 0.1, 0.3), "pins": (10, 11)}),
+    ],
+)
+def test_a_bar_with_released_ends_and_offsets(tmp_path, card, expected):
+    body, _ = body_of(tmp_path, GRIDS + card + SECTION + MATERIAL)
+    K = expected_bar(**expected)
+    assert_allclose(condensed(body, (GA, GB)), K, rtol=0, atol=1e-9 * abs(K).max())
+
+
+def test_offsets_along_axes_of_the_element(tmp_path):
+    """OFFT = GOO: W along x, y, z of the bar between its grid points."""
+    R = axes_of(GB - GA, V)
+    w_a, w_b = R.T @ [0.0, 0.2, -0.1], R.T @ [0.05, 0.2, 0.3]
+    body, _ = body_of(tmp_path, f"{GRIDS}{ORIENTED},GOO\n,,,0.,.2,-.1,.05,.2,.3\n{SECTION}{MATERIAL}")
+    K = expected_bar(w_a, w_b)
+    assert_allclose(condensed(body, (GA, GB)), K, rtol=0, atol=1e-9 * abs(K).max())
+
+
+@pytest.mark.parametrize("I12", [0.9e-6, -1.4e-6])
+def test_a_product_of_inertia_turns_the_principal_axes(tmp_path, I12):
+    """The tip of a cantilever: u_y, u_z = L³/(3 E) [[I2, -I12], [-I12, I1]]/(I1 I2 - I12²) F."""
+    body, _ = body_of(tmp_path, GRIDS + f"{ORIENTED}\nPBAR,1,1,2.-3,3.-6,1.-6,2.-6\n,,,,,,,,\n,,,{I12!r}\n" + MATERIAL)
+    R = axes_of(GB - GA, V)
+    tip = np.linalg.inv(condensed(body, (GA, GB))[6:, 6:])[:3, :3]
+    L = np.linalg.norm(GB - GA)
+    flexibility = L**3 / (3 * E) * np.array([[I2, -I12], [-I12, I1]]) / (I1 * I2 - I12**2)
+    assert_allclose((R @ tip @ R.T)[1:, 1:], flexibility, rtol=1e-9)
+
+
+def polygon_moments(shape, n=400):
+    """Return A, ∫ y², ∫ z², ∫ y z about the centroid of a shape given as a test of points (z, y), by a fine raster."""
+    z_low, z_high, y_low, y_high, inside = shape
+    ranges = ((z_low, z_high), (y_low, y_high))
+    z, y = (np.linspace(low, high, n + 1)[:-1] + (high - low) / n / 2 for low, high in ranges)
+    Z, Y = np.meshgrid(z, y)
+    has = inside(Z, Y)
+    cell = (z_high - z_low) * (y_high - y_low) / n**2
+    area = has.sum() * cell
+    y, z = Y[has] - Y[has].mean(), Z[has] - Z[has].mean()
+    return area, (y**2).sum() * cell, (z**2).sum() * cell, (y * z).sum() * cell
+
+
+def between(x, low, high):
+    return (x > low) & (x < high)
+
+
+SHAPES = {
+    # I: height 10, bottom flange 8 x 1, top flange 6 x 2, web 1
+    "I": ((10, 8, 6, 1, 1, 2), (-4, 4, 0, 10, lambda z, y: (y < 1) | ((y > 8) & (abs(z) < 3)) | (abs(z) < 0.5))),
+    "I1": ((6, 2, 8, 10), (-4, 4, 0, 10, lambda z, y: (y < 1) | (y > 9) | (abs(z) < 1))),
+    "CHAN": ((8, 10, 2, 1), (0, 8, 0, 10, lambda z, y: (z < 2) | (y < 1) | (y > 9))),
+    "CHAN1": ((6, 2, 8, 10), (0, 8, 0, 10, lambda z, y: (z < 2) | (y < 1) | (y > 9))),
+    "CHAN2": ((1, 2, 10, 8), (-4, 4, 0, 10, lambda z, y: (abs(z) > 3) | (y < 2))),
+    "T": ((8, 10, 2, 1), (-4, 4, 0, 10, lambda z, y: (y > 8) | (abs(z) < 0.5))),
+    "T2": ((8, 10, 2, 1), (-4, 4, 0, 10, lambda z, y: (y < 2) | (abs(z) < 0.5))),
+    "T1": ((8, 10, 2, 1), (-10, 2, -4, 4, lambda z, y: (z > 0) | (abs(y) < 0.5))),
+    "CROSS": ((6, 2, 10, 1), (-4, 4, -5, 5, lambda z, y: (abs(z) < 1) | (abs(y) < 0.5))),
+    "H": ((6, 4, 10, 2), (-5, 5, -5, 5, lambda z, y: (abs(z) > 3) | (abs(y) < 1))),
+    "BOX1": ((8, 10, 1, 2, 1, 2), (0, 8, 0, 10, lambda z, y: (y > 9) | (y < 2) | (z < 1) | (z > 6))),
+    "HEXA": ((2, 10, 8), (-5, 5, -4, 4, lambda z, y: abs(z) < 5 - 2 * abs(y) / 4)),
+    "HAT": (
+        (6, 1, 8, 3),
+        (-7, 7, 0, 6, lambda z, y: ((abs(z) < 4) & ((y > 5) | (abs(z) > 3))) | ((abs(z) > 4) & (y < 1))),
+    ),
+    "Z": ((3, 2, 8, 10), (-4, 4, 0, 10, lambda z, y: (abs(z) < 1) | ((y > 9) & (z < 0)) | ((y < 1) & (z > 0)))),
+    "L": ((8, 10, 1, 2), (0, 8, 0, 10, lambda z, y: (z < 2) | (y < 1))),
+    "HAT1": (
+        (14, 7, 8, 1, 2),
+        (-7, 7, 0, 7, lambda z, y: (y < 2) | ((abs(z) < 4) & ((y > 6) | (abs(z) > 3))) | ((abs(z) > 4) & (y < 3))),
+    ),
+    "DBOX": (
+        (16, 10, 6, 1, 2, 3, 1, 2, 2, 1),
+        (0, 16, 0, 10, lambda z, y: (z < 1) | between(z, 5, 7) | (z > 13) | ((z < 6) & ((y > 9) | (y < 2)))
+         | ((z > 6) & ((y > 8) | (y < 1)))),
+    ),
+    "TUBE2": ((5, 1), (-5, 5, -5, 5, lambda z, y: between(np.hypot(z, y), 4, 5))),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_sections_of_the_library(tmp_path, name):
+    """A, I1, I2 beside a raster of the shape that the guide draws; J beside the sum of thin walls or Bredt, roughly."""
+    dimensions, shape = SHAPES[name]
+    words = [f"{d / 100:g}" for d in dimensions]
+    lines = ",".join(words[:8]) + ("\n," + ",".join(words[8:]) if len(words) > 8 else "")
+    body, deck = body_of(tmp_path, GRIDS + f"{ORIENTED}\nPBARL,1,1,,{name}\n,{lines}\n" + MATERIAL)
+    sides = tuple(x / 100 for x in shape[:4])
+    area, i1, i2, i12 = polygon_moments((*sides, lambda z, y: shape[4](100 * z, 100 * y)))
+    det = i1 * i2 - i12**2
+    R = axes_of(GB - GA, V)
+    T = np.kron(np.eye(2), R)
+    F = T @ np.linalg.inv(condensed(body, (GA, GB))[6:, 6:]) @ T.T
+    L = np.linalg.norm(GB - GA)
+    has_shear = name == "TUBE2"  # the tube of a job has its shear deformation
+    assert_allclose(F[0, 0], L / E / area, rtol=0.02)
+    bending = L**3 / 3 / E / det * np.array([[i2, -i12], [-i12, i1]])
+    assert_allclose(F[1:3, 1:3], bending, rtol=0, atol=(0.06 if has_shear else 0.02) * bending.max())
+    assert F[3, 3] > L / G / (i1 + i2) * 0.99  # J is at most the polar moment
+    up = (body.dofs[:, 1] == 2).astype(float)
+    assert_allclose(up @ body.M @ up, RHO * area * L, rtol=0.02)
+    assert has_shear or any("J as the sum of its rectangles" in row[2] for row in deck.ledger.rows())
+
+
+def test_the_neutral_axis_of_a_beam_lies_off_the_line_of_its_ends(tmp_path):
+    """PBEAM with N1 = .05, N2 = -.02: an axial force at the grid points, which are shear centres, bends the beam."""
+    section = "PBEAM,1,1,2.-3,3.-6,1.-6,,2.-6\n,,,,,,,,\n,0.,0.,,,,,,\n,,,,,.05,-.02\n"
+    text = f"{GRIDS}{ORIENTED.replace('CBAR', 'CBEAM')}\n{section}"
+    body, _ = body_of(tmp_path, text + MATERIAL)
+    R = axes_of(GB - GA, V)
+    T = np.kron(np.eye(2), R)
+    F = T @ np.linalg.inv(condensed(body, (GA, GB))[6:, 6:]) @ T.T
+    L = np.linalg.norm(GB - GA)
+    # force along x at the tip's node: moments -n × x at the centroid; u_x = L/EA + L n1²/(E I1) + L n2²/(E I2)
+    assert_allclose(F[0, 0], L / E * (1 / A + 0.05**2 / I1 + 0.02**2 / I2), rtol=1e-8)
+    assert_allclose(F[1, 1], L**3 / 3 / E / I1, rtol=1e-8)
+    assert_allclose(F[3, 3], L / G / J, rtol=1e-8)  # torsion about the line of the ends
+    assert abs(F[1, 3]) < 1e-9 * F[3, 3]
+
+
+PAIR = """GRID,1,,0.,0.,0.
+GRID,2,,1.,0.,0.
+GRID,3,,{x},{y},0.
+GRID,4,,2.,.5,.3
+CBAR,1,1,1,2,0.,1.,0.
+CBAR,2,1,3,4,0.,1.,0.
+"""
+
+
+def test_scalar_elements_add_between_the_same_components(tmp_path):
+    text = PAIR.format(x="1.", y="0.") + SECTION + MATERIAL + "CORD2R,5,,0.,0.,0.,0.,0.,1.\n,1.,1.,0.\n"
+    plain, _ = body_of(tmp_path, text)
+    text += "CELAS1,11,5,2,1,3,1\nCELAS1,12,6,2,6,3,6\nPELAS,5,1.+6,,,6,2.+6\nCDAMP2,13,7.,2,2,3,2\n"
+    body, _ = body_of(tmp_path, text)
+    rng = np.random.default_rng(3)
+    u = rng.normal(size=body.n_dof)
+    index = {(node, c): np.flatnonzero((body.dofs == (node, c)).all(axis=1))[0] for node in (1, 2) for c in range(6)}
+    d = {c: u[index[1, c]] - u[index[2, c]] for c in range(6)}
+    assert_allclose(u @ (body.K - plain.K) @ u, 1e6 * d[0] ** 2 + 2e6 * d[5] ** 2, rtol=1e-9)
+    assert_allclose(u @ body.D @ u, 7 * d[1] ** 2, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "card", "why"),
+    [
+        ("1.", "0.", "CELAS1,11,77,2,1,3,1", "names PELAS 77, which is not defined"),
+        ("1.", "0.", "CELAS2,11,5.,2,1,3,2", "between different components"),
+        ("1.", ".4", "CELAS2,11,5.,2,1,3,1", "apart across its direction"),
+        ("1.", "0.", "CDAMP1,11,77,2,1,3,1", "names PDAMP 77, which is not defined"),
+        ("1.", "0.", "CMASS2,11,5.,2,1", "another mass along each axis"),
+        ("1.", "0.", "CMASS2,11,5.,2,1,3,1", "between two points"),
+        ("1.", "0.", "CBUSH,11,77,2,3,,,,0", "names PBUSH 77, which is not defined"),
+    ],
+)
+def test_scalar_elements_that_do_not_balance_are_refused(tmp_path, x, y, card, why):
+    with pytest.raises(ValueError, match=why):
+        body_of(tmp_path, PAIR.format(x=x, y=y) + SECTION + MATERIAL + card)
+
+
+def test_an_element_to_the_ground_becomes_an_interface_of_the_free_body(tmp_path):
+    held = "CELAS2,11,5.+3,2,1\nCBUSH,12,5,3\nPBUSH,5,K,1.,1."
+    body, deck = body_of(tmp_path, PAIR.format(x="1.", y=".4") + SECTION + MATERIAL + held)
+    assert sum("to the ground" in row[2] for row in deck.ledger.rows()) == 2
+    assert {support.components for support in deck.supports} == {(0,), (0, 1, 2, 3, 4, 5)}
+    assert sorted(int(node) for interface in body.interfaces for node in interface.nodes) == [1, 2]
+    assert np.sum(eigh(body.K.toarray(), eigvals_only=True) < 1e-3) == 12  # two free bars
+
+
+MPCS = "".join(f"MPC,7,3,{c},1.,2,{c},-1.\n" for c in (1, 2, 3)) + "MPC,8,3,1,1.,2,1,-1.\nMPCADD,9,7,8\n"
+
+
+@pytest.mark.parametrize(
+    ("control", "n_free"),
+    [("METHOD=1", 12), ("MPC=7", 9), ("MPC=8", 11), ("SUBCASE 1\nMPC=8\nSUBCASE 2\nMPC=8", 11)],
+)
+def test_equations_of_the_set_that_the_case_control_selects(tmp_path, control, n_free):
+    """Two free bars of twelve motions without energy; each equation takes one."""
+    text = PAIR.format(x="1.", y="0.") + SECTION + MATERIAL + MPCS
+    body, _ = body_of(tmp_path, text, head=f"SOL 103\nCEND\n{control}\nBEGIN BULK\n")
+    values = eigh(body.K.toarray(), eigvals_only=True)
+    assert int(np.sum(values < 1e-7 * values[-1])) == n_free
+
+
+def test_subcases_with_different_equations_are_refused(tmp_path):
+    text = PAIR.format(x="1.", y="0.") + SECTION + MATERIAL + MPCS
+    for control in ("SUBCASE 1\nMPC=7\nSUBCASE 2\nMPC=8", "SUBCASE 1\nMPC=7\nSUBCASE 2\nLOAD=8"):
+        with pytest.raises(ValueError, match="subcases select different sets"):
+            body_of(tmp_path, text, head=f"SOL 103\nCEND\n{control}\nBEGIN BULK\n")
+
+
+def test_parameters_of_the_case_control_count(tmp_path):
+    text = GRIDS + f"{ORIENTED}\n" + SECTION + MATERIAL
+    plain, _ = body_of(tmp_path, text)
+    body, _ = body_of(tmp_path, text, head="SOL 103\nCEND\nPARAM,WTMASS,.5\nBEGIN BULK\n")
+    assert_allclose(body.M.toarray(), 0.5 * plain.M.toarray(), rtol=1e-12, atol=1e-12)
+    with pytest.raises(ValueError, match=r"WTMASS = 3\., but case control"):
+        body_of(tmp_path, text + "PARAM,WTMASS,3.\n", head="SOL 103\nCEND\nPARAM,WTMASS,.5\nBEGIN BULK\n")
+    for line in ("K2GG = STIFF", "NSM = 5"):
+        with pytest.raises(ValueError, match="it adds to the body"):
+            body_of(tmp_path, text, head=f"SOL 103\nCEND\n{line}\nBEGIN BULK\n")
+
+
+def test_structural_damping_is_named(tmp_path):
+    text = GRIDS + f"{ORIENTED}\n" + SECTION + "MAT1,1,2.+11,,.3,7800.,,,.05\nPARAM,G,.02\n"
+    body, deck = body_of(tmp_path, text)
+    rows = [row[2] for row in deck.ledger.rows()]
+    assert body.D is None
+    assert any("GE = .05 is left out" in row for row in rows)
+    assert any("G = .02 is left out" in row for row in rows)
+
+
+STRIP = "".join(f"GRID,{2 * k + j + 1},,{k / 8},{0.1 * j},0.\n" for k in range(9) for j in (0, 1))
+STRIP += "".join(f"CQUAD4,{k + 1},1,{2 * k + 1},{2 * k + 3},{2 * k + 4},{2 * k + 2}\n" for k in range(8))
+STRIP += "MAT1,2,1.+11,,0.,7800.\nMAT1,1,2.+11,,0.,7800.\nPARAM,COUPMASS,1\n"
+
+
+@pytest.mark.parametrize(
+    ("property_", "bending", "shear"),
+    [
+        ("PSHELL,1,1,.02,1,,1", 1.0, 1.0),
+        ("PSHELL,1,1,.02,1,2.5,1", 2.5, 1.0),
+        ("PSHELL,1,1,.02,2,2.5,1", 1.25, 1.0),
+        ("PSHELL,1,1,.02,1,,1,.0001", 1.0, 1.2e-4),
+        ("PSHELL,1,1,.02,1,,2,.001", 1.0, 0.6e-3),
+    ],
+)
+def test_plates_with_ratios_of_bending_and_shear(tmp_path, property_, bending, shear):
+    """The tip of a strip of nu = 0, 1 m long: F L³/(3 E I) + F L/(5/6 G A), membrane as it is."""
+    body, _ = body_of(tmp_path, STRIP + property_)
+    K = body.K.toarray()
+    x = body.nodes[body.dofs[:, 0], 0]
+    free = np.flatnonzero(x > 1e-9)
+    tip = np.flatnonzero(x[free] > 0.999)
+    component = body.dofs[free, 1]
+    width, t = 0.1, 0.02
+    for c, exact in (
+        (2, 1 / (3 * E * bending * width * t**3 / 12) + 1 / (5 / 6 * shear * E / 2 * width * t)),
+        (0, 1 / (E * width * t)),
+    ):
+        f = np.zeros(len(free))
+        at = tip[component[tip] == c]
+        f[at] = 1 / len(at)
+        u = np.linalg.solve(K[np.ix_(free, free)], f)
+        assert_allclose(u[at].mean(), exact, rtol=5e-3)
+
+
+def test_replicated_cards_are_written_out(tmp_path):
+    text = "GRID,1,,0.,0.,0.\n=,*(1),=,*(.2),*(.1),==\n=(3)\nCBAR,1,1,1,2,0.,1.,0.\n=,*1,=,*1,*1,==\n=2\n"
+    body, deck = body_of(tmp_path, text + SECTION + MATERIAL)
+    assert list(deck.mesh.node_numbers) == [1, 2, 3, 4, 5]
+    assert_allclose(deck.mesh.nodes, np.outer(np.arange(5), [0.2, 0.1, 0]), atol=1e-15)
+    up = (body.dofs[:, 1] == 2).astype(float)
+    assert_allclose(up @ body.M @ up, RHO * A * 4 * np.hypot(0.2, 0.1), rtol=1e-12)
+
+
+def test_a_deck_with_equations_of_several_arguments(tmp_path):
+    """The text of DEQATN has commas; it is no free-field card."""
+    text = GRIDS + f"{ORIENTED}\nDEQATN  301     Z(A,B,C,D,E,F,G,H,I,J)=SUM(A,B,C,D,E,F,G,H,I,J)\n+       ;Y=2\n"
+    _, deck = body_of(tmp_path, text + SECTION + MATERIAL)
+    assert ("DEQATN", "1", "belongs to the analysis, not to the body") in deck.ledger.rows()
+
+
+def test_light_beams_between_point_masses_need_no_density(tmp_path):
+    """Nastran takes RHO that is not given as zero; a deck without any mass asks for it."""
+    text = GRIDS + f"{ORIENTED}\n" + SECTION + "MAT1,1,2.+11,,.3\n"
+    with pytest.raises(ValueError, match="1 materials have no density"):
+        body_of(tmp_path, text)
+    body, deck = body_of(tmp_path, text + "CONM2,7,2,,3.\n")
+    up = (body.dofs[:, 1] == 2).astype(float)
+    assert_allclose(up @ body.M @ up, 3.0, rtol=1e-14)
+    assert any(row[0] == "density" and "massless" in row[2] for row in deck.ledger.rows())
+
+
+@pytest.mark.parametrize(("control", "names"), [("METHOD=1", {1, 2}), ("SPC=3", {1}), ("SPC=4", {2})])
+def test_supports_make_interfaces_of_the_set_that_is_selected_or_of_all(tmp_path, control, names):
+    text = GRIDS + f"{ORIENTED}\n" + SECTION + MATERIAL + "SPC1,3,123456,1\nSPC1,4,123456,2\n"
+    _, deck = body_of(tmp_path, text, head=f"SOL 103\nCEND\n{control}\nBEGIN BULK\n")
+    held = {int(number) for each in deck.supports for number in deck.mesh.node_numbers[deck.mesh.node_sets[each.nodes]]}
+    assert held == names

@@ -1,0 +1,159 @@
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from fe_models import read_cad
+from fe_models.errors import MeshError
+from fe_models.files.cad.cad_units import length_unit
+from tests.fe_models.small_solids import PLATE, PLATE_VOLUME, drawn, iges_unit, in_unit, painted, plate_file
+
+METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "inch": 0.0254}
+
+
+@pytest.fixture(scope="module", params=["step", "iges", "brep"])
+def plate(request, tmp_path_factory):
+    return read_cad(plate_file(tmp_path_factory.mktemp("plate") / f"plate.{request.param}"), units="mm-t-s")
+
+
+def test_every_format_gives_the_plate_with_its_bore(plate):
+    assert_allclose(plate.volume, PLATE_VOLUME, rtol=1e-8, atol=0)
+    assert_allclose([plate.lo, plate.hi], [[0, 0, 0], PLATE["size"]], rtol=0, atol=1e-6)
+    assert sorted(face.kind for face in plate.faces) == ["cylinder"] + 6 * ["plane"]
+    (bore,) = [face for face in plate.faces if face.kind == "cylinder"]
+    assert bore.is_hole
+    assert_allclose(bore.radius, PLATE["bore"], rtol=1e-9, atol=0)
+    assert_allclose(bore.axis, [0, 0, 1], rtol=0, atol=1e-9)
+    assert_allclose(bore.point, [*PLATE["at"], 5], rtol=0, atol=1e-6)
+    assert_allclose(bore.area, 2 * np.pi * 6 * 10, rtol=1e-8, atol=0)
+
+
+def test_normals_of_planes_point_outward_and_areas_close(plate):
+    planes = [face for face in plate.faces if face.kind == "plane"]
+    middle = np.array(PLATE["size"]) / 2
+    assert all(face.normal @ (face.centre - middle) > 0 for face in planes)
+    closed = sum(face.area * face.normal for face in planes)  # the bore's share is zero by symmetry
+    assert_allclose(closed, 0, rtol=0, atol=1e-9 * sum(face.area for face in planes))
+
+
+def test_faces_are_numbered_from_one(plate):
+    assert [face.number for face in plate.faces] == list(range(1, 8))
+
+
+@pytest.mark.parametrize("unit", ["mm", "cm", "m", "inch"])
+@pytest.mark.parametrize(("units", "length"), [("mm-t-s", 1e-3), ("m-kg-s", 1.0), ("in-slinch-s", 0.0254)])
+def test_a_step_file_meets_the_unit_of_the_job(tmp_path, unit, units, length):
+    part = read_cad(in_unit(plate_file(tmp_path / "plate.step"), unit), units=units)
+    assert_allclose(part.hi, np.array(PLATE["size"]) * METRES[unit] / length, rtol=1e-9, atol=0)
+    assert_allclose(part.volume, PLATE_VOLUME * (METRES[unit] / length) ** 3, rtol=1e-9, atol=0)
+    (bore,) = [face for face in part.faces if face.kind == "cylinder"]
+    assert_allclose(bore.radius, 6 * METRES[unit] / length, rtol=1e-9, atol=0)
+    assert f"STEP in {unit}, taken to {part.units.length_symbol}" in part.words
+
+
+@pytest.mark.parametrize(("flag", "name", "metres"), [(1, "IN", 0.0254), (6, "M", 1.0), (10, "CM", 0.01)])
+def test_an_iges_file_meets_the_unit_of_the_job(tmp_path, flag, name, metres):
+    part = read_cad(iges_unit(plate_file(tmp_path / "plate.igs"), flag, name), units="m-kg-s")
+    assert_allclose(part.hi, np.array(PLATE["size"]) * metres, rtol=1e-7, atol=0)
+    assert_allclose(part.volume, PLATE_VOLUME * metres**3, rtol=1e-7, atol=0)
+
+
+def test_a_brep_file_has_no_unit_and_says_so(tmp_path):
+    part = read_cad(plate_file(tmp_path / "plate.brep"), units="m-kg-s")
+    assert_allclose(part.hi, PLATE["size"], rtol=1e-9, atol=0)
+    assert "without unit, its numbers taken as m" in part.words
+
+
+def test_colours_of_faces_are_kept(tmp_path):
+    part = read_cad(painted(plate_file(tmp_path / "plate.step"), 6, (1, 0, 0)), units="mm-t-s")
+    assert [(face.kind, face.colour) for face in part.faces if face.colour] == [("cylinder", "#ff0000")]
+
+
+def test_a_ball_and_a_pin_say_where_the_material_is(tmp_path):
+    with drawn(tmp_path / "ball.step") as occ:
+        ball, pin = occ.addSphere(1, 2, 3, 5), occ.addCylinder(1, 2, 3, 20, 20, 0, 2)
+        occ.fuse([(3, ball)], [(3, pin)])
+    faces = read_cad(tmp_path / "ball.step", units="mm-t-s").faces
+    (sphere,) = [face for face in faces if face.kind == "sphere"]
+    (cylinder,) = [face for face in faces if face.kind == "cylinder"]
+    assert_allclose([sphere.radius, cylinder.radius], [5, 2], rtol=1e-9, atol=0)
+    assert_allclose(sphere.point, [1, 2, 3], rtol=0, atol=1e-8)
+    assert_allclose(cylinder.axis, np.array([1, 1, 0]) / np.sqrt(2), rtol=0, atol=1e-9)
+    assert not sphere.is_hole
+    assert not cylinder.is_hole
+
+
+def test_solids_that_touch_share_a_face(tmp_path):
+    with drawn(tmp_path / "two.step") as occ:
+        occ.addBox(0, 0, 0, 10, 10, 10)
+        occ.addBox(10, 2, 2, 10, 6, 6)
+    part = read_cad(tmp_path / "two.step", units="mm-t-s")
+    assert len(part.solids) == 2
+    (shared,) = [face for face in part.faces if face.is_inner]
+    assert_allclose(shared.area, 36, rtol=1e-9, atol=0)
+    assert_allclose(part.volume, 1360, rtol=1e-9, atol=0)
+
+
+def test_solids_that_overlap_are_refused(tmp_path):
+    with drawn(tmp_path / "two.step") as occ:
+        occ.addBox(0, 0, 0, 10, 10, 10)
+        occ.addBox(5, 2, 2, 10, 6, 6)
+    with pytest.raises(MeshError, match="its 2 solids overlap"):
+        read_cad(tmp_path / "two.step", units="mm-t-s")
+
+
+def test_faces_that_do_not_close_are_refused(tmp_path):
+    plate_file(tmp_path / "plate.step")
+    with drawn(tmp_path / "open.igs") as occ:
+        occ.importShapes(str(tmp_path / "plate.step"))
+        occ.remove([(3, 1)])
+        occ.remove([(2, 7)])
+    with pytest.raises(MeshError, match=r"holds 6 faces and no solid.*do not close"):
+        read_cad(tmp_path / "open.igs", units="mm-t-s")
+
+
+DAMAGE = [
+    ("part.step", b"solid nothing", "expected a STEP file"),
+    ("part.step", b"ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\nENDSEC;\nEND-ISO-10303-21;\n", "one length unit, got none"),
+    ("part.igs", b"garbage\n", "expected an IGES file"),
+    ("part.brep", b"DBRep_DrawableShape\n", "neither solids nor faces; is the file whole"),
+    ("part.brep", b"", "the file is empty"),
+    ("part.stl", b"solid", r"unknown suffix '\.stl'"),
+]
+
+
+@pytest.mark.parametrize(("name", "content", "words"), DAMAGE)
+def test_damaged_files_are_refused_in_one_message(tmp_path, name, content, words):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(MeshError, match=words):
+        read_cad(tmp_path / name, units="mm-t-s")
+
+
+def test_a_file_that_is_missing_or_cut_off_is_refused(tmp_path):
+    with pytest.raises(MeshError, match="there is no such file"):
+        read_cad(tmp_path / "none.step", units="mm-t-s")
+    path = plate_file(tmp_path / "plate.step")
+    path.write_bytes(path.read_bytes()[:6000])
+    with pytest.raises(MeshError, match=r"plate\.step: "):
+        read_cad(path, units="mm-t-s")
+
+
+def test_two_units_in_one_file_are_refused(tmp_path):
+    path = plate_file(tmp_path / "plate.step")
+    text = path.read_text()
+    unit = "( LENGTH_UNIT() NAMED_UNIT(*) SI_UNIT(.MILLI.,.METRE.) )"
+    number = text[: text.index(unit)].rsplit("#", 1)[1].split()[0]
+    assert f"GLOBAL_UNIT_ASSIGNED_CONTEXT\n((#{number}," in text
+    more = f"#93000 = {unit.replace('.MILLI.', '$')};\n"
+    end = text.rindex("ENDSEC;")
+    text = text[:end] + more + text[end:]
+    context = "GLOBAL_UNIT_ASSIGNED_CONTEXT\n(("
+    path.write_text(text.replace(f"{context}#{number},", f"{context}#93000,#{number},"))
+    with pytest.raises(MeshError, match="one length unit, got mm, m"):
+        read_cad(path, units="mm-t-s")
+
+
+def test_texts_of_the_global_section_may_hold_the_delimiters(tmp_path):
+    line = "1H,,1H;,5Ha,b;c,4Hx;,y,3Hsys,2Hv1,32,308,15,308,15,3Hp,q,1.,4,2HFT,1,0.01;"
+    text = f"{line[:72]:<72}G0000001\n{line[72:]:<72}G0000002\n"
+    name, metres = length_unit(tmp_path / "a.igs", text.encode())
+    assert (name, metres) == ("foot", 0.3048)

@@ -1,0 +1,217 @@
+"""Parameter studies against closed forms; points that fail are rows; mistakes in the file are answered in words."""
+
+import csv
+import json
+import socket
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from typer.testing import CliRunner
+
+from fe_models.foundation.toml_file import changed
+from floatframe import GeneralizedAlpha, SystemFileError, integrate
+from floatframe.cli.app import app
+from floatframe.design.studies.study import run_study
+from floatframe.design.studies.study_file import read_study
+from floatframe.files.system_file.read_system import read_system
+from floatframe.results.sensors import measured
+from tests.floatframe.cli.test_analyses import PENDULUM
+
+SENSOR = '\n[sensors.tip]\ntype = "velocity"\nbody = "rod"\nmarker = [1, 0, 0]\n'
+STUDY = """
+system = "pendulum.toml"
+analysis = "eig"
+
+[parameters.gravity]
+path = "system.gravity.1"
+values = [-9.81, -1.62]
+
+[parameters.mass]
+path = "bodies.rod.mass"
+first = 1.0
+last = 4.0
+number = 3
+scale = "log"
+
+[outputs.swing]
+of = "frequency 1"
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "pendulum.toml").write_text(PENDULUM.replace("\n[run]", SENSOR + "\n[run]"))
+    (tmp_path / "study.toml").write_text(STUDY)
+    return tmp_path
+
+
+def sweep(*words, code=0):
+    result = CliRunner().invoke(app, ["sweep", *(str(word) for word in words)])
+    assert result.exit_code == code, result.output
+    return result.stdout if code == 0 else " ".join(result.stderr.split())
+
+
+def swing_of(mass, g):
+    """Frequency of the rod: inertia 1/6 about its middle, at half a metre from the hinge."""
+    return np.sqrt(mass * g * 0.5 / (1 / 6 + mass * 0.25)) / (2 * np.pi)
+
+
+def test_frequencies_of_a_grid_are_those_of_the_textbook_in_its_order(folder):
+    table = run_study(read_study(folder / "study.toml"), workers=1)
+    assert [row.values for row in table.rows] == [(g, m) for g in (-9.81, -1.62) for m in (1.0, 2.0, 4.0)]
+    exact = [swing_of(m, -g) for g, m in (row.values for row in table.rows)]
+    assert_allclose(table.column("swing"), exact, rtol=1e-8)
+    assert table.units == ("Hz",)
+
+
+def test_points_in_other_processes_give_table_csv_json_and_picture(folder):
+    text = sweep(folder / "study.toml", "-j", 2, *(f"-o{folder / 'out'}.{kind}" for kind in ("csv", "json", "png")))
+    assert "swing [Hz]" in text
+    with open(folder / "out.csv", newline="") as file:
+        names, *rows = csv.reader(file)
+    assert names == ["gravity", "mass", "swing [Hz]", "error"]
+    assert_allclose([float(row[2]) for row in rows], [swing_of(float(m), -float(g)) for g, m, _, _ in rows], rtol=1e-8)
+    record = json.loads((folder / "out.json").read_text())
+    assert record["points"][3]["parameters"] == {"gravity": -1.62, "mass": 1.0}
+    assert float(rows[3][2]) == record["points"][3]["outputs"]["swing"]
+    assert (folder / "out.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_cluster_gives_the_table_of_processes_bit_for_bit(folder):
+    pytest.importorskip("distributed")
+    for name, workers in (("one", "1"), ("two", "2"), ("dask", "dask:2")):
+        sweep(folder / "study.toml", "--workers", workers, "-o", folder / f"{name}.csv", "--journal", folder / name)
+    assert (folder / "one.csv").read_bytes() == (folder / "two.csv").read_bytes() == (folder / "dask.csv").read_bytes()
+    with socket.socket() as nobody:
+        nobody.bind(("127.0.0.1", 0))
+        words = sweep(folder / "study.toml", "-j", f"dask://127.0.0.1:{nobody.getsockname()[1]}", code=2)
+    assert "no Dask scheduler answers" in words
+    assert not (folder / "study.csv").exists()
+
+
+def test_a_second_call_takes_the_journal_and_gives_the_same_table(folder):
+    study, journal = read_study(folder / "study.toml"), folder / "study.journal"
+    whole = run_study(study, workers=1, journal=journal)
+    lines = journal.read_bytes().splitlines(keepends=True)
+    assert len(lines) == 1 + 6
+    journal.write_bytes(b"".join(lines[:3]) + lines[3][:20])  # killed while it wrote the third point
+    again = run_study(study, workers=1, journal=journal)
+    assert (again.n_known, again.rows) == (2, whole.rows)
+    text = STUDY.replace("[-9.81, -1.62]", "[-9.81, -3.72, -1.62]").replace("number = 3", "number = 2")
+    (folder / "study.toml").write_text(text)
+    assert "4 of 6 points were in the journal" in sweep(folder / "study.toml", "-j", 1)
+    (folder / "pendulum.toml").write_text(PENDULUM.replace("mass = 2.0", "mass = 2.5"))
+    words = sweep(folder / "study.toml", "-j", 1, code=2)
+    assert "this journal is of another system" in words
+    journal.write_text("notes\nof mine\n")
+    assert "expected a journal of floatframe sweep" in sweep(folder / "study.toml", "-j", 1, code=2)
+    assert journal.read_text() == "notes\nof mine\n"
+
+
+def test_runs_are_those_of_the_changed_system_and_failures_are_rows(folder):
+    (folder / "study.toml").write_text("""
+system = "pendulum.toml"
+combine = "together"
+workers = 1
+[parameters.mass]
+path = "bodies.rod.mass"
+values = [1.0, 0.0, 3.0]
+[parameters.h]
+path = "run.h"
+values = [1e-2, 1e-2, 2e-2]
+[outputs.fastest]
+of = "tip size"
+take = "greatest"
+[outputs.angle]
+of = "hinge.angle value"
+[outputs.mean]
+of = "hinge.angle rate"
+take = "mean"
+""")
+    text = sweep(folder / "study.toml")
+    assert "failed at mass = 0, h = 0.01" in text
+    assert "bodies.rod.mass = 0.0: expected a number above 0" in text
+    assert "1 of 3 points failed" in text
+    with open(folder / "study.csv", newline="") as file:
+        names, first, second, third = csv.reader(file)
+    assert names[2:] == ["fastest [m/s]", "angle [rad]", "mean [rad/s]", "error"]
+    assert second[2:5] == ["", "", ""]
+    assert "expected a number above 0" in second[5]
+    system, _ = read_system(folder / "pendulum.toml", {"bodies.rod.mass": 3.0})
+    motion = integrate(system, GeneralizedAlpha(), 1.0, 2e-2)
+    assert float(third[2]) == measured(system, motion)["tip"].columns["size"].max()
+    assert_allclose(float(first[4]), float(first[3]), rtol=0.05)  # the mean rate over one second
+
+
+def test_what_nobody_foresaw_is_a_row_too(folder, monkeypatch):
+    def fails_once(system, **options):
+        if system.bodies[0].mass == 2.0:
+            raise RuntimeError("a fault\nof the program")
+        return found(system, **options)
+
+    import floatframe.design.studies.study as study
+
+    found = study.linearize
+    monkeypatch.setattr(study, "linearize", fails_once)
+    table = run_study(read_study(folder / "study.toml"), workers=1)
+    assert [row.error for row in table.rows] == ["", "RuntimeError: a fault of the program", ""] * 2
+    assert_allclose(table.column("swing")[[0, 2]], [swing_of(1, 9.81), swing_of(4, 9.81)], rtol=1e-6)
+
+
+def test_equilibria_and_driven_motions_can_be_varied_too(folder):
+    text = STUDY.replace('"eig"', '"static"').replace('"frequency 1"', '"hinge.angle value"')
+    (folder / "study.toml").write_text(text)
+    table = run_study(read_study(folder / "study.toml"), workers=1)
+    assert_allclose(np.abs(table.column("swing")), np.pi / 2, rtol=1e-8)
+    drive = '\n[joints.hinge.motions.angle]\ntype = "harmonic"\namplitude = 1.0\nomega = 2.0\n'
+    (folder / "pendulum.toml").write_text(PENDULUM.replace("\n[run]", drive + "\n[run]").replace("1e-3", "5e-2"))
+    text = STUDY.replace('"eig"', '"inverse"').replace('"frequency 1"', '"hinge.angle force"\ntake = "first"')
+    (folder / "study.toml").write_text(text)
+    table = run_study(read_study(folder / "study.toml"), workers=1)
+    assert_allclose(table.column("swing"), [m * -g * 0.5 for g, m in (row.values for row in table.rows)], rtol=1e-9)
+    assert table.units == ("N m",)
+
+
+def test_study_without_any_result_says_why_and_fails(folder):
+    (folder / "study.toml").write_text(STUDY.replace("values = [-9.81, -1.62]", 'values = ["down"]'))
+    message = sweep(folder / "study.toml", "-j", 1, code=2)
+    assert "no point gave a result; the first one:" in message
+    assert "system.gravity" in message
+
+
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ('"pendulum.toml"', '"pendulm.toml"', "no such file"),
+    ('"eig"', '"eigs"', "did you mean 'eig'"),
+    ('"system.gravity.1"', '"system.gravity.7"', "expected an index of 0 to 2, got '7'"),
+    ('"bodies.rod.mass"', '"bodies.rodd.mass"', "there is no 'rodd'; did you mean 'rod'"),
+    ('"bodies.rod.mass"', '"bodies.rod.maas"', "unknown key; did you mean 'mass'"),
+    ('"frequency 1"', '"frequncy 1"', "expected one of frequency, damping, real, imaginary"),
+    ("number = 3\n", "", "expected values, or first, last and number"),
+    ("first = 1.0", "first = -1.0", "expected first and last above 0"),
+    ('analysis = "eig"', 'combine = "together"', "expected as many values of each parameter, got gravity 2, mass 3"),
+    ('analysis = "eig"', 'analysis = "run"', "of = 'frequency 1': no such sensor; choices: hinge.angle, tip"),
+    ("[outputs.swing]\nof = \"frequency 1\"", "[outputs]", "expected one table [outputs.NAME] at least"),
+])  # fmt: skip
+def test_mistakes_are_answered_before_any_work(folder, old, new, words):
+    assert STUDY.count(old) == 1
+    (folder / "study.toml").write_text(STUDY.replace(old, new))
+    assert words in sweep(folder / "study.toml", code=2)
+    assert sorted(path.name for path in folder.iterdir()) == ["pendulum.toml", "study.toml"]
+
+
+def test_column_of_a_sensor_is_named_with_its_choices(folder):
+    text = STUDY.replace('"eig"', '"run"').replace('"frequency 1"', '"{}"')
+    for of, words in (("tip", "expected one of its columns: x, y, z, size"), ("tip siz", "did you mean 'size'")):
+        (folder / "study.toml").write_text(text.format(of))
+        assert words in sweep(folder / "study.toml", code=2)
+
+
+def test_values_are_changed_by_key_path_and_names_may_hold_dots():
+    content = {"a": {"b.c": {"d": [1, [2, 3]]}, "b": 4}}
+    found = changed(content, {"a.b.c.d.1.0": 9, "a.b": 5, "a.new": 6}, "file", SystemFileError)
+    assert found == {"a": {"b.c": {"d": [1, [9, 3]]}, "b": 5, "new": 6}}
+    assert content["a"]["b"] == 4
+    for path in ("a.b.x", "x.y", "a.b.c.d.2.0"):
+        with pytest.raises(SystemFileError, match="key path"):
+            changed(content, {path: 1}, "file", SystemFileError)

@@ -1,0 +1,92 @@
+"""Which compiler makes the kernels, what is said about it, and the oldest numba."""
+
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numba
+import pytest
+
+from floatframe.engine.kernels.compiler.choice import CHOICES, KNOWN_VERSIONS, VARIABLE
+from tests.__main__ import GROUPS, KERNELS, PLAIN, environment
+from tests.root import ROOT
+
+CODE = "from floatframe.engine.kernels.compiler.choice import is_lean, words; print(is_lean, words())"
+
+
+def said(compiler: str, version: str = numba.__version__) -> subprocess.CompletedProcess[str]:
+    """Return what a process says that is told to take a compiler, with a numba of that version."""
+    code = f"import numba; numba.__version__ = {version!r}; {CODE}"
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), VARIABLE: compiler}
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=False)
+
+
+def test_the_lean_compiler_serves_the_numba_it_knows():
+    done = said("", f"{KNOWN_VERSIONS[0]}.7")
+    assert done.stdout == f"True lean, with numba {KNOWN_VERSIONS[0]}.7\n", done.stderr
+
+
+@pytest.mark.parametrize("version", ["0.60.0", "0.99.1", "1.0.0rc1"])
+def test_any_other_numba_compiles_plainly_and_says_why(version):
+    known = ", ".join(KNOWN_VERSIONS)
+    assert said("", version).stdout == f"False plain, with numba {version} (the faster lean way knows numba {known})\n"
+
+
+def test_the_switch_takes_the_plain_compiler():
+    words = f"False plain, with numba {KNOWN_VERSIONS[0]}.0 (asked for by {VARIABLE})\n"
+    assert said("plain", f"{KNOWN_VERSIONS[0]}.0").stdout == words
+
+
+@pytest.mark.parametrize(
+    ("compiler", "version", "words"),
+    [("lean", "0.60.0", "the lean compiler knows numba .* but 0.60.0 is installed"), ("fast", "0.68.0", "'fast'")],
+)
+def test_what_cannot_serve_is_refused(compiler, version, words):
+    done = said(compiler, version)
+    last = done.stderr.splitlines()[-1]
+    assert done.returncode != 0
+    assert VARIABLE in last
+    assert re.search(words, last), last
+
+
+def test_the_project_sets_no_upper_bound_of_numba():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert [line for line in project["dependencies"] if line.startswith("numba")] == ["numba>=0.60"]
+
+
+OLDEST = "numba==0.60.*"
+PACKAGES = ("numpy", "scipy", "h5py", "pydantic", "tomlkit", "lazy_loader", "threadpoolctl", "typer", "rich",
+            "scikit-fem", "meshio", "matplotlib", "pytest", "hypothesis")  # fmt: skip
+TESTS = ("tests/floatframe/integrators/test_pendulum.py", "tests/floatframe/engine/kernels/test_arrays.py")
+
+
+@pytest.mark.long
+def test_the_pendulum_moves_with_the_oldest_numba(tmp_path):
+    """In an environment of its own, with the numpy that this numba wants; some minutes of compilation."""
+    subprocess.run([sys.executable, "-m", "venv", str(tmp_path / "env")], check=True)
+    python = tmp_path / "env" / "bin" / "python"
+    subprocess.run([python, "-m", "pip", "install", "-q", OLDEST, *PACKAGES], check=True)
+    version = subprocess.run([python, "-c", "import numba; print(numba.__version__)"], capture_output=True, text=True)
+    assert version.stdout.startswith("0.60.")
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    environment.pop(VARIABLE, None)
+    command = [python, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-m", "not long", *TESTS]
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout[-3000:]
+    assert "passed" in done.stdout
+    assert "skipped" not in done.stdout
+
+
+def test_every_change_runs_kernels_and_pendulum_plainly_too():
+    """A check of the group `ci` does it, by a variable that it alone has, and names tests that exist."""
+    assert any(PLAIN in stage for stage in GROUPS["ci"].stages)
+    assert environment(PLAIN)[VARIABLE] == "plain"
+    assert environment(KERNELS).get(VARIABLE) == os.environ.get(VARIABLE)
+    paths = [word for word in PLAIN if word.startswith("tests/")]
+    assert any("pendulum" in path for path in paths)
+    assert "tests/floatframe/engine/kernels" in paths
+    assert all(Path(ROOT / path).exists() for path in paths)
+    assert set(CHOICES) == {"lean", "plain"}

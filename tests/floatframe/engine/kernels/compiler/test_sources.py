@@ -1,0 +1,168 @@
+"""What kernels are made of decides whether their cache holds: no change of a source runs with stale code."""
+
+import ast
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from floatframe.engine.kernels.compiler.sources import PACKAGES, source_digest, source_files
+from tests.root import ROOT
+
+ENTRY = "floatframe.engine.kernels.entry"
+
+
+def copy_of_sources(root: Path) -> Path:
+    """Copy the modules of the project into a folder."""
+    for package in PACKAGES:
+        shutil.copytree(ROOT / package, root / package, ignore=lambda folder, names: [
+            name for name in names if name == "__pycache__" or ("." in name and not name.endswith((".py", ".pyi")))
+        ])  # fmt: skip
+    return root
+
+
+def rooms_of_kernels() -> list[Path]:
+    kernels = ROOT / "floatframe" / "engine" / "kernels"
+    return [kernels, *sorted(path for path in kernels.rglob("*") if (path / "__init__.py").is_file())]
+
+
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory):
+    return copy_of_sources(tmp_path_factory.mktemp("copy"))
+
+
+FAR = [  # outside the folder of the kernels, which take codes from there
+    "floatframe/model/joints/rows/kinds.py",
+    "floatframe/model/functions/expressions.py",
+    "floatframe/engine/kernels/model.py",
+]
+
+
+def first_module(room: Path) -> str:
+    found = next(path for path in source_files(ENTRY) if path.parent == room and path.name != "__init__.py")
+    return found.relative_to(ROOT).as_posix()
+
+
+ROOMS = [first_module(room) for room in rooms_of_kernels()]
+
+
+@pytest.mark.parametrize("name", sorted({*ROOMS, *FAR}))
+def test_the_digest_sees_a_change_in_every_room_and_where_codes_come_from(copy, name):
+    before = source_digest(ENTRY, root=copy)
+    assert before == source_digest(ENTRY)  # the copy is faithful
+    path = copy / name
+    text = path.read_text()
+    path.write_text(text.replace("1", "2", 1))
+    try:
+        assert path.read_text() != text
+        assert source_digest(ENTRY, root=copy) != before
+    finally:
+        path.write_text(text)
+    assert source_digest(ENTRY, root=copy) == before
+
+
+def test_the_digest_does_not_change_with_what_kernels_do_not_import(copy):
+    before = source_digest(ENTRY, root=copy)
+    (copy / "floatframe" / "results" / "trajectory.py").write_text("")
+    assert source_digest(ENTRY, root=copy) == before
+
+
+def test_the_digest_tells_the_compilers_apart():
+    assert source_digest(ENTRY, "lean") != source_digest(ENTRY, "plain")
+
+
+def test_imports_are_found_as_python_reads_them():
+    """Against Python's own parser, for every module of the project that kernels reach."""
+    known, left = set(), [ENTRY]
+    while left:
+        place = ROOT.joinpath(*left.pop().split("."))
+        for path in (place.with_suffix(".py"), place / "__init__.py"):
+            if not path.is_file() or path in known:
+                continue
+            known.add(path)
+            for node in ast.walk(ast.parse(path.read_text())):
+                if isinstance(node, ast.Import):
+                    left += [alias.name for alias in node.names]
+                elif isinstance(node, ast.ImportFrom):
+                    assert node.level == 0, f"{path}: relative imports are not found by the digest"
+                    left += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+            left = [name for name in left if name.split(".")[0] in PACKAGES]
+    assert source_files(ENTRY) == sorted(known)
+    assert ROOT / "floatframe" / "model" / "joints" / "rows" / "kinds.py" in known
+    assert ROOT / "floatframe" / "model" / "functions" / "expressions.py" in known
+
+
+KERNEL = """
+import importlib.util, sys
+from numba import njit
+from pathlib import Path
+spec = importlib.util.spec_from_file_location("sources", sys.argv[1])
+sources = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(sources)
+from floatframe.codes import ADD, SUBTRACT
+
+def make(digest):
+    def run(code, x, y):
+        if digest == 0:
+            return 0.0
+        if code == ADD:
+            return x + y
+        return x - y
+    return njit(run, cache=True)
+
+run = make(sources.source_digest("floatframe.kernel", root=Path(__file__).parents[1]))
+print(run(ADD, 1.5, 1.0), sum(run.stats.cache_hits.values()))
+"""
+
+
+def test_codes_that_change_elsewhere_reach_a_cached_function(tmp_path):
+    """Without the digest of what is imported the second run would take 1.5 - 1.0 from the cache."""
+    folder = tmp_path / "floatframe"
+    folder.mkdir()
+    (folder / "__init__.py").write_text("")
+    (folder / "kernel.py").write_text(KERNEL)
+    (folder / "codes.py").write_text("ADD, SUBTRACT = 1, 2\n")
+    sources = ROOT / "floatframe" / "engine" / "kernels" / "compiler" / "sources.py"
+
+    def run() -> str:
+        command = [sys.executable, "-m", "floatframe.kernel", str(sources)]
+        environment = {**os.environ, "PYTHONPATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}
+        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
+        return done.stdout
+
+    assert run() == "2.5 0\n"
+    assert run() == "2.5 1\n"  # warm
+    (folder / "codes.py").write_text("SUBTRACT, ADD = 1, 2\n")
+    assert run() == "2.5 0\n"
+
+
+MOTION = """
+import numpy as np
+import floatframe as ff
+guide = ff.PrismaticJoint("guide", ff.GROUND, ff.Marker("block"), axis=(1, 0, 0))
+push = ff.UserForce("push", {"x": ff.JointCoordinate("guide", "distance")}, {"x": "1.5 + exp(0 * t)"})
+system = ff.System([ff.RigidBody("block", 1.0, np.eye(3))], [guide], [push])
+print(f"{ff.integrate(system, ff.trapezoidal(), 2**0.5, 0.1).body('block').r[-1, 0]:.9g}")
+"""
+
+
+@pytest.mark.long
+def test_a_warm_cache_does_not_outlive_the_codes_of_expressions(tmp_path):
+    """x = F t²/2 = 2.5 with F = 1.5 + 1 at t² = 2; kernels with codes of yesterday find 1.5 - 1."""
+    copy_of_sources(tmp_path)
+
+    def run() -> str:
+        environment = {**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+        command = [sys.executable, "-c", MOTION]
+        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
+        return done.stdout
+
+    assert run() == "2.5\n"
+    codes = tmp_path / "floatframe" / "model" / "functions" / "expressions.py"
+    text = codes.read_text()
+    assert "ADD, SUBTRACT, MULTIPLY" in text
+    codes.write_text(text.replace("ADD, SUBTRACT, MULTIPLY", "SUBTRACT, ADD, MULTIPLY", 1))
+    assert run() == "2.5\n"

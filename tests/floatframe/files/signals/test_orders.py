@@ -1,0 +1,85 @@
+"""Order tracking of run-ups whose orders are known."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from floatframe import SignalError
+from floatframe.files.signals import Signal, angle_of_speed, frequency_map, order_cut, order_map
+
+RATE = 2048.0
+t = np.arange(int(6 * RATE)) / RATE
+SPEED = 2 * np.pi * (10 + 4 * t + 0.5 * np.sin(2 * t))  # rad/s
+ANGLE = 2 * np.pi * (10 * t + 2 * t**2 + 0.25 * (1 - np.cos(2 * t)))
+RAMP = 0.2 * t  # an order whose amplitude rises
+
+
+def run_up():
+    x = 1.5 * np.sin(2 * ANGLE + 0.3) + RAMP * np.cos(4.5 * ANGLE)
+    return Signal("housing", t, x, "m/s²")
+
+
+def test_the_integral_of_a_speed_is_its_angle():
+    assert_allclose(angle_of_speed(t, SPEED), ANGLE, rtol=0, atol=1e-9 * ANGLE[-1])
+
+
+@pytest.mark.parametrize("is_rms", [False, True])
+def test_orders_of_a_run_up_have_their_amplitudes(is_rms):
+    orders = order_map(run_up(), ANGLE, max_order=6, resolution=0.125, is_rms=is_rms)
+    scale = 1 / np.sqrt(2) if is_rms else 1.0
+    assert_allclose(order_cut(orders, 2.0), 1.5 * scale, rtol=2e-3, atol=0)
+    assert_allclose(order_cut(orders, 4.5), 0.2 * orders.times * scale, rtol=0.02, atol=0.003)
+    between = (np.abs(orders.lines - 2.0) > 0.3) & (np.abs(orders.lines - 4.5) > 0.3)
+    assert np.abs(orders.amplitudes[:, between]).max() < 0.01 * scale
+    assert_allclose(orders.speeds, np.interp(orders.times, t, SPEED), rtol=5e-3, atol=0)
+    assert orders.unit == "m/s²"
+
+
+def test_a_run_down_and_a_wheel_that_turns_backward_are_the_same():
+    back = Signal("housing", t, run_up().values[::-1], "m/s²")
+    orders = order_map(back, -(ANGLE[::-1] - ANGLE[-1]), max_order=6, resolution=0.125)
+    assert (np.diff(orders.speeds) < 0).all()
+    assert_allclose(order_cut(orders, 2.0), 1.5, rtol=2e-3, atol=0)
+    assert_allclose(order_map(back, ANGLE[::-1], max_order=6, resolution=0.125).amplitudes, orders.amplitudes,
+    rtol=1e-6,
+                    atol=1e-9)  # fmt: skip
+
+
+def test_a_fixed_frequency_is_not_mirrored_into_low_orders():
+    """900 Hz is order 90 at the slowest speed and lies near half the rate: no line of it below order 20."""
+    x = Signal("whine", t, np.sin(2 * np.pi * 900 * t), "m/s²")
+    orders = order_map(x, ANGLE, max_order=20, resolution=0.25)
+    assert np.abs(orders.amplitudes).max() < 0.02
+
+
+def test_standing_and_slow_parts_are_left_out_and_said():
+    speed = np.where(t < 1.0, 0.0, 2 * np.pi * 12 * (t - 1.0))
+    angle = np.where(t < 1.0, 0.0, 2 * np.pi * 6 * (t - 1.0) ** 2)
+    orders = order_map(Signal("a", t, np.sin(3 * angle), ""), angle, max_order=5, resolution=0.25, slowest=20.0)
+    assert orders.times[0] > 1.0 + 20 / (2 * np.pi * 12)
+    assert "where the rotation is faster than 20 rad/s" in orders.notes[0]
+    assert_allclose(order_cut(orders, 3.0), 1.0, rtol=5e-3, atol=0)
+    assert speed.max() > 20
+
+
+def test_a_waterfall_shows_a_line_where_it_is():
+    speed = np.full(len(t), 70.0)
+    found = frequency_map(Signal("a", t, 2.0 * np.sin(2 * np.pi * 64 * t), "N"), speed, n_segment=1024)
+    assert_allclose(found.amplitudes[:, found.lines == 64.0], 2.0, rtol=1e-9, atol=0)
+    assert_allclose(found.speeds, 70.0, rtol=1e-12, atol=0)
+
+
+@pytest.mark.parametrize(
+    ("angle", "options", "words"),
+    [
+        (ANGLE[:-1], {}, "expected an angle at each"),
+        (0 * ANGLE, {}, "nowhere faster than 0 rad/s"),
+        (0.01 * ANGLE, {}, "turns, a block has 4"),
+        (ANGLE, {"resolution": 0.0}, "0 < resolution <= 1"),
+        (ANGLE, {"slowest": 1e4}, "nowhere faster than 10000"),
+        (np.cumsum(np.where(t < 3, 1e-7, 1.0)), {"slowest": 1e-6}, "leave slow speeds out"),
+    ],
+)
+def test_impossible_rotations_are_refused(angle, options, words):
+    with pytest.raises(SignalError, match=words):
+        order_map(run_up(), angle, **options)

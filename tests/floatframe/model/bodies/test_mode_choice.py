@@ -1,0 +1,24 @@
+"""Bodies with some of their modes only."""
+
+import numpy as np
+from numpy.testing import assert_allclose
+
+import cms
+from floatframe.model.bodies.mode_choice import with_modes
+from tests.bodies import bar
+
+EPS = np.finfo(float).eps
+
+
+def test_recovery_rows_of_fewer_modes_are_those_of_a_motion_in_these_modes():
+    part = cms.couple(bar(nx=2))
+    rows = cms.RecoveryRequest("loads", (cms.Rows("interface force"), cms.Rows("net force", about=(0.0, 0.0, 0.0))))
+    reduced = cms.reduce(part, cms.craig_bampton(part, n_modes=3), geometric=False, recovery=[rows])
+    z = np.random.default_rng(1).normal(size=(2, 6 + reduced.n_q))
+    kept = [0, 1, 2, 3, 4, 5, 6 + 4, 6 + 1]
+    only = np.zeros_like(z)
+    only[:, kept] = z[:, kept]
+    fewer = with_modes(reduced, [4, 1])
+    expected = reduced.recovery["loads"].values(only, z_ddot=only)
+    got = fewer.recovery["loads"].values(z[:, kept], z_ddot=z[:, kept])
+    assert_allclose(got, expected, rtol=0, atol=4 * EPS * np.abs(expected).max())  # sums over fewer products

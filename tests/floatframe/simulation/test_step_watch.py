@@ -1,0 +1,305 @@
+"""The watch of steps and energy: what it says of motions that coarse steps get wrong, and that it keeps still else."""
+
+import json
+import logging
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from typer.testing import CliRunner
+
+import floatframe.simulation.integration as integration
+from floatframe import (
+    ConvergenceError,
+    EnergyMomentum,
+    GeneralizedAlpha,
+    Gravity,
+    JointForce,
+    Marker,
+    ModelError,
+    PrismaticJoint,
+    RevoluteJoint,
+    RigidBody,
+    System,
+    integrate,
+    read_results,
+    resume,
+    trapezoidal,
+)
+from floatframe.cli.app import app
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.kernels.memory import KINETIC, new_rows
+from floatframe.engine.kernels.work import new_work
+from floatframe.model.rotations import euler_parameters, euler_parameters_of_rotation_vector, rotation_exp
+from floatframe.results.validity import ValidityNote, notes_from_json, notes_to_json
+from floatframe.simulation.energy_watch import EnergyWatch
+from floatframe.simulation.step_watch import StepWatch, rotations_between
+
+GROUND = Marker("ground", position=np.zeros(3))
+
+
+def oscillator(omega=5.0, damping=0.0):
+    """Return 1 kg on a spring along a rail, let go 0.1 m from its rest, far from the origin."""
+    place = np.array([50.0, 20.0, -10.0])
+    body = RigidBody("mass", 1.0, np.eye(3), position=place + np.array([0.1, 0, 0]))
+    rail = PrismaticJoint(
+        "rail", Marker("ground", position=place), Marker("mass", position=np.zeros(3)), axis=(1, 0, 0)
+    )
+    spring = JointForce("spring", "rail", "distance", stiffness=omega**2, damping=damping)
+    return System([body], [rail], [spring])
+
+
+def pendulum():
+    """Return a pendulum let go from the level."""
+    rod = RigidBody("rod", 1.0, 0.01 * np.eye(3), position=(1, 0, 0))
+    end = Marker("rod", position=np.array([-1.0, 0, 0]))
+    joint = RevoluteJoint("hinge", GROUND, end, axis=(0, 0, 1))
+    return System([rod], [joint], [Gravity((0, -9.81, 0))])
+
+
+def kinds(motion):
+    return {note.kind for note in motion.validity}
+
+
+@pytest.mark.parametrize("method", [GeneralizedAlpha(0.8), trapezoidal(), EnergyMomentum()])
+@pytest.mark.parametrize("steps_in_period", [15, 25, 60])
+def test_the_estimated_error_is_that_of_an_oscillator(method, steps_in_period):
+    """Exact: the cosine. An error in phase grows with time, as the sum of the errors of the steps does."""
+    omega, periods = 5.0, 3
+    h = 2 * np.pi / omega / steps_in_period
+    system = oscillator(omega)
+    watch = StepWatch(method, periods * steps_in_period)
+    run = running(system, method, h, periods * steps_in_period, watch)
+    motion = integrate(system, method, periods * steps_in_period * h, h)
+    x = motion.body("mass").r[:, 0] - 50.0
+    error = np.abs(x - 0.1 * np.cos(omega * motion.t)).max() / 0.2
+    assert error / 2 < run < 2 * error
+    assert ("steps" in kinds(motion)) == (run > 0.03)
+
+
+def running(system, method, h, n_steps, watch):
+    """Return the estimated error of a run, over its way."""
+    carry, work = method.start(system, 0.0), new_work(compiled_system(system).model)
+    carry, _ = method.observe(system, 0.0, carry, work)
+    watch.begin(carry.state)
+    done = 0
+    while done < n_steps:
+        n, begin = min(watch.room(done, 400), n_steps - done), carry
+        carry, _, _, failure = method.advance(system, carry, work, t0=0.0, h=h, first=done, n_steps=n, every=10**6)
+        assert failure is None
+        watch.take(system, begin, carry, t0=0.0, h=h, first=done, n_steps=n)
+        done += n
+    watch.conclude(system, carry, done, 0.0, h)
+    return float(np.linalg.norm(watch.total[:, 0] / watch.size[0], axis=1).max())
+
+
+def test_coarse_steps_of_a_pendulum_are_told_with_time_body_and_remedy(caplog, tmp_path):
+    with caplog.at_level(logging.WARNING):
+        motion = integrate(pendulum(), GeneralizedAlpha(0.5), 5.0, 0.05, output=tmp_path / "swing.h5")
+    (note,) = motion.validity
+    assert (note.kind, note.body, note.limit) == ("steps", "rod", 0.03)
+    assert 0 < note.t_first <= note.t_largest <= 5.0
+    assert f"system 'system': body 'rod', t = {note.t_first:.6g}: the steps put it off by about" in caplog.text
+    assert "take a step of about 0.0" in note.words
+    assert read_results(tmp_path / "swing.h5").validity == motion.validity
+    assert notes_from_json(notes_to_json(motion.validity)) == motion.validity
+    fine = integrate(pendulum(), GeneralizedAlpha(0.5), 5.0, 0.002, output_every=25)
+    assert np.abs(motion.body("rod").r - fine.body("rod").r).max() > 0.05 * 2  # and it is wrong
+    assert not fine.validity
+
+
+def two_bars(first):
+    """Return two bars on hinges, let go with the first at an angle: a motion that magnifies errors."""
+    R = rotation_exp(np.array([0.0, 0.0, first]))
+    way, end = R[:, 0], np.array([0.5, 0.0, 0.0])
+    bars = [
+        RigidBody(name, 1.0, 0.1 * np.eye(3), position=PLACE + at * way, orientation=euler_parameters(R))
+        for name, at in (("upper", 0.5), ("lower", 1.5))
+    ]
+    top = RevoluteJoint("top", Marker("ground", position=PLACE), Marker("upper", position=-end), axis=(0, 0, 1))
+    knee = RevoluteJoint("knee", Marker("upper", position=end), Marker("lower", position=-end), axis=(0, 0, 1))
+    return System(bars, [top, knee], [Gravity((0, -9.81, 0))])
+
+
+PLACE = np.array([30.0, -20.0, 10.0])
+
+
+@pytest.mark.parametrize(
+    ("first", "h", "formulation"), [(0.3, 0.02, "absolute"), (0.3, 0.02, "relative"), (1.0, 0.02, "absolute")]
+)
+def test_errors_that_the_motion_magnifies_are_told(first, h, formulation):
+    """Sums of the errors of single steps, which know no growth, stay below the limit in some of these."""
+    system, method, end = two_bars(first), GeneralizedAlpha(0.8), 4.0
+    motion = integrate(system, method, end, h, formulation=formulation)
+    fine = integrate(system, method, end, h / 16, output_every=16, formulation="relative", watch="off").body("lower").r
+    way = np.linalg.norm(fine - fine[0], axis=1).max()
+    assert np.linalg.norm(motion.body("lower").r - fine, axis=1).max() > 0.05 * way
+    assert kinds(motion) == {"steps"}
+
+
+@pytest.mark.parametrize(("n", "h"), [(1, 0.3), (3, 0.2)])
+def test_a_run_of_few_steps_is_judged_at_its_end(n, h):
+    """A pendulum falls in half a second."""
+    motion = integrate(pendulum(), GeneralizedAlpha(0.5), n * h, h)
+    fine = integrate(pendulum(), GeneralizedAlpha(0.5), n * h, h / 100, output_every=100)
+    way = np.linalg.norm(fine.body("rod").r[-1] - fine.body("rod").r[0])
+    assert np.linalg.norm(motion.body("rod").r[-1] - fine.body("rod").r[-1]) > 0.03 * way
+    assert kinds(motion) == {"steps"}
+    assert not fine.validity
+
+
+def test_a_swing_that_many_steps_follow_is_not_told():
+    motion = integrate(two_bars(0.3), GeneralizedAlpha(0.8), 4.0, 0.002)
+    fine = integrate(two_bars(0.3), GeneralizedAlpha(0.8), 4.0, 0.001, output_every=2, watch="off")
+    assert np.abs(motion.body("lower").r - fine.body("lower").r).max() < 0.01
+    assert not motion.validity
+
+
+@pytest.mark.parametrize(("tolerance", "is_wrong"), [(1e-4, True), (1e-9, False)])
+def test_an_error_tolerance_that_is_too_large_for_a_small_motion_is_told(tolerance, is_wrong):
+    """1 kg on a spring moves 0.1 mm, and is a metre large. Exact: the cosine."""
+    omega, amplitude = 20.0, 1e-4
+    body = RigidBody("mass", 1.0, np.eye(3), position=PLACE + np.array([amplitude, 0, 0]))
+    rail = PrismaticJoint("rail", Marker("ground", position=PLACE), Marker("mass", position=(0, 0, 0)), axis=(1, 0, 0))
+    system = System([body], [rail], [JointForce("spring", "rail", "distance", stiffness=omega**2)])
+    motion = integrate(system, GeneralizedAlpha(0.8, error_tolerance=tolerance), 2.0, 0.05)
+    x = motion.body("mass").r[:, 0] - PLACE[0]
+    error = np.abs(x - amplitude * np.cos(omega * motion.t)).max() / (2 * amplitude)
+    assert (error > 0.05) == is_wrong
+    assert kinds(motion) == ({"steps"} if is_wrong else set())
+    assert all("take an error_tolerance of about" in note.words for note in motion.validity)
+
+
+def test_a_motion_that_gains_energy_stops_with_what_was_reached():
+    with pytest.raises(ConvergenceError, match="of the energy in the motion comes from the steps") as caught:
+        integrate(growing(), FRESH, 4.0, 0.05)
+    reached = caught.value.trajectory
+    assert "energy" in kinds(reached)
+    assert 0.05 < reached.t[-1] < 4.0
+    assert 'watch = "tell"' in str(caught.value)
+    went_on = integrate(growing(), FRESH, 2.0, 0.05, watch="tell")
+    assert went_on.t[-1] == 2.0
+    assert "energy" in kinds(went_on)
+    assert not integrate(growing(), FRESH, 2.0, 0.05, watch="off").validity
+
+
+FRESH = GeneralizedAlpha(parameters=(0.0, 0.0, 0.02, 0.5))  # unstable above omega h = 2.1: beta below 1/4
+
+
+def growing():
+    return oscillator(60.0)
+
+
+def test_energy_of_forces_and_dampers_is_no_gain_of_the_steps():
+    from floatframe.model.functions.time_functions import harmonic
+
+    plain = oscillator(5.0, damping=2.0)
+    motor = JointForce("motor", "rail", "distance", motor=harmonic(30.0, 4.0))
+    driven = replace(plain, forces=(*plain.forces, motor))
+    assert not integrate(driven, GeneralizedAlpha(0.8), 10.0, 0.01).validity
+    stiff = oscillator(5.0, damping=1e4)  # a damper that the step does not resolve: its work is not known
+    assert "energy" not in kinds(integrate(stiff, GeneralizedAlpha(0.8), 0.5, 0.01))
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e6])
+@pytest.mark.parametrize(("kinetic", "gain"), [((1.0, 1.0, 1.0), 0.0), ((1.0, 1.2, 1.5), 0.5 / 1.5), ((1.0, 0.4), 0.0)])
+def test_a_gain_of_energy_is_measured_by_the_energy_that_moves(scale, kinetic, gain):
+    watch, model = EnergyWatch(1, 1e-2), compiled_system(oscillator()).model
+    for number, energy in enumerate(kinetic):
+        rows = new_rows(model, 1)
+        rows.diagnostics[:, KINETIC] = scale * energy
+        watch.observe(oscillator(), rows, is_switched=False, is_last=number == len(kinetic) - 1)
+    assert_allclose(0.0 if watch.note is None else watch.note.largest, gain, rtol=1e-12)
+
+
+@pytest.mark.parametrize("far", [0.0, 1e7])
+def test_what_rounding_gives_far_from_the_origin_is_no_gain(far):
+    """Velocities that close joints jump by the rounding of places over the step, 2 nm / 10 µs there."""
+    watch, model = EnergyWatch(1, 1e-5), compiled_system(oscillator()).model
+    for speed in (1e-4, 2e-4, 3e-4):
+        rows = new_rows(model, 1)
+        rows.r[...], rows.u[:, 0] = far, speed
+        rows.diagnostics[:, KINETIC] = 0.5 * speed**2
+        watch.observe(oscillator(), rows, is_switched=False, is_last=speed > 2e-4)
+    assert (watch.note is None) == (far > 0.0)
+
+
+def test_rotations_between_orientations_are_those_that_made_them():
+    rng = np.random.default_rng(3)
+    start = rng.normal(size=4)
+    start /= np.linalg.norm(start)
+    for angle in (0.0, 1e-9, 0.3, 2.0, 3.1):
+        axis = rng.normal(size=3)
+        theta = angle * axis / np.linalg.norm(axis)
+        p = multiplied(start, euler_parameters_of_rotation_vector(theta))
+        for sign in (1.0, -1.0):
+            assert_allclose(rotations_between(sign * p[None], start[None])[0], theta, rtol=1e-9, atol=1e-14)
+
+
+def multiplied(p, other):
+    """Return the product of quaternions (Hamilton)."""
+    w, v = p[0] * other[0] - p[1:] @ other[1:], p[0] * other[1:] + other[0] * p[1:] + np.cross(p[1:], other[1:])
+    return np.array([w, *v])
+
+
+def test_a_resumed_run_has_the_notes_of_one_never_interrupted(tmp_path, monkeypatch):
+    monkeypatch.setattr(integration, "SEGMENT_SECONDS", 0.0)
+    whole = integrate(pendulum(), GeneralizedAlpha(0.5), 30.0, 0.05)
+
+    def stop(progress):
+        if progress.n_steps >= 400:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        integrate(pendulum(), GeneralizedAlpha(0.5), 30.0, 0.05, output=tmp_path / "run.h5", progress=stop)
+    resumed = resume(pendulum(), tmp_path / "run.h5")
+    assert resumed.validity == whole.validity != ()
+    assert_array_equal(resumed.body("rod").r, whole.body("rod").r)
+    assert not integrate(pendulum(), GeneralizedAlpha(0.5), 30.0, 0.05, watch="off").validity
+
+
+def test_an_unknown_watch_is_refused_with_the_choices():
+    with pytest.raises(ModelError, match="watch: expected one of stop, tell, off, got 'tel'"):
+        integrate(pendulum(), GeneralizedAlpha(0.8), 0.1, 0.01, watch="tel")
+
+
+SWING = """
+[system]
+units = "m-kg-s"
+gravity = [0.0, -9.81, 0.0]
+[bodies.rod]
+mass = 1.0
+inertia = [[0.01, 0, 0], [0, 0.01, 0], [0, 0, 0.01]]
+position = [1.0, 0.0, 0.0]
+[joints.hinge]
+type = "revolute"
+body_a = "ground"
+body_b = "rod"
+marker_b = [-1.0, 0.0, 0.0]
+axis = [0.0, 0.0, 1.0]
+[run]
+t_end = 5.0
+h = 0.05
+rho_inf = 0.5
+"""
+
+
+@pytest.mark.parametrize(("more", "words", "says"), [
+    ("", (), True), ('watch = "off"', (), False), ("", ("--watch", "off"), False),
+    ('watch = "off"', ("--watch", "tell"), True),
+])  # fmt: skip
+def test_the_command_line_prints_the_line_and_files_choose(tmp_path, more, words, says):
+    (tmp_path / "swing.toml").write_text(SWING + more)
+    result = CliRunner().invoke(app, ["run", str(tmp_path / "swing.toml"), *words])
+    assert result.exit_code == 0, result.output
+    told = json.loads(CliRunner().invoke(app, ["info", str(tmp_path / "swing.h5"), "--json"]).stdout)["validity"]
+    assert [note["kind"] for note in told] == ["steps"] * says
+    assert ("What the run says of its steps" in result.output) == says
+
+
+def test_notes_of_older_files_are_read():
+    note = ValidityNote("rod", "speed", 0.2, 0.3, 0.1, 0.2, False, True)
+    fields = json.loads(notes_to_json([note]))
+    del fields[0]["advice"]
+    assert notes_from_json(json.dumps(fields)) == (note,)
