@@ -6,19 +6,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import floatframe.cli.analyses as analyses
+import floatframe.cli.cosimulation as cosimulation
+import floatframe.cli.driven as driven
+import floatframe.cli.fatigue as fatigue
+import floatframe.cli.linear as linear
+import floatframe.cli.machine as machine
+import floatframe.cli.prepare as prepare
+import floatframe.cli.shake as shake
+import floatframe.cli.spectra as spectra
+import floatframe.cli.view as view
 from cms.cli.console import INTERRUPTED, commands, guarded, output_path, print_error, print_table, say, stages
-from floatframe.cli import (
-    analyses,
-    cosimulation,
-    driven,
-    fatigue,
-    linear,
-    machine,
-    prepare,
-    shake,
-    spectra,
-    view,
-)
 from floatframe.cli.exchange import generate, robot
 from floatframe.cli.parameters import gradient, identify, optimize, study, sweep
 

@@ -304,7 +304,11 @@ class GeneralizedAlpha:
             return Failure(words, excess)
         if status == SINGULAR_CONNECTION:
             name = compiled.connection_names[index]
-            return Failure(f"the constraints of joint {name!r} depend on others here (a singular position)", excess)
+            words = (
+                f"the constraints of joint {name!r} depend on others here (a singular position); choose a smaller h, "
+                "or look for a drive out of reach or an error in the system"
+            )
+            return Failure(words, excess)
         if status == TURNED:
             name, turn = compiled.body_names[index], float(np.linalg.norm(work.state.theta[index]))
             words = (

@@ -401,7 +401,8 @@ class Run:
                     work.solver.c_k[...] = 0.0  # factors are made anew, as after a resumption
                     if n_done and time.monotonic() - self.closed > SEGMENT_SECONDS:
                         self.close_segment(self.record(carry, n_done))
-                n_batch = min(batch_steps, self.steps.room(n_done, batch_steps), self.n_total - n_done)
+                n_left = batch_steps - (n_done - n_told)  # the watch divides batches, and leaves their ends
+                n_batch = min(n_left, self.steps.room(n_done, batch_steps), self.n_total - n_done)
                 n_batch = min(n_batch, RESTART_STEPS - n_done % RESTART_STEPS)
                 begin, n_happened = carry, self.n_happened
                 n_smooth = min((k - n_done for k in jumps if k >= n_done), default=n_batch)
@@ -452,10 +453,12 @@ class Run:
                     self.tell(self.steps.conclude(self.acting, carry, n_done, self.t_start, self.h))
                     self.look()
                 is_batch = n_done % RESTART_STEPS == 0 or n_done - n_told >= batch_steps or n_done == self.n_total
-                if progress is not None and (is_batch or not n_good or self.events is not None):
-                    t, n_told = self.t_start + n_done * self.h, n_done
-                    counts = carry.n_iterations, self.watch.notes, carry.n_rejected
-                    progress(Progress(t, self.t_end, n_done, self.n_total, *counts))
+                if is_batch or not n_good or self.events is not None:
+                    n_told = n_done
+                    if progress is not None:
+                        t = self.t_start + n_done * self.h
+                        counts = carry.n_iterations, self.watch.notes, carry.n_rejected
+                        progress(Progress(t, self.t_end, n_done, self.n_total, *counts))
         except BaseException:
             self.close_segment(safe)
             raise

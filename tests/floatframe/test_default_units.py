@@ -150,8 +150,9 @@ def described(kind):
     source = inspect.getsource(kind)
     for each in fields(kind):
         if isinstance(each.default, float) and each.default != 0.0:
-            line = re.search(rf"^    {each.name}:.*$", source, re.MULTILINE)
-            yield each.name, each.default, line.group(0) if line else ""
+            line = re.search(rf"^((?:    #: .*\n)*)    {each.name}:(.*)$", source, re.MULTILINE)
+            above, beside = line.groups() if line else ("", "")
+            yield each.name, each.default, beside if "#:" in beside else above
 
 
 def parts():
@@ -160,7 +161,7 @@ def parts():
     for info in pkgutil.walk_packages(floatframe.__path__, "floatframe."):
         rooms = ("forces", "elements", "drives", "wheels", "clearances", "hydraulics", "aerodynamics", "bearings",
                  "cables", "friction", "joints", "flexible_parts", "rails")  # fmt: skip
-        if info.name.split(".")[1] in rooms and not info.name.startswith(OF_SI_ALONE):
+        if set(info.name.split(".")[2:3]) & set(rooms) and not info.name.startswith(OF_SI_ALONE):
             module = importlib.import_module(info.name)
             for kind in list(vars(module).values()):
                 if inspect.isclass(kind) and is_dataclass(kind) and kind.__module__ == info.name:

@@ -91,7 +91,7 @@ class Flexibility:
         n_n = motions.shape[1]
         self.r = _pivots(on_z / _lengths(body, h, Z)[:, None]) if r is None else r
         self.e = np.setdiff1d(np.arange(Z.shape[1]), self.r)
-        self._factor = held_factor(condensed, Z, S_z, self.e)
+        self._factor = held_factor(condensed, Z, S_z, self.e, conditions.K_load)
         self.T = None if Z.shape[0] == Z.shape[1] else _expansion(condensed, Z)
         self.M = self._with_load(body.M, conditions.M_load)
         self.K = self._with_load(body.K, conditions.K_load)
@@ -265,19 +265,24 @@ def _pivots(motions: Array) -> IntArray:
     return np.sort(pivots[:n]).astype(np.int64)
 
 
-def held_factor(condensed: CondensedBody, Z: Array, S_z: Array, e: IntArray) -> tuple[Array, tuple[Array, bool]]:
+def held_factor(
+    condensed: CondensedBody, Z: Array, S_z: Array, e: IntArray, K_load: Array | None = None
+) -> tuple[Array, tuple[Array, bool]]:
     """Factorise S_ee, scaled by its diagonal: the scale, (n_e,), and the Cholesky factor.
+
+    S_z = Zᵀ (S + K_load) Z.
 
     Raises
     ------
     BodyError
-        If a motion of z_e costs no energy: a mechanism.
+        If a motion of z_e costs neither the body nor its load any energy: a mechanism.
     """
     S_ee = S_z[np.ix_(e, e)]
     if not len(e):
         return np.zeros(0), (S_ee, True)
     body = condensed.body
-    free = free_motions(body, condensed.Psi_C, Z[:, e], S_ee, np.abs(body.K.diagonal()[condensed.fixed.b]))
+    terms = np.abs(body.K.diagonal()[condensed.fixed.b])
+    free = free_motions(body, condensed.Psi_C, Z[:, e], S_ee, terms, K_load)
     if free.shape[1]:
         raise BodyError(mechanism_words(body, free))
     size = 1 / np.sqrt(np.where(np.diag(S_ee) > 0, np.diag(S_ee), 1.0))

@@ -24,21 +24,27 @@ def rounding_of_energy(body: FEBody, u: Array) -> Array:
     return np.finfo(float).eps * squares(np.abs(body.K.diagonal()), u)
 
 
-def free_motions(body: FEBody, X: Array, C: Array, S: Array, terms: Array) -> Array:
+def free_motions(body: FEBody, X: Array, C: Array, S: Array, terms: Array, load: Array | None = None) -> Array:
     """Return the motions in the span of X C that cost no energy, (n_dof, n_free).
 
     (1) directions v of S, scaled by the size of its terms; only those of small eigenvalues are suspect
-    (2) a suspect motion u = X C v is free where uᵀ K u, of u itself, is within its rounding
+    (2) a suspect motion u = X C v costs the body nothing where uᵀ K u, of u itself, is within its rounding
+    (3) among these motions, those are free that cost the load nothing either: its energy vᵀ Cᵀ K_load C v is not lost
+        in the terms of all dofs of the body, and is compared with those of S alone
 
     Parameters
     ----------
     X, C
         Columns, (n_dof, k), and independent combinations of them, (k, m).
     S
-        (X C)ᵀ K (X C), (m, m).
+        (X C)ᵀ K (X C) + Cᵀ K_load C, (m, m).
     terms
         Sum of the terms K_kk x_k² of each column of X, or a part of it that tells its size, (k,).
+    load
+        K_load, the stiffness of neighbours over the columns of X, (k, k); None if there are none.
     """
+    if load is not None:
+        terms = terms + np.abs(np.diag(load))
     size = np.sqrt(C.T**2 @ terms)
     size = 1 / np.where(size > 0, size, 1.0)
     values, vectors = la.eigh((S + S.T) / 2 * np.outer(size, size))
@@ -46,7 +52,13 @@ def free_motions(body: FEBody, X: Array, C: Array, S: Array, terms: Array) -> Ar
     if not v.shape[1]:
         return np.zeros((body.n_dof, 0))
     u = of_this_process(combine(X, C @ v))
-    return np.asarray(u[:, without_energy(body, u)])
+    is_free = without_energy(body, u)
+    u, on_load = np.asarray(u[:, is_free]), C @ v[:, is_free]
+    if load is None or not u.shape[1]:
+        return u
+    G = on_load.T @ load @ on_load
+    values, vectors = la.eigh((G + G.T) / 2)
+    return np.asarray(u @ vectors[:, values < WITHIN_ROUNDING * np.finfo(float).eps])
 
 
 def without_energy(body: FEBody, u: Array) -> np.ndarray:

@@ -54,7 +54,7 @@ def balanced_truncation(
     (3) Loads and responses at all boundary dofs, or at chosen ones. Each is scaled so that its own static elastic
         response is 1; stiff and compliant directions, forces and moments then have equal weight.
     (4) Position-velocity balancing (`cms.modes.mode_sets.balancing`): one symmetric projection, ranked by singular
-    values.
+        values.
 
     The number of directions is `n_modes`, or such that the neglected share of the sum of position-velocity singular
     values is at most `tolerance`. The `data` of the set contain all singular values ("hankel", "hankel signs",

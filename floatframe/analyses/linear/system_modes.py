@@ -73,6 +73,8 @@ def system_modes(linear: LinearSystem) -> SystemModes:
     )
     if is_conservative:
         noise = ROUNDING * np.einsum("zk,zk->k", np.abs(Z), np.abs(K) @ np.abs(Z)) + MODEL * np.abs(omega2)
+        beside = ROUNDING * motions_beside(system, Z)
+        noise += np.einsum("zk,zk->k", beside, np.abs(K) @ beside)
         omega2 = np.where(np.abs(omega2) <= noise, 0.0, omega2)
         root = np.sqrt(omega2.astype(complex))
         eigenvalues, shapes = np.where(omega2 >= 0, 1j * root.real, root.imag), Z.astype(complex)
@@ -82,7 +84,11 @@ def system_modes(linear: LinearSystem) -> SystemModes:
             shapes = np.column_stack([shapes, shapes[:, k]])
     else:
         A, of_terms = state_matrix(system, Z, highest)
-        eigenvalues, vectors, errors = eigenvalues_with_errors(A, of_terms)
+        dA = ROUNDING * of_terms + MODEL * np.abs(A)
+        beside, rates = ROUNDING * motions_beside(system, Z), slice(n, 2 * n)
+        dA[rates, :n] += beside.T @ np.abs(K) @ beside / highest
+        dA[rates, rates] += beside.T @ np.abs(C) @ beside
+        eigenvalues, vectors, errors = eigenvalues_with_errors(A, dA)
         eigenvalues, vectors, errors = with_motions_that_cost_nothing(A, eigenvalues, vectors, errors)
         of_z = np.r_[:n, 2 * n : len(A)]
         shapes = la.block_diag(Z, np.eye(len(system.states))) @ vectors[of_z]
@@ -152,7 +158,20 @@ def state_matrix(system: LinearSystem, Z: Array, highest: float) -> tuple[Array,
     return made[0], made[1]
 
 
-def eigenvalues_with_errors(A: Array, of_terms: Array) -> tuple[Array, Array, Array]:
+def motions_beside(system: LinearSystem, Z: Array) -> Array:
+    """Return how far the motions coupled with those of modes go where they have as much kinetic energy, (n_z, n).
+
+    Directions (of axes, of a steady rotation) are known to `ROUNDING`, so that a motion has so much of these in it. One
+    that costs nothing then costs the square of that: K of a free motion is as small, of either sign.
+    """
+    n = system.n_z
+    M, C, K = (np.abs(a[:n, :n]) for a in (system.M, system.C, system.K))
+    is_coupled = M + C + K + (M + C + K).T > 0
+    size = np.sqrt(np.diag(M))
+    return (is_coupled @ (size[:, None] * np.abs(Z))) / size[:, None]
+
+
+def eigenvalues_with_errors(A: Array, dA: Array) -> tuple[Array, Array, Array]:
     """Return all eigenvalues, their unit vectors, and by how much each may be off.
 
     The two-sided Rayleigh quotient takes away what the solver adds, which goes with the size of the whole matrix. What
@@ -164,7 +183,6 @@ def eigenvalues_with_errors(A: Array, of_terms: Array) -> tuple[Array, Array, Ar
     is_regular = np.abs(overlap) > np.finfo(float).eps
     safe = np.where(is_regular, overlap, 1.0)
     values = np.einsum("xk,xk->k", W.conj(), A @ V) / safe
-    dA = ROUNDING * of_terms + MODEL * np.abs(A)
     errors = np.einsum("xk,xk->k", np.abs(W), dA @ np.abs(V)) / np.abs(safe)
     plain = np.einsum("xk,xk->k", V.conj(), A @ V)  # of a defective one, which is as it is
     return np.where(is_regular, values, plain), V, np.where(is_regular, errors, np.inf)

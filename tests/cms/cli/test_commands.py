@@ -276,7 +276,7 @@ def test_frame_refuses_what_it_cannot_do(modal_file, tmp_path):
         (("--to", "buckens", "--origin", "1,2"), "expected three numbers with commas"),
         (("--to", "buckens", "--axes", "1,0,0;0,1,0"), "expected three axes"),
         (("--to", "buckens", "--axes", "1,0,0;0,1,0;0,0,-1"), "three orthonormal right-handed axes"),
-        (("--to", "buckens", "--damping", "-1"), "ratio = -1.0; expected 0 or more"),
+        (("--to", "buckens", "--damping", "-1"), "ratio = -1.0; expected 0 to 1"),
         (("--to", "buckens", "--units", "m-kg"), "did you mean 'm-kg-s'?"),
         (("--to", "buckens", "-o", path), "this is an input; choose another name"),
     ]:

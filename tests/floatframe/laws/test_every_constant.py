@@ -7,7 +7,8 @@ from pkgutil import iter_modules
 import pytest
 from numpy.testing import assert_array_equal
 
-import floatframe
+import floatframe.components
+import floatframe.model
 from floatframe.components.aerodynamics import LiftingSurface
 from floatframe.components.bearings import Bearing
 from floatframe.components.cables import Cable
@@ -83,10 +84,10 @@ NEEDED = {("Cylinder", "rod_area"), ("Cylinder", "head_dead_volume"), ("Cylinder
 
 def kinds():
     """Return the names of all elements that there are."""
-    packages = [each.name for each in iter_modules(floatframe.__path__) if each.ispkg]
     return [
-        f"{package}.{kind}" for package in packages
-        for kind in getattr(import_module(f"floatframe.components.{package}"), "ELEMENTS", {})
+        f"{package}.{kind}" for wing in (floatframe.components, floatframe.model)
+        for package in (each.name for each in iter_modules(wing.__path__) if each.ispkg)
+        for kind in getattr(import_module(f"{wing.__name__}.{package}"), "ELEMENTS", {})
     ]  # fmt: skip
 
 

@@ -116,24 +116,25 @@ def test_the_critical_speed_is_that_by_hand_and_a_damper_takes_it_away(gear):
 
 
 def amplitudes(gear, speed, blow, ends):
-    """Half the range of the fork's turn over the 0.1 s before each of some times [rad]."""
+    """Half the range of the fork's turn over the 0.1 s before each of some times [rad], and the speed over the last."""
     changes = {f"bodies.{name}.velocity": [speed, 0, 0] for name in ("carriage", "leg", "fork", "wheel")}
     changes |= {"bodies.wheel.omega_B": [0, speed / 0.3421, 0], "forces.blow.force": [0, blow, 0]}
     system = gear(**changes)
     motion = ff.integrate(system, ff.GeneralizedAlpha(0.9, 1e-8), ends[-1], 1e-3)
     angle = ff.joint_coordinate(system, motion, "swivel", "angle").value
-    return [np.ptp(angle[(motion.t > end - 0.1) & (motion.t <= end)]) / 2 for end in ends]
+    spans = [(motion.t > end - 0.1) & (motion.t <= end) for end in ends]
+    return [np.ptp(angle[span]) / 2 for span in spans], motion.body("carriage").v[spans[-1], 0].mean()
 
 
 def test_a_blow_dies_out_below_the_critical_speed(gear):
-    first, last = amplitudes(gear, 15.0, 2000.0, [0.8, 1.3])
+    (first, last), _ = amplitudes(gear, 15.0, 2000.0, [0.8, 1.3])
     assert_allclose(np.log(last / first), 0.5 * eigenvalues(15.0, 4.0).real.max(), rtol=0.1)
 
 
 def test_above_the_critical_speed_small_and_large_blows_end_in_one_limit_cycle(gear):
-    small, grown = amplitudes(gear, 30.0, 6000.0, [0.3, 1.8])
-    large, shrunk = amplitudes(gear, 30.0, 60000.0, [0.2, 1.8])
-    cycle = limit_cycle(30.0, 4.0)
+    (small, grown), speed = amplitudes(gear, 30.0, 6000.0, [0.3, 1.8])
+    (large, shrunk), other = amplitudes(gear, 30.0, 60000.0, [0.2, 1.8])
     assert small < 0.5 * grown
     assert large > 1.05 * shrunk
-    assert_allclose([grown, shrunk], cycle, rtol=0.05)
+    # the carriage rolls freely and slows to 29.5 and 29.3 m/s, at which the cycle is smaller by 2 and 4 %
+    assert_allclose([grown, shrunk], [limit_cycle(speed, 4.0), limit_cycle(other, 4.0)], rtol=0.05)

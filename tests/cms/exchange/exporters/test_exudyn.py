@@ -60,7 +60,8 @@ def run_here(reduced, n_steps, t_end, *loads, **placed):
     omega = placed.pop("omega", np.zeros(3))
     body = ff.FlexibleBody("bar", reduced, position=-origin, velocity=-np.cross(omega, origin), omega_B=omega, **placed)
     system = ff.System([body], [], loads, units=reduced.units)
-    return ff.integrate(system, ff.GeneralizedAlpha(0.9, tolerance=1e-12), t_end=t_end, h=t_end / n_steps).body("bar")
+    scheme = ff.GeneralizedAlpha(0.9, tolerance=1e-12, stabilized=False)  # Exudyn does not take spins by themselves
+    return ff.integrate(system, scheme, t_end=t_end, h=t_end / n_steps).body("bar")
 
 
 def rotation(p):
@@ -75,7 +76,10 @@ def rotation(p):
 
 
 def test_a_spinning_body_under_a_tip_force_moves_as_here(exported):
-    """Both schemes are of second order: 2000 steps over 0.2 s leave 1e-7 of the bar's length and deflection."""
+    """Plain steps are those of Exudyn: 2000 over 0.2 s leave 4e-4 of the deflection in both alike, 3e-7 between them.
+
+    More steps bring them no nearer: from 4000 on Exudyn's modal coordinates scatter by some 1e-6.
+    """
     reduced, _, script = exported
     r, R, q, _ = run_there(script, 2000, 0.2, force=FORCE, initialAngularVelocity=SPIN)
     ours = run_here(reduced, 2000, 0.2, ff.PointForce("tip", ff.Marker("bar", "right"), force=FORCE), omega=SPIN)

@@ -10,7 +10,8 @@ from benchmarks.floatframe_growth import FIRST_STEP, growth_with_bodies
 
 RUN = """
 import resource, sys
-from floatframe import GeneralizedAlpha, integrate, mechanisms
+from floatframe import GeneralizedAlpha, integrate
+from floatframe.components import mechanisms
 integrate(mechanisms.chain(10), GeneralizedAlpha(0.8), float(sys.argv[1]), 1e-3, output=sys.argv[2])
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """

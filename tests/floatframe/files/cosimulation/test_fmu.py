@@ -21,7 +21,7 @@ from floatframe.files.cosimulation.archive import write_fmu
 from floatframe.files.cosimulation.unit_words import BaseUnit, base_unit
 from tests.floatframe.files.cosimulation.arms import JUMPS, MACRO, MOTORS, T_END, TOLERANCE, H, write_arm
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[4]
 MOTOR = "forces.motor.motor"
 NAMED = {
     "inputs": [MOTOR, "torque"],

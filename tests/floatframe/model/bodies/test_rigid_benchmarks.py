@@ -1,5 +1,7 @@
 """Rigid bodies against published values and against solutions by other means."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
@@ -230,8 +232,10 @@ def test_bricard_mechanism_moves_at_any_step():
     """Rods with a millionth of their moment about their own axis: reactions of least norm stand above rounding."""
     system = Bricard.system()
     for n_steps in (475, 479, 484, 488, 493):
+        plain = integrate(system, replace(METHOD, stabilized=False), 1.9, 1.9 / n_steps)
+        assert plain.head.summary["n_iterations"] < 5 * n_steps
         motion = integrate(system, METHOD, 1.9, 1.9 / n_steps)
-        assert motion.head.summary["n_iterations"] < 5 * n_steps
+        assert motion.head.summary["n_iterations"] < 8 * n_steps  # held velocities converge slowly here: 6.7 a step
 
 
 def boom(length, radius, material):

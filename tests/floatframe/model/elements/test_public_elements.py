@@ -1,5 +1,7 @@
 """Public elements beside the built-in parts that do the same."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -90,9 +92,10 @@ def hinge():
 
 
 def test_three_multipliers_hold_a_flexible_pendulum_as_a_spherical_joint_does():
-    by_joint = integrate(pendulum([SphericalJoint("ball", *hinge())]), METHOD, 0.2, 1e-3)
+    plain = replace(METHOD, stabilized=False)  # velocities of joints are held too, those of rows of elements never
+    by_joint = integrate(pendulum([SphericalJoint("ball", *hinge())]), plain, 0.2, 1e-3)
     system = pendulum(elements=[Ball("ball", *hinge())])
-    by_element = integrate(system, METHOD, 0.2, 1e-3)
+    by_element = integrate(system, plain, 0.2, 1e-3)
     assert_allclose(by_element.body("b").r, by_joint.body("b").r, rtol=0, atol=1e-11)
     assert_allclose(by_element.body("b").q, by_joint.body("b").q, rtol=0, atol=1e-11)
     reaction = by_joint.reaction("ball").force

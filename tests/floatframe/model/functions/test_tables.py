@@ -90,13 +90,19 @@ def test_a_shock_through_an_acceleration_table_does_not_ring_where_a_cubic_does(
     [
         (EnergyDecaying(), 1, 0.0, 1e-6),
         (EnergyDecaying(), 2, 0.0, 1e-6),
-        (GeneralizedAlpha(rho_inf=0.8), 1, 1e-3, 5e-3),
-        (GeneralizedAlpha(rho_inf=0.8), 2, 0.05, 0.1),
-        (GeneralizedAlpha(rho_inf=0.5), 2, 5e-3, 0.02),
+        (GeneralizedAlpha(rho_inf=0.8), 1, 0.0, 3e-4),
+        (GeneralizedAlpha(rho_inf=0.8), 2, 0.0, 2e-3),
+        (GeneralizedAlpha(rho_inf=0.5), 2, 0.0, 2e-3),
+        (GeneralizedAlpha(rho_inf=0.8, stabilized=False), 1, 1e-3, 5e-3),
+        (GeneralizedAlpha(rho_inf=0.8, stabilized=False), 2, 0.05, 0.1),
+        (GeneralizedAlpha(rho_inf=0.5, stabilized=False), 2, 5e-3, 0.02),
     ],
 )
 def test_schemes_report_the_acceleration_of_a_driven_body_at_the_knots(scheme, per_interval, least, most):
-    """Parts of the peak; generalized-alpha has accelerations of its own, in which kinks at every second step add up."""
+    """Parts of the peak; plain generalized-alpha has accelerations of its own: kinks at every second step add up.
+
+    Where velocities of joints are held too, as by default, they are nearer by ten to eighty times.
+    """
     t, a = half_sine(23)
     body = RigidBody("box", 2.0, np.eye(3))
     rail = PrismaticJoint("rail", GROUND, Marker("box"), axis=(1, 0, 0), motions={"distance": acceleration_table(t, a)})
