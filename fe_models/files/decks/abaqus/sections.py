@@ -15,6 +15,7 @@ from fe_models.files.decks.abaqus.materials import numbers, read_orientation, re
 from fe_models.files.decks.abaqus.thickness import read_nodal_thickness
 from fe_models.files.decks.abaqus.uneven_box import uneven_box
 from fe_models.files.decks.deck import DeckMass, DeckSpring, LineSection, RodSection, ShellSection, SolidSection
+from fe_models.files.decks.spring_axes import as_triad, axes_along
 from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.components import MOTION_COMPONENTS
 
@@ -319,13 +320,8 @@ def _component_springs(here: str, block: DeckBlock, draft: Draft, of_set: PointE
 def _axial(here: str, draft: Draft, row: tuple[int, ...], value: float, *, is_damper: bool) -> DeckSpring:
     """Return a spring or damper along the line of its nodes."""
     ends = draft.mesh.coordinates[draft.mesh.rows_of(np.array(row))]
-    x = ends[1] - ends[0]
-    x = x / np.linalg.norm(x)
-    y = np.cross(x, np.eye(3)[int(np.argmin(np.abs(x)))])
-    y = y / np.linalg.norm(y)
-    rows = (x, y, np.cross(x, y))
-    triad = tuple((float(axis[0]), float(axis[1]), float(axis[2])) for axis in rows)
+    triad = as_triad(axes_along(ends[1] - ends[0]))
     names = tuple(draft.node_group(here, [number]) for number in row)
     six, none = (value, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0,) * 6
     stiffness, damping = (none, six) if is_damper else (six, None)
-    return DeckSpring((names[0], names[1]), stiffness, damping, (triad[0], triad[1], triad[2]))
+    return DeckSpring((names[0], names[1]), stiffness, damping, triad)

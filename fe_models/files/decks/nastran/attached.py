@@ -14,7 +14,7 @@ from fe_models.meshes.cell_shapes import CELL_SHAPES
 
 __all__ = ["read_attached"]
 
-SAME = 1e-9  #: part of the largest entry of a mass matrix below which entries are equal
+SAME = 1e-9  #: part of the largest entry of a 3 x 3 block of a mass matrix, below which entries are equal
 
 _FACED = {"CTETRA": ("tetra", 4), "CPENTA": ("wedge", 6), "CHEXA": ("hexahedron", 8)}  #: card -> kind, corner grids
 
@@ -66,8 +66,8 @@ def _mass_matrix(model: NastranModel, card: Card) -> None:
     m, arm = float(M[0, 0]), M[3:, :3]
     r = np.array([arm[2, 1], arm[0, 2], arm[1, 0]]) / m if m else np.zeros(3)
     S = np.array([[0, -r[2], r[1]], [r[2], 0, -r[0]], [-r[1], r[0], 0]])
-    scale = np.abs(M).max()
-    if np.abs(M[:3, :3] - m * np.eye(3)).max() > SAME * scale or np.abs(arm - m * S).max() > SAME * scale:
+    differences = (M[:3, :3] - m * np.eye(3), M[:3, :3]), (arm - m * S, arm)
+    if any(np.abs(difference).max() > SAME * np.abs(whole).max() for difference, whole in differences):
         why = "no mass matrix of a rigid piece: another mass along each axis, or no centre of mass"
         model.ledger.refuse("CONM1", why)
         return
@@ -80,7 +80,7 @@ def _mass_matrix(model: NastranModel, card: Card) -> None:
 def _scalar_masses(model: NastranModel) -> None:
     """CMASS1 and CMASS2 of one grid point: the same mass along all three axes is a point mass; others are refused."""
     along: dict[int, list[float]] = {}
-    counts: dict[int, int] = {}
+    cards: dict[int, list[Card]] = {}
     for card in model.of("CMASS1", "CMASS2"):
         m = card.real(2, 0.0) if card.name == "CMASS2" else model.property_value(card, "PMASS", 2)
         if m is None:
@@ -94,21 +94,19 @@ def _scalar_masses(model: NastranModel) -> None:
             continue
         node, component = grids[0]
         along.setdefault(node, [0.0, 0.0, 0.0])[component] += m * model.wtmass
-        counts[node] = counts.get(node, 0) + 1
+        cards.setdefault(node, []).append(card)
     for node, masses in along.items():
         if len(set(masses)) > 1:
             why = f"grid point {node} has another mass along each axis, {masses}: no body frame can move with it"
-            model.ledger.refuse("CMASS", why, count=counts[node])
+            model.ledger.refuse("CMASS", why, count=len(cards[node]))
         else:
-            card = next(card for card in model.cards["GRID"] if card.integer(1) == node)
-            model.masses.append(DeckMass(model.group(card, [node]), masses[0]))
+            model.masses.append(DeckMass(model.group(cards[node][0], [node]), masses[0]))
 
 
 def _rigid(model: NastranModel, card: Card) -> None:
     if card.name == "RBE2":
-        last = len(card.fields)
-        words = [word for word in card.fields[3:last] if word]
-        if words and "." in words[-1]:  # the coefficient of thermal expansion
+        words = [word for word in card.fields[3:] if word]
+        while words and "." in words[-1]:  # ALPHA, TREF
             words = words[:-1]
         leader, components = card.integer(2), components_of(card, card.text(3))
         followers = [int(word) for word in _written_out(words)]

@@ -26,10 +26,12 @@ from fe_models.files.decks.ledger import Ledger
 from fe_models.files.nastran import ELEMENT_TYPES
 from fe_models.foundation.arrays import Array
 
-__all__ = ["ALL", "ALONG", "NastranModel"]
+__all__ = ["ALL", "ALONG", "PROPERTIES", "NastranModel"]
 
 ALL = (0, 1, 2, 3, 4, 5)
 ALONG = 1e-9  #: part of a vector across a line, below which it is along it
+#: properties of solids, shells, bars and beams, which share their numbers
+PROPERTIES = ("PSOLID", "PSHELL", "PCOMP", "PCOMPG", "PBAR", "PBARL", "PBEAM", "PBEAML")
 
 
 @dataclass
@@ -103,7 +105,7 @@ class NastranModel:
                     first, last = 3, 3 + max(ELEMENT_TYPES[name])
                     words = [card.text(k) for k in range(first, last)]
                     found |= {int(word) for word in words if word.isdigit()}
-        found |= {number for number in self.ends.values()}
+        found |= set(self.ends.values())
         groups = [mass.nodes for mass in self.masses] + [name for each in self.springs for name in each.nodes]
         groups += [link.node for link in self.rigid] + [coupling.node for coupling in self.couplings]
         return found.union(*(self.groups[name] for name in groups)) & set(self.points.positions)

@@ -8,8 +8,9 @@ from fe_models.files.bulk_data.cards import Card
 from fe_models.files.decks.deck import DeckMass, DeckMaterial, DeckSpring, ShellSection, SolidSection
 from fe_models.files.decks.nastran.bars import BARS, read_bars, with_defaults
 from fe_models.files.decks.nastran.layups import layered_shells, orthotropic_shells, sheet_material
-from fe_models.files.decks.nastran.model import NastranModel
+from fe_models.files.decks.nastran.model import PROPERTIES, NastranModel
 from fe_models.files.decks.nastran.tapers import cut_tapers
+from fe_models.files.decks.spring_axes import as_triad, axes_along
 
 __all__ = ["SHELLS", "SOLIDS", "read_sections"]
 
@@ -43,9 +44,8 @@ def read_sections(model: NastranModel) -> None:
     by_property: dict[int, list[Card]] = {}
     for card in model.of(*SOLIDS, *SHELLS, *BARS):
         by_property.setdefault(card.integer(2, card.integer(1)), []).append(card)
-    kinds = "PSOLID", "PSHELL", "PCOMP", "PCOMPG", "PBAR", "PBARL", "PBEAM", "PBEAML"
     for pid, cards in by_property.items():
-        known = model.property_of(cards[0], *kinds)
+        known = model.property_of(cards[0], *PROPERTIES)
         for names, read in ((SOLIDS, _solids), (SHELLS, _shells), (BARS, read_bars)):
             mine = [card for card in cards if card.name in names]
             if mine and known is None:
@@ -117,9 +117,6 @@ def _shells(model: NastranModel, known: Card, cards: list[Card]) -> None:
         layered_shells(model, known, cards, _OFFSET_FIELD)
         return
     if known.name != "PSHELL":
-        model.ledger.refuse(cards[0].name, f"property {pid} is {known.name}", count=len(cards))
-        return
-    if known.name in ("PBAR", "PBARL", "PBEAM", "PBEAML"):
         model.ledger.refuse(cards[0].name, f"property {pid} is {known.name}", count=len(cards))
         return
     ratios = _ratios(model, known)
@@ -220,15 +217,13 @@ def _rod(model: NastranModel, card: Card) -> None:
     ends = [model.point(card, number) for number in numbers]
     x = ends[1] - ends[0]
     L = float(np.linalg.norm(x))
-    x = x / L
-    y = np.cross(x, np.eye(3)[int(np.argmin(np.abs(x)))])
-    y = y / np.linalg.norm(y)
-    rows = (x, y, np.cross(x, y))
-    triad = tuple((float(a[0]), float(a[1]), float(a[2])) for a in rows)
+    if not L > 0:
+        model.ledger.refuse(card.name, "has no length between its ends")
+        return
     G = E / (2 * (1 + nu))
     names = [model.group(card, [number]) for number in numbers]
     stiffness = (E * A / L, 0.0, 0.0, G * J / L, 0.0, 0.0)
-    model.springs.append(DeckSpring((names[0], names[1]), stiffness, triad=(triad[0], triad[1], triad[2])))
+    model.springs.append(DeckSpring((names[0], names[1]), stiffness, triad=as_triad(axes_along(x))))
     mass = ((material.density or 0.0) * A + nsm * model.wtmass) * L
     if mass:
         model.masses += [DeckMass(name, mass / 2) for name in names]

@@ -3,8 +3,9 @@
 import numpy as np
 
 from fe_models.files.bulk_data.cards import Card
-from fe_models.files.decks.deck import DeckSpring, Vector
+from fe_models.files.decks.deck import DeckSpring
 from fe_models.files.decks.nastran.model import ALL, ALONG, NastranModel
+from fe_models.files.decks.spring_axes import as_triad, axes_along
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.components import MOTION_COMPONENTS
 
@@ -81,19 +82,15 @@ def _axial_damper(model: NastranModel, card: Card) -> None:
         for k in (1, 5):
             if known.text(k) and known.integer(k) == number:
                 along, about = known.real(k + 1, 0.0), known.real(k + 2, 0.0)
-                ends = [model.point(card, card.integer(n)) for n in (3, 4)]
-                R = _any_axes(ends[1] - ends[0])
+                axes = _axes_along(model, card, None)
+                if axes is None:
+                    model.ledger.refuse("CVISC", "has no length between its ends")
+                    return
                 names = [model.group(card, [card.integer(n)]) for n in (3, 4)]
                 damping = (along, 0.0, 0.0, about, 0.0, 0.0)
-                model.springs.append(DeckSpring((names[0], names[1]), (0.0,) * 6, damping, _rows(R)))
+                model.springs.append(DeckSpring((names[0], names[1]), (0.0,) * 6, damping, as_triad(axes.T)))
                 return
     model.ledger.refuse("CVISC", f"names PVISC {number}, which is not defined")
-
-
-def _rows(axes: Array) -> tuple[Vector, Vector, Vector]:
-    """Return axes, (3, 3) columns, as rows of a deck."""
-    rows = [(float(a[0]), float(a[1]), float(a[2])) for a in axes.T]
-    return rows[0], rows[1], rows[2]
 
 
 def _bush(model: NastranModel, card: Card) -> None:
@@ -137,7 +134,7 @@ def _bush(model: NastranModel, card: Card) -> None:
     if card.real(9, 0.5) != 0.5 and has_length:
         at = ends[0] + card.real(9) * (ends[1] - ends[0])
         point = (float(at[0]), float(at[1]), float(at[2]))
-    model.springs.append(DeckSpring((names[0], names[1]), tuple(k), damping, _rows(triad), point))
+    model.springs.append(DeckSpring((names[0], names[1]), tuple(k), damping, as_triad(triad.T), point))
 
 
 def _bush_axes(model: NastranModel, card: Card, ends: list[Array]) -> Array | None:
@@ -149,7 +146,7 @@ def _bush_axes(model: NastranModel, card: Card, ends: list[Array]) -> Array | No
         return model.system(card, card.integer(8), ends[0])
     x = ends[1] - ends[0]
     if not np.linalg.norm(x) or not card.text(5):
-        return model.axes(card.integer(3)) if not np.linalg.norm(x) else _any_axes(x)
+        return model.axes(card.integer(3)) if not np.linalg.norm(x) else axes_along(x).T
     word = card.text(5)
     is_grid = word.isdigit() and not card.text(6)
     v = model.point(card, int(word)) - ends[0] if is_grid else np.array([card.real(k, 0.0) for k in (5, 6, 7)])
@@ -160,13 +157,6 @@ def _bush_axes(model: NastranModel, card: Card, ends: list[Array]) -> Array | No
         return None
     z = z / np.linalg.norm(z)
     return np.stack([x, np.cross(z, x), z], axis=1)
-
-
-def _any_axes(x: Array) -> Array:
-    x = x / np.linalg.norm(x)
-    y = np.cross(x, np.eye(3)[int(np.argmin(np.abs(x)))])
-    y = y / np.linalg.norm(y)
-    return np.stack([x, y, np.cross(x, y)], axis=1)
 
 
 def _scalar_spring(model: NastranModel, card: Card) -> None:
@@ -209,7 +199,7 @@ def _scalar_spring(model: NastranModel, card: Card) -> None:
     names = [model.group(card, [node]) for node in (a, b)]
     six, none = tuple(value if k == c else 0.0 for k in range(6)), (0.0,) * 6
     stiffness, damping = (six, None) if card.name.startswith("CELAS") else (none, six)
-    model.springs.append(DeckSpring((names[0], names[1]), stiffness, damping, _rows(axes[0])))
+    model.springs.append(DeckSpring((names[0], names[1]), stiffness, damping, as_triad(axes[0].T)))
 
 
 def _bush_1d(model: NastranModel, card: Card) -> None:
@@ -233,15 +223,18 @@ def _bush_1d(model: NastranModel, card: Card) -> None:
         return
     names = [model.group(card, [card.integer(n)]) for n in (3, 4)]
     none = (0.0,) * 5
-    model.springs.append(DeckSpring((names[0], names[1]), (k, *none), (c, *none) if c else None, _rows(axes)))
+    model.springs.append(DeckSpring((names[0], names[1]), (k, *none), (c, *none) if c else None, as_triad(axes.T)))
 
 
-def _axes_along(model: NastranModel, card: Card, field: int) -> Array | None:
-    """Return axes of which x is that of the system in a field, or the line from GA to GB; None: no forces balance."""
+def _axes_along(model: NastranModel, card: Card, field: int | None) -> Array | None:
+    """Return axes of which x is that of the system in a field, or the line from GA to GB (no field, or a blank one).
+
+    None if no forces along x balance.
+    """
     ends = [model.point(card, card.integer(n)) for n in (3, 4)]
     apart = ends[1] - ends[0]
-    if not card.text(field):
-        return _any_axes(apart) if np.linalg.norm(apart) else None
+    if field is None or not card.text(field):
+        return axes_along(apart).T if np.linalg.norm(apart) else None
     axes = model.system(card, card.integer(field), ends[0])
     across = apart - (apart @ axes[:, 0]) * axes[:, 0]
     return axes if np.abs(across).max() <= ALONG * np.abs(apart).max() else None
@@ -272,4 +265,4 @@ def _gap(model: NastranModel, card: Card) -> None:
     names = [model.group(card, [card.integer(n)]) for n in (3, 4)]
     if along or across:
         six = (along, across, across, 0.0, 0.0, 0.0)
-        model.springs.append(DeckSpring((names[0], names[1]), six, None, _rows(axes)))
+        model.springs.append(DeckSpring((names[0], names[1]), six, None, as_triad(axes.T)))

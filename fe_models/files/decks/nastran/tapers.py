@@ -6,7 +6,8 @@ import numpy as np
 
 from fe_models.files.bulk_data.cards import Card, real_of
 from fe_models.files.decks.nastran.bar_shapes import DIMENSIONS
-from fe_models.files.decks.nastran.model import NastranModel
+from fe_models.files.decks.nastran.bars import OFFSETS, line_of_ends, orientation_of
+from fe_models.files.decks.nastran.model import PROPERTIES, NastranModel
 from fe_models.foundation.arrays import Array
 
 __all__ = ["N_PIECES", "cut_tapers"]
@@ -14,6 +15,7 @@ __all__ = ["N_PIECES", "cut_tapers"]
 N_PIECES = 12  #: of a tapered beam
 YES = ("YES", "YESA", "NO")
 FIRST = 3  #: field of the area of a PBEAM
+ALIKE = 1e-12  #: part of a size below which stations do not differ in it
 SIZES = 6  #: A, I1, I2, I12, J, NSM
 
 
@@ -27,7 +29,7 @@ class Taper:
     @property
     def is_none(self) -> bool:
         """Whether all stations are alike."""
-        return bool(np.abs(self.sizes - self.sizes[0]).max() <= 1e-12 * np.abs(self.sizes).max())
+        return bool((np.ptp(self.sizes, axis=0) <= ALIKE * np.abs(self.sizes).max(axis=0)).all())
 
     def at(self, x: float) -> Array:
         """Return the sizes at a place x/L."""
@@ -48,11 +50,11 @@ def cut_tapers(model: NastranModel) -> None:
                 model.cards[name][k] = _property(card, card.integer(1), taper.sizes[0])
             elif taper is not None:
                 tapers[card.integer(1)] = (card, taper)
-    beams = [card for card in model.of("CBEAM") if card.integer(2, card.integer(1)) in tapers]
+    beams = [card for card in model.of("CBEAM") if _property_number(card) in tapers]
     if not beams:
         return
     last_element = max(card.integer(1, 0) for cards in model.cards.values() for card in cards if card.name[0] == "C")
-    last_property = max(card.integer(1) for card in model.of("PBEAM", "PBEAML", "PBAR", "PBARL"))
+    last_property = max(card.integer(1) for card in model.of(*PROPERTIES))
     made: dict[int, list[int]] = {}  # property -> of its pieces
     for pid, (card, taper) in tapers.items():
         made[pid] = [last_property + k for k in range(1, N_PIECES + 1)]
@@ -60,20 +62,21 @@ def cut_tapers(model: NastranModel) -> None:
         for k, number in enumerate(made[pid]):
             sizes = taper.at((k + 0.5) / N_PIECES)
             model.cards[card.name].append(_property(card, number, sizes))
-    kept = [card for card in model.cards["CBEAM"] if card not in beams]
+    cards = [card for card in model.of("CBEAM") if _property_number(card) not in tapers]
     for beam in beams:
-        pieces = _pieces(model, beam, made[beam.integer(2, beam.integer(1))], last_element)
+        cards += _pieces(model, beam, made[_property_number(beam)], last_element)
         last_element += N_PIECES - 1
-        kept += pieces
-    model.cards["CBEAM"] = kept
+    model.cards["CBEAM"] = cards
     why = f"tapers: {N_PIECES} pieces of one section each, between nodes of their own"
     model.ledger.note("CBEAM", why, count=len(beams))
 
 
+def _property_number(beam: Card) -> int:
+    return beam.integer(2, beam.integer(1))
+
+
 def _pieces(model: NastranModel, beam: Card, properties: list[int], last: int) -> list[Card]:
     """Return the pieces of a beam, from its first to its second end."""
-    from fe_models.files.decks.nastran.bars import OFFSETS, line_of_ends, orientation_of
-
     ends = line_of_ends(model, beam)
     between = [ends[0] + (ends[1] - ends[0]) * k / N_PIECES for k in range(1, N_PIECES)]
     nodes = [beam.integer(3), *(model.new_point(point) for point in between), beam.integer(4)]
@@ -103,21 +106,19 @@ def _property(card: Card, number: int, sizes: Array) -> Card:
     words = [repr(float(value)) for value in sizes]
     if card.name == "PBEAML":
         return Card(card.name, (str(number), *card.fields[1:8], *words), card.where)
-    at = _behind_stations(card)
+    _, at = _stations(card)
     fields = (str(number), card.text(2), *words, *[""] * 8, *card.fields[at - 1 :])
     return Card(card.name, fields, card.where)
 
 
-def _first_station(card: Card) -> int:
-    return 9 if card.text(9).upper() in YES else 17
-
-
-def _behind_stations(card: Card) -> int:
-    """Return the field behind the stations of a PBEAM, of K1."""
-    at = _first_station(card)
+def _stations(card: Card) -> tuple[list[int], int]:
+    """Return the first field of each station of a PBEAM, and the field behind them, of K1."""
+    found: list[int] = []
+    at = 9 if card.text(9).upper() in YES else 17
     while card.text(at).upper() in YES:
+        found.append(at)
         at += 16 if card.text(at).upper() == "YES" else 8
-    return at
+    return found, at
 
 
 def _pbeam_taper(card: Card) -> Taper | None:
@@ -127,11 +128,9 @@ def _pbeam_taper(card: Card) -> Taper | None:
     """
     first = [card.real(FIRST + j, 0.0) for j in range(SIZES)]
     given: list[tuple[float, list[float | None]]] = []
-    at = _first_station(card)
-    while card.text(at).upper() in YES:
+    for at in _stations(card)[0]:
         x = card.real(at + 1, 1.0)
         given.append((x, [card.real(at + 2 + j) if card.text(at + 2 + j) else None for j in range(SIZES)]))
-        at += 16 if card.text(at).upper() == "YES" else 8
     if not given:
         return None
     last = next((sizes for x, sizes in given if x == 1.0), [None] * SIZES)

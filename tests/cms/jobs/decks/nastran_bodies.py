@@ -97,3 +97,9 @@ def condensed(body, points):
     K = body.K.toarray()
     i = [k for k in range(len(K)) if k not in b]
     return K[np.ix_(b, b)] - K[np.ix_(b, i)] @ np.linalg.pinv(K[np.ix_(i, i)]) @ K[np.ix_(i, b)]
+
+
+def tip_flexibility(body):
+    """Return the motions of GB by loads there, (6, 6), along the axes of the bar; GA is held."""
+    T = np.kron(np.eye(2), axes_of(GB - GA, V))
+    return T @ np.linalg.inv(condensed(body, (GA, GB))[6:, 6:]) @ T.T

@@ -19,10 +19,8 @@ from tests.cms.jobs.decks.nastran_bodies import (
     E,
     G,
     J,
-    V,
-    axes_of,
     body_of,
-    condensed,
+    tip_flexibility,
 )
 
 TURNED = "CORD2R,7,,0.,0.,0.,.3,.2,1.\n,1.,.1,.4\n"
@@ -279,9 +277,7 @@ TAPER = "PBEAM,1,1,2.-3,3.-6,1.-6,,2.-6,.4\n,,,,,,,,\n,YESA,1.,4.-3,6.-6,3.-6,,6
 def test_a_tapered_beam_is_made_of_pieces(tmp_path):
     """Flexibilities of a cantilever with A, I, J linear in x: integrals of the closed form by 4000 steps."""
     body, deck = body_of(tmp_path, f"{GRIDS}{ORIENTED.replace('CBAR', 'CBEAM')}\n{TAPER}{MATERIAL}")
-    R = axes_of(GB - GA, V)
-    T = np.kron(np.eye(2), R)
-    F = T @ np.linalg.inv(condensed(body, (GA, GB))[6:, 6:]) @ T.T
+    F = tip_flexibility(body)
     L = np.linalg.norm(GB - GA)
     x = (np.arange(4000) + 0.5) / 4000 * L
     s = x / L
@@ -316,6 +312,44 @@ def test_tapered_beams_of_the_library_keep_their_mass_pins_and_offsets(tmp_path)
     assert plain.n_dof < body.n_dof
     with pytest.raises(ValueError, match="stations that cannot be understood"):
         body_of(tmp_path, GRIDS + beam + section.replace("YES", "PERHAPS") + MATERIAL)
+
+
+def test_pieces_of_a_taper_have_properties_of_their_own_beside_those_of_shells(tmp_path):
+    """PSHELL 5 would have the number of a piece if pieces were numbered from the last beam on."""
+    shell = "GRID,11,,0.,0.,0.\nGRID,12,,1.,0.,0.\nGRID,13,,1.,1.,0.\nGRID,14,,0.,1.,0.\n"
+    shell += "CQUAD4,7,5,11,12,13,14\nPSHELL,5,1,.01,1,,1\n"
+    body, _ = body_of(tmp_path, f"{GRIDS}{ORIENTED.replace('CBAR', 'CBEAM')}\n{TAPER}{MATERIAL}{shell}")
+    up = (body.dofs[:, 1] == 2).astype(float)
+    mass = np.linalg.norm(GB - GA) * (RHO * 1.5 * A + 0.6) + RHO * 0.01
+    assert_allclose(up @ body.M @ up, mass, rtol=1e-9)
+
+
+def test_a_taper_of_a_small_size_beside_large_ones_counts(tmp_path):
+    """Second moments of a wire, 1e-13 m⁴, beside added mass of 10 kg/m."""
+    section = "PBEAM,1,1,1.-6,1.-13,1.-13,,2.-13,10.\n,,,,,,,,\n,YESA,1.,1.-6,2.-13,2.-13,,4.-13,10.\n"
+    _, deck = body_of(tmp_path, f"{GRIDS}{ORIENTED.replace('CBAR', 'CBEAM')}\n{section}{MATERIAL}")
+    assert any("tapers: 12 pieces" in row[2] for row in deck.ledger.rows())
+
+
+def test_a_rigid_element_with_thermal_expansion_and_its_temperature(tmp_path):
+    """RBE2 ends with ALPHA and TREF, which move no point here."""
+    plain, _ = body_of(tmp_path, TWO_BARS + "RBE2,9,2,123456,3\n")
+    body, _ = body_of(tmp_path, TWO_BARS + "RBE2,9,2,123456,3,6.5-6,20.\n")
+    assert_allclose(body.K.toarray(), plain.K.toarray(), rtol=0, atol=0)
+
+
+@pytest.mark.parametrize("cards", ["CVISC,8,9,2,3\nPVISC,9,5.\n", "CROD,8,9,2,3\nPROD,9,1,1.-3\n"])
+def test_elements_along_no_line_are_refused(tmp_path, cards):
+    with pytest.raises(ValueError, match=f"{cards[:4]}.*: has no length between its ends"):
+        body_of(tmp_path, TWO_BARS.replace("GRID,3,,1.1,0.2,0.3", "GRID,3,,1.,0.,.1") + cards)
+
+
+def test_a_mass_matrix_of_large_inertia_may_not_differ_along_its_axes(tmp_path):
+    """3 kg along x and 3.003 kg along y, beside 1e8 kg m²."""
+    mass = "CONM1,7,2,,3.,0.,{},0.,0.\n,3.,0.,0.,0.,1.+8,0.,0.,0.\n,0.,1.+8,0.,0.,0.,0.,0.,1.+8\n"
+    body_of(tmp_path, TWO_BARS + mass.format("3."))
+    with pytest.raises(ValueError, match="CONM1: no mass matrix of a rigid piece"):
+        body_of(tmp_path, TWO_BARS + mass.format("3.003"))
 
 
 #: middle lines of the walls: (y, z) of their ends and thickness, of shapes as PBEAML draws them, in cm
@@ -378,9 +412,7 @@ def test_beams_of_the_library_have_their_ends_at_the_shear_centre(tmp_path, name
     words = ",".join(f"{d / 100:g}" for d in dimensions)
     beam = ORIENTED.replace("CBAR", "CBEAM")
     body, deck = body_of(tmp_path, GRIDS + f"{beam}\nPBEAML,1,1,,{name}\n,{words}\n" + MATERIAL)
-    R = axes_of(GB - GA, V)
-    T = np.kron(np.eye(2), R)
-    F = T @ np.linalg.inv(condensed(body, (GA, GB))[6:, 6:]) @ T.T
+    F = tip_flexibility(body)
     # the couple about z and y that turns the tip as the axial force does: M_z = n_y N, M_y = -n_z N
     arm = np.linalg.solve(F[np.ix_([5, 4], [5, 4])], F[[5, 4], 0])
     size = max(dimensions)
