@@ -1,5 +1,6 @@
 """What an integrator remembers between steps, and what it reports: one type for all of them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -27,6 +28,7 @@ __all__ = [
     "carry_of_past",
     "counted_on",
     "has_divided_steps",
+    "joined_rows",
     "memory_of",
     "observed",
     "observed_unless_stopped",
@@ -294,6 +296,11 @@ def observed(system: System, t: float, carry: Carry, work: Work) -> tuple[Array,
     memory = memory_of(carry)
     rows = observe_state(compiled_system(system).model, work, memory, t)
     return np.array([memory.power_given, memory.power_taken]), rows
+
+
+def joined_rows(parts: Sequence[Rows]) -> Rows:
+    """Return rows of results one after the other."""
+    return parts[0] if len(parts) == 1 else Rows(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 
 def words_of_contact(compiled: CompiledSystem, work: Work, least: float, smaller: str) -> str:

@@ -20,6 +20,7 @@ from floatframe.integrators.carry import (
     Carry,
     Failure,
     FollowedRotations,
+    joined_rows,
     observed,
     observed_unless_stopped,
     one_step_of,
@@ -134,8 +135,7 @@ class Ida:
         if n_good < n_steps and not has_stopped:
             failure = Failure(f"IDA: {made.problem or solution.message}", np.inf)
         carry = replace(carry, n_iterations=carry.n_iterations + made.n_evaluations)
-        joined = Rows(*(np.concatenate([getattr(part, name) for part in rows]) for name in Rows._fields))
-        return carry, joined, n_good, failure
+        return carry, joined_rows(rows), n_good, failure
 
 
 def solver_class():

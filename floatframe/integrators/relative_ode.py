@@ -22,6 +22,7 @@ from floatframe.integrators.carry import (
     Carry,
     Failure,
     FollowedRotations,
+    joined_rows,
     observed,
     observed_unless_stopped,
     one_by_one,
@@ -130,8 +131,7 @@ class RelativeOde:
                 self, system, carry, work, t0=t0, h=h, first=begun, n_steps=n_steps - n_good, every=every
             )
             rows, n_good = [*rows, *more_rows], n_good + more
-        joined = Rows(*(np.concatenate([getattr(part, name) for part in rows]) for name in Rows._fields))
-        return carry, joined, n_good, failure
+        return carry, joined_rows(rows), n_good, failure
 
 
 class Motion:

@@ -31,6 +31,8 @@ __all__ = [
     "rotation_exp",
     "rotation_log",
     "rotation_matrix",
+    "rotation_vector",
+    "rotations_between",
     "spin_rate",
     "tilde",
     "turned",
@@ -39,6 +41,7 @@ __all__ = [
 SERIES_BELOW = 0.25  #: limit of the squared angle
 NEAR_FULL_TURN = 1e-6  #: |theta| minus full turns, below which the direction of theta is lost to rounding
 TERMS = 10
+CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])  #: times Euler parameters: those of the inverse rotation
 
 
 def cross(a: Array, b: Array) -> Array:
@@ -208,11 +211,20 @@ def spin_rate(theta: Array, rate: Array, second: Array) -> Array:
 
 def rotation_log(R: Array) -> Array:
     """Return the rotation vector, (3,) [rad], of a rotation matrix; its length is between 0 and pi."""
-    p = euler_parameters(R)
-    sine = np.linalg.norm(p[1:])
-    if sine == 0.0:
-        return np.zeros(3)
-    return 2 * np.arctan2(sine, p[0]) * p[1:] / sine
+    return rotation_vector(euler_parameters(R))
+
+
+def rotation_vector(p: Array) -> Array:
+    """Return the rotation vectors, (..., 3) [rad], of Euler parameters, (..., 4); their lengths are at most pi."""
+    w, v = p[..., 0], p[..., 1:]
+    sine = np.sqrt(dot(v, v))
+    angle = 2 * np.arctan2(sine, np.abs(w)) * np.where(w < 0.0, -1.0, 1.0)
+    return np.asarray(v * (angle / np.where(sine > 0.0, sine, 1.0))[..., None])
+
+
+def rotations_between(p: Array, other: Array) -> Array:
+    """Return the rotation vectors, (..., 3) [rad], that lead from orientations `other` to p, both (..., 4)."""
+    return rotation_vector(euler_parameter_product(other * CONJUGATE, p))
 
 
 def continued_rotation(theta: Array, expected: Array) -> Array:

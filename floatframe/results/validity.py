@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 __all__ = ["ValidityNote", "notes_from_json", "notes_to_json"]
@@ -43,6 +43,10 @@ class ValidityNote:
         """Return the note of a sentence "where: problem; remedy" about a function of time."""
         where, _, rest = words.partition(": ")
         return cls(where, kind, 0.0, 0.0, t, t, advice=rest)
+
+    def with_value(self, value: float, t: float) -> "ValidityNote":
+        """Return the note after a value at time t, which changes it if it is the largest so far."""
+        return replace(self, largest=value, t_largest=t) if value > self.largest else self
 
     @property
     def key(self) -> tuple[str, ...]:

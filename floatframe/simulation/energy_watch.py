@@ -7,13 +7,14 @@ distance from the origin, velocities that close joints to that over the step.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.kernels.memory import GRAVITATION, KINETIC, SPRINGS, STRAIN, WORK_GIVEN, WORK_TAKEN, Rows
+from floatframe.integrators.carry import joined_rows
 from floatframe.model.system import System
 from floatframe.results.validity import ValidityNote
 from floatframe.simulation.step_watch import FIRST_VERDICT
@@ -56,14 +57,14 @@ class EnergyWatch:
         n = sum(len(each.t) for each in self.waiting)
         if n == 0 or (not (is_switched or is_last) and n < min(MOST_WAITING, self.n_seen // WAITING)):
             return note
-        rows, self.waiting = joined(self.waiting), []
+        rows, self.waiting = joined_rows(self.waiting), []
         return self.judge(system, rows, is_switched=is_switched, is_last=is_last) or note
 
     def flush(self, system: System) -> ValidityNote | None:
         """Judge the rows that wait; return a note that is new with them."""
         if not self.waiting:
             return None
-        rows, self.waiting = joined(self.waiting), []
+        rows, self.waiting = joined_rows(self.waiting), []
         return self.judge(system, rows, is_switched=False, is_last=False)
 
     def judge(self, system: System, rows: Rows, *, is_switched: bool, is_last: bool) -> ValidityNote | None:
@@ -100,8 +101,7 @@ class EnergyWatch:
         k = int(np.argmax(share))
         self.is_beyond = self.is_beyond or largest > ENERGY_STOP
         if self.note is not None:
-            if largest > self.note.largest:
-                self.note = replace(self.note, largest=largest, t_largest=float(rows.t[k]))
+            self.note = self.note.with_value(largest, float(rows.t[k]))
             return None
         first = float(rows.t[int(np.argmax(share > ENERGY_LIMIT))])
         compiled = compiled_system(system)
@@ -139,11 +139,6 @@ class EnergyWatch:
         self.potential = np.array([low[-1], high[-1]])
         parts = np.abs(d[:, [KINETIC, STRAIN, SPRINGS, WORK_GIVEN, WORK_TAKEN]]).max(axis=1)
         return np.maximum(self.scale, np.maximum(np.maximum.accumulate(parts), high - low))
-
-
-def joined(parts: list[Rows]) -> Rows:
-    """Return rows one after the other."""
-    return parts[0] if len(parts) == 1 else Rows(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 
 def rounding_energies(system: System, rows: Rows, h: float) -> Array:

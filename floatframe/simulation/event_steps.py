@@ -22,7 +22,7 @@ from floatframe.engine.initial_conditions.initial import consistent_motion
 from floatframe.engine.kernels.memory import KINETIC, SPRINGS, WORK_GIVEN, WORK_TAKEN, Rows
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.errors import ModelError
-from floatframe.integrators.carry import Carry, Failure, Integrator, carry_of_past, coasted, counted_on
+from floatframe.integrators.carry import Carry, Failure, Integrator, carry_of_past, coasted, counted_on, joined_rows
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha
 from floatframe.integrators.ida import Ida
 from floatframe.integrators.relative_ode import RelativeOde
@@ -81,11 +81,6 @@ class Place(NamedTuple):
 def same(carry: Carry) -> Carry:
     """Return a memory that is known."""
     return carry
-
-
-def joined_rows(parts: list[Rows]) -> Rows:
-    """Return rows of results one after the other."""
-    return Rows(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 
 def past_rows(work: Work, n_steps: int, t0: float, h: float, first: int) -> Rows:

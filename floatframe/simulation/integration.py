@@ -24,7 +24,7 @@ from floatframe.engine.kernels.memory import Rows
 from floatframe.engine.kernels.work import new_work
 from floatframe.errors import ConvergenceError, ModelError, ResultsError
 from floatframe.integrators import CLASSES, in_formulation
-from floatframe.integrators.carry import Carry, Integrator
+from floatframe.integrators.carry import Carry, Failure, Integrator, joined_rows
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.checked_values import number
 from floatframe.model.forces import BodyLoad, PointForce
@@ -349,8 +349,7 @@ class Run:
             self.writer.validity = notes_to_json(self.watch.notes)
         if not self.waiting:
             return
-        rows = Rows(*(np.concatenate(arrays) for arrays in zip(*self.waiting, strict=True)))
-        self.waiting = []
+        rows, self.waiting = joined_rows(self.waiting), []
         for note in self.watch.observe(rows):
             log.warning("%s", note.words)
         told = rows_of_file(compiled_system(self.system), rows)
@@ -400,7 +399,7 @@ class Run:
                 if n_done % RESTART_STEPS == 0:
                     work.solver.c_k[...] = 0.0  # factors are made anew, as after a resumption
                     if n_done and time.monotonic() - self.closed > SEGMENT_SECONDS:
-                        self.close_segment(self.record(carry, n_done))
+                        self.close_segment(safe)
                 n_left = batch_steps - (n_done - n_told)  # the watch divides batches, and leaves their ends
                 n_batch = min(n_left, self.steps.room(n_done, batch_steps), self.n_total - n_done)
                 n_batch = min(n_batch, RESTART_STEPS - n_done % RESTART_STEPS)
@@ -471,17 +470,7 @@ class Run:
             begins = self.words_of_start() if n_done < FIRST_STEPS else ""
             if begins:
                 failure = replace(failure, words=f"{failure.words}; {begins}")
-            raise stopped(
-                self.system,
-                self.head,
-                self.kept,
-                self.writer,
-                failure,
-                self.t_start + n_done * self.h,
-                self.h,
-                self.watch.notes,
-                carry.state,
-            )
+            raise stopped(self, failure, self.t_start + n_done * self.h, carry.state)
         return self.finished(carry)
 
     @property
@@ -514,22 +503,22 @@ def in_order(parts: list[Rows]) -> Rows:
     """Return rows of results in the order of time; of two at one time, that of an earlier part first."""
     if len(parts) == 1:
         return parts[0]
-    rows = Rows(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+    rows = joined_rows(parts)
     order = np.argsort(rows.t, kind="stable")
     return Rows(*(array[order] for array in rows))
 
 
-def stopped(system, head, kept, writer, failure, t: float, h: float, notes, state: State) -> ConvergenceError:
+def stopped(run: Run, failure: Failure, t: float, state: State) -> ConvergenceError:
     """Return the error of a failed step, with the motion so far."""
-    words = f"system {system.name!r}: the step of {h:g} from t = {t:.9g} failed: {failure.words}"
-    advice = step_advice(system, h)
+    words = f"system {run.system.name!r}: the step of {run.h:g} from t = {t:.9g} failed: {failure.words}"
+    advice = step_advice(run.system, run.h)
     if advice is not None:
         words += f"; {advice.words}"
-    words += "".join(f"; {note.words}" for note in notes)
-    lost = indefinite_mass_words(indefinite_masses(system, state))
+    words += "".join(f"; {note.words}" for note in run.watch.notes)
+    lost = indefinite_mass_words(indefinite_masses(run.system, state))
     words += f"; {lost}" if lost else ""
-    trajectory, where = motion_so_far(system, head, kept, writer, notes)
-    return ConvergenceError(words + where, t=t, h=h, residual=failure.residual, trajectory=trajectory)
+    trajectory, where = motion_so_far(run)
+    return ConvergenceError(words + where, t=t, h=run.h, residual=failure.residual, trajectory=trajectory)
 
 
 def energetic(run: Run, t: float) -> ConvergenceError:
@@ -539,18 +528,17 @@ def energetic(run: Run, t: float) -> ConvergenceError:
         f"system {run.system.name!r}: stopped at t = {t:.9g} with steps of {run.h:g}: {run.energy.note.words}; "
         'watch = "tell" goes on in spite of it'
     )
-    trajectory, where = motion_so_far(run.system, run.head, run.kept, run.writer, run.watch.notes)
+    trajectory, where = motion_so_far(run)
     return ConvergenceError(words + where, t=t, h=run.h, residual=float("inf"), trajectory=trajectory)
 
 
-def motion_so_far(
-    system: System, head: Head, kept: list[Rows], writer: ResultsWriter | None, notes: tuple[ValidityNote, ...]
-) -> tuple[Trajectory, str]:
+def motion_so_far(run: Run) -> tuple[Trajectory, str]:
     """Return the motion of a run that ends before its time, and where it is, in words; "" for one in memory."""
-    if writer is None:
-        return Trajectory(head, MemorySource(joint_rows(system, kept)), is_complete=False, validity=notes), ""
-    writer.close_segment()
-    return read_results(writer.folder), f"; the motion so far is in {str(writer.folder)!r}"
+    if run.writer is None:
+        arrays = MemorySource(joint_rows(run.system, run.kept))
+        return Trajectory(run.head, arrays, is_complete=False, validity=run.watch.notes), ""
+    run.writer.close_segment()
+    return read_results(run.writer.folder), f"; the motion so far is in {str(run.writer.folder)!r}"
 
 
 def joint_rows(system: System, kept: list[Rows]) -> dict[str, np.ndarray]:

@@ -29,8 +29,7 @@ def knot_words(system: System, t_start: float, h: float, n_steps: int) -> tuple[
             shortest = float(np.diff(knots).min())
             words.append(
                 f"{where}: steps of {h:.6g} pass over {passed} of the {len(knots)} knots of its table, which are down "
-                f"to "
-                f"{shortest:.6g} apart: what lies between is not seen; take a shorter step, or resample the signal"
+                f"to {shortest:.6g} apart: what lies between is not seen; take a shorter step, or resample the signal"
             )
         if is_motion:
             times, sizes = function.jumps(2)

@@ -20,7 +20,7 @@ from floatframe.engine.compiling.pair_forces import bushing_markers
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.kernels.memory import Rows
 from floatframe.model.forces import Bushing
-from floatframe.model.rotations import rotation_log, rotation_matrix
+from floatframe.model.rotations import euler_parameter_product, euler_parameters, rotation_matrix, rotations_between
 from floatframe.model.system import System
 
 __all__ = ["ANGLES_LIMIT", "angle_measures"]
@@ -56,8 +56,7 @@ def apart_from_cardan(a: MarkerData, b: MarkerData, k: int, rows: Rows) -> Array
     if k >= 0:
         theta = rows.angle[:, k : k + 3]
     else:
-        R = np.swapaxes(axes_of(a, rows), -1, -2) @ axes_of(b, rows)
-        theta = np.array([rotation_log(each) for each in R]).reshape(-1, 3)
+        theta = rotations_between(orientations_of(b, rows), orientations_of(a, rows))
     size = np.abs(theta)
     products = np.max([size[:, 0] * size[:, 1], size[:, 1] * size[:, 2], size[:, 2] * size[:, 0]], axis=0)
     angle = np.linalg.norm(theta, axis=1)
@@ -66,12 +65,12 @@ def apart_from_cardan(a: MarkerData, b: MarkerData, k: int, rows: Rows) -> Array
 
 def of_element(beyond: Callable[[Array], Array], markers: tuple[MarkerData, ...], rows: Rows) -> Array:
     """Return what an element says of its angles (`Element.small_angles`), (n_t,)."""
-    return beyond(np.stack([axes_of(marker, rows) for marker in markers], axis=1))
+    return beyond(np.stack([rotation_matrix(orientations_of(marker, rows)) for marker in markers], axis=1))
 
 
-def axes_of(marker: MarkerData, rows: Rows) -> Array:
-    """Return the axes of a marker on the undeformed body, ground axes, (n_t, 3, 3)."""
-    triad = np.asarray(marker.shape.triad)
+def orientations_of(marker: MarkerData, rows: Rows) -> Array:
+    """Return the Euler parameters of the axes of a marker on the undeformed body, (n_t, 4)."""
+    p = euler_parameters(np.asarray(marker.shape.triad))
     if marker.body < 0:
-        return np.broadcast_to(triad, (len(rows.t), 3, 3))
-    return np.asarray(rotation_matrix(rows.p[:, marker.body]) @ triad)
+        return np.broadcast_to(p, (len(rows.t), 4))
+    return euler_parameter_product(rows.p[:, marker.body], p)

@@ -33,6 +33,7 @@ from floatframe.integrators.generalized_alpha import GeneralizedAlpha
 from floatframe.integrators.ida import Ida
 from floatframe.integrators.relative import RelativeGeneralizedAlpha
 from floatframe.integrators.relative_ode import RelativeOde
+from floatframe.model.rotations import rotations_between
 from floatframe.model.state import State
 from floatframe.model.system import System
 from floatframe.results.validity import ValidityNote
@@ -216,12 +217,10 @@ class StepWatch:
             if not is_good:
                 self.companion, self.is_calm, self.next = None, True, last
                 return None
-        t = t0 + last * h
         is_judged = last >= max(FIRST_VERDICT, min(self.n_total, BESIDE) // 2)
-        note = self.judged(system, t, h) if is_judged else None
-        largest = float(self.share(system, other).max())
+        note = self.judged(system, t0 + last * h, h) if is_judged else None
         is_over = self.spent + last - other.start >= BESIDE or self.note is not None
-        is_calm = last >= CALM_STEPS and self.is_long and largest * (self.n_total / last) ** 2 < CALM * self.limit
+        is_calm = self.is_long and last >= CALM_STEPS and self.drawn_out(system, other, last) < CALM * self.limit
         if is_over or is_calm or last % RESTART_STEPS == 0:
             self.leave(h)
         if is_over or is_calm:
@@ -314,6 +313,10 @@ class StepWatch:
         parts = total / np.where(size > 0.0, size, np.inf)
         return np.where(moves, np.linalg.norm(parts, axis=2), 0.0)
 
+    def drawn_out(self, system: System, companion: Companion, last: int) -> float:
+        """Return the largest error after step `last`, drawn out to the end of the run by its square."""
+        return float(self.share(system, companion).max()) * (self.n_total / last) ** 2
+
     def judged(self, system: System, t: float, h: float) -> ValidityNote | None:
         """Return the note of the error so far if it is new."""
         companion = self.companion
@@ -325,8 +328,7 @@ class StepWatch:
         if not largest > limit:
             return None
         if self.note is not None:
-            if largest > self.note.largest:
-                self.note = replace(self.note, largest=largest, t_largest=t)
+            self.note = self.note.with_value(largest, t)
             return None
         turn = f"it turns by up to {self.turn[i]:.2g} rad in a step; " if self.turn[i] > 0.1 else ""
         finer = h * np.sqrt(AIM * limit / largest)
@@ -397,22 +399,6 @@ def difference(state: State, other: State) -> Array:
     apart = np.empty((len(state.r), 2, 3))
     apart[:, 0], apart[:, 1] = state.r - other.r, rotations_between(state.p, other.p)
     return apart
-
-
-def rotations_between(p: Array, other: Array) -> Array:
-    """Return the rotation vectors from orientations to others, Euler parameters (n, 4): (n, 3) [rad].
-
-    conj(other) p = (cos(angle/2), sin(angle/2) axis); of the two signs, that of the smaller angle.
-    """
-    w, x, y, z = p.T
-    a, b, c, d = other.T
-    scalar = a * w + b * x + c * y + d * z
-    vector = np.stack(
-        [a * x - b * w - c * z + d * y, a * y + b * z - c * w - d * x, a * z - b * y + c * x - d * w], axis=1
-    )
-    sine = lengths(vector)
-    angle = 2 * np.arctan2(sine, np.abs(scalar)) * np.where(scalar < 0, -1.0, 1.0)
-    return np.asarray(vector * (angle / np.where(sine > 0.0, sine, 1.0))[:, None])
 
 
 def turns_in_a_step(system: System, state: State, h: float) -> Array:

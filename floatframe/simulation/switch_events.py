@@ -16,7 +16,8 @@ from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.kernels.memory import Rows
 from floatframe.model.elements.held_signs import HeldSigns
 from floatframe.model.forces import UserForce
-from floatframe.model.functions.expressions import compile_expression
+from floatframe.model.functions.expressions import Tape, compile_expression
+from floatframe.model.functions.time_functions import TimeFunction
 from floatframe.model.functions.time_switches import time_parts
 from floatframe.model.system import System
 from floatframe.simulation.events import Event
@@ -43,8 +44,12 @@ def switch_events(system: System) -> tuple[SwitchEvent, ...]:
     found = []
     forces = [force for force in system.forces if isinstance(force, UserForce)]
     for u, force in enumerate(forces):
-        for key in force.switches:
-            values = partial(values_of_expression, compiled, force, u, len(system.couplers) + u, key)
+        unknowns = unknowns_of_force(compiled, u, len(system.couplers) + u)
+        numbers = {name: k for k, name in enumerate(force.functions)}
+        for key, text in force.switches.items():
+            where = f"force {force.name!r}: switches: {key}"
+            tape = compile_expression(where, text, force.inputs, parameters=force.parameters, functions=numbers)
+            values = partial(values_of_tape, tape, list(force.functions.values()), unknowns)
             found.append(SwitchEvent(f"{force.name}.{key}", f"{force.name}.{key}", values=values))
     for placed in compiled.laws:
         names = (f"{placed.element.name}.{key}" for key in placed.law.switches)
@@ -52,18 +57,12 @@ def switch_events(system: System) -> tuple[SwitchEvent, ...]:
     return tuple(found)
 
 
-def values_of_expression(
-    compiled: CompiledSystem, force: UserForce, u: int, i: int, key: str, rows: Sequence[Rows]
-) -> Array:
-    """Return a switching function of user force u, element i among couplers and user forces, at rows, (n_times,)."""
+def values_of_tape(tape: Tape, functions: Sequence[TimeFunction], unknowns: IntArray, rows: Sequence[Rows]) -> Array:
+    """Return a switching function of a user force, which depends on the time and on unknowns, at rows, (n_times,)."""
     t, w = (np.concatenate([getattr(row, name) for row in rows]) for name in ("t", "w"))
-    columns = w[:, unknowns_of_force(compiled, u, i)].T
-    numbers = {name: k for k, name in enumerate(force.functions)}
-    where = f"force {force.name!r}: switches: {key}"
-    text = force.switches[key]
-    tape = compile_expression(where, text, force.inputs, parameters=force.parameters, functions=numbers)
+    columns = w[:, unknowns].T
     inputs = {0: np.asarray} | {1 + k: partial(column_at, column) for k, column in enumerate(columns)}
-    value = time_parts(tape, inputs, list(force.functions.values())).value
+    value = time_parts(tape, inputs, functions).value
     assert value is not None  # all inputs are known
     with np.errstate(all="ignore"):
         return np.asarray(value(t), dtype=float)

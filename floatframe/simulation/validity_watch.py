@@ -32,6 +32,7 @@ from floatframe.engine.kernels.model import JOINT, STIFFNESS
 from floatframe.engine.kernels.work import new_work
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.joints.rows import is_held
+from floatframe.model.rotations import rotation_matrix
 from floatframe.model.system import System
 from floatframe.results.validity import ValidityNote
 from floatframe.simulation.small_angles import ANGLES_LIMIT, angle_measures
@@ -100,17 +101,20 @@ class ValidityWatch:
                 if not largest > limit:
                     continue
                 key, t = (part.body.name, kind), float(rows.t[k])
+                known = self.found.get(key)
+                if known is not None and largest <= known.largest:
+                    continue
                 remedied = in_mean_axes(part, self.coordinates(part, rows)) if kind == "rotation" else -1.0
-                if key not in self.found:
+                if known is None:
                     first = float(rows.t[int(np.argmax(values > limit))])
                     has_matrices = part.body.reduced.geometric is not None
                     self.found[key] = ValidityNote(
                         *key, limit, largest, first, t, part.body.is_stiffened, has_matrices, remedied
                     )  # fmt: skip
                     new.append(self.found[key])
-                elif largest > self.found[key].largest:
-                    most = max(self.found[key].in_mean_axes, remedied)
-                    self.found[key] = replace(self.found[key], largest=largest, t_largest=t, in_mean_axes=most)
+                else:
+                    most = max(known.in_mean_axes, remedied)
+                    self.found[key] = replace(known, largest=largest, t_largest=t, in_mean_axes=most)
         return tuple(new)
 
     def observe_angles(self, rows: Rows) -> list[ValidityNote]:
@@ -126,8 +130,8 @@ class ValidityWatch:
                 first = float(rows.t[int(np.argmax(values > ANGLES_LIMIT))])
                 self.found[key] = ValidityNote(where, kind, ANGLES_LIMIT, largest, first, t, advice=ADVICE[kind])
                 new.append(self.found[key])
-            elif largest > self.found[key].largest:
-                self.found[key] = replace(self.found[key], largest=largest, t_largest=t)
+            else:
+                self.found[key] = self.found[key].with_value(largest, t)
         return new
 
     def measures(self, part: Watched, rows: Rows, told: Rows) -> list[tuple[str, Array]]:
@@ -157,7 +161,7 @@ class ValidityWatch:
 
     def load_measure(self, part: Watched, rows: Rows, i: int, u0: int) -> Array:
         """Return the change of the stiffness by the loads; -1 in the rows where it is not looked for."""
-        R, omega = rotations(rows.p[:, i]), rows.u[:, u0 + 3 : u0 + 6]
+        R, omega = rotation_matrix(rows.p[:, i]), rows.u[:, u0 + 3 : u0 + 6]
         lam = np.zeros((len(rows.t), len(part.norms)))
         acceleration = rows.u_dot[:, u0 : u0 + 3] - compiled_system(self.system).model.gravity
         lam[:, :3] = in_body(R, acceleration)
@@ -306,13 +310,3 @@ def estimated_interface_loads(reduced: ReducedBody) -> Array:
             slopes = np.cross(e, np.asarray(interface.Psi[3:]), axisb=0)
             own[:3] = e[:, None, None] * (length / 2 * slopes @ slopes.T)
     return K
-
-
-def rotations(p: Array) -> Array:
-    """Return R_GB of Euler parameters over time, (n_t, 3, 3)."""
-    w, x, y, z = p.T
-    return np.stack([
-        1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
-        2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-        2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y),
-    ], axis=1).reshape(-1, 3, 3)  # fmt: skip

@@ -13,9 +13,10 @@ from floatframe.design.gradients.tangents import Point
 from floatframe.design.studies.study_file import TAKES
 from floatframe.engine.compiling.file_frames import rows_of_file
 from floatframe.engine.compiling.system import CompiledSystem
-from floatframe.engine.kernels.memory import Rows, new_rows
+from floatframe.engine.kernels.memory import new_rows
 from floatframe.engine.open_equations.configuration import Configurations
 from floatframe.errors import ModelError
+from floatframe.integrators.carry import joined_rows
 from floatframe.model.state import State
 from floatframe.model.system import System
 from floatframe.results.results_file import MemorySource
@@ -90,7 +91,7 @@ def values_at(neighbour: Neighbour, columns: tuple[Column, ...], points: Sequenc
     compiled = neighbour.compiled
     if any(isinstance(each.sensor, EnergySensor | MomentumSensor) for each in columns):
         rows = [observed_state(compiled, neighbour.work, p.state, p.u_dot, p.w, p.t)[0] for p in points]
-        joined = Rows(*(np.concatenate([getattr(row, name) for row in rows]) for name in Rows._fields))
+        joined = joined_rows(rows)
     else:
         joined = new_rows(compiled.model, len(points))
         for k, p in enumerate(points):

@@ -14,9 +14,9 @@ from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.bodies.rigid_body import RigidBody
 from floatframe.model.system import Body
 
-SYMMETRIC = 0.02  #: difference of two moments of inertia of an axisymmetric body, by the largest one
-
 __all__ = ["body_n_q", "body_types", "integers", "offsets", "type_arrays"]
+
+SYMMETRIC = 0.02  #: difference of two moments of inertia of an axisymmetric body, by the largest one
 
 
 def integers(values: list[int]) -> IntArray:
@@ -54,9 +54,9 @@ def body_types(bodies: Sequence[Body]) -> tuple[list[RigidBody | ReducedBody], I
 
 
 def axis_of_symmetry(mass: float, S: Array, J0: Array) -> Array:
-    """Return the axis about which the inertia at the centre of mass is symmetric, (3,), zero if there is none.
+    """Return the axis about which the inertia at the centre of mass is symmetric, (3,); zero if there is no such axis.
 
-    Of a sphere, to which every axis is one, none.
+    It is zero also for a sphere, which is symmetric about every axis.
     """
     s = S / mass if mass > 0 else np.zeros(3)
     moments, axes = np.linalg.eigh(J0 - mass * (s @ s * np.eye(3) - np.outer(s, s)))

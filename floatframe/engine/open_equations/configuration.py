@@ -19,6 +19,7 @@ from floatframe.model.rotations import (
     left_jacobian,
     quotients,
     right_jacobian,
+    rotations_between,
     tilde,
 )
 
@@ -71,8 +72,7 @@ class Configurations:
         result = np.zeros(self.n_v)
         for i, j, n in self.parts():
             result[j : j + 3] = other[i : i + 3] - x[i : i + 3]
-            back = np.array(x[i + 3 : i + 7]) * (1, -1, -1, -1)
-            result[j + 3 : j + 6] = rotation_vector(euler_parameter_product(back, other[i + 3 : i + 7]))
+            result[j + 3 : j + 6] = rotations_between(other[i + 3 : i + 7], x[i + 3 : i + 7])
             result[j + 6 : j + 6 + n] = other[i + 7 : i + 7 + n] - x[i + 7 : i + 7 + n]
         return result
 
@@ -109,14 +109,6 @@ class Configurations:
         for _, j, _ in self.parts():
             result[j + 3 : j + 6, j + 3 : j + 6] = of_rotation(np.asarray(dx)[j + 3 : j + 6])
         return result
-
-
-def rotation_vector(p: Array) -> Array:
-    """Return the rotation vector, (3,) [rad], from Euler parameters, at most half a turn; accurate also near zero."""
-    p = np.asarray(p) if p[0] >= 0 else -np.asarray(p)
-    sine = float(np.linalg.norm(p[1:]))
-    scale = 2.0 / p[0] if sine == 0.0 else 2 * np.arctan2(sine, p[0]) / sine
-    return np.asarray(scale * p[1:])
 
 
 def inverse_right_jacobian(theta: Array) -> Array:

@@ -116,7 +116,7 @@ def co_simulate(
 def with_motion(error: CosimulationError | ConvergenceError, run: Run, t: float, H: float) -> Exception:
     """Return the error with the motion so far, and where it is."""
     run.look()
-    trajectory, where = motion_so_far(run.system, run.head, run.kept, run.writer, run.watch.notes)
+    trajectory, where = motion_so_far(run)
     words = f"system {run.system.name!r}: the macro-step of {H:g} from t = {t:.9g} failed: {error}{where}"
     if isinstance(error, ConvergenceError):
         return ConvergenceError(words, t=error.t, h=error.h, residual=error.residual, trajectory=trajectory)

@@ -99,7 +99,6 @@ class ElementLaw:
     length: float | None = None  #: length scale on which the law changes [m]; default: the size of its smallest body
     #: time scale on which it changes with time alone and with velocities [s]; `math.inf` if time does not enter;
     #: default: unknown
-    #: not known
     time: float | None = None
     accelerations: bool = False  #: whether accelerations are inputs
     energy: str | None = None  #: name of the output that is the stored energy

@@ -5,49 +5,26 @@ clutch). Its constraints are released, and its multipliers are zero.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array
-from floatframe.model.bodies.markers import Marker
-from floatframe.model.elements.element import NOTHING, Element, ElementLaw, Placed, markers_of
+from floatframe.model.elements.element import NOTHING, ElementLaw, Placed
+from floatframe.model.elements.element_proxy import ElementProxy
 
 __all__ = ["SwitchedOff", "law_switched_off", "off_at_start", "times_off"]
 
 
-@dataclass(frozen=True, eq=False)
-class SwitchedOff(Element):
-    """Replaces an element, with the same markers and unknowns; it does nothing."""
-
-    element: Element
-
-    if not TYPE_CHECKING:
-
-        @property
-        def name(self) -> str:
-            """Its name."""
-            return self.element.name
-
-    @property
-    def markers(self) -> tuple[Marker, ...]:
-        """Its markers."""
-        return markers_of(self.element)
+class SwitchedOff(ElementProxy):
+    """Replaces an element; it does nothing."""
 
     def law(self, placed: Placed) -> ElementLaw:
         """Return its law while it is off."""
         return law_switched_off(self.element.law(placed))
-
-    def events(self) -> Any:
-        """Return its events, which may switch it on."""
-        return self.element.events()
-
-    def drawn(self) -> Any:
-        """Return its shapes."""
-        return self.element.drawn()
 
 
 def law_switched_off(law: ElementLaw) -> ElementLaw:

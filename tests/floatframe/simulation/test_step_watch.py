@@ -31,10 +31,15 @@ from floatframe.cli.app import app
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.kernels.memory import KINETIC, new_rows
 from floatframe.engine.kernels.work import new_work
-from floatframe.model.rotations import euler_parameters, euler_parameters_of_rotation_vector, rotation_exp
+from floatframe.model.rotations import (
+    euler_parameters,
+    euler_parameters_of_rotation_vector,
+    rotation_exp,
+    rotations_between,
+)
 from floatframe.results.validity import ValidityNote, notes_from_json, notes_to_json
 from floatframe.simulation.energy_watch import EnergyWatch
-from floatframe.simulation.step_watch import StepWatch, rotations_between
+from floatframe.simulation.step_watch import StepWatch
 
 GROUND = Marker("ground", position=np.zeros(3))
 
