@@ -20,7 +20,7 @@ from fe_models.assembly.constraints import Constraint, MeanMotion, RigidNodes, e
 from fe_models.assembly.massless_nodes import MasslessNodes
 from fe_models.body.elimination import eliminate_dofs
 from fe_models.body.fe_body import MULTIPLIER, FEBody, Recovery
-from fe_models.body.weld import WeldedModel, WeldedPoints, mesh_rows
+from fe_models.body.weld import WeldedModel, block_damping, points_side_by_side
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
 from fe_models.meshes.numbering import NONE, NamedSet, Numbering, no_numbers, numbering_side_by_side
@@ -157,20 +157,13 @@ def _shared_dofs(parts: Sequence[Part], place: IntArray, leaders: IntArray) -> t
 
 def _side_by_side(name: str, bodies: list[FEBody], S: sp.csr_array, dofs: IntArray, nodes: Array) -> FEBody:
     first = np.cumsum([0, *(len(body.nodes) for body in bodies)])
-    recoveries = [
-        Recovery(sp.eye_array(body.n_dof, format="csr"), body.dofs) if body.recovery is None else body.recovery
-        for body in bodies
-    ]
+    recoveries = [body.to_mesh for body in bodies]
     loose = np.flatnonzero(np.diff(S.tocsc().indptr) == 0)  # dofs of leaders that belong to no part
     own = sp.csr_array((np.ones(len(loose)), (np.arange(len(loose)), loose)), shape=(len(loose), len(dofs)))
     n_mesh_dof = tuple(int(recovery.matrix.shape[0]) for recovery in recoveries)
     models = [body.element_model for body in bodies]
+    damping = block_damping(bodies)
     volumes = [np.zeros(len(b.nodes)) if b.node_volumes is None else b.node_volumes for b in bodies]
-    points = tuple(
-        (body.name, body.stress_points, rows)
-        for body, rows in zip(bodies, mesh_rows(n_mesh_dof), strict=True)
-        if body.stress_points is not None
-    )
     n_added = len(nodes) - int(first[-1])
     has_volumes = any(volume.any() for volume in volumes)
     counts = tuple(len(body.nodes) for body in bodies)
@@ -178,9 +171,7 @@ def _side_by_side(name: str, bodies: list[FEBody], S: sp.csr_array, dofs: IntArr
         name=name,
         M=S.T @ sp.block_diag([body.M for body in bodies], format="csc") @ S,
         K=S.T @ sp.block_diag([body.K for body in bodies], format="csc") @ S,
-        D=None
-        if all(body.D is None for body in bodies)
-        else S.T @ sp.block_diag([sp.csc_array(b.K.shape) if b.D is None else b.D for b in bodies], format="csc") @ S,
+        D=None if damping is None else S.T @ damping @ S,
         nodes=nodes,
         dofs=dofs,
         units=bodies[0].units,
@@ -198,7 +189,7 @@ def _side_by_side(name: str, bodies: list[FEBody], S: sp.csr_array, dofs: IntArr
                 [*(r.dofs + np.array([n, 0]) for r, n in zip(recoveries, first, strict=False)), dofs[loose]]
             ),
         ),
-        stress_points=WeldedPoints(points) if points else None,
+        stress_points=points_side_by_side(bodies, n_mesh_dof),
         node_volumes=np.concatenate([*volumes, np.zeros(n_added)]) if has_volumes else None,
         provenance={
             f"{body.name}: {key}" if len(bodies) > 1 else key: value

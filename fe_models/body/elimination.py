@@ -48,7 +48,7 @@ def eliminate_dofs(body: FEBody, slaves: IntArray, T_s: sp.sparray) -> FEBody:
     T = sp.csr_array(selection + placement @ T_s[:, keep])
     new_index = np.full(body.n_dof, -1, np.int64)
     new_index[keep] = np.arange(len(keep))
-    before = Recovery(sp.eye_array(body.n_dof, format="csr"), body.dofs) if body.recovery is None else body.recovery
+    before = body.to_mesh
     return replace(
         body,
         M=T.T @ body.M @ T,

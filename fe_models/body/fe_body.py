@@ -307,6 +307,13 @@ class FEBody:
         return self.name, self.numbering, len(self.nodes), len(self.surface)
 
     @property
+    def to_mesh(self) -> Recovery:
+        """The recovery; the identity where the dofs are the mesh dofs."""
+        if self.recovery is not None:
+            return self.recovery
+        return Recovery(sp.eye_array(self.n_dof, format="csr"), self.dofs)
+
+    @property
     def n_dof(self) -> int:
         """Number of dofs."""
         return len(self.dofs)

@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,7 +16,7 @@ from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
 from fe_models.meshes.numbering import numbering_side_by_side
 
-__all__ = ["WeldedModel", "WeldedPoints", "mesh_rows", "weld"]
+__all__ = ["WeldedModel", "WeldedPoints", "block_damping", "mesh_rows", "points_side_by_side", "weld"]
 
 Place = tuple[str, str]  #: name of a body, name of its interface
 
@@ -232,23 +231,15 @@ def _side_by_side(
         f[start[body.name][0] :][: body.n_dof] = case.f
         own_name = f"{body.name}.{case.name}" if case_names.count(case.name) > 1 else case.name
         load_cases.append(LoadCase(own_name, case.kind, f))
-    recoveries = [
-        Recovery(sp.eye_array(body.n_dof, format="csr"), body.dofs) if body.recovery is None else body.recovery
-        for body in bodies
-    ]
+    recoveries = [body.to_mesh for body in bodies]
     volumes = [body.node_volumes for body in bodies]
     n_mesh_dof = tuple(int(recovery.matrix.shape[0]) for recovery in recoveries)
-    points = tuple(
-        (body.name, body.stress_points, rows)
-        for body, rows in zip(bodies, mesh_rows(n_mesh_dof), strict=True)
-        if body.stress_points is not None
-    )
     models = [body.element_model for body in bodies]
     return FEBody(
         name=name,
         M=sp.block_diag([body.M for body in bodies], format="csc"),
         K=sp.block_diag([body.K for body in bodies], format="csc"),
-        D=_block_damping(bodies),
+        D=block_damping(bodies),
         nodes=np.concatenate([body.nodes for body in bodies]),
         dofs=_numbered([body.dofs for body in bodies], first_node),
         interfaces=tuple(interfaces),
@@ -266,7 +257,7 @@ def _side_by_side(
             _numbered([recovery.dofs for recovery in recoveries], first_node),
         ),
         load_cases=tuple(load_cases),
-        stress_points=WeldedPoints(points) if points else None,
+        stress_points=points_side_by_side(bodies, n_mesh_dof),
         numbering=numbering_side_by_side([body.numbered for body in bodies]),
         kept=np.concatenate([body.kept + n for body, n in zip(bodies, first_node, strict=False)]),
         node_volumes=None if any(v is None for v in volumes) else np.concatenate([v for v in volumes if v is not None]),
@@ -287,7 +278,18 @@ def _numbered(dofs: list[IntArray], first_node: IntArray) -> IntArray:
     return np.concatenate([d + np.array([n, 0]) for d, n in zip(dofs, first_node, strict=False)])
 
 
-def _block_damping(bodies: tuple[FEBody, ...]) -> Any:
+def points_side_by_side(bodies: Sequence[FEBody], n_mesh_dof: tuple[int, ...]) -> WeldedPoints | None:
+    """Return the stress points of all bodies, whose mesh dofs lie side by side; None if no body has any."""
+    points = tuple(
+        (body.name, body.stress_points, rows)
+        for body, rows in zip(bodies, mesh_rows(n_mesh_dof), strict=True)
+        if body.stress_points is not None
+    )
+    return WeldedPoints(points) if points else None
+
+
+def block_damping(bodies: Sequence[FEBody]) -> sp.csc_array | None:
+    """Return the damping of all bodies side by side; None if no body has any."""
     if all(body.D is None for body in bodies):
         return None
     return sp.block_diag([sp.csc_array(body.K.shape) if body.D is None else body.D for body in bodies], format="csc")

@@ -130,6 +130,7 @@ def report_mesh(
         raise MeshError(f"mesh {mesh.source}: expected solid cells, got none")
     X = mesh.nodes[used]
     lo, hi = X.min(axis=0), X.max(axis=0)
+    size = float(np.linalg.norm(hi - lo))
     geometry = {kind: cell_geometry(mesh, kind) for kind in mesh.cells}
     findings = []
     degenerate = _select(geometry, lambda g: g.flatness <= FLAT)
@@ -137,7 +138,7 @@ def report_mesh(
     distorted = _select(geometry, lambda g: (g.lowest_inside > ROUNDING) & (g.lowest_at_nodes <= ROUNDING))
     findings += _cell_findings(mesh, inverted, degenerate, distorted)
     links = connectivity(mesh)
-    coincident = coincident_nodes(mesh, COINCIDENCE * float(np.linalg.norm(hi - lo)))
+    coincident = coincident_nodes(mesh, COINCIDENCE * size)
     findings += _link_findings(links, coincident, mesh)
     n_unused = int((~used).sum())
     if n_unused:
@@ -151,7 +152,6 @@ def report_mesh(
     first_order = _first_order(mesh, materials, incompatible_modes, findings)
     if first_order is not None and first_order.error > FIRST_ORDER_NOTED:
         findings.append(Finding("first-order", False, first_order.words()))
-    size = float(np.linalg.norm(hi - lo))
     findings += [Finding("units", is_error, text) for is_error, text in implausible_units(units, size, given)]
     return MeshReport(
         source=mesh.source,

@@ -59,6 +59,7 @@ class ElementGroup:
     source: "ShellCells | BeamModel | SolidModel"  #: element model that computes the values
     rows: slice  #: rows of the element model among the mesh dofs of the body
     first_node: int  #: index in the body of the first node of the element model
+    kind: str = ""  #: cell type of solids
 
     @property
     def count(self) -> int:
@@ -154,8 +155,9 @@ def _groups(body: FEBody, model: object, at: _Place) -> Iterator[ElementGroup]:
                 ("element strain", NUMBER, centre_strains(model, kind, at.rows)),
             ):
                 yield ElementGroup(
-                    quantity, part, *named, STRESS_COMPONENTS, (dimension,) * 6, values, model, at.rows, at.first_node
-                )
+                    quantity, part, *named, STRESS_COMPONENTS, (dimension,) * 6, values, model, at.rows,
+                    at.first_node, kind,
+                )  # fmt: skip
 
 
 def _named_cells(part: str, model: SolidModel, kind: str) -> tuple[tuple[str, ...], IntArray, Mapping[str, IntArray]]:

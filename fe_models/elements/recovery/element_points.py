@@ -263,20 +263,19 @@ def shell_corners(body: FEBody, group: ElementGroup, cells: ShellCells, rows: In
 
 def solid_nodes(body: FEBody, group: ElementGroup, model: SolidModel, rows: IntArray) -> SolidNodes:
     """Return the nodes of some cells of a group."""
-    kind = next(kind for kind in model.mesh.cells if group.part.rpartition(" ")[2] == kind)
-    cells = model.mesh.cells[kind][rows]
+    cells = model.mesh.cells[group.kind][rows]
     names = [
         f"solid {group.names[row]} node {body.numbering.called(group.first_node + node)} inside"
         for row, own in zip(rows.tolist(), cells.tolist(), strict=True)
         for node in own
     ]
-    return SolidNodes(model, kind, rows, tuple(names), frozen(model.mesh.nodes[cells.ravel()]), group.rows)
+    return SolidNodes(model, group.kind, rows, tuple(names), frozen(model.mesh.nodes[cells.ravel()]), group.rows)
 
 
 def material_borders(body: FEBody, group: ElementGroup) -> list[MaterialBorders]:
     """Return the borders of the solid model of a group, once for its groups of all cell types; none without any."""
     model = group.source
-    if not isinstance(model, SolidModel) or group.part.rpartition(" ")[2] != next(iter(model.mesh.cells)):
+    if not isinstance(model, SolidModel) or group.kind != next(iter(model.mesh.cells)):
         return []
     has = np.zeros((len(model.materials), len(model.mesh.nodes)), dtype=bool)
     for kind, cells in model.mesh.cells.items():

@@ -13,11 +13,19 @@ def field_tables() -> str:
     abaqus = {f"*{name}": parameters_of(name) for name in sorted(PARAMETERS)}
     ansys = {name: fields_of_command(name) for name in sorted(COMMANDS)}
     ansys["EBLOCK, columns"] = parse_fields(COLUMNS.split())
-    whole = (TableField(1, "all", "read"),)
-    nastran = {name: fields_of(name) or whole for name in sorted(CARDS)}
+    nastran = {name: _with_rest(name) for name in sorted(CARDS)}
     sections = [
         ("Nastran", "card", nastran),
         ("Abaqus and CalculiX", "keyword", abaqus),
         ("ANSYS", "command", ansys),
     ]
     return "\n\n".join(f"## {title}\n\n{markdown_table(what, fields)}" for title, what, fields in sections)
+
+
+def _with_rest(name: str) -> tuple[TableField, ...]:
+    """Return the fields of a card of Nastran, and in words those behind them."""
+    fields, last = fields_of(name), CARDS[name].split()[-1]
+    if not last.startswith("..."):
+        return fields
+    use = "left out" if last.endswith("^") else "read"
+    return (*fields, TableField(0, "further fields" if fields else "all fields", use))

@@ -7,6 +7,7 @@ NAME~       says nothing about mass, stiffness or damping
 NAME^       damping or the like, which is left out and named in the ledger
 -           blank in every deck
 ...         the fields before it repeat, or the reader takes the rest itself
+...^        the reader leaves the rest out and names it in the ledger
 """
 
 import re
@@ -25,7 +26,7 @@ USES = {"": "read", "=": "default", "!": "default", "~": "harmless", "^": "left 
 class TableField:
     """One field of a card or command, or one parameter of a keyword."""
 
-    number: int  #: of the field, from 1
+    number: int  #: of the field, from 1; 0 for several fields, which `name` describes
     name: str
     use: str  #: "read", "default", "blank", "harmless" or "left out"
     default: str = ""  #: value that says nothing, for "default"
@@ -35,7 +36,7 @@ def parse_fields(words: Iterable[str]) -> tuple[TableField, ...]:
     """Return the fields of a line of a table, without those that the reader takes as a repeating rest."""
     found = []
     for number, word in enumerate(words, start=1):
-        if word == "...":
+        if word.startswith("..."):
             break
         match = SYMBOLS.fullmatch(word)
         assert match is not None  # the tables are ours
@@ -66,9 +67,12 @@ def markdown_table(what: str, fields: Mapping[str, tuple[TableField, ...]]) -> s
     for name, items in fields.items():
         cells = []
         for use, _ in (*columns, ("harmless", "")):
-            words = [
-                f"{each.name} = {each.default}" if each.default else each.name for each in items if each.use == use
-            ]
-            cells.append(", ".join(f"`{word}`" for word in words))
+            cells.append(", ".join(_in_words(each) for each in items if each.use == use))
         lines.append(f"| `{name}` | {' | '.join(cells)} |")
     return "\n".join(lines)
+
+
+def _in_words(item: TableField) -> str:
+    if not item.number:
+        return item.name
+    return f"`{item.name} = {item.default}`" if item.default else f"`{item.name}`"

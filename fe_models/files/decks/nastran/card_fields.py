@@ -47,7 +47,7 @@ CARDS: dict[str, str] = {
     "CONM2": "EID G CID M X1 X2 X3 - I11 I21 I22 I31 I32 I33",
     "CBUSH": "EID PID GA GB GO/X1 X2 X3 CID S OCID=-1 S1! S2! S3!",
     "PBUSH": "PID ...",
-    "CBUSH1D": "EID PID GA GB CID", "PBUSH1D": "PID K C M - SA~ SE~ ...",
+    "CBUSH1D": "EID PID GA GB CID", "PBUSH1D": "PID K C M - SA~ SE~ ...^",
     "CGAP": "EID PID GA GB GO/X1~ X2~ X3~ CID", "PGAP": "PID U0 F0~ KA KB KT MU1 MU2~ TMAX~ MAR~ TRMIN~",
     "CELAS1": "EID PID G1 C1 G2 C2", "CELAS2": "EID K G1 C1 G2 C2 GE^ S~",
     "PELAS": "PID1 K1 GE1^ S1~ PID2 K2 GE2^ S2~",
@@ -61,7 +61,8 @@ CARDS: dict[str, str] = {
     "MPC": "...", "MPCADD": "...", "SPC": "SID G1 C1 D1~ G2 C2 D2~", "SPC1": "...", "SPCADD": "...",
     "BSET": "...", "BSET1": "...", "BNDFIX": "...", "BNDFIX1": "...", "ASET": "...", "ASET1": "...",
     "FORCE": "SID G CID F N1 N2 N3", "MOMENT": "SID G CID M N1 N2 N3", "GRAV": "SID CID A N1 N2 N3 MB~",
-    "PLOAD": "...", "PLOAD2": "...", "PLOAD4": "SID EID P1 P2 P3 P4 G1 G34 CID N1 N2 N3 SORL LDIR~",
+    "PLOAD": "SID~ P~ G1~ G2~ G3~ G4~", "PLOAD2": "SID~ P~ EID1~ EID2~ EID3~ EID4~ EID5~ EID6~",
+    "PLOAD4": "SID EID P1 P2 P3 P4 G1 G34 CID N1 N2 N3 SORL LDIR~",
 }  # fmt: skip
 
 HARMLESS = frozenset(

@@ -197,6 +197,8 @@ READ: dict[str, tuple[str, dict[str, str | None]]] = {
         {"SID": None, "EID": None, "P1": "6.", "P2": None, "P3": None, "P4": None, "G1": "5", "G34": "6", "CID": None,
          "N1": None, "N2": None, "N3": None, "SORL": None},
     ),
+    "PLOAD": (SHELL_4 + "\nPLOAD,3,5.,1,2,3,4", {}),
+    "PLOAD2": (SHELL_4 + "\nPLOAD2,3,5.,1", {}),
     "PARAM": (BAR + "\nPARAM,WTMASS,2.", {"N": None, "V1": "3.", "V2": None}),
 }  # fmt: skip
 #: cards with the fields of another one, on a deck of their own
