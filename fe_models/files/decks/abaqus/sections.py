@@ -265,7 +265,11 @@ def _springs(here: str, block: DeckBlock, draft: Draft) -> None:
     if is_axial:
         value = numbers(block.lines[1 if len(block.lines) > 1 and not numbers(block.lines[0])[0] else 0])[0]
         for row in of_set.rows.values():
-            draft.springs.append(_axial(here, draft, row, value, is_damper=block.keyword == "DASHPOT"))
+            spring = _axial(here, draft, row, value, is_damper=block.keyword == "DASHPOT")
+            if spring is None:
+                draft.ledger.refuse(of_set.kind, "has no length between its nodes", line=block.line_number)
+            else:
+                draft.springs.append(spring)
     elif of_set.kind.endswith("1"):
         _to_ground(block, draft, of_set)
     else:
@@ -317,9 +321,11 @@ def _component_springs(here: str, block: DeckBlock, draft: Draft, of_set: PointE
             draft.springs.append(DeckSpring((names[0], names[1]), stiffness, damping, triad))
 
 
-def _axial(here: str, draft: Draft, row: tuple[int, ...], value: float, *, is_damper: bool) -> DeckSpring:
-    """Return a spring or damper along the line of its nodes."""
+def _axial(here: str, draft: Draft, row: tuple[int, ...], value: float, *, is_damper: bool) -> DeckSpring | None:
+    """Return a spring or damper along the line of its nodes; None if they are at one place."""
     ends = draft.mesh.coordinates[draft.mesh.rows_of(np.array(row))]
+    if not np.linalg.norm(ends[1] - ends[0]) > 0:
+        return None
     triad = as_triad(axes_along(ends[1] - ends[0]))
     names = tuple(draft.node_group(here, [number]) for number in row)
     six, none = (value, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0,) * 6

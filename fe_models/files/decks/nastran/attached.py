@@ -6,7 +6,7 @@ from fe_models.errors import MeshError
 from fe_models.files.bulk_data.cards import Card, real_of
 from fe_models.files.decks.deck import Coupling, DeckMass, Load, RigidGroup
 from fe_models.files.decks.equations import Row, solved_equations
-from fe_models.files.decks.nastran.model import ALL, NastranModel, components_of
+from fe_models.files.decks.nastran.model import ALL, NastranModel, components_of, numbers_in, range_at
 from fe_models.files.decks.nastran.springs import read_springs, scalar_ends, springs_to_ground
 from fe_models.files.decks.nastran.supports import in_basic, make_supports, selected_sets
 from fe_models.foundation.arrays import Array
@@ -109,7 +109,7 @@ def _rigid(model: NastranModel, card: Card) -> None:
         while words and "." in words[-1]:  # ALPHA, TREF
             words = words[:-1]
         leader, components = card.integer(2), components_of(card, card.text(3))
-        followers = [int(word) for word in _written_out(words)]
+        followers = numbers_in(card, words)
     else:
         independent = [components_of(card, card.text(k) or "0") for k in (4, 5)]
         first = 0 if independent[0] else 1  # the end that leads
@@ -163,19 +163,6 @@ def _rod_of_constant_length(model: NastranModel, card: Card) -> None:
     model.rows.append(((ends[0] if given[0] else ends[1], 0), row))
 
 
-def _written_out(words: list[str]) -> list[str]:
-    out: list[str] = []
-    k = 0
-    while k < len(words):
-        if k + 2 < len(words) and words[k + 1].upper() == "THRU":
-            out += [str(n) for n in range(int(words[k]), int(words[k + 2]) + 1)]
-            k += 3
-        else:
-            out.append(words[k])
-            k += 1
-    return out
-
-
 def _mean(model: NastranModel, card: Card) -> None:
     """RBE3: reference grid, its components, then sets of weight, components and grids; six weights for each grid.
 
@@ -214,11 +201,12 @@ def _weights(card: Card, words: list[str]) -> dict[int, Array]:
     weights: dict[int, Array] = {}
     six = np.zeros(0)
     k = 0
-    words = _written_out(words)
     while k < len(words):
         if words[k].isdigit() and len(six):
-            weights[int(words[k])] = weights.get(int(words[k]), np.zeros(6)) + six
-            k += 1
+            numbers, n_words = range_at(card, words, k)
+            for number in numbers:
+                weights[number] = weights.get(number, np.zeros(6)) + six
+            k += n_words
             continue
         try:
             weight = real_of(words[k])

@@ -156,18 +156,28 @@ def components_of(card: Card, word: str) -> tuple[int, ...]:
 
 
 def numbers_of(card: Card, first: int) -> list[int]:
-    """Return the numbers from a field on, ranges (a THRU b, with BY c) written out."""
-    words = [word for word in card.fields[first - 1 :] if word]
+    """Return the numbers from a field on, ranges written out."""
+    return numbers_in(card, [word for word in card.fields[first - 1 :] if word])
+
+
+def numbers_in(card: Card, words: list[str]) -> list[int]:
+    """Return the numbers of these words of a card, ranges written out."""
     found: list[int] = []
     k = 0
     while k < len(words):
-        if k + 2 < len(words) and words[k + 1].upper() == "THRU":
-            step, used = (int(words[k + 4]), 5) if k + 4 < len(words) and words[k + 3].upper() == "BY" else (1, 3)
-            if int(words[k + 2]) - int(words[k]) > 10_000_000 or step < 1:
-                raise MeshError(f"{card.where}: {words[k]} THRU {words[k + 2]}: not a range of grid points")
-            found += range(int(words[k]), int(words[k + 2]) + 1, step)
-            k += used
-        else:
-            found.append(int(words[k]))
-            k += 1
+        numbers, n_words = range_at(card, words, k)
+        found += numbers
+        k += n_words
     return found
+
+
+def range_at(card: Card, words: list[str], k: int) -> tuple[range, int]:
+    """Return the numbers that begin at a word, a or a THRU b or a THRU b BY c, and how many words they take."""
+    start = int(words[k])
+    if k + 2 >= len(words) or words[k + 1].upper() != "THRU":
+        return range(start, start + 1), 1
+    stop = int(words[k + 2])
+    step, n_words = (int(words[k + 4]), 5) if k + 4 < len(words) and words[k + 3].upper() == "BY" else (1, 3)
+    if stop - start > 10_000_000 or step < 1:
+        raise MeshError(f"{card.where}: {start} THRU {stop}: not a range of grid points")
+    return range(start, stop + 1, step), n_words

@@ -81,3 +81,9 @@ def test_a_spring_or_dashpot_to_the_ground_makes_an_interface(tmp_path, keyword)
 def test_dashpots_whose_forces_do_not_balance_are_refused(tmp_path, nodes, components):
     with pytest.raises(ValueError, match=r"1 DASHPOT2 .*the forces do not balance"):
         body_of(tmp_path, kind="DASHPOT2", keyword="DASHPOT", nodes=nodes, components=components, value="1.")
+
+
+@pytest.mark.parametrize("keyword", ["SPRING", "DASHPOT"])
+def test_a_spring_or_dashpot_along_no_line_is_refused(tmp_path, keyword):
+    with pytest.raises(ValueError, match=rf"1 {keyword}A \(first: line 19\): has no length between its nodes"):
+        body_of(tmp_path, kind=f"{keyword}A", keyword=keyword, nodes="2, 2", components="", value="1.")
