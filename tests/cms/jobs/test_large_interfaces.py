@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cms.cli.info import print_body
-from cms.errors import BodyError
+from cms.errors import BodyError, ModeSetError
 from cms.jobs.job import read_job
 from cms.jobs.reduce_job import expected_columns, reduce_job
 from cms.modes.families import families, interface_cost
@@ -131,6 +131,27 @@ def test_what_a_large_geometric_stiffness_costs_is_told_before_the_work(job, mon
             reduce_job(job(lines))
         assert re.search(words, told[-1])
         assert caplog.text == told[-1]  # and once
+
+
+def test_columns_are_announced_up_to_the_dofs_of_the_body(job, monkeypatch, caplog):
+    """The block has 75 nodes, of which 15 move with a reference node: 60 x 3 + 6 dofs."""
+    size = 8.0 * 30 * 186**2
+    monkeypatch.setattr(room_for_stiffness, "machine_memory", lambda: room_for_stiffness.HELD * size)
+    monkeypatch.setattr(interface_cost, "MANY", 10_000)
+    for unasked, lines, told in (
+        (size, "", ""),
+        (size, "geometric_stiffness = true\n", ""),
+        (size - 1, "", "left out: 30 unit loads over 186 modes"),
+        (size - 1, "geometric_stiffness = true\n", "of 30 unit loads over about 186 modes"),
+    ):
+        monkeypatch.setattr(room_for_stiffness, "UNASKED", unasked)
+        caplog.clear()
+        asked = job(lines)
+        asked = asked.model_copy(update={"reduction": asked.reduction.model_copy(update={"n_modes": 5000})})
+        with caplog.at_level(logging.WARNING), pytest.raises(ModeSetError, match=r"n_modes = 5000.* interior dofs"):
+            reduce_job(asked)
+        assert told in caplog.text
+        assert bool(told) == bool(caplog.text)
 
 
 def test_a_job_names_the_interfaces_whose_loads_stiffen(job, capsys):

@@ -1,3 +1,6 @@
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import scipy.linalg as la
@@ -13,6 +16,7 @@ from fe_models.body.fe_body import MULTIPLIER
 from fe_models.foundation.tasks.this_process import ThisProcess
 from tests.bodies import bar
 from tests.cms.linear_algebra.substructures.shells import between
+from tests.root import ROOT
 
 NONE = np.zeros(0, dtype=int)
 
@@ -138,6 +142,39 @@ def test_multipliers_of_distributing_interfaces_stay_in_the_root():
     unordered[dissection.order] = b
     expected = tree.solve(unordered)[dissection.order][~is_multiplier[dissection.order]]
     assert_allclose(spread, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+
+
+SOLVE_IN_THREADS = """
+import sys
+from concurrent.futures import ThreadPoolExecutor
+import numpy as np
+import scipy.linalg as la
+from cms.linear_algebra.substructures.elimination import Substructure
+
+rng = np.random.default_rng(0)
+s = 200
+K, x = rng.normal(size=(s, s)), rng.normal(size=(s, 4))
+f = K @ x
+L, pivots = la.lu_factor(K)
+none = np.zeros(0)
+root = Substructure(0, none, L, np.zeros((s, 0)), np.zeros((s, 0)), none, np.zeros((0, 0)), (), pivots)
+
+def error(_):
+    u = f.copy()
+    root.solve_own(u)
+    return np.abs(u - x).max()
+
+sys.setswitchinterval(1e-6)
+with ThreadPoolExecutor(4) as pool:
+    print(np.max(list(pool.map(error, range(2000)))))
+"""
+
+
+def test_threads_share_the_factors_of_a_root_with_multipliers():
+    """In a process of its own: LAPACK may write outside its arrays with pivots that another thread shifts."""
+    done = subprocess.run([sys.executable, "-c", SOLVE_IN_THREADS], capture_output=True, text=True, cwd=ROOT)
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout) < 1e-9
 
 
 def test_a_singular_stiffness_is_refused(pencil):

@@ -11,8 +11,9 @@ from cms.linear_algebra.solvers.factorization import factorize
 from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.modes.families.families import Families
 from cms.modes.families.flexibility import BoundaryConditions
+from cms.modes.families.interface_loads import InterfaceLoad, point_load
 from cms.modes.families.rigid_modes import geometric_rigid_modes
-from cms.modes.mode_sets import MODE_SETS
+from cms.modes.mode_sets import MODE_SETS, benfield_hruda
 from fe_models.body.couplings.couplings import couple
 from fe_models.body.fe_body import FEBody, Interface
 from tests.bodies import bar, beam, chain, with_interfaces
@@ -347,6 +348,46 @@ def test_hinged_parts_with_both_sides_held_are_a_mechanism():
 
     with Families(couple(hinged_bricks())) as f, pytest.raises(BodyError, match=r"1 motion besides.*a mechanism"):
         _ = f.Psi_A
+
+
+HINGE = np.array([1.0, 1.0, 0.0])  # a point on the axis of `hinged_bricks`, which is along z
+
+
+def springs_of_hinged_bricks(stiffness, direction):
+    """Springs in all directions at the left brick, one spring at the reference point of the right one."""
+    at_right = np.zeros((6, 6))
+    at_right[:3, :3] = stiffness * np.outer(direction, direction) / (direction @ direction)
+    return [
+        point_load("left", stiffness=stiffness, rotational_stiffness=stiffness),
+        InterfaceLoad(("right",), np.zeros((6, 6)), at_right),
+    ]
+
+
+@pytest.mark.parametrize("stiffness", [1e4, 1e9])
+def test_a_load_through_the_hinge_leaves_the_mechanism(stiffness):
+    from tests.cms.test_reduction import hinged_bricks
+
+    body = couple(hinged_bricks())
+    arm = (body.interface("right").reference - HINGE) * [1, 1, 0]
+    with pytest.raises(BodyError, match=r"1 motion besides.*a mechanism"):
+        benfield_hruda(body, n_modes=3, loads=springs_of_hinged_bricks(stiffness, arm))
+
+
+@pytest.mark.parametrize("stiffness", [1e4, 1e5])
+def test_a_load_across_the_hinge_holds_the_mechanism(stiffness):
+    """Such soft springs move the bricks as rigid bodies: seven motions, those of the whole and that of the hinge."""
+    from tests.cms.test_reduction import hinged_bricks
+
+    body = couple(hinged_bricks())
+    arm = body.interface("right").reference - HINGE
+    loads = springs_of_hinged_bricks(stiffness, np.cross([0.0, 0.0, 1.0], arm))
+    rigid, about_hinge = geometric_rigid_modes(body), geometric_rigid_modes(body, origin=HINGE)[:, 5]
+    is_right = body.nodes[body.dofs[:, 0]][:, :2].sum(axis=1) > 2.0 + 1e-9
+    Psi = np.column_stack([rigid, np.where(is_right, about_hinge, 0.0)])
+    K_load = la.block_diag(*[load.K for load in loads])  # both triads are the mesh axes
+    omega2 = la.eigvalsh(Psi[body.b].T @ K_load @ Psi[body.b], Psi.T @ body.M @ Psi)
+    modes = benfield_hruda(body, n_modes=7, loads=loads)
+    assert_allclose(modes.frequencies[-7:], np.sqrt(omega2) / (2 * np.pi), rtol=10 * stiffness / 2e11 + 1e-6)
 
 
 def test_an_uncoupled_body_is_sent_to_couple():
