@@ -114,17 +114,17 @@ def split_job(request: SplitRequest) -> list[Path]:
 
 @dataclass(frozen=True)
 class StiffnessDamping:
-    """Damping of the parts in the place of ratios of the modes of the whole."""
+    """Damping of the parts, in place of modal damping ratios of the whole body."""
 
     beta: float  #: D = beta K, in the unit of time of the job
     words: str
 
 
 def stiffness_damping(job: Job) -> StiffnessDamping | None:
-    """Return D = beta K with the ratio of the first elastic mode of the whole; None where the job has no ratios.
+    """Return D = beta K with the damping ratio of the first elastic mode of the whole; None if the job has no ratios.
 
-    Ratios belong to modes of one body. Those of a part lie far above the first ones of the whole, which would keep a
-    small fraction of their damping. D = beta K is the same in parts and in one piece.
+    Ratios belong to the modes of one body. The modes of a part lie far above the first modes of the whole, so ratios of
+    the parts would damp the latter far too little. D = beta K is the same for the parts and for the whole.
     """
     from cms.jobs.reduce_job import reduce_job
     from cms.reduction.basis.damping import PerModeDamping, RayleighDamping, damping_ratios

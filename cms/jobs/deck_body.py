@@ -41,14 +41,13 @@ def body_of_deck(job: Job, path: Path, stages: Stages, on_report: Callable[[Any]
     with stages("read deck"):
         deck = read_deck(path)
         raw = with_centres(deck.mesh)
-        numbers = raw.node_numbers
-        # rows of the deck serve as the node numbers of the parts
-        raw = replace(raw, node_numbers=np.arange(len(raw.nodes)))
     with stages("assemble"):
         parts, meshes = _parts(job, path, raw, on_report)
         means = _mean_interfaces(job, raw)
         constraints = _constraints(job, raw, besides=set(means.values()))
-        joined = join(str(job.body.name), parts, raw.nodes, constraints, numbers=numbers, node_sets=raw.node_sets)
+        joined = join(
+            str(job.body.name), parts, raw.nodes, constraints, numbers=raw.node_numbers, node_sets=raw.node_sets
+        )
         record = {**joined.body.provenance, "deck": str(path), "deck sha256": file_digest(path)}
         record |= {f"file {name}": digest for name, digest in raw.included.items()}
         numbering = joined.body.numbering.with_instances(raw.instances, raw.instance_step)
@@ -71,12 +70,14 @@ def _parts(
     """Return the bodies of solids, shells, lines and attachments at single nodes; and the meshes of the solids."""
     from fe_models.assembly.join import Part
 
+    # rows of the deck serve as the node numbers of the parts
+    by_row = replace(raw, node_numbers=np.arange(len(raw.nodes)))
     parts: list[Part] = []
     meshes = []
-    for body, mesh in _solids(job, path, raw, on_report):
+    for body, mesh in _solids(job, path, by_row, on_report):
         parts.append(Part(body, np.asarray(mesh.node_numbers)))
         meshes.append(mesh)
-    parts += [*_shells(job, path, raw, on_report), *_lines(job, path, raw, on_report), *_rods(job, path, raw)]
+    parts += [*_shells(job, path, by_row, on_report), *_lines(job, path, by_row, on_report), *_rods(job, path, by_row)]
     attached = _attached(job, raw)
     return [*parts, *([] if attached is None else [attached])], meshes
 
@@ -449,7 +450,7 @@ def _require_group(raw: "RawMesh", where: str, group: str) -> None:
 def _require_used_groups(job: Job, raw: "RawMesh", joined: "Joined", *, naming: tuple[str, ...]) -> None:
     """Raise `JobError` if cells of the deck are in no table, because their mass would be lost silently.
 
-    naming: kinds of cells that only name edges and faces where they lie on the body.
+    naming: kinds of cells that are only names of edges and faces if all their nodes are on the body.
     """
     tables = [*(t.cells for t in job.solids.values()), *(t.cells for t in job.shells.values())]
     groups = {

@@ -119,7 +119,7 @@ def announce_stiffness(job: Job, body: FEBody) -> None:
     )
 
     asked = job.reduction.geometric_stiffness
-    n_modes = min(expected_columns(job, body), body.n_dof)  # of a job that asks for more, the mode set says so
+    n_modes = min(expected_columns(job, body), body.n_dof)  # the mode set refuses a job that asks for more
     if asked in (None, False) and not job.reduction.quadratic_modes:
         if asked is None and has_geometric_stiffness(body) and (words := room.left_out_words(body, n_modes)):
             log.warning("body %r: %s", body.name, words)

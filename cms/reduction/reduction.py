@@ -168,10 +168,10 @@ def assembled(
 
     Parameters
     ----------
-    Kept nodes of the body, ascending, (n_kept,); they include the surface and the members of interfaces.
-        Nodes of the body, ascending; among them surface and members of interfaces, (n_kept,).
-    Moments of the shapes in the frame of `condition`.
-        Of the shapes in the frame of `condition`.
+    kept
+        Kept nodes of the body, ascending, (n_kept,); they include the surface and the members of interfaces.
+    moments
+        Moments of the shapes in the frame of `condition`.
     """
     axes, origin = condition.frame.axes, condition.frame.origin
     Phi_kept = kept_translations(body, finished.Phi, kept, axes)

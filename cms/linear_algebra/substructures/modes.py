@@ -259,9 +259,7 @@ def _guards(count: int) -> int:
     return GUARDS + int(GUARD_SHARE * count)
 
 
-def _improved(
-    modes: ApproximateModes, Z: Array, count: int, tolerance: float, highest: float
-) -> tuple[Array, int]:
+def _improved(modes: ApproximateModes, Z: Array, count: int, tolerance: float, highest: float) -> tuple[Array, int]:
     """Step (6): improve modes until the remaining error of the wanted ones is below the tolerance.
 
     The wanted modes are at least `count`, and all below omega² = `highest`. All modes are improved together with the

@@ -1,7 +1,8 @@
-"""Motions that cost no energy: which they are, how many, and where they are largest.
+"""Motions without strain energy: which they are, how many, and where they are largest.
 
-An energy uᵀ K u is a sum of terms K_kk u_k² and of others no larger: rounding leaves eps of them instead of zero.
-A motion is free where its energy is within that rounding, however soft the body is beside its stiffest part.
+An energy uᵀ K u is a sum of terms K_kk u_k² and of others that are no larger. Rounding leaves about eps times their sum
+instead of zero. A motion is free if its energy is below this rounding, however soft the body is compared with its
+stiffest part.
 """
 
 import numpy as np
@@ -15,8 +16,8 @@ from fe_models.foundation.words import node_list
 
 __all__ = ["free_motions", "mechanism_words", "moving_nodes", "rounding_of_energy", "without_energy"]
 
-WITHIN_ROUNDING = 30.0  #: energy in units of its rounding that is none: 0.01 to 1 of it is left of motions without any
-SUSPECT = 1e-6  #: energy of a direction, of the sum of K_kk u_k², above which it is certain
+WITHIN_ROUNDING = 30.0  #: energy below which a motion is free, in units of its rounding; free motions have 0.01 to 1
+SUSPECT = 1e-6  #: energy above which a direction is certainly not free, relative to the sum of K_kk u_k²
 
 
 def rounding_of_energy(body: FEBody, u: Array) -> Array:
@@ -25,12 +26,12 @@ def rounding_of_energy(body: FEBody, u: Array) -> Array:
 
 
 def free_motions(body: FEBody, X: Array, C: Array, S: Array, terms: Array, load: Array | None = None) -> Array:
-    """Return the motions in the span of X C that cost no energy, (n_dof, n_free).
+    """Return the motions in the span of X C without energy, (n_dof, n_free).
 
-    (1) directions v of S, scaled by the size of its terms; only those of small eigenvalues are suspect
-    (2) a suspect motion u = X C v costs the body nothing where uᵀ K u, of u itself, is within its rounding
-    (3) among these motions, those are free that cost the load nothing either: its energy vᵀ Cᵀ K_load C v is not lost
-        in the terms of all dofs of the body, and is compared with those of S alone
+    (1) eigenvectors v of S, scaled by the size of its terms; only those with small eigenvalues are suspect
+    (2) a suspect motion u = X C v has no strain energy in the body if uᵀ K u is within its rounding
+    (3) combinations of these motions are free if they have no energy in the load either. The load energy
+        vᵀ Cᵀ K_load C v does not suffer from the rounding of K, so it is compared with the terms of S alone
 
     Parameters
     ----------
@@ -39,7 +40,7 @@ def free_motions(body: FEBody, X: Array, C: Array, S: Array, terms: Array, load:
     S
         (X C)ᵀ K (X C) + Cᵀ K_load C, (m, m).
     terms
-        Sum of the terms K_kk x_k² of each column of X, or a part of it that tells its size, (k,).
+        Sum of the terms K_kk x_k² of each column of X, or a part of the sum that has its magnitude, (k,).
     load
         K_load, the stiffness of neighbours over the columns of X, (k, k); None if there are none.
     """
@@ -62,12 +63,12 @@ def free_motions(body: FEBody, X: Array, C: Array, S: Array, terms: Array, load:
 
 
 def without_energy(body: FEBody, u: Array) -> np.ndarray:
-    """Whether the strain energy of each motion is within its rounding, (k,) bool."""
+    """Return whether the strain energy of each motion is within its rounding, (k,) bool."""
     return np.asarray(dots(u, body.K @ u) < WITHIN_ROUNDING * rounding_of_energy(body, u))
 
 
 def mechanism_words(body: FEBody, u: Array) -> str:
-    """Say how many motions without energy there are besides the rigid ones, and where they are largest."""
+    """Describe the motions without energy besides the rigid ones: their number, and where they are largest."""
     several = u.shape[1] > 1
     return (
         f"body {body.name!r}: {u.shape[1]} motion{'s' if several else ''} besides the rigid ones "
@@ -81,5 +82,5 @@ def moving_nodes(body: FEBody, rows: IntArray, Phi: Array) -> str:
     is_translation = (body.dofs[rows, 1] >= 0) & (body.dofs[rows, 1] < 3)
     chosen = is_translation if is_translation.any() else np.ones(len(rows), bool)
     size = np.bincount(body.dofs[rows[chosen], 0], (Phi[chosen] ** 2).sum(axis=1), minlength=len(body.nodes))
-    order = np.argsort(-np.round(size / size.max(), 6), kind="stable")  # nodes that move alike: in their order
+    order = np.argsort(-np.round(size / size.max(), 6), kind="stable")  # nodes with equal motion keep their order
     return node_list(order[: min(3, np.count_nonzero(size))].tolist(), body.nodes)

@@ -1,8 +1,8 @@
 """The moments of a file against each other and against its shapes at the kept nodes.
 
-They are integrals over one mass of products of a = [1, c, phi_x, phi_y, phi_z], so their Gram matrix has no negative
-eigenvalue. Where the mass lies the file does not say; but masses at the kept nodes with the right sum and centre give
-moments that point the same way, wherever these are not small. A wrong sign does not.
+The moments are integrals over the mass of products of a = [1, c, phi_x, phi_y, phi_z], so their Gram matrix has no
+negative eigenvalue. The file does not hold the distribution of the mass. But masses at the kept nodes with the right
+sum and centre have moments of about the same direction, unless these are small. A wrong sign reverses the direction.
 """
 
 import numpy as np
@@ -16,8 +16,8 @@ from fe_models.foundation.arrays import Array
 __all__ = ["check_gram", "check_moments_of_shapes"]
 
 ROUNDING = 1e3 * np.finfo(float).eps  #: of the Gram matrix about the origin of B, relative
-LEAST_NODES = 60  #: that can stand for the mass of a body
-CLEAR = 0.1  #: of what the mass could carry, above which the direction of a moment is told
+LEAST_NODES = 60  #: smallest number of nodes that can represent the mass of a body
+CLEAR = 0.1  #: smallest moment whose direction is judged, relative to the largest that the mass could have
 
 
 def check_gram(reduced: ReducedBody) -> QualityRecord:
@@ -42,11 +42,12 @@ def check_gram(reduced: ReducedBody) -> QualityRecord:
 
 
 def check_moments_of_shapes(reduced: ReducedBody) -> QualityRecord:
-    """Moments point the way of those that masses at the kept nodes have with the shapes there.
+    """Moments have the direction of those of masses at the kept nodes, with the shapes there.
 
-    (1) masses nearest to equal ones with the right mass and centre
-    (2) P of each mode, and the parts of S_kl beside its trace, of these masses
-    (3) the cosine between these and those of the file, where both are at least `CLEAR` of what the mass could carry
+    (1) find the masses with the right sum and centre that are nearest to equal masses
+    (2) compute P of each mode, and S_kl without its trace, of these masses
+    (3) compute the cosine between these moments and those of the file, if both are at least `CLEAR` of the largest that
+        the mass could have
     """
     moments, nodes = reduced.moments, np.asarray(reduced.nodes)
     if moments.missing or len(nodes) < LEAST_NODES or not reduced.n_q:
@@ -77,7 +78,7 @@ def check_moments_of_shapes(reduced: ReducedBody) -> QualityRecord:
 
 
 def masses_at_nodes(reduced: ReducedBody) -> Array | None:
-    """Return masses nearest to equal ones with the right mass and centre, (n,); None: some would be negative."""
+    """Return the masses nearest to equal ones that have the right sum and centre, (n,); None if one is negative."""
     moments, L = reduced.moments, body_length(reduced)
     c = (np.asarray(reduced.nodes) - moments.center_of_mass) / L
     rows, equal = np.vstack([np.ones(len(c)), c.T]), np.full(len(c), 1 / len(c))
@@ -87,7 +88,7 @@ def masses_at_nodes(reduced: ReducedBody) -> Array | None:
 
 
 def cosines(a: Array, b: Array) -> Array:
-    """Return the cosine between columns of equal number, NaN where one is below `CLEAR`, (k,)."""
+    """Return the cosine between columns of the same index, (k,); NaN if one of both is shorter than `CLEAR`."""
     one, other = np.linalg.norm(a, axis=0), np.linalg.norm(b, axis=0)
     is_clear = (one > CLEAR) & (other > CLEAR)
     product = np.einsum("nk,nk->k", a, b)

@@ -1,4 +1,4 @@
-"""Recovery rows of a reduced body in rigid motions, and beside what the modes of the file give themselves."""
+"""Recovery rows of a reduced body in rigid motions, and compared with those that follow from the rest of the file."""
 
 import numpy as np
 
@@ -39,7 +39,7 @@ def check_recovery_forces(reduced: ReducedBody) -> QualityRecord:
                 own = rows[(table.dimensions[rows] == dimensions).all(axis=1)]
                 rigid = np.abs(table.dynamic[0][own, :N_RIGID] * lengths).max()
                 elastic = (np.abs(table.dynamic[0][own, N_RIGID:]) / np.where(shape > 0, shape, 1.0)).max(initial=0.0)
-                if quantity == "stress" and reduced.stress is not None:  # a place that is held rigid has none itself
+                if quantity == "stress" and reduced.stress is not None:  # a place in a rigid part has no stress
                     whole = np.abs(reduced.stress).max(axis=(0, 1), initial=0.0)
                     elastic = max(elastic, (whole / np.where(shape > 0, shape, 1.0)).max(initial=0.0))
                 key = f"{name}: {quantity}"
@@ -111,9 +111,10 @@ def known_place(reduced: ReducedBody, place: str) -> Array | None:
 
 
 def check_recovery_shapes(reduced: ReducedBody) -> QualityRecord:
-    """Rows of kept nodes, stress points and interfaces are those of the modes, stress and matrices of the file itself.
+    """Rows of kept nodes, stress points and interfaces follow from the modes, stress and matrices of the file.
 
-    Over the largest entry of their quantity, modes at unit strain energy; what only the model can give is left out.
+    Differences are divided by the largest entry of the quantity, over modes of unit strain energy. Rows that only the
+    model can give are left out.
     """
     if not reduced.recovery or not reduced.n_q:
         return information("recovery-shapes", NO_TABLE)
@@ -133,9 +134,10 @@ def check_recovery_shapes(reduced: ReducedBody) -> QualityRecord:
             elif quantity in MOTIONS:
                 order = MOTIONS.index(quantity)
                 a, b = a[order], b[order]
-            if quantity in MOTIONS:  # rotations times the size of the body; places that a frame holds do not move
+            if quantity in MOTIONS:  # rotations are multiplied by the size of the body
                 lengths = np.where(table.dimensions[own, 1] == 0, body_length(reduced), 1.0)
                 a, b = a * lengths[:, None], b * lengths[:, None]
+            # places that the frame holds do not move: their size is that of other places
             at_least = 1e-3 * float((mode_size(reduced) * by_energy).max()) if quantity in MOTIONS else 0.0
             size = np.maximum(np.abs(b).max(axis=(-2, -1), keepdims=True, initial=0.0), at_least)
             size = np.maximum(size, 1e-9 * size.max(initial=0.0))
@@ -149,7 +151,7 @@ def check_recovery_shapes(reduced: ReducedBody) -> QualityRecord:
 
 
 def rows_by_label(reduced: ReducedBody, table: RecoveryTable, quantity: str) -> tuple[IntArray, Array]:
-    """Return the rows of a quantity that the file can make itself, and these, (n,) and (3, n, 6 + n_q)."""
+    """Return the rows of a quantity that follow from the rest of the file, (n,), and their values, (3, n, 6 + n_q)."""
     loads, forces = loads_of_body(reduced)
     made: dict[str, Array] = {}
     rows = [k for k, each in enumerate(table.quantities) if each == quantity]
@@ -162,7 +164,7 @@ def rows_by_label(reduced: ReducedBody, table: RecoveryTable, quantity: str) -> 
                 part = interface_part(reduced, request, loads, forces)
             else:
                 part = kept_part(reduced, request, loads)
-        except RecoveryError:  # the file does not hold what it would be made of
+        except RecoveryError:  # the file lacks the data for these rows
             continue
         made |= {each.label: part.dynamic[:, k] for k, each in enumerate(part.names)}
     found = [k for k in rows if table.labels[k] in made]
@@ -172,7 +174,7 @@ def rows_by_label(reduced: ReducedBody, table: RecoveryTable, quantity: str) -> 
 
 
 def place_of(table: RecoveryTable, row: int) -> str | int:
-    """Return the node, point or interface that a row is of, as it is asked for."""
+    """Return the node, point or interface of a row, as a request names it."""
     words = table.labels[row].removeprefix(f"{table.entities[row]} ")
     place = words.removesuffix(f" {table.components[row]}").removesuffix(f" {table.quantities[row]}")
     node = place.partition(" skin ")[0]

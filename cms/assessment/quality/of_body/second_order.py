@@ -1,8 +1,8 @@
 """The geometric stiffness of a file against its own moments, interfaces and quadratic modes.
 
-A rotation theta of the whole body turns the stress of a load f with it, and the load that it is in balance with: over a
-rotation and a mode the geometric stiffness is (theta × f)·phi_k, which follows from f alone (docs/theory.md §7). The
-displacement of second order of a reference point is minus the geometric stiffness of a unit force there.
+A rotation theta of the whole body also rotates the stress of a load f, and the load that balances it. Between a
+rotation and a mode, the geometric stiffness is therefore (theta × f)·phi_k, which follows from f alone (docs/theory.md
+§7). The second-order displacement of a reference point is minus the geometric stiffness of a unit force there.
 """
 
 from collections.abc import Iterator
@@ -20,12 +20,12 @@ from fe_models.meshes.mesh import SOLID_TYPES
 
 __all__ = ["check_second_order", "check_turned_loads", "turned_loads"]
 
-ROUNDING = 100 * np.finfo(float).eps  #: of moments of a body, relative, where its distance is its size
-NEGLIGIBLE = 1e-3  #: of the size that a field could have, below which its own size does not count
+ROUNDING = 100 * np.finfo(float).eps  #: relative, of moments; times the square of distance over size of the body
+NEGLIGIBLE = 1e-3  #: smallest size that a difference is divided by, relative to the size that the field could have
 
 
 def check_second_order(reduced: ReducedBody) -> QualityRecord:
-    """Matrices of forces at interfaces are minus the quadratic modes of their nodes, over modes of unit energy."""
+    """Force matrices of interfaces are minus the quadratic modes of their nodes, over modes of unit strain energy."""
     geometric = reduced.geometric
     if geometric is None or reduced.quadratic is None or not (np.diag(reduced.K) > 0).all():
         return information("second-order", "the file has no quadratic modes, or modes without stiffness")
@@ -38,10 +38,10 @@ def check_second_order(reduced: ReducedBody) -> QualityRecord:
 
 
 def check_turned_loads(reduced: ReducedBody) -> QualityRecord:
-    """Turned loads follow from the moments: the difference over the sum of both, modes at unit strain energy.
+    """Turned loads follow from the moments: the difference over the sum of both, over modes of unit strain energy.
 
-    Exact for solids but for the quadrature of distorted cells. Nodes that turn take a couple beside a force, which
-    counts by half when it is turned, and of beams and shells the moments are as small where they bend: not judged.
+    This is exact for solids, except for the quadrature of distorted cells. Beams and shells are not judged: their nodes
+    also take couples, which count by half when they are turned, and their turned loads in bending are as small as that.
     """
     geometric = reduced.geometric
     if geometric is None or geometric.turned is None or not reduced.n_q or not (np.diag(reduced.K) > 0).all():
@@ -86,7 +86,7 @@ def turned_defects(reduced: ReducedBody, geometric: GeometricStiffness) -> Itera
 
 
 def quadratic_defects(reduced: ReducedBody, geometric: GeometricStiffness) -> Iterator[tuple[str, float]]:
-    """Yield the largest difference of force matrices of interfaces from minus the second order of their nodes."""
+    """Yield the largest difference of the force matrix of each interface from minus its quadratic modes."""
     if reduced.quadratic is None:
         return
     by_energy = 1 / np.sqrt(np.diag(reduced.K))
@@ -97,20 +97,20 @@ def quadratic_defects(reduced: ReducedBody, geometric: GeometricStiffness) -> It
         interface = reduced.interfaces[k]
         distance = np.linalg.norm(reduced.nodes - interface.position, axis=1)
         if interface.kind == "nodes" or not len(distance) or distance.min() > 1e-9 * length:
-            continue  # not a node that the file keeps
+            continue  # the file does not keep this node
         own = np.flatnonzero(distance <= 1e-9 * length)
         second = np.asarray(reduced.quadratic)[own] + geometric.of_interface(k)[:3]
-        apart = (np.abs(second) * weights).max(axis=(1, 2, 3)).min()  # of several nodes there the nearest
+        apart = (np.abs(second) * weights).max(axis=(1, 2, 3)).min()  # the best of several nodes at this place
         yield f"quadratic modes at {interface.name!r}", float(apart / (largest or 1.0))
 
 
 def turned_loads(reduced: ReducedBody, geometric: GeometricStiffness) -> Array | None:
-    """Return (e_x × f_j)·phi_k of all unit loads in balance, (12 + 6 n_loaded, 3, n_q); None where it is not known.
+    """Return (e_x × f_j)·phi_k of all unit loads with their reactions, (12 + 6 n_loaded, 3, n_q); None if unknown.
 
     (1) loads A c + b per mass, forces and moments at interfaces
     (2) in a Tisserand frame the reaction is a rigid-body acceleration; in a nodal frame it acts on the interface that
-        does not move, and has no work
-    (3) forces per mass turn with P and 1C, those at interfaces with Psi; a moment that is turned counts by half
+        does not move, and does no work
+    (3) the work of turned forces per mass follows from P and 1C, at interfaces from Psi; of a turned moment half counts
     """
     moments, frame = reduced.moments, reduced.frame
     kinds = {each.name: each.kind for each in reduced.interfaces}
@@ -153,5 +153,5 @@ def is_solid(reduced: ReducedBody) -> bool:
 
 
 def reach(reduced: ReducedBody) -> float:
-    """Return the size of the body, or the farthest distance of a node from the origin of B where that is more [m]."""
+    """Return the larger of the size of the body and the largest distance of a node from the origin of B [m]."""
     return max(body_length(reduced), float(np.linalg.norm(reduced.nodes, axis=1).max(initial=0.0)))

@@ -1,12 +1,12 @@
-"""Everything that a modal file holds against its model, in the file's own modes.
+"""Compare every field of a modal file with its model, in the file's own modes.
 
-(1) the modes of the file over all dofs of the model, Phi, as its kept nodes tell them (`full_shapes`)
-(2) each field afresh from the model and Phi, by the functions that `reduce` makes it with
-(3) the largest difference over the size of the field; stiffness and stress over modes of unit energy, inertia over
+(1) find the modes of the file over all dofs of the model, Phi, from their values at the kept nodes (`full_shapes`)
+(2) compute each field from the model and Phi, by the functions that `reduce` uses
+(3) divide the largest difference by the size of the field; stiffness and stress over modes of unit energy, inertia over
     modes of unit mass
 
-No second reduction is compared, so signs, order and frame of the modes are free. With more than `FEW` modes what costs
-much is compared in `PROBES` random combinations of them, in which every mode has a part.
+The body is not reduced a second time, so signs, order and frame of the modes are free. If there are more than `FEW`
+modes, the expensive fields are compared in `PROBES` random combinations, and every mode is part of each.
 """
 
 from collections.abc import Callable, Iterator
@@ -40,7 +40,7 @@ from cms.reduction.geometric_stiffness.unit_states import has_geometric_stiffnes
 from cms.reduction.recovery.load_columns import forces_of_loads
 from cms.reduction.recovery.matrices import recovery_of_model
 from cms.reduction.recovery.request import OF_INTERFACES, OF_MOTION, RecoveryRequest
-from cms.reduction.reduction import assembled, kept_nodes, reduced_moments
+from cms.reduction.reduction import assembled, kept_nodes, reduced_damping, reduced_moments
 from fe_models.body.fe_body import FEBody
 from fe_models.errors import FeModelsError
 from fe_models.foundation.arrays import Array, IntArray
@@ -48,26 +48,26 @@ from fe_models.foundation.tall.on_disk import in_memory
 
 __all__ = ["CONTENTS", "ReductionOptions", "contents_records"]
 
-FEW = 24  #: modes up to which each is compared by itself
-PROBES = 12  #: combinations of more modes
-FEW_NODES = 20  #: up to which quadratic modes are compared node by node
-NODE_PROBES = 8  #: combinations of the forces at more nodes
-NEGLIGIBLE = 1e-3  #: of the size that a field could have, below which its own size does not count
-ROUGH = 1e5  #: times the limit, for geometric stiffness that went over from another frame
+FEW = 24  #: largest number of modes that are compared one by one
+PROBES = 12  #: number of combinations if there are more modes
+FEW_NODES = 20  #: largest number of nodes whose quadratic modes are compared one by one
+NODE_PROBES = 8  #: number of combinations if there are more nodes
+NEGLIGIBLE = 1e-3  #: smallest size that a difference is divided by, relative to the size that the field could have
+ROUGH = 1e5  #: factor on the limit for geometric stiffness that was converted from another frame
 STRESS = (1.0, -1.0, -2.0)  #: exponents of mass, length and time
-CONVERTED = "frame converted from"  #: provenance of a file that was carried to another frame
-#: provenance that has to be that of the model and its mode set; paths, versions and solvers may differ
+CONVERTED = "frame converted from"  #: provenance of a file that was converted to another frame
+#: provenance that must agree with the model and its mode set; paths, versions and solvers may differ
 OF_ORIGIN = ("full dofs", "mode set", "mode set columns", "mode set n_modes", "mesh sha256", "deck sha256")
 
 
 @dataclass(frozen=True)
 class ReductionOptions:
-    """What a file is meant to hold: the options of `reduce` that its job names."""
+    """The options of `reduce` in the job of a file, which say what the file should hold."""
 
     damping: Damping | None = None
     frame: Frame | HeldFrame | None = None
     stress: bool = True
-    geometric: bool | tuple[str, ...] = False  #: whether the stiffness is made, or at which interfaces
+    geometric: bool | tuple[str, ...] = False  #: whether there is geometric stiffness, or the loaded interfaces
     quadratic: bool = False
     recovery: tuple[RecoveryRequest, ...] = ()
 
@@ -91,13 +91,13 @@ class Case:
 
     @cached_property
     def reach(self) -> float:
-        """The same, or the farthest distance of a node from the origin of B where that is more [m]."""
+        """The larger of `length` and the largest distance of a node from the origin of B [m]."""
         own = (self.body.nodes - self.reduced.frame.origin) @ self.reduced.frame.axes
         return max(self.length, float(np.linalg.norm(own, axis=1).max(initial=0.0)))
 
     @cached_property
     def combined(self) -> Array:
-        """Combinations of the modes in which they are compared: each, or some random ones, (n_q, k)."""
+        """Coefficients of the compared shapes: each mode, or random combinations of all modes, (n_q, k)."""
         n = self.reduced.n_q
         if n <= FEW:
             return np.eye(n)
@@ -106,45 +106,49 @@ class Case:
 
     @cached_property
     def by_energy(self) -> Array:
-        """The same of modes of unit strain energy, (n_q, k)."""
+        """`combined` over modes of unit strain energy, (n_q, k)."""
         stiffness = np.diag(self.reduced.K)
         return self.combined / np.sqrt(np.where(stiffness > 0, stiffness, 1.0))[:, None]
 
     @property
     def axes_words(self) -> str:
-        """What an axis over the combinations counts."""
+        """Name of one compared shape."""
         return "mode" if self.reduced.n_q <= FEW else "combination"
 
     @cached_property
     def condition(self) -> FrameCondition:
-        """The frame that the file names, made of the model."""
+        """The frame that the file names, evaluated for the model."""
         return frame_condition(self.body, named_frame(self.reduced.frame))
 
     @cached_property
     def keeping(self) -> FEBody:
-        """The model that keeps what the file keeps with rotations."""
+        """The model, which also keeps the nodes whose rotations the file holds."""
         kept = self.reduced.kept
         own = np.zeros(0, np.int64) if kept is None else self.reduced.node_ids[kept.nodes]
         return replace(self.body, kept=np.union1d(self.body.kept, own).astype(np.int64))
 
     @cached_property
     def node_ids(self) -> IntArray:
-        """Nodes that the file has to keep, with those that it does."""
+        """Nodes that the file must keep, and nodes that it keeps."""
         return np.union1d(self.reduced.node_ids, kept_nodes(self.keeping)).astype(np.int64)
 
     @cached_property
-    def expected(self) -> ReducedBody:
-        """What follows from model and modes without much work; moments and columns are those of the file."""
-        n, frame = self.reduced.n_q, self.reduced.frame
-        none = np.zeros((self.body.n_dof, 0))
-        finished = FinishedBasis(
+    def finished(self) -> FinishedBasis:
+        """The modes over all dofs with the matrices and columns of the file."""
+        n = self.reduced.n_q
+        return FinishedBasis(
             self.Phi, self.reduced.M, self.reduced.K,
             self.reduced.columns or SourceColumns(("",), ("",), np.zeros((1, n)), np.zeros((1, n))),
             dropped=(), n_rigid=0, free_omega2=np.zeros(0),
         )  # fmt: skip
-        condition = FrameCondition(frame, lambda columns: none, none, none, none, np.zeros(3))
+
+    @cached_property
+    def expected(self) -> ReducedBody:
+        """The fields that follow from model and modes with little work; moments and columns are those of the file."""
+        none = np.zeros((self.body.n_dof, 0))
+        condition = FrameCondition(self.reduced.frame, lambda columns: none, none, none, none, np.zeros(3))
         made = assembled(
-            self.keeping, self.modes, finished, condition, kept=self.node_ids, moments=self.reduced.moments
+            self.keeping, self.modes, self.finished, condition, kept=self.node_ids, moments=self.reduced.moments
         )
         D, _ = wanted_damping(self)
         return replace(made, D=self.reduced.D if D is None else D)
@@ -159,14 +163,14 @@ def contents_records(
     basis: FreeBasis,
     options: ReductionOptions | None = None,
 ) -> tuple[QualityRecord, ...]:
-    """Return a record for each of `CONTENTS`: what the file holds against what the model makes of its modes.
+    """Return a record for each of `CONTENTS`, which compares the file with its model.
 
     Parameters
     ----------
     shapes
         The file's modes over all dofs of the model; None: its kept nodes do not determine them.
     options
-        What the file was asked to hold; None: damping as its provenance says, and no recovery tables are compared.
+        What the file should hold. None: the damping named in the provenance; recovery tables are not compared.
     """
     if shapes is None:
         return tuple(information(name, "the file does not tell its modes over the whole body") for name in CONTENTS)
@@ -175,7 +179,7 @@ def contents_records(
 
 
 def record_of(name: str, case: Case, compare: Callable[[Case], Iterator[Compared]]) -> QualityRecord:
-    """Return the record of some fields."""
+    """Return the record of the fields that one function compares."""
     found: list[Compared] = []
     try:
         found += compare(case)
@@ -185,10 +189,10 @@ def record_of(name: str, case: Case, compare: Callable[[Case], Iterator[Compared
         )
     if not found:
         return information(name, "the file holds none, and none was asked for")
-    worst = max(found, key=lambda each: np.inf if np.isnan(each.defect) else each.defect)
+    worst = found[int(np.argmax([each.defect for each in found]))]  # not a number counts as the largest
     data: dict[str, float] = {}
     for each in found:
-        data[each.field] = max(data.get(each.field, 0.0), each.defect)
+        data[each.field] = float(np.maximum(data.get(each.field, 0.0), each.defect))
     at = f" ({worst.where})" if worst.where else ""
     reason = f"{worst.field}{at}: {worst.doubt}" if worst.doubt else ""
     if not reason:
@@ -197,7 +201,7 @@ def record_of(name: str, case: Case, compare: Callable[[Case], Iterator[Compared
 
 
 def missing(field: str, where: str = "") -> Compared:
-    """Return what is said of a field that the file has to hold and does not."""
+    """Return the result for a field that the file should hold but lacks."""
     return Compared(field, np.inf, where, "the file does not hold it")
 
 
@@ -233,7 +237,7 @@ def compare_points(case: Case) -> Iterator[Compared]:
 
 
 def compare_frame(case: Case) -> Iterator[Compared]:
-    """Whether the modes satisfy the frame that the file names."""
+    """The modes in the condition of the frame that the file names."""
     frame, made = case.reduced.frame, case.condition.frame
     C = case.condition.rigid_part(case.Phi)
     scale = np.repeat([1.0, case.length], 3)[: len(C)]
@@ -297,9 +301,9 @@ def compare_sums(case: Case) -> Iterator[Compared]:
 
 
 def compare_moments(case: Case) -> Iterator[Compared]:
-    """All moments of the modes, with which 1C to 5C go, over what a mode of unit mass could have.
+    """All moments of the modes, relative to the largest that a mode of unit mass could have; 1C to 5C follow from them.
 
-    1C and 2C by the full mass matrix too, which has them exactly of any body.
+    1C and 2C are also computed from the full mass matrix, which gives them exactly for any body.
     """
     file, R = case.reduced.moments, case.combined
     frame = case.reduced.frame
@@ -314,7 +318,7 @@ def compare_moments(case: Case) -> Iterator[Compared]:
         yield same("moments.is_exact", file.is_exact, made.is_exact)
     yield same("moments.missing", file.missing, made.missing)
     if not made.is_exact and CONVERTED in case.reduced.provenance:
-        return  # what matrices alone tell of them depends on the frame
+        return  # moments that are only approximated from matrices depend on the frame
     word = case.axes_words
     yield apart("moments.C1", file.C1 @ R, made.C1, size, axes=f"component {word}")
     P = known_P(made.P, file.missing)
@@ -324,7 +328,7 @@ def compare_moments(case: Case) -> Iterator[Compared]:
 
 
 def compare_damping(case: Case) -> Iterator[Compared]:
-    """The damping matrix over modes of one frequency: that of the model, and what the job or the provenance adds."""
+    """The damping matrix, scaled by frequency: damping of the model plus that of the job or the provenance."""
     D, words = wanted_damping(case)
     if D is None:
         return
@@ -337,7 +341,7 @@ def compare_damping(case: Case) -> Iterator[Compared]:
 
 
 def wanted_damping(case: Case) -> tuple[Array | None, str]:
-    """Return the damping matrix that the file should have, and where it comes from; None where that is not known."""
+    """Return the damping matrix that the file should have, and its origin in words; None if it is unknown."""
     reduced, options = case.reduced, case.options
     told = reduced.provenance.get("damping", "none")
     damping, words = damping_of_words(told), f"provenance: {told}"
@@ -347,7 +351,7 @@ def wanted_damping(case: Case) -> tuple[Array | None, str]:
         asked = str(options.damping) if options.damping else "none"
         if asked == told:
             return carried_damping(case, options.damping, options.frame), f"the job: {asked}, carried to this frame"
-        # of new modes, in place of all that was there
+        # the conversion replaced all damping by that of the new modes
         return None if damping is None else modal_damping(
             damping, reduced.M, reduced.K, second=reduced.units.time
         ), words
@@ -355,25 +359,16 @@ def wanted_damping(case: Case) -> tuple[Array | None, str]:
         damping, words = options.damping, f"the job: {options.damping or 'none'}"
     elif damping is None and told != "none":
         return None, ""
-    return damping_of(case.body, case.Phi, damping, reduced.M, reduced.K), words
-
-
-def damping_of(body: FEBody, Phi: Array, damping: Damping | None, M: Array, K: Array) -> Array:
-    """Return the damping of the model over shapes and what is added to it, (n_q, n_q)."""
-    D = np.zeros(K.shape) if damping is None else modal_damping(damping, M, K, second=body.units.time)
-    if body.D is not None:
-        of_model = Phi.T @ (body.D @ Phi)
-        D = D + (of_model + of_model.T) / 2
-    return D
+    return reduced_damping(case.body, case.finished, damping), words
 
 
 def carried_damping(case: Case, damping: Damping | None, frame: Frame | HeldFrame | None) -> Array:
-    """Return Tᵀ D T of the modes in the frame of the job, Phi_job T = Phi but for rigid motion."""
+    """Return Tᵀ D T, D over the modes in the frame of the job; Phi_job T = Phi up to rigid motion."""
     old = frame or named_frame(replace(case.reduced.frame, kind="tisserand", at=""))
     finished = finished_in(case.body, case.basis, old)
     Phi = in_memory(finished.Phi)
     T = (Phi.T @ (case.body.K @ case.Phi)) / np.diag(finished.K)[:, None]
-    return np.asarray(T.T @ damping_of(case.body, Phi, damping, finished.M, finished.K) @ T)
+    return np.asarray(T.T @ reduced_damping(case.body, finished, damping) @ T)
 
 
 # Loads, stress, columns -----------------------------------------------------------------------------------------------
@@ -394,9 +389,9 @@ def compare_load_cases(case: Case) -> Iterator[Compared]:
 
 
 def compare_sources(case: Case) -> Iterator[Compared]:
-    """Labels and shares by the columns on record; these by the mode set, up to the scale of each column.
+    """Labels and shares by the columns of the file; the columns by the mode set, up to a scale for each column.
 
-    The forces F of a mode on the columns V are VᵀK Phi, its coordinates A give it back, V A = Phi but for rigid motion.
+    The forces of the modes on the columns V are F = VᵀK Phi; the coordinates A satisfy V A = Phi up to rigid motion.
     """
     file = case.reduced
     if file.columns is None:
@@ -414,7 +409,7 @@ def compare_sources(case: Case) -> Iterator[Compared]:
     G, F, A = V.T @ K_Phi, np.asarray(file.columns.F) @ Z, np.asarray(file.columns.A) @ Z
     energy = np.einsum("nc,nc->c", V, case.body.K @ V)
     works = energy > SUSPECT_ENERGY * rounding_of_energy(case.body, V)  # the others are rigid-body motions
-    works &= np.asarray(file.columns.F).any(axis=1)  # a column without forces is on record as zero
+    works &= np.asarray(file.columns.F).any(axis=1)  # the file stores zeros for a column without forces
     size = np.where(works, np.sqrt(np.maximum(energy, 0.0)), np.inf)
     own = np.einsum("ck,ck->c", F, F)
     scale = np.divide(np.einsum("ck,ck->c", G, F), own, out=np.zeros_like(own), where=works & (own > 0))
@@ -478,8 +473,8 @@ def compare_recovery(case: Case) -> Iterator[Compared]:
 def compare_table(case: Case, own: RecoveryTable, made: RecoveryTable) -> Iterator[Compared]:
     """Rows of one table, those of a quantity and dimension together.
 
-    Of a file that was carried to another frame the static part stays that of the first frame, whose reaction it has;
-    positions, velocities and accelerations are compared alone.
+    A file that was converted to another frame keeps the static part of its first frame, with the reaction there. Only
+    its positions, velocities and accelerations are compared.
     """
     is_carried = CONVERTED in case.reduced.provenance
     name = own.name
@@ -508,7 +503,7 @@ def compare_table(case: Case, own: RecoveryTable, made: RecoveryTable) -> Iterat
             rows = of_quantity[(own.dimensions[of_quantity] == dimensions).all(axis=1)]
             where, axes = f"{name}: {quantity}", f"row {case.axes_words}"
             a, b = own.dynamic[:, rows] @ X, made.dynamic[:, rows] * scaled
-            anywhere = typical.get((quantity, float(dimensions[1])), 0.0)  # places that are held have none
+            anywhere = typical.get((quantity, float(dimensions[1])), 0.0)  # places that are held do not move
             first = max(np.abs(b[0]).max(initial=0.0), 0.0 if quantity in OF_MOTION else anywhere)
             for order in range(3):
                 if is_carried and order and quantity not in OF_MOTION:
@@ -522,7 +517,7 @@ def compare_table(case: Case, own: RecoveryTable, made: RecoveryTable) -> Iterat
                 yield apart("recovery.dynamic", a[order], b[order], size, f"{where}, order {order}", axes)
             if is_carried:
                 continue
-            # what modes of the same force answer, beside which a small remainder is small
+            # response of the modes to the same force; a static remainder far below it is negligible
             static = own.dynamic[0][rows][:, N_RIGID:] @ (loads / np.diag(reduced.K)[:, None])
             answer = max((np.abs(static).max(axis=0, initial=0.0) / force).max(initial=0.0), anywhere * strength)
             if quantity in OF_INTERFACES:
@@ -557,7 +552,7 @@ def force_of_load(case: Case, load: str) -> float:
 
 
 def compare_geometric(case: Case) -> Iterator[Compared]:
-    """Geometric stiffness of modes of unit strain energy: the inverse of the load that buckles, kind by kind."""
+    """Geometric stiffness over modes of unit strain energy (an inverse buckling load), for each kind of load."""
     file = case.reduced.geometric
     asked = False if case.options is None else case.options.geometric
     if file is None:
@@ -580,7 +575,7 @@ def compare_geometric(case: Case) -> Iterator[Compared]:
     unit = np.abs(np.asarray(made.interfaces)[:, :3]).max(initial=0.0)  # of a unit force
     force = {"translation": m, "rotation": m * L, "spin": m * L, "interfaces": 1.0}
     by_axis = np.array([1.0, 1, 1, L, L, L])[:, None, None]
-    # how followers turn loads is not on record, nor the quadrature of their cells: in another frame it is not exact
+    # the file lacks the rotations of followers and the quadrature of cells, so the conversion to a frame is not exact
     is_carried = CONVERTED in case.reduced.provenance
     for name in UNIT_LOADS:
         kind = by_axis if name == "interfaces" else 1.0
@@ -604,7 +599,7 @@ def compare_geometric(case: Case) -> Iterator[Compared]:
 
 
 def compare_quadratic(case: Case) -> Iterator[Compared]:
-    """Displacement of second order of modes of unit strain energy, node by node or in combinations of nodes."""
+    """Second-order displacement over modes of unit strain energy, for each node or for combinations of nodes."""
     file = case.reduced.quadratic
     if file is None:
         if case.options is not None and case.options.quadratic and CONVERTED not in case.reduced.provenance:
@@ -622,7 +617,7 @@ def compare_quadratic(case: Case) -> Iterator[Compared]:
 
 
 def compare_origin(case: Case) -> Iterator[Compared]:
-    """Name, mode set and digests of what the file was made of."""
+    """Name, mode set and digests of the input of the file."""
     yield same("name", case.reduced.name, case.body.name)
     own, made = case.reduced.provenance, case.expected.provenance
     yield Compared("provenance", 0.0)
@@ -631,7 +626,7 @@ def compare_origin(case: Case) -> Iterator[Compared]:
             yield same("provenance", own[key], made[key], key)
 
 
-#: record -> how its fields are compared, in the order of the verdicts
+#: the function that compares the fields of each record, in the order of the verdicts
 CONTENTS: dict[str, Callable[[Case], Iterator[Compared]]] = {
     "points": compare_points,
     "frame": compare_frame,

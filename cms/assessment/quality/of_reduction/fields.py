@@ -1,7 +1,7 @@
-"""What a modal file holds, field by field, and the verdict that compares each with the model.
+"""The fields of a modal file, and the verdict that compares each with the model.
 
-Every field of `ReducedBody`, and of the records in it, stands in `FIELDS` with the record that judges it; a field that
-is new and has none fails a test (tests/cms/assessment/quality/of_reduction/test_contents.py).
+`FIELDS` names for every field of `ReducedBody`, and of the records in it, the record that judges it. A new field
+without a record fails a test (tests/cms/assessment/quality/of_reduction/test_contents.py).
 """
 
 from collections.abc import Mapping
@@ -113,22 +113,22 @@ FIELDS: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class Compared:
-    """A field of a file beside that of the model."""
+    """The comparison of a field of a file with that of the model."""
 
     field: str  #: as in `FIELDS`
-    defect: float  #: largest difference over the size that its norm gives; infinite for words and counts that differ
-    where: str = ""  #: of the largest difference, in words
-    doubt: str = ""  #: what differs, where no number says it
+    defect: float  #: largest difference relative to the size of the field; infinite for words and counts that differ
+    where: str = ""  #: place of the largest difference, in words
+    doubt: str = ""  #: the difference in words, if it is not one of numbers
 
 
 def leaves(value: Any, path: str = "") -> dict[str, list[Any]]:
     """Return the values of all fields of a record and of the records in it, by the path of the field.
 
-    Records in a tuple, or by name in a mapping, share their paths; a record that is not there has no fields.
+    Records in a tuple or mapping share their paths; a missing record has no fields.
     """
     found: dict[str, list[Any]] = {}
     if value is None and path not in FIELDS:
-        return found  # a record that is not there
+        return found  # a missing record
     if is_dataclass(value) and path not in ("units", "recovery.system"):
         for each in fields(value):
             for name, values in leaves(getattr(value, each.name), f"{path}.{each.name}".removeprefix(".")).items():
@@ -148,7 +148,7 @@ def leaves(value: Any, path: str = "") -> dict[str, list[Any]]:
 
 
 def same(field: str, got: Any, wanted: Any, where: str = "") -> Compared:
-    """Compare words, counts and indices, which are the same or not."""
+    """Compare words, counts and indices, which must be equal."""
     if isinstance(got, np.ndarray) or isinstance(wanted, np.ndarray):
         is_same = np.array_equal(np.asarray(got), np.asarray(wanted))
     else:
@@ -162,12 +162,13 @@ def same(field: str, got: Any, wanted: Any, where: str = "") -> Compared:
 
 
 def apart(field: str, got: Array, wanted: Array, size: Array | float, where: str = "", axes: str = "") -> Compared:
-    """Compare numbers: the largest difference over a size that broadcasts with them.
+    """Compare numbers: the largest difference divided by a size that broadcasts with them.
 
     Parameters
     ----------
     axes
-        What the axes of the arrays count, in words, to name the place of the largest difference: "mode mode".
+        Words for the axes of the arrays, such as "mode mode", that name the place of the largest difference; "-" for an
+        axis that is not named.
     """
     got, wanted = np.asarray(got), np.asarray(wanted)
     if got.shape != wanted.shape:
@@ -176,7 +177,7 @@ def apart(field: str, got: Array, wanted: Array, size: Array | float, where: str
     if not difference.size:
         return Compared(field, 0.0, where)
     size = np.broadcast_to(np.asarray(size, dtype=float), difference.shape)
-    relative = np.divide(difference, size, out=np.where(difference > 0, np.inf, 0.0), where=size > 0)
+    relative = np.divide(difference, size, out=np.where(difference == 0, 0.0, np.inf), where=size > 0)
     at = np.unravel_index(int(np.argmax(relative)), relative.shape)
     words = [f"{word} {place + 1}" for word, place in zip(axes.split(), at, strict=False) if word != "-"]
     return Compared(field, float(relative[at]), ", ".join(filter(None, [where, *words])))

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import eigh
 from typer.testing import CliRunner
 
@@ -64,6 +64,22 @@ def test_masses_rigid_groups_and_loads_of_a_deck_are_in_the_body(tmp_path):
     assert_allclose(force @ sink, -2.0, rtol=1e-12)
     leader = body.dofs[np.flatnonzero(body.dofs[:, 1] == 3)[0], 0]
     assert_allclose(body.nodes[leader], [1.2, 0.05, 0.04], rtol=1e-14)
+
+
+def test_a_mass_of_a_deck_names_its_node_by_number(tmp_path):
+    """The number of a node of this deck is its row plus one."""
+    path = deck_of(tmp_path, "*NSET, NSET=tip\n7\n", kind="hexahedron")
+    toml = path.with_suffix(".toml")
+    job_of(path)
+    plain = toml.read_text()
+    M = {}
+    for node in ("7", '"tip"'):
+        toml.write_text(plain + f"\n[masses.bob]\nnode = {node}\nmass = 5.0\n")
+        M[node] = uncoupled_body(read_job(toml), Stages()).M
+    assert_array_equal(M["7"].toarray(), M['"tip"'].toarray())
+    toml.write_text(plain + "\n[masses.bob]\nnode = 901\nmass = 5.0\n")
+    with pytest.raises(JobError, match=r"masses\.bob\.node = 901: the deck has 0 nodes with this number"):
+        uncoupled_body(read_job(toml), Stages())
 
 
 def test_pressure_of_a_deck_has_the_resultant_of_its_faces(tmp_path):

@@ -12,7 +12,7 @@ import cms
 import fe_models as fm
 from cms.assessment.quality.body_check import check_body
 from cms.assessment.quality.of_reduction.contents import CONTENTS, Case, ReductionOptions, contents_records, record_of
-from cms.assessment.quality.of_reduction.fields import FIELDS, leaves
+from cms.assessment.quality.of_reduction.fields import FIELDS, Compared, apart, leaves
 from cms.assessment.quality.of_reduction.full_shapes import full_shapes, same_body_record
 from cms.assessment.quality.of_reduction.mass_properties import check_mass_properties
 from cms.assessment.quality.reduction_check import check_reduction
@@ -222,3 +222,12 @@ def test_other_words_are_no_damping(words):
 def test_a_random_sound_body_raises_no_alarm_and_a_spoilt_one_does(seed, tmp_path):
     verdict = verdict_case(seed, tmp_path)
     assert verdict.kind == ACCEPTED, verdict.words
+
+
+@pytest.mark.parametrize("size", [0.0, 1.0, np.nan])
+def test_a_number_that_is_none_is_never_equal(size):
+    found = apart("D", np.array([1.0, np.nan]), np.array([1.0, 2.0]), size)
+    assert not found.defect <= 1e300
+    record = record_of("damping-matrix", None, lambda _: iter([Compared("K", 1e-16), found, Compared("D", 0.0)]))
+    assert record.verdict == "fail"
+    assert not record.data["fields"]["D"] <= 1e300
