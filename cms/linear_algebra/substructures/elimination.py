@@ -53,7 +53,7 @@ class Substructure:
     def solve_own(self, f: Array) -> None:
         """Overwrite f, (s, k) in C order, with K_ss⁻¹ f."""
         if self.pivots is not None:
-            # SciPy shifts pivots in place, to count from 1, and LAPACK runs without the lock: threads may not share them
+            # SciPy shifts pivots in place to count from 1, and LAPACK runs without the lock: threads may not share them
             f[:] = la.lu_solve((self.L, self.pivots.copy()), f, check_finite=False)
             return
         solve_triangular(self.L, f.T, transposed=True, right=True)
