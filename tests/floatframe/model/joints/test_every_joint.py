@@ -33,10 +33,13 @@ from floatframe import (
 )
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.newton_equations import displaced, set_iterate
-from floatframe.engine.kernels.entry import evaluate_and_linearize, rates_of_constraints
+from floatframe.engine.kernels.compiler.compilation import entry
+from floatframe.engine.kernels.compiler.structure import kept_table_of
+from floatframe.engine.kernels.connections.connection import write_held_rates
+from floatframe.engine.kernels.entry import as_model, as_work, evaluate_and_linearize, rates_of_constraints
 from floatframe.engine.kernels.work import new_work
 from floatframe.model.functions.time_functions import harmonic, polynomial_of_time
-from floatframe.model.joints.rows import is_held, is_held_velocity
+from floatframe.model.joints.rows import is_held, is_held_position, is_held_velocity
 from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_exp, rotation_matrix
 from floatframe.results.joint_coordinates import joint_coordinate, joint_coordinates
 from tests.floatframe.engine.kernels.test_tangent import C_K, Iterate, newton_matrices, turned_triad
@@ -308,3 +311,28 @@ def test_coordinates_of_driven_joints_are_their_motions_and_forces_those_of_newt
     assert_allclose(turned.force, -0.7 * 16 * turned.value, rtol=0, atol=2e-4)
     with pytest.raises(ResultsError, match="no coordinate 'turn'"):
         joint_coordinate(one, integrate(one, GeneralizedAlpha(), 0.01, 1e-3), "hub", "turn")
+
+
+def cheap_rates(model_table, work_table):
+    model, work = as_model(model_table), as_work(work_table)
+    for c in range(model.connections.size.shape[0]):
+        write_held_rates(model, work, c, work.connections.rate)
+
+
+compiled_cheap_rates = entry(cheap_rates, cache=False)  # inner functions have no machine code of their own
+
+
+@pytest.mark.parametrize("make", CASES)
+def test_cheap_rates_of_held_positions_are_their_rates(make):
+    """At an open joint with any velocities; the second route is that which differences along a motion confirm."""
+    iterate = Iterate(pair(make), 1)
+    model, work = iterate.model, iterate.work
+    work.state.time[...] = 0.37
+    iterate.residual(np.zeros_like(iterate.u), np.zeros_like(iterate.w))
+    rate, _ = rates_of_constraints(model, work)
+    work.connections.rate[:] = np.nan
+    compiled_cheap_rates(kept_table_of(model), kept_table_of(work))
+    rows = is_held_position(model.rows.kind)
+    assert np.abs(rate[rows]).min() > 1e-3
+    assert_allclose(work.connections.rate[rows], rate[rows], rtol=0, atol=1e-12 * np.abs(rate).max())
+    assert np.isnan(work.connections.rate[~rows]).all()
