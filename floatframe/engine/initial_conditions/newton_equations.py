@@ -156,20 +156,20 @@ def highest_frequency(model: Model) -> float:
     return highest
 
 
-def modal_weight(model: Model, i: int) -> float:
-    """Return the factor s of the modal stiffness of a body in W of the module docstring."""
+def modal_weight(model: Model, i: int, stiff: float = STIFF) -> float:
+    """Return the factor of the modal stiffness of a body with which its softest mode weighs `stiff` times its mass."""
     M, K = modal_diagonals(model, i, MASS), modal_diagonals(model, i, STIFFNESS)
     elastic = (M > 0) & (K > 0)
     softest = np.min(K[elastic] / M[elastic]) if elastic.any() else (K.max() if K.size and K.max() > 0 else 1.0)
-    return float(STIFF / softest)
+    return float(stiff / softest)
 
 
 def with_modal_weight(model: Model, H: tuple[Array, ...], stiff: float = STIFF) -> tuple[Array, ...]:
-    """Return mass matrices with the modal stiffness added, scaled by `stiff` (W of the module docstring)."""
+    """Return mass matrices with the modal stiffness added, scaled by `stiff`: W of `initial`."""
     weighted = []
     for i, block in enumerate(H):
         block = block.copy()
-        block[6:, 6:] += stiff / STIFF * modal_weight(model, i) * modal_matrix(model, i, STIFFNESS)
+        block[6:, 6:] += modal_weight(model, i, stiff) * modal_matrix(model, i, STIFFNESS)
         weighted.append(block)
     return tuple(weighted)
 
