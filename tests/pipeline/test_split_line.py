@@ -168,6 +168,32 @@ def test_the_first_mode_keeps_its_damping_in_parts(beam, caplog, table):
     assert ("keeps its ratio 0.03" in files[0].read_text()) == told
 
 
+def test_damping_of_parts_is_in_the_time_unit_of_the_job(beam):
+    """The same beam in m-kg-s and in mm-kg-ms; limits of a ramp are in Hz in both."""
+    beta, words = [], []
+    for units in ("m-kg-s", "mm-kg-ms"):
+        job = beam(n_modes=8)
+        text = job.read_text()
+        text = text[: text.index("[masses.bob]")] + text[text.index("[load_cases") :]
+        if units == "mm-kg-ms":
+            table = job.with_name("nodes.csv")
+            head, *rows = [line.split(",") for line in table.read_text().splitlines()]
+            scaled = [[node, *(repr(1e3 * float(x)) for x in place), name] for node, *place, name in rows]
+            table.write_text("".join(",".join(row) + "\n" for row in [head, *scaled]))
+            for si, mm in (
+                ("m-kg-s", units), ("210e9", "210"), ("7850", "7850e-9"), ("0.03", "30"), ("0.004", "4"),
+                ("-9.81", "-9.81e-3"),
+            ):  # fmt: skip
+                text = text.replace(si, mm)
+        job.write_text(f"{text}\n[damping]\nramp = [[5, 0.2]]\nabove = 0.03\n")
+        part = split_job(SplitRequest(job, 3, folder=job.with_name(units)))[0]
+        beta.append(read_job(part).damping.damping.beta)
+        words += [line for line in part.read_text().splitlines() if "ratios belong to modes of one body" in line]
+    assert_allclose(beta[1], 1e3 * beta[0], rtol=1e-6)
+    assert words[0] == words[1]
+    assert "keeps its ratio 0.03" in words[0]
+
+
 SOLID = """
 [body]
 mesh = "{mesh}"
