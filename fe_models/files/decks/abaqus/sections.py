@@ -284,13 +284,17 @@ def _to_ground(block: DeckBlock, draft: Draft, of_set: PointElements) -> None:
         draft.ledger.refuse(of_set.kind, why, line=block.line_number)
         return
     value = numbers(block.lines[1])[0]
+    first = component - component % 3
+    is_turned = TURNED in block.parameters  # with its instance: its axis takes all three components in basic axes
+    components = range(first, first + 3) if is_turned else (component,)
+    along = MOTION_COMPONENTS[component] + (" along axes of its instance" if is_turned else "")
     for (node,) in of_set.rows.values():
         why = (
-            f"ties {MOTION_COMPONENTS[component]} of node {node} to the ground with {value:g}; the body is free here: "
-            "put it into the system file"
+            f"ties {along} of node {node} to the ground with {value:g}; the body is free here: put it into the system "
+            "file"
         )
         draft.ledger.note(of_set.kind, why, line=block.line_number)
-        draft.held.setdefault(node, {}).setdefault(GROUNDED, set()).add(component)
+        draft.held.setdefault(node, {}).setdefault(GROUNDED, set()).update(components)
 
 
 def _component_springs(here: str, block: DeckBlock, draft: Draft, of_set: PointElements) -> None:
@@ -303,7 +307,6 @@ def _component_springs(here: str, block: DeckBlock, draft: Draft, of_set: PointE
     value = numbers(block.lines[1])[0]
     turn = block.parameters.get(TURNED)
     axes = np.eye(3) if turn is None else np.array(turn.split(), dtype=float).reshape(3, 3).T
-    rows = [(float(x), float(y), float(z)) for x, y, z in axes]
     for row in of_set.rows.values():
         ends = draft.mesh.coordinates[draft.mesh.rows_of(np.array(row))]
         apart, e = ends[1] - ends[0], axes[(first - 1) % 3]
@@ -317,7 +320,7 @@ def _component_springs(here: str, block: DeckBlock, draft: Draft, of_set: PointE
             six, none = tuple(value if k == first - 1 else 0.0 for k in range(6)), (0.0,) * 6
             stiffness, damping = (none, six) if block.keyword == "DASHPOT" else (six, None)
             names = [draft.node_group(here, [number]) for number in row]
-            triad = None if turn is None else (rows[0], rows[1], rows[2])
+            triad = None if turn is None else as_triad(axes)
             draft.springs.append(DeckSpring((names[0], names[1]), stiffness, damping, triad))
 
 

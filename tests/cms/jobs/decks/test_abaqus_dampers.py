@@ -87,3 +87,15 @@ def test_dashpots_whose_forces_do_not_balance_are_refused(tmp_path, nodes, compo
 def test_a_spring_or_dashpot_along_no_line_is_refused(tmp_path, keyword):
     with pytest.raises(ValueError, match=rf"1 {keyword}A \(first: line 19\): has no length between its nodes"):
         body_of(tmp_path, kind=f"{keyword}A", keyword=keyword, nodes="2, 2", components="", value="1.")
+
+
+def test_a_spring_to_the_ground_of_a_turned_instance_holds_along_its_axis(tmp_path):
+    """Turned by 30 degrees about z, its axis 1 has two components in basic axes."""
+    text = DECK.format(kind="SPRING1", keyword="SPRING", nodes="4", components="1", value="7.E4")
+    turned = f"*PART, NAME=P\n{text}*END PART\n*ASSEMBLY, NAME=A\n*INSTANCE, NAME=I, PART=P\n"
+    turned += "0., 0., 0.\n0., 0., 0., 0., 0., 1., 30.\n*END INSTANCE\n*END ASSEMBLY\n"
+    path = tmp_path / "model.inp"
+    path.write_text(turned)
+    deck = read_deck(path)
+    assert [support.components for support in deck.supports] == [(0, 1, 2)]
+    assert any("ties ux along axes of its instance of node" in row[2] for row in deck.ledger.rows())
