@@ -7,7 +7,6 @@ An element writes them when it makes its law, and keeps the index where they beg
 
 and the law evaluates `function_at(data, at, t)`. The functions accept real and complex numbers, and can be called from
 compiled functions and from Python.
-Python alike.
 """
 
 from collections.abc import Sequence

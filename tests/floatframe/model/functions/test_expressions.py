@@ -1,9 +1,15 @@
 """The language of expressions: its meaning against Python's, its refusals."""
 
+import math
+
+import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from floatframe.errors import ModelError
-from floatframe.model.functions.expressions import compile_expression
+from floatframe.model.elements.tapes import tape_at, tape_numbers
+from floatframe.model.functions.expressions import FUNCTIONS, compile_expression
+from floatframe.model.functions.time_switches import time_parts
 
 EXPRESSIONS = [  # also used with their gradients in test_user_forces
     "2 * x - y / 3 + 4",
@@ -23,6 +29,21 @@ def test_a_tape_has_an_operation_for_every_node(text):
     tape = compile_expression("f", text, ["x", "y", "z"], parameters={"k": 2.5})
     assert len(tape.op) == len(tape.a) == len(tape.b) == len(tape.c) > 0
     assert all(a <= k and b <= k for k, (a, b) in enumerate(zip(tape.a, tape.b, strict=True)) if tape.op[k] > 1)
+
+
+@pytest.mark.parametrize("text", EXPRESSIONS)
+def test_values_over_time_and_in_laws_of_elements_are_those_of_python(text):
+    motion = {"x": lambda t: 1.3 + np.sin(7 * t), "y": lambda t: 2 * np.cos(5 * t), "z": lambda t: 3 * t - 0.4}
+    own = {name: getattr(math, name) for name in FUNCTIONS if hasattr(math, name)}
+    own |= {"abs": abs, "min": min, "max": max, "sign": lambda x: (x > 0) - (x < 0), "pi": math.pi, "k": 2.5}
+    times = np.linspace(0.0, 0.28, 41)  # y is above zero, for x ** y
+    rows = np.array([function(times) for function in motion.values()]).T
+    exact = [eval(text.replace("^", "**"), own | dict(zip(motion, map(float, row), strict=True))) for row in rows]
+    tape = compile_expression("f", text, list(motion), parameters={"k": 2.5})
+    value = time_parts(tape, dict(enumerate(motion.values())), []).value
+    assert_allclose(value(times), exact, rtol=1e-14, atol=1e-14)
+    data, results = np.array(tape_numbers(tape, [])), np.empty(len(tape.op))
+    assert_allclose([tape_at(data, 0, row, results) for row in rows], exact, rtol=1e-14, atol=1e-14)
 
 
 @pytest.mark.parametrize(
