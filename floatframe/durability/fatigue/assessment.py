@@ -169,7 +169,8 @@ def places_named(key: str, section: PlacesSection, body: ReducedBody) -> tuple[I
             raise FatigueError(f"{key}.points: body {body.name!r}: no stress point {quoted(begin)}: {has}")
         points.append(np.array(found, dtype=np.int64))
     of_nodes, of_points = np.unique(np.concatenate(nodes)), np.unique(np.concatenate(points))
-    if body.point_stress is not None:  # at borders of materials nodes show the stiffest; chosen points stand for them
+    if body.point_stress is not None:
+        # nodes at borders have the stress of the stiffest material; chosen points replace them
         own = body.point_stress.positions[[k for k in of_points if known[k].endswith(" border")]]
         if len(own) and len(of_nodes):
             distance, _ = cKDTree(own).query(body.nodes[of_nodes])

@@ -65,7 +65,9 @@ def test_a_hinge_gives_a_rotating_arm_no_energy(rho_inf, turn):
         assert speed.min() > 10.0 * (1 - 0.03)
 
 
-@pytest.mark.parametrize("method", [trapezoidal(), GeneralizedAlpha(0.95), GeneralizedAlpha(0.8)], ids=repr)
+@pytest.mark.parametrize(
+    "method", [trapezoidal(), GeneralizedAlpha(0.95), GeneralizedAlpha(0.8)], ids=["trapezoidal", "0.95", "0.8"]
+)
 @pytest.mark.parametrize("h", [5e-3, 2e-2])
 def test_a_rod_gives_a_pendulum_no_energy(method, h):
     ball = body_at("ball", 2.0, np.eye(3), (1, 0, 0), (0, 0, 0), (0, 0, 0))
@@ -120,12 +122,12 @@ def top(spin, rate):
 @pytest.mark.parametrize("rho_inf", [0.9, 0.8, 0.5])
 @pytest.mark.parametrize("turn", [0.1, 0.4, 1.0, 5.0], ids=lambda turn: f"{turn} rad a step")
 def test_a_spinning_rotor_precesses_as_its_weight_asks(system, rho_inf, turn):
-    """Steady precession with a level axis: m g l = J w W, exactly."""
+    """Steady precession with a level axis: m g l = J w W, exactly; plain steps of 0.1 rad are off by 0.2 %."""
     spin = 1000.0 if turn > 1 else 200.0
     rate = M * G * L / (J * spin)
     found, height = precession(integrate(system(spin, rate), GeneralizedAlpha(rho_inf), 1.0, turn / spin))
-    assert_allclose(found, rate, rtol=5e-3, atol=0)
-    assert height < 5e-3 * L
+    assert_allclose(found, rate, rtol=1e-3, atol=0)
+    assert height < 1e-4 * L
 
 
 def test_a_spinning_rotor_precesses_with_a_step_that_follows_its_error():

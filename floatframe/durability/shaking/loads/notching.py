@@ -133,7 +133,7 @@ def in_output_units(model: ShakenModel, output: Output, value: float) -> float:
 
 
 def notched_sine(model: ShakenModel, run: SineRun, limits: Sequence[Limit], deepest: float = DEEPEST) -> NotchedRun:
-    """Return the notched input of a sine run; amplitudes with uncertainty are kept below the limits.
+    """Return the notched input of a sine run; the limits apply to the amplitudes with uncertainty.
 
     Raises
     ------
@@ -169,7 +169,7 @@ def notched_sine(model: ShakenModel, run: SineRun, limits: Sequence[Limit], deep
 def notched_random(model: ShakenModel, run: RandomRun, limits: Sequence[Limit], deepest: float = DEEPEST) -> NotchedRun:
     """Return the notched input of a random run of one direction; limits of density, then of rms.
 
-    What is kept below the limits are the densities with uncertainty; the densities and rms that are left are nominal.
+    The limits apply to the densities with uncertainty; the returned densities and rms are nominal.
     """
     if run.level.shape[1] != 1:
         raise ModelError(f"notch: random {run.test!r} drives several inputs at once; notches are made of one direction")

@@ -109,7 +109,7 @@ class RandomRun:
     density: Array  #: (n_f, n_out) [units of the model² per Hz]
     rms: Array  #: (n_out,)
     error: Array  #: bound of the relative error of rms by the integration, (n_out,)
-    wide: Array  #: densities with uncertainty, (n_f, n_out): what notches keep below their limits
+    wide: Array  #: densities with uncertainty, to which the limits of notches apply, (n_f, n_out)
     uncertain: Array  #: rms with uncertainty, (n_out,)
     crossings: Array  #: zero crossings upwards, (n_out,) [Hz]
     expected: Array | None  #: largest value to expect in the duration, (n_out,)

@@ -24,8 +24,8 @@ POINTS_A_CYCLE = 20  #: of the highest mode that vibrates
 AFTER = 10.0  #: cycles of the lowest mode that are looked at after the end of an input
 MOST_SAMPLES = 2_000_000
 ON_GRID = 1e-6  #: of a step, by which a time may miss it
-COARSE_DIGIT = 0.25  #: of a step, above which the last digit of a time does not say where it was meant to be
-LOST = 0.01  #: of the largest value of a history, from which its change by new times is told
+COARSE_DIGIT = 0.25  #: of a step, above which the last digit of a time is too coarse to identify its step
+LOST = 0.01  #: of the largest value of a history; a note reports a larger change of it by new times
 
 
 @dataclass(frozen=True)
@@ -217,11 +217,11 @@ def time_run(
 
 
 def sampled(given: Array, values: Array, h: float, after: float) -> tuple[Array, Array, str]:
-    """Return equal time steps of at most h, the values there, and what was done to the given ones, "" if nothing.
+    """Return equal time steps of at most h, the values there, and a note on how the times were changed, else "".
 
-    (1) times on equal steps, or off them by the rounding of their digits: these steps, divided
-    (2) others: steps of half the shortest distance; the values whose straight pieces are nearest to the given ones in
-        the square mean, so that areas and first moments stay and what is faster than the steps does not fold down
+    (1) times that are multiples of a step, exactly or rounded to their last digit: this step, divided
+    (2) other times: steps of half the shortest distance. The values are the least-squares fit to the given straight
+        pieces, which keeps areas and first moments and does not alias content faster than the steps.
 
     Beyond the last given time the values are zero, from the next step on.
 
@@ -233,7 +233,6 @@ def sampled(given: Array, values: Array, h: float, after: float) -> tuple[Array,
         (n_act, n), straight between them.
     """
     words = ""
-    distances = np.diff(given)
     if (equal := equal_steps(given)) is not None:  # (1)
         step, counts, miss = equal
         if miss > ON_GRID * step:
@@ -245,7 +244,7 @@ def sampled(given: Array, values: Array, h: float, after: float) -> tuple[Array,
     else:  # (2)
         places = given
         room = MOST_SAMPLES * given[-1] / (given[-1] + after)
-        n = math.ceil(given[-1] / min(h, max(float(distances.min()) / 2, given[-1] / room)))
+        n = math.ceil(given[-1] / min(h, max(float(np.diff(given).min()) / 2, given[-1] / room)))
         step = given[-1] / n
         words = f"unequal times were sampled anew every {step:.4g} s, areas under the straight pieces kept"
     t = np.arange(n + math.ceil(after / step) + 1) * step
@@ -261,15 +260,15 @@ def sampled(given: Array, values: Array, h: float, after: float) -> tuple[Array,
 
 
 def equal_steps(given: Array) -> tuple[float, Array, float] | None:
-    """Return the step on whose multiples all times lie, the multiples, and by how much they miss; None: no such step.
+    """Return the step of equally spaced times, the multiples, and the largest deviation; None if there is no such step.
 
-    Times miss by `ON_GRID` of a step, or by the rounding to the last digit that they have.
+    A deviation of `ON_GRID` of a step, or of the rounding to the last digit of the times, is accepted.
     """
-    least = float(np.diff(given).min())
+    distances = np.diff(given)
+    least = float(distances.min())
     counts = np.round(given / least)
     if np.abs(given / least - counts).max() < ON_GRID:
         return least, counts, 0.0
-    distances = np.diff(given)
     counts = np.concatenate([[0], np.cumsum(np.round(distances / np.median(distances)))])
     step = float(counts @ given / (counts @ counts)) if counts.any() else 0.0
     miss = float(np.abs(given - counts * step).max())
@@ -279,7 +278,7 @@ def equal_steps(given: Array) -> tuple[float, Array, float] | None:
 
 
 def nearest_straight(places: Array, values: Array, t: Array) -> Array:
-    """Return values at equal times t whose straight pieces are nearest to those of others in the square mean, (n_t,).
+    """Return the least-squares fit, straight between equal times t, to values straight between places, (n_t,).
 
     M v = b: with hats N_k on t, M_kl is the integral of N_k N_l and b_k that of N_k times the given straight pieces,
     by Simpson's rule between all times of both, where the product is a parabola.

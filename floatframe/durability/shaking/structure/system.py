@@ -110,10 +110,10 @@ def marker_a(system: System, connection: object, state: State) -> tuple[Array, f
 
 
 class RecoveryFromBase(RecoverySensor):
-    """Rows of a recovery table, of whose places and velocities those are taken off that the first base carries."""
+    """Rows of a recovery table, with displacements and velocities relative to the first base."""
 
     def places_and_rates(self, small: SmallMotions, z: small_rows.Rows) -> tuple[small_rows.Rows, small_rows.Rows]:
-        """Return the motion of the body relative to the first base, the inputs of which come first."""
+        """Return the motion of the body relative to the first base, whose inputs come first, and its rate."""
         x = np.array(z.x)
         for k, base in enumerate(small.bases[: len(DIRECTIONS)]):
             x[:, small.n_u + k] -= x[:, : small.n_u] @ small.rigid(base)
@@ -229,7 +229,7 @@ def is_carried(column: Column) -> bool:
 
 
 def is_velocity(system: System, column: Column, unit: str) -> bool:
-    """Whether an output is a velocity, whose rates are none of dampers."""
+    """Whether an output is a velocity, which depends on rates also without dampers."""
     if isinstance(column.sensor, RecoverySensor):
         _, table, _ = column.sensor.found(system)
         return table.quantities[table.labels.index(column.column)] == "velocity"
