@@ -76,9 +76,7 @@ h = 1e-3
 output_every = 2
 """
 MOST_STEPS = 5000  #: of a run in the campaign; longer ones are only read (`floatframe info`)
-#: of forces, over the largest of them: the tolerance of Newton's method is in it, whose last correction of the
-#: velocities of joints comes after the last residual (1.7e-6 here at the default tolerance, 5e-8 at 1e-12)
-BALANCE = 2e-6
+BALANCE = 1e-6  #: of forces, over the largest of them: the tolerance of Newton's method is in it
 GAP = 1e-7  #: of joints, over the size of the system
 KNOWN = {
     "bodies": {"mass", "inertia", "center_of_mass", "position", "rotation_vector"},

@@ -8,6 +8,7 @@ from floatframe.engine.kernels.connections.gap import next_step, step_before_con
 from floatframe.engine.kernels.connections.user_force import resize_states
 from floatframe.engine.kernels.diagnostics import diagnose, power
 from floatframe.engine.kernels.evaluation import evaluate
+from floatframe.engine.kernels.joints.row_formulas import held_value
 from floatframe.engine.kernels.memory import WORK_GIVEN, WORK_TAKEN
 from floatframe.engine.kernels.model import JOINT, MASS, STIFFNESS
 from floatframe.engine.kernels.past import keep_past
@@ -323,10 +324,31 @@ def hold_velocities(model, work, by_rate, by_acceleration, c_k):
                 for j in range(n):
                     residual[k] -= K[k * n + j] * y[6 + j]
         change_rates(model, work, i, (0.0, 0.0, 0.0), by_rate, by_acceleration)
-    for k in range(work.solver.mu.shape[0]):
-        if model.rows.holds[k] != NOTHING and model.rows.soft[k] == 0.0:  # in soft ones rates disagree by rounding
-            work.state.w[k] += work.solver.mu[k] / c_k
+    add_reactions(model, work, c_k)
     return total
+
+
+@inner
+def add_reactions(model, work, c_k):
+    """Add the wrenches of the velocity correction to those of joints and of what else is held.
+
+    Those of force elements stay, as positions do. The wrench of a joint has parts along axes of the ground: all of them
+    change, but for what acts along its soft rows, whose rates disagree with those they repeat by rounding.
+    """
+    for c in range(model.connections.size.shape[0]):
+        w0, end = model.connections.w0[c], model.connections.w0[c + 1]
+        a, b = model.connections.a[c], model.connections.b[c]
+        is_joint, mu = model.connections.law[c] == JOINT, work.solver.mu[w0:end]
+        for k in range(w0, end):
+            if is_joint and model.rows.soft[k] > 0.0:
+                _, n, _, m_b = held_value(model.rows.kind[k], model, work, k, a, b)
+                part = model.rows.part[k]
+                along = (dot(n, vector(mu)) + dot(m_b, vector(mu[part:]))) / (dot(n, n) + dot(m_b, m_b))
+                put_sum(mu, 0, scaled(-along, n))
+                put_sum(mu, part, scaled(-along, m_b))
+        for k in range(w0, end):
+            if is_joint or (model.rows.holds[k] != NOTHING and model.rows.soft[k] == 0.0):
+                work.state.w[k] += work.solver.mu[k] / c_k
 
 
 @inner

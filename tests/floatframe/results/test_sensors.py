@@ -170,12 +170,8 @@ def test_reactions_energies_momenta_and_modes_are_those_of_the_motion(swing):
     assert_allclose(columns["moment size"], np.linalg.norm(motion.moment, axis=1))
     turned = ReactionSensor("r", "knee", "marker").measure(system, swing).columns
     assert_allclose(turned["force size"], columns["force size"], rtol=1e-12)
-    # a hinge carries no moment about its axis, in the axes of the marker: to rounding where equations of motion are met
-    # last, as in plain steps; stabilised ones correct velocities after them
-    plain = integrate(system, GeneralizedAlpha(0.8, stabilized=False), 0.3, H)
-    of_plain = ReactionSensor("r", "knee", "marker").measure(system, plain).columns
-    assert np.abs(of_plain["moment y"]).max() < 1e-9 * of_plain["moment size"].max()
-    assert np.abs(turned["moment y"]).max() < 1e-5 * turned["moment size"].max()
+    # a hinge carries no moment about its axis, in the axes of the marker
+    assert np.abs(turned["moment y"]).max() < 1e-9 * turned["moment size"].max()
     assert np.abs(columns["moment y"]).max() > 1e-2 * columns["moment size"].max()
     tension = ReactionSensor("t", "stay", "marker").measure(system, swing).columns
     assert_allclose(tension["force size"], np.linalg.norm(swing.reaction("stay").force, axis=1))
