@@ -7,7 +7,7 @@ import typer
 
 from cms.cli.console import print_table
 from cms.exchange.exporters.formats import FORMATS as EXPORTED
-from cms.exchange.importers.formats import FORMATS as REDUCED
+from cms.exchange.importers.import_body import FORMATS as REDUCED
 from fe_models.files.formats import FORMATS as MODELS
 from fe_models.foundation.formats import FileFormat
 

@@ -1,24 +1,59 @@
 """A system: bodies, joints and forces in one coherent set of units."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, is_dataclass
-from typing import Protocol
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from typing import Any, Protocol
 
 from fe_models.foundation.copies import frozen_copies
-from fe_models.foundation.units import Units, unit_system
+from fe_models.foundation.units import Quantity, Units, unit_system
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.bodies.ground import GROUND
+from floatframe.model.bodies.markers import Marker
 from floatframe.model.bodies.rigid_body import RigidBody
-from floatframe.model.default_units import in_units_of
 from floatframe.model.elements.element import Element
 from floatframe.model.forces import Force, Gravity
 from floatframe.model.joints import Joint
 from floatframe.model.joints.coordinate_coupler import CoordinateCoupler
 from floatframe.model.shapes.shape import Geometry, Shape, shape_tuple
 
-__all__ = ["Body", "Named", "System"]
+__all__ = ["Body", "Named", "System", "in_units_of"]
+
+
+# default units --------------------------------------------------------------------------------------------------------
+# Conversion of the default values of joints, forces and elements to the units of a system; user values stay.
+
+
+def in_units_of(units: Units, part: Any) -> Any:
+    """Return a part of a system (a dataclass) with its defaults, also nested ones, in the units of the system."""
+    of_angle = bool(getattr(part, "is_angular", False))
+    changed = {}
+    for each in fields(part):
+        value = getattr(part, each.name)
+        found = value.in_units(units, of_angle=of_angle) if isinstance(value, Quantity) else held_in_units(units, value)
+        if found is not value:
+            changed[each.name] = found
+    return replace(part, **changed) if changed else part
+
+
+def held_in_units(units: Units, value: Any) -> Any:
+    """Return the value of a field with its defaults in the units of the system, or the value itself if it has none."""
+    if isinstance(value, Marker):
+        return value
+    if is_dataclass(value) and not isinstance(value, type):
+        return in_units_of(units, value)
+    if isinstance(value, list | tuple) and any(is_dataclass(each) for each in value):
+        items = [held_in_units(units, each) for each in value]
+        return type(value)(items) if any(a is not b for a, b in zip(items, value, strict=True)) else value
+    if isinstance(value, Mapping) and any(is_dataclass(each) for each in value.values()):
+        held = {key: held_in_units(units, each) for key, each in value.items()}
+        return held if any(held[key] is not each for key, each in value.items()) else value
+    return value
+
+
+# system ---------------------------------------------------------------------------------------------------------------
+
 
 Body = RigidBody | FlexibleBody
 REDUNDANT = ("refuse", "minimum-norm")

@@ -9,7 +9,6 @@ from functools import partial
 import scipy.sparse as sp
 
 from cms.errors import FactorizationError
-from cms.linear_algebra.solvers.cholesky import cholesky_or_superlu
 from cms.linear_algebra.solvers.pardiso import PardisoFactor, missing_pardiso
 from cms.linear_algebra.solvers.petsc.factor import PetscFactor
 from cms.linear_algebra.solvers.petsc.libraries import missing_petsc
@@ -18,7 +17,24 @@ from cms.linear_algebra.sparse_cholesky.factor import CholeskyFactor
 from fe_models.foundation.solver import Factor, Solver
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["DEFAULTS", "SOLVERS", "solver_of"]
+__all__ = ["DEFAULTS", "SMALL", "SOLVERS", "cholesky_or_superlu", "solver_of"]
+
+
+# the solver that runs on every processor: our Cholesky factorisation, or SuperLU where that is unsuitable -------------
+
+
+SMALL = 3000  #: number of rows below which SuperLU finishes before the compiled loops are loaded
+
+
+def cholesky_or_superlu(lower: sp.csc_array, *, definite: bool) -> Factor:
+    """Return the Cholesky factor, or the factor of SuperLU if the matrix is small or need not be positive definite."""
+    if definite and lower.shape[0] >= SMALL:
+        return CholeskyFactor(lower)
+    return SuperLuFactor(lower, definite=definite)
+
+
+# registry -------------------------------------------------------------------------------------------------------------
+
 
 ON_DISK = partial(PetscFactor, on_disk=True)
 WITH_MATRIX = partial(PetscFactor, keeps_matrix=True)

@@ -15,7 +15,7 @@ def kept_points(body: FEBody, Phi: Array, axes: Array, row_of: IntArray) -> Kept
 
     (1) if all three rotations of the node are dofs (beams, shells, leaders of rigid groups): these dofs
     (2) else, if the elements know the rotation: half the curl of the displacement
-    (`fe_models.elements.solids.rotation`)
+    (`fe_models.elements.solids.body`)
     (3) else the rotations that are dofs, and zero for the others, as in a plane model; without any, the rotation is
         unknown
 

@@ -17,10 +17,12 @@ from fe_models.body.material import AnyMaterial, assign_materials, material_word
 from fe_models.elements.solids.assembly import Progress, assemble, elastic_properties, expand_scalar_mass
 from fe_models.elements.solids.assembly_on_ranks import SpreadMesh, assemble_on_ranks
 from fe_models.elements.solids.elements import INTEGRATIONS, MASSES, reference_element
-from fe_models.elements.solids.geometric import internal_forces, projected_geometric_stiffness
-from fe_models.elements.solids.geometric_on_ranks import spread_geometric_stiffness
+from fe_models.elements.solids.geometric import (
+    internal_forces,
+    projected_geometric_stiffness,
+    spread_geometric_stiffness,
+)
 from fe_models.elements.solids.incompatible import KIND
-from fe_models.elements.solids.rotation import nodal_rotation
 from fe_models.elements.solids.stress import nodal_stress, stiffest_at_nodes
 from fe_models.foundation.arrays import Array, IntArray, frozen_int
 from fe_models.foundation.errors import BodyError
@@ -35,12 +37,60 @@ from fe_models.foundation.threads import n_threads
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.boundary import boundary_triangles
-from fe_models.meshes.cell_shapes import cell_jacobians
+from fe_models.meshes.cell_shapes import CELL_SHAPES, cell_jacobians, shape_values
 from fe_models.meshes.mesh import Mesh
 from fe_models.meshes.mesh_numbering import solid_numbering
 from fe_models.meshes.objects.as_mesh import as_mesh
 
-__all__ = ["SolidModel", "scalar_mass_gram", "solid_body"]
+__all__ = ["SolidModel", "nodal_rotation", "scalar_mass_gram", "solid_body"]
+
+
+# rotation at nodes of a solid mesh, which have only translational dofs: half the curl of the displacement -------------
+# (1) in a cell, H_ij = ∂u_i/∂x_j at its node, from its shape functions. This is exact for fields linear in x, hence for
+#     rigid rotations and constant strain on any mesh, and for quadratic fields in straight-edged quadratic cells
+# (2) theta = ½ (H_32 - H_23, H_13 - H_31, H_21 - H_12): the mean rotation of all fibres through the point. In a sheared
+#     beam it lies midway between the slope of the axis and the rotation of the section
+# (3) at a node, average over its cells
+
+
+FLAT = 1e-9  #: det J divided by the cube of its largest entry, up to which a cell has no gradient at its node
+
+
+def nodal_rotation(mesh: Mesh, u: Array, nodes: IntArray) -> Array:
+    """Return rotation vectors at some nodes, (n, 3, k), of displacement columns u, (3 n_nodes, k), mesh axes.
+
+    Raises
+    ------
+    BodyError
+        If no cell at a node has a gradient there, because the cells are collapsed.
+    """
+    fields = np.asarray(u).reshape(len(mesh.nodes), 3, -1)
+    place = np.full(len(mesh.nodes), -1)
+    place[nodes] = np.arange(len(nodes))
+    total, count = np.zeros((len(nodes), 3, fields.shape[2])), np.zeros(len(nodes))
+    for kind, cells in mesh.cells.items():
+        _, dN = shape_values(kind, CELL_SHAPES[kind].nodes)  # (node, shape, axis)
+        row, local = np.nonzero(place[cells] >= 0)
+        X, at = mesh.nodes[cells[row]], place[cells[row, local]]
+        J = np.einsum("nai,nak->nik", X, dN[local])
+        size = np.abs(J).max(axis=(1, 2), initial=0.0) ** 3
+        good = np.linalg.det(J) > FLAT * size
+        row, local, J, at = row[good], local[good], J[good], at[good]
+        grad = np.einsum("nak,nki->nai", dN[local], np.linalg.inv(J))  # (1)
+        U = fields[cells[row]]  # (n, shape, component, k)
+        for a, (i, j) in enumerate(((2, 1), (0, 2), (1, 0))):  # (2)
+            curl = np.einsum("nb,nbk->nk", grad[:, :, j], U[:, :, i]) - np.einsum(
+                "nb,nbk->nk", grad[:, :, i], U[:, :, j]
+            )
+            np.add.at(total[:, a], at, curl / 2)
+        np.add.at(count, at, 1.0)
+    if not count.all():
+        raise BodyError(f"rotation at node index {nodes[int(np.argmin(count))]}: no cell there has a gradient")
+    return total / count[:, None, None]  # (3)
+
+
+# body -----------------------------------------------------------------------------------------------------------------
+
 
 CELLS_AT_ONCE = 8_000  #: number of cells whose Jacobians are held at once
 GRAM_BYTES = 64e6  #: memory for M_s times a block of columns

@@ -13,9 +13,8 @@ from typer.testing import CliRunner
 import cms
 from cms.cli.app import app
 from cms.errors import JobError
-from cms.jobs.fleets import fleet_job
-from cms.jobs.fleets.fleet import reduce_fleet
-from fe_models.foundation.tasks.this_process import ThisProcess
+from cms.jobs.fleets.fleet import reduce_and_write_one, reduce_fleet
+from fe_models.foundation.tasks.workers import ThisProcess
 
 ROD = """
 [body]
@@ -150,7 +149,7 @@ def killed_once(job):
         mark.write_text(str(os.getpid()))
         job.output.with_name(f".{job.output.name}.0123abcd.part").write_bytes(b"half")
         os.kill(os.getpid(), signal.SIGKILL)
-    return fleet_job.reduce_and_write_one(job)
+    return reduce_and_write_one(job)
 
 
 def interrupted(job):
@@ -158,7 +157,7 @@ def interrupted(job):
     if job.job.name == "rod_2.toml":
         job.output.with_name(f".{job.output.name}.0123abcd.part").write_bytes(b"half")
         raise KeyboardInterrupt
-    return fleet_job.reduce_and_write_one(job)
+    return reduce_and_write_one(job)
 
 
 def test_a_worker_killed_at_its_writing_loses_no_job(jobs, monkeypatch):

@@ -10,11 +10,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import cms.linear_algebra.solvers.mode_search
 from cms.errors import EigenError, FactorizationError
-from cms.linear_algebra.solvers.block_lanczos import BlockLanczos
 from cms.linear_algebra.solvers.eigen import eigenmodes
 from cms.linear_algebra.solvers.factorization import factorize
 from cms.linear_algebra.solvers.mode_count import ModeCount
-from cms.linear_algebra.solvers.mode_search import improved_modes
+from cms.linear_algebra.solvers.mode_search import BlockLanczos, improved_modes
 from cms.linear_algebra.solvers.pardiso import mkl_runtime
 from cms.linear_algebra.solvers.shift_inverted import ShiftInverted, measured_residual
 from cms.linear_algebra.solvers.sparse_product import SymmetricProduct

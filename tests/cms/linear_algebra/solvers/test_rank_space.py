@@ -8,8 +8,8 @@ import pytest
 import scipy.sparse as sp
 from numpy.testing import assert_allclose, assert_array_equal
 
-from cms.linear_algebra.solvers.block_lanczos import BlockLanczos
 from cms.linear_algebra.solvers.factorization import factorize
+from cms.linear_algebra.solvers.mode_search import BlockLanczos
 from cms.linear_algebra.solvers.rank_space import RankSpace
 from cms.linear_algebra.solvers.tall_space import ArraySpace
 from fe_models.body.couplings.couplings import couple

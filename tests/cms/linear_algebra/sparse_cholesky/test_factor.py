@@ -17,8 +17,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import cms
 from cms.errors import FactorizationError, FactorRoomError
-from cms.linear_algebra.solvers.cholesky import SMALL, cholesky_or_superlu
 from cms.linear_algebra.solvers.factorization import factorize, lower_triangle
+from cms.linear_algebra.solvers.registry import SMALL, cholesky_or_superlu
 from cms.linear_algebra.sparse_cholesky import analysis
 from cms.linear_algebra.sparse_cholesky.analysis import analyse, dissection_order
 from cms.linear_algebra.sparse_cholesky.blocks import blocks_of, for_each

@@ -4,8 +4,8 @@ import scipy.linalg as la
 from numpy.testing import assert_allclose
 from scipy.special import gammaincinv
 
-from cms.linear_algebra.substructures.improvement import ApproximateModes
 from cms.linear_algebra.substructures.modes import Interior
+from cms.linear_algebra.substructures.reduced_modes import ApproximateModes
 from cms.linear_algebra.substructures.tree import substructure_tree
 from fe_models.body.couplings.couplings import couple
 from fe_models.body.couplings.submatrix import principal_block
@@ -78,7 +78,7 @@ def test_what_probes_find_above_the_tolerance_is_measured_by_itself(pencil, monk
     modes = spoiled(pencil, 1e-4)
     modes.X[:, 2] += 1e-3 * pencil[3][1][:, -1]
     exact = modes.errors(COUNT)
-    monkeypatch.setattr("cms.linear_algebra.substructures.improvement.PROBES", 5)
+    monkeypatch.setattr("cms.linear_algebra.substructures.reduced_modes.PROBES", 5)
     probed = modes.errors(COUNT)
     found = modes.errors(COUNT, np.sort(probed)[-1] * 0.99)
     assert np.argmax(probed) == 2
@@ -91,9 +91,9 @@ def test_probes_find_residuals_from_above_and_not_far_above(pencil, monkeypatch)
     """The same residuals one by one; those of neighbours point the same way here, so that their sums cancel."""
     modes = spoiled(pencil, 1e-4)
     exact = modes.errors(COUNT)
-    monkeypatch.setattr("cms.linear_algebra.substructures.improvement.PROBES", 5)
+    monkeypatch.setattr("cms.linear_algebra.substructures.reduced_modes.PROBES", 5)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("cms.linear_algebra.substructures.improvement.RARE", 0.5)
+        patch.setattr("cms.linear_algebra.substructures.reduced_modes.RARE", 0.5)
         middle = modes.errors(COUNT)
     found = modes.errors(COUNT)
     assert (found >= exact).all()

@@ -13,7 +13,7 @@ from cms.linear_algebra.substructures.tree import substructure_tree
 from fe_models.body.couplings.couplings import couple
 from fe_models.body.couplings.submatrix import principal_block
 from fe_models.body.fe_body import MULTIPLIER
-from fe_models.foundation.tasks.this_process import ThisProcess
+from fe_models.foundation.tasks.workers import ThisProcess
 from tests.bodies import bar
 from tests.cms.linear_algebra.substructures.shells import between
 from tests.root import ROOT

@@ -12,8 +12,7 @@ from cms.errors import EigenError, ModeSetError
 from cms.modes.families.families import Families
 from cms.modes.families.receptance import largest_error, receptance_of_modes
 from cms.modes.mode_set import ModeSet
-from cms.modes.mode_sets.balanced import balanced_truncation
-from cms.modes.mode_sets.balancing import balance
+from cms.modes.mode_sets.balanced import balance, balanced_truncation
 from cms.reduction.reduction import reduce
 from fe_models.body.couplings.couplings import couple
 from fe_models.foundation.units import unit_system

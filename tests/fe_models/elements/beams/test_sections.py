@@ -5,8 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import fe_models as fm
-from fe_models.elements.beams.outline import triangulate_polygon
-from fe_models.elements.beams.sections import box_shear_coefficient, i_shear_coefficient
+from fe_models.elements.beams.sections import box_shear_coefficient, i_shear_coefficient, triangulate_polygon
 from fe_models.elements.beams.torsion import rectangle_torsion_constant, rectangle_torsion_stress
 from fe_models.errors import SectionError
 

@@ -306,7 +306,7 @@ def test_many_columns_give_the_matrices_of_few(kind, incompatible, monkeypatch):
     u, Phi = rng.standard_normal((3 * len(mesh.nodes), 3)), rng.standard_normal((3 * len(mesh.nodes), 7))
     few = model.geometric_stiffness(u, MassLoads.none(3), Phi)
     monkeypatch.setattr("fe_models.elements.solids.geometric.MANY_COLUMNS", 7)
-    monkeypatch.setattr("fe_models.elements.solids.geometric_matrix.PRODUCT_BYTES", 1.0)  # 16 columns at a time
+    monkeypatch.setattr("fe_models.elements.solids.geometric.PRODUCT_BYTES", 1.0)  # 16 columns at a time
     many = model.geometric_stiffness(u, MassLoads.none(3), np.hstack([Phi, Phi, Phi]))
     assert_allclose(many[:, 7:14, 14:], few, rtol=0, atol=ROUNDOFF * np.abs(few).max())
     assert_allclose(many, many.transpose(0, 2, 1), rtol=0, atol=0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from fe_models.elements.solids.rotation import nodal_rotation
+from fe_models.elements.solids.body import nodal_rotation
 from tests.bodies import box_mesh, distorted
 
 KINDS = ["tetra", "tetra10", "hexahedron", "hexahedron20", "hexahedron27", "wedge", "wedge15"]

@@ -20,7 +20,7 @@ from fe_models import (
 )
 from fe_models.errors import MeshError
 from fe_models.meshes.mesh import SOLID_TYPES
-from fe_models.meshes.objects.pyvista_grid import VTK_TYPES
+from fe_models.meshes.objects.as_mesh import VTK_TYPES
 from tests.bodies import box_mesh
 
 SI = unit_system("m-kg-s")

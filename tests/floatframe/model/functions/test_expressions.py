@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from floatframe.errors import ModelError
-from floatframe.model.elements.tapes import tape_at, tape_numbers
+from floatframe.model.elements.expressions import tape_at, tape_numbers
 from floatframe.model.functions.expressions import FUNCTIONS, compile_expression
 from floatframe.model.functions.time_switches import time_parts
 
