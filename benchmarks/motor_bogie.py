@@ -15,8 +15,14 @@ from floatframe.files.signals.orders import frequency_map
 from floatframe.files.signals.signals import Signal
 from floatframe.machines.motor_bogie import MotorBogie
 from floatframe.machines.motor_bogie.closed_forms import ripple_of_leakage, speed_of_torque, torque_lines
-from floatframe.machines.motor_bogie.figures import at_rest, modes_of, predicted_lines, supply_lines, supply_phase
-from floatframe.machines.motor_bogie.plots import plot_start
+from floatframe.machines.motor_bogie.plots import (
+    at_rest,
+    modes_of,
+    plot_start,
+    predicted_lines,
+    supply_lines,
+    supply_phase,
+)
 
 LOAD, COLUMN = "leading_lower", "force x"
 

@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 
 import floatframe as ff
 from floatframe.components.mechanisms import slider_crank
-from floatframe.design.gradients.paths import value_at, with_value
+from floatframe.design.gradients.parameters import value_at, with_value
 
 RUN = {"t_end": 0.24, "h": 4e-3}
 PATHS = (

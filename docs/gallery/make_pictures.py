@@ -234,8 +234,7 @@ def road_car() -> None:
     from floatframe.machines import copy_machine
     from floatframe.machines.road_car import RoadCar
     from floatframe.machines.road_car.description import CORNERS
-    from floatframe.machines.road_car.systems import rig_file
-    from floatframe.machines.road_car.write_files import post_motion
+    from floatframe.machines.road_car.systems import post_motion, rig_file
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

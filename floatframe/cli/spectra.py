@@ -82,7 +82,7 @@ def chosen_signals(
 
     from fe_models.foundation.words import nearest, quoted
     from floatframe.errors import SignalError
-    from floatframe.files.signals.of_sensors import even_signals
+    from floatframe.files.signals.analysis import even_signals
     from floatframe.files.signals.read_signals import read_signals
 
     whole = even_signals(read_signals(file), rate)
@@ -101,7 +101,7 @@ def chosen_signals(
 def sensor_signals(trajectory: "Trajectory", names: list[str], rate: float | None = None) -> "Signals":
     """Return the measurements of chosen sensors (default: all) at equidistant times; notes are printed."""
     from floatframe.errors import ResultsError
-    from floatframe.files.signals.of_sensors import even_signals, signals_of
+    from floatframe.files.signals.analysis import even_signals, signals_of
     from floatframe.files.system_file.recorded_system import recorded_system
     from floatframe.results.sensor_choice import chosen_measurements
     from floatframe.results.sensors import measured
@@ -134,9 +134,8 @@ def write_spectra(signals: "Signals", kind: str, request: "SpectrumRequest", pat
 
     from fe_models.foundation.paths import replace_file
     from floatframe.errors import ResultsError
-    from floatframe.files.signals.analysis import spectra_of
+    from floatframe.files.signals.analysis import spectra_of, spectral_csv, spectral_record
     from floatframe.files.signals.spectra import Spectrum
-    from floatframe.files.signals.spectral_tables import spectral_csv, spectral_record
     from floatframe.pictures.spectrum_plots import plot_spectra
 
     ending = path.suffix.lower().removeprefix(".")

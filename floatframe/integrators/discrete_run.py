@@ -106,8 +106,8 @@ class DiscreteScheme:
         self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
     ) -> tuple[Carry, Rows, int, Failure | None]:
         """Advance by n_steps of size h, the first of them number `first` from t0; see `carry.Integrator`."""
-        from floatframe.engine.structure_preserving.kernels.entry import advance_discrete_steps
         from floatframe.engine.structure_preserving.kernels.newton import NO_ACCELERATION
+        from floatframe.engine.structure_preserving.kernels.steps import advance_discrete_steps
 
         compiled = compiled_system(system)
         model = compiled.model

@@ -5,26 +5,126 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.words import nearest, quoted
 from floatframe.engine.compiling.counted_angles import angle_of
 from floatframe.engine.compiling.markers import MarkerData, joint_markers, marker_pose, n_q_of
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import ResultsError
 from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.bodies.marker_shape import interface_shape
+from floatframe.model.bodies.markers import body_name
 from floatframe.model.joints import Joint
 from floatframe.model.joints.rows import MOMENT, SPAN, TWIST_B, RelativePlace, RowCoordinate
-from floatframe.model.joints.sliding import SlidingJoint
-from floatframe.model.rotations import cross, dot
+from floatframe.model.joints.sliding import SlidingJoint, line_triad
+from floatframe.model.rotations import cross, dot, left_jacobian, rotation_matrix, turned
 from floatframe.model.system import System
 from floatframe.results.full_turns import through_turns
 from floatframe.results.place_motion import PlaceMotion, as_moved, shape_motion, still_place
-from floatframe.results.sliding_place import sliding_place
 from floatframe.results.small_motions.rows import Rows
 from floatframe.results.small_motions.small_motions import SmallMotions
 from floatframe.results.trajectory import Trajectory
 
-__all__ = ["CoordinateMotion", "force_rows", "joint_coordinate", "joint_coordinates"]
+__all__ = ["CoordinateMotion", "SlidingPlace", "force_rows", "joint_coordinate", "joint_coordinates", "sliding_place"]
+
+
+# the coordinate of a sliding joint during a motion: the position of B along the deformed line -------------------------
+
+
+MOST = 30
+
+
+@dataclass(frozen=True, eq=False)
+class SlidingPlace:
+    """Position of marker B along the line over time."""
+
+    s: Array  #: from marker A, measured on the undeformed line, (n_t,) [m]
+    rate: Array  #: (n_t,) [m/s]
+    tangent: Array  #: unit vector along the deformed line, in ground axes, (n_t, 3)
+    #: derivative of the line's rotation by s, divided by the slope of the line, in ground axes, (n_t, 3) [1/m]
+    turning: Array
+
+
+def sliding_place(system: System, trajectory: Trajectory, joint: SlidingJoint, end: PlaceMotion) -> SlidingPlace:
+    """Return the position along the line of marker B with a given motion; as in kernels/joints/deformed_line.py."""
+    name = body_name(joint.marker_a.body)
+    body = system.body(name)
+    assert isinstance(body, FlexibleBody)
+    motion, reduced = as_moved(trajectory, name, body.reduced)
+    points = np.array([reduced.interface(station).position for station in joint.stations])
+    places, triad = line_triad(f"joint {joint.name!r}", points, joint.normal)
+    e = triad[:, 0]
+    shapes = [interface_shape(reduced, i, is_stiffened=body.is_stiffened) for i in joint.stations]
+    deformed = [shape.deformation(motion.q) for shape in shapes]
+    rates = [shape.rates(motion.q, motion.q_dot, motion.q_ddot)[0] for shape in shapes]
+    R = rotation_matrix(motion.p)
+    x = turned(np.swapaxes(R, 1, 2), end.position - motion.r)
+    v = turned(np.swapaxes(R, 1, 2), end.velocity - motion.v) - cross(motion.omega_B, x)
+    line = Line(places, e, np.array(deformed), np.array(rates))
+    s = (x - points[0]) @ e
+    for _ in range(MOST):
+        D, slope, bend = (line.displacement(s, order) for order in range(3))
+        t = e + slope
+        gap = x - points[0] - s[:, None] * e - D
+        change = dot(gap, t) / (dot(t, t) - dot(gap, bend))
+        s = s + change
+        if np.abs(change).max(initial=0.0) <= 1e-14 * places[-1]:
+            break
+    t = e + line.displacement(s, 1)
+    size = np.linalg.norm(t, axis=1)
+    rate = dot(t, v - line.displacement(s, 0, of_rates=True)) / size**2
+    tangent = turned(R, t / size[:, None])
+    angle, by_s = line.rotation(s)
+    turning = turned(R @ left_jacobian(angle), by_s)
+    return SlidingPlace(s, rate, tangent, turning / size[:, None])
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """Cubics through stations over time, in body axes."""
+
+    places: Array  #: (n,)
+    e: Array  #: (3,)
+    deformed: Array  #: displacement and rotation of the stations, (n, n_t, 6)
+    rates: Array  #: (n, n_t, 6)
+
+    def piece(self, s: Array) -> tuple[IntArray, Array, Array]:
+        """Return the index of the piece at each time, its length, and the distance of s from its beginning."""
+        j = np.clip(np.searchsorted(self.places[1:-1], s, side="left"), 0, len(self.places) - 2)
+        h = self.places[j + 1] - self.places[j]
+        return j, h, s - self.places[j]
+
+    def displacement(self, s: Array, order: int, *, of_rates: bool = False) -> Array:
+        """Return D or a derivative by s, (n_t, 3)."""
+        table = self.rates if of_rates else self.deformed
+        j, h, along = self.piece(s)
+        x = np.clip(along / h, 0.0, 1.0)
+        over = along - x * h
+        a = [x**2 * (3 - 2 * x), 6 * x * (1 - x) / h, (6 - 12 * x) / h**2][order]
+        b_1 = [h * x * (1 - x) ** 2, 1 + x * (3 * x - 4), (6 * x - 4) / h][order]
+        b_2 = [h * x**2 * (x - 1), x * (3 * x - 2), (6 * x - 2) / h][order]
+        if order == 0:
+            b_1, b_2 = b_1 + np.minimum(over, 0.0), b_2 + np.maximum(over, 0.0)
+        elif order == 2:
+            inside = over == 0
+            a, b_1, b_2 = a * inside, b_1 * inside, b_2 * inside
+        times = np.arange(len(s))
+        first, second = table[j, times], table[j + 1, times]
+        own = a[:, None] * (second[:, :3] - first[:, :3]) + (first[:, :3] if order == 0 else 0.0)
+        return np.asarray(own + np.cross(b_1[:, None] * first[:, 3:] + b_2[:, None] * second[:, 3:], self.e))
+
+    def rotation(self, s: Array) -> tuple[Array, Array]:
+        """Return the rotation vector of the line and its derivative by s, (n_t, 3) each."""
+        j, h, along = self.piece(s)
+        w = np.clip(along / h, 0.0, 1.0)
+        times = np.arange(len(s))
+        first, second = (self.deformed[k, times, 3:] @ self.e for k in (j, j + 1))
+        twist, inside = first + w * (second - first), (along >= 0) & (along <= h)
+        value = np.cross(self.e, self.displacement(s, 1)) + twist[:, None] * self.e
+        return value, np.cross(self.e, self.displacement(s, 2)) + (inside * (second - first) / h)[:, None] * self.e
+
+
+# joint coordinates ----------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)

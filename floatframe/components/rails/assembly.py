@@ -10,13 +10,24 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.components.rails.contact_search import Pair, quasi_elastic
 from floatframe.components.rails.contact_table import Steel, TableGrid, contact_table, numbers_of_table
-from floatframe.components.rails.creep_names import CREEP_LAWS, NORMAL_LAWS
 from floatframe.components.rails.splines import coefficients
 from floatframe.components.rails.track import Track
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import number
 
-__all__ = ["ContactLaws", "Wheel", "law_numbers", "output_names", "shift_off_the_rail"]
+__all__ = ["CREEP_LAWS", "NORMAL_LAWS", "ContactLaws", "Wheel", "law_numbers", "output_names", "shift_off_the_rail"]
+
+
+# names of the creep laws, without importing the compiled code ---------------------------------------------------------
+
+
+#: number of the law in `creep_force`, by name
+CREEP_LAWS = {"kalker": 0, "kalker-saturated": 1, "polach": 2, "fastsim": 3}
+NORMAL_LAWS = ("hertz", "constraint")
+
+
+# assembly -------------------------------------------------------------------------------------------------------------
+
 
 PARTS = ("tread", "flange")
 N_OPTIONS = 5  #: number of options of a creep law

@@ -14,17 +14,260 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.words import nearest, quoted
 from floatframe.design.identification.inertial_parameters import INERTIAL, inertia_columns, parameters_of
-from floatframe.design.identification.loops import independent_columns, loop_samples, looped_tree
-from floatframe.design.identification.tree_samples import TreeSamples, rigid_tree, tree_samples
-from floatframe.engine.tree.topology import CoordinateName, tree_of
+from floatframe.design.identification.tree_samples import (
+    TreeSamples,
+    distances,
+    joints_as_placed,
+    motion_of_tree,
+    rigid_bodies,
+    rigid_tree,
+    tree_samples,
+)
+from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.kernels.work import new_work
+from floatframe.engine.tree.kernels.tree import new_tangent_work
+from floatframe.engine.tree.topology import CoordinateName, SystemTree, tree_of
 from floatframe.errors import ModelError
+from floatframe.model.forces import JointForce
+from floatframe.model.joints.rows import is_held, is_held_length, is_held_position
 from floatframe.model.system import System
 
-__all__ = ["DRIVE_TERMS", "LinearForm", "linear_form", "reaction_rows", "torque_rows"]
+__all__ = [
+    "DRIVE_TERMS",
+    "LinearForm",
+    "independent_columns",
+    "linear_form",
+    "loop_samples",
+    "looped_tree",
+    "reaction_rows",
+    "torque_rows",
+]
+
+
+# loops ----------------------------------------------------------------------------------------------------------------
+# Motions of trees with closed loops by their independent coordinates: all others follow from the joints that are cut.
+#
+# With C the derivative of what cut joints hold by the rates of all coordinates z = (z_i, z_d),
+#
+#     g(z) = 0,      C_d z_d' = -C_i z_i',      C_d z_d'' = -C_i z_i'' - (second rates of g at z'' = 0),
+#
+# and the forces that drive the independent coordinates are those of the tree that is left, projected on the motions
+# that the loops allow (reactions of cut joints do no work on them):
+#
+#     tau_i = Γᵀ Y phi,        Γ = dz'/dz_i' = (1, -C_d⁻¹ C_i).
+#
+# Rows of cut joints may repeat each other, as three of five do in a parallelogram of hinges: equations are solved in
+# the least squares sense, and what is left of g is looked at. A motion is followed in short steps from where the system
+# is placed, so that it stays on its branch.
+
+
+RANK = 1e-8  #: singular values of C, rows and columns in their sizes, below this times the largest are zero
+CLOSED = 1e-11  #: of lengths and angles
+MOST = 25  #: iterations
+STRIDE = 0.1  #: rad, or of the length of the system: what an independent coordinate moves at once
+
+
+def looped_tree(system: System, where: str) -> SystemTree:
+    """Return the tree of a system of rigid bodies with loops that cut joints close; `ModelError` for anything else."""
+    rigid_bodies(system, where)
+    tree = tree_of(system)
+    if tree.is_tree:
+        raise ModelError(f"{where}: no loop: independent coordinates are all of its coordinates")
+    beside = [coupler.name for coupler in system.couplers] + [element.name for element in system.elements]
+    if beside:
+        raise ModelError(
+            f"{where}: {', '.join(quoted(name) for name in beside)}: couplers and elements are no joints, whose "
+            "reactions do no work; leave them out"
+        )
+    normal = [
+        force.joint
+        for force in system.forces
+        if isinstance(force, JointForce) and force.friction_coefficient and force.joint in tree.constrained
+    ]
+    if normal:
+        raise ModelError(
+            f"{where}: joint {quoted(normal[0])} has friction by its normal force, which is not linear in the "
+            "parameters; leave it out"
+        )
+    driven = [column.name for column in tree.columns if column.is_driven]
+    if driven:
+        raise ModelError(
+            f"{where}: {', '.join(quoted(name) for name in driven)}: prescribed motions; with loops the motion is "
+            "given by the samples: leave them out"
+        )
+    model = compiled_system(system).model
+    kinds = model.rows.kind[tree.tree.kept_row >= 0]
+    if (is_held(kinds) & ~is_held_position(kinds)).any():
+        raise ModelError(f"{where}: joints that hold velocities (rolling) close no loop that positions could follow")
+    return tree
+
+
+class Loops:
+    """The cut joints of a system at work."""
+
+    def __init__(self, system: System, where: str) -> None:
+        """Begin as placed."""
+        compiled = compiled_system(system)
+        self.where, self.parts = where, looped_tree(system, where)
+        self.model, self.tree = compiled.model, self.parts.tree
+        self.work, self.joints = new_work(self.model), joints_as_placed(system)
+        self.tangent = new_tangent_work(self.model, self.tree)
+        self.start = distances(self.tree, self.joints)
+        kept = self.tree.kept_row >= 0
+        kinds = self.model.rows.kind[kept]
+        held = np.flatnonzero(is_held(kinds))
+        self.held, self.rows = held, np.flatnonzero(kept)[held]
+        self.row_size = np.where(is_held_length(kinds[held]), compiled.length, 1.0)
+        self.size = np.array([compiled.length if column.unit == "m" else 1.0 for column in self.parts.columns])
+        self.names = ", ".join(quoted(name) for name in (*self.parts.cut, *self.parts.constrained))
+
+    def put(self, x: Array, rate: Array, acceleration: Array, *, by_increments: bool) -> Array:
+        """Move, and return C over rows and coordinates in their sizes, (n_rows, n_c); rates of g are in the work."""
+        from floatframe.engine.tree.kernels.entry import constraints
+
+        joints = self.joints
+        joints.x[:], joints.rate[:], joints.acceleration[:] = x - self.start, rate, acceleration
+        constraints(self.model, self.work, self.tree, joints, self.tangent, by_increments=by_increments)
+        C = np.zeros((len(self.rows), len(self.size)))
+        C[:, self.tree.column] = self.tangent.C[self.held]
+        return C * self.size / self.row_size[:, None]
+
+    def gap(self) -> Array:
+        """Return what is held, in its sizes, (n_rows,)."""
+        return self.work.connections.g[self.rows] / self.row_size
+
+    def close(self, x: Array, dependent: IntArray, at: str) -> Array:
+        """Return the coordinates with the dependent ones such that the loops are closed."""
+        x, zero = x.copy(), np.zeros_like(x)
+        for _ in range(MOST):
+            C_d = self.put(x, zero, zero, by_increments=True)[:, dependent]
+            g = self.gap()
+            step = solved(C_d, -g)
+            x[dependent] += step * self.size[dependent]
+            if np.abs(step).max() <= CLOSED:
+                if np.abs(g).max() <= 1e3 * CLOSED:
+                    return x
+                break
+        raise ModelError(
+            f"{self.where}: the loops cut at {self.names} cannot be closed {at} (they miss by {np.abs(g).max():.2g} of "
+            "their size); the coordinates are out of reach, or their zero is not where the system is placed"
+        )
+
+
+def solved(C_d: Array, right: Array) -> Array:
+    """Return the dependent coordinates, least squares over rows that repeat each other."""
+    return np.asarray(la.lstsq(C_d, right, cond=RANK, lapack_driver="gelsy")[0])
+
+
+def independent_columns(system: System, names: Sequence[str] | None, where: str) -> IntArray:
+    """Return the columns of independent coordinates, (n_i,).
+
+    Parameters
+    ----------
+    names
+        As given; they have to be as many as the system can move in, and to determine all others as it is placed.
+
+    Raises
+    ------
+    ModelError
+        If they are not; with names that are.
+    """
+    loops = Loops(system, where)
+    every = [column.name for column in loops.parts.columns]
+    zero = np.zeros(len(every))
+    C = loops.put(loops.start, zero, zero, by_increments=False)
+    s = la.svdvals(C)
+    n_d = int((s > RANK * s[0]).sum())
+    n_i = len(every) - n_d
+    fit = f"{n_i} of {', '.join(every)} move independently"
+    if names is None:
+        raise ModelError(
+            f"{where}: loops are cut at {loops.names}; {fit}: say which are driven and measured, such as independent = "
+            f"({', '.join(repr(each) for each in proposed(C, every, n_d))})"
+        )
+    for name in names:
+        if name not in every:
+            raise ModelError(f"{where}: independent: no coordinate {quoted(name)}{nearest(name, every)}")
+    columns = np.array([every.index(name) for name in names], dtype=np.int64)
+    if len(set(names)) != len(names) or len(columns) != n_i:
+        raise ModelError(f"{where}: independent: {fit} (loops are cut at {loops.names}), got {', '.join(names)}")
+    rest = np.setdiff1d(np.arange(len(every)), columns)
+    s_d = la.svdvals(C[:, rest])
+    if s_d[n_d - 1] <= RANK * s[0]:
+        raise ModelError(
+            f"{where}: independent: {', '.join(names)} do not determine the others as the system is placed; take such "
+            f"as {', '.join(proposed(C, every, n_d))}, or place it away from where its links are in line"
+        )
+    return columns
+
+
+def proposed(C: Array, names: list[str], n_d: int) -> list[str]:
+    """Return names of independent coordinates: those that pivoted columns leave, early ones of equals kept free."""
+    _, _, pivot = la.qr(C[:, ::-1], mode="economic", pivoting=True)
+    dependent = {len(names) - 1 - int(k) for k in pivot[:n_d]}
+    return [name for k, name in enumerate(names) if k not in dependent]
+
+
+def loop_samples(system: System, independent: IntArray, x: Array, rate: Array, acceleration: Array) -> TreeSamples:
+    """Return the motion of a system with loops at given independent coordinates.
+
+    Parameters
+    ----------
+    independent
+        Their columns, (n_i,).
+    x, rate, acceleration
+        Of them, (n, n_i), as in `tree_samples`; one instant not far from the next.
+
+    Raises
+    ------
+    ModelError
+        If loops cannot be closed, or a position is singular, with the number of the instant.
+    """
+    where = f"system {system.name!r}: samples"
+    loops = Loops(system, where)
+    n, n_c = len(x), len(loops.size)
+    if not x.shape == rate.shape == acceleration.shape == (n, len(independent)):
+        names = ", ".join(loops.parts.columns[k].name for k in independent)
+        raise ModelError(
+            f"{where}: expected three arrays (n, {len(independent)}), one column for each of {names}; got {x.shape}, "
+            f"{rate.shape}, {acceleration.shape}"
+        )
+    dependent = np.setdiff1d(np.arange(n_c), independent)
+    size_d, size_i = loops.size[dependent], loops.size[independent]
+    z, z_dot, z_ddot = np.empty((n, n_c)), np.empty((n, n_c)), np.empty((n, n_c))
+    gamma = np.zeros((n, n_c, len(independent)))
+    gamma[:, independent] = np.eye(len(independent))
+    zero, here = np.zeros(n_c), loops.start.copy()
+    for k in range(n):
+        at = f"at instant {k}"
+        way = (x[k] - here[independent]) / size_i
+        n_strides = max(1, int(np.ceil(np.abs(way).max() / STRIDE)))
+        for _ in range(n_strides):
+            C = loops.put(here, zero, zero, by_increments=True)
+            here[independent] += way / n_strides * size_i
+            here[dependent] += solved(C[:, dependent], -C[:, independent] @ way / n_strides) * size_d
+            here = loops.close(here, dependent, at)
+        here[independent] = x[k]
+        C = loops.put(here, zero, zero, by_increments=False)
+        s = la.svdvals(C[:, dependent])
+        if s[len(dependent) - 1] <= RANK * s[0]:
+            raise ModelError(f"{where}: {at} the loops cut at {loops.names} are in a singular position")
+        gamma[k, dependent] = solved(C[:, dependent], -C[:, independent]) * size_d[:, None] / size_i
+        z[k], z_dot[k], z_ddot[k] = here, gamma[k] @ rate[k], zero
+        z_ddot[k, independent] = acceleration[k]
+        loops.put(here, z_dot[k], z_ddot[k], by_increments=False)
+        bias = loops.work.connections.bias[loops.rows] / loops.row_size
+        z_ddot[k, dependent] = solved(C[:, dependent], -bias) * size_d
+    return motion_of_tree(system, loops.parts.tree, z, z_dot, z_ddot, gamma)
+
+
+# regressors -----------------------------------------------------------------------------------------------------------
+
 
 #: terms of a drive beside those of the bodies: what they multiply, in words
 DRIVE_TERMS = {
@@ -87,7 +330,7 @@ def linear_form(system: System, terms: Sequence[str] = (), *, independent: Seque
         Of `DRIVE_TERMS`, for each coordinate, also those that loops make dependent, but not for joints that are cut.
     independent
         Where joints close loops: the coordinates that are driven and measured, as many as move independently. The
-        others follow, and torques are those that act on these (`floatframe.design.identification.loops`).
+        others follow, and torques are those that act on these (`floatframe.design.identification.regressors`).
 
     Raises
     ------

@@ -20,9 +20,15 @@ from floatframe.engine.compiling.callbacks import raise_errors_of
 from floatframe.engine.compiling.file_frames import motion_of_file, state_of_engine
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.initial_conditions.constraint_words import conflict_of_drives, drive_name, open_joints
-from floatframe.engine.initial_conditions.far_drives import driven_angles, led_by, stages, way_of_drives
 from floatframe.engine.initial_conditions.freedoms import Mobility, constraint_mobility, scaled_constraints
-from floatframe.engine.initial_conditions.half_turns import require_no_half_turns
+from floatframe.engine.initial_conditions.initial_checks import (
+    driven_angles,
+    led_by,
+    repeated_constraints,
+    require_no_half_turns,
+    stages,
+    way_of_drives,
+)
 from floatframe.engine.initial_conditions.newton_equations import (
     STIFF_START,
     displaced,
@@ -34,7 +40,6 @@ from floatframe.engine.initial_conditions.newton_equations import (
     with_modal_weight,
 )
 from floatframe.engine.initial_conditions.placement import require_placed_near
-from floatframe.engine.initial_conditions.repeated_constraints import repeated_constraints
 from floatframe.engine.kernels.model import Model
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.engine.tree.kernels.tree import Tree

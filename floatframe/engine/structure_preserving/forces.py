@@ -12,7 +12,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.engine.kernels.model import Model
 from floatframe.engine.structure_preserving.bodies import BodyStep, CentralBody
-from floatframe.engine.structure_preserving.constraints import Loads, Pair, Span
+from floatframe.engine.structure_preserving.constraints import Loads, Pair, Span, arctan2
 from floatframe.engine.structure_preserving.coordinates import (
     add_coordinate_force,
     add_impulsive_force,
@@ -21,11 +21,121 @@ from floatframe.engine.structure_preserving.coordinates import (
     coordinate_rate,
 )
 from floatframe.engine.structure_preserving.functions import along_imaginary, value_of
-from floatframe.engine.structure_preserving.markers import Load, MarkerStep
+from floatframe.engine.structure_preserving.markers import Load, MarkerStep, mean_jacobian
+from floatframe.engine.structure_preserving.rotation import relative_cayley
 from floatframe.model.joints.rows import kind_of
-from floatframe.model.rotations import cross, dot, turned
+from floatframe.model.rotations import continued_rotation, cross, dot, rotation_exp, tilde, turned
 
-__all__ = ["Given", "body_load", "coordinate_load", "point_load", "spring_load"]
+__all__ = ["Given", "body_load", "bushing_load", "coordinate_load", "point_load", "spring_load"]
+
+
+# bushings -------------------------------------------------------------------------------------------------------------
+# Bushings over a step: the potential of six deformations by its exact discrete derivative, see kernels/bushing.py.
+#
+# With R = A_Aᵀ A_B = exp(theta), s = A_Aᵀ d and Q = exp(-share theta) the deformations are xi = (e, theta), e = Q s;
+# the share is 0 in axes of A, 1 in axes of B, 1/2 half way. Products of axes and places change by the product rule with
+# means, and with the Cayley vectors psi and chi of the two rotations
+#
+# R_1 - R_0 = tilde(psi) R_mean,   psi = Gamma dtheta,     Q_1 - Q_0 = tilde(chi) Q_mean,   chi = -share Gamma' dtheta
+# de = Q_mean ds + chi × (Q_mean s_mean)
+#
+# Gamma and Gamma' by Gonzalez' discrete derivative of exp (discrete/markers.py). So the force f and the moment m of the
+# mean deformations, f·de + m·dtheta being the change of a potential of degree two, act by
+#
+#     f on s:  Q_meanᵀ f,      tau = Gamma⁻ᵀ (m - share Gamma'ᵀ ((Q_mean s_mean) × f)),
+#     on the products a_i · b_j of the axes:  1/2 tilde(tau) P,  P = (1 + tilde(psi)/2) R_0 = R_mean⁻ᵀ,
+#
+# because <tilde(tau) P, tilde(psi) R_mean> = 2 tau·psi. They depend on products of directions alone and add no angular
+# momentum. Rates of damping are changes over the step, so that damping takes energy whatever h; tables act at the mean.
+
+
+def transposed(A: Array) -> Array:
+    """Return Aᵀ of stacks of matrices."""
+    return np.swapaxes(A, -1, -2)
+
+
+def solved(A: Array, x: Array) -> Array:
+    """Return A⁻¹ x for stacks of matrices and vectors."""
+    return np.asarray(np.linalg.solve(A, x[..., None])[..., 0], dtype=x.dtype)
+
+
+def axial(A: Array) -> Array:
+    """Return x with tilde(x) = (A - Aᵀ)/2, (..., 3)."""
+    B = 0.5 * (A - transposed(A))
+    return np.stack([B[..., 2, 1], B[..., 0, 2], B[..., 1, 0]], axis=-1)
+
+
+def rotation_vector(R: Array) -> Array:
+    """Return the rotation vector of R, shorter than pi, (..., 3); complex numbers too."""
+    x = axial(R)
+    sine2 = dot(x, x)
+    cosine = 0.5 * (R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2] - 1)
+    is_small = np.abs(sine2) < 1e-8
+    sine = np.sqrt(np.where(is_small, 1.0, sine2))
+    factor = np.where(is_small, 1 + sine2 / 6 + 3 * sine2**2 / 40, arctan2(sine, cosine) / sine)
+    return factor[..., None] * x
+
+
+def axes(marker: MarkerStep) -> tuple[Array, Array]:
+    """Return the axes of a marker at both ends, ground axes, (..., 3, 3)."""
+    ends = [marker.ends(e) for e in np.eye(3)]
+    return np.stack([e[0] for e in ends], axis=-1), np.stack([e[1] for e in ends], axis=-1)
+
+
+def axes_change(marker: MarkerStep, mean: Array) -> Array:
+    """Return the change of the axes of a marker, (..., 3, 3); mean: their mean."""
+    return np.stack([marker.change(e, mean[..., i]) for i, e in enumerate(np.eye(3))], axis=-1)
+
+
+def bushing_load(model: Model, c: int, pair: Pair, loads: Loads, span: Span) -> tuple[Array, Array]:
+    """Add the loads of bushing c; return the work that its tables give, and that its damping takes."""
+    (a, b), i = pair, int(model.connections.item[c])
+    (A_0, A_1), (B_0, B_1) = axes(a), axes(b)
+    A, B, d = 0.5 * (A_0 + A_1), 0.5 * (B_0 + B_1), b.x_mean - a.x_mean
+    s_0, s_1 = turned(transposed(A_0), b.x_0 - a.x_0), turned(transposed(A_1), b.x_1 - a.x_1)
+    R_0 = transposed(A_0) @ B_0
+    share = float(model.bushings.share[i])
+    th_0, th_1 = rotation_vector(R_0), rotation_vector(transposed(A_1) @ B_1)
+    if model.bushings.angle[i] >= 0:
+        expected = span.rotation(int(model.bushings.angle[i]))
+        th_0, th_1 = continued_rotation(th_0, expected), continued_rotation(th_1, expected)
+    Gamma, part = mean_jacobian(th_0, th_1), mean_jacobian(-share * th_0, -share * th_1)
+    P = R_0 + 0.5 * tilde(relative_cayley(th_0, th_1)) @ R_0
+    Q_0, Q_1 = rotation_exp(-share * th_0), rotation_exp(-share * th_1)
+    Q, arm = 0.5 * (Q_0 + Q_1), turned(0.5 * (Q_0 + Q_1), 0.5 * (s_0 + s_1))
+    # the change of the deformations by the motion over the step
+    dA, dB = axes_change(a, A), axes_change(b, B)
+    psi = axial((transposed(dA) @ B + transposed(A) @ dB) @ transposed(P))
+    dtheta = solved(Gamma, psi)
+    ds = turned(transposed(dA), d) + turned(transposed(A), b.dx - a.dx)
+    de = turned(Q, ds) + cross(-share * turned(part, dtheta), arm)
+    change = np.concatenate(np.broadcast_arrays(de, dtheta), axis=-1)
+    e_mean = 0.5 * (turned(Q_0, s_0) + turned(Q_1, s_1))
+    mean = np.concatenate(np.broadcast_arrays(e_mean, 0.5 * (th_0 + th_1)), axis=-1)
+    law = model.bushings
+    damping = turned(law.damping[i], change / span.h)
+    force = turned(law.stiffness[i], mean) + law.preload[i] + damping
+    given = np.zeros(np.shape(change)[:-1], change.dtype)
+    for r in range(6):
+        if law.table[i, r] >= 0:
+            value = along_imaginary(model, int(law.table[i, r]), mean[..., r])
+            force = force + value[..., None] * np.eye(6)[r]
+            given = given - value * change[..., r]
+    f, m = force[..., :3], force[..., 3:]
+    m = m - share * turned(transposed(part), cross(arm, f))
+    tau = solved(transposed(Gamma), m)
+    G, g = -0.5 * tilde(tau) @ P, -turned(transposed(Q), f)
+    on_A, on_B = B @ transposed(G) + d[..., :, None] * g[..., None, :], A @ G
+    for k, e in enumerate(np.eye(3)):
+        a.add_direction(loads[0], e, on_A[..., k])
+        b.add_direction(loads[1], e, on_B[..., k])
+    F = turned(A, g)
+    a.add_force(loads[0], -F)
+    b.add_force(loads[1], F)
+    return given, dot(damping, change)
+
+
+# forces ---------------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)

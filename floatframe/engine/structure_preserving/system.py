@@ -9,7 +9,6 @@ from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.kernels.model import BUSHING, CONTACT, COUPLER, ELEMENT, JOINT, USER_FORCE, Model
 from floatframe.engine.kernels.model import SPRING as SPRING_LAW
 from floatframe.engine.structure_preserving.bodies import BodyStep, CentralBody, central_bodies
-from floatframe.engine.structure_preserving.bushings import bushing_load
 from floatframe.engine.structure_preserving.constraints import (
     Loads,
     Pair,
@@ -30,7 +29,14 @@ from floatframe.engine.structure_preserving.deformed_lines import (
     line_rate_in_time,
     line_value,
 )
-from floatframe.engine.structure_preserving.forces import Given, body_load, coordinate_load, point_load, spring_load
+from floatframe.engine.structure_preserving.forces import (
+    Given,
+    body_load,
+    bushing_load,
+    coordinate_load,
+    point_load,
+    spring_load,
+)
 from floatframe.engine.structure_preserving.functions import value_of
 from floatframe.engine.structure_preserving.markers import BodyMarker, Load, MarkerStep, body_marker, marker_step
 from floatframe.engine.structure_preserving.public_elements import (

@@ -14,7 +14,7 @@ import functools
 import sys
 
 try:
-    from floatframe.files.cosimulation.hosted import HostedUnit, words_of
+    from floatframe.files.cosimulation.archive import HostedUnit, words_of
     from floatframe.errors import ConvergenceError
 except ImportError as error:  # told by the instance: the binary does not survive an error of the script itself
     missing = (

@@ -1,21 +1,138 @@
 """Spectra of channels by the name of their kind: what `floatframe plot --as` and `floatframe spectrum` make."""
 
-from collections.abc import Callable
+import csv
+import io
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import SignalError
 from floatframe.files.signals.octaves import octave_levels
 from floatframe.files.signals.orders import SpectralMap, angle_of_speed, frequency_map, order_map
+from floatframe.files.signals.resampling import resampled
 from floatframe.files.signals.signal_units import signal_unit
-from floatframe.files.signals.signals import Signal, Signals
+from floatframe.files.signals.signals import Signal, Signals, equidistant_step
 from floatframe.files.signals.spectra import Spectrum, amplitude_spectrum, psd
 from floatframe.files.signals.transfer import TransferEstimate, transfer_estimate
+from floatframe.results.sensors.measurement import Measurement
 
-__all__ = ["SPECTRA", "SpectrumRequest", "spectra_of"]
+__all__ = ["SPECTRA", "SpectrumRequest", "even_signals", "signals_of", "spectra_of", "spectral_csv", "spectral_record"]
+
+
+# spectra as tables (CSV) and records (JSON) for other programs --------------------------------------------------------
+
+
+AnySpectrum = Spectrum | SpectralMap | TransferEstimate
+
+
+def spectral_csv(spectra: Sequence[AnySpectrum]) -> str:
+    """Return spectra as comma-separated values: over common frequencies side by side, maps one below the other."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    first = spectra[0]
+    if isinstance(first, SpectralMap):
+        line = "order" if first.kind == "order" else "frequency [Hz]"
+        writer.writerow(
+            ["name", "time [s]", "speed [rad/s]", line, f"amplitude ({'rms' if first.is_rms else 'peak'})", "unit"]
+        )
+        for each in spectra:
+            assert isinstance(each, SpectralMap)  # of one kind with the first
+            speeds: Iterable[Any] = [""] * len(each.times) if each.speeds is None else each.speeds.tolist()
+            for t, speed, row in zip(each.times.tolist(), speeds, each.amplitudes.tolist(), strict=True):
+                writer.writerows(
+                    [each.name, repr(t), repr(speed) if speed != "" else "", repr(x), repr(a), each.unit]
+                    for x, a in zip(each.lines.tolist(), row, strict=True)
+                )
+        return text.getvalue()
+    columns: dict[str, Array] = {"frequency [Hz]": first.frequencies}
+    if isinstance(first, Spectrum) and first.edges is not None:
+        columns |= {"from [Hz]": first.edges[:, 0], "to [Hz]": first.edges[:, 1]}
+    for each in spectra:
+        if isinstance(each, TransferEstimate):
+            name = f"{each.output} / {each.input}"
+            columns |= {
+                f"{name} H1 [{each.unit}]": np.abs(each.H1), f"{name} H1 phase [degrees]": np.angle(each.H1, deg=True),
+                f"{name} H2 [{each.unit}]": np.abs(each.H2), f"{name} H2 phase [degrees]": np.angle(each.H2, deg=True),
+                f"{name} coherence": each.coherence,
+            }  # fmt: skip
+        elif isinstance(each, Spectrum):
+            columns[f"{each.name} {each.kind} [{each.unit}]"] = each.values
+    if len({len(values) for values in columns.values()}) != 1:
+        raise SignalError("spectra over different frequencies do not stand in one table; write them one by one")
+    writer.writerow(columns)
+    writer.writerows([repr(float(x)) for x in row] for row in zip(*columns.values(), strict=True))
+    return text.getvalue()
+
+
+def spectral_record(spectra: Sequence[AnySpectrum]) -> list[dict[str, Any]]:
+    """Return spectra in plain types: every field by its name, complex numbers in two parts, NaN as None."""
+    return [{key: plain(value) for key, value in vars(each).items()} for each in spectra]
+
+
+def plain(value: Any) -> Any:
+    """Return lists in place of arrays."""
+    if isinstance(value, np.ndarray):
+        if np.iscomplexobj(value):
+            return {"real": plain(value.real), "imaginary": plain(value.imag)}
+        whole = value.astype(object)
+        whole[~np.isfinite(value)] = None
+        return whole.tolist()
+    return list(value) if isinstance(value, tuple) else value
+
+
+# what sensors measured on a motion, as signals ------------------------------------------------------------------------
+
+
+NO_SIGNALS = ("number in the mesh",)  #: units of columns that are no quantity over time
+
+
+def signals_of(measurements: Sequence[Measurement], units: Units) -> Signals:
+    """Return the columns of measurements as channels "sensor column"; times in seconds, values in units of the system.
+
+    Raises
+    ------
+    SignalError
+        If there is no column, or no time.
+    """
+    columns = [
+        (one.sensor if one.sensor.endswith(f".{name}") else f"{one.sensor} {name}", one.columns[name], one.units[name])
+        for one in measurements
+        for name in one.columns
+        if one.units[name] not in NO_SIGNALS
+    ]
+    if not columns or not len(measurements[0].t):
+        raise SignalError("signals: no sensor has measured anything; name one, or a joint coordinate")
+    names, values, words = zip(*columns, strict=True)
+    return Signals(measurements[0].t * units.time, np.column_stack(values), names, words)
+
+
+def even_signals(signals: Signals, rate: float | None = None) -> Signals:
+    """Return channels at equidistant times: as they are, or resampled to a rate, by default that of their usual step.
+
+    Rows that events put between the others are so left out, and steps that followed the motion made even; the notes
+    say it.
+    """
+    if rate is None and equidistant_step(signals.time) is not None:
+        return signals
+    if len(signals.time) < 2:
+        raise SignalError("signals: expected two or more times")
+    rate = 1.0 / float(np.median(np.diff(signals.time))) if rate is None else rate
+    parts: list[Signal] = []
+    notes: list[str] = list(signals.notes)
+    for k, name in enumerate(signals.names):
+        part, _ = resampled(Signal(name, signals.time, signals.values[:, k], signals.units[k]), rate)
+        parts.append(part)
+        notes += [f"{name}: {note}" for note in part.notes]
+    values = np.stack([part.values for part in parts], axis=1)
+    return Signals(parts[0].time, values, signals.names, signals.units, signals.source, tuple(notes))
+
+
+# analysis -------------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -13,11 +15,87 @@ from floatframe.analyses.linear.channels import AnyInput, AnyOutput, Column
 from floatframe.analyses.linear.force_inputs import ForceInput
 from floatframe.analyses.linear.inputs import BaseMotion, DriveMotion, ParameterInput
 from floatframe.errors import ModelError
+from floatframe.files.system_file.keys import Name, Number, Positive
 from floatframe.files.system_file.place_key import MeasuredPlace, marker_at
 from floatframe.results.sensors import Sensor
 from floatframe.results.sensors.channels import QUANTITIES, RATES, Channel, CoordinateChannel, StressChannel
+from floatframe.simulation.events import DIRECTIONS, Event
+from floatframe.simulation.foreign_units import SCHEMES, Coupling, ForeignUnit
 
-__all__ = ["InputSection", "OutputSection"]
+__all__ = ["CosimulationSection", "EventSection", "FmuSection", "ForeignSection", "InputSection", "OutputSection"]
+
+
+# tables of the system file for events: [events.NAME] ------------------------------------------------------------------
+
+
+class EventSection(Table):
+    """[events.NAME]: an action of a run when a measured value crosses a level, or at a given time."""
+
+    watch: str = Field("", description='the name of a sensor, or "joint.coordinate"')
+    at: float | None = Field(None, description="instead of watch, a number, the time of the event")
+    column: str = Field("", description="a column of the sensor; default: its first")
+    level: float = Field(0.0, description="a number, the value that is crossed")
+    direction: choice("direction", lambda: tuple(DIRECTIONS)) = Field(  # type: ignore[valid-type]
+        "both", description=f"one of {', '.join(DIRECTIONS)}"
+    )
+    stop: bool = Field(False, description="true: the run ends there")
+    switch_on: list[str] = Field([], description="names of forces and couplers")
+    switch_off: list[str] = Field([], description="names of forces and couplers")
+    record: bool = Field(False, description="true: the results at this time are kept")
+    tolerance: Annotated[float, Field(gt=0)] = Field(
+        1e-9, description="a number above 0, the tolerance of the time, relative to the step"
+    )
+
+    def event(self, name: str) -> Event:
+        """Return the event of that name."""
+        return Event(name, **{key: getattr(self, key) for key in type(self).model_fields})
+
+
+# tables of the system file for co-simulation: [fmu], [fmus.NAME] and [cosimulation] -----------------------------------
+
+
+class FmuSection(Table):
+    """[fmu]: the inputs, outputs and parameters of the FMU that `floatframe fmu` writes."""
+
+    inputs: list[Name] | None = Field(
+        None, description="names of inputs, such as forces.NAME.amplitude, joints.NAME.angle, or a table [inputs.NAME]"
+    )
+    outputs: list[Name] | None = Field(None, description='names of sensors, or "joint.coordinate"')
+    parameters: dict[str, Name] | None = Field(None, description="key paths of numbers in this file by name, text")
+
+
+class ForeignSection(Table):
+    """[fmus.NAME]: an FMU of another program that is coupled to the system."""
+
+    file: Name = Field(description="the path of the FMU, relative to this file")
+    inputs: dict[str, Name] = Field({}, description='sensors by input of the FMU, such as {phi = "hinge.angle"}')
+    outputs: dict[str, Name] = Field(
+        {}, description='inputs of the system by output of the FMU, such as {torque = "forces.motor.motor"}'
+    )
+    parameters: dict[str, Number] = Field({}, description="numbers by parameter of the FMU")
+
+    def unit(self, name: str, folder: Path) -> ForeignUnit:
+        """Return the unit; its path is relative to the folder."""
+        return ForeignUnit(name, str(folder / self.file), self.inputs, self.outputs, self.parameters)
+
+
+class CosimulationSection(Table):
+    """[cosimulation]: how the system and its FMUs are stepped together."""
+
+    step: Positive | None = Field(None, description="a number above 0, the macro-step, a multiple of run.h")
+    scheme: choice("scheme", lambda: SCHEMES) = Field(  # type: ignore[valid-type]
+        SCHEMES[0], description=f"one of {', '.join(SCHEMES)}"
+    )
+    tolerance: float = Field(1e-9, gt=0, lt=1, description="a number between 0 and 1, the tolerance of the iteration")
+    max_iterations: int = Field(50, ge=2, description="a whole number, 2 or more, the most rounds of the iteration")
+
+    def coupling(self) -> Coupling:
+        """Return the coupling that the table describes."""
+        return Coupling(self.step, self.scheme, self.tolerance, self.max_iterations)
+
+
+# channel section ------------------------------------------------------------------------------------------------------
+
 
 WAYS = {  # keys that belong together, by the key that identifies the group
     "joint": ("joint", "coordinate"),

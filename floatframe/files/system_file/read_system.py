@@ -26,10 +26,15 @@ from fe_models.foundation.words import nearest
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import FloatframeError, SystemFileError
 from floatframe.files.system_file.bodies import BodySection, body_of
-from floatframe.files.system_file.channel_section import InputSection, OutputSection
-from floatframe.files.system_file.cosimulation_section import CosimulationSection, FmuSection, ForeignSection
+from floatframe.files.system_file.channel_section import (
+    CosimulationSection,
+    EventSection,
+    FmuSection,
+    ForeignSection,
+    InputSection,
+    OutputSection,
+)
 from floatframe.files.system_file.element_section import element_of
-from floatframe.files.system_file.event_section import EventSection
 from floatframe.files.system_file.forces import ForceSection, force_of
 from floatframe.files.system_file.joints import CouplerSection, JointSection, coupler_of, joint_of
 from floatframe.files.system_file.keys import Name
@@ -37,8 +42,8 @@ from floatframe.files.system_file.run_section import RunOptions, RunSection
 from floatframe.files.system_file.sensor_section import SensorSection
 from floatframe.files.system_file.shape_section import ShapeSection
 from floatframe.files.system_file.signal_section import SignalSection, signal_functions
-from floatframe.files.system_file.unit_hints import unit_hints
 from floatframe.model.bodies.ground import GROUND
+from floatframe.model.bodies.rigid_body import RigidBody
 from floatframe.model.forces import (
     Force,
     Gravity,
@@ -46,7 +51,51 @@ from floatframe.model.forces import (
 from floatframe.model.system import REDUNDANT, System
 from floatframe.simulation.events import require_events
 
-__all__ = ["RunOptions", "read_system"]
+__all__ = ["RunOptions", "read_system", "unit_hints"]
+
+
+# hints that numbers of a system seem to be in other units than stated -------------------------------------------------
+
+
+EARTH = 9.80665  #: m/s²
+POWERS = (1e-6, 1e-3, 1e3, 1e6)  #: factors by which a number is wrong if m and mm, or kg and t, are mixed up
+NEAR = 0.02  #: relative difference from such a factor
+FAR = 300.0  #: ratio of radius of gyration to size of the system, or the inverse with its square, that no real part has
+
+
+def unit_hints(system: System) -> tuple[str, ...]:
+    """Return notes on numbers that do not fit the units of a system: gravity off by 1000, or implausible inertia."""
+    hints = []
+    units, where = system.units, f"system {system.name!r}, units {system.units.name}"
+    for force in system.forces:
+        if isinstance(force, Gravity):
+            size = float(np.linalg.norm(force.acceleration))
+            on_earth = EARTH * units.time**2 / units.length
+            if any(abs(size / (factor * on_earth) - 1) < NEAR for factor in POWERS):
+                hints.append(
+                    f"{where}: gravity is {size:g} {units.length_symbol}/{units.time_symbol}², but on earth "
+                    f"{on_earth:g}: is it in other units?"
+                )
+    rigid = [body for body in system.bodies if isinstance(body, RigidBody)]
+    sizes = [
+        float(np.linalg.norm(np.ptp(b.reduced.nodes, axis=0))) for b in system.bodies if not isinstance(b, RigidBody)
+    ]
+    reach = [float(np.linalg.norm(body.center_of_mass)) for body in rigid]
+    places = np.array([body.position for body in system.bodies])
+    length = max([*sizes, *reach, float(np.linalg.norm(np.ptp(places, axis=0)))])
+    for body in rigid:
+        radius = float(np.sqrt(np.linalg.eigvalsh(body.inertia)[-1] / body.mass))
+        if length > 0 and (radius > FAR * length or (sizes and radius < length / FAR**2)):
+            hints.append(
+                f"{where}: rigid body {body.name!r} has mass and inertia of a part with a radius of gyration of "
+                f"{radius:.3g} {units.length_symbol}, in a system of {length:.3g}: are they in "
+                f"{units.mass_symbol} and {units.mass_symbol} {units.length_symbol}²?"
+            )
+    return tuple(hints)
+
+
+# read system ----------------------------------------------------------------------------------------------------------
+
 
 log = logging.getLogger(__name__)
 

@@ -1,16 +1,57 @@
 """The antenna as systems with any number of petals, and all its files."""
 
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from fe_models.foundation.arrays import Array
 from floatframe.machines.antenna.closed_forms import mechanism
 from floatframe.machines.antenna.description import FINE, Antenna, HingePlay
 from floatframe.machines.antenna.parts import petal_job, petal_mesh, strut_files, strut_job
+from floatframe.model.bodies.markers import Marker
+from floatframe.model.system import System
+from floatframe.results.place_motion import PlaceMotion
+from floatframe.results.sensors.places import place_motion
+from floatframe.results.trajectory import Trajectory
 
-__all__ = ["antenna_files", "fine_files"]
+__all__ = ["Pointing", "antenna_files", "fine_files", "pointing"]
+
+
+# pointing directions of the petals of the antenna relative to the spacecraft ------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Pointing:
+    """Direction from the middle of each hinge to the tip of its petal, in axes of the spacecraft, (n_t, n_petals)."""
+
+    t: Array  #: (n_t,) [s]
+    theta: Array  #: from the mast [rad]
+    lateral: Array  #: out of the plane of the petal and the mast [rad]
+
+
+def pointing(system: System, motion: Trajectory, antenna: Antenna) -> Pointing:
+    """Return the pointing of the petals of an antenna during a motion."""
+
+    def place(body: str, position: tuple[float, float, float]) -> PlaceMotion:
+        return place_motion(system, motion, "pointing", Marker(body, position=np.array(position)))
+
+    bus = place("bus", (0.0, 0.0, 0.0))
+    theta, lateral = [], []
+    for k in range(1, antenna.n_petals + 1):
+        turn = 2 * np.pi * k / antenna.n_petals
+        tip = place(f"petal_{k}", (antenna.petal_length, 0.0, 0.0)).position - bus.position
+        seen = np.einsum("tij,ti->tj", bus.axes, tip)
+        out = np.cos(turn) * seen[:, 0] + np.sin(turn) * seen[:, 1] - antenna.geometry.hinge_radius
+        theta.append(np.arctan2(out, seen[:, 2]))
+        across = np.cos(turn) * seen[:, 1] - np.sin(turn) * seen[:, 0]
+        lateral.append(np.arctan2(across, np.hypot(out, seen[:, 2])))
+    return Pointing(motion.t, np.transpose(theta), np.transpose(lateral))
+
+
+# systems --------------------------------------------------------------------------------------------------------------
+
 
 STAND = """
 [joints.stand]

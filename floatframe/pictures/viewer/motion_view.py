@@ -24,12 +24,19 @@ from floatframe.model.system import System
 from floatframe.pictures.animation import bodies_of, diagonal
 from floatframe.pictures.body_colors import BODY_COLORS
 from floatframe.pictures.film_times import film_times, round_below
-from floatframe.pictures.viewer.curves import Panel, motion_panels, sensor_panels
 from floatframe.pictures.viewer.flexible import FlexibleSurface, flexible_surface, nodes_within
 from floatframe.pictures.viewer.packing import Block
-from floatframe.pictures.viewer.page import fixed_size, page_of
+from floatframe.pictures.viewer.page import (
+    Panel,
+    Timeline,
+    evenly,
+    fixed_size,
+    motion_panels,
+    page_of,
+    sensor_panels,
+    timeline,
+)
 from floatframe.pictures.viewer.record import Shown, colors_record, stage_record
-from floatframe.pictures.viewer.timeline import Timeline, evenly, timeline
 from floatframe.results.recovery import require_same_modes
 from floatframe.results.sensor_choice import chosen_measurements
 from floatframe.results.sensors import measured

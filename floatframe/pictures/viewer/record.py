@@ -9,24 +9,106 @@ from cms.assessment.rendering.shape import colormap
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.units import Units
+from fe_models.foundation.words import nearest, quoted
+from floatframe.engine.compiling.markers import find_marker
+from floatframe.errors import ModelError
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.bodies.rigid_body import RigidBody
-from floatframe.model.shapes import Piece
+from floatframe.model.elements.element import Element, markers_of
+from floatframe.model.rotations import rotation_exp, rotation_matrix
+from floatframe.model.shapes import Arrow, Drawn, Piece, Plane, Stretched
 from floatframe.model.system import System
 from floatframe.pictures.animation import diagonal, rotations, up_of
 from floatframe.pictures.body_colors import BODY_COLORS
+from floatframe.pictures.element_looks import drawn_pieces, shown_of
 from floatframe.pictures.film_times import round_below
 from floatframe.pictures.stage import view_axes
-from floatframe.pictures.viewer.carriers import Carriers
-from floatframe.pictures.viewer.cast import Cast, bodies_cast, scene_cast
-from floatframe.pictures.viewer.connections import connections_cast
-from floatframe.pictures.viewer.element_cast import elements_cast
+from floatframe.pictures.viewer.carriers import GROUND_CARRIER, Carriers
+from floatframe.pictures.viewer.cast import Between, Cast, Force, Placed, bodies_cast, scene_cast
+from floatframe.pictures.viewer.connections import connections_cast, distance
 from floatframe.pictures.viewer.flexible import FlexibleSurface
 from floatframe.pictures.viewer.packing import Block, Packed
 from floatframe.pictures.viewer.surface import broken_at_edges
+from floatframe.results.element_motion import ElementMotion, element_motion
 from floatframe.results.trajectory import Trajectory
 
-__all__ = ["FORMAT", "VERSION", "Shown", "Stage", "colors_record", "stage_record"]
+__all__ = ["FORMAT", "VERSION", "Shown", "Stage", "colors_record", "elements_cast", "stage_record"]
+
+
+# element cast ---------------------------------------------------------------------------------------------------------
+# What public elements show of themselves in a page: `Element.drawn()` on their markers, arrows of their outputs.
+
+
+def elements_cast(cast: Cast) -> None:
+    """Add what the elements of a system show of themselves."""
+    system = cast.carriers.system
+    for element in () if system is None else system.elements:
+        element_cast(cast, element)
+
+
+def element_cast(cast: Cast, element: Element) -> None:
+    """Add what an element shows of itself."""
+    carriers, where = cast.carriers, f"element {element.name!r}"
+    system = carriers.system
+    shown = () if system is None else shown_of(system, element)
+    if system is None or not shown:
+        return
+    ends = [carriers.of_marker(marker, find_marker(system, where, marker)) for marker in markers_of(element)]
+    motion = None
+    for each in shown:
+        if isinstance(each, Drawn):
+            carrier = GROUND_CARRIER if each.marker is None else ends[each.marker]
+            drawn_cast(cast, each, carrier, system.units.length)
+        elif isinstance(each, Stretched):
+            a, b = ends[each.first], ends[each.second]
+            length = distance(cast, a, b)
+            if length > 0:
+                cast.between.append(Between(each.pieces(length), a, b))
+        else:
+            motion = element_motion(system, carriers.trajectory, element.name) if motion is None else motion
+            cast.forces.append(element_force(cast, element.name, each, ends[each.marker], motion))
+
+
+def drawn_cast(cast: Cast, drawn: Drawn, carrier: int, metres: float) -> None:
+    """Add a shape on a carrier; one that stands on the ground once, though several elements show it."""
+    found = cast.carriers.found[carrier]
+    if found.body < 0 and isinstance(drawn.shape.geometry, Plane):
+        cast.add_plane(drawn.shape.geometry, found.position + found.axes @ drawn.shape.position, found.axes)
+    for piece in drawn_pieces(drawn, metres):
+        if found.body < 0:
+            key = (carrier, piece.color, piece.nodes.tobytes())
+            if key not in cast.on_ground:
+                cast.on_ground.add(key)
+                cast.placed.append(Placed(piece, carrier, "scene"))
+        else:
+            cast.placed.append(Placed(piece, carrier, "body"))
+
+
+def element_force(cast: Cast, name: str, arrow: Arrow, carrier: int, motion: ElementMotion) -> Force:
+    """Return an arrow of three outputs of an element."""
+    rows, trajectory = cast.carriers.rows, cast.carriers.trajectory
+    missing = [each for each in (*(arrow.outputs or ()), *(arrow.at or ())) if each not in motion.outputs]
+    if missing:
+        hint = nearest(missing[0], list(motion.outputs))
+        raise ModelError(f"element {name!r}: drawn: there is no output {quoted(missing[0])}{hint}")
+    if arrow.outputs is None:
+        values = motion.wrench[rows, arrow.marker, :3]
+    else:
+        values = np.stack([motion.outputs[each][rows] for each in arrow.outputs], axis=1)
+    if arrow.is_in_marker_axes and arrow.outputs is not None:
+        found = cast.carriers.found[carrier]
+        axes = np.broadcast_to(found.axes, (len(rows), 3, 3))
+        if found.motion is not None:
+            axes = rotation_exp(found.motion[:, 3:]) @ axes
+        if found.body >= 0:
+            axes = rotation_matrix(trajectory.body(trajectory.body_names[found.body]).p[rows]) @ axes
+        values = np.einsum("tab,tb->ta", axes, values)
+    at = None if arrow.at is None else np.stack([motion.outputs[each][rows] for each in arrow.at], axis=1)
+    return Force(name, values, carrier, arrow.color, at, is_of_element=True)
+
+
+# record ---------------------------------------------------------------------------------------------------------------
+
 
 FORMAT, VERSION = "floatframe-view", 1
 MOST_FORCES = 40  #: largest number of arrows of joints and springs

@@ -9,8 +9,7 @@ from floatframe.model.system import System
 from floatframe.results.sensors.body_loads import InterfaceForceSensor, RecoverySensor, SpringSensor
 from floatframe.results.sensors.bushings import BushingSensor
 from floatframe.results.sensors.channels import Channel, CoordinateChannel, StressChannel
-from floatframe.results.sensors.coordinate_elements import ControlSensor, CouplerSensor
-from floatframe.results.sensors.elements import ElementSensor
+from floatframe.results.sensors.elements import ControlSensor, CouplerSensor, ElementSensor
 from floatframe.results.sensors.loads import CoordinateSensor, EnergySensor, ModeSensor, MomentumSensor, ReactionSensor
 from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.sensors.places import AngleSensor, DisplacementSensor, PlaceSensor

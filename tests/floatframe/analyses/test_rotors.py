@@ -24,7 +24,7 @@ from floatframe import (
     static_equilibrium,
     steady_rotation,
 )
-from floatframe.design.gradients.paths import value_at, with_value
+from floatframe.design.gradients.parameters import value_at, with_value
 from floatframe.model.elements.expressions import ExpressionElement
 from floatframe.model.functions.time_functions import polynomial_of_time
 from floatframe.model.rotations import rotation_exp

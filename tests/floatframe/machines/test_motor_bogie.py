@@ -34,7 +34,7 @@ from floatframe.machines.motor_bogie.closed_forms import (
     torque_lines,
     torque_over_speed,
 )
-from floatframe.machines.motor_bogie.figures import at_rest, modes_of, predicted_lines
+from floatframe.machines.motor_bogie.plots import at_rest, modes_of, predicted_lines
 
 MOTOR = Motor()
 UNBALANCED = ((-1, 0.03),)

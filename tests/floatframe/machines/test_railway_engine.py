@@ -18,14 +18,25 @@ from cms.jobs.job import read_job
 from cms.reduction.basis.damping import RayleighDamping
 from fe_models.elements.shells.shell_points import shell_points
 from fe_models.parts import EngineBody
-from floatframe.design.laboratory.body_errors import BodyReference, without_rigid
-from floatframe.design.laboratory.body_study import Loading, body_study, lean_body, stress_rows
+from floatframe.design.laboratory.body_study import (
+    BodyReference,
+    Loading,
+    body_study,
+    lean_body,
+    stress_rows,
+    without_rigid,
+)
 from floatframe.design.laboratory.suspended_body import suspended_motion
 from floatframe.errors import ModelError
 from floatframe.files.system_file.read_system import read_system
 from floatframe.machines.railway_engine.mode_sets import FREE, MORE_SETS, NAME, SETS
-from floatframe.machines.railway_engine.wheel_paths import Defect, SCurve, envelope
-from floatframe.machines.railway_engine.write_files import railway_engine_files, write_railway_engine
+from floatframe.machines.railway_engine.write_files import (
+    Defect,
+    SCurve,
+    envelope,
+    railway_engine_files,
+    write_railway_engine,
+)
 
 SHIPPED = Path(ff.__file__).parent / "machines" / "railway_engine" / "files"
 BETA = 2.6e-4

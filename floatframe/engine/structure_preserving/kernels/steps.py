@@ -2,13 +2,22 @@
 
 import math
 
+from numba import types
+
 from floatframe.engine.kernels.body import block
-from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.compiler.choice import is_lean
+from floatframe.engine.kernels.compiler.compilation import inner, kept_entry
+from floatframe.engine.kernels.compiler.sources import source_digest
+from floatframe.engine.kernels.compiler.structure import converter, kept_table_of, table_of, table_of_numbers
 from floatframe.engine.kernels.connections.gap import next_step, step_before_contact
+from floatframe.engine.kernels.entry import Order, Outcome
 from floatframe.engine.kernels.generalized_alpha import load_state
+from floatframe.engine.kernels.memory import Memory, Rows
+from floatframe.engine.kernels.model import Model
 from floatframe.engine.kernels.past import keep_past
 from floatframe.engine.kernels.turns import count_turns
 from floatframe.engine.kernels.vector import add, cross, dot, matrix, put, scaled, sub, turned, turned_back, vector
+from floatframe.engine.kernels.work import Work
 from floatframe.engine.structure_preserving.kernels.bodies import (
     begin_bodies,
     end_rates,
@@ -32,9 +41,13 @@ from floatframe.engine.structure_preserving.kernels.newton import (
     solve,
 )
 from floatframe.engine.structure_preserving.kernels.observation import observe
-from floatframe.engine.structure_preserving.kernels.records import CONSERVING, DAMPING
+from floatframe.engine.structure_preserving.kernels.records import CONSERVING, DAMPING, Discrete, StepWork
 
-__all__ = ["advance"]
+__all__ = ["advance", "advance_discrete_steps"]
+
+
+# steps ----------------------------------------------------------------------------------------------------------------
+
 
 FADING = 0.9  # of the size of a multiplier that holds nothing, a step: one that passes zero keeps its size
 
@@ -354,3 +367,45 @@ def count_angles(model, work, memory, h):
         return
     load_state(work.state, memory)
     count_turns(model, work, memory, h)
+
+
+# the compiled entry of the conserving and variational schemes; compiled when one of them is first used ----------------
+
+
+as_model, as_work, as_memory = converter(Model()), converter(Work()), converter(Memory())
+as_rows, as_order = converter(Rows()), converter(Order())
+as_discrete, as_step = converter(Discrete()), converter(StepWork())
+
+
+def make_entry(digest):
+    """Return the cached entry; the digest of the sources enters its key."""
+
+    def run(model_table, work_table, discrete_table, step_table, memory_table, rows_table, order_table):
+        if digest == 0:
+            return 0, 0, 0, -1, 0.0
+        model, work, discrete = as_model(model_table), as_work(work_table), as_discrete(discrete_table)
+        step, memory = as_step(step_table), as_memory(memory_table)
+        status, n_steps, n_rows = advance(
+            model, work, discrete, step, memory, as_rows(rows_table), as_order(order_table)
+        )  # fmt: skip
+        return status, n_steps, n_rows, -1, step.excess
+
+    return kept_entry(run)
+
+
+run = make_entry(source_digest(__name__, "lean" if is_lean else "plain"))
+SIGNATURE = (types.Array(types.int64, 1, "C"),) * 7
+ORDER = Order()
+
+
+def advance_discrete_steps(
+    model: Model, work: Work, discrete: Discrete, step: StepWork, memory: Memory, rows: Rows, **order: float
+) -> Outcome:
+    """Advance the memory by steps of the scheme; see `kernels.steps.advance`."""
+    if not run.signatures:
+        run.compile(SIGNATURE)
+    ordered, numbers = table_of_numbers(ORDER, order)
+    kept = (kept_table_of(record) for record in (model, work, discrete, step))
+    outcome = run(*kept, table_of(memory), table_of(rows), ordered)
+    del numbers  # not before
+    return Outcome(*outcome)

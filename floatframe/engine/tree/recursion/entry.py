@@ -1,25 +1,157 @@
 """The compiled entry of the recursive equations, and a plain function for each thing it does."""
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from fe_models.foundation.arrays import IntArray
 from floatframe.engine.kernels.compiler.choice import is_lean
-from floatframe.engine.kernels.compiler.compilation import kept_entry
+from floatframe.engine.kernels.compiler.compilation import inner, kept_entry, loops, small
 from floatframe.engine.kernels.compiler.sources import source_digest
 from floatframe.engine.kernels.compiler.structure import converter, table_of
+from floatframe.engine.kernels.marker import elastic_motion
 from floatframe.engine.kernels.model import Model
 from floatframe.engine.kernels.records import integer, zeros
+from floatframe.engine.kernels.rotation import exp_matrix, matrix_of_euler_parameters
+from floatframe.engine.kernels.vector import (
+    add,
+    matrix,
+    product,
+    put,
+    put_matrix,
+    scaled,
+    sub,
+    transposed,
+    turned,
+    unit_matrix,
+    vector,
+)
 from floatframe.engine.kernels.work import Work
 from floatframe.engine.tree.recursion.articulated import articulate, solve_articulated, solve_columns
 from floatframe.engine.tree.recursion.columns import motion_in_ground, rate_columns
 from floatframe.engine.tree.recursion.composite import evaluate_flexible, mass_matrix
 from floatframe.engine.tree.recursion.newton_euler import newton_euler
-from floatframe.engine.tree.recursion.nodes import Dense, Nodes, NodeWork
-from floatframe.engine.tree.recursion.poses import place_in_ground, place_in_parent, set_modes
+from floatframe.engine.tree.recursion.nodes import ROTATION, SCREW, TRANSLATION, Dense, Nodes, NodeWork
 from floatframe.engine.tree.recursion.tangents import force_tangents
 
-__all__ = ["FORWARD", "INVERSE", "MASS", "PLACE", "SOLVE", "TANGENTS", "Prepared", "Task", "prepared"]
+__all__ = [
+    "FORWARD",
+    "INVERSE",
+    "MASS",
+    "PLACE",
+    "SOLVE",
+    "TANGENTS",
+    "Prepared",
+    "Task",
+    "own_marker",
+    "place_in_ground",
+    "place_in_parent",
+    "prepared",
+    "set_modes",
+]
+
+
+# where nodes are: pose of each in its parent, and in the ground (docs/recursive.md §1) --------------------------------
+# The frame of a node in that of its parent is R, p: of a rigid body, joined to a rigid one,
+#
+#     R = A E,  p = r + A d        with A, r of the joint in the parent and E, d of the joint alone
+#
+# An elastic parent moves A and r with its modes: A = exp(th) A, r = rho; an elastic body lies in the outer frame of its
+# joint by its own marker, axes R_own = exp(th) F at rho: R = A E R_ownᵀ, p = r + A d - R rho.
+
+
+@inner
+def set_modes(nodes, work, state):
+    """Take modal coordinates and rates out of positions and rates."""
+    for k in range(nodes.parent.shape[0]):
+        for j in range(nodes.n_q[k]):
+            state.q[nodes.q0[k] + j] = work.x[nodes.xq[k] + j]
+            state.u[nodes.u0[k] + 6 + j] = work.v[nodes.vq[k] + j]
+            state.u_dot[nodes.u0[k] + 6 + j] = work.a[nodes.vq[k] + j]
+
+
+@inner
+def own_marker(model, marker_work, m):
+    """Write how a marker moves in its flexible body; return its axes but for those of the undeformed marker."""
+    work = marker_work.markers
+    put(work.rho[m], 0, vector(model.markers.position[m]))
+    if model.markers.psi0[m] < 0:
+        return unit_matrix()
+    elastic_motion(model, marker_work, m, model.markers.body[m])
+    return exp_matrix(vector(work.angle[m]))
+
+
+@small
+def joint_rotation(nodes, work, k, A):
+    """Return A E of the joint of node k."""
+    kind = nodes.kind[k]
+    if kind == SCREW:
+        turn = nodes.turn[k]
+        if turn != 0.0:
+            angle = turn * work.x[nodes.x0[k]]
+            c, s = math.cos(angle), math.sin(angle)
+            return (
+                (c * A[0][0] + s * A[0][1], c * A[0][1] - s * A[0][0], A[0][2]),
+                (c * A[1][0] + s * A[1][1], c * A[1][1] - s * A[1][0], A[1][2]),
+                (c * A[2][0] + s * A[2][1], c * A[2][1] - s * A[2][0], A[2][2]),
+            )
+    elif kind == ROTATION:
+        E = matrix_of_euler_parameters(work.x[nodes.x0[k] :])
+        if nodes.is_near[k]:
+            E = transposed(E)
+        return product(A, E)
+    return A
+
+
+@small
+def joint_distance(nodes, work, k):
+    """Return d of the joint of node k, inner frame."""
+    kind = nodes.kind[k]
+    if kind == SCREW:
+        return 0.0, 0.0, nodes.slide[k] * work.x[nodes.x0[k]]
+    if kind == TRANSLATION:
+        return scaled(nodes.slide[k], vector(work.x[nodes.x0[k] :]))
+    return 0.0, 0.0, 0.0
+
+
+@loops
+def place_in_parent(nodes, work, model, marker_work):
+    """Write R, p of all nodes, and the markers of flexible bodies."""
+    for k in range(nodes.parent.shape[0]):
+        m = nodes.above[k]
+        if m >= 0:
+            put_matrix(work.A[k], product(own_marker(model, marker_work, m), nodes.A[k]))
+            put(work.rho[k], 0, vector(marker_work.markers.rho[m]))
+        A = matrix(work.A[k])
+        R, p = joint_rotation(nodes, work, k, A), vector(work.rho[k])
+        if nodes.kind[k] == TRANSLATION or nodes.slide[k] != 0.0:
+            p = add(p, turned(A, joint_distance(nodes, work, k)))
+        if nodes.n_q[k] > 0 and nodes.own[k] >= 0:
+            m = nodes.own[k]
+            own = product(own_marker(model, marker_work, m), nodes.F[k])
+            put_matrix(work.R_own[k], own)
+            R = product(R, transposed(own))
+            p = sub(p, turned(R, vector(marker_work.markers.rho[m])))
+        put_matrix(work.R[k], R)
+        put(work.p[k], 0, p)
+
+
+@loops
+def place_in_ground(nodes, work):
+    """Write R_G, r_G of all nodes."""
+    for k in range(nodes.parent.shape[0]):
+        above = nodes.parent[k]
+        if above < 0:
+            put_matrix(work.R_G[k], matrix(work.R[k]))
+            put(work.r_G[k], 0, vector(work.p[k]))
+        else:
+            R = matrix(work.R_G[above])
+            put_matrix(work.R_G[k], product(R, work.R[k]))
+            put(work.r_G[k], 0, add(vector(work.r_G[above]), turned(R, vector(work.p[k]))))
+
+
+# entry ----------------------------------------------------------------------------------------------------------------
+
 
 PLACE, INVERSE, MASS, FORWARD, SOLVE, TANGENTS = range(6)  #: values of `Task.what`
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe.design.generation.derivatives import jacobian, seeds_of
 from floatframe.design.generation.graph import Graph
+from floatframe.design.generation.routines import jacobian, seeds_of
 from floatframe.errors import ModelError
 from tests.floatframe.design.generation.calls import values_of
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe.design.generation.derivatives import derivative
 from floatframe.design.generation.graph import CONSTANT, COS, NEG, SIN, STUMPFF, SYMBOL, Graph, reachable
 from floatframe.design.generation.rotation_series import expanded, rotation_matrix
+from floatframe.design.generation.routines import derivative
 from floatframe.model.rotations import rotation_exp
 from tests.floatframe.design.generation.calls import values_of
 

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 import floatframe as ff
 from floatframe.components.mechanisms import pendulum, slider_crank
-from floatframe.design.gradients.paths import value_at, with_value
+from floatframe.design.gradients.parameters import value_at, with_value
 from floatframe.model.functions.time_functions import constant, harmonic, piecewise
 from tests.floatframe.model.elements.test_element_states import lifted
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffened_body, stiffness

@@ -12,8 +12,7 @@ from floatframe import SystemFileError, linearize, optimize, read_design, read_s
 from floatframe.cli.app import app
 from floatframe.cli.parameters.optimize import best_system
 from floatframe.design.optimization.design import Quantity
-from floatframe.design.optimization.evaluation import EvaluationFunction
-from floatframe.design.optimization.responses import response_number
+from floatframe.design.optimization.evaluation import EvaluationFunction, response_number
 from floatframe.design.studies.study_file import Output
 from floatframe.machines import copy_machine
 

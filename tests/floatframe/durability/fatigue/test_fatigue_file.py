@@ -15,9 +15,9 @@ from floatframe import assess, basquin_curve, equivalent_repeats, history_damage
 from floatframe.cli.app import app
 from floatframe.durability.fatigue.criteria import Criterion
 from floatframe.durability.fatigue.load_blocks import LoadBlock, block_of_results
-from floatframe.durability.fatigue.load_spectrum import cycles_at, exceedances
 from floatframe.durability.fatigue.mean_stress import MeanStress
 from floatframe.durability.fatigue.planes import surface_frames, surface_nodes
+from floatframe.durability.fatigue.report import cycles_at, exceedances
 from floatframe.durability.fatigue.spectral.spectra import spectra_of_history
 from floatframe.durability.fatigue.surface_damage import spectral_damage
 from floatframe.errors import FatigueError

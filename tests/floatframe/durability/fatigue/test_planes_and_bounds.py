@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from floatframe.durability.fatigue.bounds import damage_bounds, envelope, stress_bounds
 from floatframe.durability.fatigue.criteria import CRITERIA, Criterion, von_mises_root
-from floatframe.durability.fatigue.history_damage import count_histories
+from floatframe.durability.fatigue.history_damage import count_histories, damage_bounds, envelope, stress_bounds
 from floatframe.durability.fatigue.kernels.cycle_kernels import collect
 from floatframe.durability.fatigue.kernels.stress_kernels import largest_principal, signed_von_mises
 from floatframe.durability.fatigue.load_blocks import LoadBlock

@@ -18,7 +18,7 @@ from fe_models.foundation.units import unit_system
 from floatframe import ModelError, SystemFileError, integrate, measured, read_system
 from floatframe.cli.app import app
 from floatframe.files.cosimulation.archive import write_fmu
-from floatframe.files.cosimulation.unit_words import BaseUnit, base_unit
+from floatframe.files.cosimulation.model_description import BaseUnit, base_unit
 from tests.floatframe.files.cosimulation.arms import JUMPS, MACRO, MOTORS, T_END, TOLERANCE, H, write_arm
 
 ROOT = Path(__file__).resolve().parents[4]

@@ -1,4 +1,4 @@
-"""Bushings over a step, see `floatframe.engine.structure_preserving.bushings` for the formulas."""
+"""Bushings over a step, see `floatframe.engine.structure_preserving.forces` for the formulas."""
 
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.connections.bushing import continued, law, rotation_vector

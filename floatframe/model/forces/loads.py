@@ -1,0 +1,83 @@
+"""Loads on bodies: gravity, a force at a point, and a load spread over a body."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
+from floatframe.errors import ModelError
+from floatframe.model.bodies.markers import Marker, Named
+from floatframe.model.checked_values import array_of_shape, number
+from floatframe.model.functions.time_functions import TimeFunction, constant
+
+__all__ = ["BodyLoad", "Gravity", "PointForce"]
+
+
+# Gravity: a uniform field ---------------------------------------------------------------------------------------------
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class Gravity:
+    """A uniform gravitational acceleration, which acts on every particle of the deformed bodies."""
+
+    acceleration: Array  #: ground axes, (3,) [m/s²], such as (0, 0, -9.81)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "acceleration", array_of_shape("gravity", self.acceleration, (3,)))
+
+
+# a load case of a modal file (pressure, field, nodal forces) as a force on its body -----------------------------------
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class BodyLoad:
+    """A load case of a flexible body times an amplitude; it rotates with the body.
+
+    Its resultant acts on the undeformed body, and its modal forces act on the modes. The first-order change of its
+    torque due to the deformation is neglected.
+    """
+
+    name: str
+    body: str | Named  #: a flexible body
+    load_case: str  #: name of the load case in the modal file
+    amplitude: TimeFunction | float = field(default=1.0)  #: factor: a number or a function of time
+
+    def __post_init__(self) -> None:
+        if isinstance(self.amplitude, int | float):
+            value = number(f"force {self.name!r}: amplitude", self.amplitude)
+            object.__setattr__(self, "amplitude", constant(value))
+        if not isinstance(self.amplitude, TimeFunction):
+            raise ModelError(
+                f"force {self.name!r}: amplitude: expected a number or a function of functions.time_functions, got "
+                f"{self.amplitude!r}"
+            )
+
+
+# a force and torque at a marker, fixed in space or in the body --------------------------------------------------------
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class PointForce:
+    """A force and a torque on a marker."""
+
+    name: str
+    marker: Marker
+    force: Array = field(default_factory=lambda: np.zeros(3))  #: (3,) [N]
+    torque: Array = field(default_factory=lambda: np.zeros(3))  #: (3,) [N m]
+    is_follower: bool = False  #: True: components in the axes of the (deformed) marker; False: ground axes
+    amplitude: TimeFunction | None = None  #: function of time that multiplies both; None: one
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.amplitude, TimeFunction | None):
+            raise ModelError(
+                f"force {self.name!r}: amplitude: expected a function of "
+                f"floatframe.model.functions.time_functions, got "
+                f"{self.amplitude!r}"
+            )
+        for name in ("force", "torque"):
+            value = array_of_shape(f"force {self.name!r}: {name}", getattr(self, name), (3,))
+            object.__setattr__(self, name, value)

@@ -1,0 +1,277 @@
+"""The six lower pairs: revolute, prismatic, screw, cylindrical, spherical and planar joints."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.units import LENGTH, Quantity
+from floatframe.errors import ModelError
+from floatframe.model.bodies.markers import Place
+from floatframe.model.checked_values import number
+from floatframe.model.functions.time_functions import TimeFunction
+from floatframe.model.joints.axis_frame import axis_in_b, checked_axes, checked_motions, normals_of, turning_frame
+from floatframe.model.joints.rows import (
+    DOT,
+    FORCE,
+    MOMENT,
+    MOMENT_B,
+    NO_MOMENT,
+    PUSH,
+    SCREW,
+    SLIDE,
+    THREAD,
+    TURN,
+    TWIST,
+    Row,
+    RowCoordinate,
+    arm_rows,
+    orientation_rows,
+    point_rows,
+    slide_row,
+    turn_row,
+)
+
+__all__ = ["CylindricalJoint", "PlanarJoint", "PrismaticJoint", "RevoluteJoint", "ScrewJoint", "SphericalJoint"]
+
+
+# the revolute joint (hinge): two markers share a point and an axis ----------------------------------------------------
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class RevoluteJoint:
+    """Allows one rotation between two markers, about an axis; five constraints.
+
+    The axis is given in the axes of marker A (the ground axes, if A is on the ground with the default triad). On B it
+    is the same line as assembled, unless `axis_b` gives it in the axes of marker B. Coordinate `angle`: of B about the
+    axis, zero as assembled.
+    """
+
+    name: str
+    marker_a: Place
+    marker_b: Place
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
+    axis_b: Array | None = None  #: in the axes of marker B, (3,); None: as assembled
+    #: prescribed motions by coordinate; a number fixes the coordinate
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
+
+    size = 6  #: components of the unknown wrench
+    moment_b = MOMENT  #: index at which the moment on B starts in the wrench
+    coordinates = ("angle",)
+
+    def __post_init__(self) -> None:
+        checked_axes(self)
+        checked_motions(self)
+
+    def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
+        axis_b = axis_in_b(self.axis, self.axis_b, A_a, A_b)
+        frame = turning_frame(self.axis, axis_b, A_a, A_b)
+        held = (Row(DOT, self.axis, n, part=MOMENT) for n in normals_of(axis_b))
+        return (*point_rows(), *held, turn_row(self.axis, frame, MOMENT, self.motions, "angle"))
+
+
+# the prismatic joint (slider): one translation along an axis ----------------------------------------------------------
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class PrismaticJoint:
+    """Lets marker B slide along an axis of marker A without rotation; five constraints.
+
+    The point of B stays on the line through the point of A. The fixed orientation is that of the assembled bodies.
+    Coordinate `distance`: from the point of A to the point of B, along the axis.
+    """
+
+    name: str
+    marker_a: Place
+    marker_b: Place
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
+    #: prescribed motions by coordinate; a number fixes the coordinate
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
+
+    size = 9  #: components of the unknown wrench
+    moment_b = MOMENT_B  #: index at which the moment on B starts in the wrench
+    coordinates = ("distance",)
+
+    def __post_init__(self) -> None:
+        checked_axes(self)
+        checked_motions(self)
+
+    def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
+        held = (Row(SLIDE, n) for n in normals_of(self.axis))
+        return (
+            *arm_rows(),
+            *held,
+            *orientation_rows(A_a.T @ A_b, MOMENT_B),
+            slide_row(self.axis, self.motions, "distance"),
+        )
+
+
+# the screw joint: rotation about an axis, and translation along it in a fixed ratio -----------------------------------
+
+
+METRE = Quantity(1.0, LENGTH)
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class ScrewJoint:
+    """Lets marker B rotate about an axis and slide along it by `lead` for each turn; five constraints.
+
+    The point of B stays on the line through the point of A. Coordinates: `angle` of B about the axis, zero as
+    assembled; `distance` = lead angle/(2 pi) between the points along the axis. The points must coincide as assembled.
+    """
+
+    name: str
+    marker_a: Place
+    marker_b: Place
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
+    axis_b: Array | None = None  #: in the axes of marker B, (3,); None: as assembled
+    lead: float = METRE  #: distance along the axis per turn; positive for a right-handed screw [m]
+    #: prescribed motions by coordinate; a number fixes the coordinate
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
+
+    size = 9  #: components of the unknown wrench
+    moment_b = MOMENT_B  #: index at which the moment on B starts in the wrench
+    coordinates = ("angle", "distance")
+
+    def __post_init__(self) -> None:
+        checked_axes(self)
+        lead = number(f"joint {self.name!r}: lead", self.lead)
+        if lead == 0:
+            raise ModelError(f"joint {self.name!r}: lead: expected a number other than zero; use a revolute joint")
+        object.__setattr__(self, "lead", lead)
+        checked_motions(self)
+
+    def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
+        axis_b = axis_in_b(self.axis, self.axis_b, A_a, A_b)
+        x, z, y = turning_frame(self.axis, axis_b, A_a, A_b)
+        slope = self.lead / (2 * np.pi)
+        if len(self.motions) > 1:
+            raise ModelError(f"joint {self.name!r}: motions: expected angle or distance, which follows it, got both")
+        angle = RowCoordinate("angle", TWIST, x, y, z, parts=((MOMENT_B, 1.0), (FORCE, slope)))
+        distance = RowCoordinate("distance", PUSH, self.axis, parts=((FORCE, 1.0), (MOMENT_B, 1 / slope)))
+        other = angle if "distance" in self.motions else distance  # it depends on the coordinate of the last row
+        if "distance" in self.motions:
+            drive = Row(SLIDE, self.axis, motion=self.motions["distance"], coordinate=distance)
+        elif "angle" in self.motions:
+            drive = Row(TURN, x, y, z=z, motion=self.motions["angle"], coordinate=angle)
+        else:
+            drive = Row(THREAD, self.axis, y, c=slope, z=z, coordinate=angle)
+        return (
+            *arm_rows(),
+            *(Row(SLIDE, n) for n in normals_of(self.axis)),
+            *(Row(DOT, self.axis, n, part=MOMENT_B) for n in normals_of(axis_b)),
+            Row(SCREW, x, y, c=slope, z=z, coordinate=other),
+            drive,
+        )
+
+
+# the cylindrical joint: translation along an axis and rotation about it -----------------------------------------------
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class CylindricalJoint:
+    """Lets marker B slide along an axis and rotate about it; four constraints.
+
+    The point of B stays on the line through the point of A. Coordinates: `distance` between the points along the axis;
+    `angle` of B about it, zero as assembled.
+    """
+
+    name: str
+    marker_a: Place
+    marker_b: Place
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
+    axis_b: Array | None = None  #: in the axes of marker B, (3,); None: as assembled
+    #: prescribed motions by coordinate; a number fixes the coordinate
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
+
+    size = 9  #: components of the unknown wrench
+    moment_b = MOMENT_B  #: index at which the moment on B starts in the wrench
+    coordinates = ("distance", "angle")
+
+    def __post_init__(self) -> None:
+        checked_axes(self)
+        checked_motions(self)
+
+    def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
+        axis_b = axis_in_b(self.axis, self.axis_b, A_a, A_b)
+        frame = turning_frame(self.axis, axis_b, A_a, A_b)
+        return (
+            *arm_rows(),
+            *(Row(SLIDE, n) for n in normals_of(self.axis)),
+            *(Row(DOT, self.axis, n, part=MOMENT_B) for n in normals_of(axis_b)),
+            slide_row(self.axis, self.motions, "distance"),
+            turn_row(self.axis, frame, MOMENT_B, self.motions, "angle"),
+        )
+
+
+# the spherical joint: two markers have a common point -----------------------------------------------------------------
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class SphericalJoint:
+    """Holds the point of marker B at the point of marker A; three constraints."""
+
+    name: str
+    marker_a: Place
+    marker_b: Place
+
+    size = 3  #: components of the unknown wrench: force
+    moment_b = NO_MOMENT  #: no moment acts
+    coordinates = ()
+
+    def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
+        """Return the rows; axes and positions of the markers do not matter."""
+        return point_rows()
+
+
+# the planar joint: motion in a plane ----------------------------------------------------------------------------------
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class PlanarJoint:
+    """Keeps the point of marker B in a plane of marker A, with parallel normals; three constraints.
+
+    Coordinates: `first` and `second`, the position of the point of B in the plane along the two directions of
+    `normals_of(axis)`; `angle` of B about the normal, zero as assembled.
+    """
+
+    name: str
+    marker_a: Place
+    marker_b: Place
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: normal, in the axes of marker A
+    axis_b: Array | None = None  #: in the axes of marker B, (3,); None: as assembled
+    #: prescribed motions by coordinate; a number fixes the coordinate
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
+
+    size = 9  #: components of the unknown wrench
+    moment_b = MOMENT_B  #: index at which the moment on B starts in the wrench
+    coordinates = ("first", "second", "angle")
+
+    def __post_init__(self) -> None:
+        checked_axes(self)
+        checked_motions(self)
+
+    def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
+        axis_b = axis_in_b(self.axis, self.axis_b, A_a, A_b)
+        first, second = normals_of(self.axis)
+        return (
+            *arm_rows(),
+            Row(SLIDE, self.axis),
+            *(Row(DOT, self.axis, n, part=MOMENT_B) for n in normals_of(axis_b)),
+            slide_row(first, self.motions, "first"),
+            slide_row(second, self.motions, "second"),
+            turn_row(self.axis, turning_frame(self.axis, axis_b, A_a, A_b), MOMENT_B, self.motions, "angle"),
+        )

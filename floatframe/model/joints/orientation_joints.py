@@ -1,0 +1,179 @@
+"""Joints that constrain an orientation: fixed, constant-orientation, universal and constant-velocity joints."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
+from floatframe.errors import ModelError
+from floatframe.model.bodies.markers import Place
+from floatframe.model.checked_values import rotation_of
+from floatframe.model.functions.time_functions import TimeFunction
+from floatframe.model.joints.axis_frame import axis_in_b, checked_axes, checked_motions, normals_of
+from floatframe.model.joints.rows import (
+    DOT,
+    FORCE,
+    GAUGE,
+    MOMENT,
+    Row,
+    orientation_rows,
+    point_rows,
+    turn_row,
+    turn_row_b,
+)
+from floatframe.model.joints.rows.kinds import BISECTOR, EQUAL_TURN
+
+__all__ = ["ConstantOrientation", "ConstantVelocityJoint", "FixedJoint", "UniversalJoint"]
+
+
+# the fixed joint: two markers have the same position and orientation --------------------------------------------------
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class FixedJoint:
+    """Fixes marker B to marker A; six constraints.
+
+    The fixed orientation is that of the assembled bodies, unless `rotation` is given.
+    """
+
+    name: str
+    marker_a: Place
+    marker_b: Place
+    rotation: Array | None = None  #: fixed rotation R_AB from marker axes B to A, (3, 3); None: as assembled
+
+    size = 6  #: components of the unknown wrench: force, moment
+    moment_b = MOMENT  #: index at which the moment on B starts in the wrench
+    coordinates = ()
+
+    def __post_init__(self) -> None:
+        if self.rotation is not None:
+            object.__setattr__(self, "rotation", rotation_of(f"joint {self.name!r}: rotation", self.rotation))
+
+    def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
+        R_AB = A_a.T @ A_b if self.rotation is None else self.rotation
+        return (*point_rows(), *orientation_rows(R_AB))
+
+
+# the constant-orientation joint: two bodies move without relative rotation --------------------------------------------
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class ConstantOrientation:
+    """Fixes the orientation of marker B relative to marker A; three constraints.
+
+    The fixed orientation is that of the assembled bodies, unless `rotation` is given.
+    """
+
+    name: str
+    marker_a: Place
+    marker_b: Place
+    rotation: Array | None = None  #: fixed rotation R_AB from marker axes B to A, (3, 3); None: as assembled
+
+    size = 6  #: components of the unknown wrench
+    moment_b = MOMENT  #: index at which the moment on B starts in the wrench
+    coordinates = ()
+
+    def __post_init__(self) -> None:
+        if self.rotation is not None:
+            object.__setattr__(self, "rotation", rotation_of(f"joint {self.name!r}: rotation", self.rotation))
+
+    def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
+        R_AB = A_a.T @ A_b if self.rotation is None else self.rotation
+        return (*(Row(GAUGE, axis, part=FORCE) for axis in np.eye(3)), *orientation_rows(R_AB))
+
+
+# the universal joint (Cardan, Hooke): two axes that intersect at right angles -----------------------------------------
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class UniversalJoint:
+    """Joins two points, and keeps an axis of marker A normal to an axis of marker B; four constraints.
+
+    Coordinates, zero as assembled: `angle` of the cross about the axis of A; `angle_b` of B relative to the cross about
+    the axis of B.
+    """
+
+    name: str
+    marker_a: Place
+    marker_b: Place
+    axis: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))  #: in the axes of marker A, (3,)
+    axis_b: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  #: in the axes of marker B, (3,)
+    #: prescribed motions by coordinate; a number fixes the coordinate
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
+
+    size = 6  #: components of the unknown wrench
+    moment_b = MOMENT  #: index at which the moment on B starts in the wrench
+    coordinates = ("angle", "angle_b")
+
+    def __post_init__(self) -> None:
+        checked_axes(self)
+        checked_motions(self)
+
+    def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
+        # angle zero is the assembled position: z of A lies along the axis of B
+        z = A_a.T @ A_b @ self.axis_b
+        z = z - (z @ self.axis) * self.axis
+        if np.linalg.norm(z) < 1e-3:
+            raise ModelError(f"joint {self.name!r}: expected axes at about a right angle as placed, got parallel ones")
+        z = z / np.linalg.norm(z)
+        frame = (np.cross(z, self.axis), z, self.axis_b)
+        z_b = A_b.T @ A_a @ self.axis
+        z_b = z_b - (z_b @ self.axis_b) * self.axis_b
+        z_b = z_b / np.linalg.norm(z_b)
+        return (
+            *point_rows(),
+            Row(DOT, self.axis, self.axis_b, part=MOMENT),
+            turn_row(self.axis, frame, MOMENT, self.motions, "angle"),
+            turn_row_b(self.axis, self.axis_b, z_b, self.motions, "angle_b"),
+        )
+
+
+# the constant-velocity joint (Rzeppa, tripod): two shafts at any angle that rotate at equal speed ---------------------
+
+
+@dataclass(frozen=True, eq=False)
+class ConstantVelocityJoint:
+    """Joins two points, and makes the shafts through them rotate equally at any angle between them; four constraints.
+
+    B only rotates relative to A about axes normal to the bisector of both shafts. The angular velocities of the shafts
+    about their own axes are therefore equal at every instant. The two deflections of the shafts are free. In the
+    assembled position the shafts must be at less than 135 degrees from a straight line.
+    """
+
+    name: str
+    marker_a: Place
+    marker_b: Place
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: shaft of A, in the axes of marker A, (3,)
+    #: shaft of B, pointing away from A, in the axes of marker B, (3,); None: collinear as assembled
+    axis_b: Array | None = None
+
+    size = 6  #: components of the unknown wrench: force and moment
+    moment_b = MOMENT  #: index at which the moment on B starts in the wrench
+    coordinates = ()
+
+    def __post_init__(self) -> None:
+        checked_axes(self)
+
+    def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
+        axis_b = axis_in_b(self.axis, self.axis_b, A_a, A_b)
+        along, across = A_a @ self.axis, A_b @ axis_b
+        cosine = float(along @ across)
+        if cosine < -np.sqrt(0.5):
+            raise ModelError(
+                f"joint {self.name!r}: expected shafts less than 135 degrees from one line as placed, got "
+                f"{np.degrees(np.arccos(max(cosine, -1.0))):.6g}; axis_b leads away from A"
+            )
+        x, z = normals_of(self.axis)  # x × z is along the axis of A
+        turn = np.cross(along, across)  # as assembled, B is A rotated about this axis from shaft to shaft
+        in_b = [A_b.T @ (v * cosine + np.cross(turn, v) + turn * (turn @ v) / (1 + cosine)) for v in (A_a @ x, A_a @ z)]
+        held = Row(EQUAL_TURN, x, in_b[0], z=z, u=in_b[1])
+        return (*point_rows(), held, *(Row(BISECTOR, e, axis_b, z=self.axis, part=MOMENT) for e in (x, z)))

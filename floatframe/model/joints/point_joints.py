@@ -1,0 +1,124 @@
+"""Joints that constrain the position of a point: on a line, on a plane, at a distance."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
+from floatframe.errors import ModelError
+from floatframe.model.bodies.markers import Place
+from floatframe.model.checked_values import number
+from floatframe.model.functions.time_functions import TimeFunction
+from floatframe.model.joints.axis_frame import checked_axes, checked_motions, normals_of
+from floatframe.model.joints.rows import DISTANCE, NO_MOMENT, ROD, SLIDE, SPAN, Row, RowCoordinate, arm_rows, slide_row
+
+__all__ = ["DistanceJoint", "PointOnLine", "PointOnPlane"]
+
+
+# a point of one body on a line of another -----------------------------------------------------------------------------
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class PointOnLine:
+    """Keeps the point of marker B on a line through the point of marker A; two constraints.
+
+    Coordinate `distance`: from the point of A to the point of B, along the line.
+    """
+
+    name: str
+    marker_a: Place
+    marker_b: Place
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
+    #: prescribed motions by coordinate; a number fixes the coordinate
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
+
+    size = 6  #: components of the unknown wrench
+    moment_b = NO_MOMENT  #: index at which the moment on B starts in the wrench
+    coordinates = ("distance",)
+
+    def __post_init__(self) -> None:
+        checked_axes(self)
+        checked_motions(self)
+
+    def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
+        held = (Row(SLIDE, n) for n in normals_of(self.axis))
+        return (*arm_rows(), *held, slide_row(self.axis, self.motions, "distance"))
+
+
+# a point of one body on a plane of another ----------------------------------------------------------------------------
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class PointOnPlane:
+    """Keeps the point of marker B on a plane through the point of marker A; one constraint.
+
+    Coordinates: `first` and `second`, the position of the point of B in the plane along the two directions of
+    `normals_of(axis)`.
+    """
+
+    name: str
+    marker_a: Place
+    marker_b: Place
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: normal, in the axes of marker A
+    #: prescribed motions by coordinate; a number fixes the coordinate
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
+
+    size = 6  #: components of the unknown wrench
+    moment_b = NO_MOMENT  #: index at which the moment on B starts in the wrench
+    coordinates = ("first", "second")
+
+    def __post_init__(self) -> None:
+        checked_axes(self)
+        checked_motions(self)
+
+    def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), ground axes, as assembled."""
+        first, second = normals_of(self.axis)
+        free = (slide_row(first, self.motions, "first"), slide_row(second, self.motions, "second"))
+        return (*arm_rows(), Row(SLIDE, self.axis), *free)
+
+
+# the distance joint: two points at a constant distance ----------------------------------------------------------------
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class DistanceJoint:
+    """Keeps the points of two markers at a distance, like a massless rod; one constraint.
+
+    Coordinate `distance`.
+    """
+
+    name: str
+    marker_a: Place
+    marker_b: Place
+    distance: float | None = None  #: [m]; None: as assembled
+    #: prescribed motions by coordinate; a number fixes the coordinate
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)
+
+    size = 4  #: components of the unknown wrench
+    moment_b = NO_MOMENT  #: index at which the moment on B starts in the wrench
+    coordinates = ("distance",)
+
+    def __post_init__(self) -> None:
+        if self.distance is not None:
+            value = number(f"joint {self.name!r}: distance", self.distance, above=0.0)
+            object.__setattr__(self, "distance", value)
+        checked_motions(self)
+
+    def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
+        """Return the rows for markers assembled with r_B - r_A = d, (3,), in ground axes."""
+        distance = float(np.linalg.norm(d)) if self.distance is None else self.distance
+        if np.linalg.norm(d) == 0:
+            raise ModelError(
+                f"joint {self.name!r}: its points coincide as placed, so that the rod has no direction; move one, or "
+                "use a spherical joint"
+            )
+        own = RowCoordinate("distance", SPAN)
+        held = Row(DISTANCE, c=distance, motion=self.motions.get("distance"), coordinate=own)
+        return (*(Row(ROD, axis) for axis in np.eye(3)), held)
