@@ -19,8 +19,8 @@ from .body.reduced_body import BodyFrame as BodyFrame
 from .body.reduced_body import ReducedBody as ReducedBody
 from .body.reduced_body import ReducedInterface as ReducedInterface
 from .errors import CmsError as CmsError
-from .exchange.exporters.export import export_body as export_body
-from .exchange.importers.import_body import import_body as import_body
+from .exchange.export import export_body as export_body
+from .exchange.import_body import import_body as import_body
 from .exchange.importers.inertia import FullMass as FullMass
 from .exchange.importers.inertia import MeshMass as MeshMass
 from .exchange.importers.inertia import NodalMasses as NodalMasses

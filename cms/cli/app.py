@@ -102,7 +102,7 @@ def faces_command(
 
     Example: cms faces part.step --select "cylinder r=12 hole" --json
     """
-    from cms.cli.geometry.faces import FacesRequest, run_faces
+    from cms.cli.geometry import FacesRequest, run_faces
 
     run_faces(FacesRequest(file, units, tuple(select or ()), output, json))
 
@@ -119,7 +119,7 @@ def converge_command(
 
     Example: cms converge part.toml
     """
-    from cms.cli.geometry.converge import run_converge
+    from cms.cli.geometry import run_converge
 
     run_converge(job, ratio=ratio, n_modes=modes, as_json=json)
 
@@ -149,7 +149,7 @@ def formats_command(
 
     Example: cms formats
     """
-    from cms.cli.formats import list_formats
+    from cms.cli.exchange import list_formats
 
     list_formats(as_json=json, as_markdown=markdown)
 
@@ -176,7 +176,7 @@ def export_command(
 
     Example: cms export rod.h5 --to sid_fem --units m-kg-s -o rod.SID_FEM
     """
-    from cms.cli.exchange.export import ExportRequest, run_export
+    from cms.cli.exchange import ExportRequest, run_export
 
     run_export(ExportRequest(file, to, units, nodes, output, tuple(load or ())))
 
@@ -205,7 +205,7 @@ def recovery_command(
 
     Example: cms recovery outboard.h5 --rows accelerations.toml -o accelerations.csv
     """
-    from cms.cli.exchange.recovery import RecoveryCommand, run_recovery
+    from cms.cli.exchange import RecoveryCommand, run_recovery
 
     run_recovery(RecoveryCommand(file, table, rows, over, units, output))
 
@@ -250,7 +250,7 @@ def import_command(
 
     Example: cms import part.op4 --units mm-t-s --nodal-masses masses.csv --interface hub=11
     """
-    from cms.cli.exchange.import_body import ImportRequest, run_import
+    from cms.cli.exchange import ImportRequest, run_import
 
     print_body(
         run_import(

@@ -5,7 +5,11 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from cms.errors import JobError
+from cms.jobs.attachments_of_job import frame_interface, frame_mesh, one_node
+from cms.jobs.frame_body import body_of_frame
 from cms.jobs.job import Job
+from cms.jobs.mesh_of_job import is_cad, solid_mesh_of
+from cms.jobs.parts_of_job import interfaces_of, load_cases_of, materials_of, part_of_mesh
 from fe_models.body.couplings.coupling_on_ranks import spread_body
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.ranks.ranks import Ranks
@@ -15,10 +19,58 @@ from fe_models.foundation.units import unit_system
 if TYPE_CHECKING:
     from fe_models.checks.first_order import FirstOrderError
     from fe_models.meshes.mesh import Mesh
-from cms.jobs.mesh_of_job import is_cad, solid_mesh_of
-from cms.jobs.parts_of_job import interfaces_of, load_cases_of, materials_of, part_of_mesh
 
-__all__ = ["checked_mesh", "coupled_body", "is_of_mesh", "job_body", "uncoupled_body"]
+__all__ = ["body_of_mixed", "checked_mesh", "coupled_body", "is_of_mesh", "job_body", "uncoupled_body"]
+
+
+# beams of a job that are welded to its solid --------------------------------------------------------------------------
+
+
+def body_of_mixed(job: Job, stages: Stages, solid: FEBody, solid_mesh: Any, on_report: Any) -> FEBody:
+    """Weld the beams of the job to its solid by the ties, and put its interfaces on both.
+
+    Parameters
+    ----------
+    solid
+        The solid without interfaces.
+    solid_mesh
+        Mesh of the solid, for selections.
+    """
+    from cms.jobs.parts_of_job import interface_of, selection_of
+    from fe_models.body.couplings.couplings import couple
+    from fe_models.body.weld import weld
+    from fe_models.elements.beams.interfaces import NodeIndices, line_interface
+    from fe_models.elements.solids import interfaces as on_solid
+
+    lines = frame_mesh(job)
+    makers = {"rigid": on_solid.rigid_interface, "distributing": on_solid.distributing_interface}
+    of_solid, of_frame = [], []
+    for name, tie in job.ties.items():
+        node = one_node(lines, f"ties.{name}.node", tie.node)
+        key = "faces" if tie.faces is not None else "nodes"
+        point = lines.nodes[node]
+        of_solid.append(makers[tie.kind](solid_mesh, name, selection_of(key, getattr(tie, key)), reference=point))
+        of_frame.append(line_interface(lines, name, NodeIndices((node,))))
+    frame = body_of_frame(job, stages, on_report, interfaces=tuple(of_frame))
+    frame = replace(frame, name=f"{frame.name} beams")
+    with stages("weld"):
+        whole = weld(
+            [couple(replace(solid, interfaces=tuple(of_solid))), couple(frame)],
+            [((solid.name, name), (frame.name, name)) for name in job.ties],
+            name=str(job.body.name),
+        )
+    first_line_node = len(solid.nodes) + len(of_solid)
+    placed = []
+    for name, section in job.interfaces.items():
+        if section.on == "lines":
+            interface = frame_interface(name, section, lines)
+            placed.append(replace(interface, nodes=interface.nodes + first_line_node))
+        else:
+            placed.append(interface_of(name, section, solid_mesh))
+    return whole.with_interfaces(*placed)
+
+
+# body of job ----------------------------------------------------------------------------------------------------------
 
 
 def job_body(
@@ -173,7 +225,5 @@ def body_of_mesh(
         if first_order is not None:
             body = replace(body, provenance={**body.provenance, **first_order.provenance()})
     if job.ties:
-        from cms.jobs.mixed_body import body_of_mixed
-
         body = body_of_mixed(job, stages, body, mesh, on_report)
     return body.with_load_cases(*load_cases_of(job, body, mesh))

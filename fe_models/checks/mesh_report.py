@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from math import nan
 from types import MappingProxyType
 from typing import Any
@@ -17,21 +17,63 @@ from fe_models.checks.unit_check import implausible_units
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 from fe_models.foundation.units import Units, unit_system
-from fe_models.meshes.cell_angles import face_angles
 from fe_models.meshes.cell_shapes import CELL_SHAPES, cell_jacobians, quadrature, shape_values
 from fe_models.meshes.connectivity import Connectivity, coincident_nodes, connectivity
 from fe_models.meshes.mesh import Mesh
 from fe_models.meshes.objects.as_mesh import as_mesh
 from fe_models.meshes.unused_nodes import used_nodes
 
-__all__ = ["CellGeometry", "MeshReport", "cell_geometry", "report_mesh"]
+__all__ = ["CellGeometry", "MeshReport", "cell_geometry", "face_angles", "report_mesh"]
+
+
+# angles between neighbouring faces of solid cells; small or nearly straight angles make poor elements -----------------
+
+
+_CHUNK = 20_000  #: number of cells processed at a time
+
+
+def face_angles(mesh: Mesh) -> tuple[float, float]:
+    """Return the smallest and the largest angle between two faces of a cell that share an edge [degrees].
+
+    The angle is measured at both ends of every edge, between the straight edges to other corners. It is 70.5 for a
+    regular tetrahedron and 90 for a cube. Both are NaN for a mesh without solid cells. Coincident corners count as
+    angle 0.
+    """
+    smallest, largest = np.inf, -np.inf
+    for kind, cells in mesh.cells.items():
+        i, j, k, m = _corners(kind).T
+        for begin in range(0, len(cells), _CHUNK):
+            X = mesh.nodes[cells[begin : begin + _CHUNK]]
+            edge = X[:, j] - X[:, i]
+            first, second = np.cross(edge, X[:, k] - X[:, i]), np.cross(edge, X[:, m] - X[:, i])
+            sine = np.linalg.norm(np.cross(first, second), axis=-1)
+            cosine = (first * second).sum(axis=-1)
+            angles = np.arctan2(sine, cosine)
+            smallest, largest = min(smallest, float(angles.min())), max(largest, float(angles.max()))
+    return (float(np.degrees(smallest)), float(np.degrees(largest))) if np.isfinite(smallest) else (np.nan, np.nan)
+
+
+@cache
+def _corners(kind: str) -> IntArray:
+    """Return rows i, j, k, m, (n, 4): edge i-j, and the other neighbours of i on the two faces of the edge."""
+    beside: dict[tuple[int, int], list[int]] = {}
+    for facet in CELL_SHAPES[kind].facets:
+        n = len(facet)
+        for a in range(n):
+            before, here, after = facet[a - 1], facet[a], facet[(a + 1) % n]
+            beside.setdefault((here, after), []).append(before)
+            beside.setdefault((here, before), []).append(after)
+    return np.array([[i, j, *neighbours] for (i, j), neighbours in beside.items()])
+
+
+# mesh report ----------------------------------------------------------------------------------------------------------
+
 
 COINCIDENCE = 1e-6  #: distance of coincident nodes relative to the diagonal of the bounding box
 FLAT = 1e-9  #: volume relative to the cube of the cell size, below which the cell is degenerate
 ROUNDING = 1e-12  #: Jacobian relative to its mean, below which it counts as zero
 FIRST_ORDER_NOTED = 0.02  #: error of the lowest frequencies above which first-order cells give a warning
 UNMEASURABLE = {"inverted", "degenerate", "overlap", "transition"}  #: errors that prevent the computation of modes
-_CHUNK = 20_000  #: number of cells processed at a time, so that a million dofs need 100 MB
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,18 +7,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import floatframe.cli.analyses as analyses
-import floatframe.cli.cosimulation as cosimulation
 import floatframe.cli.driven as driven
-import floatframe.cli.fatigue as fatigue
+import floatframe.cli.durability as durability
+import floatframe.cli.exchange as exchange
+import floatframe.cli.fits as fits
 import floatframe.cli.linear as linear
 import floatframe.cli.machine as machine
 import floatframe.cli.prepare as prepare
-import floatframe.cli.shake as shake
 import floatframe.cli.spectra as spectra
+import floatframe.cli.studies as studies
 import floatframe.cli.view as view
 from cms.cli.console import INTERRUPTED, commands, guarded, output_path, print_error, print_table, say, stages
-from floatframe.cli.exchange import generate, robot
-from floatframe.cli.parameters import gradient, identify, optimize, study, sweep
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -291,7 +290,7 @@ def info_command(
         print_mobility(file, as_json=json)
         return
     if file.suffix == ".urdf":
-        robot.print_robot(file, as_json=json)
+        exchange.print_robot(file, as_json=json)
         return
     trajectory = read_results(file)
     if json:
@@ -519,16 +518,16 @@ analyses.register(app)
 linear.register(app)
 spectra.register(app)
 driven.register(app)
-sweep.register(app)
-optimize.register(app)
-identify.register(app)
-study.register(app)
-shake.register(app)
-gradient.register(app)
-fatigue.register(app)
-cosimulation.register(app)
+studies.register_sweep(app)
+fits.register_optimize(app)
+fits.register_identify(app)
+studies.register_study(app)
+durability.register_shake(app)
+studies.register_gradient(app)
+durability.register_fatigue(app)
+exchange.register_fmu(app)
 machine.register(app)
 prepare.register(app)
-robot.register(app)
-generate.register(app)
+exchange.register_robot(app)
+exchange.register_generate(app)
 view.register(app)

@@ -1,6 +1,6 @@
 """The table of docs/formats.md is that of `cms formats`."""
 
-from cms.cli.formats import FORMATS, markdown_tables
+from cms.cli.exchange import FORMATS, markdown_tables
 from fe_models.files.read_mesh import MESH_FORMATS
 from tests.root import ROOT
 

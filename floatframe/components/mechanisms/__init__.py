@@ -13,11 +13,16 @@ from floatframe.components.mechanisms.iftomm import (
     n_four_bar,
     point_pendulum,
 )
-from floatframe.components.mechanisms.linkages import four_bar, slider_crank
-from floatframe.components.mechanisms.pendulums import chain, double_pendulum, pendulum
+from floatframe.components.mechanisms.linkages import (
+    chain,
+    double_pendulum,
+    four_bar,
+    pendulum,
+    slider_crank,
+    telescopic_slider_crank,
+)
 from floatframe.components.mechanisms.satellite import satellite
 from floatframe.components.mechanisms.spinning import rotating_blade, spin_up_beam, spinning_shaft, spinning_top
-from floatframe.components.mechanisms.telescopic import telescopic_slider_crank
 
 __all__ = [
     "andrews_mechanism",

@@ -1,5 +1,7 @@
 """Planar linkages in the xy plane with one degree of freedom and no redundant constraints."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from cms.body.reduced_body import ReducedBody
@@ -10,13 +12,184 @@ from floatframe.errors import ModelError
 from floatframe.model.bodies.ground import GROUND
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.bodies.rigid_body import RigidBody
+from floatframe.model.forces import Gravity
 from floatframe.model.functions.time_functions import TimeFunction
-from floatframe.model.joints import Joint, PointOnLine, PrismaticJoint, RevoluteJoint, SphericalJoint, UniversalJoint
+from floatframe.model.joints import (
+    Joint,
+    PointOnLine,
+    PrismaticJoint,
+    RevoluteJoint,
+    SlidingJoint,
+    SphericalJoint,
+    UniversalJoint,
+)
 from floatframe.model.system import System
 
-__all__ = ["four_bar", "slider_crank"]
+__all__ = ["chain", "double_pendulum", "four_bar", "pendulum", "slider_crank", "telescopic_slider_crank"]
+
+
+# pendulums and chains of rods in the xy plane, under gravity along -y -------------------------------------------------
+
+
+AXIS = (0.0, 0.0, 1.0)
+
+
+def pendulum(
+    *,
+    length: float = 1.0,
+    mass: float = 1.0,
+    angle: float = 0.0,
+    gravity: float = 9.81,
+    rod: ReducedBody | None = None,
+    ends: tuple[str, str] = ("start", "end"),
+    units: Units | None = None,
+) -> System:
+    """Return a rod on a hinge at the ground origin, released at an angle from the x axis [rad]: `chain` of one."""
+    return chain(1, length=length, mass=mass, angles=(angle,), gravity=gravity, rod=rod, ends=ends, units=units)
+
+
+def double_pendulum(
+    *,
+    length: float = 1.0,
+    mass: float = 1.0,
+    angles: tuple[float, float] = (0.0, 0.0),
+    gravity: float = 9.81,
+    rod: ReducedBody | None = None,
+    ends: tuple[str, str] = ("start", "end"),
+    units: Units | None = None,
+) -> System:
+    """Return two equal rods, one hanging on the other, at angles from the x axis [rad]: `chain` of two."""
+    return chain(2, length=length, mass=mass, angles=angles, gravity=gravity, rod=rod, ends=ends, units=units)
+
+
+def chain(
+    n: int,
+    *,
+    length: float = 1.0,
+    mass: float = 1.0,
+    angles: tuple[float, ...] | None = None,
+    gravity: float = 9.81,
+    rod: ReducedBody | None = None,
+    ends: tuple[str, str] = ("start", "end"),
+    units: Units | None = None,
+) -> System:
+    """Return n equal rods "rod 1", "rod 2", ... in a row, with hinges "hinge 1", ... about z, the first at the origin.
+
+    Parameters
+    ----------
+    n
+        Number of rods.
+    length, mass
+        Of each rigid rod [m, kg].
+    angles
+        Angle of each rod from the x axis [rad]; zero by default.
+    gravity
+        Gravity along -y [m/s²].
+    rod
+        A reduced body, of which all rods are instances; `length` is then the distance between its interfaces `ends`.
+    ends
+        Interfaces of `rod` at its start and end.
+    units
+        Default: those of `rod`, or m-kg-s.
+    """
+    if n < 1:
+        raise ModelError(f"chain: n: expected at least 1, got {n}")
+    angles = (0.0,) * n if angles is None else tuple(angles)
+    if len(angles) != n:
+        raise ModelError(f"chain: angles: expected {n}, got {len(angles)}")
+    if rod is not None:
+        a, b = (rod.interface(end).position for end in ends)
+        length = float(np.linalg.norm(b - a))
+    point, place = np.zeros(3), Marker(GROUND)
+    bodies, joints = [], []
+    for k, angle in enumerate(angles, start=1):
+        end = point + length * np.array([np.cos(angle), np.sin(angle), 0.0])
+        part = Rod(f"rod {k}", point, end, mass, rod, ends)
+        bodies.append(part.body)
+        axis = AXIS if place.interface is None else tuple(np.asarray(AXIS) @ _axes_of(place, rod, bodies[-2]))
+        joints.append(RevoluteJoint(f"hinge {k}", place, part.start, axis=np.asarray(axis)))
+        point, place = end, part.end
+    name = {1: "pendulum", 2: "double pendulum"}.get(n, f"chain of {n}")
+    units = units or (rod.units if rod is not None else unit_system("m-kg-s"))
+    return System(bodies, joints, [Gravity(np.array([0.0, -gravity, 0.0]))], units, name)
+
+
+def _axes_of(place: Marker, rod: ReducedBody | None, body: object) -> np.ndarray:
+    """Return the axes of an assembled interface, in ground axes, (3, 3)."""
+    from floatframe.model.bodies.flexible_body import FlexibleBody
+
+    assert rod is not None and isinstance(body, FlexibleBody) and place.interface is not None  # noqa: PT018
+    return np.asarray(body.frame_orientation @ rod.interface(place.interface).triad)
+
+
+# a telescopic slider-crank: a crank pushes a flexible rod through a fixed ring ----------------------------------------
+
 
 Z = np.array([0.0, 0.0, 1.0])
+
+
+def telescopic_slider_crank(
+    rod: ReducedBody,
+    stations: Sequence[str],
+    *,
+    crank: float = 0.1,
+    ring: float = 0.25,
+    crank_mass: float = 0.5,
+    angle: float = 0.0,
+    speed: float = 0.0,
+    drive: TimeFunction | None = None,
+) -> System:
+    """Return a crank at the origin and a flexible rod that slides through a ring on the x axis, in the xy plane.
+
+    Bodies "crank" and "rod"; joints "main" (ground, crank), "pin" (a universal joint of crank and rod) and "ring" (a
+    fixed point on the deformed line of the rod): one degree of freedom besides the deformation.
+
+    Parameters
+    ----------
+    rod
+        The rod, whose interfaces `stations` lie on a straight line; the first is at the pin.
+    stations
+        Names of interfaces along the rod, in order; more of them give a more accurate line.
+    crank, ring
+        Length of the crank, and distance of the ring from its hinge [m]; the rod must always reach through the ring.
+    crank_mass
+        Mass [kg].
+    angle
+        Initial angle from the x axis to the crank [rad].
+    speed
+        Initial angular velocity of the crank, if there is no drive [rad/s].
+    drive
+        Angle of the crank as a function of time, relative to `angle`; None: it rotates freely.
+    """
+    names = tuple(stations)
+    if len(names) < 2:
+        raise ModelError(f"telescopic_slider_crank: stations: expected two or more, got {list(names)}")
+    first, last = (rod.interface(name).position for name in (names[0], names[-1]))
+    length = float(np.linalg.norm(last - first))
+    if not 0 < crank < ring or ring + crank > length:
+        raise ModelError(
+            "telescopic_slider_crank: expected 0 < crank < ring and ring + crank within the rod, got crank = "
+            f"{crank:g}, ring = {ring:g}, rod {length:g}"
+        )
+    knee = crank * np.array([np.cos(angle), np.sin(angle), 0.0])
+    place = np.array([ring, 0.0, 0.0])
+    along = (place - knee) / np.linalg.norm(place - knee)
+    arm = Rod("crank", np.zeros(3), knee, crank_mass)
+    link = Rod("rod", knee, knee + length * along, 0.0, rod, (names[0], names[-1]))
+    omega = (speed if drive is None else drive(0.0, 1)) * Z
+    v_knee = np.cross(omega, knee)
+    omega_rod = np.cross(place - knee, -v_knee) / np.dot(place - knee, place - knee)
+    body = link.body
+    bodies = [turning(arm.body, omega), turning(body, omega_rod, point=knee, velocity=v_knee)]
+    joints: list[Joint] = [
+        RevoluteJoint("main", GROUND, arm.start, axis=Z, motions={} if drive is None else {"angle": drive}),
+        UniversalJoint("pin", arm.end, link.start, axis=Z, axis_b=link.across(np.cross(Z, along))),
+        SlidingJoint("ring", link.start, Marker(GROUND, position=place), line=names[1:]),
+    ]
+    return System(bodies, joints, [], rod.units, "telescopic slider-crank")
+
+
+# linkages -------------------------------------------------------------------------------------------------------------
 
 
 def slider_crank(

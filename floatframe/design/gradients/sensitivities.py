@@ -15,8 +15,17 @@ from floatframe.analyses.linear.linearization import linearize
 from floatframe.analyses.linear.system_modes import system_modes
 from floatframe.design.gradients.differences import CENTRAL
 from floatframe.design.gradients.discrete_motion import adjoint_gradient, computed_motion, direct_columns, start_columns
-from floatframe.design.gradients.eigenvalues import branch_of, eigenvalue_derivatives, pencil_rates
-from floatframe.design.gradients.equilibria import equilibrium_adjoint, equilibrium_columns, equilibrium_matrix
+from floatframe.design.gradients.eigenvalues import (
+    DEPENDS,
+    SteadyRotation,
+    branch_of,
+    eigenvalue_derivatives,
+    equilibrium_adjoint,
+    equilibrium_columns,
+    equilibrium_matrix,
+    pencil_rates,
+    steady_rotation_of,
+)
 from floatframe.design.gradients.outputs import (
     Column,
     Take,
@@ -28,7 +37,6 @@ from floatframe.design.gradients.outputs import (
     weights_of,
 )
 from floatframe.design.gradients.parameters import Family, Neighbour, Source, family_of, neighbour
-from floatframe.design.gradients.steady_rotations import DEPENDS, SteadyRotation, steady_rotation_of
 from floatframe.design.gradients.tangents import Point, parameter_residuals, tangents_at
 from floatframe.design.studies.study import OF_MODES
 from floatframe.engine.compiling.file_frames import motion_of_engine

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from cms.assessment.rendering import Drawing, Scene, Surface, Triad, render_picture
-from cms.exchange.exporters.vtk import numbers_of_cells, numbers_of_nodes, unstructured_grid
+from cms.exchange.programs.vtk import numbers_of_cells, numbers_of_nodes, unstructured_grid
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.meshes.numbering import NONE
 from floatframe.durability.fatigue.assessment import Assessment

@@ -1,6 +1,6 @@
 """A four-axle passenger vehicle on bogies: stability over speed, limit cycles, independent wheels, curves."""
 
-from floatframe.machines.bogie.circle import circle, in_circle, weighted_rms
+from floatframe.machines.bogie.curves_and_comfort import circle, in_circle, weighted_rms
 from floatframe.machines.bogie.frame import frame_files
 from floatframe.machines.bogie.running import (
     Falling,

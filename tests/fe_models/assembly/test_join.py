@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fe_models.assembly.constraints import MeanMotion, NodeEquation, RigidNodes
+from fe_models.assembly.constraints import MeanMotion, NodeEquation, RigidNodes, weighted_motion
 from fe_models.assembly.join import Part, join
 from fe_models.body.couplings.couplings import couple, mean_motion
 from fe_models.body.fe_body import MULTIPLIER, Interface
 from fe_models.body.loads import nodal_load
-from fe_models.body.weighted_motion import weighted_motion
 from fe_models.elements.beams.attachments import PointMass
 from fe_models.elements.beams.beam_property import BeamProperty
 from fe_models.elements.beams.body import beam_body

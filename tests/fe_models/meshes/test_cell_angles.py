@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from fe_models.meshes.cell_angles import face_angles
+from fe_models.checks.mesh_report import face_angles
 from fe_models.meshes.cell_shapes import CELL_SHAPES
 from fe_models.meshes.mesh import SOLID_TYPES, Mesh
 

@@ -21,7 +21,7 @@ from floatframe.machines.bogie import (
     steady_running,
     vehicle,
 )
-from floatframe.machines.bogie.circle import weighted_rms, weighting
+from floatframe.machines.bogie.curves_and_comfort import weighted_rms, weighting
 from floatframe.machines.bogie.running import lateral_modes
 
 DATA = RailVehicle()

@@ -166,7 +166,7 @@ def _rod_of_constant_length(model: NastranModel, card: Card) -> None:
 def _mean(model: NastranModel, card: Card) -> None:
     """RBE3: reference grid, its components, then sets of weight, components and grids; six weights for each grid.
 
-    The mean motion is that of `fe_models.body.weighted_motion`. A grid in several sets has the sum of their weights.
+    The mean motion is that of `fe_models.assembly.constraints`. A grid in several sets has the sum of their weights.
     """
     node, components = card.integer(3), components_of(card, card.text(4))
     words = [word for word in card.fields[4:] if word]

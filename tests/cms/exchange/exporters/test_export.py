@@ -10,7 +10,7 @@ import cms
 from cms.body.modal_file.file import convert_units
 from cms.cli.app import app
 from cms.errors import ExportError, ModalFileError, UnitsError
-from cms.exchange.exporters.export import WRITERS, export_body
+from cms.exchange.export import WRITERS, export_body
 from cms.exchange.exporters.formats import FORMATS
 from fe_models.foundation.units import unit_system
 from tests.cms.exchange.exporters.small_bodies import cloud_body

@@ -114,7 +114,7 @@ def test_the_archive_holds_what_exudyn_computes_from_the_points():
     """Its own formulas, with the matrices of the full model, for a body of point masses."""
     from exudyn.rigidBodyUtilities import ComputeSkewMatrix
 
-    from cms.exchange.exporters.exudyn import archive_of
+    from cms.exchange.programs.exudyn import archive_of
 
     body, cloud = cloud_body()
     archive = archive_of(body)

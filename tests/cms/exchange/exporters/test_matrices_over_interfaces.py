@@ -177,7 +177,7 @@ def test_ext_ptfm_wants_one_interface_and_known_loads(reduced, tmp_path):
 
 
 def test_our_own_reader_of_superelements_finds_the_same(reduced, model, tmp_path):
-    from cms.exchange.importers.nastran import read_nastran
+    from cms.exchange.programs.nastran import read_nastran
 
     exported = export(reduced, tmp_path, "bar.op4", "nastran-op4")
     found = read_nastran(exported.files, "bar")

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import cms
-from cms.exchange.exporters.sid_fem import DIALECTS
+from cms.exchange.programs.sid_fem import DIALECTS
 from tests.cms.exchange.exporters.small_bodies import cloud_body
 from tests.cms.exchange.exporters.test_mbdyn import stiffened
 

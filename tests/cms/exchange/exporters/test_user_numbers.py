@@ -12,9 +12,9 @@ import cms
 import fe_models as fm
 from cms.cli.app import app
 from cms.errors import BodyError
-from cms.exchange.exporters.export import export_body
+from cms.exchange.export import export_body
 from cms.exchange.exporters.nodes import all_nodes
-from cms.exchange.importers.nastran import read_nastran
+from cms.exchange.programs.nastran import read_nastran
 from cms.jobs.body_of_job import job_body
 from cms.jobs.decks.job_text import JobRequest, job_text
 from cms.jobs.job import read_job

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 import cms
 from cms.cli.app import app
 from cms.errors import BodyError, ForeignBodyError, UnitsError
-from cms.exchange.exporters.export import export_body
+from cms.exchange.export import export_body
 from cms.exchange.importers.inertia import FullMass
 from fe_models.errors import MatrixError
 from floatframe import GeneralizedAlpha, System, integrate

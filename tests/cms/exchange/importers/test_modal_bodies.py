@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 import cms
 from cms.errors import BodyError, ForeignBodyError
-from cms.exchange.exporters.export import export_body
+from cms.exchange.export import export_body
 from tests.bodies import bar
 from tests.cms.exchange.exporters.small_bodies import soft_bar
 

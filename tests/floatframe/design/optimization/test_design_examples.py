@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from floatframe import SystemFileError, linearize, optimize, read_design, read_system
 from floatframe.cli.app import app
-from floatframe.cli.parameters.optimize import best_system
+from floatframe.cli.fits import best_system
 from floatframe.design.optimization.design import Quantity
 from floatframe.design.optimization.evaluation import EvaluationFunction, response_number
 from floatframe.design.studies.study_file import Output

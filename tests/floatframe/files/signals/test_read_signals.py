@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 
 from floatframe import SignalError
 from floatframe.files.signals import read_signals
-from floatframe.files.signals.mat_elements import sound_variables
+from floatframe.files.signals.mat_file import sound_variables
 
 
 def written(tmp_path, text, name="a.csv"):

@@ -1,1 +1,0 @@
-"""Commands that import models from other programs, and export bodies to them."""

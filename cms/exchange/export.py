@@ -1,0 +1,192 @@
+"""Export of a reduced body to another program: the table of writers, and the function that uses it."""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from cms.body.invariants import INERTIA_TERMS
+from cms.body.modal_file.file import convert_units, digest, read
+from cms.body.reduced_body import ReducedBody
+from cms.errors import CmsError, ExportError
+from cms.exchange.exporters.formats import FORMATS
+from cms.exchange.exporters.writer import Request, Writer, left_out
+from cms.exchange.programs.abaqus import make_abaqus
+from cms.exchange.programs.ext_ptfm import make_ext_ptfm
+from cms.exchange.programs.exudyn import make_exudyn
+from cms.exchange.programs.matlab import make_mat5, make_mat73, make_simscape
+from cms.exchange.programs.matrix_market import make_matrix_market
+from cms.exchange.programs.mbdyn import make_mbdyn
+from cms.exchange.programs.mbsim import make_mbsim
+from cms.exchange.programs.nastran import make_dmig, make_op4
+from cms.exchange.programs.sid_fem import DIALECTS, make_sid_fem
+from cms.exchange.programs.vtk import make_vtk
+from fe_models.foundation.paths import is_stream, replace_files
+from fe_models.foundation.seal import reason
+from fe_models.foundation.units import Units, unit_system
+from fe_models.foundation.words import nearest, quoted
+
+__all__ = ["WRITERS", "Exported", "export_body"]
+
+OVER_INTERFACES = frozenset(
+    {"damping", "rotation", "load cases", "axes in B"}
+)  #: content of all formats with matrices over the interfaces
+WRITERS: dict[str, Writer] = {
+    "mbsim": Writer(
+        make_mbsim,
+        frozenset({"gyroscopic", "damping", "rotation", "stress", "surface", "axes in the mesh"}),
+        needs=("modes",),
+    ),
+    "exudyn": Writer(
+        make_exudyn,
+        frozenset({"gyroscopic", "damping", "interfaces", "stress", "surface", "axes in B", "axes in the mesh"}),
+        needs=("modes", "nodes"),
+    ),
+    "mbdyn": Writer(
+        make_mbdyn,
+        frozenset({"gyroscopic", "geometric", "damping", "rotation", "axes in the mesh"}),
+        needs=("modes", "interfaces"),
+    ),
+    **{
+        dialect: Writer(
+            partial(make_sid_fem, dialect=dialect),
+            frozenset({"gyroscopic", "geometric", "damping", "rotation", "axes in the mesh"}),
+            needs=("modes", "interfaces"),
+        )
+        for dialect in DIALECTS
+    },
+    "mat": Writer(make_mat5, OVER_INTERFACES | {"interfaces", "surface"}, takes_held=True, needs=("interfaces",)),
+    "mat73": Writer(make_mat73, OVER_INTERFACES | {"interfaces", "surface"}, takes_held=True, needs=("interfaces",)),
+    "matrix-market": Writer(
+        make_matrix_market, OVER_INTERFACES | {"interfaces"}, takes_held=True, needs=("interfaces",)
+    ),
+    "simscape": Writer(
+        make_simscape, (OVER_INTERFACES | {"interfaces"}) - {"load cases"}, units="m-kg-s", needs=("interfaces",)
+    ),
+    "nastran-op4": Writer(make_op4, OVER_INTERFACES, takes_held=True, needs=("interfaces",)),
+    "nastran-dmig": Writer(make_dmig, OVER_INTERFACES, takes_held=True, needs=("interfaces",)),
+    "abaqus": Writer(make_abaqus, OVER_INTERFACES - {"load cases"}, takes_held=True, needs=("interfaces",)),
+    "ext_ptfm": Writer(
+        make_ext_ptfm, OVER_INTERFACES, takes_held=True, takes_loads=True, units="m-kg-s", needs=("interfaces",)
+    ),
+    "vtk": Writer(
+        make_vtk, frozenset({"surface", "stress", "axes in the mesh"}), takes_held=True, needs=("modes", "nodes")
+    ),
+}  #: by key of `cms.exchange.exporters.formats.FORMATS`
+
+NEEDS = {
+    "modes": (lambda body: body.n_q > 0, "has no modes: it is rigid; give the other program its mass and inertia"),
+    "nodes": (lambda body: len(body.nodes) > 0, "has no nodes with shapes, of which the format is made"),
+    "interfaces": (lambda body: len(body.interfaces) > 0, "has no interfaces, whose motion the format is made of"),
+}  #: test whether the body meets each key of `Writer.needs`, and the text of the error
+
+
+@dataclass(frozen=True)
+class Exported:
+    """The written files, and what the format could not hold."""
+
+    files: tuple[Path, ...]
+    left_out: tuple[str, ...]  #: descriptions of what the body has but the files do not
+    notes: tuple[str, ...]  #: positions of the interfaces, and other facts for the user of the other program
+    units: Units  #: of the numbers in the files
+
+
+def export_body(
+    body: ReducedBody | str | os.PathLike[str],
+    path: str | os.PathLike[str],
+    *,
+    to: str,
+    units: Units | str | None = None,
+    nodes: str = "default",
+    loads: Mapping[str, float] | None = None,
+) -> Exported:
+    """Write a reduced body in the format of another program; files are written completely or not at all.
+
+    Parameters
+    ----------
+    body
+        A reduced body, or its modal file.
+    path
+        The file to write. A missing suffix is added; formats with several files use its stem for the others.
+    to
+        Key of the format, as listed by `cms formats`.
+    units
+        Unit system of the numbers, or its name; default: that of the body, or the only one that the other program
+        knows. Most formats do not record their units.
+    nodes
+        Nodes in formats that allow a choice (SID_FEM, MBDyn): "interfaces", "all", or "default" for the usual choice.
+    loads
+        Amplitudes of load cases that act permanently, by name, for formats with such loads (ext_ptfm).
+
+    Returns
+    -------
+    exported
+        The files, and a description of what the format cannot hold of this body.
+
+    Raises
+    ------
+    ExportError
+        If the format is unknown, the body lacks data that it needs, or the files cannot be written.
+    ModalFileError
+        If the modal file cannot be read.
+    UnitsError
+        If the unit system is unknown.
+    """
+    if to not in WRITERS:
+        raise ExportError(f"export: unknown format {quoted(to)}{nearest(to, WRITERS)}")
+    writer = WRITERS[to]
+    source = "" if isinstance(body, ReducedBody) else f"{Path(body).name}, digest {digest(body)}"
+    body = body if isinstance(body, ReducedBody) else read(body)
+    system = wanted_units(units or writer.units or body.units, to, writer)
+    if nodes not in ("default", "interfaces", "all"):
+        raise ExportError(f"export: nodes = {quoted(nodes)}: expected 'interfaces' or 'all'")
+    if loads and not writer.takes_loads:
+        raise ExportError(f"export: loads: {to} holds no constant loads; give them to the other program as forces")
+    converted = convert_units(body, system)
+    require_content(converted, to, writer)
+    request = Request(converted, with_suffix(Path(path), to), source, nodes, loads or {})
+    made = writer.make(request)
+    if is_stream(request.path) and list(made.files) != [request.path]:
+        names = ", ".join(file.name for file in made.files)
+        raise ExportError(f"{path}: is a device or a pipe, and {to} is written in files that belong together: {names}")
+    try:
+        replace_files(made.files)
+    except OSError as error:
+        raise ExportError(f"{path}: cannot be written: {reason(error)}; nothing was written") from error
+    return Exported(tuple(made.files), left_out(converted, writer.holds), made.notes, system)
+
+
+def wanted_units(units: Units | str, to: str, writer: Writer) -> Units:
+    """Return the requested unit system; `ExportError` if the other program only accepts another one."""
+    system = unit_system(units) if isinstance(units, str) else units
+    if writer.units and system.name != writer.units:
+        raise ExportError(
+            f"export: units {system.name}: the program behind {to} knows {writer.units} only; ask for that"
+        )
+    return system
+
+
+def with_suffix(path: Path, to: str) -> Path:
+    """Return the path, with the suffix of the format if it has none."""
+    suffix = next(known.suffixes[0] for known in FORMATS if known.key == to)
+    return path if path.suffix or is_stream(path) else path.with_suffix(suffix)
+
+
+def require_content(body: ReducedBody, to: str, writer: Writer) -> None:
+    """Raise `ExportError` unless the body has the data that the format needs."""
+    where = f"export to {to}: body {body.name!r}"
+    if body.is_held and not writer.takes_held:
+        raise ExportError(
+            f"{where} is held to the ground, and the format is that of a body in a moving frame; reduce the body free, "
+            "and let the other program hold it by a joint"
+        )
+    for need in writer.needs:
+        has, words = NEEDS[need]
+        if not has(body):
+            raise ExportError(f"{where} {words}")
+    if "gyroscopic" in writer.holds:
+        try:
+            body.moments.require(*INERTIA_TERMS)
+        except CmsError as error:
+            raise ExportError(f"{where}: {error}") from error

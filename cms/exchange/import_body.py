@@ -1,0 +1,280 @@
+"""One door for bodies that another program has reduced: formats by suffix and content, one judgement, one error."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from cms.body.reduced_body import ReducedBody
+from cms.errors import CmsError, ForeignBodyError
+from cms.exchange.importers.inertia import Inertia
+from cms.exchange.importers.modal_body import ModalBody, body_of_modes
+from cms.exchange.importers.superelement import Superelement, superelement_of_matrices
+from cms.exchange.importers.superelement_body import ImportOptions, body_of_superelement
+from cms.exchange.programs.ext_ptfm import is_ext_ptfm, read_ext_ptfm
+from cms.exchange.programs.exudyn import is_exudyn, read_exudyn
+from cms.exchange.programs.mbdyn import is_mbdyn, read_mbdyn
+from cms.exchange.programs.mbsim import is_mbsim, read_mbsim
+from cms.exchange.programs.nastran import is_nastran, read_nastran
+from cms.exchange.programs.sid_fem_reader import is_sid_fem, read_sid_fem, read_sid_fem_fembeam
+from cms.reduction.basis.damping import Damping
+from cms.reduction.basis.frames import Frame
+from fe_models.errors import FeModelsError
+from fe_models.files.matrices.body import numbers_of
+from fe_models.files.matrices.foreign_matrices import SCALAR, ForeignMatrices
+from fe_models.files.matrices.read_matrices import read_matrices
+from fe_models.files.read_mesh import read_geometry
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.digest import file_digest
+from fe_models.foundation.formats import FileFormat
+from fe_models.foundation.paths import near_file
+from fe_models.foundation.units import Units, unit_system
+from fe_models.foundation.words import damage, nearest, quoted
+
+__all__ = ["BODY_FORMATS", "FORMATS", "BodyFormat", "ForeignFiles", "import_body"]
+
+
+# the formats of bodies that another program has reduced ---------------------------------------------------------------
+
+
+FORMATS = (
+    FileFormat(
+        "external superelement (EXTSEOUT)", "Nastran", "reduced body", (".op4", ".pch", ".asm"), reads=True,
+        key="nastran", tried="NX Nastran (sample of pyYeti)",
+        lost="3C, 4C, 5C unless masses are beside; forces of elements of unknown items; structural damping",
+    ),
+    FileFormat(
+        "CMS superelement", "ANSYS", "reduced body", (".sub",), reads=True, key="matrices",
+        tried="example-data of PyMAPDL (cp56.sub)", lost="3C, 4C, 5C unless masses are beside",
+    ),
+    FileFormat(
+        "*SUBSTRUCTURE MATRIX OUTPUT, *USER ELEMENT", "Abaqus, CalculiX", "reduced body", (".mtx",), reads=True,
+        key="matrices", tried="our own matrices in its layout",
+        lost="3C, 4C, 5C unless masses are beside; retained modes; places: a deck beside it",
+    ),
+    FileFormat(
+        "reduced matrices", "any of the matrix formats", "reduced body", (".mtx", ".op4", ".npz", ".mat"), reads=True,
+        key="matrices", tried="our own Craig-Bampton matrices",
+        lost="3C, 4C, 5C unless masses are beside; stress; rows say their dofs, or --boundary does",
+    ),
+    FileFormat(
+        "ExternalFlexibleFfrBody, HDF5", "MBSim", "reduced body", (".h5",), reads=True, key="mbsim",
+        tried="files of our writer; names and orders of its source",
+    ),
+    FileFormat(
+        "ObjectFFRFreducedOrder, npz", "Exudyn", "reduced body", (".npz",), reads=True, key="exudyn",
+        tried="files of our writer, which exudyn 1.13.6 runs", lost="stress (a pickled object, which is never opened)",
+    ),
+    FileFormat(
+        "modal joint, FEM data", "MBDyn", "reduced body", (".fem",), reads=True, key="mbdyn",
+        tried="files of our writer", lost="stress stiffening where an interface is no single node",
+    ),
+    FileFormat(
+        "SID_FEM, m1(row, q, column)", "PY_SID, EMBSlib", "reduced body", (".SID_FEM",), reads=True, key="sid_fem",
+        tried="files of our writer", lost="geometric stiffness without 5C (Gr of first order)",
+    ),
+    FileFormat(
+        "SID_FEM, m1(row, column, q)", "FEMBeam, welib", "reduced body", (".SID_FEM",), reads=True,
+        key="sid_fem-fembeam", tried="files of our writer", lost="geometric stiffness without 5C (Gr of first order)",
+    ),
+    FileFormat(
+        "ExtPtfm, FlexASCII", "OpenFAST", "reduced body", (".dat",), reads=True, key="ext_ptfm",
+        tried="files of our writer", lost="3C, 4C, 5C; loads that change with time; the place of the node",
+    ),
+)  #: one line a format; `cms formats` and docs/formats.md list them  # fmt: skip
+
+
+# import body ----------------------------------------------------------------------------------------------------------
+
+
+HEAD = 4096  #: bytes by which the format of a file is told
+Places = Mapping[int, Array]  #: number of a node -> its place
+ForeignFiles = str | Path | Iterable[str | Path] | Mapping[str, str | Path]  #: a file, several, or role -> file
+
+
+def never(path: Path, head: bytes) -> bool:
+    """Return that no content tells a format, which then has to be named."""
+    return False
+
+
+@dataclass(frozen=True)
+class BodyFormat:
+    """A format of reduced bodies: how its files are told, and what reads them."""
+
+    is_it: Callable[[Path, bytes], bool]  #: by path and head of 4096 bytes of one of the files
+    read: Callable[[Sequence[Path], str, Places], Superelement | ModalBody]  #: files, name of the body, further places
+
+
+BODY_FORMATS: dict[str, BodyFormat] = {
+    "nastran": BodyFormat(is_nastran, read_nastran),
+    "mbsim": BodyFormat(is_mbsim, read_mbsim),
+    "exudyn": BodyFormat(is_exudyn, read_exudyn),
+    "mbdyn": BodyFormat(is_mbdyn, read_mbdyn),
+    "sid_fem": BodyFormat(is_sid_fem, read_sid_fem),
+    "sid_fem-fembeam": BodyFormat(never, read_sid_fem_fembeam),
+    "ext_ptfm": BodyFormat(is_ext_ptfm, read_ext_ptfm),
+}  #: by the name of `format`; the first that knows a file reads it, other files are matrices (`read_matrices`)
+
+
+def import_body(
+    files: ForeignFiles | ForeignMatrices,
+    *,
+    units: Units | str,
+    name: str | None = None,
+    form: str | None = None,
+    nodes: str | Path | Places | None = None,
+    boundary: Sequence[int] | None = None,
+    interfaces: Mapping[str, Sequence[int]] | None = None,
+    inertia: Inertia | None = None,
+    frame: Frame | None = None,
+    damping: Damping | None = None,
+    mend_mass: bool = False,
+    accept: Sequence[str] = (),
+) -> ReducedBody:
+    """Make a reduced body of what another program has reduced.
+
+    Superelements (matrices over boundary dofs and modal coordinates, rigid motion inside) and bodies of floating frames
+    (modes without rigid motion, with their mass integrals) become bodies like our own. What the files do not say is
+    missing in them: `Moments.missing`, stress, geometric stiffness.
+
+    Parameters
+    ----------
+    files
+        A file, several of one body, or role ("K", "M", "D") -> file of matrices; or matrices that were read already.
+    units
+        Of all numbers in the files: no format of these says them.
+    name
+        Of the body; that of the first file by default.
+    form
+        Key of `BODY_FORMATS`, or "matrices"; None: told by suffix and content.
+    nodes
+        Places that the files lack: a deck or mesh with the same node numbers, or number -> place.
+    boundary
+        Of matrices without a list of dofs: the boundary nodes in the order of the rows, six dofs each; the rows after
+        them are modal coordinates.
+    interfaces
+        Name -> node numbers; by default those of the files, or every boundary node with six dofs.
+    inertia
+        Of superelements: `FullMass`, `NodalMasses` or `MeshMass`, for 3C, 4C and 5C, which reduced matrices do not say.
+    frame
+        Of the body; Tisserand (mean axes) by default.
+    damping
+        Added to that of the files.
+    mend_mass
+        Whether slightly negative eigenvalues of a reduced mass are set to zero, which is told.
+    accept
+        Findings to accept: "units", that size, density or wave speed are implausible.
+
+    Raises
+    ------
+    ForeignBodyError
+        If a file is missing, damaged, of an unknown kind or of two bodies, or says less than a body needs.
+    BodyError
+        If the body is held, a mechanism, or its mass is indefinite.
+    """
+    options = ImportOptions(
+        unit_system(units) if isinstance(units, str) else units,
+        interfaces, inertia, frame, damping, mend_mass, tuple(accept),
+    )  # fmt: skip
+    places = places_of(nodes)
+    if isinstance(files, ForeignMatrices):
+        options = with_names(options, files)
+        return body_of_superelement(of_matrices(files, name or "superelement", places, boundary), options)
+    paths = paths_of(files)
+    name = name or paths[0].stem
+    key = form or format_of(paths)
+    if key != "matrices" and key not in BODY_FORMATS:
+        raise ForeignBodyError(f"format {quoted(key)}: unknown{nearest(key, [*BODY_FORMATS, 'matrices'])}")
+    try:
+        if key == "matrices":
+            read = read_matrices(files if isinstance(files, Mapping) else paths)
+            options = with_names(options, read)
+            body: Superelement | ModalBody = of_matrices(read, name, places, boundary)
+        else:
+            if boundary is not None:
+                raise ForeignBodyError(f"boundary: files of {key} list their dofs themselves; remove it")
+            body = BODY_FORMATS[key].read(paths, name, places)
+    except (CmsError, FeModelsError):
+        raise
+    except MemoryError as error:
+        raise ForeignBodyError(f"{paths[0]}: not enough memory to read it") from error
+    except Exception as error:  # whatever a damaged file does to a parser, the user gets one message
+        raise ForeignBodyError(f"{paths[0]}: could not be read as {key}: {damage(error)}") from error
+    if isinstance(body, Superelement):
+        return body_of_superelement(body, options)
+    record = {f"file {path}": file_digest(path) for path in paths}
+    return body_of_modes(replace(body, provenance={**record, **body.provenance}), options)
+
+
+def paths_of(files: ForeignFiles) -> list[Path]:
+    """Return the paths of files that exist."""
+    if isinstance(files, Mapping):
+        files = list(files.values())
+    paths = [Path(files)] if isinstance(files, str | Path) else [Path(path) for path in files]
+    if not paths:
+        raise ForeignBodyError("import: expected at least one file, got none")
+    for path in paths:
+        if not path.is_file():
+            what = "expected a file, got a folder" if path.is_dir() else f"there is no such file{near_file(path)}"
+            raise ForeignBodyError(f"{path}: {what}")
+    return paths
+
+
+def format_of(paths: Sequence[Path]) -> str:
+    """Return the key of the first format that knows one of the files; "matrices" if none does."""
+    heads = []
+    for path in paths:
+        with path.open("rb") as file:
+            heads.append(file.read(HEAD))
+        if not heads[-1].strip():
+            raise ForeignBodyError(f"{path}: the file is empty")
+    for key, known in BODY_FORMATS.items():
+        if any(known.is_it(path, head) for path, head in zip(paths, heads, strict=True)):
+            return key
+    return "matrices"
+
+
+def of_matrices(foreign: ForeignMatrices, name: str, places: Places, boundary: Sequence[int] | None) -> Superelement:
+    """Return the superelement of matrices, with the rows of boundary nodes where the files do not list them."""
+    if boundary is not None:
+        n = foreign.n_dof or 0
+        if foreign.dofs is not None:
+            raise ForeignBodyError("boundary: the files list the dofs of their rows themselves; remove it")
+        if not 6 * len(boundary) <= n or not len(boundary):
+            raise ForeignBodyError(
+                f"boundary: {len(boundary)} nodes have {6 * len(boundary)} dofs, the matrices {n} rows; expected at "
+                "least one node, and not more dofs than rows"
+            )
+        own = np.stack([np.repeat(np.asarray(boundary), 6), np.tile(np.arange(6), len(boundary))], axis=1)
+        n_modes = n - len(own)
+        modal = np.stack([1 + np.arange(n_modes), np.full(n_modes, SCALAR)], axis=1)
+        note = f"the first {len(own)} rows are six dofs of each of nodes {list(map(int, boundary))}, as it was said"
+        foreign = replace(foreign, dofs=np.concatenate([own, modal]), notes=(*foreign.notes, note))
+    return superelement_of_matrices(foreign, name, places)
+
+
+def with_names(options: ImportOptions, foreign: ForeignMatrices) -> ImportOptions:
+    """Return the options with the interfaces that the files name, where the user names none."""
+    return options if options.interfaces is not None else replace(options, interfaces=named_interfaces(foreign))
+
+
+def named_interfaces(foreign: ForeignMatrices) -> dict[str, list[int]] | None:
+    """Return the interfaces whose names stand beside the places of the nodes, as our own .mat files have them."""
+    names = np.asarray(foreign.others.get("interfaces", ()))
+    if foreign.node_numbers is None or names.dtype.kind != "U" or names.shape != (len(foreign.node_numbers),):
+        return None
+    found: dict[str, list[int]] = {}
+    for text, number in zip(names.tolist(), foreign.node_numbers.tolist(), strict=True):
+        found.setdefault(text.strip(), []).append(number)
+    return None if "" in found else found
+
+
+def places_of(nodes: str | Path | Places | None) -> Places:
+    """Return places by the number of the node."""
+    if nodes is None:
+        return {}
+    if isinstance(nodes, str | Path):
+        geometry = read_geometry(nodes)
+        return dict(zip(map(int, numbers_of(geometry)), geometry.nodes, strict=True))
+    return {int(number): np.asarray(place, dtype=float) for number, place in nodes.items()}

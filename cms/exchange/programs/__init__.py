@@ -1,0 +1,1 @@
+"""One module for each program whose reduced bodies are read or written."""

@@ -1,0 +1,134 @@
+"""MATLAB: matrices of a body over its interfaces in .mat files of version 5 or 7.3, and Simscape's flexible solid."""
+
+import io
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cms.errors import ExportError
+from cms.exchange.exporters.writer import Made, Request, in_ascii
+from cms.reduction.interface_model import InterfaceModel, interface_model
+from fe_models.foundation.arrays import Array
+
+__all__ = ["make_mat5", "make_mat73", "make_simscape"]
+
+
+FIRST_MODE = 1000001  #: number of the first mode in the list of dofs
+TEXT_OF_HEADER = 116  #: bytes of text at the beginning of every .mat file
+USER_BLOCK = 512  #: bytes before HDF5 in version 7.3, which hold the header
+
+
+def make_mat5(request: Request) -> Made:
+    """Return a file of version 5, which MATLAB, Octave and SciPy can read."""
+    model = interface_model(request.body)
+    return Made({request.path: mat5(variables(model, request), request)}, notes_of(model))
+
+
+def make_mat73(request: Request) -> Made:
+    """Return a file of version 7.3: HDF5 with the header and class attributes of MATLAB."""
+    model = interface_model(request.body)
+    return Made({request.path: mat73(variables(model, request), request)}, notes_of(model))
+
+
+def make_simscape(request: Request) -> Made:
+    """Return a file of version 5 with the structure `rom`: P, K, M, C of a Reduced Order Flexible Solid.
+
+    P holds the origins of the interface frames as rows; their axes are the mesh axes. K, M, C have six rows (three
+    translations, three rotations) for each frame in the order of P, then the modes.
+    """
+    model = interface_model(request.body)
+    for node in model.nodes:
+        if len(node.components) != 6:
+            raise ExportError(
+                f"export to simscape: interface {node.interface!r} has nodes without rotations, and a frame of the "
+                "block has six degrees of freedom; make the interface rigid or distributing"
+            )
+    rom = {"P": np.array([node.position for node in model.nodes]), "K": model.K, "M": model.M, "C": model.D}
+    names = {"frames": rows_of_text([node.interface for node in model.nodes]), "header": rows_of_text(request.header())}
+    return Made({request.path: mat5({"rom": rom, **names}, request)}, notes_of(model))
+
+
+def variables(model: InterfaceModel, request: Request) -> dict[str, Any]:
+    """Return the variables by name, as listed in docs/formats.md."""
+    body = model.body
+    rows = [(k + 1, c + 1) for k, node in enumerate(model.nodes) for c in node.components]
+    rows += [(FIRST_MODE + k, 0) for k in range(model.n_modes)]
+    values: dict[str, Any] = {
+        "K": model.K,
+        "M": model.M,
+        "D": model.D,
+        "dofs": np.array(rows, dtype=float),
+        "nodes": np.array([node.position for node in model.nodes]),
+        "interfaces": rows_of_text([node.interface for node in model.nodes]),
+        "omega": model.omega[:, None],
+        "T": model.T,
+        "header": rows_of_text(request.header()),
+    }
+    if body.load_cases:
+        values |= {"F": model.loads, "load_cases": rows_of_text([case.name for case in body.load_cases])}
+    if len(body.nodes):
+        n = len(model.K)
+        values |= {"R": model.recovery().reshape(-1, n), "R_nodes": model.mesh_positions()}
+        numbers = body.numbering.nodes if body.numbering.nodes.size else body.node_ids + 1
+        values["R_numbers"] = np.asarray(numbers, dtype=float)[:, None]
+    if len(body.surface):
+        values["R_triangles"] = np.asarray(body.surface, dtype=float) + 1
+    return {name: value for name, value in values.items() if np.size(value)}
+
+
+def notes_of(model: InterfaceModel) -> tuple[str, ...]:
+    """Return a description of the rows."""
+    found = [
+        f"interface {node.interface}: rows {node.first + 1} to {node.first + len(node.components)}"
+        for node in model.nodes
+    ]
+    if model.n_modes:
+        found.append(f"fixed-interface modes: rows {model.n_boundary + 1} to {len(model.K)}")
+    return tuple(found)
+
+
+def rows_of_text(lines: Any) -> np.ndarray:
+    """Return strings as a column of equal length, as MATLAB stores them."""
+    ascii_lines = [in_ascii(line) for line in lines]
+    width = max([len(line) for line in ascii_lines], default=1) or 1
+    return np.array([line.ljust(width) for line in ascii_lines])
+
+
+def mat5(values: Mapping[str, Any], request: Request) -> bytes:
+    """Return the file; its header has no date, so that equal bodies give equal bytes."""
+    from scipy.io import savemat
+
+    image = io.BytesIO()
+    savemat(image, dict(values), format="5", oned_as="column")
+    return header_words("5.0", request) + image.getvalue()[TEXT_OF_HEADER:]
+
+
+def mat73(values: Mapping[str, Any], request: Request) -> bytes:
+    """Return the file: arrays with reversed indices and the attribute MATLAB_class; text as numbers."""
+    import h5py
+
+    image = io.BytesIO()
+    with h5py.File(image, "w", userblock_size=USER_BLOCK, libver=("earliest", "v108")) as file:
+        for name, value in values.items():
+            array = np.asarray(value)
+            is_text = array.dtype.kind == "U"
+            stored = letters(array) if is_text else np.asarray(array, dtype="<f8")
+            item = file.create_dataset(name, data=stored.T, track_times=False)
+            item.attrs.create("MATLAB_class", np.bytes_(b"char" if is_text else b"double"))
+            if is_text:
+                item.attrs.create("MATLAB_int_decode", np.int32(2))
+    # text, no subsystem data, version 2.0 of the container, byte order
+    head = header_words("7.3", request) + bytes(8) + (0x0200).to_bytes(2, "little") + b"IM"
+    return head.ljust(USER_BLOCK, b"\0") + image.getvalue()[USER_BLOCK:]
+
+
+def letters(text: np.ndarray) -> Array:
+    """Return rows of text as UTF-16 code units, (n_rows, width)."""
+    return np.array([[ord(letter) for letter in row] for row in text.tolist()], dtype="<u2")
+
+
+def header_words(version: str, request: Request) -> bytes:
+    """Return the header text of a file."""
+    words = f"MATLAB {version} MAT-file, {'; '.join(request.header()[:3])}"
+    return words.encode("ascii")[:TEXT_OF_HEADER].ljust(TEXT_OF_HEADER)

@@ -1,1 +1,0 @@
-"""Commands that exchange systems with other programs."""

@@ -1,0 +1,340 @@
+"""The commands that find parameters: identify, optimize."""
+
+import json as json_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cms.cli.arguments import Journal, Workers
+from cms.cli.console import guarded, output_path, print_table, say, stages
+
+if TYPE_CHECKING:
+    from floatframe.design.identification.excitation import ExcitingMotion
+    from floatframe.design.identification.regressors import LinearForm
+    from floatframe.design.optimization.optimize import Evaluated, OptimizationResult
+
+__all__ = ["register_identify", "register_optimize"]
+
+
+# the command identify: inertial parameters of a tree from a measured motion -------------------------------------------
+
+
+IDENTIFY_KINDS = ("html", "json")
+
+
+def register_identify(app: typer.Typer) -> None:
+    """Add the command to an application."""
+    app.command("identify")(identify_command)
+
+
+@guarded
+def identify_command(
+    system: Annotated[Path, typer.Argument(help="System file (TOML) of a tree of rigid bodies, or with loops.")],
+    data: Annotated[Path, typer.Argument(help="Measured motion (.csv, .mat, ...), see docs/identification.md.")],
+    outputs: Annotated[
+        list[Path],
+        typer.Option("--output", "-o", help="A .html or .json file; repeatable."),
+    ] = [],  # noqa: B006
+    terms: Annotated[
+        str,
+        typer.Option("--terms", help="Of each drive, with commas: motor-inertia, viscous, coulomb, offset; none."),
+    ] = "viscous,coulomb",
+    method: Annotated[str, typer.Option("--method", help="ordinary, weighted or robust.")] = "weighted",
+    cutoff: Annotated[float | None, typer.Option("--cutoff", help="Filter all channels above this [Hz].")] = None,
+    thin: Annotated[int | None, typer.Option("--thin", min=1, help="Take every so many rows.")] = None,
+    check: Annotated[
+        Path | None, typer.Option("--check", help="Another measured motion, on which the estimate is tried.")
+    ] = None,
+    real: Annotated[
+        bool, typer.Option("--real/--no-real", help="Find real bodies (positive masses and inertias) too.")
+    ] = True,
+    motion: Annotated[
+        Path | None, typer.Option("--motion", help="Write the motion that would tell more, a .csv of positions.")
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Write the result as JSON, for other programs.")] = False,
+) -> None:
+    """Find the inertial parameters of a robot from a measured motion: base parameters with their deviations.
+
+    Columns of the data are the positions of all coordinates, named as in results (joint1/angle), and their torques
+    (joint1/angle torque) or the reactions at the base (base F_x to base M_z), or both. Rates and accelerations
+    (joint1/angle rate, joint1/angle acceleration) may be included if they were measured. If joints close loops, the
+    positions and torques of an independent set of coordinates are needed.
+
+    Example: floatframe identify robot.toml measured.csv --cutoff 10 -o report.html
+    """
+    from fe_models.foundation.paths import replace_file
+    from floatframe.design.identification.estimation import estimate
+    from floatframe.design.identification.identify_report import identification_html, identification_record
+    from floatframe.design.identification.measured_file import measured_coordinates, read_measured
+    from floatframe.design.identification.next_motion import next_motion
+    from floatframe.design.identification.physical import real_parameters
+    from floatframe.design.identification.regressors import linear_form
+    from floatframe.errors import ModelError
+    from floatframe.files.system_file.read_system import read_system
+
+    described = read_system(system)[0]
+    inputs = tuple(path for path in (system, data, check) if path is not None)
+    wanted = outputs or ([] if json else [data.with_suffix(".html")])
+    paths = [output_path(path, None, ModelError, overwrite_of=inputs) for path in wanted]
+    for path in paths:
+        if path.suffix.lower().removeprefix(".") not in IDENTIFY_KINDS:
+            raise ModelError(
+                f"--output {path}: expected a file name that ends in {', '.join('.' + k for k in IDENTIFY_KINDS)}"
+            )
+    if motion is not None:
+        motion = output_path(motion, None, ModelError, overwrite_of=inputs)
+    named = [term.strip() for term in terms.split(",") if term.strip() not in ("", "none")]
+    with stages() as clock:
+        with clock("measured motion"):
+            form = linear_form(described, named, independent=measured_coordinates(data, described))
+            read = read_measured(data, form, cutoff=cutoff, thin=thin)
+            other = None if check is None else read_measured(check, form, cutoff=cutoff, thin=thin).measured
+        with clock("base parameters"):
+            made = estimate(form, read.measured, method=method)
+        bodies = None
+        if real:
+            with clock("real bodies"):
+                bodies = real_parameters(made)
+        better, notes = None, read.notes
+        if paths or motion is not None:
+            with clock("motion that would help"):
+                try:
+                    better = next_motion(made)
+                    if better is None:
+                        notes = (
+                            *notes,
+                            "of other motions within its range, rates and accelerations none excites better",
+                        )
+                except ModelError as error:
+                    notes = (*notes, f"no motion that would tell more was found: {error}")
+        with clock("record"):
+            record = identification_record(made, bodies, other, notes, better)
+    if json:
+        typer.echo(json_module.dumps(record, indent=2))
+    else:
+        print_estimate(record)
+    for path in paths:
+        if path.suffix.lower() == ".json":
+            replace_file(path, (json_module.dumps(record, indent=2) + "\n").encode())
+        else:
+            replace_file(path, identification_html(made, record, other).encode())
+        if not json:
+            say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    if motion is not None and better is None and not json:
+        say(f"{motion} is not written: no better motion was found")
+    if motion is not None and better is not None:
+        replace_file(motion, motion_table(better.motion, form).encode())
+        if not json:
+            say(f"wrote {motion}")
+
+
+def motion_table(motion: "ExcitingMotion", form: "LinearForm") -> str:
+    """Return the positions of one period, at 100 times per period of the fastest harmonic, as a table."""
+    import numpy as np
+
+    n = 100 * ((motion.coefficients.shape[1] - 1) // 2)
+    t = np.arange(n + 1) * motion.period / n
+    units = [form.system.units.length_symbol if column.unit == "m" else "rad" for column in form.columns]
+    heads = ["time [s]", *(f"{name} [{unit}]" for name, unit in zip(motion.names, units, strict=True))]
+    rows = np.column_stack([t, motion.at(t)[0]])
+    return "\n".join([",".join(heads), *(",".join(f"{x:.9g}" for x in row) for row in rows)]) + "\n"
+
+
+def print_estimate(record: dict[str, Any]) -> None:
+    """Print parameter combinations, channels, and doubtful results."""
+    rows = [
+        (each["name"], f"{each['value']:.5g}", f"{each['deviation']:.2g}", each["unit"], each["verdict"])
+        for each in record["parameters"]
+    ]
+    print_table("Base parameters", ("combination", "value>", "deviation>", "", ""), rows)
+    channels = [(c["name"], f"{c['noise']:.4g}", c["unit"], f"{c['misfit']:.2%}") for c in record["channels"]]
+    print_table("Channels", ("channel", "noise>", "", "misfit>"), channels)
+    if record["validation"] is not None:
+        print_table(
+            "Another motion", ("channel", "misfit>"), [(k, f"{v:.2%}") for k, v in record["validation"].items()]
+        )
+    if record["without_effect"]:
+        say(f"without effect on what was measured: {', '.join(record['without_effect'])}")
+    for words in (*record["notes"], *record["warnings"]):
+        say(words)
+
+
+# the command optimize: the best values of parameters of a system ------------------------------------------------------
+
+
+OPTIMIZE_KINDS = ("csv", "json", "png", "svg", "pdf", "toml")
+
+
+def register_optimize(app: typer.Typer) -> None:
+    """Add the command to an application."""
+    app.command("optimize")(optimize_command)
+
+
+@guarded
+def optimize_command(
+    design: Annotated[Path, typer.Argument(help="Design file (TOML), see docs/optimization.md.")],
+    outputs: Annotated[
+        list[Path],
+        typer.Option(
+            "--output",
+            "-o",
+            help="A .csv, .json, .png, .svg or .pdf file, or .toml, the system with the best values.",
+        ),
+    ] = [],  # noqa: B006
+    journal: Journal = None,
+    workers: Workers = None,
+    json: Annotated[bool, typer.Option("--json", help="Write the result as JSON, for other programs.")] = False,
+) -> None:
+    """Find the best values of parameters of a system: fits to tables, peaks, frequencies, damping, within limits.
+
+    Every evaluation is recorded in a journal (study.toml: study.journal); after an interruption, the same command
+    continues. A failed evaluation is a row with its reason. Without -o, the history is written next to the design file
+    as a table and a picture: study.csv and study.png.
+
+    Example: floatframe optimize study.toml -o history.csv -o history.png -o best.toml
+
+    Example: floatframe optimize study.toml --workers dask://cluster:8786
+    """
+    import io
+
+    from fe_models.foundation.paths import replace_file
+    from fe_models.foundation.tasks.workers import tasks_of
+    from floatframe.design.optimization.design_file import read_design
+    from floatframe.design.optimization.history_plots import plot_history
+    from floatframe.design.optimization.optimize import optimize
+    from floatframe.errors import ModelError
+    from floatframe.files.system_file.read_system import read_system
+
+    described = read_design(design)
+    inputs = (design, Path(described.study.system), *read_system(described.study.system)[0].files, *described.tables)
+    kept = output_path(journal, design.with_suffix(".journal"), ModelError, overwrite_of=inputs, needs_file=True)
+    wanted = outputs or ([] if json else [design.with_suffix(".csv"), design.with_suffix(".png")])
+    paths = [output_path(path, None, ModelError, overwrite_of=(*inputs, kept)) for path in wanted]
+    for path in paths:
+        if path.suffix.lower().removeprefix(".") not in OPTIMIZE_KINDS:
+            raise ModelError(
+                f"--output {path}: expected a file name that ends in {', '.join('.' + k for k in OPTIMIZE_KINDS)}"
+            )
+        if path.suffix.lower() == ".toml" and path.resolve().parent != Path(described.study.system).resolve().parent:
+            raise ModelError(
+                f"--output {path}: expected a place beside {described.study.system}, which names files relative to it"
+            )
+    with stages() as clock, tasks_of(described.workers if workers is None else workers) as tasks:
+        if "run" in described.analyses:
+            from floatframe.engine.kernels.entry import prepare
+
+            with clock("compiled code (made at first use)"):
+                prepare()  # once, before many processes need it
+        with clock(f"{described.method}"):
+            result = optimize(described, workers=tasks, journal=kept)
+    record = optimization_record(result)
+    if json:
+        typer.echo(json_module.dumps(record, indent=2))
+    else:
+        print_optimum(result)
+    for path in paths:
+        kind = path.suffix.lower().removeprefix(".")
+        if kind == "csv":
+            replace_file(path, csv_of(result).encode())
+        elif kind == "toml":
+            replace_file(path, best_system(result).encode())
+        elif kind == "json":
+            replace_file(path, (json_module.dumps(record, indent=2) + "\n").encode())
+        else:
+            picture = io.BytesIO()
+            plot_history(result).savefig(picture, format=kind, dpi=130)
+            replace_file(path, picture.getvalue())
+        if not json:
+            say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
+def print_optimum(result: "OptimizationResult") -> None:
+    """Print the best point, and how it was found."""
+    parameters = [
+        (p.name, ", ".join(p.paths), f"{p.start:.8g}", f"{result.values[p.name]:.8g}", bound_of(p, result))
+        for p in result.design.parameters
+    ]
+    print_table("Best values", ("parameter", "key path", "start>", "best>", "note"), parameters)
+    rows = []
+    for q in result.design.quantities:
+        of = f"{q.output.of}, rms deviation" if q.values is not None else q.output.of
+        rows.append((q.output.name, of, f"{result.numbers[q.output.name]:.6g}"))
+    print_table("Objectives and constraints", ("name", "of", "at the best point>"), rows)
+    say(f"{'converged' if result.is_converged else 'NOT CONVERGED'}: {result.message}")
+    n = len(result.history)
+    say(f"{n} evaluations, {n - result.n_computed} of them from the journal, {result.n_failed} failed")
+    for row in [row for row in result.history if row.evaluation.error][:3]:
+        say(f"failed at {', '.join(f'{v:.6g}' for v in row.evaluation.values)}: {row.evaluation.error}")
+
+
+def bound_of(parameter: Any, result: "OptimizationResult") -> str:
+    """Return a note if a parameter is at a bound."""
+    near = 1e-6 * (parameter.upper - parameter.lower)
+    value = result.values[parameter.name]
+    if value - parameter.lower < near:
+        return "at its lower bound"
+    return "at its upper bound" if parameter.upper - value < near else ""
+
+
+def row_record(result: "OptimizationResult", row: "Evaluated") -> dict[str, Any]:
+    """Return a row of the history in plain types; values missing in a failed evaluation are null."""
+    from floatframe.design.optimization.optimize import numbers_by_name
+
+    is_failed = bool(row.evaluation.error)
+    numbers = numbers_by_name(result.design, row.evaluation)
+    return {
+        "parameters": {p.name: v for p, v in zip(result.design.parameters, row.evaluation.values, strict=True)},
+        "numbers": {name: None if is_failed else number for name, number in numbers.items()},
+        "objective": None if is_failed else row.objective,
+        "violation": None if is_failed else row.violation,
+        "purpose": "difference" if row.is_difference else "trial",
+        "error": row.evaluation.error or None,
+    }
+
+
+def optimization_record(result: "OptimizationResult") -> dict[str, Any]:
+    """Return an optimisation in plain types."""
+    return {
+        "system": result.design.study.system,
+        "method": result.design.method,
+        "converged": result.is_converged,
+        "message": result.message,
+        "best": row_record(result, result.best),
+        "computed": result.n_computed,
+        "history": [row_record(result, row) for row in result.history],
+    }
+
+
+def best_system(result: "OptimizationResult") -> str:
+    """Return the system file with the best values of the parameters; comments and order are kept."""
+    import tomlkit
+
+    from fe_models.foundation.toml_file import holder_of
+    from floatframe.errors import SystemFileError
+
+    design = result.design
+    text = Path(design.study.system).read_text(encoding="utf-8-sig")
+    document = tomlkit.parse(text)
+    point = design.point(result.best.evaluation.values)
+    paths = [path for p in design.parameters for path in p.paths]
+    for path, value in zip(paths, point, strict=True):
+        holder, key = holder_of(document, path, design.study.system, SystemFileError)
+        holder[key] = value
+    return str(tomlkit.dumps(document))
+
+
+def csv_of(result: "OptimizationResult") -> str:
+    """Return the history as comma-separated values with 17 digits; a failure has empty cells and a reason."""
+    import csv
+    import io
+
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    names = [p.name for p in result.design.parameters] + [q.output.name for q in result.design.quantities]
+    writer.writerow(["evaluation", "purpose", *names, "objective", "violation", "error"])
+    for i, row in enumerate(result.history):
+        r = row_record(result, row)
+        cells = [*r["parameters"].values(), *r["numbers"].values(), r["objective"], r["violation"]]
+        writer.writerow([i + 1, r["purpose"], *("" if c is None else repr(c) for c in cells), row.evaluation.error])
+    return text.getvalue()

@@ -1,1 +1,0 @@
-"""Commands that vary or find parameters: sweeps, studies, optimisation, gradients, identification."""
