@@ -52,7 +52,7 @@ LIMITS: dict[str, Limit] = {
         "a moment has the wrong sign, or belongs to another mode; reduce again",
     ),
     "turned-loads": Limit(
-        "geometric stiffness over a rotation by the loads that turn", 0.05, 0.3,
+        "geometric stiffness over a rotation by the loads that turn", 1e-6, 1e-4,
         "moments or geometric stiffness have a wrong sign, order or unit; reduce again",
     ),
     "second-order": Limit(

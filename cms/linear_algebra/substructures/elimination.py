@@ -8,6 +8,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from cms.errors import FactorizationError
+from cms.linear_algebra.lu_factors import solve_factored
 from cms.linear_algebra.substructures.dense import (
     add_product,
     add_rank_2k,
@@ -53,8 +54,7 @@ class Substructure:
     def solve_own(self, f: Array) -> None:
         """Overwrite f, (s, k) in C order, with K_ss⁻¹ f."""
         if self.pivots is not None:
-            # SciPy shifts pivots in place to count from 1, and LAPACK runs without the lock: threads may not share them
-            f[:] = la.lu_solve((self.L, self.pivots.copy()), f, check_finite=False)
+            f[:] = solve_factored((self.L, self.pivots), f)
             return
         solve_triangular(self.L, f.T, transposed=True, right=True)
         solve_triangular(self.L, f.T, right=True)

@@ -13,6 +13,7 @@ import scipy.sparse as sp
 
 from cms.body.reduced_body import BodyFrame
 from cms.errors import BodyError
+from cms.linear_algebra.lu_factors import solve_factored
 from cms.linear_algebra.solvers.tall import inner, rows_times
 from cms.modes.families.rigid_modes import geometric_rigid_modes
 from cms.reduction.basis.node_weights import node_weights, weighted_rigid_modes
@@ -139,7 +140,7 @@ def frame_condition(body: FEBody, frame: Frame | HeldFrame) -> FrameCondition:
         norm = la.lu_factor(W_Psi_R.T @ Psi_R)
         return FrameCondition(
             placed("buckens", frame, middle),
-            lambda columns: la.lu_solve(norm, inner(W_Psi_R, columns)),
+            lambda columns: solve_factored(norm, inner(W_Psi_R, columns)),
             Psi_R,
             M_Psi_R,
             W_Psi_R,
@@ -150,7 +151,7 @@ def frame_condition(body: FEBody, frame: Frame | HeldFrame) -> FrameCondition:
     lu = la.lu_factor(rows @ Psi_R)
     return FrameCondition(
         placed("nodal", frame, default, held),
-        lambda columns: la.lu_solve(lu, rows_times(rows, columns)),
+        lambda columns: solve_factored(lu, rows_times(rows, columns)),
         Psi_R,
         M_Psi_R,
         rows.T.toarray(),

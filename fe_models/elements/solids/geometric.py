@@ -3,13 +3,13 @@
 K_geo(sigma)_kl = ∫ sigma_ab Σ_c phi_k,c,a phi_l,c,b dV is linear in the stress. The products of gradients of a pair of
 columns do not depend on the state. They are therefore computed once at every point, and one matrix product with the
 stress of all states sums over the points. With very many columns these products dominate the cost; a sparse matrix is
-then assembled for each state (`fe_models.elements.solids.geometric`).
+then assembled for each state.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -26,6 +26,7 @@ from fe_models.foundation.ranks.rows import Rows
 from fe_models.foundation.ranks.spread_columns import Part, SpreadColumns, own_part, spread_columns
 from fe_models.foundation.tall.on_disk import in_memory, row_slices
 from fe_models.foundation.threads import n_threads, one_blas_thread
+from fe_models.meshes.cell_shapes import CELL_SHAPES, shape_values
 from fe_models.meshes.mesh import Mesh
 
 __all__ = [
@@ -72,38 +73,43 @@ def sparse_geometric_stiffness(matrices: Iterator[sp.csr_array], n_states: int, 
     return K
 
 
+class IntegratedCells(NamedTuple):
+    """Cells of one type that share the points of a quadrature."""
+
+    cells: IntArray  #: nodes, (n_cells, n_nodes)
+    material: IntArray  #: index of the material of each cell, (n_cells,)
+    table: ShapeTable
+
+
 def scalar_geometric_matrices(
-    mesh: Mesh, tensors: Array, of_cell: Mapping[str, IntArray], tables: Mapping[str, ShapeTable], u: Array
+    nodes: Array, tensors: Array, parts: Sequence[IntegratedCells], u: Array
 ) -> Iterator[sp.csr_array]:
-    """Yield S, (n_nodes, n_nodes), for the stress of each state u, (3 n_nodes, k), over the cell types in `tables`.
+    """Yield S, (n_nodes, n_nodes), for the stress of each state u, (3 n_nodes, k), over these cells.
 
     Parameters
     ----------
+    nodes
+        Positions, (n_nodes, 3).
     tensors
         Matrix of every material that maps strain to stress, (n_materials, 6, 6).
-    of_cell
-        Index of the material of each cell, (n_cells,), by cell type.
-    tables
-        Quadrature points and gradients of the shape functions, by cell type.
+    parts
+        The cells with their quadrature.
     """
     from fe_models.elements.solids.geometric_kernels import write_scalar_matrices
 
-    n_nodes = len(mesh.nodes)
+    n_nodes = len(nodes)
     states = np.ascontiguousarray(u).reshape(n_nodes, 3, -1)
-    rows = [np.repeat(mesh.cells[kind], mesh.cells[kind].shape[1], axis=1).ravel() for kind in tables]
-    columns = [np.tile(mesh.cells[kind], mesh.cells[kind].shape[1]).ravel() for kind in tables]
+    rows = [np.repeat(cells, cells.shape[1], axis=1).ravel() for cells, _, _ in parts]
+    columns = [np.tile(cells, cells.shape[1]).ravel() for cells, _, _ in parts]
     keys = np.concatenate([np.zeros(0, np.int64), *rows]) * n_nodes + np.concatenate([np.zeros(0, np.int64), *columns])
     places, entry = np.unique(keys, return_inverse=True)
     indptr = np.searchsorted(places // max(n_nodes, 1), np.arange(n_nodes + 1))
     for j in range(states.shape[2]):
         state = np.ascontiguousarray(states[:, :, j : j + 1])
         values = []
-        for kind, table in tables.items():
-            cells = mesh.cells[kind]
+        for cells, material, table in parts:
             matrices = np.zeros((len(cells), cells.shape[1], cells.shape[1]))
-            write_scalar_matrices(
-                mesh.nodes, cells, of_cell[kind], tensors, table.gradients, table.weights, state, matrices
-            )
+            write_scalar_matrices(nodes, cells, material, tensors, table.gradients, table.weights, state, matrices)
             values.append(matrices.ravel())
         summed = np.bincount(entry, np.concatenate([np.zeros(0), *values]), minlength=len(places))
         yield sp.csr_array((summed, places % max(n_nodes, 1), indptr), shape=(n_nodes, n_nodes))
@@ -112,6 +118,9 @@ def scalar_geometric_matrices(
 # geometric ------------------------------------------------------------------------------------------------------------
 
 
+#: distance of a middle node from the middle of its edge, over the cell's size, above which a tetrahedron is curved;
+#: below it the error of the geometric stiffness over a rotation is of this size
+CURVED = 1e-9
 CHUNK_BYTES = 1.5e6  #: memory of the products that a thread holds at once; they must stay in its cache
 
 
@@ -143,13 +152,14 @@ def projected_geometric_stiffness(
     """
     n_nodes, n = len(mesh.nodes), Phi.shape[1]
     tensors = np.array([material.stiffness for material in materials])
+    parts = [
+        part
+        for kind in mesh.cells
+        if not (incompatible and kind == KIND)
+        for part in integrated_cells(mesh, kind, of_cell, integration)
+    ]
     if n >= MANY_COLUMNS:
-        tables = {
-            kind: geometric_table(kind, integration)
-            for kind in mesh.cells
-            if kind in of_cell and not (incompatible and kind == KIND)
-        }
-        matrices = scalar_geometric_matrices(mesh, tensors, of_cell, tables, u)
+        matrices = scalar_geometric_matrices(mesh.nodes, tensors, parts, u)
         K = sparse_geometric_stiffness(matrices, u.shape[1], Phi)
         if incompatible and len(mesh.cells.get(KIND, ())):
             K += _of_bricks(mesh.nodes, mesh.cells[KIND], tensors[of_cell[KIND]], u, Phi)
@@ -159,21 +169,10 @@ def projected_geometric_stiffness(
     pairs = np.zeros((states.shape[2], n * (n + 1) // 2))
     n_parts = n_threads()
     with one_blas_thread(), ThreadPoolExecutor(n_parts) as pool:
-        for kind, cells in mesh.cells.items():
-            if incompatible and kind == KIND:
-                continue
+        for cells, material, table in parts:
             cuts = np.linspace(0, len(cells), n_parts + 1).astype(int)
             futures = [
-                pool.submit(
-                    _pairs_of,
-                    mesh.nodes,
-                    cells[a:b],
-                    of_cell[kind][a:b],
-                    tensors,
-                    geometric_table(kind, integration),
-                    states,
-                    columns,
-                )
+                pool.submit(_pairs_of, mesh.nodes, cells[a:b], material[a:b], tensors, table, states, columns)
                 for a, b in pairwise(cuts)
                 if b > a
             ]
@@ -222,30 +221,51 @@ def internal_forces(
     if nodes is not None:
         wanted[:] = False
         wanted[nodes[nodes < len(wanted)]] = True
-    for kind, all_cells in mesh.cells.items():
-        is_wanted = wanted[all_cells].any(axis=1)
-        if is_wanted.any():
-            table = geometric_table(kind, integration)
-            cells, material = all_cells[is_wanted], of_cell[kind][is_wanted]
-            if incompatible and kind == KIND:
-                for rows, dofs in brick_chunks(cells):
-                    K = brick_stiffness(mesh.nodes[cells[rows]], tensors[material[rows]])
-                    np.add.at(forces.reshape(3 * len(mesh.nodes), -1), dofs, K @ np.asarray(u)[dofs])
-                continue
-            add_internal_forces(mesh.nodes, cells, material, tensors, table.gradients, table.weights, fields, forces)
+    for kind in mesh.cells:
+        if incompatible and kind == KIND:
+            own = wanted[mesh.cells[kind]].any(axis=1)
+            for rows, dofs in brick_chunks(mesh.cells[kind][own]):
+                K = brick_stiffness(mesh.nodes[mesh.cells[kind][own][rows]], tensors[of_cell[kind][own][rows]])
+                np.add.at(forces.reshape(3 * len(mesh.nodes), -1), dofs, K @ np.asarray(u)[dofs])
+            continue
+        for cells, material, table in integrated_cells(mesh, kind, of_cell, integration):
+            own = wanted[cells].any(axis=1)
+            add_internal_forces(
+                mesh.nodes, cells[own], material[own], tensors, table.gradients, table.weights, fields, forces
+            )
     forces[~wanted] = 0.0
     return forces.reshape(3 * len(mesh.nodes), -1)
 
 
-def geometric_table(kind: str, integration: str = "full") -> ShapeTable:
-    """Return the quadrature of the geometric stiffness.
+def integrated_cells(
+    mesh: Mesh, kind: str, of_cell: Mapping[str, IntArray], integration: str = "full"
+) -> list[IntegratedCells]:
+    """Return the cells of a kind with the quadrature of their geometric stiffness.
 
-    sigma · grad N must be exact for affine cells, so that the work on a rigid rotation equals that of the nodal forces
-    K u to roundoff. The four stress points of a quadratic tetrahedron satisfy this (degree 2); bricks need the
-    stiffness points.
+    The work on a rigid rotation must equal that of the nodal forces K u to roundoff. At the points of the stiffness it
+    does. In a quadratic tetrahedron with straight edges four points are enough, those of the stress: there
+    sigma · grad N has degree 2. A curved one takes the points of its stiffness.
     """
-    element = reference_element(kind, integration)
-    return element.stress if kind == "tetra10" else element.stiffness
+    cells = mesh.cells[kind]
+    if not len(cells):
+        return []
+    material, element = of_cell[kind], reference_element(kind, integration)
+    if kind != "tetra10":
+        return [IntegratedCells(cells, material, element.stiffness)]
+    is_curved = bends_of_cells(mesh.nodes, cells) > CURVED
+    return [
+        IntegratedCells(cells[own], material[own], table)
+        for own, table in ((~is_curved, element.stress), (is_curved, element.stiffness))
+        if own.any()
+    ]
+
+
+def bends_of_cells(nodes: Array, cells: IntArray) -> Array:
+    """Return how far the middle nodes of quadratic tetrahedra lie beside their edges, over the cell's size, (n,)."""
+    x = nodes[cells]
+    x = x - x[:, :1]
+    straight = shape_values("tetra", CELL_SHAPES["tetra10"].nodes)[0] @ x[:, :4]
+    return np.asarray(np.abs(x - straight).max(axis=(1, 2)) / np.abs(x[:, :4]).max(axis=(1, 2)))
 
 
 def _pairs_of(

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
+from cms.linear_algebra.lu_factors import solve_factored
 from fe_models.foundation.arrays import Array
 from floatframe.design.gradients.outputs import vector_of
 from floatframe.design.gradients.parameters import Family, Neighbour
@@ -138,8 +139,8 @@ class ScaledSolver:
     def once(self, right: Array, is_transposed: bool) -> Array:
         """Return it without refinement."""
         if is_transposed:
-            return np.asarray(self.rows[:, None] * la.lu_solve(self.lu, self.columns[:, None] * right, trans=1))
-        return np.asarray(self.columns[:, None] * la.lu_solve(self.lu, self.rows[:, None] * right))
+            return self.rows[:, None] * solve_factored(self.lu, self.columns[:, None] * right, is_transposed=True)
+        return self.columns[:, None] * solve_factored(self.lu, self.rows[:, None] * right)
 
 
 class Step:

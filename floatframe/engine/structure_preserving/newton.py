@@ -15,6 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
+from cms.linear_algebra.lu_factors import solve_factored
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.engine.structure_preserving.bodies import BodyStep, CentralBody, Placed, step_of
 from floatframe.engine.structure_preserving.constraints import Span
@@ -179,7 +180,7 @@ def factorized(blocks: list[tuple[IntArray, Array]], n: int) -> Callable[[Array]
         factors, pivots, info = la.lapack.dgetrf(matrix)
         if info != 0:
             raise RuntimeError("singular")
-        return lambda b: np.asarray(la.lapack.dgetrs(factors, pivots, b)[0])
+        return lambda b: solve_factored((factors, pivots), b)
     rows = np.concatenate([np.repeat(at, len(at)) for at, _ in blocks])
     columns = np.concatenate([np.tile(at, len(at)) for at, _ in blocks])
     values = np.concatenate([block.ravel() for _, block in blocks])

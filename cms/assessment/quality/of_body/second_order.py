@@ -40,8 +40,8 @@ def check_second_order(reduced: ReducedBody) -> QualityRecord:
 def check_turned_loads(reduced: ReducedBody) -> QualityRecord:
     """Turned loads follow from the moments: the difference over the sum of both, over modes of unit strain energy.
 
-    This is exact for solids, except for the quadrature of distorted cells. Beams and shells are not judged: their nodes
-    also take couples, which count by half when they are turned, and their turned loads in bending are as small as that.
+    This is exact for solids. Beams and shells are not judged: their nodes also take couples, which count by half when
+    they are turned, and their turned loads in bending are as small as that.
     """
     geometric = reduced.geometric
     if geometric is None or geometric.turned is None or not reduced.n_q or not (np.diag(reduced.K) > 0).all():
