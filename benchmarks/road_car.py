@@ -19,8 +19,7 @@ from floatframe.components.wheels import read_tyre_file, shipped_tyre
 from floatframe.machines.road_car import CarOnPosts, Linkage, RoadCar, body_files
 from floatframe.machines.road_car.closed_forms import MODES, roll_control_stiffness
 from floatframe.machines.road_car.description import CORNERS
-from floatframe.machines.road_car.figures import Driven, body_twist_stiffness, car_mass, driven
-from floatframe.machines.road_car.steady_turn import steady_turn
+from floatframe.machines.road_car.figures import Driven, body_twist_stiffness, car_mass, driven, steady_turn
 from floatframe.machines.road_car.systems import (
     SUPPORTS,
     car_file,

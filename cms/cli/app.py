@@ -8,8 +8,8 @@ import typer
 from cms.cli.arguments import ModalFile, Output, Workers
 from cms.cli.console import commands, guarded, say
 from cms.cli.info import info_command, print_body
+from cms.cli.modes import view_command
 from cms.cli.reduce import Fleet, reduce_and_write_fleet, reduce_command
-from cms.cli.view import view_command
 
 __all__ = ["app"]
 

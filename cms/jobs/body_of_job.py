@@ -4,14 +4,15 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from cms.errors import JobError
-from cms.jobs.attachments_of_job import frame_interface, frame_mesh, one_node
-from cms.jobs.frame_body import body_of_frame
+from cms.jobs.attachments_of_job import attachments_of, frame_interface, frame_mesh, one_node, properties_of
 from cms.jobs.job import Job
 from cms.jobs.mesh_of_job import is_cad, solid_mesh_of
-from cms.jobs.parts_of_job import interfaces_of, load_cases_of, materials_of, part_of_mesh
+from cms.jobs.parts_of_job import interfaces_of, load_cases_of, materials_of, part_of_mesh, selection_of
 from fe_models.body.couplings.coupling_on_ranks import spread_body
-from fe_models.body.fe_body import FEBody
+from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.ranks.ranks import Ranks
 from fe_models.foundation.stages import Stages
 from fe_models.foundation.units import unit_system
@@ -19,8 +20,147 @@ from fe_models.foundation.units import unit_system
 if TYPE_CHECKING:
     from fe_models.checks.first_order import FirstOrderError
     from fe_models.meshes.mesh import Mesh
+    from fe_models.meshes.node_cloud import NodeCloud
 
-__all__ = ["body_of_mixed", "checked_mesh", "coupled_body", "is_of_mesh", "job_body", "uncoupled_body"]
+__all__ = [
+    "body_of_frame",
+    "body_of_matrices",
+    "body_of_mixed",
+    "checked_mesh",
+    "coupled_body",
+    "is_of_mesh",
+    "job_body",
+    "uncoupled_body",
+]
+
+
+# bodies whose elements stay in another program: matrices, their geometry, and interfaces on it ------------------------
+
+
+def body_of_matrices(job: Job, stages: Stages, on_report: Callable[[Any], None] | None = None) -> FEBody:
+    """Read mass and stiffness, and make a body with the interfaces and load cases of the job.
+
+    An .npz file of this project contains nodes and interfaces. All other files need a deck or a mesh, unless they
+    contain node positions. `on_report` is called with the `MatrixReport` before the matrices are checked.
+    """
+    if job.body.brings_interfaces:
+        return body_with_its_interfaces(job, stages)
+    from fe_models.files.matrices.body import body_from_foreign, nodes_of, with_geometry
+    from fe_models.files.matrices.matrix_report import MatrixReport
+    from fe_models.files.matrices.read_matrices import read_matrices
+    from fe_models.files.read_mesh import read_geometry
+
+    if job.body.matrices is None:
+        raise JobError("job: expected matrices, got none")
+    with stages("read matrices"):
+        read = read_matrices(job.body.matrices, names=job.body.names)
+    with stages("read geometry"):
+        geometry = nodes_of(read) if job.body.geometry is None else read_geometry(job.body.geometry)
+        read = with_geometry(read, geometry)
+        if on_report is not None:
+            on_report(MatrixReport(read))
+        interfaces = interfaces_on(job, geometry)
+    with stages("check matrices"):
+        body = body_from_foreign(
+            read, geometry, name=str(job.body.name), units=unit_system(job.body.units), interfaces=interfaces,
+            held=bool(job.body.held), remove_supports=job.body.remove_supports, mend_mass=bool(job.body.mend_mass),
+            accept=[word for word in job.body.accept if word == "units"],
+        )  # fmt: skip
+    return body.with_load_cases(*load_cases_of(job, body, geometry))
+
+
+def body_with_its_interfaces(job: Job, stages: Stages) -> FEBody:
+    """Read a body of bare matrices whose file contains the interfaces."""
+    from pathlib import Path
+
+    from fe_models.files.matrices.given import body_from_npz
+
+    with stages("read matrices"):
+        body = body_from_npz(
+            Path(str(job.body.matrices)), name=job.body.name, units=unit_system(job.body.units),
+            held=bool(job.body.held), mend_mass=bool(job.body.mend_mass),
+            accept=[word for word in job.body.accept if word == "units"],
+        )  # fmt: skip
+        return body.with_load_cases(*load_cases_of(job, body))
+
+
+def interfaces_on(job: Job, geometry: "Mesh | NodeCloud") -> tuple[Interface, ...]:
+    """Return the interfaces of the job, on a solid mesh or on nodes of unknown elements."""
+    from fe_models.elements.beams.interfaces import node_interface
+    from fe_models.elements.solids.interfaces import check_overlap
+    from fe_models.meshes.boundary import facet_weights
+    from fe_models.meshes.mesh import Mesh
+    from fe_models.meshes.selections import selected_facets
+
+    if isinstance(geometry, Mesh):
+        return interfaces_of(job, geometry)
+    interfaces = []
+    for name, section in job.interfaces.items():
+        chosen = selection_of(section.selection, getattr(section, section.selection))
+        facets = selected_facets(geometry, chosen)
+        weights = facet_weights(geometry.nodes, facets) if facets else np.ones(len(geometry.nodes))
+        # the job lists axes as rows; here they are columns
+        triad = None if section.triad is None else np.array(section.triad).T
+        interfaces.append(
+            node_interface(geometry, name, chosen, section.kind, section.reference, triad, np.maximum(weights, 0.0))
+        )
+    check_overlap(interfaces, numbers=geometry.node_numbers)
+    return tuple(interfaces)
+
+
+# body of job ----------------------------------------------------------------------------------------------------------
+
+
+# beams of a reduction job: a body of lines, alone or tied to a solid --------------------------------------------------
+
+
+def body_of_frame(
+    job: Job,
+    stages: Stages,
+    on_report: Callable[[Any], None] | None,
+    *,
+    interfaces: tuple[Interface, ...] | None = None,
+) -> FEBody:
+    """Read and check the lines, and make the body with the sections and attachments of the job.
+
+    Parameters
+    ----------
+    interfaces
+        Interfaces to use instead of those of the job; load cases are then left to the caller too.
+    """
+    from cms.jobs.parts_of_job import load_cases_of, part_of_mesh
+    from fe_models.checks.frame_report import report_frame
+    from fe_models.elements.beams.body import beam_body
+
+    units = unit_system(job.body.units)
+    with stages("read lines"):
+        mesh = part_of_mesh(job, frame_mesh(job))
+    properties = properties_of(job)
+    masses, springs, links = attachments_of(job, mesh)
+    with stages("check lines"):
+        materials = {item.material: None for item in properties.values()}
+        report = report_frame(mesh, materials, units=units, springs=springs, links=links)
+        if on_report is not None:
+            on_report(report)
+        report.raise_for_errors(accept=job.body.accept)
+        is_whole = interfaces is None
+        if interfaces is None:
+            interfaces = tuple(frame_interface(name, section, mesh) for name, section in job.interfaces.items())
+    with stages("assemble"):
+        body = beam_body(
+            mesh,
+            next(iter(properties.values())) if set(properties) == {"all"} else properties,
+            name=str(job.body.name),
+            units=units,
+            interfaces=interfaces,
+            point_masses=masses,
+            springs=springs,
+            links=links,
+        )
+        return body.with_load_cases(*load_cases_of(job, body, mesh)) if is_whole else body
+
+
+# body of job ----------------------------------------------------------------------------------------------------------
 
 
 # beams of a job that are welded to its solid --------------------------------------------------------------------------
@@ -153,14 +293,10 @@ def made_body(
 
         return body_of_shell(job, stages, on_report)
     if job.sections and not job.ties:
-        from cms.jobs.frame_body import body_of_frame
-
         return body_of_frame(job, stages, on_report)
     if job.body.mesh is not None:
         return body_of_mesh(job, stages, on_report, mesh, ranks)
     if job.body.matrices is not None:
-        from cms.jobs.matrices_of_job import body_of_matrices
-
         return body_of_matrices(job, stages, on_report)
     raise JobError("job: expected either mesh or matrices, got neither")
 

@@ -14,9 +14,8 @@ from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
 from cms.linear_algebra.solvers.mode_search import DenseSearch, KrylovSearch
 from cms.linear_algebra.solvers.orientation import orientation
 from cms.linear_algebra.solvers.petsc.factor import PetscFactor
-from cms.linear_algebra.solvers.rank_space import RankSpace
 from cms.linear_algebra.solvers.shift_inverted import Modes, ShiftInverted, Wanted
-from cms.linear_algebra.solvers.slepc_search import SlepcSearch
+from cms.linear_algebra.solvers.slepc_modes import RankSpace, SlepcSearch
 from cms.linear_algebra.solvers.tall import combine
 from cms.linear_algebra.solvers.tall_space import ArraySpace
 from fe_models.body.couplings.submatrix import PrincipalBlock

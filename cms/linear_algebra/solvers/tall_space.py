@@ -1,6 +1,6 @@
 """Storage of the tall columns of an iteration, (n, k) with n much larger than k, and operations on them.
 
-`ArraySpace` uses arrays of this process; `cms.linear_algebra.solvers.rank_space` distributes the rows over ranks.
+`ArraySpace` uses arrays of this process; `cms.linear_algebra.solvers.slepc_modes` distributes the rows over ranks.
 """
 
 from collections.abc import Callable

@@ -8,11 +8,10 @@ import numpy as np
 
 from fe_models.elements.beams.slices import Slices
 from fe_models.elements.shells.laminate import ShellLaw, shell_law
-from fe_models.elements.shells.quad import quad_strains
+from fe_models.elements.shells.plates import quad_strains, triangle_strains
 from fe_models.elements.shells.shapes import FlatShape, flat_quadrature, flat_shape
 from fe_models.elements.shells.shell_property import AnyShellProperty, LaminateProperty
 from fe_models.elements.shells.strains import N_STRAINS, FlatLaw, FlatStrains, jacobians
-from fe_models.elements.shells.triangle import triangle_strains
 from fe_models.errors import ShellError
 from fe_models.foundation.arrays import Array, IntArray, frozen, tilde
 

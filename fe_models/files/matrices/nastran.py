@@ -1,9 +1,11 @@
 """Nastran's matrix files as parts of a model: OP4, OP2, DMIG in punch files and decks, rows of superelements."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+import scipy.sparse as sp
 
 from fe_models.errors import MatrixError
 from fe_models.files.bulk_data.cards import Card, read_cards
@@ -11,14 +13,170 @@ from fe_models.files.bulk_data.coordinate_systems import read_grid_points
 from fe_models.files.matrices.foreign_matrices import ForeignMatrices
 from fe_models.files.matrices.request import Request
 from fe_models.files.matrices.triangles import mirrored
-from fe_models.files.nastran_matrices.dmig import dmig_matrices
+from fe_models.files.nastran_matrices.dti import SCALAR
 from fe_models.files.nastran_matrices.op2 import read_op2
 from fe_models.files.nastran_matrices.op4 import read_op4
 from fe_models.files.nastran_matrices.raw_matrix import NastranMatrix, matrix_named, real_square
 from fe_models.files.nastran_matrices.superelement import extrn_rows
 from fe_models.foundation.arrays import Array, IntArray
 
-__all__ = ["read_op2_part", "read_op4_part", "read_punch_part"]
+__all__ = ["dmig_matrices", "read_op2_part", "read_op4_part", "read_punch_part"]
+
+
+# dmig -----------------------------------------------------------------------------------------------------------------
+# Matrices of Nastran's bulk data (DMIG), by the grid points of their rows and columns: punch files and decks.
+
+
+DMIG_SQUARE, GENERAL, SYMMETRIC, RECTANGULAR = 1, 2, 6, 9  #: forms (IFO)
+MOST_COLUMNS = 10_000_000  #: of a rectangular matrix, which its numbers of columns take memory for
+
+
+@dataclass
+class _Entries:
+    """What the cards of one matrix say."""
+
+    header: Card
+    form: int
+    kind: int
+    is_polar: bool
+    n_columns: int  #: of a rectangular matrix; 0: not said
+    columns: list[tuple[int, int]] = field(default_factory=list)  # point and component, of each entry
+    rows: list[tuple[int, int]] = field(default_factory=list)
+    values: list[complex] = field(default_factory=list)
+
+
+def dmig_matrices(cards: Iterable[Card]) -> tuple[NastranMatrix, ...]:
+    """Return the matrices of the DMIG cards, in the order of their headers.
+
+    Rows and columns are those that occur, by number of the point and component; a square matrix has the same for both.
+    Of a symmetric one (form 6) the cards hold each pair once: it is mirrored. A rectangular one (form 9) has columns
+    1 to NCOL.
+
+    Raises
+    ------
+    MatrixError
+        If a matrix has no header or two, an entry or (form 6) both entries of a pair are listed, or a form, a type, a
+        component or a column is unknown.
+    """
+    found: dict[str, _Entries] = {}
+    for card in cards:
+        if card.name != "DMIG":
+            continue
+        name = card.text(1).upper()
+        if card.text(2) == "0":
+            if name in found:
+                raise MatrixError(f"{card.where}: matrix {name} has a second header; expected one")
+            found[name] = _header(card)
+        elif name not in found:
+            raise MatrixError(f"{card.where}: a column of {name!r} without a header before it (DMIG {name} 0 ...)")
+        else:
+            _read_column(card, found[name])
+    return tuple(_matrix(name, entries) for name, entries in found.items())
+
+
+def _header(card: Card) -> _Entries:
+    form, kind = card.integer(3), card.integer(4)
+    if form not in (DMIG_SQUARE, GENERAL, SYMMETRIC, RECTANGULAR):
+        raise MatrixError(f"{card.where} {card.text(1)}: expected form 1, 2, 6 or 9 (IFO), got {form}")
+    if kind not in (1, 2, 3, 4):
+        raise MatrixError(f"{card.where} {card.text(1)}: expected type 1 to 4 (TIN), got {kind}")
+    n_columns = card.integer(8, 0) if form == RECTANGULAR else 0
+    if not 0 <= n_columns <= MOST_COLUMNS:
+        raise MatrixError(f"{card.where} {card.text(1)}: expected up to {MOST_COLUMNS} columns (NCOL), got {n_columns}")
+    return _Entries(card, form, kind, card.integer(6, 0) > 0, n_columns)
+
+
+def _read_column(card: Card, entries: _Entries) -> None:
+    """Read one column: point and component, then groups of point, component, value and imaginary part."""
+    if entries.form == RECTANGULAR:
+        column = (card.integer(2), 0)
+        limit = entries.n_columns or MOST_COLUMNS
+        if not 0 < column[0] <= limit or card.integer(3, 0) != 0:
+            raise MatrixError(
+                f"{card.where} {card.text(1)}: expected a column from 1 to {limit} with component 0, got {column[0]} "
+                f"and {card.text(3)!r}"
+            )
+    else:
+        column = _point(card, 2)
+    is_complex = entries.kind > 2
+    for k in range(5, len(card.fields) + 1, 4):
+        if not any(card.text(k + i) for i in range(4)):
+            continue
+        value: complex = card.real(k + 2)
+        if is_complex:
+            other = card.real(k + 3, 0.0)
+            value = value * np.exp(1j * np.radians(other)) if entries.is_polar else complex(value, other)
+        elif card.text(k + 3) and card.real(k + 3) != 0:
+            raise MatrixError(
+                f"{card.where} {card.text(1)}: an imaginary part in a matrix of type {entries.kind} (real)"
+            )
+        entries.columns.append(column)
+        entries.rows.append(_point(card, k))
+        entries.values.append(value)
+
+
+def _point(card: Card, k: int) -> tuple[int, int]:
+    """Return point and component 0-5, or `SCALAR`, of two fields."""
+    number, component = card.integer(k), card.integer(k + 1, 0)
+    if number < 1 or not 0 <= component <= 6:
+        raise MatrixError(
+            f"{card.where} {card.text(1)}: expected a point and its component 0 to 6, got {number} and {component}"
+        )
+    return number, component - 1 if component else SCALAR
+
+
+def _matrix(name: str, entries: _Entries) -> NastranMatrix:
+    where = f"{entries.header.where} {name}"
+    if not entries.values:
+        raise MatrixError(f"{where}: has a header, but no entries")
+    rows = np.array(entries.rows, dtype=np.int64)
+    columns = np.array(entries.columns, dtype=np.int64)
+    values = np.array(entries.values, dtype=np.complex128 if entries.kind > 2 else np.float64)
+    is_square = entries.form in (DMIG_SQUARE, SYMMETRIC)
+    row_points, row_index = _numbered(np.concatenate([rows, columns]) if is_square else rows, rows)
+    if entries.form == RECTANGULAR:
+        n_columns = entries.n_columns or int(columns[:, 0].max())
+        column_points = np.stack([np.arange(1, n_columns + 1), np.zeros(n_columns, np.int64)], axis=1)
+        column_index: IntArray = columns[:, 0] - 1
+    elif is_square:
+        column_points, column_index = row_points, _numbered(np.concatenate([rows, columns]), columns)[1]
+    else:
+        column_points, column_index = _numbered(columns, columns)
+    shape = (len(row_points), len(column_points))
+    listed = sp.csc_array(sp.coo_array((np.ones(len(values)), (row_index, column_index)), shape=shape))
+    if entries.form == SYMMETRIC:
+        mirror = row_index != column_index
+        row_index, column_index = (
+            np.concatenate([row_index, column_index[mirror]]),
+            np.concatenate([column_index, row_index[mirror]]),
+        )
+        values = np.concatenate([values, values[mirror]])
+        listed = sp.csc_array(sp.coo_array((np.ones(len(values)), (row_index, column_index)), shape=shape))
+    if listed.nnz < len(values):
+        both = " or both entries of a pair (form 6 takes each pair once)" if entries.form == SYMMETRIC else ""
+        twice = sp.coo_array(listed > 1).nonzero()
+        first = row_points[twice[0][0]]
+        raise MatrixError(f"{where}: lists an entry twice{both}, in row {first[0]}, component {first[1] + 1}")
+    return NastranMatrix(
+        name=name,
+        matrix=sp.csc_array(sp.coo_array((values, (row_index, column_index)), shape=shape)),
+        form=entries.form,
+        kind=entries.kind,
+        where=where,
+        rows=row_points,
+        columns=column_points,
+    )
+
+
+def _numbered(points: IntArray, asked: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the points in the order of their numbers, (n, 2), and the place of each that is asked for."""
+    keys = 8 * points[:, 0] + points[:, 1] + 1
+    unique, first = np.unique(keys, return_index=True)
+    return points[first], np.searchsorted(unique, 8 * asked[:, 0] + asked[:, 1] + 1)
+
+
+# nastran --------------------------------------------------------------------------------------------------------------
+
 
 SETS = ("aa", "xx", "gg", "aax", "2gg")  #: endings of the usual names: analysis set, EXTSEOUT, all grid points, DMIG
 USUAL = {

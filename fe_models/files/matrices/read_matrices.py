@@ -1,36 +1,204 @@
 """One door for matrix files: formats by suffix and content, several files that make one model, one error."""
 
+import io
 import os
+import zipfile
 from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.io
+import scipy.sparse as sp
 
 from fe_models.errors import FeModelsError, MatrixError
 from fe_models.files.ansys_matrices.records import is_ansys_binary
 from fe_models.files.matrices.ansys import read_full_part, read_sub_part
 from fe_models.files.matrices.foreign_matrices import ROLES, ForeignMatrices, joined
-from fe_models.files.matrices.local_systems import in_basic_axes
-from fe_models.files.matrices.matlab import is_matlab_5, is_matlab_7, read_matlab_5, read_matlab_7
+from fe_models.files.matrices.matlab import (
+    MOST_INFLATED,
+    from_named,
+    is_matlab_5,
+    is_matlab_7,
+    read_matlab_5,
+    read_matlab_7,
+    real_matrix,
+)
 from fe_models.files.matrices.nastran import read_op2_part, read_op4_part, read_punch_part
 from fe_models.files.matrices.request import MatrixFormat, Request
-from fe_models.files.matrices.scipy_files import is_harwell_boeing, read_harwell_boeing, read_npz
-from fe_models.files.matrices.text_files.abaqus_labels import is_labelled, read_labelled
-from fe_models.files.matrices.text_files.abaqus_text import is_coordinates, read_coordinates
-from fe_models.files.matrices.text_files.calculix import (
+from fe_models.files.matrices.text_files.abaqus import (
     calculix_neighbours,
+    is_labelled,
+    is_user_element,
     read_calculix_dofs,
     read_calculix_matrix,
+    read_labelled,
+    read_user_element,
 )
-from fe_models.files.matrices.text_files.matrix_market import is_matrix_market, read_matrix_market
-from fe_models.files.matrices.text_files.user_element import is_user_element, read_user_element
+from fe_models.files.matrices.text_files.abaqus_text import is_coordinates, read_coordinates
+from fe_models.files.matrices.text_files.matrix_market import is_matrix_market, read_matrix_market, role_by_stem
+from fe_models.files.matrices.triangles import mirrored
 from fe_models.files.nastran_matrices.op2 import is_op2
 from fe_models.files.nastran_matrices.op4 import is_op4
 from fe_models.foundation.digest import file_digest
 from fe_models.foundation.paths import near_file
 from fe_models.foundation.words import damage, nearest, quoted
 
-__all__ = ["MATRIX_FORMATS", "MatrixFiles", "read_matrices"]
+__all__ = [
+    "MATRIX_FORMATS",
+    "MatrixFiles",
+    "in_basic_axes",
+    "is_harwell_boeing",
+    "read_harwell_boeing",
+    "read_matrices",
+    "read_npz",
+]
+
+
+# dofs that another program writes in local axes of their nodes, turned to basic axes: K_basic = D K Dᵀ ----------------
+
+
+ORTHONORMAL = 1e-8  #: largest |Rᵀ R - 1| of axes as files with nine digits have them
+
+
+def in_basic_axes(read: ForeignMatrices) -> ForeignMatrices:
+    """Return the matrices and loads with all rows in basic axes, and no local systems left.
+
+    u_basic = D u_local with D = blockdiag(R) on the three translations and the three rotations of a node, so that
+    K_basic = D K Dᵀ and f_basic = D f.
+
+    Raises
+    ------
+    MatrixError
+        If axes are not orthonormal and right-handed, or a turned node lacks a component: what is held in oblique axes
+        has no row of its own in basic ones.
+    """
+    if not read.systems:
+        return read
+    if read.dofs is None:
+        raise MatrixError("local systems: the dofs of the rows are not known; give the list of dofs with the matrices")
+    turned = {node: R for node, R in read.systems.items() if not np.array_equal(R, np.eye(3))}
+    places: dict[tuple[int, int], int] = {
+        (int(node), int(component)): row
+        for row, (node, component) in enumerate(read.dofs)
+        if int(node) in turned and component >= 0
+    }
+    rows: list[Any] = []
+    columns: list[Any] = []
+    values: list[Any] = []
+    is_turned = np.zeros(len(read.dofs), dtype=bool)
+    for node, R in turned.items():
+        if np.abs(R.T @ R - np.eye(3)).max() > ORTHONORMAL or np.linalg.det(R) < 0:
+            raise MatrixError(f"local system of node {node}: expected orthonormal right-handed axes, got {R.tolist()}")
+        for first in (0, 3):
+            at = [places[node, first + c] for c in range(3) if (node, first + c) in places]
+            if not at:
+                continue
+            if len(at) < 3:
+                raise MatrixError(
+                    f"local system of node {node}: {3 - len(at)} of its components have no row, while others in "
+                    "oblique axes have; give all rows of the node (without its supports)"
+                )
+            rows += np.repeat(at, 3).tolist()
+            columns += at * 3
+            values += R.ravel().tolist()
+            is_turned[at] = True
+    rest = np.flatnonzero(~is_turned)
+    n = len(read.dofs)
+    place = (np.concatenate([rest, rows]).astype(np.int64), np.concatenate([rest, columns]).astype(np.int64))
+    D = sp.csc_array((np.concatenate([np.ones(len(rest)), values]), place), shape=(n, n))
+    held = [int(read.dofs[row, 0]) for row in read.constrained if is_turned[row]]
+    if held:
+        raise MatrixError(
+            f"local system of node {held[0]}: some of its rows are held in oblique axes ({len(held)} such rows), which "
+            "basic axes cannot say; give the matrices without supports"
+        )
+    matrices = {role: D @ matrix @ D.T for role in ROLES if (matrix := getattr(read, role)) is not None}
+    note = f"dofs of {len(turned)} nodes turned from local to basic axes"
+    return replace(
+        read,
+        **matrices,
+        loads={name: D @ load for name, load in read.loads.items()},
+        systems={},
+        notes=(*read.notes, note) if turned else read.notes,
+    )
+
+
+# scipy files ----------------------------------------------------------------------------------------------------------
+# Matrices that Python programs keep: `scipy.sparse.save_npz`, arrays of `numpy.savez`; and Harwell-Boeing files.
+
+
+SPARSE = {"format", "shape", "data"}  #: keys that `save_npz` always writes
+
+
+def read_npz(path: Path, request: Request) -> ForeignMatrices:
+    """Read one sparse matrix of `scipy.sparse.save_npz`, or several dense arrays by name, as a MATLAB file has them.
+
+    Pickled objects are refused.
+
+    Raises
+    ------
+    MatrixError
+        If it holds something else, or claims more memory than its bytes can fill.
+    """
+    where = f"matrices {path}"
+    with zipfile.ZipFile(path) as archive:
+        for entry in archive.infolist():
+            if entry.file_size > MOST_INFLATED * max(entry.compress_size, 1):
+                raise MatrixError(f"{where}: {entry.filename} claims {entry.file_size} bytes; the file is damaged")
+    with np.load(path, allow_pickle=False) as content:
+        if not set(content.files) >= SPARSE:
+            return from_named(where, {name: content[name] for name in content.files}, request, "NumPy")
+        for key in ("indptr", "row"):
+            if key in content.files and len(content[key]) > 10 * path.stat().st_size + 10:
+                raise MatrixError(f"{where}: {key} is longer than the file can be; it is damaged")
+    role = request.role_of(where, role_by_stem(path), ", and it is not named K.npz, M.npz, stiffness.npz, mass.npz")
+    matrix, triangle = real_matrix(f"{where}: {role}", sp.load_npz(path))
+    return ForeignMatrices(**{role: matrix}, triangle={role: triangle}, program="SciPy")
+
+
+def is_harwell_boeing(head: bytes) -> bool:
+    """Whether the third line begins with the type of a matrix, such as RSA."""
+    lines = head.split(b"\n", 3)
+    kind = lines[2][:3].upper() if len(lines) > 2 else b""
+    return len(kind) == 3 and kind[:1] in b"RCP" and kind[1:2] in b"SUHZR" and kind[2:3] in b"AE"
+
+
+def read_harwell_boeing(path: Path, request: Request) -> ForeignMatrices:
+    """Read an assembled real matrix; of a symmetric one the file has one triangle.
+
+    Raises
+    ------
+    MatrixError
+        If it is complex, a pattern, in elements, rectangular, or its header does not fit its size.
+    """
+    where = f"matrices {path}"
+    with path.open("rb") as file:
+        lines = [file.readline(200).decode("ascii", "replace") for _ in range(3)]
+    kind, counts = lines[2][:3].upper(), lines[2][3:].split()
+    if kind not in ("RSA", "RUA"):
+        raise MatrixError(f"{where}: expected a real, assembled matrix (RSA, RUA), got {kind!r}")
+    n_bytes = path.stat().st_size
+    if len(counts) < 3 or not all(word.isdigit() for word in counts[:3]) or max(map(int, counts[:3])) > n_bytes:
+        raise MatrixError(
+            f"{where}, line 3: expected rows, columns, entries of a file of {n_bytes} bytes, got {counts}"
+        )
+    role = request.role_of(where, role_by_stem(path), ", and it is not named K.rsa, M.rsa, stiffness.hb, mass.hb")
+    text = path.read_text("ascii", "replace").replace(lines[2], "RUA" + lines[2][3:], 1)
+    stored = sp.csc_array(scipy.io.hb_read(io.StringIO(text), spmatrix=False))  # which reads one triangle as it stands
+    if stored.shape[0] != stored.shape[1]:
+        raise MatrixError(f"{where}: {role}: expected a square matrix, got {stored.shape[0]} x {stored.shape[1]}")
+    if not np.isfinite(stored.data).all():
+        raise MatrixError(f"{where}: {role}: expected finite numbers, got NaN or infinity")
+    declared = "symmetric" if kind == "RSA" else "general"
+    matrix, triangle = mirrored(f"{where}: {role}", stored, declared=declared)
+    return ForeignMatrices(**{role: matrix}, triangle={role: triangle}, program="Harwell-Boeing")
+
+
+# read matrices --------------------------------------------------------------------------------------------------------
+
 
 HEAD = 4096  #: bytes by which the format of a file is told
 

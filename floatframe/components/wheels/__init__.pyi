@@ -1,11 +1,11 @@
 from .brush_tyre import BrushTyre as BrushTyre
 from .linear_tyre import LinearTyre as LinearTyre
 from .magic_formula_tyre import MagicFormulaTyre as MagicFormulaTyre
-from .roads.iso_8608 import iso_8608_road as iso_8608_road
-from .roads.obstacles import bump as bump
-from .roads.obstacles import cosine_bump as cosine_bump
-from .roads.obstacles import ramp as ramp
-from .roads.obstacles import step as step
+from .roads.profiles import bump as bump
+from .roads.profiles import cosine_bump as cosine_bump
+from .roads.profiles import iso_8608_road as iso_8608_road
+from .roads.profiles import ramp as ramp
+from .roads.profiles import step as step
 from .roads.road import FlatRoad as FlatRoad
 from .roads.road import GridRoad as GridRoad
 from .roads.road import Grip as Grip

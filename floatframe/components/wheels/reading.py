@@ -8,8 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from fe_models.foundation.words import nearest, quoted
-from floatframe.components.wheels.roads.iso_8608 import iso_8608_road
-from floatframe.components.wheels.roads.obstacles import bump, cosine_bump, ramp, step
+from floatframe.components.wheels.roads.profiles import bump, cosine_bump, iso_8608_road, ramp, step
 from floatframe.components.wheels.roads.road import FlatRoad, GridRoad, Grip, Polyline, Road
 from floatframe.components.wheels.tyre_file import TyreProperties, read_tyre_file, shipped_tyre
 from floatframe.errors import ModelError

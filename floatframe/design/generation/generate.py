@@ -13,8 +13,8 @@ from fe_models.foundation.words import quoted
 from floatframe.design.generation.graph import Operations
 from floatframe.design.generation.joint_forces import model_terms
 from floatframe.design.generation.languages.c import c_files
-from floatframe.design.generation.languages.casadi import casadi_files
-from floatframe.design.generation.languages.matlab import matlab_files
+from floatframe.design.generation.languages.casadi import casadi_files, rows_of
+from floatframe.design.generation.languages.lines import lines_of, with_subscript
 from floatframe.design.generation.languages.python import python_files
 from floatframe.design.generation.links import TreeTerms
 from floatframe.design.generation.routines import ROUTINES, Routine, routine_of
@@ -22,7 +22,27 @@ from floatframe.engine.tree.recursive import RelativeModel
 from floatframe.errors import ModelError
 from floatframe.model.system import System
 
-__all__ = ["LANGUAGES", "GeneratedCode", "generate"]
+__all__ = ["LANGUAGES", "GeneratedCode", "generate", "matlab_files"]
+
+
+# routines as MATLAB functions, which Octave reads as well -------------------------------------------------------------
+
+
+def matlab_files(routine: Routine, notes: Sequence[str]) -> dict[str, str]:
+    """Return NAME.m with the function NAME(inputs)."""
+    lines = lines_of(routine, symbol=lambda name: with_subscript(name, 1, "()"))
+    outs = ", ".join(output.name for output in routine.outputs)
+    head = f"function [{outs}] = {routine.name}({', '.join(name for name, _, _ in routine.inputs)})\n"
+    body = [f"  {name} = {text};" for name, text in lines.named]
+    for output, results in zip(routine.outputs, lines.results, strict=True):
+        rows = [f"    {', '.join(f'({text})' for text in row)};" for row in rows_of(output, results)]
+        body += [f"  {output.name} = [", *rows, "  ];"]
+    comment = "".join(f"% {note}".rstrip() + "\n" for note in notes)
+    return {f"{routine.name}.m": head + comment + "\n".join(body) + "\nend\n"}
+
+
+# generate -------------------------------------------------------------------------------------------------------------
+
 
 LANGUAGES: dict[str, Callable[[Routine, Sequence[str]], dict[str, str]]] = {
     "c": c_files,

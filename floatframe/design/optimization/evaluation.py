@@ -1,7 +1,9 @@
 """One evaluation of a design: the numbers that objectives and constraints are made of, or why there are none."""
 
+import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,6 +11,8 @@ from scipy.interpolate import CubicSpline
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ReportedError
+from fe_models.foundation.tasks.installation import source_mark
+from fe_models.foundation.tasks.journal import TaskJournal, open_task_journal
 from fe_models.foundation.tasks.task_map import ProcessError
 from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.linear.frequency_response import resolved_frequencies
@@ -16,11 +20,25 @@ from floatframe.analyses.linear.linearization import LinearSystem, linearize
 from floatframe.analyses.linear.system_modes import system_modes
 from floatframe.design.optimization.design import Design, Quantity
 from floatframe.design.studies.study import StudyPoint, column_of, taken, taken_of_modes
-from floatframe.errors import ModelError
+from floatframe.errors import ModelError, ResultsError
 from floatframe.model.system import System
 from floatframe.results.trajectory import Trajectory
 
-__all__ = ["Evaluation", "EvaluationFunction", "residuals", "response_number", "scalar", "terms", "violations"]
+__all__ = [
+    "Evaluation",
+    "EvaluationFunction",
+    "Journal",
+    "design_digest",
+    "open_journal",
+    "residuals",
+    "response_number",
+    "scalar",
+    "terms",
+    "violations",
+]
+
+
+# evaluation -----------------------------------------------------------------------------------------------------------
 
 
 # responses ------------------------------------------------------------------------------------------------------------
@@ -204,3 +222,62 @@ def violations(design: Design, evaluation: Evaluation) -> Array:
         if q.most is not None:
             g.append((numbers[0] - q.most) / (abs(q.most) or 1.0))
     return np.array(g)
+
+
+# the journal of an optimisation: every evaluation is a line, for a second call to go on with --------------------------
+
+
+KIND = "floatframe optimize journal 1"
+
+
+class Journal:
+    """A file to which evaluations are appended, and what it held when it was opened."""
+
+    def __init__(self, journal: TaskJournal, known: dict[tuple[float, ...], Evaluation]) -> None:
+        self.journal = journal
+        self.known = known
+
+    def append(self, evaluation: Evaluation) -> None:
+        """Write an evaluation; not one that another try may give."""
+        if not evaluation.is_lasting:
+            return
+        self.journal.append({"values": evaluation.values, "numbers": evaluation.numbers, "error": evaluation.error})
+        self.known[evaluation.values] = evaluation
+
+
+def open_journal(path: Path, design: Design, files: tuple[str, ...]) -> Journal:
+    """Return the journal at a path, new or with what it holds.
+
+    Raises
+    ------
+    ResultsError
+        If the file is no journal, or one of another system, other numbers or another version of the program; it is left
+        as it is.
+    """
+    journal = open_task_journal(path, KIND, design_digest(design, files), design.source, ResultsError)
+    expected = tuple(1 if q.times is None else len(q.times) for q in design.quantities)
+    known: dict[tuple[float, ...], Evaluation] = {}
+    for record in journal.records:
+        try:
+            values = tuple(float(v) for v in record["values"])
+            numbers = tuple(tuple(float(v) for v in part) for part in record["numbers"])
+            error = str(record["error"])
+        except (ValueError, TypeError, KeyError):
+            continue
+        if len(values) == len(design.parameters) and (error or tuple(map(len, numbers)) == expected):
+            known[values] = Evaluation(values, numbers, error)
+    return Journal(journal, known)
+
+
+def design_digest(design: Design, files: tuple[str, ...]) -> str:
+    """Return the SHA-256 of what the numbers depend on: this program, files of the system, key paths, quantities."""
+    asked = [
+        (q.analysis, q.output.of, q.output.take, q.band, q.at, None if q.times is None else q.times.tolist())
+        for q in design.quantities
+    ]
+    text = repr((source_mark(), [(p.paths, p.factors) for p in design.parameters], asked))
+    digest = hashlib.sha256(text.encode())
+    for name in files:
+        data = Path(name).read_bytes()
+        digest.update(str(len(data)).encode() + b" " + data)
+    return digest.hexdigest()

@@ -21,12 +21,13 @@ from floatframe.design.optimization.design_file import SMALLEST_TOLERANCE
 from floatframe.design.optimization.evaluation import (
     Evaluation,
     EvaluationFunction,
+    Journal,
+    open_journal,
     residuals,
     scalar,
     terms,
     violations,
 )
-from floatframe.design.optimization.journal import Journal, open_journal
 from floatframe.design.studies.study import check, sendable_study
 from floatframe.errors import ModelError
 

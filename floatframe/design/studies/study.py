@@ -29,7 +29,6 @@ from floatframe.analyses.linear.linearization import linearize
 from floatframe.analyses.linear.system_modes import SystemModes, system_modes
 from floatframe.analyses.snapshot import snapshot
 from floatframe.design.studies.study_file import TAKES, Output, Study
-from floatframe.design.studies.study_row import StudyRow
 from floatframe.engine.compiling.file_frames import state_of_file
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.errors import ModelError, ResultsError
@@ -39,7 +38,24 @@ from floatframe.results.sensors import measured, sensor_of
 from floatframe.results.trajectory import Trajectory
 from floatframe.simulation.integration import integrate
 
-__all__ = ["StudyJournal", "StudyTable", "open_study_journal", "run_study", "sendable_study"]
+__all__ = ["StudyJournal", "StudyRow", "StudyTable", "open_study_journal", "run_study", "sendable_study"]
+
+
+# a point of a study and its result ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class StudyRow:
+    """Parameter values of a point, and its outputs or error."""
+
+    values: tuple[Any, ...]
+    outputs: tuple[float, ...]  #: NaN if the point failed
+    units: tuple[str, ...]
+    error: str = ""  #: reason of a failure
+    is_lasting: bool = True  #: whether a repeated attempt would give the same result; False for a killed process
+
+
+# study ----------------------------------------------------------------------------------------------------------------
 
 
 # the journal of a study: every completed point is a line, so that a later call can continue ---------------------------

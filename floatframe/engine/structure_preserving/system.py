@@ -34,8 +34,12 @@ from floatframe.engine.structure_preserving.forces import (
     body_load,
     bushing_load,
     coordinate_load,
+    element_of,
     point_load,
     spring_load,
+    state_rows,
+    user_force_load,
+    user_state_rates,
 )
 from floatframe.engine.structure_preserving.functions import value_of
 from floatframe.engine.structure_preserving.markers import BodyMarker, Load, MarkerStep, body_marker, marker_step
@@ -52,7 +56,6 @@ from floatframe.engine.structure_preserving.rolling import (
     height_value,
     roll_value,
 )
-from floatframe.engine.structure_preserving.user_forces import element_of, state_rows, user_force_load, user_state_rates
 from floatframe.errors import ModelError
 from floatframe.model.joints.rows import COUPLE, PUSH, RIM_HEIGHT, ROLL, is_held_length, is_held_velocity, kind_of
 from floatframe.model.rotations import dot

@@ -33,13 +33,19 @@ from floatframe.files.system_file.channel_section import (
     ForeignSection,
     InputSection,
     OutputSection,
+    SensorSection,
+)
+from floatframe.files.system_file.connections import (
+    CouplerSection,
+    ForceSection,
+    JointSection,
+    coupler_of,
+    force_of,
+    joint_of,
 )
 from floatframe.files.system_file.element_section import element_of
-from floatframe.files.system_file.forces import ForceSection, force_of
-from floatframe.files.system_file.joints import CouplerSection, JointSection, coupler_of, joint_of
 from floatframe.files.system_file.keys import Name
 from floatframe.files.system_file.run_section import RunOptions, RunSection
-from floatframe.files.system_file.sensor_section import SensorSection
 from floatframe.files.system_file.shape_section import ShapeSection
 from floatframe.files.system_file.signal_section import SignalSection, signal_functions
 from floatframe.model.bodies.ground import GROUND

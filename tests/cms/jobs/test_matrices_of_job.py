@@ -12,8 +12,7 @@ from numpy.testing import assert_allclose
 import cms
 import fe_models
 from cms.errors import JobError
-from cms.jobs.body_of_job import job_body, uncoupled_body
-from cms.jobs.matrices_of_job import interfaces_on
+from cms.jobs.body_of_job import interfaces_on, job_body, uncoupled_body
 from fe_models.errors import FeModelsError
 from fe_models.foundation.stages import Stages
 

@@ -11,7 +11,7 @@ from pyyeti.nastran import op2 as pyyeti_op2
 
 from fe_models.errors import MatrixError, MeshError
 from fe_models.files.bulk_data.cards import read_cards
-from fe_models.files.nastran_matrices.dmig import dmig_matrices
+from fe_models.files.matrices.nastran import dmig_matrices
 from fe_models.files.nastran_matrices.dti import SCALAR
 from fe_models.files.nastran_matrices.op2 import read_op2
 

@@ -14,8 +14,7 @@ from floatframe.machines import machine_files
 from floatframe.machines.road_car import CarOnPosts, Linkage, RoadCar, body_files, road_car_files
 from floatframe.machines.road_car.closed_forms import MODES, roll_control_stiffness, transfer_shares
 from floatframe.machines.road_car.description import CORNERS
-from floatframe.machines.road_car.figures import car_mass, driven
-from floatframe.machines.road_car.steady_turn import steady_turn
+from floatframe.machines.road_car.figures import car_mass, driven, steady_turn
 from floatframe.machines.road_car.systems import ON_GROUND, car_file, lane_change, rig_file
 from floatframe.model.elements.expressions import ExpressionElement
 from floatframe.model.rotations import rotation_matrix

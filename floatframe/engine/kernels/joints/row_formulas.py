@@ -4,9 +4,10 @@ A kind that holds something brings `value` and `rates` (held_rows.py), one that 
 `derivatives` (wrench_rows.py). Kernels call them by the code of the row and know nothing else of it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.joints import (
     constant_velocity,
     deformed_line,
@@ -15,7 +16,6 @@ from floatframe.engine.kernels.joints import (
     rolling,
     wrench_rows,
 )
-from floatframe.engine.kernels.joints.by_code import by_code
 from floatframe.model.joints.rows.kinds import (
     ARM,
     BISECTOR,
@@ -42,7 +42,44 @@ from floatframe.model.joints.rows.kinds import (
     TWIST_B,
 )
 
-__all__ = ["HELD", "WRENCH", "held_by_place", "held_rates", "held_value", "wrench_derivatives", "wrench_value"]
+__all__ = [
+    "HELD",
+    "WRENCH",
+    "by_code",
+    "held_by_place",
+    "held_rates",
+    "held_value",
+    "wrench_derivatives",
+    "wrench_value",
+]
+
+
+# one compiled function that calls another by a code: `if code == ...` written from a table ----------------------------
+
+
+def by_code(name: str, functions: Mapping[int, Callable[..., Any]], arguments: str) -> Callable[..., Any]:
+    """Return the inner function name(code, ...) that calls functions[code](...).
+
+    All of them take the arguments named and return the same types; a code that is not in the table is not asked for.
+    The name is its own among such functions: the symbols of two of one name and types differ by a number that counts
+    what a process has compiled, and an entry from the cache may bring the number of one for the code of another.
+    """
+    different = list(dict.fromkeys(functions.values()))
+    lines = [f"def {name}(code, {arguments}):"]
+    for k, function in enumerate(different):
+        codes = [code for code, each in functions.items() if each is function]
+        if k < len(different) - 1:
+            lines.append(f"    if {' or '.join(f'code == {code}' for code in codes)}:")
+            lines.append(f"        return f_{k}({arguments})")
+        else:
+            lines.append(f"    return f_{k}({arguments})")
+    names: dict[str, Any] = {f"f_{k}": function for k, function in enumerate(different)}
+    exec("\n".join(lines), names)
+    return inner(names[name])
+
+
+# row formulas ---------------------------------------------------------------------------------------------------------
+
 
 Function = Callable[..., Any]
 

@@ -10,10 +10,13 @@ from floatframe.engine.kernels.compiler.compilation import inner, matrix_loops
 from floatframe.engine.kernels.model import BUSHING, CONTACT, ELEMENT, JOINT, SPRING, USER_FORCE
 from floatframe.engine.kernels.vector import cross, matrix, norm, put_sum, scaled, sub, turned_back, vector
 from floatframe.engine.structure_preserving.kernels.bodies import body_inertia, body_step
-from floatframe.engine.structure_preserving.kernels.connections.bushings import bushing_load
 from floatframe.engine.structure_preserving.kernels.connections.contacts import contact_load
+from floatframe.engine.structure_preserving.kernels.connections.forces import (
+    bushing_load,
+    user_force_load,
+    user_state_residual,
+)
 from floatframe.engine.structure_preserving.kernels.connections.public_elements import element_load, element_residual
-from floatframe.engine.structure_preserving.kernels.connections.user_forces import user_force_load, user_state_residual
 from floatframe.engine.structure_preserving.kernels.deformed_lines import line_steps
 from floatframe.engine.structure_preserving.kernels.held_rows import add_reaction, row_change, row_rate, row_value
 from floatframe.engine.structure_preserving.kernels.loads import (

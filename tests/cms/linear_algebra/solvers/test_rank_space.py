@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from cms.linear_algebra.solvers.factorization import factorize
 from cms.linear_algebra.solvers.mode_search import BlockLanczos
-from cms.linear_algebra.solvers.rank_space import RankSpace
+from cms.linear_algebra.solvers.slepc_modes import RankSpace
 from cms.linear_algebra.solvers.tall_space import ArraySpace
 from fe_models.body.couplings.couplings import couple
 from fe_models.body.couplings.submatrix import PrincipalBlock
@@ -44,7 +44,7 @@ def space(request, pencil, monkeypatch):
         b = collected(ranks, rows, own)
         return own_rows(ranks, rows, None if b is None else solve(b))
 
-    monkeypatch.setattr("cms.linear_algebra.solvers.rank_space.solved_rows", solved)
+    monkeypatch.setattr("cms.linear_algebra.solvers.slepc_modes.solved_rows", solved)
     monkeypatch.setattr(factorization, "_factor", Stand(request.param, K))
     return RankSpace(factorization.factor)
 
@@ -107,7 +107,7 @@ def test_a_matrix_by_rows_on_the_ranks_of_a_space_is_multiplied_there(size, monk
     rows = block.spread().rows if size > 1 else even_rows(one.M.indptr[: len(i) + 1], 1)
     space = RankSpace(SimpleNamespace(ranks=ranks, rows=rows, n=len(i), key="factor"))
     if size > 1:
-        monkeypatch.setattr("cms.linear_algebra.solvers.rank_space.matrix_of", None)  # nothing is collected
+        monkeypatch.setattr("cms.linear_algebra.solvers.slepc_modes.matrix_of", None)  # nothing is collected
     X = space.random(np.random.default_rng(0), 3)
     expected = PrincipalBlock(one.M, i) @ space.whole(X)
     assert_allclose(space.whole(space.product(block) @ X), expected, rtol=0, atol=1e-13 * np.abs(expected).max())

@@ -222,7 +222,7 @@ def test_a_folder_that_is_not_there_is_refused(tmp_path):
 
 
 def test_a_disk_without_room_is_not_taken_for_a_mechanism_of_the_body(monkeypatch):
-    monkeypatch.setattr("cms.linear_algebra.sparse_cholesky.panels.tempfile.gettempdir", lambda: "/nowhere")
+    monkeypatch.setattr("cms.linear_algebra.sparse_cholesky.factor.tempfile.gettempdir", lambda: "/nowhere")
     on_disk = Solver("cholesky", lambda lower, *, definite: CholeskyFactor(lower, definite=definite, on_disk=True))
     with pytest.raises(FactorRoomError, match=r"^no file for the factor in .*nowhere"):
         fix_interfaces(cms.couple(bar(nx=3)), solver=on_disk)

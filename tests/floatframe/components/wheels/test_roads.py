@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from floatframe.components import wheels
-from floatframe.components.wheels.roads.iso_8608 import ROUGHNESS, density, track_correlation
+from floatframe.components.wheels.roads.profiles import ROUGHNESS, density, track_correlation
 from floatframe.components.wheels.roads.surface import road_grip, road_height
 from floatframe.errors import ModelError
 

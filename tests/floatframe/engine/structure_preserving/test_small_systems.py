@@ -18,8 +18,8 @@ from floatframe import (
     UserForce,
 )
 from floatframe.engine.compiling.system import compiled_system
+from floatframe.engine.structure_preserving.forces import user_values
 from floatframe.engine.structure_preserving.public_elements import Motion
-from floatframe.engine.structure_preserving.user_forces import user_values
 from floatframe.model.elements import Element, ElementLaw
 
 MASS, OMEGA = 1e-3, 20.0

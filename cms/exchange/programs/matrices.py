@@ -1,17 +1,24 @@
-"""MATLAB: matrices of a body over its interfaces in .mat files of version 5 or 7.3, and Simscape's flexible solid."""
+"""Plain matrices of a reduced body: MATLAB, Simscape and Matrix Market files."""
 
 import io
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from cms.errors import ExportError
 from cms.exchange.exporters.writer import Made, Request, in_ascii
 from cms.reduction.interface_model import InterfaceModel, interface_model
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.components import MOTION_COMPONENTS
 
-__all__ = ["make_mat5", "make_mat73", "make_simscape"]
+__all__ = ["make_mat5", "make_mat73", "make_matrix_market", "make_simscape"]
+
+
+# matlab ---------------------------------------------------------------------------------------------------------------
+# MATLAB: matrices of a body over its interfaces in .mat files of version 5 or 7.3, and Simscape's flexible solid.
 
 
 FIRST_MODE = 1000001  #: number of the first mode in the list of dofs
@@ -132,3 +139,30 @@ def header_words(version: str, request: Request) -> bytes:
     """Return the header text of a file."""
     words = f"MATLAB {version} MAT-file, {'; '.join(request.header()[:3])}"
     return words.encode("ascii")[:TEXT_OF_HEADER].ljust(TEXT_OF_HEADER)
+
+
+# matrix Market: stiffness, mass and damping of a body over its interfaces, one text file for each matrix --------------
+
+
+def make_matrix_market(request: Request) -> Made:
+    """Return FILE_K.mtx, FILE_M.mtx, FILE_C.mtx and, if there are load cases, FILE_F.mtx; comments name the rows."""
+    model = interface_model(request.body)
+    names = [f"{node.interface} {MOTION_COMPONENTS[c]}" for node in model.nodes for c in node.components]
+    names += [f"fixed-interface mode {k + 1}" for k in range(model.n_modes)]
+    comment = "\n".join([*request.header(), *(f"row {row + 1}: {in_ascii(name)}" for row, name in enumerate(names))])
+    files: dict[Path, bytes] = {}
+    for letter, matrix in {"K": model.K, "M": model.M, "C": model.D, "F": model.loads}.items():
+        if matrix.shape[1]:
+            path = request.path.with_name(f"{request.path.stem}_{letter}.mtx")
+            files[path] = text_of(matrix, comment, "general" if letter == "F" else "symmetric")
+    cases = enumerate(model.body.load_cases)
+    return Made(files, tuple(f"load case {case.name}: column {k + 1} of F" for k, case in cases))
+
+
+def text_of(matrix: Array, comment: str, symmetry: str) -> bytes:
+    """Return a file in coordinate format, in full precision."""
+    from scipy.io import mmwrite
+
+    image = io.BytesIO()
+    mmwrite(image, sp.coo_array(matrix), comment=comment, field="real", precision=17, symmetry=symmetry)
+    return image.getvalue()

@@ -1,15 +1,4 @@
-"""Random roads of ISO 8608 with the one-sided density G_d(n) = G_d(n_0) (n/n_0)^-w of the height, n_0 = 0.1 cycles/m.
-
-A profile is the sum of cosines sqrt(2 G_d dn) cos(2 pi n x + phi) at equally spaced n with random phases, so that its
-density is exactly that of the class, not only on average. Tracks at distance b on an isotropic surface have the
-normalised cross density (the two-dimensional density is proportional to |n|^-(w + 1); its section at lag b is Basset's
-integral)
-
-    g(n, b) = 2/Gamma(w/2) (pi n b)^(w/2) K_(w/2)(2 pi n b),
-
-which is 1 for long waves and 0 for short ones. Tracks are made from independent tracks with the Cholesky factor of the
-matrix of g between all of them. The coherence is g².
-"""
+"""Profiles of roads: random unevenness by ISO 8608, and single obstacles."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -17,11 +6,26 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.components.wheels.roads.road import GridRoad, knots
+from floatframe.components.wheels.roads.road import GridRoad, Polyline, knots
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import array_of_shape, number
 
-__all__ = ["ROUGHNESS", "density", "iso_8608_road", "track_correlation"]
+__all__ = ["ROUGHNESS", "bump", "cosine_bump", "density", "iso_8608_road", "ramp", "step", "track_correlation"]
+
+
+# iso 8608 -------------------------------------------------------------------------------------------------------------
+# Random roads of ISO 8608 with the one-sided density G_d(n) = G_d(n_0) (n/n_0)^-w of the height, n_0 = 0.1 cycles/m.
+#
+# A profile is the sum of cosines sqrt(2 G_d dn) cos(2 pi n x + phi) at equally spaced n with random phases, so that its
+# density is exactly that of the class, not only on average. Tracks at distance b on an isotropic surface have the
+# normalised cross density (the two-dimensional density is proportional to |n|^-(w + 1); its section at lag b is
+# Basset's integral)
+#
+#     g(n, b) = 2/Gamma(w/2) (pi n b)^(w/2) K_(w/2)(2 pi n b),
+#
+# which is 1 for long waves and 0 for short ones. Tracks are made from independent tracks with the Cholesky factor of
+# the matrix of g between all of them. The coherence is g².
+
 
 #: G_d(n_0) at the geometric mean of each class [m³]
 ROUGHNESS = {name: 16e-6 * 4.0**k for k, name in enumerate("ABCDEFGH")}
@@ -132,3 +136,48 @@ def mixed(waves: Any, n: Any, y: Array, waviness: float, coherence: float | None
                 g[:, i, j] = 1.0 if i == j else np.sqrt(coherence)
     factor = np.linalg.cholesky(g + 1e-12 * np.eye(len(y)))
     return np.einsum("nij,jn->in", factor, waves)
+
+
+# obstacles of a test track as profiles: step, ramp and bumps ----------------------------------------------------------
+
+
+PIECES = 64  #: number of straight pieces of a rounded bump
+
+
+def step(at: float, height: float, *, length: float) -> Polyline:
+    """Return a road from x = 0 to `length` [m] with an upright step at x = at; a negative height steps down."""
+    at, length = place("step", at, length)
+    return Polyline(np.array([0.0, at, at, length]), np.array([0.0, 0.0, 1.0, 1.0]) * number("step: height", height))
+
+
+def ramp(at: float, height: float, run: float, *, length: float) -> Polyline:
+    """Return a road that rises by `height` over `run`, beginning at x = at, and is level up to `length` [m]."""
+    at, length = place("ramp", at, length)
+    run = number("ramp: run", run, above=0.0)
+    x = np.array([0.0, at, at + run, max(length, at + run)])
+    return Polyline(x, np.array([0.0, 0.0, 1.0, 1.0]) * number("ramp: height", height))
+
+
+def bump(at: float, height: float, width: float, *, length: float) -> Polyline:
+    """Return a level road with a cleat of rectangular section from x = at to at + width [m]."""
+    at, length = place("bump", at, length)
+    end = at + number("bump: width", width, above=0.0)
+    x = np.array([0.0, at, at, end, end, max(length, end)])
+    return Polyline(x, np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0]) * number("bump: height", height))
+
+
+def cosine_bump(at: float, height: float, width: float, *, length: float) -> Polyline:
+    """Return a level road with the bump height (1 - cos(2 pi s/width))/2, 0 <= s = x - at <= width [m]."""
+    at, length = place("cosine_bump", at, length)
+    s = np.linspace(0.0, 1.0, PIECES + 1)
+    rise = 0.5 * number("cosine_bump: height", height) * (1 - np.cos(2 * np.pi * s))
+    x = at + s * number("cosine_bump: width", width, above=0.0)
+    return Polyline(np.concatenate([[0.0], x, [max(length, x[-1])]]), np.concatenate([[0.0], rise, [0.0]]))
+
+
+def place(where: str, at: float, length: float) -> tuple[float, float]:
+    """Return the beginning of an obstacle and the length of its road, validated."""
+    at, length = number(f"{where}: at", at, at_least=0.0), number(f"{where}: length", length, above=0.0)
+    if at >= length:
+        raise ModelError(f"{where}: at: expected a place on the road of length {length:g}, got {at:g}")
+    return at, length
