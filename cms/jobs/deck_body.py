@@ -32,6 +32,7 @@ NO_NODES = np.zeros(0, dtype=np.int64)
 
 def body_of_deck(job: Job, path: Path, stages: Stages, on_report: Callable[[Any], None] | None) -> FEBody:
     """Read the deck, make a body of each kind of elements, join them, and add loads and interfaces."""
+    from cms.jobs.beam_tables import PLANES
     from fe_models.assembly.join import join
     from fe_models.files.decks.read_deck import read_deck
     from fe_models.meshes.cells.raw_mesh import LINES
@@ -46,8 +47,9 @@ def body_of_deck(job: Job, path: Path, stages: Stages, on_report: Callable[[Any]
         means = _mean_interfaces(job, raw)
         constraints = _constraints(job, raw, besides=set(means.values()))
         joined = join(
-            str(job.body.name), parts, raw.nodes, constraints, numbers=raw.node_numbers, node_sets=raw.node_sets
-        )
+            str(job.body.name), parts, raw.nodes, constraints, numbers=raw.node_numbers, node_sets=raw.node_sets,
+            normal=None if job.body.plane is None else PLANES[job.body.plane],
+        )  # fmt: skip
         record = {**joined.body.provenance, "deck": str(path), "deck sha256": file_digest(path)}
         record |= {f"file {name}": digest for name, digest in raw.included.items()}
         numbering = joined.body.numbering.with_instances(raw.instances, raw.instance_step)

@@ -101,6 +101,7 @@ def join(
     *,
     numbers: IntArray | None = None,
     node_sets: Mapping[str, IntArray] | None = None,
+    normal: int | None = None,
 ) -> Joined:
     """Make one body of parts that share nodes.
 
@@ -118,6 +119,9 @@ def join(
         The user's numbers of these nodes, (n_nodes,); None: they have no numbers.
     node_sets
         Sets of these nodes.
+    normal
+        Axis normal to the plane of a body that becomes planar (`fe_models.assembly.planar`). The first node with six
+        dofs then keeps its rotations out of the plane, even without mass and stiffness: the body follows them rigidly.
 
     Raises
     ------
@@ -144,7 +148,7 @@ def join(
         whole = eliminate_dofs(whole, slaves, T_s)
     references = place[[c.node for c in constraints if isinstance(c, MeanMotion)]]
     n_of_parts = sum(len(recovered_dofs(body)) for body in bodies)
-    return Joined(_without_idle_dofs(whole, n_of_parts, references), place)
+    return Joined(_without_idle_dofs(whole, n_of_parts, references, normal), place)
 
 
 def _kept(part: Part, begin: int, place: IntArray) -> IntArray:
@@ -253,7 +257,7 @@ def recovered_dofs(body: FEBody) -> IntArray:
     return body.dofs if body.recovery is None else body.recovery.dofs
 
 
-def _without_idle_dofs(body: FEBody, n_of_parts: int, references: IntArray) -> FEBody:
+def _without_idle_dofs(body: FEBody, n_of_parts: int, references: IntArray, normal: int | None) -> FEBody:
     """Step (4). A rotation with mass but without stiffness stays, and appears as a motion of zero frequency.
 
     The reference of a mean motion that follows in some components only has no other motion, so its other translations
@@ -263,6 +267,9 @@ def _without_idle_dofs(body: FEBody, n_of_parts: int, references: IntArray) -> F
     is_idle = (body.dofs[:, 1] >= 3) | np.isin(body.dofs[:, 0], references)
     for A in (body.K, body.M):
         is_idle &= np.asarray(abs(A).sum(axis=0)).ravel() == 0
+    count = np.bincount(body.dofs[:, 0], minlength=len(body.nodes))
+    if normal is not None and count.max() == 6:
+        is_idle &= (body.dofs[:, 0] != int(np.argmax(count == 6))) | (body.dofs[:, 1] == 3 + normal)
     idle = np.flatnonzero(is_idle)
     if not len(idle):
         return body

@@ -22,7 +22,7 @@ def planar(body: FEBody, *, normal: int = 2) -> FEBody:
     the body in space, and K has no strain energy for all six rigid-body motions. Frames, mode sets and multibody
     systems work as they do in space, and a body that moves in its plane moves as a planar model does.
 
-    The reference node is the node of the first interface, which keeps six boundary dofs. The other interfaces lose
+    The reference node is the node of the first interface, which keeps its out-of-plane dofs. The other interfaces lose
     their three out-of-plane dofs.
 
     Parameters
@@ -35,7 +35,7 @@ def planar(body: FEBody, *, normal: int = 2) -> FEBody:
     Raises
     ------
     BodyError
-        If the body is not coupled, has multipliers, or no node has six dofs.
+        If the body is not coupled, has multipliers, or no node has all three dofs out of the plane.
     """
     where = f"planar: body {body.name!r}"
     if normal not in (0, 1, 2):
@@ -45,7 +45,7 @@ def planar(body: FEBody, *, normal: int = 2) -> FEBody:
         raise BodyError(f"{where}: has distributing interfaces; make them rigid, or choose single nodes")
     node, component = body.dofs.T
     is_out = np.isin(component, [normal, *(3 + axis for axis in range(3) if axis != normal)])
-    reference = _reference_node(body, where)
+    reference = _reference_node(body, is_out, where)
     out_of_reference = np.flatnonzero(is_out & (node == reference))
     slaves = np.flatnonzero(is_out & (node != reference))
     rows = np.zeros((len(slaves), 6))
@@ -60,15 +60,15 @@ def planar(body: FEBody, *, normal: int = 2) -> FEBody:
     return eliminate_dofs(body, slaves, columns @ placement)
 
 
-def _reference_node(body: FEBody, where: str) -> int:
-    """Return the node of the first boundary dofs, or else the first node with six dofs."""
+def _reference_node(body: FEBody, is_out: np.ndarray, where: str) -> int:
+    """Return the node of the first boundary dofs, or else the first node, that has three dofs out of the plane."""
     candidates = [np.asarray(i.dofs) for i in body.interfaces if i.dofs is not None]
     nodes = np.concatenate([*[body.dofs[dofs, 0] for dofs in candidates], body.dofs[:, 0]])
-    count = np.bincount(body.dofs[:, 0], minlength=len(body.nodes))
-    with_six = nodes[count[nodes] == 6]
-    if not len(with_six):
-        raise BodyError(f"{where}: no node has six dofs; expected beams, or a rigid interface")
-    return int(with_six[0])
+    count = np.bincount(body.dofs[is_out, 0], minlength=len(body.nodes))
+    possible = nodes[count[nodes] == 3]
+    if not len(possible):
+        raise BodyError(f"{where}: no node has rotations out of the plane; expected beams, or a rigid interface")
+    return int(possible[0])
 
 
 def _without(interface: Interface, kept: np.ndarray) -> Interface:

@@ -13,7 +13,7 @@ import numpy as np
 from fe_models.errors import MeshError
 from fe_models.files.bulk_data.cards import Card, read_cards
 from fe_models.files.bulk_data.coordinate_systems import SYSTEM_CARDS, read_grid_points
-from fe_models.files.bulk_data.includes import bulk_text
+from fe_models.files.bulk_data.includes import bulk_parts, bulk_text
 from fe_models.foundation.arrays import IntArray
 from fe_models.meshes.cells.raw_mesh import RawBlock, RawMesh
 
@@ -66,7 +66,11 @@ def read_nastran(path: Path, data: bytes) -> RawMesh:
     """
     where = f"mesh {path}"
     included: dict[str, str] = {}
-    text = bulk_text(where, path, data.decode("utf-8", "replace"), included)
+    parts = bulk_parts(where, bulk_text(where, path, data.decode("utf-8", "replace"), included))
+    if len(parts) > 1:
+        why = "a deck of several superelements; expected one body"
+        raise MeshError(f"{where}: BEGIN SUPER = {max(parts)}: {why}; read it as a whole deck ([body] deck)")
+    text = parts[0]
     placing: list[Card] = []  # what says where grid points are
     cells: dict[tuple[str, int, str], tuple[list[int], list[list[str]]]] = {}  # card, nodes, property -> elements
     noted: dict[str, int] = {}

@@ -11,6 +11,7 @@ from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int, til
 
 __all__ = ["PointMass", "RigidLink", "Spring"]
 
+ROUNDING = 1e-14  #: entries of lever arms below this, relative to the lever, are zero
 SYMMETRIC = 1e-9  #: relative asymmetry of a given matrix that counts as rounding
 
 
@@ -133,13 +134,16 @@ def spring_matrix(nodes: Array, spring: Spring, matrix: Array) -> tuple[Array, I
 def spring_motion(nodes: Array, spring: Spring) -> tuple[Array, IntArray]:
     """Return B in d = B u, (6, 12), the motion of the second side relative to the first, and the dofs of u."""
     first, second = (nodes[node] for node in spring.nodes)
-    point = (first + second) / 2 if spring.point is None else np.asarray(spring.point)
+    half = (second - first) / 2
+    levers = (half, -half) if spring.point is None else (spring.point - first, spring.point - second)
     B = np.zeros((6, 12))
     axes = np.asarray(spring.triad).T
-    for sign, at, position in ((-1.0, 0, first), (1.0, 6, second)):
-        x, y, z = point - position
+    for sign, at, lever in ((-1.0, 0, levers[0]), (1.0, 6, levers[1])):
+        x, y, z = lever
+        turned = axes @ np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])  # theta × lever
+        turned[np.abs(turned) < ROUNDING * np.linalg.norm(lever)] = 0.0  # a spring along its line resists no rotation
         B[:3, at : at + 3] = sign * axes
-        B[:3, at + 3 : at + 6] = sign * axes @ np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])  # theta × lever
+        B[:3, at + 3 : at + 6] = sign * turned
         B[3:, at + 3 : at + 6] = sign * axes
     return B, np.concatenate([6 * node + np.arange(6) for node in spring.nodes])
 

@@ -1,14 +1,16 @@
-"""The text of a deck of Nastran with the files that it includes."""
+"""The text of a deck of Nastran with the files that it includes, and its sections: main bulk data, superelements."""
 
+import re
 from hashlib import sha256
 from pathlib import Path
 
 from fe_models.errors import MeshError
 from fe_models.foundation.paths import near_file
 
-__all__ = ["bulk_text"]
+__all__ = ["bulk_parts", "bulk_text"]
 
 DEEPEST = 10  #: levels of files that include files
+SECTION = re.compile(r"(?i)\s*BEGIN(?:\s+BULK)?(?:\s+SUPER\s*=?\s*(\d+))?\s*")
 
 
 def bulk_text(where: str, path: Path, text: str, included: dict[str, str], files: tuple[Path, ...] = ()) -> str:
@@ -56,15 +58,40 @@ def bulk_text(where: str, path: Path, text: str, included: dict[str, str], files
             out.append(bulk_text(where, other, inner.decode("utf-8", "replace"), included, (*files, path)))
         elif head.startswith("ENDDATA") and not is_first:
             break
-        elif head.startswith("BEGIN") and "SUPER" in head:
-            raise MeshError(f"{where}: {line.strip()}: a deck of several superelements; expected one body")
-        elif head.startswith("BEGIN") and (not is_first or any(_is_begin(each) for each in out)):
-            pass  # a second BEGIN BULK says nothing
+        elif head.split()[:1] == ["BEGIN"]:
+            if is_first or _section(where, line):  # BEGIN BULK of an included file says nothing
+                out.append(line)
         else:
             out.append(line)
         k += 1
     return "\n".join(out)
 
 
-def _is_begin(line: str) -> bool:
-    return any(each.lstrip().upper().startswith("BEGIN") for each in line.splitlines())
+def bulk_parts(where: str, text: str) -> dict[int, str]:
+    """Return the sections of a deck: 0 for the main bulk data, and the number of each superelement -> its text.
+
+    Each text has as many lines as the deck, so that messages name the right line.
+
+    Raises
+    ------
+    MeshError
+        If a section is of another kind.
+    """
+    lines = text.splitlines()
+    begins = [k for k, line in enumerate(lines) if line.split()[:1] and line.split()[0].upper() == "BEGIN"]
+    if len(begins) < 2:
+        return {0: text}
+    made: dict[int, list[str]] = {0: [""] * len(lines)}
+    end = next((k for k, line in enumerate(lines) if line.lstrip()[:7].upper() == "ENDDATA"), len(lines))
+    for first, last in zip(begins, [*begins[1:], end], strict=True):
+        mine = made.setdefault(_section(where, lines[first]), [""] * len(lines))
+        mine[first:last] = lines[first:last] if not any(mine) else ["", *lines[first + 1 : last]]
+    return {number: "\n".join(mine) for number, mine in made.items()}
+
+
+def _section(where: str, line: str) -> int:
+    """Return the superelement that a line BEGIN opens, 0 for the main bulk data."""
+    match = SECTION.fullmatch(line.partition("$")[0])
+    if match is None:
+        raise MeshError(f"{where}: {line.strip()}: expected BEGIN BULK or BEGIN SUPER = n; other sections are not read")
+    return int(match[1] or 0)

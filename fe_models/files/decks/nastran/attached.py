@@ -1,5 +1,7 @@
 """Masses, springs, rigid elements, constraints, supports and loads of Nastran."""
 
+from collections import Counter
+
 import numpy as np
 
 from fe_models.errors import MeshError
@@ -14,7 +16,7 @@ from fe_models.meshes.cell_shapes import CELL_SHAPES
 
 __all__ = ["read_attached"]
 
-SAME = 1e-9  #: part of the largest entry of a 3 x 3 block of a mass matrix, below which entries are equal
+SAME = 1e-9  #: entries of a mass matrix count as equal if they differ by less than this, relative to the largest one
 
 _FACED = {"CTETRA": ("tetra", 4), "CPENTA": ("wedge", 6), "CHEXA": ("hexahedron", 8)}  #: card -> kind, corner grids
 
@@ -78,7 +80,7 @@ def _mass_matrix(model: NastranModel, card: Card) -> None:
 
 
 def _scalar_masses(model: NastranModel) -> None:
-    """CMASS1 and CMASS2 of one grid point: the same mass along all three axes is a point mass; others are refused."""
+    """CMASS1 and CMASS2 of one grid point: equal masses along all three axes are a point mass; others are refused."""
     along: dict[int, list[float]] = {}
     cards: dict[int, list[Card]] = {}
     for card in model.of("CMASS1", "CMASS2"):
@@ -96,11 +98,11 @@ def _scalar_masses(model: NastranModel) -> None:
         along.setdefault(node, [0.0, 0.0, 0.0])[component] += m * model.wtmass
         cards.setdefault(node, []).append(card)
     for node, masses in along.items():
-        if len(set(masses)) > 1:
+        if max(masses) - min(masses) > SAME * max(np.abs(masses)):
             why = f"grid point {node} has another mass along each axis, {masses}: no body frame can move with it"
             model.ledger.refuse("CMASS", why, count=len(cards[node]))
         else:
-            model.masses.append(DeckMass(model.group(cards[node][0], [node]), masses[0]))
+            model.masses.append(DeckMass(model.group(cards[node][0], [node]), float(np.mean(masses))))
 
 
 def _rigid(model: NastranModel, card: Card) -> None:
@@ -223,23 +225,50 @@ def _weights(card: Card, words: list[str]) -> dict[int, Array]:
 def _equations(model: NastranModel) -> None:
     """MPC of the sets that the case control selects; of all sets where there is no case control."""
     chosen = selected_sets(model, "MPC")
+    found = []
     for card in model.of("MPC"):
         if chosen is not None and card.integer(1) not in chosen:
             model.ledger.note("MPC", "of a set that the case control does not select")
+            continue
+        terms = _terms(card)
+        if all(node in model.points.positions and 0 <= c < 6 for node, c, _ in terms):
+            found.append(terms)
         else:
-            _equation(model, card)
+            model.ledger.refuse("MPC", "of scalar points")
+    attached = _attached_points(model) | {node for _, row in model.rows for node, _ in row}
+    uses = Counter(node for terms in found for node in {node for node, _, _ in terms})
+    for terms in found:
+        loose = {
+            node
+            for node, c, a in terms
+            if a and uses[node] == 1 and node not in attached and c not in model.held.get(node, set())
+        }
+        if loose:  # the equation only says how this point moves
+            why = f"only says how a point of no element moves ({min(loose)}): it does not restrict the body"
+            model.ledger.note("MPC", why)
+        else:
+            _add_row(model, terms)
 
 
-def _equation(model: NastranModel, card: Card) -> None:
-    """Add an equation; the components of grid points with axes of their own are turned to basic axes."""
+def _attached_points(model: NastranModel) -> set[int]:
+    """Return the grid points of elements, masses, springs, rigid elements and mean motions."""
+    groups = [link.followers for link in model.rigid]
+    groups += [group for coupling in model.couplings for group, _ in coupling.members]
+    return model.used_points().union(*(model.groups[name] for name in groups))
+
+
+def _terms(card: Card) -> list[tuple[int, int, float]]:
+    """Return grid point, component from 0, and coefficient of the terms of an MPC."""
     terms = []
     for first in range(2, len(card.fields), 8):
         for k in (first, first + 3):
             if card.text(k):
                 terms.append((card.integer(k), card.integer(k + 1, 0) - 1, card.real(k + 2)))
-    if any(node not in model.points.positions or not 0 <= c < 6 for node, c, _ in terms):
-        model.ledger.refuse("MPC", "of scalar points")
-        return
+    return terms
+
+
+def _add_row(model: NastranModel, terms: list[tuple[int, int, float]]) -> None:
+    """Add an equation; the components of grid points with axes of their own are turned to basic axes."""
     row: Row = {}
     for node, c, a in terms:
         for j, part in enumerate(model.axes(node)[:, c % 3].tolist()):
@@ -266,8 +295,13 @@ def _close_equations(model: NastranModel) -> None:
 def _loads(model: NastranModel) -> None:
     """Forces and moments by their set, gravity, pressure on solids; other loads are counted."""
     forces: dict[int, dict[str, Array]] = {}
+    attached = _attached_points(model) | {node for row in model.plain_rows for node, _ in row}
+    attached |= {node for _, row in model.rows for node, _ in row}
     for card in model.of("FORCE", "MOMENT"):
         node = card.integer(2)
+        if node not in attached and node in model.points.positions:
+            model.ledger.note(card.name, f"at a point of no element ({node}): left out of its load case")
+            continue
         direction = np.array([card.real(k, 0.0) for k in (5, 6, 7)])
         vector = card.real(4) * (model.system(card, card.integer(3, 0), model.point(card, node)) @ direction)
         six = forces.setdefault(card.integer(1), {}).setdefault(model.group(card, [node]), np.zeros(6))

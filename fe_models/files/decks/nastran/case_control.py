@@ -61,20 +61,32 @@ def case_control(text: str) -> CaseControl | None:
     return CaseControl(chosen, has_temperature, lines, tuple(parameters))
 
 
-def read_parameters(model: NastranModel, cards: Iterable[Card]) -> None:
-    """Take PARAM, from the case control or the bulk data: WTMASS, COUPMASS; G and others of damping are named.
+def read_parameters(model: NastranModel, above: Iterable[Card]) -> None:
+    """Read PARAM: WTMASS and COUPMASS; G and other damping is named in the ledger.
+
+    Parameters
+    ----------
+    above
+        Those of the case control, which count before those of the bulk data.
 
     Raises
     ------
     MeshError
-        If WTMASS or COUPMASS has two values.
+        If WTMASS or COUPMASS has two values in the bulk data, or in the case control.
     """
     given: dict[str, Card] = {}
-    for card in cards:
-        name = card.text(1).upper()
-        old = given.setdefault(name, card)
-        if name in ("WTMASS", "COUPMASS") and old.text(2) != card.text(2):
-            raise MeshError(f"{card.where}: {name} = {card.text(2)}, but {old.where} says {old.text(2)}; keep one")
+    for cards in (list(above), model.cards.get("PARAM", ())):
+        here: dict[str, Card] = {}
+        for card in cards:
+            name = card.text(1).upper()
+            old = here.setdefault(name, card)
+            if name in ("WTMASS", "COUPMASS") and old.text(2) != card.text(2):
+                raise MeshError(f"{card.where}: {name} = {card.text(2)}, but {old.where} says {old.text(2)}; keep one")
+        for name in ("WTMASS", "COUPMASS"):
+            if name in given and name in here and given[name].text(2) != here[name].text(2):
+                why = f"of the case control counts, not {here[name].text(2)} of the bulk data"
+                model.ledger.note("PARAM", f"{name} = {given[name].text(2)} {why}")
+        given = here | given
     model.wtmass = given["WTMASS"].real(2) if "WTMASS" in given else 1.0
     model.is_lumped = (given["COUPMASS"].text(2) if "COUPMASS" in given else "-1").startswith("-")
     for name in ("G", "GFL", "ALPHA1", "ALPHA2"):

@@ -67,6 +67,7 @@ class NastranModel:
     held: dict[int, set[int]] = field(default_factory=dict)  #: grid point -> components that are held
     plane: int | None = None  #: axis of the basic system across the plane of a planar deck
     grounded: dict[int, set[int]] = field(default_factory=dict)  #: grid point -> components that elements hold
+    shared: set[int] = field(default_factory=set)  #: grid points that belong to other superelements too
     last_point: int = 0  #: number of the last grid point that was made here
     properties: dict[str, dict[int, Card]] = field(default_factory=dict)  #: by kind and number, made when asked for
     ends: dict[tuple[int, int], int] = field(default_factory=dict)  #: element, end 0 or 1 -> a node of its own
@@ -105,7 +106,7 @@ class NastranModel:
                     first, last = 3, 3 + max(ELEMENT_TYPES[name])
                     words = [card.text(k) for k in range(first, last)]
                     found |= {int(word) for word in words if word.isdigit()}
-        found |= set(self.ends.values())
+        found |= set(self.ends.values()) | self.shared
         groups = [mass.nodes for mass in self.masses] + [name for each in self.springs for name in each.nodes]
         groups += [link.node for link in self.rigid] + [coupling.node for coupling in self.couplings]
         return found.union(*(self.groups[name] for name in groups)) & set(self.points.positions)

@@ -13,8 +13,14 @@ AXES_DIGITS = 7  #: to which axes are the same
 JOINING = ("CROD", "CTUBE")  #: further elements whose grid points decide whether a deck is planar
 
 
-def hold_points(model: NastranModel) -> None:
-    """Take SPC, SPC1, PS and GRDSET: grid point -> components that are held; and find the plane of a planar deck."""
+def hold_points(model: NastranModel, *, find_plane: bool = True) -> None:
+    """Take SPC, SPC1, PS and GRDSET: grid point -> components that are held; and find the plane of a planar deck.
+
+    Parameters
+    ----------
+    find_plane
+        False for sections of a deck, of which others may leave the plane.
+    """
     chosen = selected_sets(model, "SPC")
     if chosen == set() and any(name in model.cards for name in ("SPC", "SPC1")):
         model.ledger.note("SPC", "the case control selects none: those of all sets make interfaces")
@@ -34,7 +40,8 @@ def hold_points(model: NastranModel) -> None:
         word = card.text(7) or default
         if word and word != "0":
             model.held.setdefault(card.integer(1), set()).update(components_of(card, word))
-    _find_plane(model)
+    if find_plane:
+        _find_plane(model)
 
 
 def _find_plane(model: NastranModel) -> None:
@@ -132,6 +139,8 @@ def make_supports(model: NastranModel) -> None:
 
 def _groups_of(model: NastranModel, held: dict[int, set[int]], what: str) -> None:
     """Make one support for each set of components, and axes where they matter; each grid point in one."""
+    if not held:
+        return
     card = model.cards["GRID"][0]
     followers = {node for link in model.rigid for node in model.groups[link.followers]}
     followers |= {  # whose job has no interface at the reference point

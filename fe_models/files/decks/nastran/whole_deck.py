@@ -8,15 +8,21 @@ import numpy as np
 from fe_models.errors import MeshError
 from fe_models.files.bulk_data.cards import Card, read_cards
 from fe_models.files.bulk_data.coordinate_systems import read_grid_points
-from fe_models.files.bulk_data.includes import bulk_text
+from fe_models.files.bulk_data.includes import bulk_parts, bulk_text
 from fe_models.files.decks.deck import Deck
 from fe_models.files.decks.ledger import Ledger
 from fe_models.files.decks.nastran.attached import read_attached
 from fe_models.files.decks.nastran.bars import BARS
 from fe_models.files.decks.nastran.card_fields import check_cards
-from fe_models.files.decks.nastran.case_control import case_control, read_parameters
+from fe_models.files.decks.nastran.case_control import CaseControl, case_control, read_parameters
 from fe_models.files.decks.nastran.model import NastranModel
 from fe_models.files.decks.nastran.sections import SHELLS, SOLIDS, read_sections
+from fe_models.files.decks.nastran.superelements import (
+    MAIN_CARDS,
+    connect_superelements,
+    join_superelements,
+    place_superelements,
+)
 from fe_models.files.decks.nastran.supports import hold_points
 from fe_models.files.nastran import ELEMENT_TYPES, nodes_of
 from fe_models.meshes.cells.raw_mesh import RawBlock, RawMesh
@@ -35,23 +41,50 @@ def read_nastran_deck(path: Path, data: bytes) -> Deck:
     where = f"deck {path}"
     included: dict[str, str] = {}
     text = bulk_text(where, path, data.decode("utf-8", "replace"), included)
+    head = case_control(text)
+    ledger = Ledger(where)
+    sections = bulk_parts(where, text)
+    models = {number: _model(where, section, head, ledger) for number, section in sections.items()}
+    if not any(model.points.positions for model in models.values()):
+        raise MeshError(f"{where}: expected grid points (GRID), got none; is this a Nastran bulk data file?")
+    for model in models.values():
+        hold_points(model, find_plane=len(models) == 1)
+    if len(models) == 1:
+        deck = _deck(path, models[0], included)
+    else:
+        placed = place_superelements(models)
+        connected = connect_superelements(models, placed)
+        decks = {
+            number: _deck(path, model, included)
+            for number, model in models.items()
+            if model.points.positions or not number
+        }
+        deck = join_superelements(models, decks, placed, connected)
+    for name in MAIN_CARDS if len(models) == 1 else ():
+        if name in models[0].cards:
+            ledger.refuse(name, "there is no superelement (BEGIN SUPER) that it could name")
+    if head is not None:
+        head.check(ledger)
+    return deck
+
+
+def _model(where: str, text: str, head: CaseControl | None, ledger: Ledger) -> NastranModel:
+    """Return the cards of a section with its grid points and parameters."""
     cards: dict[str, list[Card]] = {}
     for card in read_cards(where, text):
         cards.setdefault(card.name, []).append(card)
-    if "GRID" not in cards:
-        raise MeshError(f"{where}: expected grid points (GRID), got none; is this a Nastran bulk data file?")
     points = read_grid_points([card for found in cards.values() for card in found])
-    head = case_control(text)
-    model = NastranModel(where, cards, points, Ledger(where), None if head is None else head.chosen)
+    model = NastranModel(where, cards, points, ledger, None if head is None else head.chosen)
     model.has_temperature = None if head is None else head.has_temperature
-    parameters = [*([] if head is None else head.parameters), *cards.get("PARAM", ())]
-    read_parameters(model, parameters)
-    hold_points(model)
+    read_parameters(model, () if head is None else head.parameters)
+    return model
+
+
+def _deck(path: Path, model: NastranModel, included: dict[str, str]) -> Deck:
+    """Return the deck of one section."""
     read_sections(model)
     read_attached(model)
     check_cards(model)
-    if head is not None:
-        head.check(model.ledger)
     mesh = replace(_mesh(model), included=included)
     return Deck(
         path, "nastran", mesh, model.ledger, model.materials, tuple(model.solids), tuple(model.shells),

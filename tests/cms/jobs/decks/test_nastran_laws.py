@@ -26,6 +26,7 @@ from tests.cms.jobs.decks.nastran_bodies import (
     axes_of,
     body_of,
     condensed,
+    dofs_of,
     expected_bar,
     tip_flexibility,
 )
@@ -306,8 +307,11 @@ def test_parameters_of_the_case_control_count(tmp_path):
     plain, _ = body_of(tmp_path, text)
     body, _ = body_of(tmp_path, text, head="SOL 103\nCEND\nPARAM,WTMASS,.5\nBEGIN BULK\n")
     assert_allclose(body.M.toarray(), 0.5 * plain.M.toarray(), rtol=1e-12, atol=1e-12)
-    with pytest.raises(ValueError, match=r"WTMASS = 3\., but case control"):
-        body_of(tmp_path, text + "PARAM,WTMASS,3.\n", head="SOL 103\nCEND\nPARAM,WTMASS,.5\nBEGIN BULK\n")
+    both, deck = body_of(tmp_path, text + "PARAM,WTMASS,3.\n", head="SOL 103\nCEND\nPARAM,WTMASS,.5\nBEGIN BULK\n")
+    assert (both.M != body.M).nnz == 0  # the case control comes first
+    assert "WTMASS = .5 of the case control counts, not 3. of the bulk data" in str(deck.ledger.rows())
+    with pytest.raises(ValueError, match=r"WTMASS = 3\., but .* says 2\."):
+        body_of(tmp_path, text + "PARAM,WTMASS,2.\nPARAM,WTMASS,3.\n")
     for line in ("K2GG = STIFF", "NSM = 5"):
         with pytest.raises(ValueError, match="it adds to the body"):
             body_of(tmp_path, text, head=f"SOL 103\nCEND\n{line}\nBEGIN BULK\n")
@@ -390,3 +394,61 @@ def test_supports_make_interfaces_of_the_set_that_is_selected_or_of_all(tmp_path
     _, deck = body_of(tmp_path, text, head=f"SOL 103\nCEND\n{control}\nBEGIN BULK\n")
     held = {int(number) for each in deck.supports for number in deck.mesh.node_numbers[deck.mesh.node_sets[each.nodes]]}
     assert held == names
+
+
+def test_scalar_masses_that_differ_by_rounding_are_a_point_mass(tmp_path):
+    """Three cards along each axis, summed in another order: 0.1 + 0.2 + 0.3 in general is not 0.3 + 0.2 + 0.1."""
+    sums = [(0.1, 0.2, 0.3), (0.3, 0.2, 0.1), (0.2, 0.1, 0.3)]
+    cards = "".join(
+        f"CMASS2,{10 * c + k},{m},2,{c + 1}\n" for c, each in enumerate(sums) for k, m in enumerate(each, 10)
+    )
+    text = GRIDS + f"{ORIENTED}\n" + SECTION + MATERIAL
+    plain, _ = body_of(tmp_path, text)
+    body, _ = body_of(tmp_path, text + cards)
+    added = (body.M - plain.M).toarray()
+    assert_allclose(added[np.ix_(*[dofs_of(body, (GB,))] * 2)], np.diag([0.6] * 3 + [0.0] * 3), atol=1e-12)
+    with pytest.raises(ValueError, match="another mass along each axis"):
+        body_of(tmp_path, text + cards + "CMASS2,99,1.-6,2,1\n")
+
+
+def test_an_equation_that_only_moves_a_point_of_no_element_leaves_the_body_free(tmp_path):
+    """Point 3 belongs to nothing: u_3z = 2 u_2x + u_1y says how it moves, and a force there has no place to act."""
+    text = GRIDS + f"{ORIENTED}\n" + SECTION + MATERIAL + "GRID,3,,4.,5.,6.\nGRID,4,,4.,5.,7.\nPARAM,COUPMASS,1\n"
+    plain, _ = body_of(tmp_path, text)
+    one = "MPC,5,2,1,2.,1,2,1.\n,,3,3,-1.\n"
+    body, deck = body_of(tmp_path, text + one + "FORCE,6,3,,1.,0.,0.,1.\n")
+    assert (body.K != plain.K).nnz == 0
+    assert (body.M != plain.M).nnz == 0
+    notes = str(deck.ledger.rows())
+    assert "only says how a point of no element moves (3)" in notes
+    assert "at a point of no element (3)" in notes
+    for held in (one + "MPC,5,2,2,2.,3,3,1.\n", one + "SPC1,7,3,3\n"):  # another equation of it, or it is held
+        with pytest.raises(ValueError, match=r"node .* has no dof"):
+            body_of(tmp_path, text + held)
+
+
+@pytest.mark.parametrize("normal", [0, 1, 2])
+def test_a_planar_truss_is_a_body_whose_points_turn_rigidly_out_of_the_plane(tmp_path, normal):
+    """Five rods with masses at their ends, held in a plane: natural frequencies by a truss in two dimensions."""
+    plane = np.array([[0.3, 0.1], [2.3, 0.5], [2.0, 1.9], [0.1, 1.5]])
+    across = [axis for axis in range(3) if axis != normal]
+    points = np.full((4, 3), 0.7)
+    points[:, across] = plane
+    rods, masses = [(0, 1), (1, 2), (2, 3), (3, 0), (0, 2)], [2.0, 3.0, 1.5, 4.0]
+    text = "".join(f"GRID,{k},,{','.join(map(str, x))}\n" for k, x in enumerate(points.tolist(), start=1))
+    text += "".join(f"CROD,{k},9,{a + 1},{b + 1}\n" for k, (a, b) in enumerate(rods, start=1))
+    text += "".join(f"CONM2,{k + 20},{k + 1},,{m}\n" for k, m in enumerate(masses))
+    held = "".join(sorted(str(1 + normal) + "".join(str(4 + c) for c in across)))
+    body, deck = body_of(tmp_path, text + f"PROD,9,1,1.-3\nMAT1,1,2.+11,,.3\nSPC1,1,{held},1,THRU,4\n", is_coupled=True)
+    assert deck.plane == normal
+    K, M = np.zeros((8, 8)), np.diag(np.repeat(masses, 2))
+    for a, b in rods:
+        x = plane[b] - plane[a]
+        row = np.zeros(8)
+        row[2 * a : 2 * a + 2], row[2 * b : 2 * b + 2] = -x, x
+        K += 2e11 * 1e-3 / np.linalg.norm(x) ** 3 * np.outer(row, row)
+    expected = np.sort(eigh(K, M, eigvals_only=True))[3:]
+    found = np.sort(eigh(body.K.toarray(), body.M.toarray(), eigvals_only=True))
+    assert len(found) == 8 + 3
+    assert_allclose(found[6:], expected, rtol=1e-9)
+    assert np.abs(found[:6]).max() < 1e-9 * found[-1]
