@@ -171,10 +171,9 @@ def _mirrored(block: RawBlock) -> RawBlock:
 
 def _moved_line(line: LineSection, Q: Array, side: float) -> LineSection:
     """Return a section whose y axis moves with the line; z = x × y changes sides when it is mirrored."""
-    shape = dict(line.shape)
+    shape: dict[str, Any] = dict(line.shape)
     if "shear_center" in shape:
-        y, z = shape["shear_center"]  # type: ignore[misc]
-        shape["shear_center"] = [y, side * z]
+        shape["shear_center"] = [shape["shear_center"][0], side * shape["shear_center"][1]]
     y_axis = None if line.orientation is None else _vector(Q @ np.array(line.orientation))
     return replace(line, orientation=y_axis, shape=shape, offset=(line.offset[0], side * line.offset[1]))
 

@@ -8,6 +8,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -26,6 +27,8 @@ TOLERANCE = 1e-4  #: distance within which points are one where TOL of SEBULK is
 SAME_SHAPE = 1e-4  #: difference of distances of the points of SELOC, relative to the largest
 KINDS = ("PRIMARY", "REPEAT", "MIRROR")
 MAIN_CARDS = ("SEBULK", "SELOC", "SEMPLN", "SECONCT", "SEEXCLD")  #: cards that only the main bulk data may hold
+#: fields of a deck that are those of its parts, one after another
+JOINED = ("solids", "shells", "lines", "masses", "springs", "rigid", "couplings", "equations", "supports", "rods")
 
 Key = tuple[int, int]  #: superelement, grid point
 
@@ -250,23 +253,10 @@ def join_superelements(
             moved = moved_deck(decks[each.source], each.motion, ledger, what)
             parts.append(renamed_deck(moved, f"super_{each.number}_") if each.number else moved)
     numbered = [each for each in placed if each.source in decks]
-    joined = parts[0]
-    for kind in (
-        "solids",
-        "shells",
-        "lines",
-        "masses",
-        "springs",
-        "rigid",
-        "couplings",
-        "equations",
-        "supports",
-        "rods",
-    ):
-        joined = replace(joined, **{kind: tuple(item for part in parts for item in getattr(part, kind))})
+    every: dict[str, Any] = {kind: tuple(item for part in parts for item in getattr(part, kind)) for kind in JOINED}
     materials = {name: material for part in parts for name, material in part.materials.items()}
     mesh = _joined_mesh(parts, numbered, connected)
-    return replace(joined, mesh=mesh, materials=materials, loads=_joined_loads(parts, models[0]))
+    return replace(parts[0], mesh=mesh, materials=materials, loads=_joined_loads(parts, models[0]), **every)
 
 
 def _joined_mesh(parts: list[Deck], placed: list[Superelement], connected: dict[Key, Key]) -> RawMesh:
