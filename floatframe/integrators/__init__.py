@@ -20,6 +20,8 @@ __all__ = [
     "RelativeGeneralizedAlpha",
     "RelativeOde",
     "Variational",
+    "has_fixed_steps",
+    "has_second_order",
     "hht",
     "in_formulation",
     "newmark",
@@ -45,3 +47,13 @@ CLASSES = {
         GeneralizedAlpha, RelativeGeneralizedAlpha, RelativeOde, EnergyMomentum, EnergyDecaying, Variational, Ida,
     )
 }  # fmt: skip
+
+
+def has_second_order(integrator: Integrator) -> bool:
+    """Whether the error of a method falls with the square of its steps."""
+    return not isinstance(integrator, Ida | RelativeOde)
+
+
+def has_fixed_steps(integrator: Integrator) -> bool:
+    """Whether a method takes steps of the size that it is given."""
+    return has_second_order(integrator) and getattr(integrator, "error_tolerance", None) is None

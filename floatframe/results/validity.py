@@ -11,7 +11,8 @@ OF_FRAMES = ("rotation", "load", "speed", "inertia")  #: kinds of notes about th
 #: notes on functions of time that are faster than the steps, or jump within them
 OF_LAWS = ("frequency", "knots", "law")
 OF_ANGLES = ("angles", "tilt")  #: notes on bushings and bearings that rotate beyond the validity of small angles
-KINDS = (*OF_FRAMES, "steps", "energy", *OF_LAWS, *OF_ANGLES)
+OF_ENERGY = ("energy", "damping")  #: kinds of notes about energy that the steps add or remove
+KINDS = (*OF_FRAMES, "steps", *OF_ENERGY, *OF_LAWS, *OF_ANGLES)
 
 
 @dataclass(frozen=True)
@@ -19,12 +20,12 @@ class ValidityNote:
     """A note of a run about its validity: a limit that is exceeded, and the remedy.
 
     There is one note per body and kind for the linear frame of a body ("rotation", "load", "speed" or "inertia", fields
-    of `cms.body.linear_range.Limits`); one for the steps of the run ("steps": their estimated error relative to
-    the motion); and one for its energy ("energy": the energy added by the steps, relative to the energy in motion). The
-    latter two name the body most affected. There is one note for each supply, load, drive or user law that the steps do
-    not resolve ("frequency", "knots" of a table, "law"), and for each bushing and bearing with large angles ("angles",
-    "tilt": the difference between interpretations of the angles). These have their place in the system instead of a
-    body.
+    of `cms.body.linear_range.Limits`); one for the steps of the run ("steps": their estimated error relative to the
+    motion); one for energy that the steps add ("energy") and one for energy that they remove ("damping"), relative to
+    the energy in motion. These name the body most affected. There is one note for each supply, load, drive or user law
+    that the steps do not resolve ("frequency", "knots" of a table, "law"), and for each bushing and bearing with large
+    angles ("angles", "tilt": the difference between interpretations of the angles). These have their place in the
+    system instead of a body.
     """
 
     body: str
@@ -70,6 +71,11 @@ class ValidityNote:
             return (
                 f"{100 * self.largest:.2g} % of the energy in the motion comes from the steps, not from forces (limit "
                 f"{100 * self.limit:g} %)"
+            )
+        if self.kind == "damping":
+            return (
+                f"numerical damping by the steps has removed {100 * self.largest:.2g} % of the energy in the motion "
+                f"(limit {100 * self.limit:g} %)"
             )
         if self.kind == "angles":
             return (

@@ -1,9 +1,21 @@
-"""Watches the energy of a motion row by row: what its steps have added to it.
+"""Energy balance of a run, row by row: the energy that its time steps have added or removed.
 
-Total energy - work + dissipated, less its value at the start, is what the steps have added. The schemes may lose
-energy, never gain it. Work is summed by the trapezoidal rule, which is exact to the change of the power in a step; so
-much of a gain is not held against the steps. Nor is what rounding gives: places are known to `ROUNDING` of their
-distance from the origin, velocities that close joints to that over the step.
+The balance is total energy - work of forces + dissipated energy, less its value at the start.
+
+- Gain: the steps must not add energy. A run reports a gain of `GAIN_LIMIT`. It stops where the energy of the motion,
+  without the sum of the work of dampers, has grown by `STOP_LIMIT`.
+- Loss: numerical damping removes energy, mostly that of vibrations which the steps do not resolve. Companions in other
+  steps damp the same vibrations, so that they cannot see what these would do to the motion. A run reports a loss of
+  `LOSS_LIMIT`.
+
+Not counted in favour of a gain or a loss:
+
+- the change of the power in a step, to which the trapezoidal sums of work are accurate;
+- for gains, the work of dampers where it changes fast from step to step: the velocity in a damper that the steps do not
+  resolve changes its sign from step to step, and the trapezoidal sum is then far above the energy that the scheme
+  takes out;
+- rounding: positions have an error of `ROUNDING` times their distance from the origin, and velocities that close joints
+  an error of this over the step.
 """
 
 from collections.abc import Mapping
@@ -21,9 +33,16 @@ from floatframe.simulation.step_watch import FIRST_VERDICT
 
 __all__ = ["EnergyWatch"]
 
-ENERGY_LIMIT = 0.05  #: gain over the energy that moves about, above which a run tells
-ENERGY_STOP = 0.5  #: and above which it stops
+GAIN_LIMIT = 0.05  #: gain over the energy in motion above which a run reports it
+STOP_LIMIT = 0.5  #: gain above which a run stops
+LOSS_LIMIT = 0.1  #: loss over the energy in motion above which a run reports it
+STEADY = 0.05  #: relative change of the work of dampers between two intervals up to which their velocities are resolved
 WAITING, MOST_WAITING = 8, 400  #: rows wait for others, up to this part of those before and so many
+ADVICE = {
+    "energy": "take a shorter step, the scheme energy-momentum or relative coordinates",
+    "damping": "take a step that resolves the fast vibrations, less numerical damping (rho_inf nearer to 1), or start "
+    "without these vibrations",
+}  #: remedy by the kind of the note
 ROUNDING = 8 * np.finfo(float).eps  #: of a number
 
 
@@ -37,38 +56,42 @@ class EnergyWatch:
     last: Array | None = None  #: energy, work given and taken at the last row, (3,)
     change: Array | None = None  #: of the work in the interval before it, (2,)
     potential: Array | None = None  #: least and largest of gravity
-    gain: float = 0.0  #: what the steps have added
-    unsure: float = 0.0  #: of it, by the sum of the work
+    gain: float = 0.0  #: energy that the steps have added
+    unsure: float = 0.0  #: error of it by the sums of work
+    unresolved: float = 0.0  #: further error by the work of dampers that the steps do not resolve
+    taken: float = 0.0  #: work of dampers
     scale: float = 0.0  #: largest energy that moves about
     noise: float = 0.0  #: of the energy, by rounding
     waiting: list[Rows] = field(default_factory=list)  #: rows that are not judged yet
-    note: ValidityNote | None = None
+    notes: dict[str, ValidityNote] = field(default_factory=dict)  #: by kind
     is_beyond: bool = False  #: whether the run has to stop
 
-    def observe(self, system: System, rows: Rows, *, is_switched: bool, is_last: bool = False) -> ValidityNote | None:
-        """Take rows of results; return a note that is new with them. is_switched: something else acts in them.
+    def observe(
+        self, system: System, rows: Rows, *, is_switched: bool, is_last: bool = False
+    ) -> tuple[ValidityNote, ...]:
+        """Take rows of results; return the notes that are new with them. is_switched: something else acts in them.
 
         The first steps, in which little moves yet, are judged at the end of a run alone (is_last). Rows are judged
         together: a look at a few costs as much as one at many.
         """
-        note = self.flush(system) if is_switched else None
+        notes = self.flush(system) if is_switched else ()
         if len(rows.t):
             self.waiting.append(rows)
         n = sum(len(each.t) for each in self.waiting)
         if n == 0 or (not (is_switched or is_last) and n < min(MOST_WAITING, self.n_seen // WAITING)):
-            return note
+            return notes
         rows, self.waiting = joined_rows(self.waiting), []
-        return self.judge(system, rows, is_switched=is_switched, is_last=is_last) or note
+        return (*notes, *self.judge(system, rows, is_switched=is_switched, is_last=is_last))
 
-    def flush(self, system: System) -> ValidityNote | None:
-        """Judge the rows that wait; return a note that is new with them."""
+    def flush(self, system: System) -> tuple[ValidityNote, ...]:
+        """Judge the rows that wait; return the notes that are new with them."""
         if not self.waiting:
-            return None
+            return ()
         rows, self.waiting = joined_rows(self.waiting), []
         return self.judge(system, rows, is_switched=False, is_last=False)
 
-    def judge(self, system: System, rows: Rows, *, is_switched: bool, is_last: bool) -> ValidityNote | None:
-        """Take rows of results; return a note that is new with them."""
+    def judge(self, system: System, rows: Rows, *, is_switched: bool, is_last: bool) -> tuple[ValidityNote, ...]:
+        """Take rows of results; return the notes that are new with them."""
         d = rows.diagnostics
         energy = d[:, KINETIC] + d[:, STRAIN] + d[:, SPRINGS] + d[:, GRAVITATION]
         now = np.stack([energy, d[:, WORK_GIVEN], d[:, WORK_TAKEN]], axis=1)
@@ -80,44 +103,56 @@ class EnergyWatch:
         self.n_seen += 0 if last is None else len(rows.t)
         if last is None or is_switched:
             self.change = None
-            return None
+            return ()
         steps = np.diff(np.concatenate([last[None], now]), axis=0)
         work = steps[:, 1:]
         change = work[:1] if self.change is None else self.change[None]
-        swing = np.abs(work) if self.every > 1 else np.abs(np.diff(np.concatenate([change, work]), axis=0)) / 2
+        before = np.concatenate([change, work])[:-1]
+        swing = np.abs(work) if self.every > 1 else np.abs(work - before) / 2
         if self.change is None:
             swing[0] = np.abs(work[0])
         self.change = work[-1]
+        taken, taken_before = np.abs(work[:, 1]), np.abs(before[:, 1])
+        taken_so_far = self.taken + np.cumsum(taken)
+        is_steady = np.abs(taken - taken_before) <= STEADY * np.maximum(taken, taken_before)
+        unresolved = self.unresolved + np.cumsum(np.where(is_steady, 0.0, np.maximum(taken - swing[:, 1], 0.0)))
         gains = self.gain + np.cumsum(steps[:, 0] - work[:, 0] + work[:, 1])
         unsure = self.unsure + np.cumsum(swing.sum(axis=1))
         self.gain, self.unsure = float(gains[-1]), float(unsure[-1])
-        share = np.where(scales > 0.0, (gains - unsure - noises) / np.where(scales > 0.0, scales, 1.0), 0.0)
+        self.unresolved, self.taken = float(unresolved[-1]), float(taken_so_far[-1])
         is_judged = number * self.every >= FIRST_VERDICT
         is_judged[-1] = is_judged[-1] or is_last
-        share = np.where(is_judged, share, 0.0)
-        largest = float(share.max())
-        if not largest > ENERGY_LIMIT:
-            return None
+        is_judged &= scales > 0.0
+        share_of = np.where(is_judged, 1.0 / np.where(scales > 0.0, scales, 1.0), 0.0)
+        gained, lost = share_of * (gains - unsure - unresolved - noises), share_of * (-gains - unsure - noises)
+        grown = share_of * (gains - unsure - taken_so_far - noises)
+        self.is_beyond = self.is_beyond or float(grown.max()) > STOP_LIMIT
+        new = (
+            self.noted(system, rows, "energy", gained, GAIN_LIMIT),
+            self.noted(system, rows, "damping", lost, LOSS_LIMIT),
+        )
+        return tuple(note for note in new if note is not None)
+
+    def noted(self, system: System, rows: Rows, kind: str, share: Array, limit: float) -> ValidityNote | None:
+        """Keep the largest share at the times of rows, (n_t,), if it is above a limit; return the note if it is new."""
         k = int(np.argmax(share))
-        self.is_beyond = self.is_beyond or largest > ENERGY_STOP
-        if self.note is not None:
-            self.note = self.note.with_value(largest, float(rows.t[k]))
+        largest, t = float(share[k]), float(rows.t[k])
+        if not largest > limit:
             return None
-        first = float(rows.t[int(np.argmax(share > ENERGY_LIMIT))])
-        compiled = compiled_system(system)
-        body = compiled.body_names[int(np.argmax(kinetic_energies(system, rows.u[k])))]
-        self.note = ValidityNote(
-            body, "energy", ENERGY_LIMIT, largest, first, float(rows.t[k]), advice=
-            "take a shorter step, the scheme energy-momentum or relative coordinates",
-        )  # fmt: skip
-        return self.note
+        if kind in self.notes:
+            self.notes[kind] = self.notes[kind].with_value(largest, t)
+            return None
+        first = float(rows.t[int(np.argmax(share > limit))])
+        body = compiled_system(system).body_names[int(np.argmax(kinetic_energies(system, rows.u[k])))]
+        self.notes[kind] = ValidityNote(body, kind, limit, largest, first, t, advice=ADVICE[kind])
+        return self.notes[kind]
 
     def record(self) -> dict[str, Array]:
         """Return what is needed to go on, by name; no rows may wait."""
         if self.last is None or self.potential is None:
             return {}
         change = np.full(2, np.nan) if self.change is None else self.change
-        sums = np.array([self.gain, self.unsure, self.scale, self.noise])
+        sums = np.array([self.gain, self.unsure, self.unresolved, self.taken, self.scale, self.noise])
         return {"energy_sums": np.concatenate([sums, self.last, change, self.potential])}
 
     def restore(self, record: Mapping[str, Array], notes: tuple[ValidityNote, ...]) -> None:
@@ -125,11 +160,12 @@ class EnergyWatch:
         if "energy_sums" not in record:
             return
         numbers = np.array(record["energy_sums"], dtype=float)
-        self.gain, self.unsure, self.scale, self.noise = (float(x) for x in numbers[:4])
+        sums = (float(x) for x in numbers[:6])
+        self.gain, self.unsure, self.unresolved, self.taken, self.scale, self.noise = sums
         self.n_seen = FIRST_VERDICT  # a restart comes later
-        self.last, change, self.potential = numbers[4:7], numbers[7:9], numbers[9:11]
+        self.last, change, self.potential = numbers[6:9], numbers[9:11], numbers[11:13]
         self.change = None if np.isnan(change).any() else change
-        self.note = next((note for note in notes if note.kind == "energy"), None)
+        self.notes = {note.kind: note for note in notes if note.kind in ADVICE}
 
     def measured(self, d: Array) -> Array:
         """Return the largest energy that has moved about at the times of rows, (n_t,)."""

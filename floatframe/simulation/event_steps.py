@@ -7,6 +7,7 @@ nothing is taken twice, and a motion that events only record goes on as if there
 
 import json
 from collections.abc import Callable, Mapping
+from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -132,6 +133,14 @@ class EventWatch:
         is_own = [isinstance(each, StopEvent | SwitchEvent) for each in self.events]
         each_event = zip(self.events, is_own, strict=True)
         self.direct = [None if own else direct_values(self.full, each) for each, own in each_event]
+
+    def copied(self) -> "EventWatch":
+        """Return a watch of the same motion that goes on in other steps; both share the systems to switch to."""
+        other = copy(self)
+        other.caught, other.resting, other.signs = dict(self.caught), dict(self.resting), dict(self.signs)
+        other.values, other.happened, other.recorded = self.values.copy(), list(self.happened), []
+        other.trial, other.due, other.calm, other.changed = None, -1, BLOCK, 0  # numbers of other steps
+        return other
 
     def switch(self, off: frozenset[str]) -> None:
         """Take these forces and couplers off, all others on, with what couplers have caught and stops hold."""

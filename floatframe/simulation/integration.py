@@ -23,7 +23,7 @@ from floatframe.engine.initial_conditions.mass_positivity import indefinite_mass
 from floatframe.engine.kernels.memory import Rows
 from floatframe.engine.kernels.work import new_work
 from floatframe.errors import ConvergenceError, ModelError, ResultsError
-from floatframe.integrators import CLASSES, in_formulation
+from floatframe.integrators import CLASSES, has_fixed_steps, has_second_order, in_formulation
 from floatframe.integrators.carry import Carry, Failure, Integrator, joined_rows
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.checked_values import number
@@ -40,12 +40,12 @@ from floatframe.results.writer import ResultsPlace, ResultsWriter, arrays_of, la
 from floatframe.simulation.energy_watch import EnergyWatch
 from floatframe.simulation.event_steps import EventWatch
 from floatframe.simulation.events import has_events, require_times_of_events
-from floatframe.simulation.jumps import jumps_of_steps, over_jumps
+from floatframe.simulation.jumps import jumps_of_steps, next_steps
 from floatframe.simulation.knots import knot_words
 from floatframe.simulation.law_watch import LawWatch
 from floatframe.simulation.restart import RESTART_STEPS, carry_of_record, restart_record, system_digest
 from floatframe.simulation.step_advice import frequency_words, step_advice
-from floatframe.simulation.step_watch import WATCHES, StepWatch, has_second_order, has_steps_of_one_size
+from floatframe.simulation.step_watch import WATCHES, StepWatch
 from floatframe.simulation.validity_watch import ValidityWatch
 
 __all__ = ["Progress", "integrate", "resume"]
@@ -156,7 +156,7 @@ def integrate(
     advice = step_advice(system, step)
     if advice is not None and advice.n_followed == 0:
         log.warning("system %r: %s", system.name, advice.words)
-    is_fixed = has_steps_of_one_size(integrator)
+    is_fixed = has_fixed_steps(integrator)
     frequencies = frequency_words(system, t_start, step, n_total, has_steps_of_one_size=is_fixed)
     acting = [ValidityNote.of_law("knots", words, t_start) for words in knot_words(system, t_start, step, n_total)]
     acting += [ValidityNote.of_law("frequency", words, t_start) for words in frequencies]
@@ -300,7 +300,7 @@ class Run:
 
     def record(self, carry: Carry, n_done: int) -> dict[str, np.ndarray]:
         """Return what is needed to go on from here."""
-        self.tell(self.energy.flush(self.system))
+        self.report(*self.energy.flush(self.system))
         events = {} if self.events is None else self.events.record()
         watches = self.steps.record() | self.energy.record()
         return restart_record(carry, n_done) | {"seconds": np.array(self.seconds)} | events | watches
@@ -328,13 +328,6 @@ class Run:
         self.closed = self.looked = time.monotonic()  # when the last segment was, and rows were looked at
         self.waiting: list[Rows] = []
 
-    def wanted(self, rows: Rows, n_done: int, n_good: int, has_stopped: bool) -> Rows:
-        """Return of the results after each of n_good steps those at output times, and those at a stop."""
-        is_due = (n_done + 1 + np.arange(n_good)) % self.output_every == 0
-        if has_stopped:
-            is_due[-1:] = True
-        return Rows(*(array[:n_good][is_due] for array in rows))
-
     def keep(self, rows: Rows) -> None:
         """Take rows of results, which wait for others: a look at a few costs as much as one at a thousand."""
         if len(rows.t):
@@ -359,12 +352,12 @@ class Run:
             self.writer.validity = notes_to_json(self.watch.notes)
             self.writer.append(told)
 
-    def tell(self, note: ValidityNote | None) -> None:
-        """Keep what the watches of steps and energy have found; log a note that is new."""
-        for found in (self.steps.note, self.energy.note):
-            if found is not None:
-                self.watch.found[found.key] = found
-        if note is not None:
+    def report(self, *new: ValidityNote | None) -> None:
+        """Keep the notes of the watches of steps and energy; log those that are new."""
+        found = [] if self.steps.note is None else [self.steps.note]
+        for each in (*found, *self.energy.notes.values()):
+            self.watch.found[each.key] = each
+        for note in (each for each in new if each is not None):
             log.warning("system %r: %s", self.system.name, note.words)
 
     def close_segment(self, record: dict[str, np.ndarray] | None = None) -> None:
@@ -389,7 +382,7 @@ class Run:
         _, row = self.integrator.observe(begun, t_begun, carry, work)  # the iterate to begin from
         if self.events is not None:
             self.events.begin(row)
-        jumps = jumps_of_steps(self.system, self.t_start, self.h, self.n_total)
+        jumps = self.steps.jumps = jumps_of_steps(self.system, self.t_start, self.h, self.n_total)
         laws = LawWatch(self.system, self.t_start, self.h, jumps, n_done)
         failure, has_stopped, is_beyond, n_told = None, False, False, n_done
         safe = self.record_where_due(carry, n_done)  # while a block runs its events are ahead of its memory
@@ -404,41 +397,27 @@ class Run:
                 n_batch = min(n_left, self.steps.room(n_done, batch_steps), self.n_total - n_done)
                 n_batch = min(n_batch, RESTART_STEPS - n_done % RESTART_STEPS)
                 begin, n_happened = carry, self.n_happened
-                n_smooth = min((k - n_done for k in jumps if k >= n_done), default=n_batch)
-                if n_smooth == 0:
-                    carry, rows, work, failure = over_jumps(
-                        self.integrator, self.acting, carry, work, t=self.t_start + n_done * self.h, h=self.h,
-                        jumps=jumps[n_done], events=self.events,
-                    )  # fmt: skip
-                    n_good = int(failure is None)
-                elif self.events is None:
-                    carry, rows, n_good, failure = self.integrator.advance(
-                        self.system, carry, work, t0=self.t_start, h=self.h, first=n_done,
-                        n_steps=min(n_batch, n_smooth), every=self.output_every,
-                    )  # fmt: skip
-                else:
-                    carry, rows, work, n_good, failure = self.events.steps(
-                        self.integrator, carry, work, t0=self.t_start, h=self.h, first=n_done,
-                        n_steps=min(n_batch, n_smooth), every=self.output_every,
-                    )  # fmt: skip
+                begins = self.events is not None and self.steps.has_companion and self.steps.companion is None
+                events_before = self.events.copied() if begins else None
+                carry, rows, work, n_good, failure = next_steps(
+                    self.integrator, self.acting, carry, work, t0=self.t_start, h=self.h, first=n_done, n_steps=n_batch,
+                    every=self.output_every, jumps=jumps, events=self.events,
+                )  # fmt: skip
                 if self.events is not None:
                     has_stopped = self.events.has_stopped
-                if n_smooth == 0:
-                    rows = self.wanted(rows, n_done, n_good, has_stopped)
-                if self.events is not None:
                     rows = in_order([*self.events.taken(), rows])
                 self.keep(rows)
                 is_switched = self.n_happened > n_happened
                 if self.watching != "off":
                     is_last = n_done + n_good >= self.n_total or failure is not None or has_stopped
-                    note = self.energy.observe(self.system, rows, is_switched=is_switched, is_last=is_last)
-                    self.tell(note)
+                    self.report(*self.energy.observe(self.system, rows, is_switched=is_switched, is_last=is_last))
                     is_beyond = self.energy.is_beyond and self.watching == "stop"
-                if n_smooth and n_good and failure is None and not is_switched:
+                if n_good and failure is None and not has_stopped:
                     note = self.steps.take(
-                        self.acting, begin, carry, t0=self.t_start, h=self.h, first=n_done, n_steps=n_good
-                    )
-                    self.tell(note)
+                        self.acting, begin, carry, t0=self.t_start, h=self.h, first=n_done, n_steps=n_good,
+                        events=events_before, is_cut=is_switched or n_done in jumps,
+                    )  # fmt: skip
+                    self.report(note)
                 else:
                     self.steps.interrupt(self.h)
                 n_done += n_good
@@ -449,7 +428,8 @@ class Run:
                         log.warning("system %r: %s", self.system.name, words)
                 safe = self.record_where_due(carry, n_done)
                 if n_done == self.n_total or failure is not None or has_stopped or is_beyond:
-                    self.tell(self.steps.conclude(self.acting, carry, n_done, self.t_start, self.h))
+                    note = self.steps.conclude(self.acting, carry, n_done, self.t_start, self.h)
+                    self.report(note)
                     self.look()
                 is_batch = n_done % RESTART_STEPS == 0 or n_done - n_told >= batch_steps or n_done == self.n_total
                 if is_batch or not n_good or self.events is not None:
@@ -464,7 +444,6 @@ class Run:
         for each in (self.system, self.acting):
             raise_errors_of(compiled_system(each).callbacks)
         if is_beyond and failure is None:
-            assert self.energy.note is not None
             raise energetic(self, self.t_start + n_done * self.h)
         if failure is not None:
             begins = self.words_of_start() if n_done < FIRST_STEPS else ""
@@ -523,9 +502,9 @@ def stopped(run: Run, failure: Failure, t: float, state: State) -> ConvergenceEr
 
 def energetic(run: Run, t: float) -> ConvergenceError:
     """Return the error of a run that ends because its energy comes from its steps, with the motion so far."""
-    assert run.energy.note is not None
     words = (
-        f"system {run.system.name!r}: stopped at t = {t:.9g} with steps of {run.h:g}: {run.energy.note.words}; "
+        f"system {run.system.name!r}: stopped at t = {t:.9g} with steps of {run.h:g}: "
+        f"{run.energy.notes['energy'].words}; "
         'watch = "tell" goes on in spite of it'
     )
     trajectory, where = motion_so_far(run)

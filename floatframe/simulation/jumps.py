@@ -14,13 +14,13 @@ from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.compiling.time_laws import functions_of_time, parts_of_time
 from floatframe.engine.kernels.memory import Rows
 from floatframe.engine.kernels.work import Work
+from floatframe.integrators import has_fixed_steps
 from floatframe.integrators.carry import Carry, Failure, Integrator
 from floatframe.model.functions.time_switches import switch_times
 from floatframe.model.system import System
 from floatframe.simulation.event_steps import EventWatch
-from floatframe.simulation.step_watch import has_steps_of_one_size
 
-__all__ = ["jump_times", "jumps_of_steps", "over_jumps"]
+__all__ = ["jump_times", "jumps_by_step", "jumps_of_steps", "next_steps"]
 
 PER_STEP = 4  #: places in a step between which expressions of t are compared
 MOST_PLACES = 1_000_000  #: in a run
@@ -50,12 +50,53 @@ def jump_times(system: System, t_start: float, h: float, n_steps: int) -> list[f
 
 def jumps_of_steps(system: System, t_start: float, h: float, n_steps: int) -> dict[int, list[float]]:
     """Return the times of jumps in each step k, from t_start + k h (not there) to t_start + (k + 1) h (there too)."""
+    jumps = jumps_by_step(jump_times(system, t_start, h, n_steps), t_start, h)
+    return {k: times for k, times in jumps.items() if k < n_steps}
+
+
+def jumps_by_step(times: list[float], t0: float, h: float) -> dict[int, list[float]]:
+    """Return the times of jumps after t0 by the step k in which each lies, from t0 + k h to t0 + (k + 1) h."""
     found: dict[int, list[float]] = {}
-    for t in jump_times(system, t_start, h, n_steps):
-        k = max(ceil((t - t_start) / h - SHORT) - 1, 0)  # next to the start: the motion begins anew at once
-        if k < n_steps:
-            found.setdefault(k, []).append(t)
+    for t in times:
+        k = max(ceil((t - t0) / h - SHORT) - 1, 0)  # next to t0: the motion begins anew at once
+        found.setdefault(k, []).append(t)
     return found
+
+
+def next_steps(
+    integrator: Integrator,
+    system: System,
+    carry: Carry,
+    work: Work,
+    *,
+    t0: float,
+    h: float,
+    first: int,
+    n_steps: int,
+    every: int,
+    jumps: dict[int, list[float]],
+    events: EventWatch | None = None,
+) -> tuple[Carry, Rows, Work, int, Failure | None]:
+    """Take steps of size h, the first of them number `first` from t0: the one with the next jumps, or those before it.
+
+    Return the memory after them, the results after every `every`-th (and at a stop), how many steps are done, at most
+    n_steps, and why the next one failed, if it did. jumps: times by step. system: as events have switched it.
+    """
+    n_smooth = min((k - first for k in jumps if k >= first), default=n_steps)
+    if n_smooth == 0:
+        carry, rows, work, failure = over_jumps(
+            integrator, system, carry, work, t=t0 + first * h, h=h, jumps=jumps[first], events=events
+        )
+        n_good = int(failure is None)
+        has_row = n_good and ((first + 1) % every == 0 or (events is not None and events.has_stopped))
+        return carry, Rows(*(array[: 1 if has_row else 0] for array in rows)), work, n_good, failure
+    n_steps = min(n_steps, n_smooth)
+    if events is not None:
+        return events.steps(integrator, carry, work, t0=t0, h=h, first=first, n_steps=n_steps, every=every)
+    carry, rows, n_good, failure = integrator.advance(
+        system, carry, work, t0=t0, h=h, first=first, n_steps=n_steps, every=every
+    )
+    return carry, rows, work, n_good, failure
 
 
 def over_jumps(
@@ -109,7 +150,7 @@ def n_settling_parts(integrator: Integrator, system: System, carry: Carry, work:
     A step is tried: a state whose rate at its beginning would lead much further than the step does settles in less.
     """
     rows = compiled_system(system).model.states.row
-    if not len(rows) or not has_steps_of_one_size(integrator):
+    if not len(rows) or not has_fixed_steps(integrator):
         return 0
     after, _, n_good, _ = integrator.advance(system, carry, work, t0=t, h=size, first=0, n_steps=1, every=2)
     if not n_good:

@@ -7,16 +7,17 @@ For methods of second order, with steps of one size and with steps that an error
     along the motion included
 (2) where that is above the limit, or the long steps fail, a companion in halves of the steps takes all of them again,
     and goes on instead: it differs by 3/4 of the error, and alone decides what is told
-(3) the companion goes along for `BESIDE` steps. In a run of more than `LONG` it begins after the first of them, without
-    a start of its own, and ends where the error, drawn out to the end of the run by its square, is far below the limit
+(3) the companion goes along for `BESIDE` steps, over jumps of forces and with events of its own. In a run of more than
+    `LONG` it begins after the first of them, without a start of its own, and ends where the error, drawn out to the end
+    of the run by its square, is far below the limit
 (4) afterwards windows of `WINDOW` steps, farther and farther apart, are taken again in halves from the same memory, and
     the errors of the steps are summed; between two windows a step has the mean of theirs
 (5) errors of place are measured by the farthest way of a body from its start, rotations likewise, or by the way over
     the length of the system where that is more. In windows those of speed count as well, by twice the largest speed
     (a vibration goes two amplitudes away); both make one number, sqrt(a² + b²), as they turn into one another
 
-A companion begins anew where forces jump, events switch and a run can be resumed; the errors before it are added. What
-errors become that windows sum is not known: a motion may forget them (damping) or magnify them (chaos).
+A companion begins anew where a run can be resumed; the errors before it are added. What errors become that windows sum
+is not known: a motion may forget them (damping) or magnify them (chaos).
 """
 
 from collections.abc import Mapping
@@ -28,18 +29,19 @@ from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.kernels.work import Work, new_work
 from floatframe.errors import FloatframeError, ResultsError
+from floatframe.integrators import has_fixed_steps
 from floatframe.integrators.carry import Carry, Integrator, has_divided_steps
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha
-from floatframe.integrators.ida import Ida
 from floatframe.integrators.relative import RelativeGeneralizedAlpha
-from floatframe.integrators.relative_ode import RelativeOde
 from floatframe.model.rotations import rotations_between
 from floatframe.model.state import State
 from floatframe.model.system import System
 from floatframe.results.validity import ValidityNote
+from floatframe.simulation.event_steps import EventWatch
+from floatframe.simulation.jumps import jumps_by_step, next_steps
 from floatframe.simulation.restart import RESTART_STEPS
 
-__all__ = ["FIRST_VERDICT", "WATCHES", "StepWatch", "has_second_order", "has_steps_of_one_size"]
+__all__ = ["FIRST_VERDICT", "WATCHES", "StepWatch"]
 
 #: what is done with what is found: end a run half of whose energy comes from its steps; tell alone; do not look for it
 WATCHES = ("stop", "tell", "off")
@@ -74,31 +76,55 @@ class Companion:
     ratio: float  #: size of its steps over that of the run
     at: int  #: step after which it is
     carry: Carry  #: its memory there
+    work: Work  #: its working arrays
     apart: Array  #: error of the run there, (n_b, 2, 3)
     before: int  #: the comparison before: step
     apart_before: Array  #: and error
     peak: Array  #: largest error, of place and rotation, (n_b, 2)
+    events: EventWatch | None  #: its events
+    events_at_begin: EventWatch | None  #: those of the run at its beginning
 
     @classmethod
-    def begun(cls, integrator: Integrator, carry: Carry, start: int, ratio: float, h: float = 0.0) -> "Companion":
-        """Begin from a memory after step `start`; h: of fixed steps, which become longer as divided ones do."""
+    def begun(
+        cls, integrator: Integrator, carry: Carry, work: Work, start: int, ratio: float, h: float = 0.0,
+        events: EventWatch | None = None,
+    ) -> "Companion":  # fmt: skip
+        """Begin from a memory after step `start`; h: of fixed steps, which become longer as divided ones do.
+
+        events: of the run at that step; the companion takes working arrays for its own.
+        """
         none = np.zeros((len(carry.state.r), 2, 3))
         method, begin = integrator_of(integrator, ratio), carry
         if h and carry.h and isinstance(method, GeneralizedAlpha | RelativeGeneralizedAlpha) and method.h_min is None:
             method, begin = replace(method, h_min=h), replace(carry, h_next=ratio * h)  # no start of its own
-        return cls(method, carry, start, ratio, start, begin, none, start, none, lengths(none))
+        own = None if events is None else events.copied()
+        if own is not None:
+            work = own.new_work()
+        work.solver.c_k[...] = 0.0  # without the factors of other steps, which a resumed run would not have
+        peak = lengths(none)
+        return cls(method, carry, start, ratio, start, begin, work, none, start, none, peak, own, events)
 
-    def follow(self, system: System, work: Work, end: Carry, last: int, t0: float, h: float) -> bool:
-        """Go on to the step after which the run has memory `end`; return whether its steps succeed."""
-        size, done = self.ratio * h, round((self.at - self.start) / self.ratio)
-        n = round((last - self.at) / self.ratio)
+    def follow(
+        self, system: System, end: Carry, last: int, t0: float, h: float, jumps: Mapping[int, list[float]]
+    ) -> bool:
+        """Go on to the step after which the run has memory `end`; return whether its steps succeed.
+
+        jumps: times at which forces jump, by the step of the run.
+        """
+        begin, size = t0 + self.start * h, self.ratio * h
+        done, until = round((self.at - self.start) / self.ratio), round((last - self.start) / self.ratio)
+        ahead = [t for k, times in jumps.items() if self.at <= k < last for t in times]
+        carry, own_jumps = self.carry, jumps_by_step(ahead, begin, size)
         try:
-            carry, _, _, failure = self.integrator.advance(
-                system, self.carry, work, t0=t0 + self.start * h, h=size, first=done, n_steps=n, every=done + n + 1
-            )
+            while done < until:
+                carry, _, self.work, n_good, failure = next_steps(
+                    self.integrator, system if self.events is None else self.events.system, carry, self.work, t0=begin,
+                    h=size, first=done, n_steps=until - done, every=until + 1, jumps=own_jumps, events=self.events,
+                )  # fmt: skip
+                done += n_good
+                if failure is not None or (self.events is not None and self.events.has_stopped):
+                    return False
         except FloatframeError:
-            return False
-        if failure is not None:
             return False
         self.carry, self.before, self.apart_before, self.at = carry, self.at, self.apart, last
         self.apart = SHARE_OF_ERROR[self.ratio] * difference(end.state, carry.state)
@@ -133,6 +159,7 @@ class StepWatch:
     note: ValidityNote | None = None
     opened: list[tuple[int, Carry]] = field(default_factory=list)  #: begin and middle of a window: step, memory
     again: tuple[System, Work] | None = None  #: working arrays of companions and windows
+    jumps: Mapping[int, list[float]] = field(default_factory=dict)  #: times at which forces jump, by the step
 
     def begin(self, state: State) -> None:
         """Begin from the state at the start of a run."""
@@ -164,24 +191,39 @@ class StepWatch:
         """Return how many steps may be taken at once after n_done: to a comparison, half a window, or the next one."""
         if self.has_companion:
             gone = 0 if self.companion is None else n_done - self.companion.start
-            if gone % 2:
+            if not self.is_comparable(n_done):
                 return 1
             if self.is_long:
-                return min(max(FIRST_CHECK, gone), FEW_CHECKS)
-            return max(FIRST_CHECK, gone // CHECKS // 2 * 2)
+                n = min(max(FIRST_CHECK, gone), FEW_CHECKS)
+            else:
+                n = max(FIRST_CHECK, gone // CHECKS // 2 * 2)
+            n_left = self.n_total - n_done
+            return n if n < n_left or self.is_comparable(self.n_total) else max(1, n_left // 2 * 2)
         if self.is_window(n_done):
             return WINDOW // 2
         return min(most, self.next - n_done) if self.is_on and n_done < self.next else most
 
+    def is_comparable(self, n_done: int) -> bool:
+        """Whether the companion has a step that ends where step n_done of the run does."""
+        return self.companion is None or self.companion.ratio == HALVES or (n_done - self.companion.start) % 2 == 0
+
     def take(
-        self, system: System, begin: Carry, end: Carry, *, t0: float, h: float, first: int, n_steps: int
-    ) -> ValidityNote | None:
-        """Take steps that led from one memory to another; return a note that is new with them."""
+        self, system: System, begin: Carry, end: Carry, *, t0: float, h: float, first: int, n_steps: int,
+        events: EventWatch | None = None, is_cut: bool = False,
+    ) -> ValidityNote | None:  # fmt: skip
+        """Take steps that led from one memory to another; return a note that is new with them.
+
+        events: as they were before these steps, where a companion begins with them. is_cut: forces jump or events
+        switch in the steps.
+        """
         last = first + n_steps
         if self.has_companion:
-            if self.is_long and begin.h == 0.0:
+            if self.companion is None and self.is_long and begin.h == 0.0:
                 return None
-            return self.accompany(system, begin, end, t0, h, first, last)
+            return self.accompany(system, begin, end, t0, h, first, last, events)
+        if is_cut:
+            self.opened = []
+            return None
         if not self.is_window(first):
             return None
         if not self.opened:
@@ -190,30 +232,29 @@ class StepWatch:
         return self.closed(system, end, last, t0, h)
 
     def interrupt(self, h: float) -> None:
-        """Leave the steps out that come next: forces jump in them, or events switch."""
+        """Leave the steps out that come next: they fail, or a stop ends the run within one."""
         self.opened = []
         self.leave(h)
 
     def accompany(
-        self, system: System, begin: Carry, end: Carry, t0: float, h: float, first: int, last: int
-    ) -> ValidityNote | None:
+        self, system: System, begin: Carry, end: Carry, t0: float, h: float, first: int, last: int,
+        events: EventWatch | None,
+    ) -> ValidityNote | None:  # fmt: skip
         """Compare the memory after step `last` with that of the companion; return a note that is new with it."""
-        work = self.working(system)
         if self.companion is None:
             self.catch_up(first, self.rate)
-            work.solver.c_k[...] = 0.0
-            is_fixed = not has_divided_steps(compiled_system(system).model) and has_steps_of_one_size(self.integrator)
-            self.companion = Companion.begun(self.integrator, begin, first, DOUBLES, h if is_fixed else 0.0)
+            is_fixed = not has_divided_steps(compiled_system(system).model) and has_fixed_steps(self.integrator)
+            self.companion = Companion.begun(
+                self.integrator, begin, self.working(system), first, DOUBLES, h if is_fixed else 0.0, events
+            )
         other = self.companion
-        if (last - other.start) % 2 == 0:
+        if self.is_comparable(last):
             self.measure(begin.state, end.state, h * (last - first))
             self.turn = np.maximum(self.turn, turns_in_a_step(system, end.state, h))
-            is_good = other.follow(system, work, end, last, t0, h)
+            is_good = other.follow(system, end, last, t0, h, self.jumps)
             if other.ratio == DOUBLES and not (is_good and self.share(system, other).max() < SCREEN * self.limit):
-                other = Companion.begun(self.integrator, other.begin, other.start, HALVES)
-                work.solver.c_k[...] = 0.0
-                is_good = other.follow(system, work, end, last, t0, h)
-                self.companion = other
+                other = self.companion = self.in_halves(system, other)
+                is_good = other.follow(system, end, last, t0, h, self.jumps)
             if not is_good:
                 self.companion, self.is_calm, self.next = None, True, last
                 return None
@@ -227,6 +268,12 @@ class StepWatch:
             self.is_calm, self.gap = True, max(last, WINDOW)
             self.next = last + self.gap
         return note
+
+    def in_halves(self, system: System, other: Companion) -> Companion:
+        """Return a companion in halves of the steps from where another one began."""
+        return Companion.begun(
+            self.integrator, other.begin, self.working(system), other.start, HALVES, events=other.events_at_begin
+        )
 
     def leave(self, h: float) -> None:
         """Sum the error that the companion has found, and go on without it."""
@@ -256,11 +303,9 @@ class StepWatch:
         self.opened = []
         self.gap = min(2 * self.gap + WINDOW, FARTHEST)
         self.next = last + self.gap
-        work = self.working(system)
-        work.solver.c_k[...] = 0.0  # factors of another window, which would not be the same after a resumption
-        other = Companion.begun(self.integrator, before, start, HALVES)
+        other = Companion.begun(self.integrator, before, self.working(system), start, HALVES)
         for number, coarse in ((middle, half), (last, end)):
-            if number > other.at and not other.follow(system, work, coarse, number, t0, h):
+            if number > other.at and not other.follow(system, coarse, number, t0, h, {}):
                 return None
         size = np.stack([lengths(other.apart), other.speeds(h)], axis=2)
         rate = size / (last - start)
@@ -289,8 +334,8 @@ class StepWatch:
                 return note
         other = self.companion
         if other is not None and other.at == other.start and n_done > other.start:  # a run of one step, or of three
-            other = Companion.begun(self.integrator, other.begin, other.start, HALVES)
-            if other.follow(system, self.working(system), end, n_done, t0, h):
+            other = self.in_halves(system, other)
+            if other.follow(system, end, n_done, t0, h, self.jumps):
                 self.measure(other.begin.state, end.state, h * (n_done - other.start))
                 self.companion = other
         self.leave(h)
@@ -377,16 +422,6 @@ def integrator_of(integrator: Integrator, ratio: float) -> Integrator:
     if tolerance is None:
         return integrator
     return replace(integrator, error_tolerance=tolerance * ratio**3)  # type: ignore[type-var]
-
-
-def has_second_order(integrator: Integrator) -> bool:
-    """Whether the error of a method falls with the square of its steps."""
-    return not isinstance(integrator, Ida | RelativeOde)
-
-
-def has_steps_of_one_size(integrator: Integrator) -> bool:
-    """Whether a method takes steps of the size that it is given."""
-    return has_second_order(integrator) and getattr(integrator, "error_tolerance", None) is None
 
 
 def lengths(vectors: Array) -> Array:

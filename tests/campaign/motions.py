@@ -90,7 +90,7 @@ def run(case: MotionCase, finer_by: int, watch: str = "stop") -> tuple[Samples, 
         )  # fmt: skip
         state = part.state(-1)
         parts.append(part)
-        notes = (*notes, *(note for note in part.validity if note.kind in ("steps", "energy")))
+        notes = (*notes, *(note for note in part.validity if note.kind in ("steps", "energy", "damping")))
     return Samples(parts, every), notes
 
 
