@@ -61,6 +61,7 @@ def eliminate_dofs(body: FEBody, slaves: IntArray, T_s: sp.sparray) -> FEBody:
         ),
         recovery=Recovery(sp.csr_array(before.matrix @ T), before.dofs),
         load_cases=tuple(replace(case, f=T.T @ case.f) for case in body.load_cases),
+        ties=tuple(tie.changed(T, new_index) for tie in body.ties),
     )
 
 

@@ -217,6 +217,29 @@ class Recovery:
 
 
 @dataclass(frozen=True, eq=False)
+class Tie:
+    """A distributing interface that a weld has put inside a body: multipliers hold C u = S (motion - mean) u at zero.
+
+    The mean motion of the members is not linear in large rotations. Only the geometric stiffness needs this record; M
+    and K have the linear tie.
+    """
+
+    interface: Interface  #: the interface; its `dofs` are None
+    motion: sp.csr_array  #: motion of its reference node as rows over the dofs, (6, n_dof)
+    multipliers: IntArray  #: dofs of the multipliers, (n,); n is 6, or less where some have been eliminated
+    S: Array  #: scale of the rows of the multipliers, (n, 6)
+    #: the interface whose members the reference node follows rigidly; None: it follows nodes of the body
+    leader: Interface | None = None
+
+    def changed(self, T: sp.sparray, new_index: IntArray) -> "Tie":
+        """Return the tie after a substitution u = T u_new, (n_dof, n_new); new_index is -1 for dofs that leave."""
+        stays = new_index[self.multipliers] >= 0
+        return replace(
+            self, motion=sp.csr_array(self.motion @ T), multipliers=new_index[self.multipliers[stays]], S=self.S[stays]
+        )
+
+
+@dataclass(frozen=True, eq=False)
 class FEBody:
     """Finite element model of one body, free or intentionally held to the ground.
 
@@ -249,6 +272,7 @@ class FEBody:
     provenance: Mapping[str, str] = field(default_factory=dict)  #: origin of the body: file, digest, options
     is_held: bool = False  #: whether the body is intentionally held to the ground; a floating frame rejects it
     numbering: Numbering = field(default_factory=Numbering)  #: the user's numbers of nodes and elements, and the sets
+    ties: tuple[Tie, ...] = ()  #: distributing interfaces inside the body
     #: nodes that the reduced body keeps with translations and rotations, in addition to surface and interfaces, (n,)
     kept: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
 

@@ -1,6 +1,6 @@
 """Weld several bodies into one body, joined at their interfaces; solids and frames alike."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_models.body.elimination import eliminate_dofs
-from fe_models.body.fe_body import MULTIPLIER, ElementModel, FEBody, Interface, Recovery, StressPointModel
+from fe_models.body.fe_body import MULTIPLIER, ElementModel, FEBody, Interface, Recovery, StressPointModel, Tie
 from fe_models.body.load_cases import LoadCase
 from fe_models.body.mass_loads import MassLoads
 from fe_models.body.rigid_motion import rigid_motion_of_points
@@ -125,10 +125,12 @@ def weld(bodies: Sequence[FEBody], joints: Iterable[tuple[Place, Place]], *, nam
     """Join coupled bodies into one body.
 
     (1) place matrices, nodes, dofs, surfaces and load cases side by side
-    (2) at each joint, let the six dofs of the second interface follow the first rigidly: u_2 = u_1 + theta_1 × r
+    (2) at each joint, let the six dofs of the second interface follow the first rigidly: u_2 = u_1 + theta_1 × r; the
+        first follows the second if that alone is a distributing one
     (3) where only distributing interfaces meet, nothing but multipliers holds their reference nodes: replace the leader
         by the mean motion of its members, u_1 = A u_members, and remove its multipliers
-    (4) remove the joined interfaces from the boundary; the other interfaces stay as they are
+    (4) remove the joined interfaces from the boundary, and record the distributing ones as `Tie`, for the geometric
+        stiffness; the other interfaces stay as they are
 
     To join a beam to a solid, give the solid an interface on its faces, rigid (RBE2) or distributing (RBE3), and the
     beam an interface at its end node. The two interfaces need not lie at one point: the distance between them is a
@@ -163,7 +165,8 @@ def weld(bodies: Sequence[FEBody], joints: Iterable[tuple[Place, Place]], *, nam
     first_node = np.cumsum([0, *(len(body.nodes) for body in bodies)])
     joined, pairs = _joined_dofs(where, bodies, index, first_dof, joints)
     side_by_side = _side_by_side(name, bodies, joined, first_dof, first_node)
-    slaves, T_s = _followers(where, side_by_side, pairs)
+    slaves, T_s, means = _followers(where, side_by_side, pairs)
+    side_by_side = replace(side_by_side, ties=_with_leaders(side_by_side, means))
     return eliminate_dofs(side_by_side, slaves, T_s) if len(slaves) else side_by_side
 
 
@@ -257,6 +260,7 @@ def _side_by_side(
             _numbered([recovery.dofs for recovery in recoveries], first_node),
         ),
         load_cases=tuple(load_cases),
+        ties=tuple(_ties(bodies, joined, n_dof, start)),
         stress_points=points_side_by_side(bodies, n_mesh_dof),
         numbering=numbering_side_by_side([body.numbered for body in bodies]),
         kept=np.concatenate([body.kept + n for body, n in zip(bodies, first_node, strict=False)]),
@@ -271,6 +275,41 @@ def _moved(body: FEBody, interface: Interface, is_ambiguous: bool, first_dof: in
         name=f"{body.name}.{interface.name}" if is_ambiguous else interface.name,
         nodes=interface.nodes + first_node,
         dofs=np.asarray(interface.dofs) + first_dof,
+    )
+
+
+def _ties(
+    bodies: tuple[FEBody, ...], joined: set[Place], n_dof: int, start: dict[str, tuple[int, int]]
+) -> Iterator[Tie]:
+    """Yield the ties of the parts, and those of their distributing interfaces that are joined, over all dofs."""
+    for body in bodies:
+        first_dof, first_node = start[body.name]
+        T = sp.csr_array(
+            (np.ones(body.n_dof), (np.arange(body.n_dof), first_dof + np.arange(body.n_dof))), (body.n_dof, n_dof)
+        )
+        own = list(body.ties)
+        for interface in body.interfaces:
+            dofs = np.asarray(interface.dofs)
+            if interface.kind == "distributing" and (body.name, interface.name) in joined:
+                motion = sp.csr_array((np.ones(6), (np.arange(6), dofs)), shape=(6, body.n_dof))
+                multipliers = _multipliers(body, dofs)
+                S = sp.csr_array(body.K[multipliers])[:, dofs].toarray()
+                own.append(Tie(replace(interface, dofs=None), motion, multipliers, S))
+        for tie in own:
+            tie = tie.changed(T, first_dof + np.arange(body.n_dof))
+            yield replace(
+                tie, interface=replace(tie.interface, nodes=tie.interface.nodes + first_node),
+                leader=None if tie.leader is None else replace(tie.leader, nodes=tie.leader.nodes + first_node),
+            )  # fmt: skip
+
+
+def _with_leaders(body: FEBody, means: dict[int, int]) -> tuple[Tie, ...]:
+    """Return the ties; the reference nodes in `means` follow the members of the tie at another node, their leader."""
+    at = {int(body.dofs[tie.motion.indices[0], 0]): tie for tie in body.ties}
+    return tuple(
+        replace(tie, leader=at[means[node]].interface) if node in means else tie
+        for node, tie in at.items()
+        if node not in means.values()
     )
 
 
@@ -295,8 +334,13 @@ def block_damping(bodies: Sequence[FEBody]) -> sp.csc_array | None:
     return sp.block_diag([sp.csc_array(body.K.shape) if body.D is None else body.D for body in bodies], format="csc")
 
 
-def _followers(where: str, body: FEBody, pairs: list[tuple[IntArray, IntArray]]) -> tuple[IntArray, sp.csr_array]:
-    """Return the dependent dofs and their rows over all dofs; chains are resolved to their first leader."""
+def _followers(
+    where: str, body: FEBody, pairs: list[tuple[IntArray, IntArray]]
+) -> tuple[IntArray, sp.csr_array, dict[int, int]]:
+    """Return the dependent dofs and their rows over all dofs; chains are resolved to their first leader.
+
+    The third result is the leader of each node whose leader was replaced by the mean motion of its members.
+    """
     leader: dict[int, int] = {}  # node -> node
     dofs_of: dict[int, IntArray] = {}
     for pair in pairs:
@@ -305,8 +349,13 @@ def _followers(where: str, body: FEBody, pairs: list[tuple[IntArray, IntArray]])
         roots = [_root(leader, node) for node in nodes]
         if roots[0] == roots[1]:
             raise BodyError(f"{where}: a joint connects interfaces that are joined already; remove one of the joints")
-        leader[roots[1]] = roots[0]
+        # a node that multipliers alone hold leads: elements then act on its own dofs (PARDISO finds the matrix singular
+        # where multipliers act on the dofs of a node at an arm)
+        is_held = [_has_only_multipliers(body, dofs_of[root]) for root in roots]
+        lead, follow = roots[::-1] if is_held[1] and not is_held[0] else roots
+        leader[follow] = lead
     slaves: list[IntArray] = []
+    means: dict[int, int] = {}
     blocks: list[sp.csr_array] = []
     for root in dict.fromkeys(_root(leader, node) for node in leader):
         followers = [node for node in leader if _root(leader, node) == root]
@@ -315,14 +364,15 @@ def _followers(where: str, body: FEBody, pairs: list[tuple[IntArray, IntArray]])
             multipliers, motion = _mean_motion(body, dofs_of[root])
             slaves += [dofs_of[root], multipliers]
             blocks += [motion, sp.csr_array((len(multipliers), body.n_dof))]
+            means |= dict.fromkeys(followers, root)
         for node in followers:
             arm = np.eye(6)
             arm[:3] = rigid_motion_of_points(body.nodes[node][None], body.nodes[root])[0]
             slaves.append(dofs_of[node])
             blocks.append(sp.csr_array(arm @ motion))
     if not slaves:
-        return np.zeros(0, np.int64), sp.csr_array((0, body.n_dof))
-    return np.concatenate(slaves), sp.csr_array(sp.vstack(blocks, "csr"))
+        return np.zeros(0, np.int64), sp.csr_array((0, body.n_dof)), means
+    return np.concatenate(slaves), sp.csr_array(sp.vstack(blocks, "csr")), means
 
 
 def _has_only_multipliers(body: FEBody, dofs: IntArray) -> bool:
@@ -331,10 +381,15 @@ def _has_only_multipliers(body: FEBody, dofs: IntArray) -> bool:
     return bool((body.dofs[rows, 1] == MULTIPLIER).all())
 
 
+def _multipliers(body: FEBody, dofs: IntArray) -> IntArray:
+    """Return the multipliers that hold the reference node of these dofs."""
+    rows = np.unique(body.K[:, dofs].nonzero()[0])
+    return np.asarray(rows[body.dofs[rows, 1] == MULTIPLIER], np.int64)
+
+
 def _mean_motion(body: FEBody, dofs: IntArray) -> tuple[IntArray, sp.csr_array]:
     """Return the multipliers of a reference node, and A of u_reference = A u_members over all dofs, (6, n_dof)."""
-    rows, _ = body.K[:, dofs].nonzero()
-    multipliers = np.unique(rows)
+    multipliers = _multipliers(body, dofs)
     C = sp.csr_array(body.K[multipliers])
     at_reference = C[:, dofs].toarray()
     is_member = np.ones(body.n_dof)

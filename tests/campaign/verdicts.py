@@ -30,9 +30,7 @@ JUDGED = (
     "recovery-shapes", "damping-told",
 )  # fmt: skip
 #: what a file that was carried to another frame is not compared in
-NOT_CARRIED = (
-    "spread loads turned", "spread loads of rotations", "turned loads", "recovery: no static", "recovery: loads",
-)  # fmt: skip
+NOT_CARRIED = ("recovery: no static", "recovery: loads")
 
 
 def judged(sound: SoundBody, reduced: cms.ReducedBody, reference: FullReference) -> dict[str, QualityRecord]:

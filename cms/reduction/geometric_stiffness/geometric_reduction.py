@@ -4,6 +4,7 @@
 (2) compute static states u_j = G_R P f_j with the factorisation of the mode set; only their stress counts
 (3) compute Phiᵀ K_geo(sigma_j) Phi of the elements, also for rotations of the body, as needed for other frames
 (4) add rigid links: forces on followers, internal minus applied, do work on their second-order motion
+    and so do the multipliers of distributing interfaces inside the body, on the second-order gap that they hold closed
 (5) add interfaces that follow the mean of their members: the applied loads do work on the second-order mean motion
 """
 
@@ -130,7 +131,7 @@ def elastic_part(body: FEBody, u: Array, mass: MassLoads, Phi: Array) -> Array:
     model = body.element_model
     assert model is not None
     u_mesh = body.mesh_displacement(u)
-    K = model.geometric_stiffness(u_mesh, mass, body.mesh_displacement(Phi))
+    K = model.geometric_stiffness(u_mesh, mass, body.mesh_displacement(Phi)) + tie_part(body, u, Phi)
     if body.recovery is None:
         return K
     T, dofs = body.recovery.matrix, body.recovery.dofs
@@ -141,6 +142,30 @@ def elastic_part(body: FEBody, u: Array, mass: MassLoads, Phi: Array) -> Array:
     on_followers = forces - model.mass_forces(mass)
     on_followers[~np.isin(dofs[:, 0], nodes)] = 0.0
     return K + link_work(T, dofs, body.dofs, on_followers, Phi)
+
+
+def tie_part(body: FEBody, u: Array, Phi: Array) -> Array:
+    """Return the work of multipliers on the second-order gap of the ties of a body, (k, n, n).
+
+    The gap is the second-order motion of the reference node, as it follows a lever or the members of another interface,
+    minus that of the mean of the members. A multiplier lambda puts F = Sᵀ lambda on it.
+    """
+    K = np.zeros((u.shape[1], Phi.shape[1], Phi.shape[1]))
+    six = np.stack([np.zeros(6, np.int64), np.arange(6)], axis=1)
+    for tie in body.ties:
+        F = tie.S.T @ u[tie.multipliers]
+        K -= np.einsum("cj,ckl->jkl", F, members_second_order(body, tie.interface, Phi, True), optimize=True)
+        if tie.leader is None:
+            K += link_work(tie.motion, six, body.dofs, F, Phi)
+            continue
+        arm = tie.interface.reference - tie.leader.reference
+        gamma = members_second_order(body, tie.leader, Phi, True)
+        gamma[:3] += np.cross(gamma[3:], arm[:, None, None], axis=0)
+        K += np.einsum("cj,ckl->jkl", F, gamma, optimize=True)
+        theta = rows_times(tie.motion, Phi)[3:]
+        W = rotation_work(F[:3].T[:, :, None] * arm)
+        K += np.einsum("ak,jab,bl->jkl", theta, W, theta, optimize=True)
+    return K
 
 
 def mean_part(body: FEBody, on_dofs: Array, Phi: Array, axes: Array, is_loaded: tuple[bool, ...]) -> Array:

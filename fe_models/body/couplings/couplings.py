@@ -113,6 +113,7 @@ def couple(body: FEBody) -> FEBody:
         if body.recovery is None
         else replace(body.recovery, matrix=sp.csr_array(body.recovery.matrix @ recovery)),
         load_cases=tuple(replace(case, f=recovery.T @ case.f) for case in body.load_cases),
+        ties=tuple(tie.changed(recovery, new_index) for tie in body.ties),
     )
 
 

@@ -30,7 +30,8 @@ def check_gram(reduced: ReducedBody) -> QualityRecord:
     L[1:4, 0] = -c
     gram = L @ moments.gram @ L.T
     size = np.sqrt(np.abs(np.diag(gram)))
-    offset = float(np.linalg.norm(c) / (size[1:4].max() / size[0])) if size[1:4].max() > 0 else 0.0
+    far = float(np.linalg.norm(c) + np.linalg.norm(reduced.frame.origin))  # integrals about the mesh origin lose digits
+    offset = far / float(size[1:4].max() / size[0]) if size[1:4].max() > 0 else 0.0
     value = negativity(gram)
     value = 0.0 if value < ROUNDING * (1 + offset**2) else value
     reason = (

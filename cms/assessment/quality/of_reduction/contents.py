@@ -53,7 +53,6 @@ PROBES = 12  #: number of combinations if there are more modes
 FEW_NODES = 20  #: largest number of nodes whose quadratic modes are compared one by one
 NODE_PROBES = 8  #: number of combinations if there are more nodes
 NEGLIGIBLE = 1e-3  #: smallest size that a difference is divided by, relative to the size that the field could have
-ROUGH = 1e5  #: factor on the limit for geometric stiffness that was converted from another frame
 STRESS = (1.0, -1.0, -2.0)  #: exponents of mass, length and time
 CONVERTED = "frame converted from"  #: provenance of a file that was converted to another frame
 #: provenance that must agree with the model and its mode set; paths, versions and solvers may differ
@@ -575,8 +574,6 @@ def compare_geometric(case: Case) -> Iterator[Compared]:
     unit = np.abs(np.asarray(made.interfaces)[:, :3]).max(initial=0.0)  # of a unit force
     force = {"translation": m, "rotation": m * L, "spin": m * L, "interfaces": 1.0}
     by_axis = np.array([1.0, 1, 1, L, L, L])[:, None, None]
-    # the file lacks the rotations of followers and the quadrature of cells, so the conversion to a frame is not exact
-    is_carried = CONVERTED in case.reduced.provenance
     for name in UNIT_LOADS:
         kind = by_axis if name == "interfaces" else 1.0
         words = f"load {case.axes_words} {case.axes_words}"
@@ -587,14 +584,11 @@ def compare_geometric(case: Case) -> Iterator[Compared]:
             source, target = (own, made) if part is None else (own.turned, made.turned)
             a, b = (np.asarray(getattr(x, name)) / kind for x in (source, target))
             size = max(np.abs(b).max(initial=0.0), NEGLIGIBLE * at_least * force[name])
-            size = size * ROUGH if is_carried else size
             yield apart(f"geometric.{f'{part}.' if part else ''}{name}", a, b, size, axes=words)
     if own.spread is not None and made.spread is not None:
         for name, at_least in (("K", unit), ("turned", shape), ("turned_rigid", L)):
             a, b = (np.asarray(getattr(x.spread, name)) / by_axis for x in (own, made))
-            if name != "K" and is_carried:
-                continue
-            size = max(np.abs(b).max(initial=0.0), NEGLIGIBLE * at_least) * (ROUGH if is_carried else 1.0)
+            size = max(np.abs(b).max(initial=0.0), NEGLIGIBLE * at_least)
             yield apart(f"geometric.spread.{name}", a, b, size, axes="load")
 
 

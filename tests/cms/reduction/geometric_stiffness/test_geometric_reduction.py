@@ -55,11 +55,22 @@ def some_bodies():
         [(("solid", "right"), ("beam", "left"))],
         name="both",
     )
-    return {"rigid": rigid, "distributing": mean, "nodes": nodes, "linked": linked, "welded": both}
+    tied = weld(
+        [replace(mean, name="solid"), replace(beam, name="beam"), replace(mean, name="third")],
+        [(("beam", "left"), ("solid", "right")), (("solid", "right"), ("third", "left"))],
+        name="tied",
+    )
+    two = weld(
+        [replace(mean, name="one"), replace(mean, name="two"), replace(beam, name="beam")],
+        [(("one", "right"), ("two", "left")), (("two", "right"), ("beam", "left"))],
+        name="two",
+    )
+    welded = {"welded": both, "tied": tied, "two": two}
+    return {"rigid": rigid, "distributing": mean, "nodes": nodes, "linked": linked} | welded
 
 
 @pytest.mark.parametrize("frame", [TisserandFrame(), NodalFrame(), BuckensFrame()], ids=lambda f: type(f).__name__)
-@pytest.mark.parametrize("name", ["rigid", "distributing", "nodes", "linked", "welded"])
+@pytest.mark.parametrize("name", ["rigid", "distributing", "nodes", "linked", "welded", "tied", "two"])
 def test_a_rigid_rotation_turns_the_loads(name, frame):
     """phi·K_j (theta × c) is the work on phi of the loads turned by theta; half of it for moments."""
     body = some_bodies()[name]
