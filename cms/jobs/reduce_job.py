@@ -31,12 +31,6 @@ log = logging.getLogger(__name__)
 
 GUESSED_MODES = 50  #: assumed number of modes for the memory estimate, if a cutoff or "auto" determines it
 
-#: mode sets with one column for each boundary dof
-OF_INTERFACES = (
-    "craig-bampton", "craig-bampton-ir", "guyan", "herting", "benfield-hruda", "rubin", "macneal", "craig-chang",
-    "dual-craig-bampton", "attachment", "unrestrained-attachment", "multilevel",
-)  # fmt: skip
-
 
 def reduce_job(
     job: Job | Path | str,
@@ -212,11 +206,12 @@ def reduces_interfaces(job: Job) -> bool:
 def expected_columns(job: Job, body: FEBody) -> int:
     """Return a lower bound of the number of columns of the mode set of a job, before the set is made."""
     from cms.modes.families.interface_cost import few_columns
+    from cms.modes.mode_sets import INTERFACE_SETS
 
     found = len(body.b)
     if reduces_interfaces(job):
         found = few_columns(body, job.reduction.interface_modes or 0)
-    if job.reduction.set not in OF_INTERFACES:
+    if job.reduction.set not in INTERFACE_SETS:
         found = 0
     return found + (job.reduction.n_modes if isinstance(job.reduction.n_modes, int) else 0)
 

@@ -53,3 +53,9 @@ MODE_SETS: dict[str, Callable[..., ModeSet]] = {
     "assumed-modes": assumed_modes,
     "user-basis": user_basis,
 }
+
+#: mode sets with one column for each boundary dof
+INTERFACE_SETS = (
+    "craig-bampton", "craig-bampton-ir", "guyan", "herting", "benfield-hruda", "rubin", "macneal", "craig-chang",
+    "dual-craig-bampton", "attachment", "unrestrained-attachment", "multilevel",
+)  # fmt: skip
