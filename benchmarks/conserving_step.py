@@ -35,8 +35,8 @@ from floatframe import (
     integrate,
 )
 from floatframe.components.mechanisms import four_bar
-from tests.floatframe.integrators.test_pendulum import pendulum
-from tests.floatframe.model.bodies.test_free_body import spinning
+from tests.floatframe.integrators.examples import pendulum
+from tests.floatframe.model.bodies.examples import spinning
 
 H = 0.005
 GIVEN = "generalized-alpha"

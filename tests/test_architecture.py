@@ -168,6 +168,22 @@ def test_no_package_imports_the_tests():
             assert not wrong, path
 
 
+def test_tests_share_helpers_and_fixtures_and_import_no_other_tests():
+    """What several tests need stands in a plain module beside them, such as `examples.py`, or in a conftest.py."""
+    files = {".".join(path.relative_to(ROOT).with_suffix("").parts): path for path in files_of("tests")}
+    tests = {name for name in files if name.rpartition(".")[2].startswith("test_")}
+    wrong = {}
+    for name, path in files.items():
+        text = path.read_text()
+        nodes = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Import | ast.ImportFrom)]
+        named = {f"{node.module}.{a.name}" for node in nodes if isinstance(node, ast.ImportFrom) for a in node.names}
+        named |= {str(node.module) for node in nodes if isinstance(node, ast.ImportFrom)}
+        named |= {a.name for node in nodes if isinstance(node, ast.Import) for a in node.names}
+        if named & tests:
+            wrong[name] = sorted(named & tests)
+    assert wrong == {}
+
+
 HEAVY = ["skfem", "meshio", "pyvista", "vtk", "numba", "matplotlib", "gmsh", "typer", "rich"]
 
 

@@ -30,7 +30,7 @@ def system_of(number: int) -> Any:
             return read_system(path)[0]
         finally:
             path.unlink()
-    from tests.floatframe.simulation.test_restart import swing
+    from tests.floatframe.simulation.examples import swing
 
     return swing()
 

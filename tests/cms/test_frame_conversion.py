@@ -16,12 +16,11 @@ from cms.reduction.basis.frames import BuckensFrame, NodalFrame, TisserandFrame
 from cms.reduction.frame_conversion import convert_frame
 from fe_models.body.couplings.couplings import couple
 from fe_models.body.fe_body import FEBody, Interface
-from fe_models.body.loads import gravity_load, interface_load
-from tests.bodies import bar, beam, box_mesh, chain, distorted, with_interfaces
+from tests.bodies import bar, beam, chain, with_interfaces
+from tests.cms.examples import TURNED, uneven_bar
 from tests.root import ROOT
 from tests.synthetic import synthetic_reduced_body
 
-TURNED = ((0.0, 1.0, 0.0), (-0.6, 0.0, 0.8), (0.8, 0.0, 0.6))
 FRAMES = {
     "tisserand": TisserandFrame(),
     "tisserand turned": TisserandFrame(origin=(0.2, -0.1, 0.3), axes=TURNED),
@@ -38,25 +37,6 @@ SLACK = 1e-8  #: roundoff times the condition of M in another frame, relative to
 def reduce(*args, **options):
     """Return the reduced body without geometric stiffness, which tests of that room carry from frame to frame."""
     return reduction.reduce(*args, **options, geometric=False)
-
-
-def uneven_bar(kinds=("rigid", "distributing")):
-    """A bar of two densities with distorted cells and an interface of each kind, so that no two frames coincide."""
-    from fe_models.elements.solids.body import solid_body
-    from fe_models.foundation.units import unit_system
-    from tests.bodies import ALUMINIUM, STEEL
-
-    mesh = distorted(box_mesh(6, 1, 1, 1.0, 0.08, 0.05, "hexahedron"), amount=0.3)
-    ends = [
-        Interface(name, kind, mesh.node_sets[name], np.array([x, 0.03, 0.02]))
-        for name, kind, x in (("left", kinds[0], 0.0), ("right", kinds[1], 1.02))
-    ]
-    materials = {"left half": STEEL, "right half": ALUMINIUM}
-    body = solid_body(mesh, materials, name="bar", units=unit_system("m-kg-s"), interfaces=ends)
-    return body.with_load_cases(
-        gravity_load(body, "weight", (1.0, 2.0, -9.81)),
-        interface_load(body, "pull", "right", force=(5.0, 1.0, 2.0), torque=(0.3, 0.2, 0.1)),
-    )
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,8 @@ from cms.reduction.basis.frames import NodalFrame, TisserandFrame
 from cms.reduction.reduction import reduce
 from fe_models.body.couplings.couplings import couple
 from fe_models.body.fe_body import FEBody, Interface
-from tests.bodies import STEEL, bar, box_mesh, with_interfaces
+from tests.bodies import STEEL, bar, with_interfaces
+from tests.cms.examples import hinged_bricks
 
 ROUNDOFF = 1e-12
 FRAMES = [TisserandFrame(), NodalFrame("left"), NodalFrame("right"), NodalFrame()]
@@ -299,24 +300,6 @@ def test_a_part_no_interface_holds_is_named_where_it_moves():
     only_left = couple(with_interfaces(body, body.interfaces[0]))
     with pytest.raises(BodyError, match=r"singular.*1 motions without energy, largest at node"):
         craig_bampton(only_left, n_modes=2)
-
-
-def hinged_bricks():
-    from fe_models.elements.solids.body import solid_body
-    from fe_models.foundation.units import unit_system
-    from fe_models.meshes.mesh import Mesh
-
-    one = box_mesh(2, 1, 1, kind="hexahedron")
-    other = one.nodes + np.array([1.0, 1.0, 0.0])
-    nodes = np.vstack([one.nodes, other])
-    unique, index = np.unique(np.round(nodes, 9), axis=0, return_inverse=True)
-    cells = np.vstack([one.cells["hexahedron"], one.cells["hexahedron"] + len(one.nodes)])
-    mesh = Mesh(unique, {"hexahedron": index[cells]})
-    ends = [
-        Interface("left", "rigid", np.flatnonzero(unique[:, 0] == 0), np.array([0.0, 0.5, 0.5])),
-        Interface("right", "rigid", np.flatnonzero(unique[:, 0] == 2), np.array([2.0, 1.5, 0.5])),
-    ]
-    return solid_body(mesh, STEEL, name="hinged", units=unit_system("m-kg-s"), interfaces=ends)
 
 
 @pytest.mark.parametrize(

@@ -64,7 +64,7 @@ def test_pynastran_reads_exported_superelements(tmp_path):
     """OP4 bit for bit, DMIG to the ten digits of its fields, rows sorted by their point and component."""
     import cms
     from cms.reduction.interface_model import interface_model
-    from tests.cms.exchange.exporters.test_matrices_over_interfaces import reduced_bar
+    from tests.cms.exchange.exporters.examples import reduced_bar
 
     body = reduced_bar()
     model = interface_model(body)

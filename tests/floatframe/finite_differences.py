@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
-from tests.floatframe.engine.kernels.test_tangent import C_K, Iterate, newton_matrices
+from tests.floatframe.engine.kernels.examples import C_K, Iterate, newton_matrices
 
 
 def assert_tangent_is_exact(system, *, seed=1, step=1e-5, tolerance=4e-9, prepare=None):

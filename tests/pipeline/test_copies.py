@@ -18,7 +18,7 @@ from fe_models.foundation.errors import ReportedError
 from floatframe import GROUND, ConvergenceError, FlexibleBody, GeneralizedAlpha, RevoluteJoint, System, integrate
 from floatframe.components.mechanisms import slider_crank
 from tests.bodies import box_mesh
-from tests.floatframe.results.test_results_file import SYSTEM
+from tests.floatframe.results.examples import SYSTEM
 from tests.synthetic import synthetic_reduced_body
 
 WAYS = {"pickle": lambda value: pickle.loads(pickle.dumps(value)), "deep copy": copy.deepcopy}

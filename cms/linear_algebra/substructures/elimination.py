@@ -163,7 +163,7 @@ class Substructure:
     omega2: Array  #: of these modes, ascending, (m,) [1/s²]
     coupling: Array  #: mass between the modes of all substructures below, in order, and these modes, (m_below, m)
     children: tuple[int, ...]
-    pivots: Array | None = None  #: only for a root with multipliers: L then holds the factors of SciPy's `lu_factor`
+    pivots: IntArray | None = None  #: only for a root with multipliers: L then holds the factors of SciPy's `lu_factor`
     spread: Array | None = None  #: in that case S with S Sᵀ f = u for [K Cᵀ; C 0] [u; .] = [f; 0], (s, s - n_ties)
 
     @property

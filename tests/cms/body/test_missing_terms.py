@@ -13,7 +13,7 @@ from cms.body.invariants import INERTIA_TERMS, moments_from_gram
 from cms.errors import BodyError, ModalFileError
 from cms.reduction.reduction import reduce
 from tests.bodies import bar
-from tests.cms.body.modal_file.test_file import differences
+from tests.cms.body.modal_file.examples import differences
 from tests.synthetic import synthetic_reduced_body
 
 SOME = (("3C", "4C", "5C"), ("3C",), ("5C",), ("4C", "5C"), ("3C", "5C"))

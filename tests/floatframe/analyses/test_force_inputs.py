@@ -22,9 +22,8 @@ from floatframe import (
     static_equilibrium,
 )
 from floatframe.model.functions.time_functions import constant, harmonic
-from tests.cms.reduction.geometric_stiffness.test_geometric_reduction import bar_of_beams
-from tests.floatframe.analyses.test_linear_sensors import TURN, machine, sensors, values_of
-from tests.floatframe.analyses.test_recovery_sensors import held
+from tests.cms.reduction.geometric_stiffness.examples import bar_of_beams
+from tests.floatframe.analyses.examples import TURN, held, machine, sensors, values_of
 
 CASE = ReducedLoadCase("wind", "nodal", np.array([0.3, -0.2, 0.5]), np.array([0.1, 0.2, -0.3]), np.arange(1.0, 4.0) / 5)
 

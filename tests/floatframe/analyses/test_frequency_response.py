@@ -34,7 +34,7 @@ from floatframe.analyses.linear.plots import plot_frequency_response
 from floatframe.analyses.snapshot import snapshot
 from floatframe.cli.app import app
 from floatframe.results.sensors import StressSensor
-from tests.floatframe.cli.test_analyses import PENDULUM
+from tests.floatframe.cli.examples import PENDULUM
 from tests.floatframe.point_masses import PointMasses, random_point_masses, reduced_body, stiffness
 
 M_, K_, C_ = 2.0, 50.0, 3.0

@@ -26,8 +26,8 @@ from floatframe.cli.app import app
 from floatframe.components.mechanisms import slider_crank
 from floatframe.components.mechanisms.rods import slender_inertia
 from floatframe.model.functions.time_functions import harmonic
+from tests.floatframe.examples import CRANK, TURN
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
-from tests.floatframe.test_bad_input import CRANK, TURN
 
 G = 9.81
 

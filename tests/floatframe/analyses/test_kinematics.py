@@ -44,8 +44,8 @@ from floatframe.model.functions.time_functions import constant, harmonic, polyno
 from floatframe.model.rotations import rotation_matrix
 from floatframe.results.joint_coordinates import joint_coordinates
 from floatframe.results.small_motions.joint_rates import coordinate_rows
+from tests.floatframe.examples import parallelogram
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
-from tests.floatframe.test_bad_input import parallelogram
 
 R, LENGTH, OMEGA, START = 0.15, 0.35, 20.0, 0.3
 CRANK = slider_crank(crank=R, rod=LENGTH, drive=polynomial_of_time([0, OMEGA]), angle=START)

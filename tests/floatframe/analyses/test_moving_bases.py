@@ -36,7 +36,7 @@ from floatframe import (
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.newton_equations import displaced, in_ground_axes
 from floatframe.model.functions.time_functions import constant, harmonic
-from tests.floatframe.analyses.test_linear_sensors import machine, rotor, sensors
+from tests.floatframe.analyses.examples import machine, rotor, sensors
 
 F = np.array([0.0, 0.4, 1.3, 9.0, 60.0])  #: Hz, across all modes
 AXIS, ABOUT = np.array([0.0, 0.6, 0.8]), np.array([0.3, -0.2, 0.5])

@@ -11,7 +11,7 @@ from floatframe import GROUND, FixedJoint, FlexibleBody, Gravity, Marker, ModelE
 from floatframe.analyses.equilibrium import static_equilibrium
 from floatframe.analyses.linear.channels import Channel
 from floatframe.analyses.linear.linearization import linearize
-from tests.cms.reduction.geometric_stiffness.test_geometric_reduction import bar_of_beams
+from tests.cms.reduction.geometric_stiffness.examples import bar_of_beams
 
 
 @pytest.fixture(scope="module")

@@ -12,16 +12,13 @@ from floatframe import (
     BaseMotion,
     FixedJoint,
     FlexibleBody,
-    Gravity,
     InterfaceForceSensor,
     Marker,
     ModelError,
     PlaceSensor,
     PointForce,
     RecoverySensor,
-    RevoluteJoint,
     SphericalJoint,
-    SpringDamper,
     System,
     consistent_state,
     linearize,
@@ -29,24 +26,7 @@ from floatframe import (
     snapshot,
     static_equilibrium,
 )
-from tests.cms.reduction.geometric_stiffness.test_geometric_reduction import bar_of_beams
-from tests.floatframe.analyses.test_linear_sensors import compare
-
-
-@pytest.fixture(scope="module")
-def bar():
-    coupled = cms.couple(bar_of_beams(6))
-    end = coupled.interfaces[1].name
-    rows = (cms.Rows("acceleration", at=(end,)), cms.Rows("interface force"), cms.Rows("net force", about=(0, 0, 0)))
-    asked = [cms.RecoveryRequest("instruments", rows=rows)]
-    return cms.reduce(coupled, cms.craig_bampton(coupled, n_modes=3), recovery=asked)
-
-
-def held(bar, *forces):
-    root, tip = (interface.name for interface in bar.interfaces)
-    joint = RevoluteJoint("hinge", GROUND, Marker("bar", root), axis=(0, 1, 0))
-    stay = SpringDamper("stay", Marker(GROUND, position=(0.3, 0.2, 2.0)), Marker("bar", tip), 3e4, 20.0)
-    return System([FlexibleBody("bar", bar)], [joint], [Gravity((0, 0, -9.81)), stay, *forces])
+from tests.floatframe.analyses.examples import compare, held
 
 
 def test_rows_are_linear_outputs(bar):

@@ -8,28 +8,8 @@ from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
 from floatframe.cli.app import app
+from tests.floatframe.cli.examples import PENDULUM
 
-PENDULUM = """
-[system]
-units = "m-kg-s"
-gravity = [0, -9.81, 0]
-
-[bodies.rod]
-mass = 2.0
-inertia = [[1e-4, 0, 0], [0, 0.166666666666666667, 0], [0, 0, 0.166666666666666667]]
-center_of_mass = [0.5, 0, 0]
-
-[joints.hinge]
-type = "revolute"
-body_a = "ground"
-body_b = "rod"
-marker_a = [0, 0, 0]
-axis = [0, 0, 1]
-
-[run]
-t_end = 1.0
-h = 1e-3
-"""
 runner = CliRunner()
 
 

@@ -17,46 +17,12 @@ from floatframe.cli.record import run_record
 from floatframe.pictures.animation import bodies_of
 from floatframe.results.energy_balance import balance_defect, energy_scale
 from floatframe.results.trajectory import read_results
+from tests.floatframe.cli.examples import FLEXIBLE, RIGID
 from tests.root import ROOT, heed_signals
 from tests.synthetic import synthetic_reduced_body
 
 PROGRAM = [sys.executable, "-c", "from floatframe.cli import main; main()"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"}
-
-RIGID = """
-[system]
-units = "m-kg-s"
-gravity = [0, 0, -9.81]
-
-[bodies.stick]
-mass = 2.0
-inertia = [[0.01, 0, 0], [0, 0.2, 0], [0, 0, 0.2]]
-position = [0.5, 0, 0]
-
-[joints.pin]
-type = "revolute"
-body_a = "ground"
-body_b = "stick"
-marker_b = [-0.5, 0, 0]
-axis = [0, 1, 0]
-
-[run]
-t_end = 0.5
-h = 1e-3
-"""
-
-FLEXIBLE = """
-[system]
-units = "mm-t-s"
-
-[bodies.part]
-file = "part.h5"
-omega_B = [0, 0, 3]
-
-[run]
-t_end = 0.01
-h = 1e-4
-"""
 
 
 @pytest.fixture

@@ -4,7 +4,6 @@ Energies and momenta are those of the compiled diagnostics, about the frame orig
 the centre of mass on which the schemes stand.
 """
 
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -35,34 +34,27 @@ from floatframe.engine.structure_preserving.markers import mean_jacobian
 from floatframe.engine.structure_preserving.rotation import cayley, cayley_parameters, relative_cayley
 from floatframe.model.functions.time_functions import cycloidal_spin_up
 from floatframe.model.functions.time_functions import table as table_function
-from floatframe.model.joints import JOINTS
 from floatframe.model.rotations import (
-    euler_parameters_of_rotation_vector,
     left_jacobian,
     right_jacobian,
     rotation_exp,
     rotation_matrix,
     tilde,
 )
-from tests.floatframe.integrators.test_pendulum import errors_of, exact, pendulum  # noqa: F401
-from tests.floatframe.model.bodies.test_free_body import spinning
+from tests.floatframe.integrators.examples import (  # noqa: F401
+    KNOWN,
+    SCHEMES,
+    STIFFENED,
+    energy_defect,
+    errors_of,
+    floating_pair,
+    momentum_defects,
+    pendulum,
+)
+from tests.floatframe.model.bodies.examples import spinning
 from tests.floatframe.orders import slope
-from tests.floatframe.point_masses import PointMasses, random_point_masses, reduced_body, stiffened_body, stiffness
-from tests.floatframe.simulation import test_restart
-
-SCHEMES = {"momentum": EnergyMomentum(), "decaying": EnergyDecaying(0.5), "variational": Variational()}
-
-
-def energy_defect(motion):
-    """Return the largest defect of the energy balance over the energy that moves about."""
-    balance, energies = motion.energies.balance, motion.energies
-    return np.abs(balance - balance[0]).max() / max(energies.kinetic.max(), energies.strain.max())
-
-
-def momentum_defects(motion):
-    """Return the largest change of linear and of angular momentum over their size."""
-    p, L = motion.linear_momentum, motion.angular_momentum
-    return np.abs(p - p[0]).max() / np.abs(p).max(), np.abs(L - L[0]).max() / np.abs(L).max()
+from tests.floatframe.point_masses import PointMasses, random_point_masses, reduced_body, stiffness
+from tests.floatframe.simulation.examples import StopHereError, assert_same, steps_on_record
 
 
 def test_free_body_keeps_energy_and_momenta_in_steps_that_are_far_too_long():
@@ -88,7 +80,7 @@ def test_gravity_on_a_soft_pendulum_conserves_energy():
 
 
 @pytest.mark.parametrize("name", SCHEMES)
-def test_motion_converges_with_second_order_to_that_of_minimal_coordinates(name, exact):  # noqa: F811
+def test_motion_converges_with_second_order_to_that_of_minimal_coordinates(name, exact):
     """The oracle has no joint, no frame origin apart from the pin, and another integrator."""
     steps = np.array([0.02, 0.01, 0.005, 0.0025])
     motions = [integrate(pendulum(), SCHEMES[name], 0.4, h, output_every=round(0.02 / h)) for h in steps]
@@ -97,7 +89,7 @@ def test_motion_converges_with_second_order_to_that_of_minimal_coordinates(name,
         assert abs(slope(steps, errors[:, column]) - 2) < 0.2, (what, errors[:, column])
 
 
-def errors_of_all(motion, exact):  # noqa: F811
+def errors_of_all(motion, exact):
     """Return the largest errors of rotation, q, omega, q_dot and force at all output times."""
     body, force, worst = motion.body("body"), motion.reaction("pin").force, np.zeros(5)
     for k, t in enumerate(motion.t):
@@ -106,33 +98,6 @@ def errors_of_all(motion, exact):  # noqa: F811
         for j, (a, b) in enumerate(zip(found, (rotation_matrix(p), q, omega, q_dot, reaction), strict=True)):
             worst[j] = max(worst[j], np.abs(a - b).max())
     return worst
-
-
-AXIS = (0.2, -0.3, 1.0)
-OPTIONS = {
-    "screw": {"axis": AXIS, "lead": 0.7},
-    "universal": {"axis": AXIS, "axis_b": (1.0, 0.1, 0.3)},
-    "distance": {},
-}
-ORIENTED = ("revolute", "prismatic", "cylindrical", "planar", "point-on-line", "point-on-plane")
-KNOWN = [kind for kind in (*ORIENTED, "screw", "universal", "distance", "fixed", "spherical", "constant-orientation")
-         if kind in JOINTS]  # fmt: skip
-
-
-def floating_pair(kind, forces=(), body=None, **options):
-    """Return a flexible and a rigid body that fly and spin, with a joint between them and nothing else."""
-    options = {**({"axis": AXIS} if kind in ORIENTED else OPTIONS.get(kind, {})), **options}
-    soft = FlexibleBody("soft", body or reduced_body(random_point_masses(3, 3), stiffness(3, omega=6.0)),
-                        velocity=(0.3, 0.1, -0.2), omega_B=(0.4, 1.0, -0.7), q=[0.1, -0.1, 0.05])  # fmt: skip
-    place = soft.frame_position + np.array([1.5, 0.3, 0.2])
-    block = RigidBody("block", 0.7, np.diag([0.2, 0.3, 0.25]), center_of_mass=(0.1, 0.2, 0.0), position=place,
-                      orientation=euler_parameters_of_rotation_vector(np.array([0.2, -0.6, 0.4])),
-                      velocity=(0.3, 0.4, 0.0), omega_B=(1.0, 0.2, 0.5))  # fmt: skip
-    at = None if kind != "distance" else (0.1, 0.4, 0.2)
-    joint = JOINTS[kind]("joint", Marker("soft", "end_a"), "block" if at is None else Marker("block", position=at),
-                         **options)  # fmt: skip
-    spring = SpringDamper("stay", Marker("soft", "end_b"), Marker("block", position=(0.3, 0, 0.1)), 8.0)
-    return System([soft, block], [joint], [spring, *forces])
 
 
 @pytest.mark.parametrize("kind", KNOWN)
@@ -144,9 +109,6 @@ def test_joints_do_no_work_and_add_no_momentum(kind):
     assert max(momentum_defects(motion)) < 1e-11
     drift = motion.drift("joint")
     assert max(drift.distance.max(), drift.angle.max()) < 1e-12
-
-
-STIFFENED = stiffened_body(random_point_masses(3, 3), stiffness(3, omega=6.0), size=0.2)
 
 
 @pytest.mark.parametrize("kind", ["revolute", "distance", "universal"])
@@ -261,12 +223,12 @@ def test_resumed_run_is_the_uninterrupted_one_bit_for_bit(tmp_path, monkeypatch)
     whole = integrate(spinning(), EnergyMomentum(), 2.5, 0.01, output_every=50)
 
     def stop(progress):
-        raise test_restart.StopHereError
+        raise StopHereError
 
-    with pytest.raises(test_restart.StopHereError):
+    with pytest.raises(StopHereError):
         integrate(spinning(), EnergyMomentum(), 2.5, 0.01, output_every=50, output=tmp_path / "run.h5", progress=stop)
-    assert test_restart.steps_on_record(tmp_path / "run.h5") == 200
-    test_restart.assert_same(resume(spinning(), tmp_path / "run.h5"), whole)
+    assert steps_on_record(tmp_path / "run.h5") == 200
+    assert_same(resume(spinning(), tmp_path / "run.h5"), whole)
 
 
 def test_massless_modes_are_refused():

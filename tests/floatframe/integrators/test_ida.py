@@ -18,7 +18,7 @@ from floatframe import (
     integrate,
 )
 from floatframe.components.mechanisms import pendulum as rigid_pendulum
-from tests.floatframe.integrators.test_pendulum import exact, pendulum  # noqa: F401
+from tests.floatframe.integrators.examples import pendulum
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 
 pytest.importorskip("sksundae", reason="the extra 'ida' is not installed")
@@ -30,7 +30,7 @@ def test_missing_extra_is_named(monkeypatch):
         integrate(rigid_pendulum(), Ida(), 0.1, 0.01)
 
 
-def test_flexible_pendulum_is_that_of_minimal_coordinates(exact):  # noqa: F811
+def test_flexible_pendulum_is_that_of_minimal_coordinates(exact):
     motion = integrate(pendulum(), Ida(1e-7, 1e-9), 0.2, 0.05)
     for k, t in enumerate(motion.t):
         _, q, omega, _, force = exact(t)

@@ -22,8 +22,8 @@ from floatframe import (
     integrate,
 )
 from floatframe.components.mechanisms import four_bar, slider_crank
-from tests.floatframe.integrators.test_pendulum import pendulum
-from tests.floatframe.model.bodies.test_free_body import spinning
+from tests.floatframe.integrators.examples import pendulum
+from tests.floatframe.model.bodies.examples import spinning
 
 SMALL = 1e-3  # of the error of the integrator
 #: the same of reactions of a body that bends by half its length: what positions and velocities differ by depends on the

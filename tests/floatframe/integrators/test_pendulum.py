@@ -8,85 +8,17 @@ particles are taken as they stand, and SciPy's DOP853 integrates.
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.integrate import solve_ivp
 
-from floatframe import GROUND, FlexibleBody, GeneralizedAlpha, Gravity, Marker, SphericalJoint, System, integrate
-from floatframe.model.rotations import euler_parameter_rates, rotation_matrix
+from floatframe import GeneralizedAlpha, integrate
+from tests.floatframe.integrators.examples import N_Q, OMEGA, T_END, accelerations, errors_of, pendulum
 from tests.floatframe.orders import slope
-from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 
 STEPS = np.array([4e-3, 2e-3, 1e-3, 5e-4])
-T_END = 1.0
-N_Q = 3
-G = np.array([1.0, -0.5, -9.81])
-OMEGA = np.array([0.5, 1.0, -0.8])
-
-POINTS = random_point_masses(N_Q, 11)
-K = stiffness(N_Q, omega=3.5)
-D = 0.02 * stiffness(N_Q, 5, omega=3.5)
-REDUCED = reduced_body(POINTS, K, D=D, name="pendulum")
-
-
-def accelerations(p, q, omega, q_dot):
-    """Return alpha, q_ddot and the force of the joint on the ground, in minimal coordinates."""
-    m = POINTS.m
-    pin = int(np.argmin(POINTS.c[:, 0]))  # interface end_b
-    y = POINTS.c - POINTS.c[pin] + (POINTS.phi - POINTS.phi[pin]) @ q
-    phi = POINTS.phi - POINTS.phi[pin]
-    R = rotation_matrix(p)
-    # a_p = alpha × y_p + phi_p q_ddot + known
-    known = np.cross(omega, np.cross(omega, y)) + 2 * np.cross(omega, phi @ q_dot) - R.T @ G
-    columns = np.concatenate([np.cross(np.eye(3)[:, None], y[None]), np.moveaxis(phi, 2, 0)])  # (3 + n, p, 3)
-    matrix = np.einsum("p,apx,bpx->ab", m, columns, columns)
-    right = -np.einsum("p,apx,px->a", m, columns, known)
-    right[3:] -= K @ q + D @ q_dot
-    u_dot = np.linalg.solve(matrix, right)
-    a = np.einsum("a,apx->px", u_dot, columns) + known
-    return u_dot[:3], u_dot[3:], R @ (-(m @ a))
-
-
-@pytest.fixture(scope="module")
-def exact():
-    """Return t -> (p, q, omega, q_dot, force on the ground)."""
-
-    def rates(_, x):
-        p, q, omega, q_dot = x[:4] / np.linalg.norm(x[:4]), x[4 : 4 + N_Q], x[4 + N_Q : 7 + N_Q], x[7 + N_Q :]
-        alpha, q_ddot, _ = accelerations(p, q, omega, q_dot)
-        return np.concatenate([euler_parameter_rates(p, omega), q_dot, alpha, q_ddot])
-
-    start = np.concatenate([[1.0, 0, 0, 0], np.zeros(N_Q), OMEGA, np.zeros(N_Q)])
-    solution = solve_ivp(rates, (0, T_END), start, method="DOP853", rtol=1e-12, atol=1e-12, dense_output=True)
-
-    def at(t):
-        x = solution.sol(t)
-        p = x[:4] / np.linalg.norm(x[:4])
-        q, omega, q_dot = x[4 : 4 + N_Q], x[4 + N_Q : 7 + N_Q], x[7 + N_Q :]
-        return p, q, omega, q_dot, accelerations(p, q, omega, q_dot)[2]
-
-    return at
-
-
-def pendulum():
-    pin = POINTS.c[int(np.argmin(POINTS.c[:, 0]))]
-    body = FlexibleBody("body", REDUCED, position=-pin, omega_B=OMEGA, velocity=np.cross(pin, OMEGA))
-    return System([body], [SphericalJoint("pin", GROUND, Marker("body", "end_b"))], [Gravity(G)])
 
 
 @pytest.fixture(scope="module", params=[0.0, 0.8], ids=["rho_inf=0", "rho_inf=0.8"])
 def motions(request):
     return [integrate(pendulum(), GeneralizedAlpha(request.param, 1e-10), T_END, h) for h in STEPS]
-
-
-def errors_of(motion, exact):
-    """Return the largest errors of rotation, q, omega, q_dot and the force on the ground over time."""
-    body, force = motion.body("body"), motion.reaction("pin").force
-    worst = np.zeros(5)
-    for k in (*range(10), *range(10, len(motion.t), len(motion.t) // 50)):  # the first steps too: no kick there
-        p, q, omega, q_dot, reaction = exact(motion.t[k])
-        found = (rotation_matrix(body.p[k]), body.q[k], body.omega_B[k], body.q_dot[k], force[k])
-        for j, (a, b) in enumerate(zip(found, (rotation_matrix(p), q, omega, q_dot, reaction), strict=True)):
-            worst[j] = max(worst[j], np.abs(a - b).max())
-    return worst
 
 
 def test_start_has_the_accelerations_and_the_reaction_of_the_minimal_coordinates(motions):

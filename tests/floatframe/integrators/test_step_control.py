@@ -26,16 +26,16 @@ from floatframe import (
 from floatframe.components.mechanisms import slider_crank
 from floatframe.model.functions.time_functions import cycloidal_spin_up
 from floatframe.model.rotations import rotation_matrix
-from tests.floatframe.integrators.test_pendulum import exact, pendulum  # noqa: F401
-from tests.floatframe.model.bodies.test_free_body import spinning
+from tests.floatframe.integrators.examples import pendulum
+from tests.floatframe.model.bodies.examples import spinning
 from tests.floatframe.orders import slope
 from tests.floatframe.point_masses import PointMasses, reduced_body
-from tests.floatframe.simulation import test_restart
+from tests.floatframe.simulation.examples import StopHereError, assert_same, swing
 
 T_END = 1.0
 
 
-def worst(motion, exact):  # noqa: F811
+def worst(motion, exact):
     """Return the largest error of rotation and q at the output times."""
     body, errors = motion.body("body"), []
     for k in range(0, len(motion.t), max(1, len(motion.t) // 40)):
@@ -51,7 +51,7 @@ def controlled():
                         for x in tolerances]  # fmt: skip
 
 
-def test_error_of_a_motion_falls_with_the_tolerance(controlled, exact):  # noqa: F811
+def test_error_of_a_motion_falls_with_the_tolerance(controlled, exact):
     """Local errors of third order: the global error goes with the tolerance to the power 2/3."""
     tolerances, motions = controlled
     errors = [worst(motion, exact) for motion in motions]
@@ -114,16 +114,16 @@ def test_impossible_options_are_refused(options):
 def test_resumed_run_with_controlled_steps_is_the_uninterrupted_one_bit_for_bit(tmp_path, monkeypatch):
     monkeypatch.setattr(integration, "SEGMENT_SECONDS", 0.0)
     method = GeneralizedAlpha(0.8, error_tolerance=1e-6)
-    whole = integrate(test_restart.swing(), method, 3.0, 5e-3)
+    whole = integrate(swing(), method, 3.0, 5e-3)
 
     def stop(progress):
         if progress.t > 1.4:
-            raise test_restart.StopHereError
+            raise StopHereError
 
-    with pytest.raises(test_restart.StopHereError):
-        integrate(test_restart.swing(), method, 3.0, 5e-3, output=tmp_path / "run.h5", progress=stop)
-    again = resume(test_restart.swing(), tmp_path / "run.h5")
-    test_restart.assert_same(again, whole)
+    with pytest.raises(StopHereError):
+        integrate(swing(), method, 3.0, 5e-3, output=tmp_path / "run.h5", progress=stop)
+    again = resume(swing(), tmp_path / "run.h5")
+    assert_same(again, whole)
     for name in ("n_steps", "n_rejected", "n_iterations"):
         assert again.head.summary[name] == whole.head.summary[name]
 
@@ -147,7 +147,7 @@ CASES = {"newmark": newmark(tolerance=1e-11), "hht": hht(-0.2, tolerance=1e-11)}
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_named_cases_converge_with_second_order(name, exact):  # noqa: F811
+def test_named_cases_converge_with_second_order(name, exact):
     steps = np.array([4e-3, 2e-3, 1e-3, 5e-4])
     errors = [worst(integrate(pendulum(), CASES[name], 0.5, h), exact) for h in steps]
     assert_allclose(slope(steps, errors), 2, rtol=0, atol=0.15)

@@ -9,7 +9,7 @@ from floatframe.pictures.animation import motion_scene
 from floatframe.pictures.film_times import film_times
 from floatframe.pictures.glyphs import BUSHING_COLOR, JOINT_COLOR, SPRING_COLOR, glyphs
 from floatframe.pictures.stage import box_of
-from tests.floatframe.analyses.test_linear_sensors import machine
+from tests.floatframe.analyses.examples import machine
 
 UP = np.array([0.0, 0.0, 1.0])
 

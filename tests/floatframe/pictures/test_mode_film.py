@@ -26,7 +26,7 @@ from floatframe.cli.app import app
 from floatframe.pictures.body_colors import VON_MISES
 from floatframe.pictures.glyphs import BUSHING_COLOR, JOINT_COLOR, SPRING_COLOR
 from floatframe.pictures.mode_film import mode_scene
-from tests.floatframe.cli.test_analyses import PENDULUM
+from tests.floatframe.cli.examples import PENDULUM
 from tests.synthetic import synthetic_reduced_body
 
 QUARTERS = np.exp(0.5j * np.pi * np.arange(4))

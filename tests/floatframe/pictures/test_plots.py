@@ -6,7 +6,7 @@ from numpy.testing import assert_array_equal
 
 from floatframe import GeneralizedAlpha, integrate
 from floatframe.pictures import plots
-from tests.floatframe.results.test_results_file import SYSTEM
+from tests.floatframe.results.examples import SYSTEM
 
 mpl.use("Agg")
 

@@ -22,7 +22,7 @@ from floatframe import (
     static_equilibrium,
     steady_rotation,
 )
-from tests.floatframe.analyses.test_linear_sensors import compare, machine, rotor
+from tests.floatframe.analyses.examples import compare, machine, rotor
 
 K = np.diag([40.0, 50, 60, 3, 4, 5]) + 0.3
 D = np.diag([0.4, 0.5, 0.6, 0.03, 0.04, 0.05])

@@ -38,7 +38,7 @@ from floatframe.model.rotations import rotation_matrix
 from floatframe.results.results_file import MemorySource
 from floatframe.results.trajectory import Trajectory
 from floatframe.results.writer import arrays_of
-from tests.floatframe.analyses.test_linear_sensors import compare
+from tests.floatframe.analyses.examples import compare
 
 L, WIDTH, E_STEEL = 1.0, 0.03, 210e9  #: m, Pa
 TURN = np.array([0.6, 0.3, -0.5, np.sqrt(0.3)])  #: of the mesh in the ground

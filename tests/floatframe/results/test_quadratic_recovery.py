@@ -8,7 +8,7 @@ import cms
 from floatframe import FlexibleBody, GeneralizedAlpha, System, integrate
 from floatframe.results.place_motion import interface_motion, node_motion
 from floatframe.results.recovery import interface_positions, nodal_displacements, nodal_positions
-from tests.cms.reduction.geometric_stiffness.test_geometric_reduction import bar_of_beams
+from tests.cms.reduction.geometric_stiffness.examples import bar_of_beams
 
 
 @pytest.fixture(scope="module")

@@ -16,40 +16,20 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from fe_models.foundation.hdf5_file import Manifest, as_attribute, write_sealed_file
 from floatframe import (
-    GROUND,
     ConvergenceError,
-    FlexibleBody,
     GeneralizedAlpha,
-    Gravity,
-    Marker,
     ModelError,
     ResultsError,
-    RigidBody,
-    SphericalJoint,
-    System,
     integrate,
     read_results,
 )
 from floatframe.results.place_motion import point_motion
 from floatframe.results.recovery import interface_positions, nodal_positions
 from floatframe.results.results_file import KIND
-from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
+from tests.floatframe.results.examples import SYSTEM
 
 METHOD = GeneralizedAlpha()
 DATA = ("t", "position", "euler_parameters", "q", "u", "u_dot", "w", "diagnostics", "drift")
-
-
-def pendulum():
-    reduced = reduced_body(random_point_masses(3, 3), stiffness(3), name="rod")
-    bob = RigidBody("bob", 0.5, 0.1 * np.eye(3), position=reduced.interface("end_a").position)
-    joints = [
-        SphericalJoint("pin", GROUND, Marker("rod", "end_b")),
-        SphericalJoint("link", Marker("rod", "end_a"), Marker("bob")),
-    ]
-    return System([FlexibleBody("rod", reduced), bob], joints, [Gravity((0, 0, -9.81))])
-
-
-SYSTEM = pendulum()
 
 
 def assert_same_motion(first, second):

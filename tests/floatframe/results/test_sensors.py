@@ -49,10 +49,9 @@ from floatframe.results.sensors import (
     sensor_of,
 )
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
-from tests.synthetic import synthetic_reduced_body
+from tests.floatframe.results.examples import BODY, RNG, TEXT
 
 H = 5e-4
-RNG = np.random.default_rng(4)
 REDUCED = replace(reduced_body(random_point_masses(3, 5), stiffness(3), name="rod"), stress=RNG.normal(size=(40, 6, 3)))
 TIP, ARM_TIP = Marker("rod", "end_a"), Marker("arm", position=(0.5, 0.1, 0))
 
@@ -224,47 +223,6 @@ def test_impossible_sensors_are_refused(make, words):
 def test_motion_of_another_system_is_refused(swing):
     with pytest.raises(ModelError, match="give the system that was run"):
         measured(System([RigidBody("other", 1.0, np.eye(3))]), swing)
-
-
-SPIN = """
-[system]
-units = "mm-t-s"
-
-[bodies.part]
-file = "part.h5"
-omega_B = [0, 0, 3]
-
-[joints.hinge]
-type = "revolute"
-body_a = "ground"
-body_b = "part"
-marker_b = "{}"
-axis = [0, 0, 1]
-
-[sensors.tip]
-type = "velocity"
-body = "part"
-marker = "{}"
-
-[sensors."largest stress"]
-type = "von-mises"
-body = "part"
-
-[sensors.energy]
-type = "energy"
-
-[sensors.load]
-type = "reaction"
-of = "hinge"
-axes = "marker"
-
-[run]
-t_end = 0.01
-h = 1e-4
-"""
-BODY = synthetic_reduced_body()
-BODY = replace(BODY, stress=RNG.normal(size=(len(BODY.nodes), 6, BODY.n_q)))
-TEXT = SPIN.format(BODY.interfaces[0].name, BODY.interfaces[-1].name)
 
 
 @pytest.fixture

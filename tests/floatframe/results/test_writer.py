@@ -14,7 +14,7 @@ from floatframe import GeneralizedAlpha, ResultsError, integrate, read_results, 
 from floatframe.analyses.driven.kinematics import kinematics
 from floatframe.components.mechanisms import slider_crank
 from floatframe.model.functions.time_functions import cycloidal_spin_up
-from tests.floatframe.results.test_results_file import SYSTEM
+from tests.floatframe.results.examples import SYSTEM
 from tests.root import ROOT
 
 METHOD = GeneralizedAlpha()

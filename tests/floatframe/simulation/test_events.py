@@ -15,13 +15,11 @@ from floatframe import (
     EnergyMomentum,
     Event,
     GeneralizedAlpha,
-    Gravity,
     JointCoordinate,
     JointForce,
     Marker,
     ModelError,
     PointForce,
-    PrismaticJoint,
     RevoluteJoint,
     RigidBody,
     SpringDamper,
@@ -35,17 +33,14 @@ from floatframe import (
 from floatframe.integrators.relative_ode import RelativeOde
 from floatframe.results.sensors import PlaceSensor
 from floatframe.simulation.event_steps import EventWatch
-from tests.floatframe.simulation import test_restart
-
-G = 9.81
-
-
-def falling(*events, forces=()):
-    """Return a block on a vertical guide, let go at rest; the coordinate is its height."""
-    block = RigidBody("block", 2.0, np.eye(3))
-    guide = PrismaticJoint("guide", Marker(GROUND), Marker("block"), axis=(0, 0, 1))
-    sensors = [PlaceSensor("place", Marker("block"), "position")]
-    return System([block], [guide], [Gravity((0, 0, -G)), *forces], sensors=sensors, events=events)
+from tests.floatframe.simulation.examples import (
+    G,
+    StopHereError,
+    assert_same,
+    double_pendulum,
+    falling,
+    steps_on_record,
+)
 
 
 @pytest.mark.parametrize("watch", [{"watch": "guide.distance"}, {"watch": "place", "column": "z"}])
@@ -149,13 +144,13 @@ def test_resumed_run_with_events_is_the_uninterrupted_one_bit_for_bit(tmp_path, 
 
     def stop(progress):
         if progress.t > 2.3:
-            raise test_restart.StopHereError
+            raise StopHereError
 
-    with pytest.raises(test_restart.StopHereError):
+    with pytest.raises(StopHereError):
         integrate(driven_back_and_forth(), method, 3.0, 0.01, output=tmp_path / "run.h5", progress=stop)
-    assert test_restart.steps_on_record(tmp_path / "run.h5") == 200
+    assert steps_on_record(tmp_path / "run.h5") == 200
     again = resume(driven_back_and_forth(), tmp_path / "run.h5")
-    test_restart.assert_same(again, whole)
+    assert_same(again, whole)
     assert len(whole.head.summary["events"]) > 3
     assert again.head.summary["events"] == whole.head.summary["events"]
 
@@ -209,17 +204,6 @@ def test_an_event_that_records_keeps_the_results_there_and_leaves_the_motion_as_
     assert np.all(np.diff(motion.t) > 0)
     for name in ("t", "position", "u", "w"):
         assert_array_equal(motion.source.read(name)[~is_extra], plain.source.read(name))
-
-
-def double_pendulum(*events, forces=()):
-    """Return two bars in a row, let go horizontally."""
-    bodies = [RigidBody("upper", 1.0, 0.1 * np.eye(3), position=(0.5, 0, 0)),
-              RigidBody("lower", 2.0, 0.2 * np.eye(3), position=(1.5, 0, 0))]  # fmt: skip
-    hinge = RevoluteJoint("hinge", Marker(GROUND), Marker("upper", position=(-0.5, 0, 0)), axis=(0, 1, 0))
-    knee = RevoluteJoint("knee", Marker("upper", position=(0.5, 0, 0)), Marker("lower", position=(-0.5, 0, 0)),
-                         axis=(0, 1, 0))  # fmt: skip
-    sensors = [PlaceSensor("place", Marker("lower"), "position")]
-    return System(bodies, [hinge, knee], [Gravity((0, 0, -G)), *forces], sensors=sensors, events=events)
 
 
 def test_what_a_latch_holds_does_not_happen_again():
@@ -339,7 +323,7 @@ def test_an_event_goes_on_after_a_resumption(tmp_path, monkeypatch):
     path = tmp_path / "out.h5"
     with pytest.raises(KilledError):
         integrate(system, trapezoidal(), 0.5, 1e-3, output=path, progress=kill, batch_steps=50)
-    assert test_restart.steps_on_record(path) == 200
+    assert steps_on_record(path) == 200
     again = resume(system, path)
     assert_array_equal(again.t, whole.t)
     assert_array_equal(again.source.read("position"), whole.source.read("position"))

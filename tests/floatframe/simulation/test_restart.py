@@ -12,15 +12,10 @@ from numpy.testing import assert_array_equal
 
 import floatframe.simulation.integration as integration
 from floatframe import (
-    GROUND,
-    FlexibleBody,
     GeneralizedAlpha,
     Gravity,
     JointForce,
-    Marker,
     ResultsError,
-    SphericalJoint,
-    SpringDamper,
     System,
     integrate,
     read_results,
@@ -29,24 +24,10 @@ from floatframe import (
 from floatframe.components.mechanisms import slider_crank
 from floatframe.engine.kernels.entry import prepare
 from floatframe.model.functions.time_functions import cycloidal_spin_up
-from floatframe.results.writer import last_restart
-from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
+from tests.floatframe.simulation.examples import StopHereError, assert_same, steps_on_record, swing
 from tests.root import ROOT
 
 H, T_END = 1e-3, 1.7
-
-
-def swing(softness=0.2):
-    body = FlexibleBody(
-        "body", reduced_body(random_point_masses(3, 5, softness=softness), stiffness(3)), omega_B=(0, 1, 3)
-    )
-    joint = SphericalJoint("pin", GROUND, Marker("body", "end_b"))
-    spring = SpringDamper("stay", Marker(GROUND, position=(2, 0, 1)), Marker("body", "end_a"), 30.0, 0.5)
-    return System([body], [joint], [Gravity((0, 0, -9.81)), spring])
-
-
-class StopHereError(Exception):
-    """Raised by a progress callback to end a run."""
 
 
 def interrupted(path, at, system=None):
@@ -60,12 +41,6 @@ def interrupted(path, at, system=None):
         integrate(system or swing(), GeneralizedAlpha(0.8), T_END, H, output=path, output_every=7, progress=on_progress)
 
 
-def steps_on_record(path):
-    """Return after how many steps the run to these results, which was interrupted, will go on."""
-    _, record = last_restart(path.with_name(path.name + ".segments"))
-    return int(record["n_done"])
-
-
 @pytest.fixture(autouse=True)
 def many_segments(monkeypatch):
     monkeypatch.setattr(integration, "SEGMENT_SECONDS", 0.0)
@@ -74,12 +49,6 @@ def many_segments(monkeypatch):
 @pytest.fixture(scope="module")
 def whole():
     return integrate(swing(), GeneralizedAlpha(0.8), T_END, H, output_every=7)
-
-
-def assert_same(one, other):
-    assert one.is_complete
-    for name in ("t", "position", "euler_parameters", "q", "u", "u_dot", "w", "diagnostics", "drift"):
-        assert_array_equal(one.source.read(name), other.source.read(name), err_msg=name)
 
 
 @pytest.mark.parametrize("at", [0.1, 0.2, 0.75, 1.6])

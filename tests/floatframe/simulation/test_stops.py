@@ -30,9 +30,9 @@ from floatframe.model.functions.time_functions import polynomial_of_time
 from floatframe.results.coordinate_elements import coupler_motion
 from floatframe.results.energy_balance import balance_defect
 from tests.floatframe.finite_differences import assert_tangent_is_exact
-from tests.floatframe.model.joints.test_coordinate_coupler import coupled_pairs, three_bodies
+from tests.floatframe.model.joints.examples import coupled_pairs, three_bodies
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
-from tests.floatframe.simulation import test_restart
+from tests.floatframe.simulation.examples import assert_same
 
 G = 9.81
 METHOD = GeneralizedAlpha(0.9, 1e-11)
@@ -154,7 +154,7 @@ def test_a_resumed_run_with_stops_is_the_uninterrupted_one_bit_for_bit(tmp_path,
     with pytest.raises(KeyboardInterrupt):
         integrate(system, METHOD, 1.5, 1e-2, output=path, batch_steps=10, progress=stop)
     again = resume(system, path)
-    test_restart.assert_same(whole, again)
+    assert_same(whole, again)
     assert_array_equal(
         [event["t"] for event in again.head.summary["events"]], [event["t"] for event in whole.head.summary["events"]]
     )

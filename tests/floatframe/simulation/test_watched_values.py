@@ -30,7 +30,7 @@ from floatframe.results.sensors import CoordinateSensor
 from floatframe.simulation.restart import restart_record
 from floatframe.simulation.watched_values import direct_values
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
-from tests.floatframe.simulation.test_events import double_pendulum, falling
+from tests.floatframe.simulation.examples import double_pendulum, falling
 
 METHODS = [GeneralizedAlpha(), GeneralizedAlpha(error_tolerance=1e-6), RelativeGeneralizedAlpha(), EnergyMomentum(),
            Variational()]  # fmt: skip

@@ -28,6 +28,7 @@ from fe_models.elements.solids.body import solid_body
 from fe_models.foundation import sealed_hdf5
 from fe_models.foundation.units import UNIT_SYSTEMS, unit_system
 from tests.bodies import box_mesh, distorted
+from tests.cms.body.modal_file.examples import differences
 from tests.root import ROOT
 from tests.synthetic import synthetic_reduced_body
 
@@ -43,20 +44,6 @@ def body() -> ReducedBody:
 def path(body, tmp_path) -> Path:
     write(body, tmp_path / "rod.h5")
     return tmp_path / "rod.h5"
-
-
-def differences(a, b, where="body") -> list[str]:
-    """Return the fields in which two values differ, bit for bit, over every field of every dataclass."""
-    if is_dataclass(a):
-        return [d for f in fields(a) for d in differences(getattr(a, f.name), getattr(b, f.name), f"{where}.{f.name}")]
-    if isinstance(a, np.ndarray):
-        same = a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
-        return [] if same else [where]
-    if isinstance(a, tuple):
-        if len(a) != len(b):
-            return [where]
-        return [d for k, pair in enumerate(zip(a, b, strict=True)) for d in differences(*pair, f"{where}[{k}]")]
-    return [] if a == b else [where]
 
 
 @pytest.mark.parametrize("n_q", [0, 1, 5])

@@ -55,7 +55,7 @@ def test_the_command_writes_and_says_what_is_left_out(to, modal_file, tmp_path):
 @pytest.mark.parametrize("to", WRITERS)
 def test_two_exports_are_equal_byte_for_byte(to, tmp_path):
     """No time and no chance in the files; physical formats of a body that has an interface model."""
-    from tests.cms.exchange.exporters.test_matrices_over_interfaces import reduced_bar
+    from tests.cms.exchange.exporters.examples import reduced_bar
 
     body = reduced_bar("left") if to not in FLOATING else cloud_body()[0]
     files = [cms.export_body(body, tmp_path / str(k) / "b.x", to=to, units="m-kg-s") for k in range(2) if not
@@ -211,7 +211,7 @@ def test_files_that_belong_together_appear_together_or_not_at_all(body, tmp_path
 @pytest.mark.parametrize("to", ["mbsim", "mbdyn", "sid_fem", "exudyn", "nastran-op4", "nastran-dmig", "mat"])
 def test_turned_axes_of_interfaces_are_said_to_be_lost(to, tmp_path):
     """Files over B lose what is turned against B, files over the mesh what is turned against the mesh."""
-    from tests.cms.exchange.exporters.test_matrices_over_interfaces import reduced_bar
+    from tests.cms.exchange.exporters.examples import reduced_bar
 
     turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
     body = reduced_bar("left", "right")

@@ -14,20 +14,9 @@ import cms
 from cms.errors import ExportError
 from cms.reduction.interface_model import interface_model
 from fe_models.body.fe_body import Interface
-from fe_models.body.load_cases import LoadCase
 from tests.bodies import bar, with_interfaces
+from tests.cms.exchange.exporters.examples import reduced_bar
 from tests.cms.exchange.exporters.small_bodies import RUBBER
-
-
-def reduced_bar(*names):
-    """A damped bar with a tip load as load case; interfaces by name, all by default."""
-    body = bar(nx=4, material=RUBBER)
-    keep = [interface for interface in body.interfaces if not names or interface.name in names]
-    f = np.zeros(len(body.dofs))
-    f[np.flatnonzero((body.nodes[body.dofs[:, 0], 0] == 1.0) & (body.dofs[:, 1] == 2))] = 0.5
-    body = cms.couple(with_interfaces(body, *keep).with_load_cases(LoadCase("tip", "force", f)))
-    modes = cms.craig_bampton(body, n_modes=3)
-    return cms.reduce(body, modes, damping=cms.RayleighDamping(0.1, 1e-4), geometric=False)
 
 
 @pytest.fixture(scope="module")

@@ -1,14 +1,13 @@
 """MBDyn's .fem file, read as its parser reads it; invariants by the loops of its own source over lumped masses."""
 
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import cms
-from cms.body.geometric_stiffness import GeometricStiffness
+from tests.cms.exchange.exporters.examples import stiffened
 from tests.cms.exchange.exporters.small_bodies import cloud_body
 
 
@@ -23,14 +22,6 @@ def groups_of(text: str) -> dict[int, tuple[list[str], list[float]]]:
             current[0].append(line)
             current[1].extend(float(word) for word in line.split() if word != "REV0")
     return found
-
-
-def stiffened(body):
-    """The body with a geometric stiffness of random symmetric matrices."""
-    rng = np.random.default_rng(8)
-    shapes = {"translation": (3,), "rotation": (3,), "spin": (6,), "interfaces": (len(body.interfaces), 6)}
-    K = {name: rng.normal(size=(*first, body.n_q, body.n_q)) for name, first in shapes.items()}
-    return replace(body, geometric=GeometricStiffness(**{name: k + k.swapaxes(-1, -2) for name, k in K.items()}))
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import cms
 from cms.exchange.programs.sid_fem import DIALECTS
+from tests.cms.exchange.exporters.examples import stiffened
 from tests.cms.exchange.exporters.small_bodies import cloud_body
-from tests.cms.exchange.exporters.test_mbdyn import stiffened
 
 
 def read_sid(text: str, *, column_last: bool) -> dict:

@@ -32,7 +32,7 @@ from cms.linear_algebra.sparse_cholesky.factor import CholeskyFactor
 from fe_models.foundation.tall.on_disk import is_on_disk
 from fe_models.foundation.threads import n_threads
 from tests.bodies import bar
-from tests.cms.linear_algebra.sparse_cholesky.test_factor import grid
+from tests.cms.linear_algebra.sparse_cholesky.examples import grid
 
 
 @pytest.mark.parametrize(

@@ -22,6 +22,7 @@ from fe_models.body.couplings.couplings import couple
 from fe_models.body.couplings.submatrix import PrincipalBlock
 from fe_models.foundation.solver import Solver
 from tests.bodies import bar
+from tests.cms.linear_algebra.solvers.examples import clamped_bar
 from tests.thread_ranks import ThreadRanks
 
 HAS_PARDISO = mkl_runtime() is not None
@@ -41,13 +42,6 @@ def chain(n, *, ends_held):
     if not ends_held:
         diagonal[[0, -1]] = 1.0
     return sp.diags_array([diagonal, np.full(n - 1, -1.0), np.full(n - 1, -1.0)], offsets=[0, 1, -1], format="csc")
-
-
-def clamped_bar():
-    """Stiffness of a solid bar, clamped at x = 0."""
-    body = bar(nx=6, ny=1, nz=1)
-    free = np.flatnonzero(body.nodes[body.dofs[:, 0], 0] > 0)
-    return sp.csc_array(body.K[free][:, free])
 
 
 def random_symmetric(seed, n, n_negative):

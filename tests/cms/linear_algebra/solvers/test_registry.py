@@ -15,7 +15,7 @@ from cms.linear_algebra.solvers.pardiso import mkl_runtime
 from cms.linear_algebra.solvers.registry import DEFAULTS, SOLVERS, solver_of
 from fe_models.foundation.solver import Solver
 from tests.bodies import bar
-from tests.cms.linear_algebra.solvers.test_factorization import clamped_bar
+from tests.cms.linear_algebra.solvers.examples import clamped_bar
 
 
 class DenseFactor:

@@ -26,17 +26,9 @@ from cms.linear_algebra.sparse_cholesky.factor import CholeskyFactor
 from cms.modes.families.fixed_interface import fix_interfaces
 from fe_models.foundation.solver import Solver
 from tests.bodies import bar
+from tests.cms.linear_algebra.sparse_cholesky.examples import grid
 
 ROUNDOFF = 1e-12
-
-
-def grid(n, *, dofs=1):
-    """Laplacian of a cube of n³ nodes, each with some dofs that feel all dofs of its neighbours."""
-    line = sp.diags_array([2.0 * np.ones(n), -np.ones(n - 1), -np.ones(n - 1)], offsets=[0, 1, -1])
-    one = sp.eye_array(n)
-    A = sp.kron(sp.kron(line, one), one) + sp.kron(sp.kron(one, line), one) + sp.kron(sp.kron(one, one), line)
-    block = np.eye(dofs) + 0.1 * np.ones((dofs, dofs))
-    return sp.csc_array(sp.kron(A, block))
 
 
 def clamped_bar(nx=8, ny=3, nz=3):

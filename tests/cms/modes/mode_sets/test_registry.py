@@ -31,7 +31,7 @@ from cms.reduction.reduction import reduce
 from fe_models.body.couplings.couplings import couple
 from fe_models.body.fe_body import FEBody, Interface
 from tests.bodies import bar, beam, with_interfaces
-from tests.cms.modes.families.test_families import BODIES, constrained_spectrum, three_interface_solid
+from tests.cms.modes.families.examples import BODIES, constrained_spectrum, three_interface_solid
 
 LOADS = {"left": {"mass": 1.0, "inertia": 0.01}, "right": {"stiffness": (1e6, 5e5, 2e6), "rotational_stiffness": 1e3}}
 CLASSICAL = {

@@ -21,8 +21,8 @@ from fe_models.elements.beams.sections import Rectangle
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.numbering import Numbering
 from tests.bodies import STEEL, bar, with_interfaces
-from tests.cms.reduction.geometric_stiffness.test_geometric_reduction import SI, bar_of_beams
-from tests.cms.test_frame_conversion import TURNED, uneven_bar
+from tests.cms.examples import TURNED, uneven_bar
+from tests.cms.reduction.geometric_stiffness.examples import SI, bar_of_beams
 from tests.synthetic import synthetic_reduced_body
 
 FRAMES = {

@@ -14,7 +14,7 @@ from cms.reduction.frame_conversion import convert_frame
 from cms.reduction.geometric_stiffness.quadratic_modes import quadratic_modes
 from cms.reduction.reduction import kept_nodes
 from tests.bodies import STEEL, bar
-from tests.cms.reduction.geometric_stiffness.test_geometric_reduction import bar_of_beams, some_bodies
+from tests.cms.reduction.geometric_stiffness.examples import bar_of_beams, some_bodies
 
 
 def without_rigid_motion(points, field):

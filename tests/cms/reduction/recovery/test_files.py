@@ -14,7 +14,7 @@ from cms.cli.app import app
 from cms.errors import RecoveryError
 from cms.reduction.recovery.files import write_recovery
 from cms.reduction.recovery.load_columns import forces_of_loads
-from tests.cms.reduction.recovery.test_matrices import reduced
+from tests.cms.reduction.recovery.examples import reduced
 
 JOB = """
 [body]
@@ -308,7 +308,7 @@ def test_forces_of_a_driven_base_are_those_of_pyyeti():
     force = y[:, rows.table.rows("interface force")]
     assert_allclose(force, found.frc.T, rtol=0, atol=1e-8 * np.abs(found.frc).max())
     net = y[:, rows.table.rows("net force")[:6]]
-    from tests.cms.reduction.recovery.test_matrices import POINT
+    from tests.cms.reduction.recovery.examples import POINT
 
     about = cms.craig_bampton_matrices(body, about=POINT).rigid
     assert_allclose(net, found.frc.T @ about, rtol=0, atol=1e-8 * np.abs(net).max())

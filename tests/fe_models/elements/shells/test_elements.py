@@ -10,6 +10,7 @@ import cms
 import fe_models as fm
 from cms.modes.families.rigid_modes import geometric_rigid_modes
 from fe_models.elements.shells.elements import DRILLING_SHARE
+from tests.fe_models.elements.shells.examples import shell_fields
 from tests.fe_models.small_shells import KINDS, SI, STEEL, distorted, of_nodes, plate, solved
 
 ROUNDOFF = 1e-12
@@ -168,25 +169,6 @@ def test_thin_plates_do_not_lock(kind):
         u = solved(body, load.f, np.union1d(of_nodes(rim, *range(6)), of_nodes(np.arange(len(mesh.nodes)), 0, 1, 5)))
         center = np.flatnonzero(np.abs(mesh.nodes - [5.0, 5.0, 0.0]).max(axis=1) < 1e-9)
         assert_allclose(u[of_nodes(center, 2)], 0.00126532 * 1e4, rtol=0.02)
-
-
-def shell_fields(mesh, u, share):
-    """Displacement at top and bottom of corners, middles of sides and centres of a flat grid of quads, by cell."""
-    cells = mesh.cells["quad"]
-    X, U = mesh.nodes[cells], u.reshape(-1, 6)[cells]
-    Theta, normal = U[:, :, 3:], np.array([0.0, 0.0, 1.0])
-    used = Theta * np.array([1.0, 1.0, share])  # of the rotations in the sides
-    side = [(0, 1), (1, 2), (2, 3), (3, 0)]
-    bulge = np.stack([-np.cross(used[:, j] - used[:, i], X[:, j] - X[:, i]) / 8 for i, j in side], axis=1)
-    middles = np.stack([(U[:, i, :3] + U[:, j, :3]) / 2 for i, j in side], axis=1) + bulge
-    centre = U[:, :, :3].mean(axis=1) + bulge.sum(axis=1) / 2
-    turns = np.concatenate([Theta, np.stack([(Theta[:, i] + Theta[:, j]) / 2 for i, j in side], axis=1)], axis=1)
-    turns = np.concatenate([turns, Theta.mean(axis=1, keepdims=True)], axis=1)
-    values = np.concatenate([U[:, :, :3], middles, centre[:, None]], axis=1)
-    places = np.concatenate(
-        [X, np.stack([(X[:, i] + X[:, j]) / 2 for i, j in side], axis=1), X.mean(axis=1)[:, None]], axis=1
-    )
-    return places, values, np.cross(turns, normal)
 
 
 def test_invariants_through_the_thickness_are_those_of_a_solid_of_the_same_shape_in_the_same_motion():

@@ -12,7 +12,7 @@ import fe_models as fm
 from cms.modes.families.rigid_modes import geometric_rigid_modes
 from fe_models.body.mass_loads import MassLoads
 from fe_models.elements.shells.elements import DRILLING_SHARE
-from tests.fe_models.elements.shells.test_elements import shell_fields
+from tests.fe_models.elements.shells.examples import balanced_state, n_shell_nodes, on_dofs, shell_fields, turned_loads
 from tests.fe_models.small_shells import KINDS, SI, STEEL, of_nodes, solved
 
 ROUNDOFF = 1e-12
@@ -31,32 +31,6 @@ def bent_strip(kind, *, offset=0.04, stiffened=False):
         mesh = replace(mesh, lines=np.stack([middle[:-1], middle[1:]], axis=1), line_sets={"bar": np.arange(6)})
         options["stiffeners"] = {"bar": fm.BeamProperty(fm.Rectangle(0.02, 0.04), STEEL, offset=(0.02, -0.05))}
     return fm.shell_body(mesh, fm.ShellProperty(0.05, STEEL, offset=offset), name="strip", units=SI, **options)
-
-
-def on_dofs(body, forces):
-    """Forces over the dofs of the mesh as forces on those of the body."""
-    return body.recovery.matrix.T @ forces
-
-
-def n_shell_nodes(body):
-    """Nodes of the cells; sections that turn by themselves have dofs beyond theirs."""
-    model = body.element_model
-    return getattr(model, "shell", model).n_nodes
-
-
-def balanced_state(body, seed=1):
-    """A load per mass, nodal forces that balance it, and the static response held at no more than six dofs."""
-    rng = np.random.default_rng(seed)
-    loads = MassLoads(1e3 * rng.normal(size=(1, 3, 3)), 1e3 * rng.normal(size=(1, 3)))
-    of_mass = on_dofs(body, body.element_model.mass_forces(loads))[:, 0]
-    Psi = geometric_rigid_modes(body)
-    nodal = np.zeros(body.n_dof)
-    some = rng.choice(6 * n_shell_nodes(body), 40, replace=False)
-    nodal[some] = -np.linalg.lstsq(Psi[some].T, Psi.T @ of_mass, rcond=None)[0]
-    held = np.concatenate([of_nodes([0], *range(6))])
-    u = solved(body, nodal + of_mass, held)
-    assert_allclose((body.K @ u - nodal - of_mass), 0, rtol=0, atol=1e-8 * np.abs(nodal).max())
-    return loads, nodal, u
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -81,12 +55,6 @@ def test_a_rigid_rotation_turns_the_forces_of_a_body_in_equilibrium(kind, stiffe
     assert_allclose(K[:3], 0, rtol=0, atol=1e-9 * scale)
     assert_allclose(K[3:, 3:], (expected[3:, 3:] + expected[3:, 3:].T) / 2, rtol=0, atol=1e-8 * scale)
     assert np.abs(expected[3:, 3:]).max() > 1e-3 * scale
-
-
-def turned_loads(loads, theta):
-    """theta × the loads per mass."""
-    tilde = np.cross(theta, np.eye(3)).T
-    return MassLoads(tilde @ loads.A, loads.b @ tilde.T)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -14,7 +14,7 @@ from fe_models.elements.shells.geometric import stress_second_moments
 from fe_models.elements.shells.laminate import shell_law
 from fe_models.errors import ShellError
 from tests.bodies import box_mesh
-from tests.fe_models.elements.shells.test_geometric import balanced_state, turned_loads
+from tests.fe_models.elements.shells.examples import balanced_state, turned_loads
 from tests.fe_models.small_shells import KINDS, SI, STEEL, distorted, frequencies, of_nodes, solved
 
 E_1, E_2, NU, G, G_23 = 140e9, 10e9, 0.3, 5e9, 3.5e9

@@ -19,7 +19,7 @@ from fe_models.foundation.tasks.installation import differences, installation
 from fe_models.foundation.tasks.task_map import ProcessError, WorkerError
 from fe_models.foundation.tasks.workers import checked_workers, tasks_of
 from fe_models.foundation.threads import n_threads
-from tests.fe_models.foundation.tasks.test_processes import answer, require_workers_to_end, row
+from tests.fe_models.foundation.tasks.examples import answer, require_workers_to_end, row
 from tests.root import ROOT
 
 pytest.importorskip("distributed")

@@ -9,13 +9,10 @@ from numpy.testing import assert_allclose
 from scipy.linalg import block_diag
 
 from floatframe import (
-    GROUND,
     Channel,
     FlexibleBody,
-    JointForce,
     Marker,
     ModelError,
-    SpringDamper,
     linearize,
     named_state_space,
     static_equilibrium,
@@ -23,7 +20,7 @@ from floatframe import (
     system_modes,
 )
 from floatframe.analyses.relative.coordinate_basis import coordinate_names, dependent_coordinates
-from floatframe.components.mechanisms import double_pendulum, four_bar, rotating_blade, satellite, slider_crank
+from floatframe.components.mechanisms import slider_crank
 from floatframe.engine.compiling.file_frames import motion_of_engine, small_motions_of_file
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.newton_equations import linearized, set_iterate
@@ -34,33 +31,7 @@ from floatframe.engine.tree.topology import tree_of
 from floatframe.engine.tree.tree_motions import coordinate_motions
 from floatframe.model.functions.time_functions import polynomial_of_time
 from floatframe.results.small_motions.joint_rates import coordinate_rows
-from tests.floatframe.engine.tree.mechanisms import beam, falling
-
-
-def held_satellite():
-    """A flexible boom on a free hub, held by springs and dampers in its plane: a free body with modes."""
-    free = satellite(spin=0.0, boom_length=1.0, boom=beam())
-    ends = [(2.0, 0.0, 0.0), (-1.0, 2.0, 0.3), (0.0, -2.0, 1.0), (0.0, 0.4, -2.0)]
-    springs = [
-        SpringDamper(f"spring {k}", Marker(GROUND, position=end), Marker("hub", position=0.1 * np.roll(end, 1)), 40.0,
-                     0.5, free_length=1.5)
-        for k, end in enumerate(ends)
-    ]  # fmt: skip
-    return falling(replace(free, forces=[*free.forces, *springs]))
-
-
-def sprung(system, joint):
-    """The system with a spring and a damper in a joint."""
-    own = JointForce("spring", joint, "angle", stiffness=30.0, free=0.3, damping=2.0)
-    return replace(system, forces=[*system.forces, own])
-
-
-CASES = {  # system and where to stand: at rest, or turning
-    "double pendulum": lambda: sprung(double_pendulum(angles=(-1.4, -1.7), rod=beam()), "hinge 2"),
-    "four-bar": lambda: sprung(falling(four_bar(angle=-1.2, flexible_coupler=beam(0.9))), "main"),
-    "free": held_satellite,
-    "turning": lambda: sprung(rotating_blade(beam(), hub_inertia=0.5, root="start"), "main"),
-}
+from tests.floatframe.analyses.relative.examples import CASES
 
 
 @cache

@@ -24,7 +24,7 @@ from floatframe import (
 )
 from floatframe.engine.tree.topology import tree_of
 from floatframe.model.rotations import euler_parameters_of_rotation_vector
-from tests.floatframe.analyses.relative.test_coordinate_basis import CASES
+from tests.floatframe.analyses.relative.examples import CASES
 from tests.floatframe.engine.tree.mechanisms import MECHANISMS, falling
 from tests.floatframe.model.elements.laws import Jack
 

@@ -7,16 +7,9 @@ from scipy.integrate import solve_ivp
 
 import floatframe as ff
 from floatframe.components.aerodynamics import LiftingSurface
-from floatframe.model.functions.time_functions import polynomial_of_time, smooth_step
 from floatframe.model.rotations import rotation_exp
+from tests.floatframe.components.aerodynamics.examples import NUMBERS, WING, glider, surface
 from tests.floatframe.element_laws import evaluate, marker_motion, placed
-
-NUMBERS = {"area": 12.0, "lift_slope": 5.0, "density": 1.2, "zero_lift": -0.1, "zero_drag": 0.03, "induced_drag": 0.05}
-WING = ff.Marker("glider")
-
-
-def surface(**changes):
-    return LiftingSurface("wing", WING, **(NUMBERS | changes))
 
 
 def answered(v, turn=(0, 0, 0), **changes):
@@ -47,13 +40,6 @@ def test_lift_stays_beyond_its_largest_coefficient_and_there_is_none_at_rest():
     assert answered([10.0, 0, -8.0])[2]["lift coefficient"] == 1.5
     assert answered([10.0, 0, 8.0], most_lift=0.7)[2]["lift coefficient"] == -0.7
     assert not answered([0.0, 0, 0])[0].any()
-
-
-def glider(**changes):
-    body = ff.RigidBody("glider", 500.0, np.eye(3), velocity=(30.0, 0, -1.0))
-    level = ff.ConstantOrientation("level", ff.Marker("ground"), ff.Marker("glider"))
-    wing = surface(factor=smooth_step(0.5, 1.0, 1.0, 0.2), zero_lift=polynomial_of_time([-0.1, 0.02]), **changes)
-    return ff.System([body], [level], [ff.Gravity((0, 0, -9.81))], elements=[wing])
 
 
 def test_a_body_that_keeps_level_glides_as_scipy_says_while_its_lift_fades():

@@ -20,20 +20,10 @@ from floatframe import (
 )
 from floatframe.components.cables import Cable
 from floatframe.results.energy_balance import balance_defect
+from tests.floatframe.components.cables.examples import G, jumper
 from tests.floatframe.finite_differences import assert_tangent_is_exact
 
-G = 9.81
 METHOD = GeneralizedAlpha(0.95, 1e-11)
-
-
-def jumper(**options):
-    """Return a mass of 2 kg at rest 0.5 m below the point from which it hangs on a cable of 1 m."""
-    mass = RigidBody("mass", 2.0, np.eye(3), position=(0, 0, -0.5))
-    guide = PrismaticJoint("guide", Marker(GROUND), Marker("mass"), axis=(0, 0, 1))
-    given = {"stiffness": 400.0, "length": 1.0} | options
-    return System(
-        [mass], [guide], [Gravity((0, 0, -G))], elements=[Cable("rope", [Marker(GROUND), Marker("mass")], **given)]
-    )
 
 
 def test_a_jump_into_a_cable_is_a_fall_and_half_a_wave():

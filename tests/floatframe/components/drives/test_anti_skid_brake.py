@@ -5,30 +5,14 @@ import pytest
 from numpy.testing import assert_allclose
 
 from floatframe import (
-    GROUND,
     GeneralizedAlpha,
-    Marker,
-    RevoluteJoint,
-    RigidBody,
-    System,
     check_element,
     element_motion,
     integrate,
 )
-from floatframe.components.drives import AntiSkidBrake
 from floatframe.errors import ModelError
+from tests.floatframe.components.drives.anti_skid_brake_examples import J, R, bench, brake
 from tests.floatframe.element_laws import evaluate, marker_motion, placed
-
-J, R = 1.5, 0.3
-NUMBERS = {
-    "pressure": 1e7, "gain": 3e-4, "build_rate": 3e7, "release_rate": 1.2e8, "radius": R, "slip": 0.15,
-    "slip_band": 0.05, "reference_deceleration": 8.0, "drop_out": 5.0, "deceleration": 40.0,
-    "deceleration_band": 20.0, "sensor_time": 4e-3, "time_constant": 0.015,
-}  # fmt: skip
-
-
-def brake(**changes):
-    return AntiSkidBrake("brake", Marker(GROUND), Marker("wheel"), **(NUMBERS | changes))
 
 
 def rates(omega, z, **changes):
@@ -61,12 +45,6 @@ def test_below_its_drop_out_and_without_anti_skid_a_locked_wheel_gets_the_pressu
     assert rates(0.0, [0.0, 40.0, 5e6, 5e6], anti_skid=False)[1][2] == 3e7
     assert rates(0.0, [0.0, 40.0, 1.1e7, 5e6], anti_skid=False)[1][2] < 0
     assert rates(0.0, [0.0, 40.0, 1e7, 5e6], anti_skid=False)[1][2] == 0.0
-
-
-def bench(**changes):
-    wheel = RigidBody("wheel", mass=20.0, inertia=np.diag([0.9, J, 0.9]), omega_B=(0, 100.0, 0))
-    hinge = RevoluteJoint("hinge", Marker(GROUND), Marker("wheel"), axis=(0, 1, 0))
-    return System([wheel], [hinge], [], elements=[brake(speed=100.0, **changes)])
 
 
 def test_a_wheel_on_a_bench_stops_by_the_torque_of_its_pressure_and_the_tangent_is_exact():

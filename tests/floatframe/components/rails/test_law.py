@@ -6,25 +6,14 @@ from numpy.testing import assert_allclose
 from scipy.linalg import eig
 
 from floatframe.components.rails.assembly import ContactLaws, Wheel, law_numbers, output_names
-from floatframe.components.rails.contact_search import Pair, rigid_contacts
+from floatframe.components.rails.contact_search import rigid_contacts
 from floatframe.components.rails.irregularities import Irregularities
 from floatframe.components.rails.law import CONTACT_OUTPUTS, WHEEL_OUTPUTS, wheels_on_rails
-from floatframe.components.rails.profile import Profile
-from floatframe.components.rails.standard_profiles import cone
 from floatframe.components.rails.track import Track, curve
 from floatframe.model.rotations import rotation_exp
+from tests.floatframe.components.rails.examples import CONE, NEW
 from tests.floatframe.components.rails.linear_wheelset import Suspended, eigenvalues
 
-
-def circular_rail():
-    """A head of one circle of 300 mm and steep sides, on which a cone meets no change of curvature."""
-    y = np.linspace(-0.0355, 0.0355, 1421)
-    z = np.sqrt(0.3**2 - y**2) - 0.3
-    return Profile("rail", y, z - 12.0 * np.maximum(np.abs(y) - 0.034, 0.0) ** 2 / 0.0015, "circle")
-
-
-NEW = Pair()
-CONE = Pair(wheel=cone(0.05), rail=circular_rail(), inclination=0.0, gauge=1.459)
 LOAD = 6e4
 
 

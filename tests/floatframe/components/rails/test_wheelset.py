@@ -13,7 +13,6 @@ from floatframe import (
     ElementSensor,
     Event,
     GeneralizedAlpha,
-    Gravity,
     Marker,
     ModelError,
     PointForce,
@@ -30,19 +29,10 @@ from floatframe.components.rails.conicity import wheelset_at
 from floatframe.components.rails.contact_search import rigid_contacts
 from floatframe.files.system_file.read_system import read_system
 from floatframe.model.rotations import euler_parameters
+from tests.floatframe.components.rails.examples import CONE, DOWN, I_X, I_Y, LOAD, MASS, NEW, axle
 from tests.floatframe.components.rails.linear_wheelset import Suspended, eigenvalues
-from tests.floatframe.components.rails.test_law import CONE, NEW
 
 METHOD = GeneralizedAlpha(0.9, 1e-9)
-MASS, I_X, I_Y, LOAD = 1500.0, 900.0, 110.0, 6e4
-DOWN = Gravity((0, 0, -2 * LOAD / MASS))  #: the weight of a vehicle, on the axle alone
-
-
-def axle(V, spin, r, p=(1.0, 0.0, 0.0, 0.0), velocity=None, share=1.0):
-    return RigidBody(
-        "axle", mass=share * MASS, inertia=share * np.diag([I_X, I_Y, I_X]), position=r, orientation=p,
-        velocity=(V, 0, 0) if velocity is None else velocity, omega_B=(0, spin, 0),
-    )  # fmt: skip
 
 
 def zero_crossings(x, y):

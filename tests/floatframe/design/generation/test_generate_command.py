@@ -10,24 +10,7 @@ from floatframe.cli.app import app
 from floatframe.design.generation.generate import LANGUAGES
 from floatframe.design.generation.routines import ROUTINES
 from floatframe.files.system_file.read_system import read_system
-
-PENDULUM = """
-[system]
-units = "m-kg-s"
-gravity = [0, 0, -9.81]
-
-[bodies.stick]
-mass = 2.0
-inertia = [[0.01, 0, 0], [0, 0.2, 0], [0, 0, 0.2]]
-position = [0.5, 0, 0]
-
-[joints.pin]
-type = "revolute"
-body_a = "ground"
-body_b = "stick"
-marker_b = [-0.5, 0, 0]
-axis = [0, 1, 0]
-"""
+from tests.floatframe.design.generation.examples import PENDULUM
 
 
 @pytest.fixture

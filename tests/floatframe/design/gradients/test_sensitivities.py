@@ -10,7 +10,7 @@ import floatframe as ff
 from floatframe.components.mechanisms import pendulum, slider_crank
 from floatframe.design.gradients.parameters import value_at, with_value
 from floatframe.model.functions.time_functions import constant, harmonic, piecewise
-from tests.floatframe.model.elements.test_element_states import lifted
+from tests.floatframe.model.elements.element_states_examples import lifted
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffened_body, stiffness
 
 AGREE = 1e-10  #: of direct and adjoint, relative to the largest derivative of an output

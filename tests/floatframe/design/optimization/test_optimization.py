@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from floatframe import ModelError, ResultsError, SystemFileError, optimize, read_design
 from floatframe.cli.app import app
-from tests.floatframe.cli.test_analyses import PENDULUM
+from tests.floatframe.cli.examples import PENDULUM
 
 FOUR_BAR = """
 [system]

@@ -16,7 +16,7 @@ from floatframe.design.studies.study import run_study
 from floatframe.design.studies.study_file import read_study
 from floatframe.files.system_file.read_system import read_system
 from floatframe.results.sensors import measured
-from tests.floatframe.cli.test_analyses import PENDULUM
+from tests.floatframe.cli.examples import PENDULUM
 
 SENSOR = '\n[sensors.tip]\ntype = "velocity"\nbody = "rod"\nmarker = [1, 0, 0]\n'
 STUDY = """

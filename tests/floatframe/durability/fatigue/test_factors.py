@@ -11,7 +11,7 @@ from floatframe.durability.fatigue.factors import (
     technological_size_factor,
 )
 from floatframe.errors import FatigueError
-from tests.floatframe.durability.fatigue.test_places import FILE, folder, mast  # noqa: F401 (fixtures)
+from tests.floatframe.durability.fatigue.examples import FILE
 
 
 def test_roughness_of_a_machined_steel_is_the_printed_one():
@@ -71,7 +71,7 @@ def test_numbers_out_of_range_are_refused(call, message):
         call()
 
 
-def test_a_file_takes_formulas_beside_numbers(folder):  # noqa: F811
+def test_a_file_takes_formulas_beside_numbers(folder):
     """Rm in MPa whatever the unit of the curve; both are named in the notes."""
     text = FILE.format(weld="", places="nodes").replace("survival = 0.9\n", "")
     formulas = """factors = { size = 0.9, surface = { method = "fkm-roughness", roughness = 25, group = "steel" },

@@ -21,7 +21,7 @@ from floatframe.durability.fatigue.report import cycles_at, exceedances
 from floatframe.durability.fatigue.spectral.spectra import spectra_of_history
 from floatframe.durability.fatigue.surface_damage import spectral_damage
 from floatframe.errors import FatigueError
-from tests.floatframe.results.test_sensors import BODY, TEXT
+from tests.floatframe.results.examples import BODY, TEXT
 
 FATIGUE = """
 body = "part.h5"

@@ -8,46 +8,16 @@ from numpy.testing import assert_allclose
 
 import cms
 import fe_models as fm
-from cms.body.modal_file.file import write
-from fe_models.meshes.numbering import NamedSet
 from floatframe import FatigueMaterial, MeanStress, assess, basquin_curve, history_damage, read_fatigue
 from floatframe.durability.fatigue.criteria import Criterion
 from floatframe.durability.fatigue.fatigue_file import FatigueFile
 from floatframe.durability.fatigue.load_blocks import LoadBlock
 from floatframe.durability.fatigue.outputs import csv_of, fatigue_record, nodes_of_places, vtu_of
 from floatframe.durability.fatigue.report import fatigue_html
-from floatframe.durability.fatigue.spectral.spectra import spectra_of_history
 from floatframe.durability.fatigue.surface_damage import spectral_damage
 from floatframe.errors import FatigueError
 from tests.bodies import box_mesh
-from tests.fe_models.small_frames import STEEL
-
-UNITS = cms.unit_system("m-kg-s")
-B, H, LENGTH = 0.02, 0.03, 1.0
-
-
-@pytest.fixture(scope="module")
-def mast():
-    """A beam of four elements, numbered 11 to 14, all its ends and the set ROOT of its first element kept."""
-    mesh = fm.straight_line((0, 0, 0), (LENGTH, 0, 0), 4)
-    ends = [fm.line_interface(mesh, name, fm.NodeSet(name)) for name in ("start", "end")]
-    body = fm.beam_body(
-        mesh, fm.BeamProperty(fm.Rectangle(B, H), STEEL), name="mast", units=UNITS, interfaces=ends,
-    )  # fmt: skip
-    line_of = np.asarray(body.element_model.skin.line_of)
-    root = NamedSet("ROOT", "elements", np.flatnonzero(line_of == 0), 1)
-    body = replace(body, numbering=replace(body.numbering, elements=11 + line_of, sets=(root,)))
-    coupled = cms.couple(fm.element_points(body))
-    return cms.reduce(coupled, cms.craig_bampton(coupled, n_modes=2), frame=cms.NodalFrame("start"))
-
-
-def block(body, n=60, seed=0):
-    return LoadBlock("noise", np.random.default_rng(seed).standard_normal((n, body.n_q)) * 1e-3)
-
-
-def noise(body):
-    return spectra_of_history("noise", np.arange(4096) * 0.01, block(body, 4096).q)
-
+from tests.floatframe.durability.fatigue.examples import FILE, LENGTH, UNITS, B, H, block, noise
 
 CURVE = basquin_curve(1e6, 1e6, 5.0, least_cycles=1.0)
 WEAK = basquin_curve(5e5, 2e6, 3.0, least_cycles=1.0)
@@ -128,26 +98,6 @@ def test_critical_planes_need_a_surface(mast):
     assert (found.nodes >= 0).all()
 
 
-FILE = """
-body = "mast.h5"
-survival = 0.9
-factors = {{ size = 0.9 }}
-[material]
-name = "tube"
-stress_unit = "MPa"
-tensile_strength = 700
-sn = {{ amplitude = 1.0, cycles = 1e6, slope = 5, least_cycles = 1, log_deviation = 0.1 }}
-{weld}
-[criterion]
-mean_stress = "goodman"
-[counting]
-extrapolate = true
-[outputs]
-places = "{places}"
-[[spectra]]
-file = "noise.npz"
-duration = 60.0
-"""
 WELD = """
 [materials.weld]
 stress_unit = "N/mm^2"
@@ -156,14 +106,6 @@ tensile_strength = 500
 factors = {{ weld = 0.5 }}
 sn = {{ amplitude = 0.5, cycles = 2e6, slope = 3, least_cycles = 1, log_deviation = 0.2 }}
 """
-
-
-@pytest.fixture
-def folder(mast, tmp_path):
-    write(mast, tmp_path / "mast.h5")
-    made = noise(mast)
-    np.savez(tmp_path / "noise.npz", frequencies=made.frequencies, spectra=made.spectra)
-    return tmp_path
 
 
 def read(folder, where='sets = ["ROOT"]', places="all") -> FatigueFile:

@@ -27,7 +27,7 @@ from floatframe.results.place_motion import interface_motion
 from floatframe.results.recovery import interface_positions
 from floatframe.results.sensors import Channel
 from floatframe.results.small_motions.small_motions import SmallMotions
-from tests.floatframe.engine.kernels.test_tangent import Iterate, newton_matrices, turned_triad
+from tests.floatframe.engine.kernels.examples import Iterate, newton_matrices, turned_triad
 from tests.floatframe.orders import slope
 from tests.floatframe.point_masses import (
     random_point_masses,

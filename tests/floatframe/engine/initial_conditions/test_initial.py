@@ -27,7 +27,7 @@ from floatframe.engine.kernels.entry import evaluate_and_linearize, rates_of_con
 from floatframe.engine.kernels.work import new_work
 from floatframe.model.rotations import euler_parameters_of_rotation_vector
 from floatframe.model.state import State
-from tests.floatframe.engine.kernels.test_tangent import system_with_everything
+from tests.floatframe.engine.kernels.examples import system_with_everything
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 
 LINK = np.diag([0.1, 0.1, 0.1])

@@ -27,7 +27,7 @@ from floatframe.engine.kernels.memory import Memory, Rows, new_rows
 from floatframe.engine.kernels.model import JointRows, Model
 from floatframe.engine.kernels.records import leaves, measured
 from floatframe.engine.kernels.work import Work, new_work
-from tests.floatframe.engine.kernels.test_tangent import system_with_everything
+from tests.floatframe.engine.kernels.examples import system_with_everything
 
 MODEL = compiled_system(system_with_everything()).model
 

@@ -8,7 +8,7 @@ import floatframe as ff
 from floatframe.components.mechanisms import double_pendulum, slider_crank, spinning_top
 from floatframe.engine.open_equations import Equations, open_equations
 from floatframe.model.functions.time_functions import harmonic
-from tests.floatframe.engine.kernels.test_tangent import system_with_everything
+from tests.floatframe.engine.kernels.examples import system_with_everything
 
 ROUNDOFF = 1e-12
 

@@ -8,25 +8,24 @@ from floatframe.components.bearings import Bearing
 from floatframe.components.clearances import Backlash, BallWithPlay
 from floatframe.components.drives import Pid, PidDrive
 from floatframe.model.functions.time_functions import harmonic
-from tests.floatframe.components.aerodynamics.test_lifting_surface import glider
-from tests.floatframe.components.cables.test_cable import jumper
-from tests.floatframe.components.clearances.test_clearances import pendulum
-from tests.floatframe.components.drives.test_anti_skid_brake import bench
-from tests.floatframe.components.drives.test_controllers import A, B, every_drive, turned
-from tests.floatframe.components.friction.test_bristle_friction import pulled
-from tests.floatframe.components.hydraulics.test_jack import jack
-from tests.floatframe.components.hydraulics.test_oleo_strut import drop
-from tests.floatframe.components.rails.test_law import CONE, NEW
-from tests.floatframe.components.rails.test_wheelset import DOWN as WEIGHT
-from tests.floatframe.components.rails.test_wheelset import axle
-from tests.floatframe.components.wheels.test_wheels_in_motion import DOWN, R0, K, linear, wheel
+from tests.floatframe.components.aerodynamics.examples import glider
+from tests.floatframe.components.cables.examples import jumper
+from tests.floatframe.components.clearances.examples import pendulum
+from tests.floatframe.components.drives.anti_skid_brake_examples import bench
+from tests.floatframe.components.drives.controllers_examples import A, B, every_drive, turned
+from tests.floatframe.components.friction.examples import pulled
+from tests.floatframe.components.hydraulics.jack_examples import jack
+from tests.floatframe.components.hydraulics.oleo_strut_examples import drop
+from tests.floatframe.components.rails.examples import CONE, NEW, axle
+from tests.floatframe.components.rails.examples import DOWN as WEIGHT
+from tests.floatframe.components.wheels.examples import DOWN, R0, K, linear, wheel
 from tests.floatframe.engine.structure_preserving import systems
+from tests.floatframe.engine.structure_preserving.examples import tied
 from tests.floatframe.engine.structure_preserving.parts import Part
-from tests.floatframe.engine.structure_preserving.test_large_unknowns import tied
+from tests.floatframe.model.elements.element_accelerations_examples import pair as heavy_pair
+from tests.floatframe.model.elements.element_states_examples import disc, lifted
+from tests.floatframe.model.elements.expression_element_examples import as_expressions
 from tests.floatframe.model.elements.laws import Ball, Circuit, Disc, Loop, Mount, OnPlane, Spring
-from tests.floatframe.model.elements.test_element_accelerations import pair as heavy_pair
-from tests.floatframe.model.elements.test_element_states import disc, lifted
-from tests.floatframe.model.elements.test_expression_element import as_expressions
 
 __all__ = ["ELEMENT_PARTS"]
 

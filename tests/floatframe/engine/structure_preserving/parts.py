@@ -37,7 +37,7 @@ from floatframe.model.functions.time_functions import cycloidal_spin_up, harmoni
 from floatframe.model.functions.time_functions import table as table_function
 from tests.floatframe.engine.structure_preserving import systems
 from tests.floatframe.engine.structure_preserving.lines import sliding
-from tests.floatframe.integrators.test_conserving import KNOWN, STIFFENED, floating_pair
+from tests.floatframe.integrators.examples import KNOWN, STIFFENED, floating_pair
 from tests.floatframe.point_masses import PointMasses, random_point_masses, reduced_body, stiffened_body, stiffness
 
 __all__ = ["COUPLERS", "FORCES", "METHODS", "PARTS", "Part"]

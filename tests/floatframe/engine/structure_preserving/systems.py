@@ -25,7 +25,7 @@ from floatframe.model.functions.time_functions import cycloidal_spin_up, harmoni
 from floatframe.model.functions.time_functions import table as table_function
 from floatframe.model.rotations import euler_parameters_of_rotation_vector
 from tests.floatframe.engine.structure_preserving.lines import SLIDING
-from tests.floatframe.integrators.test_conserving import AXIS, STIFFENED, floating_pair
+from tests.floatframe.integrators.examples import AXIS, STIFFENED, floating_pair
 from tests.floatframe.model.elements.laws import Creeping, Loop, Mount, OnPlane, Spring
 
 __all__ = ["CONNECTED", "CONTACTS", "FORCED", "HELD_BY_ELEMENTS", "POTENTIALS", "ROLLING", "geared"]

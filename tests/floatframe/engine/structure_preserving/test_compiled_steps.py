@@ -37,7 +37,7 @@ from floatframe.model.functions.time_functions import cycloidal_spin_up, harmoni
 from floatframe.model.functions.time_functions import table as table_function
 from floatframe.model.joints.rows import POINT
 from tests.floatframe.engine.structure_preserving.systems import CONNECTED, CONTACTS, HELD_BY_ELEMENTS, ROLLING
-from tests.floatframe.integrators.test_conserving import floating_pair
+from tests.floatframe.integrators.examples import floating_pair
 from tests.floatframe.point_masses import random_point_masses, stiffened_body, stiffness
 
 SCHEMES = {"momentum": EnergyMomentum(), "decaying": EnergyDecaying(0.3), "variational": Variational()}

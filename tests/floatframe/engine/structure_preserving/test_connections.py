@@ -29,7 +29,7 @@ from tests.floatframe.engine.structure_preserving.systems import (
     ROLLING,
     geared,
 )
-from tests.floatframe.integrators.test_conserving import SCHEMES, energy_defect, floating_pair, momentum_defects
+from tests.floatframe.integrators.examples import SCHEMES, energy_defect, floating_pair, momentum_defects
 
 REFUSED = ROLLING | HELD_BY_ELEMENTS  #: by the variational scheme
 

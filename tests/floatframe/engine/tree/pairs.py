@@ -9,7 +9,7 @@ from floatframe.engine.kernels.work import new_work
 from floatframe.engine.tree.kernels.entry import motion_of_joints, projected
 from floatframe.engine.tree.kernels.tree import new_joint_work
 from floatframe.engine.tree.topology import tree_of
-from tests.floatframe.engine.kernels.test_tangent import turned_triad
+from tests.floatframe.engine.kernels.examples import turned_triad
 from tests.floatframe.point_masses import random_point_masses, stiffened_body, stiffness
 
 

@@ -5,61 +5,14 @@ import pytest
 from numpy.testing import assert_allclose
 
 from floatframe import (
-    ConstantOrientation,
-    CylindricalJoint,
-    FixedJoint,
     JointForce,
-    PlanarJoint,
-    PrismaticJoint,
-    RevoluteJoint,
-    ScrewJoint,
-    SphericalJoint,
-    UniversalJoint,
 )
 from floatframe.engine.initial_conditions.initial import consistent_motion
 from floatframe.engine.kernels.entry import evaluate_and_linearize
 from floatframe.engine.tree.kernels.entry import motion_of_bodies, moved
 from floatframe.engine.tree.topology import tree_of
-from floatframe.model.functions.time_functions import harmonic
+from tests.floatframe.engine.tree.examples import CASES, JOINTS
 from tests.floatframe.engine.tree.pairs import RelativeIterate, pair
-
-AXIS = (0.2, 1.0, 0.3)
-DRIVE = harmonic(0.3, 2.0, 0.4, 0.1)
-SLOW_DRIVE = harmonic(0.03, 2.0, 0.4)
-JOINTS = {  # joint, whether its points may be apart, number of coordinates
-    "fixed": (lambda *ends: FixedJoint("j", *ends), False, 0),
-    "revolute": (lambda *ends: RevoluteJoint("j", *ends, axis=AXIS), False, 1),
-    "prismatic": (lambda *ends: PrismaticJoint("j", *ends, axis=AXIS), True, 1),
-    "cylindrical": (lambda *ends: CylindricalJoint("j", *ends, axis=AXIS), True, 2),
-    "screw": (lambda *ends: ScrewJoint("j", *ends, axis=AXIS, lead=0.7), False, 1),
-    "universal": (lambda *ends: UniversalJoint("j", *ends, axis=(1, 0.1, 0), axis_b=(0, 1, 0)), False, 2),
-    "planar": (lambda *ends: PlanarJoint("j", *ends, axis=AXIS), True, 3),
-    "spherical": (lambda *ends: SphericalJoint("j", *ends), False, 3),
-    "constant orientation": (lambda *ends: ConstantOrientation("j", *ends), True, 3),
-}
-DRIVEN = {
-    "revolute driven": (lambda *ends: RevoluteJoint("j", *ends, axis=AXIS, motions={"angle": DRIVE}), False, 0),
-    "planar driven": (
-        lambda *ends: PlanarJoint("j", *ends, axis=AXIS, motions={"first": DRIVE, "angle": DRIVE}),
-        True,
-        1,
-    ),
-    "universal driven": (
-        lambda *ends: UniversalJoint("j", *ends, axis=(1, 0.1, 0), motions={"angle_b": DRIVE}),
-        False,
-        1,
-    ),
-    "screw driven": (
-        lambda *ends: ScrewJoint("j", *ends, axis=AXIS, lead=0.7, motions={"distance": SLOW_DRIVE}),
-        False,
-        0,
-    ),
-}
-CASES = [
-    pytest.param(*case, swap, id=f"{name}{' swapped' if swap else ''}")
-    for name, case in (JOINTS | DRIVEN).items()
-    for swap in (False, True)
-]
 
 
 def started(make, is_apart, swap, t=0.37):

@@ -32,13 +32,13 @@ from floatframe.components.mechanisms import four_bar, pendulum, slider_crank, s
 from floatframe.engine.tree.partition import partition_of
 from floatframe.model.bodies.mode_choice import with_modes
 from floatframe.model.functions.time_functions import smooth_step
+from tests.floatframe.engine.tree.examples import rubbed_block
 from tests.floatframe.engine.tree.mechanisms import DOWN, MECHANISMS, beam
-from tests.floatframe.engine.tree.test_runs import rubbed_block
+from tests.floatframe.model.elements.element_accelerations_examples import pair
+from tests.floatframe.model.elements.element_states_examples import jack_matrix, lifted
 from tests.floatframe.model.elements.laws import Circuit
-from tests.floatframe.model.elements.test_element_accelerations import pair
-from tests.floatframe.model.elements.test_element_states import jack_matrix, lifted
-from tests.floatframe.model.forces.test_user_forces import pid, wheel
-from tests.floatframe.model.joints.test_coordinate_coupler import wheels
+from tests.floatframe.model.forces.examples import pid, wheel
+from tests.floatframe.model.joints.examples import wheels
 
 
 @pytest.mark.parametrize("name", ["slider-crank", "four-bar", "satellite"])

@@ -9,10 +9,8 @@ from floatframe import (
     EnergyMomentum,
     Event,
     GeneralizedAlpha,
-    JointForce,
     Marker,
     ModelError,
-    PrismaticJoint,
     RevoluteJoint,
     RigidBody,
     SphericalJoint,
@@ -24,8 +22,9 @@ from floatframe import (
 from floatframe.components.mechanisms import chain, double_pendulum, four_bar, slider_crank
 from floatframe.engine.tree.topology import tree_of
 from floatframe.files.system_file.read_system import read_system
+from tests.floatframe.engine.tree.examples import rubbed_block
 from tests.floatframe.engine.tree.mechanisms import DOWN, beam, falling
-from tests.floatframe.simulation.test_restart import StopHereError
+from tests.floatframe.simulation.examples import StopHereError
 
 
 def test_a_stop_is_found_where_it_is_in_both_formulations():
@@ -144,18 +143,6 @@ def test_loops_are_cut_where_the_fewest_constraints_are_left():
     assert parts.coordinates == ("main/angle", "pin/angle", "guide/distance")
     for one, other in zip(tree_of(four_bar()).tree, tree_of(four_bar()).tree, strict=True):
         assert_array_equal(one, other)
-
-
-def rubbed_block():
-    """A block with an arm, pushed along a rail that rubs by its normal force."""
-    block = RigidBody("block", 2.0, np.eye(3), velocity=(1.0, 0.0, 0.0))
-    arm = RigidBody("arm", 0.5, 0.1 * np.eye(3), position=(0.3, 0.0, 0.0), velocity=(1.0, 0.0, 0.0))
-    joints = [
-        PrismaticJoint("rail", GROUND, Marker("block"), axis=(1.0, 0.0, 0.0)),
-        RevoluteJoint("hinge", Marker("block"), Marker("arm", position=(-0.3, 0.0, 0.0))),
-    ]
-    friction = JointForce("rub", "rail", "distance", friction_coefficient=0.2, friction_speed=1e-2)
-    return System([block, arm], joints, [DOWN, friction])
 
 
 def test_friction_by_the_normal_force_keeps_a_joint_a_constraint_and_others_not():

@@ -10,10 +10,10 @@ from floatframe import Marker, SpringDamper
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.initial import consistent_motion
 from floatframe.engine.tree.kernels.entry import moved, newton_matrix, newton_step
-from tests.floatframe.engine.kernels.test_tangent import C_D, C_K, C_M, system_with_everything
+from tests.floatframe.engine.kernels.examples import C_D, C_K, C_M, system_with_everything
+from tests.floatframe.engine.tree.examples import CASES
 from tests.floatframe.engine.tree.pairs import RelativeIterate, pair
-from tests.floatframe.engine.tree.test_kinematics import CASES
-from tests.floatframe.model.elements.test_element_accelerations import Heavy
+from tests.floatframe.model.elements.element_accelerations_examples import Heavy
 
 
 class Point:

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
 from cms.body.modal_file.file import write
-from floatframe import consistent_state, read_results, read_system, static_equilibrium
+from floatframe import UrdfError, consistent_state, read_results, read_system, static_equilibrium
 from floatframe.cli.app import app
 from floatframe.files.importers.read_urdf import read_urdf
 from floatframe.files.importers.robot_system import FlexibleLink, robot_system
@@ -18,9 +18,6 @@ from floatframe.files.importers.system_tables import write_system
 from floatframe.model.bodies.mode_choice import frozen_to_rigid
 from floatframe.model.rotations import rotation_exp, rotation_matrix
 from tests.floatframe.files.importers.flexible_arm import ARM, EI, GRAVITY, LENGTH, RHO_A, TIP_MASS, beam_body
-from tests.floatframe.files.importers.test_urdf_files import UrdfError, gripper
-
-assert gripper  # a fixture
 
 
 def run(*words):

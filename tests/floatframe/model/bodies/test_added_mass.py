@@ -21,7 +21,7 @@ from floatframe import (
     integrate,
     with_masses,
 )
-from tests.floatframe.engine.kernels.test_tangent import turned_triad
+from tests.floatframe.engine.kernels.examples import turned_triad
 from tests.floatframe.point_masses import (
     random_point_masses,
     random_second_order,

@@ -4,19 +4,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe import FlexibleBody, GeneralizedAlpha, Gravity, System, integrate
+from floatframe import GeneralizedAlpha, Gravity, integrate
+from tests.floatframe.model.bodies.examples import spinning
 from tests.floatframe.orders import slope
-from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 
 STEPS = np.array([8e-3, 4e-3, 2e-3, 1e-3])
-N_Q = 4
-
-
-def spinning(forces=()):
-    reduced = reduced_body(random_point_masses(N_Q, 3), stiffness(N_Q, omega=6.0))
-    q = np.array([0.3, -0.2, 0.1, 0.25])
-    body = FlexibleBody("body", reduced, velocity=(0.4, -0.3, 1.0), omega_B=(1.5, -2.0, 1.0), q=q)
-    return System([body], forces=forces)
 
 
 @pytest.fixture(scope="module")

@@ -45,7 +45,7 @@ from floatframe.model.elements import POSITION
 from floatframe.model.functions.time_functions import harmonic
 from floatframe.results.sensors import measured
 from tests.floatframe.model.elements.laws import Circuit, Disc, Jack, Spring
-from tests.floatframe.model.elements.test_public_elements import METHOD
+from tests.floatframe.model.elements.public_elements_examples import METHOD
 
 ENDS = Marker(GROUND), Marker("b", position=(0.1, 0.2, 0.3))
 

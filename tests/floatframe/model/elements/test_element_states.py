@@ -12,12 +12,9 @@ from floatframe import (
     Column,
     ElementSensor,
     GeneralizedAlpha,
-    Gravity,
-    JointForce,
     Marker,
     ModelError,
     PlaceSensor,
-    PrismaticJoint,
     RigidBody,
     RollingDisc,
     SpringDamper,
@@ -34,30 +31,11 @@ from floatframe import (
 )
 from floatframe.results.energy_balance import balance_defect, energy_scale
 from tests.floatframe.finite_differences import assert_tangent_is_exact
-from tests.floatframe.model.elements.laws import Circuit, Disc, Jack, Spring
+from tests.floatframe.model.elements.element_states_examples import DAMPER, MASS, SPRING, G, disc, jack_matrix, lifted
+from tests.floatframe.model.elements.laws import Circuit, Disc, Spring
 from tests.floatframe.orders import slope
 
 METHOD = GeneralizedAlpha(0.9, 1e-11)
-MASS, SPRING, DAMPER, G = 10.0, 1e4, 3.0, 10.0
-
-
-def lifted(**options):
-    """Return a mass on a spring-damper over a jack."""
-    body = RigidBody("b", MASS, np.eye(3))
-    rail = PrismaticJoint("rail", Marker(GROUND), Marker("b"), axis=(0, 0, 1))
-    spring = JointForce("k", "rail", "distance", stiffness=SPRING, damping=DAMPER)
-    return System([body], [rail], [Gravity((0, 0, -G)), spring], elements=[Jack("jack", Marker("b"), **options)])
-
-
-def jack_matrix(jack):
-    """Return A of x' = A x + b, x = (z, v, p)."""
-    return np.array(
-        [
-            [0, 1, 0],
-            [-SPRING / MASS, -DAMPER / MASS, jack.area / MASS],
-            [0, -jack.stiffness * jack.area, -jack.stiffness * jack.leak],
-        ]
-    )
 
 
 def test_a_stiff_pressure_moves_as_an_independent_integration_says():
@@ -180,21 +158,6 @@ def test_a_base_shakes_what_elements_hold_to_the_ground(how):
         found.append(frequency_response(linear, np.array([0.1, 1.0])).values)
     assert np.abs(found[1]).min() > 1e-3
     assert_allclose(found[0], found[1], rtol=1e-7)
-
-
-def disc(**parts):
-    inertia = np.diag([0.5, 1.0, 0.5])
-    tilt = np.array([np.cos(0.15), np.sin(0.15), 0, 0])  # leans by 0.3 rad
-    body = RigidBody(
-        "disc",
-        2.0,
-        inertia,
-        position=(0, 0, 0.8 * np.cos(0.3)),
-        orientation=tilt,
-        velocity=(1.6, 0.1, 0),
-        omega_B=(0.2, 2.0, 0.3),
-    )
-    return System([body], parts.get("joints", ()), [Gravity((0, 0, -9.81))], elements=parts.get("elements", ()))
 
 
 def test_velocities_that_are_held_roll_a_disc_as_the_built_in_joint_does():

@@ -7,15 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from floatframe import (
-    GROUND,
-    FlexibleBody,
-    GeneralizedAlpha,
-    Gravity,
-    Marker,
-    RigidBody,
     SphericalJoint,
-    SpringDamper,
-    System,
     consistent_state,
     element_motion,
     integrate,
@@ -24,41 +16,16 @@ from floatframe import (
 from floatframe.results.energy_balance import balance_defect, energy_scale
 from floatframe.results.sensors import ElementSensor, measured, measurement_of
 from tests.floatframe.finite_differences import assert_tangent_is_exact
-from tests.floatframe.model.elements.laws import FUNCTIONS, Ball, Spring
-from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
-
-METHOD = GeneralizedAlpha(0.9, 1e-11)
-ENDS = (Marker("a", position=(0.1, 0.2, 0.3)), Marker("b", position=(0.3, 0.1, 0.2)))
-HELD = (Marker(GROUND, position=(0, 0, 1)), Marker("a", position=(0.3, 0.3, 0.3)))
-
-
-def two_bodies():
-    inertia = np.diag([0.1, 0.2, 0.25])
-    return [
-        RigidBody("a", mass=2.0, inertia=inertia, position=(1, 0, 0), omega_B=(1, 2, 3)),
-        RigidBody("b", mass=1.0, inertia=inertia, position=(2, 0.3, 0), omega_B=(1, -2, 3)),
-    ]
-
-
-def sprung(elements=(), forces=()):
-    return System(two_bodies(), [], [*forces, Gravity((0, 0, -9.81))], elements=elements)
-
-
-def built_in():
-    return sprung(
-        forces=[
-            SpringDamper("s", *ENDS, stiffness=200.0, damping=1.0, preload=1.0),
-            SpringDamper("g", *HELD, stiffness=300.0, damping=2.0, preload=1.0),
-        ]
-    )
-
-
-def as_elements(**options):
-    return sprung([Spring("s", *ENDS, 200.0, 1.0, 1.0, **options), Spring("g", *HELD, 300.0, 2.0, 1.0, **options)])
-
-
-def places(motion):
-    return np.concatenate([motion.body(name).r for name in motion.body_names], axis=1)
+from tests.floatframe.model.elements.laws import FUNCTIONS, Ball
+from tests.floatframe.model.elements.public_elements_examples import (
+    ENDS,
+    METHOD,
+    as_elements,
+    built_in,
+    hinge,
+    pendulum,
+    places,
+)
 
 
 @pytest.fixture(scope="module")
@@ -78,17 +45,6 @@ def test_a_spring_moves_as_the_built_in_one(oracle, how, is_opposite):
 @pytest.mark.parametrize("is_opposite", [True, False])
 def test_the_tangent_of_a_spring_is_exact(how, is_opposite):
     assert_tangent_is_exact(as_elements(how=how, is_opposite=is_opposite), tolerance=1e-8)
-
-
-def pendulum(joint=(), elements=()):
-    flexible = reduced_body(random_point_masses(3, 3), stiffness(3))
-    body = FlexibleBody("b", flexible, omega_B=(0.3, -0.2, 0.5))
-    return System([body], joint, [Gravity((0, 0, -9.81))], elements=elements)
-
-
-def hinge():
-    place = pendulum().bodies[0].reduced.interfaces[0].position
-    return Marker(GROUND, position=place), Marker("b", "end_a")
 
 
 def test_three_multipliers_hold_a_flexible_pendulum_as_a_spherical_joint_does():

@@ -9,7 +9,7 @@ from numpy.testing import assert_array_equal
 from floatframe import Marker, ModelError, SystemFileError, integrate
 from floatframe.files.system_file.read_system import read_system
 from floatframe.model.elements.registry import element_class
-from tests.floatframe.model.elements.test_public_elements import METHOD, as_elements, places
+from tests.floatframe.model.elements.public_elements_examples import METHOD, as_elements, places
 
 PACKAGE = """
 ELEMENTS = {"spring": "MODULE.springs:Spring", "lost": "MODULE.nowhere:Spring", "none": "MODULE.springs:Marker"}

@@ -8,7 +8,6 @@ from scipy.spatial.transform import Rotation
 from floatframe import (
     GROUND,
     Bushing,
-    FlexibleBody,
     GeneralizedAlpha,
     Gravity,
     Marker,
@@ -24,9 +23,9 @@ from floatframe.engine.kernels.work import new_work
 from floatframe.model.functions.time_functions import table
 from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_matrix
 from floatframe.model.state import State
-from tests.floatframe.engine.kernels.test_tangent import turned_triad
+from tests.floatframe.engine.kernels.examples import turned_triad
 from tests.floatframe.finite_differences import assert_tangent_is_exact
-from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
+from tests.floatframe.model.forces.examples import mounted
 
 TABLE = table(np.linspace(-9, 9, 19), np.linspace(-9, 9, 19) ** 3)
 
@@ -34,14 +33,6 @@ TABLE = table(np.linspace(-9, 9, 19), np.linspace(-9, 9, 19) ** 3)
 def six_by_six(seed, size=1.0):
     A = np.random.default_rng(seed).normal(size=(6, 6))
     return size * (A @ A.T / 6 + 0.5 * np.eye(6))
-
-
-def mounted(**options):
-    flexible = reduced_body(random_point_masses(3, 3), stiffness(3), interfaces=2)
-    bodies = [FlexibleBody("first", flexible), RigidBody("second", 2.0, np.diag([1.0, 1.5, 2.0]), (0.1, -0.2, 0.3))]
-    a = Marker("first", "end_a", triad=turned_triad(4))
-    b = Marker("second", position=(0.4, 0.2, -0.3), triad=turned_triad(5))
-    return System(bodies, [], [Gravity((0.5, -1.0, -9.81)), Bushing("mount", a, b, **options)])
 
 
 @pytest.mark.parametrize("axes", ["a", "b", "half way"])

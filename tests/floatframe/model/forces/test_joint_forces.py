@@ -27,8 +27,8 @@ from floatframe import (
 )
 from floatframe.engine.compiling.system import compiled_system
 from floatframe.model.functions.time_functions import harmonic, smooth_step, table
-from tests.floatframe.engine.kernels.test_tangent import C_K, Iterate, newton_matrices
-from tests.floatframe.model.joints.test_every_joint import AXIS, pair
+from tests.floatframe.engine.kernels.examples import C_K, Iterate, newton_matrices
+from tests.floatframe.model.joints.examples import AXIS, pair
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 
 METHOD = GeneralizedAlpha(0.9, 1e-11)

@@ -18,9 +18,9 @@ from floatframe import (
     integrate,
 )
 from floatframe.model.forces.sphere_contact import exact_dissipation, hertz_stiffness
-from tests.floatframe.engine.kernels.test_tangent import turned_triad
+from tests.floatframe.engine.kernels.examples import turned_triad
 from tests.floatframe.finite_differences import assert_tangent_is_exact
-from tests.floatframe.model.forces.test_bushing import mounted
+from tests.floatframe.model.forces.examples import mounted
 
 R = 0.1
 
@@ -41,7 +41,7 @@ def touching(radius_a=None, *, depth, friction=0.3):
 
 
 def gap_at(system, prepare):
-    from tests.floatframe.engine.kernels.test_tangent import Iterate
+    from tests.floatframe.engine.kernels.examples import Iterate
 
     iterate = Iterate(system, 1)
     prepare(iterate)

@@ -34,16 +34,16 @@ from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.newton_equations import set_iterate
 from floatframe.engine.kernels.entry import evaluate_and_linearize
 from floatframe.engine.kernels.work import new_work
-from floatframe.model.functions.time_functions import harmonic, smooth_step, table
+from floatframe.model.functions.time_functions import harmonic, table
 from floatframe.model.state import State
-from tests.floatframe.engine.kernels.test_tangent import turned_triad
+from tests.floatframe.engine.kernels.examples import turned_triad
 from tests.floatframe.finite_differences import assert_tangent_is_exact
-from tests.floatframe.model.functions.test_expressions import EXPRESSIONS
+from tests.floatframe.model.forces.examples import HUB, J, pid, wheel
+from tests.floatframe.model.functions.examples import EXPRESSIONS
 from tests.floatframe.orders import slope
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 
 METHOD = GeneralizedAlpha(0.9, 1e-11)
-J = 0.7
 
 
 @njit
@@ -120,15 +120,6 @@ def test_kernels_evaluate_an_expression_as_python_does(text):
     assert_allclose(work.users.outputs[0], expected, rtol=1e-14, atol=1e-15)
 
 
-def wheel(force, omega=0.0):
-    body = RigidBody("wheel", 1.0, np.diag([0.5, 0.5, J]), omega_B=(0, 0, omega))
-    forces = force if isinstance(force, list) else [force]
-    return System([body], [RevoluteJoint("hub", GROUND, Marker("wheel"), axis=(0, 0, 1))], forces)
-
-
-HUB = {"phi": JointCoordinate("hub", "angle")}
-
-
 def test_a_spring_by_expression_is_that_of_a_joint_force():
     plain = wheel(JointForce("s", "hub", "angle", stiffness=8.0, damping=0.6), 2.0)
     own = wheel(UserForce("s", HUB, {"phi": "-k*phi - c*phi_dot"}, parameters={"k": 8.0, "c": 0.6}), 2.0)
@@ -146,13 +137,6 @@ def test_a_line_of_force_is_that_of_a_spring():
     first, second = (integrate(System(bodies, [], [f]), METHOD, 1.0, 1e-3) for f in (spring, own))
     assert_allclose(first.body("b").r, second.body("b").r, rtol=0, atol=1e-10)
     assert_allclose(first.body("b").p, second.body("b").p, rtol=0, atol=1e-10)
-
-
-def pid():
-    return UserForce(
-        "pid", HUB, {"phi": "-kp*(phi - aim(t)) - kd*phi_dot - ki*e"}, {"e": "phi - aim(t)"}, {"e": 0.0},
-        {"kp": 40.0, "kd": 4.0, "ki": 30.0}, {"aim": smooth_step(0.0, 1.0, 0.0, 8.0)},
-    )  # fmt: skip
 
 
 def test_a_pid_drives_a_wheel_to_its_aim_against_a_load():

@@ -8,23 +8,17 @@ from numpy.testing import assert_allclose
 
 from floatframe import (
     GROUND,
-    AxialAngle,
-    AxialDistance,
     CoordinateCoupler,
-    CylindricalJoint,
-    FlexibleBody,
     GeneralizedAlpha,
     Gravity,
     JointCoordinate,
     JointForce,
     Marker,
     ModelError,
-    PointDistance,
     PrismaticJoint,
     RevoluteJoint,
     RigidBody,
     System,
-    UniversalJoint,
     integrate,
     mobility,
 )
@@ -32,45 +26,10 @@ from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.initial import consistent_motion
 from floatframe.model.functions.time_functions import harmonic, polynomial_of_time
 from floatframe.results.coordinate_elements import coupler_motion
-from tests.floatframe.engine.kernels.test_tangent import turned_triad
 from tests.floatframe.finite_differences import assert_tangent_is_exact
-from tests.floatframe.model.joints.test_every_joint import AXIS
-from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
+from tests.floatframe.model.joints.examples import coupled_pairs, three_bodies, wheels
 
 METHOD = GeneralizedAlpha(0.9, 1e-11)
-
-
-def three_bodies(joints, coupler):
-    flexible = reduced_body(random_point_masses(3, 3), stiffness(3), interfaces=2)
-    bodies = [
-        FlexibleBody("first", flexible, omega_B=(0.3, -0.2, 0.5), velocity=(0.1, 0.3, -0.2)),
-        RigidBody("second", 2.0, np.diag([1.0, 1.5, 2.0]), (0.1, -0.2, 0.3), omega_B=(-0.4, 0.2, 0.3)),
-        RigidBody("third", 1.0, np.diag([1.0, 1.5, 1.2]), position=(0.3, 1.0, 0.4)),
-    ]
-    return System(bodies, [*joints, coupler], [Gravity((0.5, -1.0, -9.81))])
-
-
-def ends():
-    return (
-        Marker("first", "end_a", triad=turned_triad(4)),
-        Marker("second", position=(0.4, 0.2, -0.3), triad=turned_triad(5)),
-        Marker("third", position=(0.1, 0.2, 0.3), triad=turned_triad(6)),
-    )
-
-
-def coupled_pairs():
-    a, b, c = ends()
-    first = CylindricalJoint("first", a, b, axis=AXIS)
-    second = UniversalJoint("second", b, c, axis=(1, 0.1, 0), axis_b=(0, 1, 0))
-    rail = PrismaticJoint("rail", GROUND, c, axis=AXIS)
-    return {
-        "angle to angle": ([first], [(JointCoordinate("first", "angle"), 2.0), (AxialAngle(b, c, AXIS), -0.7)]),
-        "angle to distance": ([first], [(JointCoordinate("first", "angle"), 2.0),
-                                        (JointCoordinate("first", "distance"), 3.0)]),
-        "cross": ([second], [(JointCoordinate("second", "angle"), 1.0), (JointCoordinate("second", "angle_b"), 1.3)]),
-        "distances": ([rail], [(JointCoordinate("rail", "distance"), 1.0), (PointDistance(a, c), -2.0),
-                               (AxialDistance(a, b, AXIS), 0.4)]),
-    }  # fmt: skip
 
 
 @pytest.mark.parametrize("case", coupled_pairs())
@@ -78,15 +37,6 @@ def test_newton_matrix_is_the_derivative_of_the_residual(case):
     joints, terms = coupled_pairs()[case]
     coupler = CoordinateCoupler("c", terms, harmonic(0.3, 2.0, 0.4, 0.1))
     assert_tangent_is_exact(three_bodies(joints, coupler))
-
-
-def wheels(ratio, terms=None, torque=0.7, inertias=(0.7, 0.3)):
-    bodies = [RigidBody(name, 1.0, np.diag([0.5, 0.5, J])) for name, J in zip("ab", inertias, strict=True)]
-    hubs = [RevoluteJoint(f"hub {name}", GROUND, Marker(name)) for name in "ab"]
-    terms = terms or [(JointCoordinate("hub a", "angle"), 1.0), (JointCoordinate("hub b", "angle"), ratio)]
-    gear = CoordinateCoupler("gear", terms)
-    motor = JointForce("motor", "hub a", "angle", preload=torque)
-    return System(bodies, [*hubs, gear], [motor])
 
 
 def test_a_pair_of_gears_turns_as_one_reduced_inertia():

@@ -6,12 +6,8 @@ from numpy.testing import assert_allclose
 
 from floatframe import (
     GROUND,
-    ConstantOrientation,
-    ConstantVelocityJoint,
     CylindricalJoint,
     DistanceJoint,
-    FixedJoint,
-    FlexibleBody,
     GeneralizedAlpha,
     Gravity,
     Marker,
@@ -23,46 +19,26 @@ from floatframe import (
     ResultsError,
     RevoluteJoint,
     RigidBody,
-    RollingDisc,
     ScrewJoint,
-    SphericalJoint,
     System,
     UniversalJoint,
     consistent_state,
     integrate,
 )
 from floatframe.engine.compiling.system import compiled_system
-from floatframe.engine.initial_conditions.newton_equations import displaced, set_iterate
+from floatframe.engine.initial_conditions.newton_equations import displaced
 from floatframe.engine.kernels.compiler.compilation import entry
 from floatframe.engine.kernels.compiler.structure import kept_table_of
 from floatframe.engine.kernels.connections.connection import write_held_rates
-from floatframe.engine.kernels.entry import as_model, as_work, evaluate_and_linearize, rates_of_constraints
-from floatframe.engine.kernels.work import new_work
+from floatframe.engine.kernels.entry import as_model, as_work, rates_of_constraints
 from floatframe.model.functions.time_functions import harmonic, polynomial_of_time
-from floatframe.model.joints.rows import is_held, is_held_position, is_held_velocity
+from floatframe.model.joints.rows import is_held_position
 from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_exp, rotation_matrix
 from floatframe.results.joint_coordinates import joint_coordinate, joint_coordinates
-from tests.floatframe.engine.kernels.test_tangent import C_K, Iterate, newton_matrices, turned_triad
-from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
+from tests.floatframe.engine.kernels.examples import C_K, Iterate, newton_matrices
+from tests.floatframe.model.joints.examples import AXIS, CASES, JOINTS, held, pair
 
 DRIVE = harmonic(0.3, 2.0, 0.4, 0.1)
-AXIS = (0.2, 1.0, 0.3)
-JOINTS = {  # make(name, a, b), constraints
-    "fixed": (lambda *ends: FixedJoint("j", *ends), 6),
-    "revolute": (lambda *ends: RevoluteJoint("j", *ends, axis=AXIS), 5),
-    "spherical": (lambda *ends: SphericalJoint("j", *ends), 3),
-    "prismatic": (lambda *ends: PrismaticJoint("j", *ends, axis=AXIS), 5),
-    "cylindrical": (lambda *ends: CylindricalJoint("j", *ends, axis=AXIS), 4),
-    "screw": (lambda *ends: ScrewJoint("j", *ends, axis=AXIS, lead=0.7), 5),
-    "planar": (lambda *ends: PlanarJoint("j", *ends, axis=AXIS), 3),
-    "point-on-line": (lambda *ends: PointOnLine("j", *ends, axis=AXIS), 2),
-    "point-on-plane": (lambda *ends: PointOnPlane("j", *ends, axis=AXIS), 1),
-    "universal": (lambda *ends: UniversalJoint("j", *ends, axis=(1, 0.1, 0), axis_b=(0, 1, 0)), 4),
-    "distance": (lambda *ends: DistanceJoint("j", *ends), 1),
-    "constant-velocity": (lambda *ends: ConstantVelocityJoint("j", *ends, axis=AXIS, axis_b=(0, 1, 0.1)), 4),
-    "constant-orientation": (lambda *ends: ConstantOrientation("j", *ends), 3),
-    "rolling-disc": (lambda *ends: RollingDisc("j", *ends, radius=0.8, axis=AXIS, axis_b=(1, 0.1, 0)), 3),
-}
 DRIVEN = {
     "revolute": lambda *ends: RevoluteJoint("j", *ends, axis=AXIS, motions={"angle": DRIVE}),
     "prismatic": lambda *ends: PrismaticJoint("j", *ends, axis=AXIS, motions={"distance": DRIVE}),
@@ -77,22 +53,7 @@ DRIVEN = {
     "screw along": lambda *ends: ScrewJoint("j", *ends, axis=AXIS, lead=0.7, motions={"distance": DRIVE}),
     "distance": lambda *ends: DistanceJoint("j", *ends, motions={"distance": harmonic(0.1, 2.0, 0.4, 1.1)}),
 }  # fmt: skip
-CASES = [pytest.param(make, id=name) for name, (make, _) in JOINTS.items()]
 CASES += [pytest.param(make, id=f"{name} driven") for name, make in DRIVEN.items()]
-
-
-def pair(make, *, is_apart=True):
-    """A flexible and a rigid body with a joint between them, their markers as placed apart (or in one place)."""
-    flexible = reduced_body(random_point_masses(3, 3), stiffness(3), interfaces=2)
-    place = flexible.interface("end_a").position
-    bodies = [
-        FlexibleBody("first", flexible, omega_B=(0.3, -0.2, 0.5), velocity=(0.1, 0.3, -0.2)),
-        RigidBody("second", 2.0, np.diag([1.0, 1.5, 2.0]), (0.1, -0.2, 0.3), position=place,
-                  omega_B=(-0.4, 0.2, 0.3)),
-    ]  # fmt: skip
-    at = np.array([0.4, 0.2, -0.3]) if is_apart else np.zeros(3)
-    joint = make(Marker("first", "end_a", triad=turned_triad(4)), Marker("second", position=at, triad=turned_triad(5)))
-    return System(bodies, [joint], [Gravity((0.5, -1.0, -9.81))])
 
 
 @pytest.mark.parametrize("make", CASES)
@@ -101,19 +62,6 @@ def test_newton_matrix_is_the_derivative_of_the_residual(make):
     iterate.work.state.time[...] = 0.37
     exact, approximate = newton_matrices(iterate)
     assert_allclose(exact, approximate, rtol=0, atol=2e-9 * max(np.abs(approximate).max(), 1 / C_K))
-
-
-def held(system, state, t):
-    """Return what the joint holds, its rate and its second rate at zero acceleration (of velocities: zero)."""
-    model = compiled_system(system).model
-    work = new_work(model)
-    work.state.time[...] = t
-    set_iterate(work, state)
-    evaluate_and_linearize(model, work, 1.0, 0.0, 0.0)
-    rows = is_held(model.rows.kind)
-    rate, bias = (part[rows] for part in rates_of_constraints(model, work))
-    is_velocity = is_held_velocity(model.rows.kind[rows])
-    return work.connections.g[rows].copy(), np.where(is_velocity, bias, rate), np.where(is_velocity, np.nan, bias)
 
 
 @pytest.mark.parametrize("make", CASES)

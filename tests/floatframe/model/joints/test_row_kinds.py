@@ -22,7 +22,7 @@ from floatframe.model.joints.rows import (
 from floatframe.model.rotations import euler_parameters_of_rotation_vector
 from floatframe.model.state import State
 from floatframe.results.small_motions.joint_rates import coordinate_rows
-from tests.floatframe.model.joints.test_every_joint import CASES, pair
+from tests.floatframe.model.joints.examples import CASES, pair
 
 
 def test_the_record_of_a_kind_is_found_by_its_code():

@@ -40,7 +40,7 @@ from floatframe.model.functions.time_functions import polynomial_of_time
 from floatframe.results.joint_coordinates import joint_coordinate
 from floatframe.results.place_motion import interface_motion, point_motion
 from floatframe.results.small_motions.joint_rates import coordinate_rows
-from tests.floatframe.model.joints.test_every_joint import held
+from tests.floatframe.model.joints.examples import held
 
 UNITS = cms.unit_system("m-kg-s")
 LENGTH, RHO_A, EI = 1.0, 1.0, 100.0

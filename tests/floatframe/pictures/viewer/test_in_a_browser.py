@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from floatframe import GeneralizedAlpha, integrate, linearize, static_equilibrium, system_modes, view, view_modes
 from floatframe.results.recovery import nodal_positions
 from tests.cms.browser import browser, opened
-from tests.floatframe.pictures.viewer.test_motion_view import SIZE, swinging
+from tests.floatframe.pictures.viewer.examples import SIZE, swinging
 
 PLACES = """(t) => {
   View.pause(); View.seek(t);

@@ -18,7 +18,6 @@ from floatframe import (
     ResultsError,
     RevoluteJoint,
     RigidBody,
-    SpringDamper,
     System,
     integrate,
     static_equilibrium,
@@ -34,26 +33,10 @@ from floatframe.pictures.film_times import film_times
 from floatframe.results.element_motion import element_motion
 from floatframe.results.place_motion import largest_von_mises, nodal_stress
 from floatframe.results.recovery import nodal_displacements, nodal_positions
-from tests.cms.reduction.geometric_stiffness.test_geometric_reduction import bar_of_beams
+from tests.cms.reduction.geometric_stiffness.examples import bar_of_beams
 from tests.floatframe.model.elements.laws import Spring
+from tests.floatframe.pictures.viewer.examples import SIZE, swinging
 from tests.floatframe.pictures.viewer.pages import ReadPage
-from tests.synthetic import synthetic_reduced_body
-
-SIZE = 4.0  #: of the bodies [m]
-
-
-def swinging(**options):
-    rng = np.random.default_rng(3)
-    reduced = synthetic_reduced_body(n_nodes=60, units="m-kg-s")
-    stress = rng.normal(size=(60, 6, reduced.n_q)) * 1e9
-    reduced = replace(reduced, surface=ConvexHull(reduced.nodes).simplices, stress=stress, **options)
-    arm = FlexibleBody("arm", reduced, omega_B=(0.3, 2.0, 1.0), q=1e-2 * np.ones(reduced.n_q))
-    end = reduced.interfaces[0]
-    inertia = np.diag([0.1, 0.2, 0.1])
-    wheel = RigidBody("wheel", 3.0, inertia, position=(0, 0, 4.0), omega_B=(0, 20.0, 0), shapes=[Wheel(0.5, 0.2)])
-    hinge = RevoluteJoint("hinge", GROUND, Marker("arm", end.name), axis=(0, 1, 0))
-    stay = SpringDamper("stay", Marker("arm", reduced.interfaces[1].name), Marker("wheel"), 400.0, 2.0)
-    return System([arm, wheel], [hinge], [Gravity((0, 0, -9.81)), stay], scene=[Road([(-3, 0, -3), (3, 0, -3)], 2.0)])
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,7 @@ from typer.testing import CliRunner
 
 from cms.body.modal_file.file import write
 from floatframe.cli.app import app
-from tests.floatframe.cli.test_analyses import PENDULUM
-from tests.floatframe.cli.test_commands import FLEXIBLE, RIGID
+from tests.floatframe.cli.examples import FLEXIBLE, PENDULUM, RIGID
 from tests.floatframe.pictures.viewer.pages import ReadPage
 from tests.synthetic import synthetic_reduced_body
 

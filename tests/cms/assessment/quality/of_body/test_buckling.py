@@ -11,7 +11,7 @@ from cms.assessment.quality.of_body.buckling import check_buckling, critical_loa
 from cms.reduction.basis.frames import NodalFrame
 from fe_models.elements.beams.sections import Rectangle
 from tests.bodies import STEEL
-from tests.cms.reduction.geometric_stiffness.test_geometric_reduction import bar_of_beams
+from tests.cms.reduction.geometric_stiffness.examples import bar_of_beams
 
 SECTION = Rectangle(0.02, 0.01)
 EI = STEEL.E * 0.02 * 0.01**3 / 12

@@ -25,7 +25,7 @@ from floatframe.machines import flexible_arm
 from floatframe.model.functions.time_functions import harmonic
 from floatframe.simulation.foreign_units import ForeignUnit
 from tests.floatframe.design.generation.calls import ROUNDOFF, Case, all_charts, puma
-from tests.floatframe.design.generation.test_generate_command import PENDULUM
+from tests.floatframe.design.generation.examples import PENDULUM
 
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 T_END = 0.3
