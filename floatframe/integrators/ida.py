@@ -1,6 +1,7 @@
 """SUNDIALS IDA on the index-reduced equations: another method of another kind, for cross-checks."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from floatframe.integrators.carry import (
     turned_on,
     with_angles,
 )
+from floatframe.integrators.passed_contacts import Stretch, gaps_at, has_gaps, stretches_of_passed_contact
 from floatframe.integrators.remembered_contacts import require_no_remembered_contacts
 from floatframe.model.rotations import euler_parameter_rates
 from floatframe.model.state import State
@@ -101,19 +103,14 @@ class Ida:
         """Advance by n_steps output times, the first of them number `first` from t0; see `carry.Integrator`."""
         compiled = compiled_system(system)
         own = new_work(compiled.model)
-        t = t0 + h * np.arange(first, first + n_steps + 1)
+        t: Array = t0 + h * np.arange(first, first + n_steps + 1, dtype=float)
         made = Motion(compiled, own)
         made.rotations = FollowedRotations(compiled.model, own, float(t[0]), carry)
-        y_0 = flattened(carry.state)
-        solver = solver_class()(
-            made.residual, rtol=self.rtol, atol=self.atol, max_num_steps=MOST_STEPS, linsolver="dense"
-        )
-        asked = t if n_steps > 1 else np.array([t[0], 0.5 * (t[0] + t[1]), t[1]])  # two times ask for every step
-        solution = solver.solve(asked, y_0, made.rates(float(t[0]), y_0))
+        solution = self.solved_past_contacts if has_gaps(compiled) else self.solved
+        reached, message = solution(made, t, flattened(carry.state))
         rows, n_good, failure, has_stopped = [new_rows(compiled.model, 0)], 0, None, False
         made.rotations = FollowedRotations(compiled.model, own, float(t[0]), carry)
-        reached = zip(np.atleast_1d(solution.t), np.atleast_2d(solution.y), strict=True)
-        for k, (at, y) in enumerate(list(reached)[len(asked) - n_steps :], start=first + 1):
+        for k, (at, y) in enumerate(reached, start=first + 1):
             if not np.isfinite(y).all() or abs(at - t[k - first]) > 1e-9 * h:  # it may end with where it failed
                 break
             own.state.time[...] = t[k - first]
@@ -133,9 +130,54 @@ class Ida:
                 rows.append(row)
             n_good += 1
         if n_good < n_steps and not has_stopped:
-            failure = Failure(f"IDA: {made.problem or solution.message}", np.inf)
+            failure = Failure(f"IDA: {made.problem or message}", np.inf)
         carry = replace(carry, n_iterations=carry.n_iterations + made.n_evaluations)
         return carry, joined_rows(rows), n_good, failure
+
+    def solved(self, made: "Motion", t: Array, y_0: Array) -> tuple[list[tuple[float, Array]], str]:
+        """Return times and y at the times but the first, as far as the solver comes, and its message."""
+        solver = self.solver(made)
+        asked = t if len(t) > 2 else np.array([t[0], 0.5 * (t[0] + t[1]), t[1]])  # two times ask for every step
+        solution = solver.solve(asked, y_0, made.rates(float(t[0]), y_0))
+        reached = zip(np.atleast_1d(solution.t), np.atleast_2d(solution.y), strict=True)
+        return list(reached)[len(asked) - len(t) + 1 :], solution.message
+
+    def solved_past_contacts(self, made: "Motion", t: Array, y_0: Array) -> tuple[list[tuple[float, Array]], str]:
+        """Return the same of a system with contacts, step by step, so that none of them is passed over."""
+        compiled, work = made.compiled, new_work(made.compiled.model)
+
+        def gaps(at: float, y: Array) -> Array:
+            return gaps_at(compiled, work, at, state_of(compiled, y), np.zeros(len(work.state.w)))
+
+        reached: list[tuple[float, Array]] = []
+        begin, y, rates, stretches = float(t[0]), y_0, made.rates(float(t[0]), y_0), [Stretch(t[-1])]
+        while len(reached) < len(t) - 1:
+            until, most = stretches.pop(0) if stretches else Stretch(t[-1])
+            until = min(until, t[-1])
+            solver = self.solver(made, max_step=most if np.isfinite(most) else 0.0)
+            solver.init_step(begin, y, rates)
+            while begin < until:
+                result = solver.step(until, method="onestep", tstop=until)
+                if not result.success:
+                    return reached, result.message
+                end = float(result.t)
+                if end <= begin:  # after outputs within a step its end is returned once more
+                    continue
+                both = np.array([y, result.y]), np.array([rates, result.yp])
+                found = stretches_of_passed_contact(gaps, begin, end, *both)
+                if found:
+                    stretches = found
+                    break
+                for time in t[1 + len(reached) :][t[1 + len(reached) :] <= end]:
+                    reached.append((float(time), np.array(solver.step(time, method="normal").y)))
+                begin, y, rates = end, result.y, result.yp
+        return reached, ""
+
+    def solver(self, made: "Motion", **options: float) -> Any:
+        """Return a solver of the residual of a motion."""
+        return solver_class()(
+            made.residual, rtol=self.rtol, atol=self.atol, max_num_steps=MOST_STEPS, linsolver="dense", **options
+        )
 
 
 def solver_class():

@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -31,6 +33,7 @@ from floatframe.integrators.carry import (
     turned_on,
     with_angles,
 )
+from floatframe.integrators.passed_contacts import Stretch, gaps_at, has_gaps, stretches_of_passed_contact
 from floatframe.integrators.remembered_contacts import require_no_remembered_contacts
 from floatframe.model.joints.rows import is_held, is_held_length, is_held_position
 from floatframe.model.rotations import euler_parameters, right_jacobian
@@ -295,27 +298,53 @@ class Motion:
         """Yield time, state, u_dot and w at each time but the first."""
         from scipy.integrate import solve_ivp
 
-        k = 1
+        k, stretches = 1, [Stretch(times[-1])]
+        is_watched, other = has_gaps(self.compiled), new_work(self.model)
         while k < len(times):
+            end, most = stretches.pop(0) if stretches else Stretch(times[-1])
+            end = min(end, times[-1])
             own = self.x[self.of_places.independent], self.rates[self.of_rates.independent]
             y, n_own = np.concatenate([*own, self.z]), len(own[0]) + len(own[1])
             atol = np.minimum(method.atol * np.concatenate([np.ones(n_own), self.z_size]), COUNTED)
             begun = self.t_start, self.rotations.angle.copy(), self.rotations.rate.copy()
             solution = solve_ivp(
-                self.derivative, (self.t_start, times[-1]), y, method=method.method, rtol=method.rtol,
-                atol=atol, t_eval=times[k:], events=self.events(),
+                self.derivative, (self.t_start, end), y, method=method.method, rtol=method.rtol, atol=atol,
+                t_eval=times[k:][times[k:] <= end], events=self.events(), max_step=most, dense_output=is_watched,
             )  # fmt: skip
+            t, y_at, found = self.before_contact(solution, other) if is_watched else (end, y, [])
             self.rotations.begin(*begun)
-            for t, y_at in zip(solution.t, np.transpose(solution.y), strict=True) if len(solution.t) else ():
-                yield (float(t), *self.state_at(float(t), y_at))
+            for at, y_then in zip(solution.t, np.transpose(solution.y), strict=True) if len(solution.t) else ():
+                if at > t:
+                    break
+                yield (float(at), *self.state_at(float(at), y_then))
                 k += 1
-            if solution.status < 0:
+            if found:
+                stretches = found
+            elif solution.status < 0:
                 raise ModelError(solution.message)
-            if solution.status == 1:  # rotations went far, or the choice of coordinates is worn out
+            elif solution.status == 1:  # rotations went far, or the choice of coordinates is worn out
                 t = float(max(events[-1] for events in solution.t_events if len(events)))
                 y_at = next(found[-1] for found in solution.y_events if len(found))
+                stretches = [Stretch(end, most), *stretches]
+            if k < len(times):
                 state, _, _ = self.state_at(t, y_at)
                 self.begin(state, t)
+
+    def before_contact(self, solution: Any, work: Work) -> tuple[float, Array, list[Stretch]]:
+        """Return time, y and the next stretches at the step that passes over a contact; the end if none does."""
+
+        def gaps(t: float, y: Array) -> Array:
+            state, _, w = self.state_at(t, y)
+            return gaps_at(self.compiled, work, t, state, w)
+
+        for a, b in pairwise(solution.sol.ts):
+            y = solution.sol(np.array([a, b])).T
+            rates = np.array([self.derivative(a, y[0]), self.derivative(b, y[1])])
+            found = stretches_of_passed_contact(gaps, float(a), float(b), y, rates)
+            if found:
+                return float(a), y[0], found
+        end = float(solution.sol.ts[-1])
+        return end, solution.sol(end), []
 
     def events(self) -> Sequence[Callable[[float, Array], float]]:
         """Return functions of (t, y) that end a stretch where they pass zero."""

@@ -6,6 +6,7 @@ motion goes on from the state at it with the accelerations of the force after it
 current of a motor) follows the jump in less than the step, the step begins with short parts that grow.
 """
 
+from collections.abc import Sequence
 from math import ceil
 
 import numpy as np
@@ -14,9 +15,10 @@ from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.compiling.time_laws import functions_of_time, parts_of_time
 from floatframe.engine.kernels.memory import Rows
 from floatframe.engine.kernels.work import Work
+from floatframe.errors import ModelError
 from floatframe.integrators import has_fixed_steps
 from floatframe.integrators.carry import Carry, Failure, Integrator
-from floatframe.model.functions.time_switches import switch_times
+from floatframe.model.functions.time_switches import OfTime, switch_times
 from floatframe.model.system import System
 from floatframe.simulation.event_steps import EventWatch
 
@@ -26,6 +28,7 @@ PER_STEP = 4  #: places in a step between which expressions of t are compared
 MOST_PLACES = 1_000_000  #: in a run
 N_PARTS = 10  #: halvings of a step after a jump that states follow faster
 FOLLOWED, FELT = 2.0, 0.05  #: change of a state by its rate at the jump, over its change in the step; over its size
+STEEP = 1.5  #: growth of an expression at half the distance from a pole
 SHORT = 1e-9  #: of a step: what is left out before a jump, and a rest that is none
 
 
@@ -39,13 +42,29 @@ def jump_times(system: System, t_start: float, h: float, n_steps: int) -> list[f
     times = {
         float(t) for each in functions_of_time(system) if not each.is_motion for t in each.function.jumps(0)[0]
     }  # (1)
-    switches = [switch for _, each in parts_of_time(system) for switch in each.parts_of_time().switches]
-    if switches:  # (2)
-        n_places = min(PER_STEP * n_steps, MOST_PLACES) + 1
-        times |= set(switch_times(switches, np.linspace(t_start, t_start + n_steps * h, n_places)))
+    n_places = min(PER_STEP * n_steps, MOST_PLACES) + 1
+    for where, each in parts_of_time(system):  # (2)
+        parts = each.parts_of_time()
+        found = switch_times(parts.switches, np.linspace(t_start, t_start + n_steps * h, n_places))
+        require_bounded(where, parts.values, found, SHORT * h)
+        times |= set(found)
     times |= {float(t) for force in system.forces for t in getattr(force, "knots", ())}  # (3)
     times |= {float(t) for placed in compiled_system(system).laws for t in placed.law.knots}
     return sorted(t for t in times if t_start < t <= t_start + n_steps * h * (1 + 1e-12))
+
+
+def require_bounded(where: str, values: Sequence[OfTime], times: Sequence[float], short: float) -> None:
+    """Raise `ModelError` if an expression has a pole at a switch: it halves, about, with twice the distance from it."""
+    for value in values:
+        for t in times:
+            for side in (-short, short):
+                near, middle, far = np.abs(value(t + side * np.array([1.0, 2.0, 4.0])))
+                if near > STEEP * middle and middle > STEEP * far > 0.0:
+                    raise ModelError(
+                        f"{where}: an expression grows without bound near t = {t:.9g}, where a tangent has a pole or a "
+                        "denominator passes zero; expected a bounded one: limit it, as in min(5, max(-5, tan(t))), or "
+                        "end the run before"
+                    )
 
 
 def jumps_of_steps(system: System, t_start: float, h: float, n_steps: int) -> dict[int, list[float]]:

@@ -53,7 +53,7 @@ from floatframe.components.hydraulics.fluid import Fluid
 from floatframe.components.hydraulics.gas import gas_numbers
 from floatframe.components.hydraulics.nodes import nodes_of, prescribed
 from floatframe.errors import ModelError
-from floatframe.model.elements import ElementLaw, Placed
+from floatframe.model.elements import ElementLaw, GapSpring, Placed
 from floatframe.model.elements.curves import function_numbers
 from floatframe.model.elements.unit_names import in_units
 from floatframe.model.functions.time_functions import TimeFunction
@@ -62,6 +62,7 @@ __all__ = ["circuit_law_of"]
 
 #: pressure difference below which the flow of orifices is laminar, relative to the ambient pressure; default
 TRANSITION = 1e-3
+STOP_STIFFNESS = 10  #: index among the numbers of a cylinder
 
 OUTPUTS = {
     ORIFICE: (("flow", "m^3/s"),),
@@ -69,7 +70,7 @@ OUTPUTS = {
     RESISTANCE: (("flow", "m^3/s"),),
     FLOW: (("flow", "m^3/s"),),
     INERTIA: (("flow", "m^3/s"),),
-    CYLINDER: (("stroke", "m"), ("rate", "m/s"), ("force", "N"), ("leakage", "m^3/s")),
+    CYLINDER: (("stroke", "m"), ("rate", "m/s"), ("force", "N"), ("leakage", "m^3/s"), ("stroke left", "m")),
     ACCUMULATOR: (("oil", "m^3"),),
     PUMP: (("flow", "m^3/s"), ("torque", "N m"), ("speed", "rad/s")),
     SPOOL: (("spool", "1"),),
@@ -347,6 +348,8 @@ def written(made: Builder, placed: Placed, acts: list[str]) -> ElementLaw:
         rows += [len(island), sum(contents), made.fluid.bulk_modulus, *island]
     array[N_ISLANDS], array[ISLANDS] = len(islands), len(array)
     array = np.concatenate([array, rows])
+    stops = {each.name: each.numbers[STOP_STIFFNESS] for each in made.records if each.kind == CYLINDER}
+    gaps = {f"{end} {name}": GapSpring(k) for name, k in stops.items() if k > 0 for end in ("stroke", "stroke left")}
     return ElementLaw(
         function=circuit_law,
         data=array,
@@ -361,6 +364,7 @@ def written(made: Builder, placed: Placed, acts: list[str]) -> ElementLaw:
         energy="energy",
         power_in="power in",
         power_lost="power lost",
+        gaps=gaps,
     )
 
 

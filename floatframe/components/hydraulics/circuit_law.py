@@ -185,6 +185,7 @@ def circuit_law(t, x, z, lam, data, wrench, z_dot, g, seen):
                 wrench[i, m] -= force * e[m]
             leak = data[n + 6] * dp
             seen[s], seen[s + 1], seen[s + 2], seen[s + 3] = stroke, rate, force, leak
+            seen[s + 4] = data[n + 2] - stroke
             seen[total + 1] += leak * (h_a - h_b) + friction * rate + low_lost + high_lost
             seen[total + 2] += low_energy + high_energy
             seen[total + 3] += force * rate

@@ -75,4 +75,4 @@ def oleo_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     seen[6], seen[7], seen[8], seen[9] = gas, oil, friction, stops
     seen[10] = (p_o - p_g) * q + friction * rate + top_lost + bottom_lost
     seen[11] = -force * rate
-    seen[12] = energy + top_energy + bottom_energy
+    seen[12], seen[13] = energy + top_energy + bottom_energy, data[13] - s

@@ -16,7 +16,7 @@ from floatframe.components.hydraulics.fluid import Fluid
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.checked_values import number, unit_vector
-from floatframe.model.elements import Element, ElementLaw, Placed
+from floatframe.model.elements import Element, ElementLaw, GapSpring, Placed
 from floatframe.model.elements.curves import function_numbers
 from floatframe.model.elements.unit_names import in_units
 from floatframe.model.functions.time_functions import NOT_OF_TIME, TimeFunction, constant
@@ -32,7 +32,7 @@ LEAST_GAS = 0.02
 OUTPUTS = (
     ("stroke", "m"), ("rate", "m/s"), ("force", "N"), ("gas pressure", "Pa"), ("oil pressure", "Pa"), ("flow", "m^3/s"),
     ("gas force", "N"), ("oil force", "N"), ("friction", "N"), ("stop force", "N"), ("power lost", "W"),
-    ("power out", "W"), ("energy", "J"),
+    ("power out", "W"), ("energy", "J"), ("stroke left", "m"),
 )  # fmt: skip
 
 
@@ -169,6 +169,7 @@ class OleoStrut(Element):
                 self.charge
                 * (self.gas_volume / (self.gas_volume - self.gas_area * min(s, self.stroke))) ** self.exponent
             ]
+        stop = GapSpring(self.stop_stiffness)
         return ElementLaw(
             function=oleo_law,
             data=[*numbers, LEAST_GAS, *area, *recoil],
@@ -180,4 +181,5 @@ class OleoStrut(Element):
             tangent="complex",
             energy="energy",
             power_lost="power lost",
+            gaps={"stroke": stop, "stroke left": stop},
         )

@@ -1,8 +1,11 @@
 """Times at which an expression jumps as a function of time: comparisons of time-dependent terms, and tables with jumps.
 
 `10 if t < 0.3 else 0` jumps at 0.3, `f(2*t - 1)` where 2 t - 1 passes a jump of f, `sign(sin(50*t))` at every zero of
-the sine. Each is a switch: a function of time that is true or false. Its changes are bracketed between given times and
-found by bisection. A comparison of coordinates depends on the motion, and is not handled here.
+the sine, `min(5, tan(t))` at every pole of the tangent, `atan2(sin(t), cos(t))` once a turn. Each is a switch: a
+function of time that is true or false. Its changes are bracketed between given times and found by bisection. A step
+that is cut where nothing jumps (atan2, where its second argument passes zero below the first axis) loses nothing. A
+denominator that touches zero without passing it, as in `x/abs(x)`, is not found: write `sign(x)`. A comparison of
+coordinates depends on the motion, and is not handled here.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -66,10 +69,13 @@ class TimeParts(NamedTuple):
     switches: tuple[Switch, ...] = ()
     phases: tuple[OfTime, ...] = ()  #: arguments of sines and cosines [rad]
     value: OfTime | None = None  #: value of the last expression; None if it does not depend only on time
+    values: tuple[OfTime, ...] = ()  #: those of all expressions that depend only on time
 
     def __add__(self, other: "TimeParts") -> "TimeParts":  # type: ignore[override]
         """Return the parts of both, with the value of the second."""
-        return TimeParts(self.switches + other.switches, self.phases + other.phases, other.value)
+        return TimeParts(
+            self.switches + other.switches, self.phases + other.phases, other.value, self.values + other.values
+        )
 
 
 def time_parts(tape: Tape, inputs: Mapping[int, OfTime], functions: Sequence[TimeFunction]) -> TimeParts:
@@ -111,10 +117,17 @@ def time_parts(tape: Tape, inputs: Mapping[int, OfTime], functions: Sequence[Tim
                     phases.append(known[0])
                 elif op == LESS:
                     switches.append(partial(is_true, value))
+                elif op == TAN:
+                    switches.append(partial(is_positive, partial(applied, np.cos, known)))
+                elif op == DIVIDE:
+                    switches.append(partial(is_positive, known[1]))
+                elif op == ATAN2:
+                    switches.append(partial(is_behind, known[0], known[1]))
                 elif op == SIGN:
                     switches += [partial(is_beyond, known[0], 0.0), partial(is_below, known[0])]
         values.append(value)
-    return TimeParts(tuple(switches), tuple(phases), values[-1])
+    last = values[-1]
+    return TimeParts(tuple(switches), tuple(phases), last, () if last is None else (last,))
 
 
 def constant_at(c: float, t: Array) -> Array:
@@ -146,6 +159,17 @@ def is_true(value: OfTime, t: Array) -> NDArray[np.bool_]:
 def is_beyond(value: OfTime, level: float, t: Array) -> NDArray[np.bool_]:
     """Return where a function of time has reached a level."""
     return value(t) >= level
+
+
+def is_positive(value: OfTime, t: Array) -> NDArray[np.bool_]:
+    """Return where a denominator is above zero. At a zero it is as just before: times of change are no zeros."""
+    v = value(t)
+    return np.where(v == 0.0, value(np.nextafter(t, -np.inf)), v) > 0.0
+
+
+def is_behind(y: OfTime, x: OfTime, t: Array) -> NDArray[np.bool_]:
+    """Return where a point is in the third quadrant, one of whose sides is the cut of atan2."""
+    return (y(t) < 0.0) & (x(t) < 0.0)
 
 
 def is_below(value: OfTime, t: Array) -> NDArray[np.bool_]:

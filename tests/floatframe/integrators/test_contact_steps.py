@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 import floatframe as ff
 from floatframe import GeneralizedAlpha, Gravity, Marker, RigidBody, System
-from floatframe.components import clearances
+from floatframe.components import clearances, hydraulics, wheels
 from floatframe.model.elements import Element, ElementLaw, GapSpring
 from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_exp
 
@@ -173,6 +173,78 @@ def test_a_contact_that_the_least_step_does_not_resolve_is_refused_by_name(formu
     ) as error:
         ff.integrate(ball_and_plane(0.06), GeneralizedAlpha(0.8, h_min=1e-3), 0.2, 0.01, formulation=formulation)
     assert "give a smaller h_min or h, or a softer contact" in str(error.value)
+
+
+@pytest.mark.parametrize("method", ["BDF", "DOP853"])
+def test_solvers_with_steps_of_their_own_pass_over_no_contact(method):
+    """Nothing changes before the contact, so that a step grows over it; the sphere is beyond the other at both ends."""
+    pass_over_no_contact(ff.RelativeOde(method))
+
+
+def test_ida_passes_over_no_contact():
+    pytest.importorskip("sksundae", reason="the extra 'ida' is not installed")
+    pass_over_no_contact(ff.Ida(1e-5, 1e-7))
+
+
+def pass_over_no_contact(method):
+    """Meet a sphere at 100 m/s, far from the origin; 0.1 % is what tolerances of a step leave of it."""
+    place, n = np.array([300.0, 400.0, -500.0]), np.array([2.0, -1.0, 2.0]) / 3
+    body = RigidBody("b", 1.0, 0.004 * np.eye(3), position=place + 0.95 * n, velocity=-100.0 * n)
+    other = Marker("ground", position=place)
+    contact = ff.SphereContact("c", other, BODY, radius_a=0.05, radius_b=0.05, stiffness=1e7)
+    motion = ff.integrate(System([body], [], [contact]), method, 0.1, 0.05)
+    assert_allclose(motion.body("b").v[-1], 100.0 * n, rtol=0, atol=0.1)
+
+
+@pytest.mark.parametrize("end", ["stroke", "stroke left"])
+@pytest.mark.parametrize("kind", ["strut", "cylinder"])
+def test_stops_of_struts_and_cylinders_give_back_the_speed_in_steps_longer_than_they(kind, end):
+    """A contact of 4.4 ms in steps of 10 ms; what gas and oil do to 20 kg at 3 m/s is below 1e-3 of its energy."""
+    place, axis = np.array([5e3, -2e3, 1e3]), np.array([2.0, -1.0, 2.0]) / 3
+    away = 1.0 if (end == "stroke") == (kind == "strut") else -1.0  # a strut is compressed, a cylinder pushed out
+    body = RigidBody("b", 20.0, np.eye(3), position=place + 0.8 * axis, velocity=3.0 * away * axis)
+    base, fluid = Marker("ground", position=place), hydraulics.Fluid(870.0, 1.4e9, 101325.0)
+    if kind == "strut":
+        element = hydraulics.OleoStrut(
+            "s", base, BODY, fluid, gas_volume=1.0, charge=1.013e5, gas_area=1e-6,
+            oil_area=1e-6, area=1e-3, stroke=0.4, extended_length=1.0, stop_stiffness=1e7, axis=axis,
+        )  # fmt: skip
+    else:
+        jack = hydraulics.Cylinder(
+            "s",
+            base,
+            BODY,
+            head="oil",
+            head_area=1e-6,
+            head_dead_volume=1e-8,
+            stroke=0.4,
+            retracted_length=0.6,
+            stop_stiffness=1e7,
+        )
+        element = hydraulics.Circuit("c", fluid, [jack, hydraulics.Tank("tank", "oil")])
+    slide = ff.PrismaticJoint("p", base, BODY, axis=axis)
+    motion = ff.integrate(System([body], [slide], elements=[element]), GeneralizedAlpha(0.8), 0.1, 0.01)
+    assert_allclose(motion.body("b").v[-1], -3.0 * away * axis, rtol=0, atol=3.0 * OF_CONTACT)
+
+
+@pytest.mark.parametrize("stiffness", [2e5, 2e7])
+def test_a_tyre_that_lands_in_too_long_steps_is_told(stiffness):
+    """20 kg at 3 m/s on a tyre without damping leave at 3 m/s; what does not is told or refused."""
+    n_off = 0
+    for h in (0.01, 0.02, 0.05):
+        for height in (0.03, 0.04, 0.05):
+            body = RigidBody("b", 20.0, np.eye(3), position=(0, 0, 0.3 + height), velocity=(0, 0, -3))
+            tyre = wheels.LinearTyre(
+                "t", GROUND, BODY, radius=0.3, stiffness=stiffness, slip_stiffness=1e4, cornering_stiffness=1e4
+            )
+            try:
+                motion = ff.integrate(System([body], elements=[tyre]), GeneralizedAlpha(0.8), 0.2, h)
+            except ff.ConvergenceError:
+                continue
+            is_off = abs(motion.body("b").v[-1, 2] - 3.0) > 0.05 * 3.0
+            n_off += is_off
+            assert motion.validity or not is_off
+    assert n_off  # so that this test may fail
 
 
 @njit

@@ -125,7 +125,7 @@ def strut(oil_volume):
         seen = {"stroke": s, "rate": v, "force": force, "gas pressure": p_g, "oil pressure": p_o, "flow": q,
                 "gas force": by_gas, "oil force": oil, "friction": seal, "stop force": stops, "power out": -force * v,
                 "power lost": (p_o - p_g) * q + seal * v + top[2] + bottom[2],
-                "energy": energy + top[1] + bottom[1]}  # fmt: skip
+                "energy": energy + top[1] + bottom[1], "stroke left": e.stroke - s}  # fmt: skip
         return two.force(force), rates, seen
 
     def placed(s):

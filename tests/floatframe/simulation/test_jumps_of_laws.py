@@ -2,12 +2,13 @@
 
 import logging
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from numba import njit
 from numpy.testing import assert_allclose
-from scipy.integrate import solve_ivp
+from scipy.integrate import quad, solve_ivp
 
 from floatframe import (
     GROUND,
@@ -17,6 +18,7 @@ from floatframe import (
     JointCoordinate,
     JointForce,
     Marker,
+    ModelError,
     PointForce,
     PrismaticJoint,
     RelativeOde,
@@ -129,6 +131,36 @@ def test_a_pulse_in_a_law_keeps_its_impulse(make):
     """Both jumps lie in one step of 20 ms."""
     for h in (H, 3e-3):
         assert_allclose(speed_along(integrate(make(), GeneralizedAlpha(0.8), END, h)), SPEED, rtol=1e-6)
+
+
+#: expressions that jump where no comparison stands, and when they do
+JUMPING = {
+    "min(3, max(-3, tan(40*(t - 0.0131) + pi/2)))": [0.0131, 0.0131 + np.pi / 40],
+    "min(3, max(-3, 0.01/(t - 0.0131)))": [0.0131],
+    "min(3, max(-3, 0.01/(0.0131 - t)))": [0.0131],
+    "atan(0.002/(t - 0.0131))": [0.0131],
+    "atan2(0.0131 - t, -0.1 - t)": [0.0131],
+    "atan2(sin(60*t), cos(60*t))": [np.pi / 60],
+}
+
+
+@pytest.mark.parametrize("text", JUMPING)
+def test_cuts_of_atan2_poles_of_tan_and_of_quotients_end_steps(text):
+    """The impulse beside a quadrature that knows where the expression jumps. Steps over a kink err by h²."""
+    own = {name: getattr(np, name) for name in ("sin", "cos", "tan", "pi")}
+    own |= {"min": min, "max": max, "atan": np.arctan, "atan2": np.arctan2}
+    ends = [0.0, *JUMPING[text], END]
+    impulse = sum(
+        quad(lambda t: eval(text, own | {"t": t}), a, b, epsabs=1e-10, limit=200)[0] for a, b in pairwise(ends)
+    )
+    motion = integrate(user_force(text), GeneralizedAlpha(0.8), END, 5e-4)
+    assert_allclose(MASS * speed_along(motion), impulse, rtol=0, atol=8e-5)
+
+
+@pytest.mark.parametrize("text", ["tan(40*t)", "1/(0.0131 - t)", "1e-9*tan(40*t)", "min(5, tan(40*t))"])
+def test_an_expression_that_grows_without_bound_is_refused(text):
+    with pytest.raises(ModelError, match=r"forces.push: an expression grows without bound near t = 0\.0"):
+        integrate(user_force(text), GeneralizedAlpha(0.8), END, H)
 
 
 @pytest.mark.parametrize(
