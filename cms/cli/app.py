@@ -35,6 +35,10 @@ def job_command(
         list[str] | None,
         typer.Option(help="Cards that carry mass or stiffness and are to be left out, by name; repeatable."),
     ] = None,
+    mass: Annotated[
+        str | None,
+        typer.Option(help="Mass of all elements: consistent, lumped, or 'as the deck'; default: that of solids alone."),
+    ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Job file to write.")] = None,
 ) -> None:
     """Write the complete job of a deck: materials, sections, masses, springs, couplings, supports, loads.
@@ -48,7 +52,7 @@ def job_command(
     """
     from cms.cli.job import DeckRequest, write_job
 
-    write_job(DeckRequest(deck, output, units, program, tuple(density or ()), tuple(leave_out or ())))
+    write_job(DeckRequest(deck, output, units, program, tuple(density or ()), tuple(leave_out or ()), mass))
 
 
 @app.command("frame")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from cms.cli.console import output_path, print_table, say
 from cms.errors import JobError
+from cms.jobs.deck_tables import DECK_MASSES
 from cms.jobs.decks.job_text import JobRequest, job_text
 from fe_models.foundation.units import UNIT_SYSTEMS
 from fe_models.foundation.words import nearest, quoted
@@ -23,6 +24,7 @@ class DeckRequest:
     program: str | None
     densities: tuple[str, ...]
     leave_out: tuple[str, ...]
+    mass: str | None = None
 
 
 def write_job(request: DeckRequest) -> None:
@@ -32,14 +34,17 @@ def write_job(request: DeckRequest) -> None:
     if request.units is None or request.units not in UNIT_SYSTEMS:
         what = "missing; a deck does not say its units" if request.units is None else f"unknown {quoted(request.units)}"
         raise JobError(f"--units: {what}{nearest(request.units or '', UNIT_SYSTEMS)}")
+    if request.mass not in (None, *DECK_MASSES):
+        raise JobError(f"--mass: unknown {quoted(request.mass)}{nearest(request.mass, DECK_MASSES)}")
     path = output_path(request.output, request.deck.with_suffix(".toml"), JobError, overwrite_of=[request.deck])
     deck = read_deck(request.deck, program=request.program)
-    rows = deck.ledger.rows()
-    if rows:
-        print_table("Not taken over from the deck", ("name", "count>", "consequence"), rows)
-    asked = JobRequest(request.units, densities_of(request.densities), request.leave_out)
+    asked = JobRequest(request.units, densities_of(request.densities), request.leave_out, request.mass)
     relative = os.path.relpath(request.deck.resolve(), path.resolve().parent)
-    text = job_text(deck, asked, Path(relative).as_posix())
+    try:
+        text = job_text(deck, asked, Path(relative).as_posix())
+    finally:  # the table explains a refusal too
+        if rows := deck.ledger.rows():
+            print_table("Not taken over from the deck", ("name", "count>", "consequence"), rows)
     path.write_text(text, encoding="utf-8")
     say(f"wrote {path}")
 

@@ -40,10 +40,10 @@ def body_of_deck(job: Job, path: Path, stages: Stages, on_report: Callable[[Any]
     from fe_models.meshes.mesh import FACE_TYPES
 
     with stages("read deck"):
-        deck = read_deck(path)
+        deck = read_deck(path, program=job.body.program)
         raw = with_centres(deck.mesh)
     with stages("assemble"):
-        parts, meshes = _parts(job, path, raw, on_report)
+        parts, meshes = _parts(job, path, raw, deck.lumped, on_report)
         means = _mean_interfaces(job, raw)
         constraints = _constraints(job, raw, besides=set(means.values()))
         joined = join(
@@ -67,7 +67,7 @@ def body_of_deck(job: Job, path: Path, stages: Stages, on_report: Callable[[Any]
 
 
 def _parts(
-    job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], None] | None
+    job: Job, path: Path, raw: "RawMesh", lumped: frozenset[str], on_report: Callable[[Any], None] | None
 ) -> "tuple[list[Part], list[Mesh]]":
     """Return the bodies of solids, shells, lines and attachments at single nodes; and the meshes of the solids."""
     from fe_models.assembly.join import Part
@@ -79,7 +79,11 @@ def _parts(
     for body, mesh in _solids(job, path, by_row, on_report):
         parts.append(Part(body, np.asarray(mesh.node_numbers)))
         meshes.append(mesh)
-    parts += [*_shells(job, path, by_row, on_report), *_lines(job, path, by_row, on_report), *_rods(job, path, by_row)]
+    if job.body.mass != "as the deck":
+        lumped = frozenset(("lines", "shells", "rods") if job.body.mass == "lumped" else ())
+    parts += _shells(job, path, by_row, "shells" in lumped, on_report)
+    parts += _lines(job, path, by_row, "lines" in lumped, on_report)
+    parts += _rods(job, path, by_row, "rods" in lumped)
     attached = _attached(job, raw)
     return [*parts, *([] if attached is None else [attached])], meshes
 
@@ -105,7 +109,7 @@ def _solids(
         for group in table.cells:
             if group != "all":
                 _require_group(raw, f"solids.{name}.cells", group)
-            rules.setdefault((table.integration, table.mass), {})[group] = material
+            rules.setdefault((table.integration, _solid_mass(job, table.mass)), {})[group] = material
     units = unit_system(job.body.units)
     is_alone = len(rules) == 1 and not job.shells and not job.sections and not job.rods
     for (integration, mass), of_group in rules.items():
@@ -133,14 +137,24 @@ def _solids(
         yield body, mesh
 
 
+def _solid_mass(job: Job, of_table: str) -> str:
+    """Return the mass of a table [solids.NAME]; [body] mass may ask for lumped mass, or for none."""
+    if job.body.mass == "lumped":
+        return "lumped"
+    return "consistent" if job.body.mass == "consistent" and of_table == "lumped" else of_table
+
+
 def _is_linked(job: Job) -> bool:
     return bool(job.links or job.couplings or job.equations or job.springs)
 
 
-def _shells(job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], None] | None) -> "Iterable[Part]":
+def _shells(
+    job: Job, path: Path, raw: "RawMesh", is_lumped: bool, on_report: Callable[[Any], None] | None
+) -> "Iterable[Part]":
     """Yield a body of the shells, or several if shells lie on the same nodes."""
     from cms.jobs.shell_body import shell_properties_of
     from fe_models.assembly.join import Part
+    from fe_models.assembly.lumped import lumped_shells
     from fe_models.checks.shell_report import report_shell
     from fe_models.elements.shells.body import shell_body
     from fe_models.elements.shells.quality import WARP_LIMIT
@@ -158,10 +172,14 @@ def _shells(job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], Non
         if on_report is not None:
             on_report(report)
         report.raise_for_errors(accept=job.body.accept if is_alone else (*job.body.accept, "parts", "transition"))
+        given, masses = mine["all"] if groups is None else mine, []
+        if is_lumped:
+            given, masses = lumped_shells(mesh, given)
         body = shell_body(
             mesh,
-            mine["all"] if groups is None else mine,
+            given,
             name=name,
+            point_masses=masses,
             units=unit_system(job.body.units),
             warp_limit=180.0 if "warped" in job.body.accept else WARP_LIMIT,
         )
@@ -186,10 +204,13 @@ def _names(name: str, layers: list[Any]) -> list[str]:
     return [name] if len(layers) == 1 else [f"{name} {k}" for k in range(1, len(layers) + 1)]
 
 
-def _lines(job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], None] | None) -> "Iterable[Part]":
+def _lines(
+    job: Job, path: Path, raw: "RawMesh", is_lumped: bool, on_report: Callable[[Any], None] | None
+) -> "Iterable[Part]":
     """Yield a body of the beams, or several if beams lie on the same nodes."""
     from cms.jobs.attachments_of_job import properties_of
     from fe_models.assembly.join import Part
+    from fe_models.assembly.lumped import lumped_beams
     from fe_models.checks.frame_report import report_frame
     from fe_models.elements.beams.body import beam_body
     from fe_models.meshes.cells.line_cells import line_mesh_from_raw
@@ -206,11 +227,14 @@ def _lines(job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], None
         if on_report is not None:
             on_report(report)
         report.raise_for_errors(accept=job.body.accept if is_alone else (*job.body.accept, "parts"))
-        body = beam_body(mesh, mine["all"] if groups is None else mine, name=name, units=unit_system(job.body.units))
+        given, masses = mine["all"] if groups is None else mine, []
+        if is_lumped:
+            given, masses = lumped_beams(mesh, given)
+        body = beam_body(mesh, given, name=name, units=unit_system(job.body.units), point_masses=masses)
         yield Part(body, np.asarray(mesh.node_numbers))
 
 
-def _rods(job: Job, path: Path, raw: "RawMesh") -> "Iterable[Part]":
+def _rods(job: Job, path: Path, raw: "RawMesh", is_lumped: bool) -> "Iterable[Part]":
     """Yield a body of the rods, or several if rods lie on the same nodes."""
     from fe_models.assembly.join import Part
     from fe_models.assembly.rods import Rod, rod_body
@@ -227,7 +251,7 @@ def _rods(job: Job, path: Path, raw: "RawMesh") -> "Iterable[Part]":
         assert groups is not None  # rods must name their lines
         mesh = line_mesh_from_raw(chosen_cells(raw, ("line",), groups), path, "", groups)
         mine = {group: rods[group] for group in groups}
-        body = rod_body(mesh, mine, name=name, units=unit_system(job.body.units))
+        body = rod_body(mesh, mine, name=name, units=unit_system(job.body.units), is_lumped=is_lumped)
         yield Part(body, np.asarray(mesh.node_numbers))
 
 

@@ -12,8 +12,18 @@ from fe_models.foundation.components import MOTION_COMPONENTS as COMPONENTS
 from fe_models.foundation.toml_file import Table, choice, is_no_number
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["CouplingSection", "EquationSection", "RodSection", "SolidSection", "check_deck"]
+__all__ = [
+    "DECK_MASSES",
+    "DECK_PROGRAMS",
+    "CouplingSection",
+    "EquationSection",
+    "RodSection",
+    "SolidSection",
+    "check_deck",
+]
 
+DECK_PROGRAMS = ("calculix", "abaqus")  #: whose decks have the same suffix
+DECK_MASSES = ("consistent", "lumped", "as the deck")
 Name = Annotated[str, StringConstraints(min_length=1)]
 
 
@@ -107,6 +117,9 @@ def check_deck(job: Any) -> None:
         "equations": job.equations,
     }
     if job.body.deck is None:
+        for key in ("mass", "program"):
+            if getattr(job.body, key) is not None:
+                raise ValueError(f"body.{key}: belongs to a whole deck; give [body] deck, or remove it")
         for name, given in tables.items():
             if given:
                 raise ValueError(f"{name}: belong to a whole deck; give [body] deck, or remove the tables")

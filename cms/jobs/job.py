@@ -19,7 +19,15 @@ from cms.jobs.beam_tables import (
     numbers,
 )
 from cms.jobs.damping_table import DampingSection
-from cms.jobs.deck_tables import CouplingSection, EquationSection, RodSection, SolidSection, check_deck
+from cms.jobs.deck_tables import (
+    DECK_MASSES,
+    DECK_PROGRAMS,
+    CouplingSection,
+    EquationSection,
+    RodSection,
+    SolidSection,
+    check_deck,
+)
 from cms.jobs.reduction_table import ReductionSection, mode_set_options, named_interfaces
 from cms.jobs.shell_tables import ShellSection, check_shells
 from cms.jobs.tables.material_table import MaterialSection
@@ -166,6 +174,14 @@ class BodySection(Table):
     lines: Path | None = Field(None, description="the path of a table of lines, for beams")
     plane: choice("plane", lambda: tuple(PLANES)) | None = Field(  # type: ignore[valid-type]
         None, description=f"the plane beams or decks deform in, one of {', '.join(PLANES)}; default: space"
+    )
+    mass: choice("mass", lambda: DECK_MASSES) | None = Field(  # type: ignore[valid-type]
+        None,
+        description="for a deck: consistent, lumped, or as the deck, of all elements; default: solids by their tables "
+        "(as the deck), others consistent",
+    )
+    program: choice("program", lambda: DECK_PROGRAMS) | None = Field(  # type: ignore[valid-type]
+        None, description="for a deck (.inp): calculix (default) or abaqus, by which elements have lumped mass"
     )
     part: PartSection | None = Field(None, description="a table {number, of or at, axis}: one part of the mesh alone")
     units: choice("unit system", lambda: tuple(UNIT_SYSTEMS)) = Field(  # type: ignore[valid-type]

@@ -29,8 +29,8 @@ class Rod:
     area: float  #: [m²]
 
 
-def rod_body(mesh: LineMesh, rods: Mapping[str, Rod], *, name: str, units: Units) -> FEBody:
-    """Return the body of the rods of a truss, with three translations at each node and consistent mass.
+def rod_body(mesh: LineMesh, rods: Mapping[str, Rod], *, name: str, units: Units, is_lumped: bool = False) -> FEBody:
+    """Return the body of the rods of a truss, with three translations at each node.
 
     Parameters
     ----------
@@ -40,6 +40,8 @@ def rod_body(mesh: LineMesh, rods: Mapping[str, Rod], *, name: str, units: Units
         Material and area of each group of lines.
     name, units
         Name and unit system of the body.
+    is_lumped
+        Whether half of the mass of a rod is at each end; False: consistent mass (2).
 
     Raises
     ------
@@ -66,7 +68,8 @@ def rod_body(mesh: LineMesh, rods: Mapping[str, Rod], *, name: str, units: Units
     E, rho = (np.array([getattr(rod.material, key) for rod in used]) for key in ("E", "rho"))
     signs = np.array([[1.0, -1.0], [-1.0, 1.0]])
     K = np.einsum("n,ab,ni,nj->naibj", E * A / L, signs, t, t)  # (1)
-    M = np.einsum("n,ab,ij->naibj", rho * A * L / 6, np.array([[2.0, 1.0], [1.0, 2.0]]), np.eye(3))  # (2)
+    shares = np.diag([3.0, 3.0]) if is_lumped else np.array([[2.0, 1.0], [1.0, 2.0]])
+    M = np.einsum("n,ab,ij->naibj", rho * A * L / 6, shares, np.eye(3))  # (2)
     n_nodes = len(mesh.nodes)
     dofs = (3 * mesh.lines[:, :, None] + np.arange(3)).reshape(-1, 6)
     volumes = np.zeros(n_nodes)

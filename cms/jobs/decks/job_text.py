@@ -27,6 +27,7 @@ class JobRequest:
     units: str  #: unit system of the numbers of the deck
     densities: Mapping[str, float]  #: densities of materials that have none, by material; "" for all such materials
     leave_out: tuple[str, ...] = ()  #: entries of the ledger with mass or stiffness that are left out intentionally
+    mass: str | None = None  #: "consistent", "lumped" or "as the deck" for all elements; None: the default of jobs
 
 
 def job_text(deck: Deck, request: JobRequest, deck_path: str) -> str:
@@ -62,6 +63,11 @@ def job_text(deck: Deck, request: JobRequest, deck_path: str) -> str:
         "body": {"name": deck.path.stem, "deck": deck_path, "units": request.units},
         "materials": _materials(deck, request),
     }
+    if request.mass is not None:
+        tables["body"]["mass"] = request.mass
+        if deck.program == "abaqus":
+            tables["body"]["program"] = deck.program
+    _note_mass(deck, request.mass)
     if deck.plane is not None:
         tables["body"]["plane"] = ("yz", "zx", "xy")[deck.plane]
     tables |= _sections(deck) | _attached(deck)
@@ -87,6 +93,19 @@ def job_text(deck: Deck, request: JobRequest, deck_path: str) -> str:
         along = "" if support.axes is None else " along its own axes"
         head.append(f"# The deck holds {held}{along} at the interface {support.name}; here the body is free.")
     return "\n".join(head) + "\n\n" + toml_text({key: value for key, value in tables.items() if value})
+
+
+def _note_mass(deck: Deck, mass: str | None) -> None:
+    """Note in the ledger which elements have another mass than the program of the deck gives them."""
+    for kind in ("lines", "shells", "rods"):
+        count = len(getattr(deck, kind))
+        lumps, is_lumped = kind in deck.lumped, mass == "lumped" or (mass == "as the deck" and kind in deck.lumped)
+        if count and lumps != is_lumped:
+            here, there = ("consistent", "lumps it") if lumps else ("lumped", "does not lump it")
+            why = f'mass is {here} here, the deck {there}; --mass "as the deck" takes it so'
+            deck.ledger.note(f"mass of {kind}", why, count=count)
+    if any(solid.mass == "lumped" for solid in deck.solids) and mass == "consistent":
+        deck.ledger.note("mass of solids", "mass is consistent here, the deck lumps it", count=len(deck.solids))
 
 
 def sections_of(deck: Deck) -> list[SolidSection | ShellSection | LineSection | RodSection]:

@@ -28,6 +28,7 @@ __all__ = [
     "determinate_rows", "frame_condition",
 ]  # fmt: skip
 
+NO_INERTIA = 1e-10  #: moment of inertia about an axis, relative to the largest one, below which there is none
 RANK_TOLERANCE = 1e-8  #: smallest pivot of the held dofs: a lever arm divided by the extent of the nodes
 Axes = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 
@@ -123,8 +124,8 @@ def frame_condition(body: FEBody, frame: Frame | HeldFrame) -> FrameCondition:
     center = np.array([rigid_mass[1, 5], rigid_mass[2, 3], rigid_mass[0, 4]]) / mass
     Psi_R = geometric_rigid_modes(body, origin=center)
     M_Psi_R = body.M @ Psi_R
+    factor = cholesky_of_inertia(body.name, Psi_R.T @ M_Psi_R)
     if isinstance(frame, TisserandFrame):
-        factor = cholesky_of_inertia(body.name, Psi_R.T @ M_Psi_R)
         return FrameCondition(
             placed("tisserand", frame, center),
             lambda columns: la.cho_solve(factor, inner(M_Psi_R, columns)),
@@ -268,11 +269,24 @@ def determinate_rows(points: Array, components: IntArray, where: str) -> IntArra
 
 
 def cholesky_of_inertia(name: str, rigid_mass: Array) -> tuple[Array, bool]:
-    """Factorise the rigid-body mass matrix about the centre of mass, (6, 6)."""
-    scale = np.sqrt(np.abs(np.diag(rigid_mass)))
-    if (scale == 0).any() or np.linalg.eigvalsh(rigid_mass / np.outer(scale, scale))[0] < 1e-10:
+    """Factorise the rigid-body mass matrix about the centre of mass, (6, 6), or its moments of inertia, (3, 3).
+
+    Raises
+    ------
+    BodyError
+        If the body has no moment of inertia about some axis. No frame can move with such a body, because its rotation
+        about that axis is undetermined.
+    """
+    turns = np.sqrt(np.abs(np.diag(rigid_mass)[-3:]))
+    scale = np.concatenate([np.sqrt(np.diag(rigid_mass)[:-3]), np.maximum(turns, NO_INERTIA * turns.max())])
+    is_point = not turns.any()
+    values, axes = (np.zeros(1), np.eye(6)) if is_point else np.linalg.eigh(rigid_mass / np.outer(scale, scale))
+    if values[0] < NO_INERTIA:
+        axis = np.zeros(3) if is_point else (axes[:, 0] / scale)[-3:]
+        words = "any axis" if is_point else f"the axis {np.round(axis / np.linalg.norm(axis), 3).tolist()}"
         raise BodyError(
-            f"body {name!r}: has no moment of inertia about some axis; a Tisserand frame needs all "
-            "three, take a nodal frame"
+            f"body {name!r}: has no moment of inertia about {words} through its centre of mass, as where all "
+            "masses lie on one line; no frame can turn with it: give masses an inertia (CONM2 I11 to I33, [masses.NAME]"
+            " inertia), or the beams a density"
         )
     return la.cho_factor(rigid_mass)

@@ -21,7 +21,7 @@ from fe_models.foundation.units import Units
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.mesh_numbering import line_numbering
 
-__all__ = ["beam_body"]
+__all__ = ["beam_body", "line_orientations"]
 
 
 def beam_body(
@@ -71,7 +71,7 @@ def beam_body(
     sections = tuple(section_of(item) for item in used)
     geometry = line_geometry(
         mesh,
-        _orientations(mesh, used, of_line),
+        line_orientations(mesh, used, of_line),
         np.array([item.offset for item in used]).reshape(-1, 2)[of_line],
     )
     elements = Elements(geometry, used, sections, of_line)
@@ -163,7 +163,7 @@ def _node_volumes(
     return volumes if volumes.any() else None
 
 
-def _orientations(mesh: LineMesh, used: tuple[BeamProperty, ...], of_line: IntArray) -> Array:
+def line_orientations(mesh: LineMesh, used: tuple[BeamProperty, ...], of_line: IntArray) -> Array:
     """Return the vector towards y of every line from the mesh, else from its property, else NaN, (n_lines, 3)."""
     own = [(np.nan,) * 3 if item.orientation is None else item.orientation for item in used]
     of_property = np.array(own, dtype=float).reshape(-1, 3)[of_line]

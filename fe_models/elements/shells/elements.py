@@ -207,6 +207,13 @@ class ShellCells:
         points, w = flat_quadrature(self.kind, STRAIN_DEGREE[self.kind])
         return np.asarray(jacobians(flat_shape(self.kind, points).gradients, self.planes.xy)[1] @ w)
 
+    def corner_masses(self) -> Array:
+        """Return ∫ N_i rho t dA of each corner, (n, c) [kg], with the bilinear or linear N_i."""
+        points, w = flat_quadrature(self.kind, MASS_DEGREE[self.kind])
+        shape = flat_shape(self.kind, points)
+        _, det = jacobians(shape.gradients, self.planes.xy)
+        return np.asarray(self.by_law(lambda law: law.mass, slice(None))[:, None] * ((w * det) @ shape.values))
+
     def mass_matrices(self) -> Array:
         """Return consistent mass matrices with rotary inertia, (n, 6 c, 6 c)."""
         return np.concatenate([self.slices(rows).mass_matrices() for rows in self.chunks()])

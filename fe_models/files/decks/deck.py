@@ -202,4 +202,5 @@ class Deck:
     loads: tuple[Load, ...] = ()
     rods: tuple[RodSection, ...] = ()
     plane: int | None = None  #: axis across the plane in which the deck holds all of its points; None: space
+    lumped: frozenset[str] = frozenset()  #: kinds of elements whose mass the program lumps: "lines", "shells", "rods"
     is_plain_mesh: bool = False  #: nodes, elements and their sets alone, such as a mesher writes

@@ -90,8 +90,6 @@ def _solid_section(here: str, block: DeckBlock, draft: Draft) -> None:
 def _rods(name: str, block: DeckBlock, draft: Draft, elements: IntArray) -> None:
     """Take the area of trusses; CalculiX and Abaqus both have 1 where none is given."""
     area = numbers(block.lines[0])[0] if block.lines else 1.0
-    if draft.program == "abaqus":
-        draft.ledger.note("T3D2", "consistent mass, where Abaqus lumps it", count=len(elements))
     draft.rods.append(RodSection(draft.cell_group(name, elements), _material_of(block, draft), area))
 
 

@@ -205,4 +205,5 @@ def _finished(path: Path, draft: Draft) -> Deck:
         supports,
         tuple(draft.loads),
         tuple(draft.rods),
+        lumped=frozenset(("rods",) if draft.program == "abaqus" else ()),
     )

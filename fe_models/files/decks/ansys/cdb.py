@@ -60,6 +60,7 @@ class _Draft:
     #: material -> label -> values by their place in the table of temperatures
     constants: dict[int, dict[str, dict[int, float]]] = field(default_factory=dict)
     keyopts: dict[int, dict[int, int]] = field(default_factory=dict)  #: number of the type -> KEYOPT -> value
+    is_lumped: bool = False  #: LUMPM,ON
     held: dict[int, set[int]] = field(default_factory=dict)
     forces: dict[int, Array] = field(default_factory=dict)
 
@@ -164,6 +165,8 @@ def _command(name: str, words: list[str], draft: _Draft, line: int) -> None:
         draft.constants.setdefault(int(words[2]), {})[words[1].upper()] = {1: float(words[3])}
     elif name in ("KEYOP", "KEYOPT") and len(words) > 3 and words[1].isdigit():
         draft.keyopts.setdefault(int(words[1]), {})[int(words[2])] = int(float(words[3] or 0))
+    elif name == "LUMPM":
+        draft.is_lumped = words[1].upper() == "ON" or (words[1].isdigit() and words[1] != "0")
     elif name == "SFE" and len(words) > 3 and words[3].upper() == "PRES":
         draft.ledger.note(name, "pressure on faces: no load case of a deck has it", line=line)
     elif name == "D" and words[1].isdigit():
@@ -201,6 +204,7 @@ def _deck(path: Path, draft: _Draft) -> Deck:
         group = f"mat_{row[0]}_solid{kind}" + ("" if _plain_type(draft, row[1]) else f"_type_{row[1]}")
         integration, mass, different = SOLIDS[kind]
         integration = _integration(draft, row[1], kind) or integration
+        mass = "lumped" if draft.is_lumped else mass
         if different:
             draft.ledger.note(f"SOLID{kind}", different)
         if row[4] and any(label in draft.constants.get(row[0], {}) for label in ORTHOTROPIC):

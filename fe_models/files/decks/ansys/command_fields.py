@@ -19,7 +19,7 @@ COMMANDS = {
     "D": "NODE LAB VALUE~ VALUE2~ NEND! NINC~ LAB2! LAB3! LAB4! LAB5! LAB6!",
     "F": "NODE LAB VALUE VALUE2~ NEND! NINC~ MESHFLAG~",
     "SFE": "ELEM~ LKEY~ LAB KVAL~ ...",
-    "LUMPM": "KEY=0",
+    "LUMPM": "KEY",
     "ALPHAD": "VALUE^", "BETAD": "VALUE^", "DMPRAT": "RATIO^", "DMPSTR": "COEFF^", "DMPSTRUCT": "COEFF^",
     "MDAMP": "STLOC~ V1^ V2^ V3^ V4^ V5^ V6^",
 }  # fmt: skip

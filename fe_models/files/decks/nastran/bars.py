@@ -98,10 +98,6 @@ def read_bars(model: NastranModel, known: Card, cards: list[Card]) -> None:
         )
     for note in (*shape.notes, "inertia of torsion is that of the section; Nastran's has none"):
         model.ledger.note(cards[0].name, note, count=len(cards))
-    if model.is_lumped:
-        model.ledger.note(
-            cards[0].name, "mass is consistent here, the deck lumps it (no PARAM,COUPMASS)", count=len(cards)
-        )
 
 
 def line_of_ends(model: NastranModel, card: Card) -> Array:

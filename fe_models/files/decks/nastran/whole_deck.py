@@ -90,6 +90,7 @@ def _deck(path: Path, model: NastranModel, included: dict[str, str]) -> Deck:
         path, "nastran", mesh, model.ledger, model.materials, tuple(model.solids), tuple(model.shells),
         tuple(model.lines), tuple(model.masses), tuple(model.springs), tuple(model.rigid), tuple(model.couplings),
         tuple(model.equations), tuple(model.supports), tuple(model.loads), plane=model.plane,
+        lumped=frozenset(("lines", "shells") if model.is_lumped else ()),
     )  # fmt: skip
 
 

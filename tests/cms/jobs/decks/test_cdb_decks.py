@@ -88,7 +88,6 @@ def test_damaged_files_are_refused(tmp_path, old, new, words):
     [
         ("ET,        1,186", "ET,        1,181", "40 element 181: this element is not known here"),
         ("EXTOPT,ATTR", "CE,1,0,2,UX,1,3,UX,-1\nEXTOPT,ATTR", "1 CE "),
-        ("EXTOPT,ATTR", "LUMPM,ON\nEXTOPT,ATTR", "1 LUMPM .*: KEY = ON: this field is not taken over"),
         ("EXTOPT,ATTR", "SWGEN,1\nEXTOPT,ATTR", "1 SWGEN .*: this command is not known here"),
         ("EXTOPT,ATTR", "KEYOP,1,6,1\nEXTOPT,ATTR", r"40 KEYOPT\(6\) = 1 of SOLID186"),
         ("EXTOPT,ATTR", "KEYOP,1,3,1\nEXTOPT,ATTR", r"40 KEYOPT\(3\) = 1 of SOLID186"),

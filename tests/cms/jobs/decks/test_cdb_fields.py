@@ -85,7 +85,7 @@ READ = {
     "ET": {"ITYPE": None, "ENAME": "185"}, "KEYOP": {"ITYPE": None, "KNUM": "3", "VALUE": "0"},
     "KEYOPT": {"ITYPE": None, "KNUM": "3", "VALUE": None}, "MP": {"LAB": "GXY", "MAT": None, "C0": ".2"},
     "MPDATA": {"LAB": "EY", "MAT": None, "STLOC": None}, "D": {"NODE": "2", "LAB": "UY"},
-    "F": {"NODE": "3", "LAB": "FZ", "VALUE": "2."}, "SFE": {"LAB": None}, "LUMPM": {},
+    "F": {"NODE": "3", "LAB": "FZ", "VALUE": "2."}, "SFE": {"LAB": None}, "LUMPM": {"KEY": "1"},
     "ALPHAD": {}, "BETAD": {}, "DMPRAT": {}, "DMPSTR": {}, "DMPSTRUCT": {}, "MDAMP": {},
 }  # fmt: skip
 

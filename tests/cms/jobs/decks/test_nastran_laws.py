@@ -8,6 +8,8 @@ from scipy.ndimage import label
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import spsolve
 
+import cms
+from cms.reduction.basis.frames import frame_condition
 from tests.cms.jobs.decks.nastran_bodies import (
     GA,
     GB,
@@ -452,3 +454,21 @@ def test_a_planar_truss_is_a_body_whose_points_turn_rigidly_out_of_the_plane(tmp
     assert len(found) == 8 + 3
     assert_allclose(found[6:], expected, rtol=1e-9)
     assert np.abs(found[:6]).max() < 1e-9 * found[-1]
+
+
+@pytest.mark.parametrize("frame", [cms.TisserandFrame(), cms.BuckensFrame(), cms.NodalFrame(at="support_123456")])
+@pytest.mark.parametrize("axis", [(1.0, 0.0, 0.0), (0.6, 0.48, 0.64)])
+def test_masses_on_one_line_are_refused_with_the_axis(tmp_path, frame, axis):
+    """Light beams between point masses: no moment of inertia about their line; a small one is enough."""
+    points = [np.array([3.0, 1.0, 2.0]) + k * np.array(axis) for k in range(4)]
+    text = "".join(f"GRID,{k},,{','.join(map(repr, x.tolist()))}\n" for k, x in enumerate(points, start=1))
+    text += "".join(f"CONM2,{10 + k},{k},,10.,,,,\n,INERTIA\n" for k in range(1, 5))
+    text += "".join(f"CBAR,{k},1,{k},{k + 1},.1,-.3,1.\n" for k in range(1, 4)) + SECTION + "MAT1,1,7.+10,,.33\n"
+    text += "SPC1,1,123456,1\n"
+    bare, _ = body_of(tmp_path, text.replace("INERTIA", "0."), is_coupled=True)
+    words = "|".join(str(np.round(sign * np.array(axis), 3).tolist()) for sign in (1, -1)).replace("-0.0", "-?0.0")
+    words = words.replace("[", r"\[").replace("]", r"\]").replace(".", r"\.")
+    with pytest.raises(ValueError, match=f"no moment of inertia about the axis ({words})"):
+        frame_condition(bare, frame)
+    enough, _ = body_of(tmp_path, text.replace("INERTIA", "1.-3,0.,1.-3,0.,0.,1.-3"), is_coupled=True)
+    assert frame_condition(enough, frame).center == pytest.approx(np.mean(points, axis=0))
