@@ -19,6 +19,7 @@ from fe_models.foundation.words import nearest
 from fe_models.meshes.numbering import Numbering
 
 if TYPE_CHECKING:
+    from fe_models.elements.beams.attachments import PointMass
     from fe_models.assembly.constraints import Constraint
     from fe_models.assembly.join import Joined, Part
     from fe_models.body.material import AnyMaterial
@@ -172,7 +173,8 @@ def _shells(
         if on_report is not None:
             on_report(report)
         report.raise_for_errors(accept=job.body.accept if is_alone else (*job.body.accept, "parts", "transition"))
-        given, masses = mine["all"] if groups is None else mine, []
+        given: Any = mine["all"] if groups is None else mine
+        masses: "list[PointMass]" = []
         if is_lumped:
             given, masses = lumped_shells(mesh, given)
         body = shell_body(
@@ -227,7 +229,8 @@ def _lines(
         if on_report is not None:
             on_report(report)
         report.raise_for_errors(accept=job.body.accept if is_alone else (*job.body.accept, "parts"))
-        given, masses = mine["all"] if groups is None else mine, []
+        given: Any = mine["all"] if groups is None else mine
+        masses: "list[PointMass]" = []
         if is_lumped:
             given, masses = lumped_beams(mesh, given)
         body = beam_body(mesh, given, name=name, units=unit_system(job.body.units), point_masses=masses)
