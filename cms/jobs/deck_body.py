@@ -19,10 +19,10 @@ from fe_models.foundation.words import nearest
 from fe_models.meshes.numbering import Numbering
 
 if TYPE_CHECKING:
-    from fe_models.elements.beams.attachments import PointMass
     from fe_models.assembly.constraints import Constraint
     from fe_models.assembly.join import Joined, Part
     from fe_models.body.material import AnyMaterial
+    from fe_models.elements.beams.attachments import PointMass
     from fe_models.meshes.cells.raw_mesh import RawMesh
     from fe_models.meshes.mesh import Mesh
 
@@ -174,7 +174,7 @@ def _shells(
             on_report(report)
         report.raise_for_errors(accept=job.body.accept if is_alone else (*job.body.accept, "parts", "transition"))
         given: Any = mine["all"] if groups is None else mine
-        masses: "list[PointMass]" = []
+        masses: list[PointMass] = []
         if is_lumped:
             given, masses = lumped_shells(mesh, given)
         body = shell_body(
@@ -230,7 +230,7 @@ def _lines(
             on_report(report)
         report.raise_for_errors(accept=job.body.accept if is_alone else (*job.body.accept, "parts"))
         given: Any = mine["all"] if groups is None else mine
-        masses: "list[PointMass]" = []
+        masses: list[PointMass] = []
         if is_lumped:
             given, masses = lumped_beams(mesh, given)
         body = beam_body(mesh, given, name=name, units=unit_system(job.body.units), point_masses=masses)
