@@ -105,10 +105,12 @@ class RelativeGeneralizedAlpha:
 
         compiled, tree = compiled_system(system), tree_of(system).tree
         model, kept = compiled.model, kept_of(work, compiled.model, tree)
-        if kept.after is not carry or work.solver.c_k == 0.0:  # a run that goes on from a file begins so too
+        begun = self.prepared(system, carry, h, t0 + first * h)
+        goes_on = kept.after is carry and begun.u_dot is carry.u_dot  # longer steps begin with other accelerations
+        if not goes_on or work.solver.c_k == 0.0:  # a run that goes on from a file begins so too
             kept.joints.is_known[...] = 0
             kept.tangent.n_known[...] = 0
-        carry = self.prepared(system, carry, h, t0 + first * h)
+        carry = begun
         memory = memory_of(carry)
         memory.a[:] = carry.a
         rows = new_rows(model, (first + n_steps) // every - first // every)
