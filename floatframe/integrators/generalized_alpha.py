@@ -280,7 +280,6 @@ class GeneralizedAlpha:
         """Say why a step failed."""
         from floatframe.engine.kernels.generalized_alpha import (
             INACCURATE,
-            MOST_TURN,
             SINGULAR_BODY,
             SINGULAR_CONNECTION,
             STOPPED,
@@ -310,11 +309,9 @@ class GeneralizedAlpha:
             )
             return Failure(words, excess)
         if status == TURNED:
-            name, turn = compiled.body_names[index], float(np.linalg.norm(work.state.theta[index]))
-            words = (
-                f"body {name!r} turns by {turn:.3g} rad in a step, with a joint away from its axis of turning: "
-                f"expected at most {MOST_TURN:g} rad, beyond which joints can give it energy; choose a smaller h, "
-                'joint coordinates (formulation = "relative"), EnergyMomentum, or the frame of the body on the axis'
+            words = words_of_turn(compiled, work, index)
+            words += (
+                ', joint coordinates (formulation = "relative"), EnergyMomentum, or the frame of the body on the axis'
             )
             return Failure(words, excess)
         if status == STOPPED:
@@ -394,6 +391,17 @@ def mass_weights(model: Model) -> Array:
         parts = [np.full(3, model.body_types.mass[t]), np.diag(model.body_types.J0[t]), modal_diagonals(model, i, MASS)]
         result[model.bodies.u0[i] : model.bodies.u0[i + 1]] = np.concatenate(parts)
     return result
+
+
+def words_of_turn(compiled: CompiledSystem, work: Work, body: int) -> str:
+    """Say that a body turns too far in a step."""
+    from floatframe.engine.kernels.generalized_alpha import MOST_TURN
+
+    turn = float(np.linalg.norm(work.state.theta[body]))
+    return (
+        f"body {compiled.body_names[body]!r} turns by {turn:.3g} rad in a step, with a joint away from its axis of "
+        f"turning: expected at most {MOST_TURN:g} rad, beyond which joints can give it energy; choose a smaller h"
+    )
 
 
 def rows_closed_by_positions(model: Model, stabilized: bool) -> NDArray[np.bool_]:

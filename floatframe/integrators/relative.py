@@ -4,6 +4,7 @@ import weakref
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
@@ -18,9 +19,8 @@ from floatframe.engine.tree.kernels.tree import JointWork, TangentWork, Tree, ne
 from floatframe.engine.tree.topology import tree_of
 from floatframe.errors import ModelError
 from floatframe.integrators.carry import Carry, Failure, Integrator, carry_of, memory_of, one_step_of, started_anew
-from floatframe.integrators.generalized_alpha import LONGER, GeneralizedAlpha
+from floatframe.integrators.generalized_alpha import LONGER, GeneralizedAlpha, rows_closed_by_positions, words_of_turn
 from floatframe.integrators.relative_ode import RelativeOde
-from floatframe.model.joints.rows import is_held_position
 from floatframe.model.state import State
 from floatframe.model.system import System
 
@@ -52,7 +52,7 @@ class RelativeGeneralizedAlpha:
     h_min: float | None = None  #: least step, to which one that fails is divided [s]; None as in `GeneralizedAlpha`
     #: alpha_m, alpha_f, beta, gamma in place of those that follow from rho_inf
     parameters: tuple[float, float, float, float] | None = None
-    stabilized: bool = True  #: of `GeneralizedAlpha`; joint coordinates take no notice of it
+    stabilized: bool = True  #: hold velocities of joints that close loops as well as positions
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parameters", self.absolute.parameters)
@@ -120,6 +120,7 @@ class RelativeGeneralizedAlpha:
             coefficients=self.absolute.coefficients, t0=t0, h=h, first=first, n_steps=n_steps, every=every,
             tolerance=self.tolerance, max_iterations=self.max_iterations, length=compiled.length,
             most_error=self.error_tolerance or 0.0, h_min=self.absolute.least_step(h, compiled),
+            stabilized=int(self.stabilized),
         )  # fmt: skip
         after = carry_of(memory, carry.n_iterations + int(work.counted.iterations) - iterations)
         kept.after = after
@@ -142,19 +143,23 @@ class RelativeGeneralizedAlpha:
         begun = method.filtered(compiled, carry, h, t, full=False)
         a, rates = joint_accelerations(compiled, tree, carry, begun, h)
         a, u_dot = a + (alpha_m - alpha_f) * h * rates, begun.u_dot
-        if is_held_position(compiled.model.rows.kind)[tree.kept_row >= 0].any():
+        rows = rows_closed_by_positions(compiled.model, self.stabilized)[tree.kept_row >= 0]
+        if rows.any():
             begun = method.filtered(compiled, carry, h, t, full=True)
             now, rates = joint_accelerations(compiled, tree, carry, begun, h)
             way = 0.5 * now + ((alpha_m - alpha_f) / 2 + beta) * h * rates
-            carry = shifted(system, carry, way, h, method.coefficients, t)
+            carry = shifted(system, carry, way, h, method.coefficients, t, rows)
         return replace(carry, u_dot=u_dot, a=a, h=h, h_next=h)
 
     def explain(self, system: System, work: Work, outcome: tuple, h: float) -> Failure | None:
         """Say why a step failed; None if none did."""
+        from floatframe.engine.kernels.generalized_alpha import TURNED
         from floatframe.engine.tree.kernels.steps import SINGULAR
 
         if outcome[0] == 0:
             return None
+        if outcome[0] == TURNED:
+            return Failure(f"{words_of_turn(compiled_system(system), work, outcome[3])}, or EnergyMomentum", outcome[4])
         if outcome[0] != SINGULAR or int(work.counted.no_number):
             return self.absolute.explain(system, work, outcome, self.absolute.least_step(h, compiled_system(system)))
         parts = tree_of(system)
@@ -250,9 +255,15 @@ def joint_accelerations(
 
 
 def shifted(
-    system: System, carry: Carry, way: Array, h: float, coefficients: tuple[float, float, float, float], t: float
+    system: System,
+    carry: Carry,
+    way: Array,
+    h: float,
+    coefficients: tuple[float, float, float, float],
+    t: float,
+    rows: NDArray[np.bool_],
 ) -> Carry:
-    """Return the memory with velocities changed by O(h²), so that x = h s_dot + h² way closes the loops.
+    """Return the memory with velocities changed by O(h²), so that x = h s_dot + h² way closes some of the kept rows.
 
     G ds = -g(after)/h with the matrix of a step, M + gamma h D + beta h² K, as (3) of `start.step_filter`.
     """
@@ -261,7 +272,6 @@ def shifted(
     compiled, tree = compiled_system(system), tree_of(system).tree
     model = compiled.model
     kept = tree.kept_row >= 0
-    holds = is_held_position(model.rows.kind)[kept]
     state, (_, _, beta, gamma) = carry.state, coefficients
     work, joints = joint_iterate(compiled, tree, state, carry.u_dot)
     work.states.base[:] = work_from(model, carry.w).states.base
@@ -281,7 +291,7 @@ def shifted(
     work.state.w[model.coordinates.row] += h * carry.w[model.coordinates.row + 1]
     moved(model, work, tree, joints, increments)
     projected(model, work, tree, joints, beta * h**2)
-    gap = np.where(holds, work.connections.g[kept], 0.0)
+    gap = np.where(rows, work.connections.g[kept], 0.0)
     set_iterate(work, state, None, carry.w)
     work.state.time[...] = t
     joints.x[:] = 0.0

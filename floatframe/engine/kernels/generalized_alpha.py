@@ -56,6 +56,7 @@ __all__ = [
     "STOPPED",
     "TURNED",
     "UNRESOLVED",
+    "add_reactions",
     "advance",
     "error_factor",
     "is_resized",
@@ -65,6 +66,7 @@ __all__ = [
     "mean_square",
     "ratio_of_steps",
     "shares",
+    "take_stiffness",
     "time_loop",
     "write_row",
 ]
@@ -311,21 +313,28 @@ def hold_velocities(model, work, by_rate, by_acceleration, c_k):
     velocity_correction(model, work, by_rate)
     total = 0.0
     for i in range(model.bodies.kind.shape[0]):
-        n, u0, t = model.bodies.n_q[i], model.bodies.u0[i], model.bodies.kind[i]
-        y, residual = work.solver.y[u0 : u0 + 6 + n], work.bodies.residual[u0 + 6 : u0 + 6 + n]
+        n, u0 = model.bodies.n_q[i], model.bodies.u0[i]
+        y = work.solver.y[u0 : u0 + 6 + n]
         for k in range(6 + n):
             total += work.solver.weight[u0 + k] * y[k] * y[k]
-        K = model.body_types.blocks[model.body_types.block0[t, STIFFNESS] :]
-        is_diagonal = model.body_types.is_diagonal[t, STIFFNESS - MASS]
-        for k in range(n):
-            if is_diagonal:
-                residual[k] -= K[k] * y[6 + k]
-            else:
-                for j in range(n):
-                    residual[k] -= K[k * n + j] * y[6 + j]
+        take_stiffness(model, i, y[6:], work.bodies.residual[u0 + 6 : u0 + 6 + n])
         change_rates(model, work, i, (0.0, 0.0, 0.0), by_rate, by_acceleration)
     add_reactions(model, work, c_k)
     return total
+
+
+@inner
+def take_stiffness(model, i, q, residual):
+    """Subtract the forces of the modal stiffness of body i by modes q from the residual of its modes."""
+    n, t = model.bodies.n_q[i], model.bodies.kind[i]
+    K = model.body_types.blocks[model.body_types.block0[t, STIFFNESS] :]
+    is_diagonal = model.body_types.is_diagonal[t, STIFFNESS - MASS]
+    for k in range(n):
+        if is_diagonal:
+            residual[k] -= K[k] * q[k]
+        else:
+            for j in range(n):
+                residual[k] -= K[k * n + j] * q[j]
 
 
 @inner

@@ -32,6 +32,7 @@ __all__ = [
     "settle_accelerations",
     "share_reactions",
     "velocity_correction",
+    "write_rates_to_close",
 ]
 
 SOFTER = 1e3  # s of `share_reactions`: well above the rounding of A
@@ -310,12 +311,9 @@ def velocity_correction(model, work, by_rate):
     positions that have no cheap rate, and all others, keep theirs. Unknowns of rotation turn a body by `T_right` of
     them, velocities at once: y is what they turn it by.
     """
-    y, mu, g = work.solver.y, work.solver.mu, work.connections.g
+    y = work.solver.y
     for c in range(model.connections.size.shape[0]):
-        w0, end = model.connections.w0[c], model.connections.w0[c + 1]
-        write_held_rates(model, work, c, mu)
-        for k in range(w0, end):
-            mu[k] = g[k] - mu[k] / by_rate if has_cheap_rate(model, c, k) else 0.0
+        write_rates_to_close(model, work, c, by_rate)
     for k in range(y.shape[0]):
         y[k] = 0.0
     solve_connections(model.elimination, model.connections, work.solver)
@@ -323,6 +321,15 @@ def velocity_correction(model, work, by_rate):
     for i in range(model.bodies.kind.shape[0]):
         u0 = model.bodies.u0[i] + 3
         put(y, u0, turned(work.bodies.T_right[i], y[u0:]))
+
+
+@inner
+def write_rates_to_close(model, work, c, by_rate):
+    """Write into `solver.mu` by what velocities shall close the positions that connection c holds, over by_rate."""
+    mu, g = work.solver.mu, work.connections.g
+    write_held_rates(model, work, c, mu)
+    for k in range(model.connections.w0[c], model.connections.w0[c + 1]):
+        mu[k] = g[k] - mu[k] / by_rate if has_cheap_rate(model, c, k) else 0.0
 
 
 @inner

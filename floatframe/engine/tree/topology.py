@@ -15,7 +15,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.engine.compiling.markers import joint_markers, marker_pose, n_q_of
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
-from floatframe.engine.kernels.model import Model
+from floatframe.engine.kernels.model import JOINT, Model
 from floatframe.engine.kernels.records import filled
 from floatframe.engine.tree.charts import FREE, Column, chart_of
 from floatframe.engine.tree.kernels.tree import COLUMN, FAR_MODE, NEAR_MODE, Tree
@@ -235,6 +235,24 @@ def jets_of(
     return jet0, jets
 
 
+def loop_markers(model: Model, ordered: list[Branch], near: list[int], kept: list[int]) -> list[tuple[int, int]]:
+    """Return the bodies that loops go through, each with the marker by which a loop leaves it outwards."""
+    found: set[tuple[int, int]] = set()
+    for c in kept:
+        if model.connections.law[c] != JOINT:
+            continue
+        ways = []
+        for marker in (int(model.connections.a[c]), int(model.connections.b[c])):
+            body, way = int(model.markers.body[marker]), []
+            while body >= 0:
+                way.append((body, marker))
+                body, marker = ordered[body].parent, near[body]
+            ways.append(way)
+        common = {body for body, _ in ways[0]} & {body for body, _ in ways[1]}
+        found |= {each for way in ways for each in way if each[0] not in common}
+    return sorted(found)
+
+
 def tree_record(compiled: CompiledSystem, branches: list[Branch]) -> Tree:
     """Return the tree as the kernels see it."""
     model = compiled.model
@@ -280,6 +298,7 @@ def tree_record(compiled: CompiledSystem, branches: list[Branch]) -> Tree:
     kept = [c for c in range(len(model.connections.size)) if c not in taken]
     is_kept: IntArray = np.isin(np.arange(len(model.connections.size)), kept).astype(np.int64)
     row_is_kept = np.repeat(is_kept, model.connections.size) > 0
+    loops = loop_markers(model, ordered, near, kept)
     tau: Array = np.array(lists.pop("tau")).reshape(-1, 3)
     alpha: Array = np.array(lists.pop("alpha")).reshape(-1, 3)
     return filled(
@@ -302,6 +321,8 @@ def tree_record(compiled: CompiledSystem, branches: list[Branch]) -> Tree:
         kept=kept,
         is_kept=is_kept,
         kept_row=np.where(row_is_kept, np.cumsum(row_is_kept) - 1, -1),
+        loop_body=[body for body, _ in loops],
+        loop_marker=[marker for _, marker in loops],
         jet0=jet0,
         jet_kind=[kind for kind, _, _ in jets],
         jet_item=[item for _, item, _ in jets],

@@ -15,6 +15,7 @@ from floatframe import (
     GeneralizedAlpha,
     Gravity,
     Marker,
+    PointOnLine,
     RevoluteJoint,
     RigidBody,
     SphericalJoint,
@@ -23,6 +24,7 @@ from floatframe import (
     integrate,
     trapezoidal,
 )
+from floatframe.components.mechanisms.linkages import slider_crank
 from floatframe.model.rotations import euler_parameters_of_rotation_vector, rotation_exp, rotation_matrix
 from tests.floatframe.orders import slope
 
@@ -69,10 +71,11 @@ def test_a_hinge_gives_a_rotating_arm_no_energy(rho_inf, turn):
     "method", [trapezoidal(), GeneralizedAlpha(0.95), GeneralizedAlpha(0.8)], ids=["trapezoidal", "0.95", "0.8"]
 )
 @pytest.mark.parametrize("h", [5e-3, 2e-2])
-def test_a_rod_gives_a_pendulum_no_energy(method, h):
+@pytest.mark.parametrize("formulation", ["absolute", "relative"])
+def test_a_rod_gives_a_pendulum_no_energy(method, h, formulation):
     ball = body_at("ball", 2.0, np.eye(3), (1, 0, 0), (0, 0, 0), (0, 0, 0))
     rod = DistanceJoint("rod", on_ground(), at("ball", 0.0))
-    motion = integrate(System([ball], [rod], [Gravity(-G * TURN[:, 2])]), method, 10.0, h)
+    motion = integrate(System([ball], [rod], [Gravity(-G * TURN[:, 2])]), method, 10.0, h, formulation=formulation)
     total = motion.energies.total - motion.energies.total[0]
     assert total.max() < 5e-3 * 2.0 * G  # where it swings fast, the error of the scheme of second order
     assert total.min() > -2e-2 * 2.0 * G
@@ -82,6 +85,27 @@ def test_an_arm_that_turns_too_far_in_a_step_is_refused_by_name():
     words = "body 'arm' turns by .* rad in a step, with a joint away from its axis.*at most 1 rad"
     with pytest.raises(ConvergenceError, match=words):
         integrate(arm(10.0, 0.01), GeneralizedAlpha(0.8), 10.0, 0.15)
+
+
+def test_a_loop_whose_crank_turns_too_far_in_a_step_is_refused_by_name():
+    """Without the limit the slider-crank reaches 1e78 times its energy in joint coordinates."""
+    words = "body 'crank' turns by 1.35 rad in a step, with a joint away from its axis.*at most 1 rad"
+    with pytest.raises(ConvergenceError, match=words):
+        integrate(slider_crank(speed=10.0), GeneralizedAlpha(0.95), 13.0, 0.13, formulation="relative")
+
+
+def test_a_loop_through_the_axis_of_its_turn_follows_any_step():
+    """The arm stands on a ball joint and is led at a point above it: a loop in joint coordinates, on the axis."""
+    up, body = 0.5 * TURN[:, 2], arm(10.0, 0.01).bodies[0]
+    joints = [
+        SphericalJoint("foot", on_ground(), at("arm", -1.0)),
+        PointOnLine(
+            "head", Marker("ground", position=PLACE + up), Marker("arm", position=np.array([-1, 0, 0.5])),
+            axis=TURN[:, 2],
+        ),
+    ]  # fmt: skip
+    motion = integrate(System([body], joints), GeneralizedAlpha(0.8), 15.0, 0.3, formulation="relative")
+    assert_allclose(motion.body("arm").omega_B[:, 2], 10.0, rtol=1e-10, atol=0)
 
 
 def test_a_step_of_an_arm_that_turns_too_far_is_divided():

@@ -36,13 +36,13 @@ def predict(model, work, tree, joints, tangent, memory, order, h):
         a_new = a if degree < 1 else predicted(tangent, s, degree)
         u = joints.rate_start[k] if k >= 0 else memory.u[slot]
         now = joints.acceleration_start[k] if k >= 0 else memory.u_dot[slot]
-        joints.increment[s] = h * (u + h * ((0.5 - beta) * a + beta * a_new))
+        x = h * (u + h * ((0.5 - beta) * a + beta * a_new))
         rate = u + h * ((1 - gamma) * a + gamma * a_new)
         acceleration = ((1 - alpha_m) * a_new + alpha_m * a - alpha_f * now) / (1 - alpha_f)
         if k >= 0:
-            joints.x[k], joints.rate[k], joints.acceleration[k] = joints.increment[s], rate, acceleration
+            joints.x[k], joints.rate[k], joints.acceleration[k] = x, rate, acceleration
         else:
-            state.q[tree.mode[s]] = memory.q[tree.mode[s]] + joints.increment[s]
+            state.q[tree.mode[s]] = memory.q[tree.mode[s]] + x
             state.u[slot], state.u_dot[slot] = rate, acceleration
     for k in range(tree.motion.shape[0]):
         if tree.motion[k] >= 0:

@@ -12,9 +12,13 @@ from floatframe.engine.kernels.generalized_alpha import (
     DIVERGED,
     DONE,
     INACCURATE,
+    MOST_TURN,
     OF_MOTION,
+    OFF_AXIS,
     SLOW,
+    TURNED,
     UNRESOLVED,
+    add_reactions,
     copy,
     correction_of_states,
     error_factor,
@@ -27,10 +31,14 @@ from floatframe.engine.kernels.generalized_alpha import (
     ratio_of_steps,
     roundoff_floor,
     settle_row,
+    take_stiffness,
     time_loop,
     write_row,
 )
+from floatframe.engine.kernels.rotation import right_jacobian
+from floatframe.engine.kernels.schur import write_rates_to_close
 from floatframe.engine.kernels.step_start import hold_states
+from floatframe.engine.kernels.vector import add, cross, dot, norm, put, scaled, sub, turned, vector
 from floatframe.engine.tree.kernels.accelerations import accelerate
 from floatframe.engine.tree.kernels.evaluation import evaluate_placed, evaluate_tree
 from floatframe.engine.tree.kernels.kept_factors import factorize_poses, keep_bodies, solve_kept
@@ -38,7 +46,7 @@ from floatframe.engine.tree.kernels.kinematics import joint_motion, move_joints,
 from floatframe.engine.tree.kernels.predictor import learn, predict
 from floatframe.engine.tree.kernels.projection import put_reactions
 from floatframe.engine.tree.kernels.tangent import write_tangent
-from floatframe.engine.tree.kernels.tree_factors import factorize_tree, solve_newton
+from floatframe.engine.tree.kernels.tree_factors import factorize_tree, solve_newton, solve_wrenches
 from floatframe.engine.tree.kernels.weights import sizes_of_step, squared_size, weigh
 
 __all__ = ["SINGULAR", "advance_tree", "correct", "renew", "write_tree_row"]
@@ -131,12 +139,83 @@ def correct(model, work, tree, joints, tangent, c_k):
 
 
 @inner
+def turns_too_far(work, tree, joints, length):
+    """Return the first body of a loop that its joint would turn by more than `MOST_TURN` in the step, or -1.
+
+    Where the loop leaves it on the axis of this turn, any turn is followed, and so are those that are prescribed.
+    """
+    for e in range(tree.loop_body.shape[0]):
+        i = tree.loop_body[e]
+        theta = (0.0, 0.0, 0.0)
+        for k in range(tree.column0[i], tree.column0[i + 1]):
+            if tree.unknown[k] >= 0:
+                theta = add(theta, scaled(joints.x[k], vector(joints.a[k])))
+        turn = norm(theta)
+        if turn > MOST_TURN:
+            origin = vector(work.state.r[i]) if tree.far[i] < 0 else vector(work.markers.r[tree.far[i]])
+            arm = sub(vector(work.markers.r[tree.loop_marker[e]]), origin)
+            if norm(cross(theta, arm)) > OFF_AXIS * length * turn:
+                put(work.state.theta[i], 0, theta)
+                return i
+    return -1
+
+
+@inner
+def hold_velocities(model, work, tree, joints, tangent, by_rate, by_acceleration, c_k):
+    """Add the correction of rates that held positions ask for to the iterate; return its squared norm.
+
+    As `kernels.generalized_alpha.hold_velocities`, of unknowns s_dot by what joints and couplers that are kept hold.
+    """
+    step, mu, state = tangent.step, work.solver.mu, work.state
+    for s in range(step.shape[0]):
+        step[s] = 0.0
+    for e in range(tree.kept.shape[0]):
+        write_rates_to_close(model, work, tree.kept[e], by_rate)
+    for k in range(tree.kept_row.shape[0]):
+        if tree.kept_row[k] >= 0:
+            tangent.mu[tree.kept_row[k]] = mu[k]
+    solve_wrenches(tangent)
+    turn_at_once(tree, joints, step)
+    for s in range(step.shape[0]):
+        k, slot = tree.column[s], tree.slot[s]
+        if k >= 0:
+            joints.rate[k] += by_rate * step[s]
+            joints.acceleration[k] += by_acceleration * step[s]
+        else:
+            state.u[slot] += by_rate * step[s]
+            state.u_dot[slot] += by_acceleration * step[s]
+    for i in range(tree.parent.shape[0]):
+        m0, end = tree.m0[i], tree.s0[i + 1]
+        take_stiffness(model, i, step[m0:end], joints.residual[m0:end])
+    for k in range(tree.kept_row.shape[0]):
+        mu[k] = tangent.mu[tree.kept_row[k]] if tree.kept_row[k] >= 0 else 0.0
+    add_reactions(model, work, c_k)
+    return squared_size(model, work, tree, tangent)
+
+
+@inner
+def turn_at_once(tree, joints, step):
+    """Turn changes of rotation vectors x of columns that are fixed in B into T(x) of them, by which they turn B."""
+    for i in range(tree.parent.shape[0]):
+        x, change = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        for k in range(tree.column0[i], tree.column0[i + 1]):
+            if tree.side[k] != 0:
+                x = add(x, scaled(joints.x[k], vector(tree.alpha[k])))
+                if tree.unknown[k] >= 0:
+                    change = add(change, scaled(step[tree.unknown[k]], vector(tree.alpha[k])))
+        if dot(x, x) > 0.0:
+            turn = turned(right_jacobian(x), change)
+            for k in range(tree.column0[i], tree.column0[i + 1]):
+                if tree.side[k] != 0 and tree.unknown[k] >= 0:
+                    step[tree.unknown[k]] = dot(vector(tree.alpha[k]), turn)
+
+
+@inner
 def update(model, work, tree, joints, tangent, by_rate, by_acceleration, c_k):
     """Add the correction to the iterate; return its squared norm."""
     total, step, state = squared_size(model, work, tree, tangent), tangent.step, work.state
     for s in range(tree.slot.shape[0]):
         k, slot, x = tree.column[s], tree.slot[s], step[s]
-        joints.increment[s] += x
         if k >= 0:
             joints.x[k] += x
             joints.rate[k] += by_rate * x
@@ -208,11 +287,11 @@ def accelerations(work, tree, joints, memory, s):
 def one_step(model, work, memory, tree, joints, tangent, order, h):
     """Advance the memory by one step, unless its error is above the one that is allowed.
 
-    Return (status, last correction by the allowed one, error; -1 if not estimated). Factors of an earlier step serve as
-    long as corrections shrink fast with them; where they do not, the step is begun anew with its own, and the more
-    steps have theirs at once the more often that happens (long chains: their mass matrix changes much with the shape).
-    A step that does not converge so is begun once more, with exact factors in every iteration: what approximate ones
-    have led far away does not come back.
+    Return (status, body that turns too far, last correction by the allowed one, error; -1 if not estimated). Factors of
+    an earlier step serve as long as corrections shrink fast with them; where they do not, the step is begun anew with
+    its own, and the more steps have theirs at once the more often that happens (long chains: their mass matrix changes
+    much with the shape). A step that does not converge so is begun once more, with exact factors in every iteration:
+    what approximate ones have led far away does not come back.
     """
     alpha_m, alpha_f, beta, gamma = order.alpha_m, order.alpha_f, order.beta, order.gamma
     c_k = beta * h * h
@@ -239,6 +318,10 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
     has_states = model.states.row.shape[0] + model.laws.equation.shape[0] > 0
     while iteration < order.max_iterations:
         evaluate_placed(model, work, tree, joints, c_k)
+        if iteration == 0 and order.stabilized != 0:
+            body = turns_too_far(work, tree, joints, order.length)
+            if body >= 0:
+                return TURNED, body, excess, -1.0
         if work.solver.is_due == 1:
             made = iteration
             work.counted.factorisations += 1
@@ -246,13 +329,16 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
             solver.c_m, solver.c_d, solver.c_k = c_m, c_d, c_k
             if not renew(model, work, tree, joints, tangent, c_m, c_d, c_k):
                 work.solver.is_due = 1
-                return SINGULAR, excess, -1.0
+                return SINGULAR, -1, excess, -1.0
+        of_rates = 0.0
+        if order.stabilized != 0 and not is_open:
+            of_rates = hold_velocities(model, work, tree, joints, tangent, c_d / c_k, c_m / c_k, c_k)
         correct(model, work, tree, joints, tangent, c_k)
         if iteration == 0:
             size, size_x = sizes_of_step(model, work, memory, h)
             wanted = order.tolerance * (c_k * math.sqrt(size) + OF_MOTION * math.sqrt(size_x))
             allowed = wanted + math.sqrt(roundoff_floor(model, work, order.length))
-        norm = math.sqrt(update(model, work, tree, joints, tangent, c_d / c_k, c_m / c_k, c_k))
+        norm = math.sqrt(of_rates + update(model, work, tree, joints, tangent, c_d / c_k, c_m / c_k, c_k))
         work.counted.iterations += 1
         if is_old and work.counted.factorisations > factorisations:
             is_old = False
@@ -281,14 +367,14 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
             continue
         if not math.isfinite(norm) and is_last_try:
             work.solver.is_due = 1
-            return DIVERGED, math.inf, -1.0
+            return DIVERGED, -1, math.inf, -1.0
         excess = norm / allowed if allowed > 0.0 else math.inf
         of_states = 0.0
         if has_states:
             of_states = correction_of_states(model, work, c_k) / order.tolerance
             if not math.isfinite(of_states) and is_last_try:
                 work.solver.is_due = 1
-                return DIVERGED, math.inf, -1.0
+                return DIVERGED, -1, math.inf, -1.0
         is_small = is_enough(norm, last, wanted, allowed) if is_open else norm <= allowed
         is_small = is_small or (norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2)
         if is_small and (of_states <= 1.0 or (of_states <= 1e3 and of_states > 0.5 * last_of_states and iteration > 2)):
@@ -296,13 +382,13 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
                 work.solver.is_due = 1
             error = -1.0
             if is_too_long(model, work, h):
-                return UNRESOLVED, excess, error
+                return UNRESOLVED, -1, excess, error
             if order.most_error > 0.0:
                 error = local_error(model, work, tree, joints, tangent, memory, order, h)
                 if not error <= order.most_error:
-                    return INACCURATE, excess, error
+                    return INACCURATE, -1, excess, error
             accept(model, work, memory, tree, joints, h, alpha_m, alpha_f)
-            return DONE, excess, error
+            return DONE, -1, excess, error
         if norm > SLOW * last and not is_small and (tangent.is_exact != 0 or made < iteration):
             work.solver.is_due = 1
             if tangent.is_exact == 0:
@@ -321,7 +407,7 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
         if is_last_try:
             work.solver.is_due = 1
     work.solver.is_due = 1
-    return DIVERGED, excess, -1.0
+    return DIVERGED, -1, excess, -1.0
 
 
 @inner
@@ -380,10 +466,10 @@ def try_tree_step(model, work, memory, others, order, t, h):
         resize(model, work, tree, joints, tangent, memory, t, h)
         tangent.n_known = 0
     work.state.time = t
-    status, excess, error = one_step(model, work, memory, tree, joints, tangent, order, memory.h)
+    status, body, excess, error = one_step(model, work, memory, tree, joints, tangent, order, memory.h)
     if status == DONE:
         learn(tree, tangent, memory)
-    return status, -1, excess, error
+    return status, body, excess, error
 
 
 @inner

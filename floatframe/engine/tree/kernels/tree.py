@@ -24,7 +24,9 @@ __all__ = ["COLUMN", "FAR_MODE", "NEAR_MODE", "JointWork", "TangentWork", "Tree"
 
 COLUMN, NEAR_MODE, FAR_MODE = range(3)  #: kinds of jets
 
-n_k, n_s, n_kept, n_j, n_rows = (Size(name) for name in ("columns", "n_s", "kept", "jets", "kept rows"))
+n_k, n_s, n_kept, n_j, n_rows, n_l = (
+    Size(name) for name in ("columns", "n_s", "kept", "jets", "kept rows", "loop markers")
+)
 
 
 class Tree(NamedTuple):
@@ -52,6 +54,8 @@ class Tree(NamedTuple):
     kept: IntArray = integer(n_kept)  #: connections that are no joints of the tree
     is_kept: IntArray = integer(n_c)  #: whether a connection is among them
     kept_row: IntArray = integer(n_w)  #: number of a row among those of connections that are kept, -1 for others
+    loop_body: IntArray = integer(n_l)  #: a body that a loop goes through,
+    loop_marker: IntArray = integer(n_l)  #: and the marker by which the loop leaves it outwards
     #: first of what moves a body with its subtree against its parent: columns that are unknown, modes of the parent at
     #: the near marker, modes of the body at the far marker
     jet0: IntArray = integer(n_b + 1)
@@ -76,7 +80,6 @@ class JointWork(NamedTuple):
     rate_start: Array = real(n_k, unit="m/s or rad/s")  #: z_dot at the beginning of a step
     acceleration_start: Array = real(n_k, unit="m/s² or rad/s²")
     is_known: IntArray = integer()  #: whether the beginning of a step is the motion in the memory
-    increment: Array = real(n_s)  #: of all unknowns since then
     t: Array = real(n_k, 3)  #: A_A tau, ground axes
     a: Array = real(n_k, 3)  #: rotation, ground axes
     near: Array = real(n_b, 12, unit="m/s², rad/s², m/s, rad/s")  #: accelerations and velocities of the marker there

@@ -20,7 +20,7 @@ from floatframe.engine.tree.kernels.spatial import pair, turned_power
 from floatframe.engine.tree.kernels.tangent import add_second_order, inner_product, product_of, unit_of
 from floatframe.engine.tree.kernels.tree import COLUMN, NEAR_MODE
 
-__all__ = ["factorize_tree", "solve_bordered", "solve_newton"]
+__all__ = ["factorize_tree", "solve_bordered", "solve_newton", "solve_wrenches"]
 
 
 @inner
@@ -233,14 +233,21 @@ def solve_newton(work, tree, joints, tangent, c_k):
 @inner
 def solve_bordered(tree, tangent):
     """Overwrite tangent.step and tangent.mu, right sides of unknowns and of rows that are kept, by the solution."""
-    step, mu, n_s, n_rows = tangent.step, tangent.mu, tree.slot.shape[0], tangent.V.shape[0]
+    step, mu = tangent.step, tangent.mu
     solve_tree(tree, tangent, step)
-    if n_rows == 0:
-        return
-    for r in range(n_rows):
-        for s in range(n_s):
+    for r in range(mu.shape[0]):
+        for s in range(step.shape[0]):
             mu[r] -= tangent.C[r, s] * step[s]
+    solve_wrenches(tangent)
+
+
+@inner
+def solve_wrenches(tangent):
+    """Overwrite tangent.mu, right sides of rows, by the wrenches that are kept; add what they move to tangent.step."""
+    step, mu = tangent.step, tangent.mu
+    if mu.shape[0] == 0:
+        return
     lu_solve(tangent.V, tangent.V_pivot, mu)
-    for r in range(n_rows):
-        for s in range(n_s):
+    for r in range(mu.shape[0]):
+        for s in range(step.shape[0]):
             step[s] -= tangent.B[r, s] * mu[r]
