@@ -18,6 +18,7 @@ from floatframe.engine.initial_conditions.initial import (
 from floatframe.engine.initial_conditions.newton_equations import displaced, modal_diagonals
 from floatframe.engine.initial_conditions.step_filter import (
     Beginning,
+    Spin,
     StepFilter,
     beginning_of,
     closing_velocities,
@@ -150,13 +151,18 @@ class GeneralizedAlpha:
         after, rows = self.observe(system, t, exact, work)
         return replace(after, u_dot=carry.u_dot + change, a=carry.a + change), rows
 
-    def jump(self, compiled: CompiledSystem, carry: Carry, t: float) -> tuple[Carry, Array]:
-        """Return the memory with u_dot and w after a jump of forces at t, and the change of u_dot, filtered."""
+    def jump(
+        self, compiled: CompiledSystem, carry: Carry, t: float, may: NDArray[np.bool_] | None = None
+    ) -> tuple[Carry, Array]:
+        """Return the memory with u_dot and w after a jump of forces at t, and the change of u_dot, filtered.
+
+        may: as of `spin_at`.
+        """
         work = work_from(compiled.model, carry.w)
         work.state.time[...] = t
         u_dot, w = solve_accelerations(compiled, work, carry.state, carry.w)
         after = replace(carry, u_dot=u_dot, w=w, h_next=0.0)
-        z = self.filter_at(compiled, after, carry.h, t, full=True)
+        z = self.filter_at(compiled, after, carry.h, t, full=True, spin=self.spin_at(compiled, after, may))
         assert z is not None
         return after, z.twice(u_dot - carry.u_dot)
 
@@ -221,28 +227,34 @@ class GeneralizedAlpha:
         is_fixed = self.error_tolerance is None and not has_divided_steps(compiled.model)
         return 0.0 if is_fixed else LEAST_STEP * h
 
-    def filter_at(self, compiled: CompiledSystem, carry: Carry, h: float, t: float, *, full: bool) -> StepFilter | None:
+    def spin_at(self, compiled: CompiledSystem, carry: Carry, may: NDArray[np.bool_] | None = None) -> Spin | None:
+        """Return the bodies whose spin the next step takes by itself, of those that may, (n_b,), None for all."""
+        return spin_of(compiled, consistent_of(carry), may) if self.stabilized else None
+
+    def filter_at(
+        self, compiled: CompiledSystem, carry: Carry, h: float, t: float, *, full: bool, spin: Spin | None
+    ) -> StepFilter | None:
         """Return the filter of `start.step_filter` for steps of size h, full: with s = 1; None for s = 0."""
         _, _, beta, gamma = self.coefficients
         s = 1.0 if full else min(gamma - 0.5, 1.0)
         if s <= 0.0:
             return None
-        spin = spin_of(compiled, consistent_of(carry)) if self.stabilized else None
         return step_filter(compiled, consistent_of(carry), t, c_d=s * gamma * h, c_k=s * beta * h**2, spin=spin)
 
-    def filtered(self, compiled: CompiledSystem, carry: Carry, h: float, t: float, *, full: bool) -> Beginning:
+    def filtered(
+        self, compiled: CompiledSystem, carry: Carry, h: float, t: float, *, full: bool, spin: Spin | None
+    ) -> Beginning:
         """Return accelerations and their rates with which a motion begins, by the filter of `filter_at`."""
-        spin = spin_of(compiled, consistent_of(carry)) if self.stabilized else None
-        z = self.filter_at(compiled, carry, h, t, full=full)
+        z = self.filter_at(compiled, carry, h, t, full=full, spin=spin)
         return beginning_of(compiled, consistent_of(carry), t, h, z, spin=spin)
 
-    def first_step(self, compiled: CompiledSystem, carry: Carry, h: float, t: float) -> float:
+    def first_step(self, compiled: CompiledSystem, carry: Carry, h: float, t: float, spin: Spin | None) -> float:
         """Return the size of the first step: what its estimated error allows, an equal part of h."""
         if self.error_tolerance is None:
             return h
         model = compiled.model
         _, _, beta, gamma = self.coefficients
-        rates = self.filtered(compiled, carry, h, t, full=True).rates
+        rates = self.filtered(compiled, carry, h, t, full=True, spin=spin).rates
         squares = np.add.reduceat(mass_weights(model) * rates**2, model.bodies.u0[:-1])
         largest = np.sqrt(squares / model.body_types.mass[model.bodies.kind]) / model.bodies.size
         error = abs(gamma / 2 - beta - 1 / 12) * largest.max()
@@ -260,15 +272,16 @@ class GeneralizedAlpha:
             return replace(carry, h_next=min(carry.h_next or h, h) if is_divided else h)
         if h <= LONGER * carry.h:
             return replace(carry, a=carry.u_dot + h / carry.h * (carry.a - carry.u_dot), h=h, h_next=h)
+        spin = self.spin_at(compiled, carry)
         if carry.h == 0.0:
-            h = self.first_step(compiled, carry, h, t)
+            h = self.first_step(compiled, carry, h, t, spin)
         alpha_m, alpha_f, beta, _ = self.coefficients
-        begun = self.filtered(compiled, carry, h, t, full=False)
+        begun = self.filtered(compiled, carry, h, t, full=False, spin=spin)
         u_dot, a = begun.u_dot, begun.u_dot + (alpha_m - alpha_f) * h * begun.rates
-        state, plain = carry.state, replace(self, stabilized=False)
+        state = carry.state
         rows = rows_closed_by_positions(compiled.model, self.stabilized)
         if rows.any():
-            z = plain.filter_at(compiled, carry, h, t, full=True)
+            z = self.filter_at(compiled, carry, h, t, full=True, spin=None)
             assert z is not None
             begun = beginning_of(compiled, consistent_of(carry), t, h, z)
             x = h * state.u + h**2 * (0.5 * begun.u_dot + ((alpha_m - alpha_f) / 2 + beta) * h * begun.rates)

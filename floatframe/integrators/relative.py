@@ -10,7 +10,7 @@ from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.initial_conditions.initial import work_from
 from floatframe.engine.initial_conditions.newton_equations import displaced, set_iterate
-from floatframe.engine.initial_conditions.step_filter import Beginning
+from floatframe.engine.initial_conditions.step_filter import Beginning, Spin
 from floatframe.engine.kernels.memory import Rows, new_rows
 from floatframe.engine.kernels.model import Model
 from floatframe.engine.kernels.work import Work, new_work
@@ -21,6 +21,7 @@ from floatframe.errors import ModelError
 from floatframe.integrators.carry import Carry, Failure, Integrator, carry_of, memory_of, one_step_of, started_anew
 from floatframe.integrators.generalized_alpha import LONGER, GeneralizedAlpha, rows_closed_by_positions, words_of_turn
 from floatframe.integrators.relative_ode import RelativeOde
+from floatframe.model.rotations import rotation_exp
 from floatframe.model.state import State
 from floatframe.model.system import System
 
@@ -62,11 +63,6 @@ class RelativeGeneralizedAlpha:
         """The same method in absolute coordinates."""
         return GeneralizedAlpha(**asdict(self))
 
-    @property
-    def plain(self) -> GeneralizedAlpha:
-        """The same method in absolute coordinates without stabilisation, whose start and jumps are those of trees."""
-        return replace(self.absolute, stabilized=False)
-
     def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
         """Return the memory at the beginning: the state made consistent and its accelerations."""
         return self.absolute.start(system, t, state, before)
@@ -76,7 +72,7 @@ class RelativeGeneralizedAlpha:
         if carry.h == 0.0:
             return started_anew(self, system, t, carry, work)
         compiled, tree = compiled_system(system), tree_of(system).tree
-        exact, change = self.plain.jump(compiled, carry, t)
+        exact, change = self.absolute.jump(compiled, carry, t, may_spin(tree))
         after, rows = self.observe(system, t, exact, work)
         a, u_dot = carry.a.copy(), carry.u_dot + change
         for sign, each in ((1.0, u_dot), (-1.0, carry.u_dot)):
@@ -132,21 +128,22 @@ class RelativeGeneralizedAlpha:
 
         At the start, and where longer steps follow: as `start.step_filter` says, in the coordinates of the joints.
         """
-        compiled, method = compiled_system(system), self.plain
+        compiled, method = compiled_system(system), self.absolute
         is_divided = method.least_step(h, compiled) > 0.0
         if carry.h != 0.0 and (is_divided or h <= LONGER * carry.h):
             return replace(carry, h_next=min(carry.h_next or h, h) if is_divided else h)
         tree = tree_of(system).tree
+        spin = method.spin_at(compiled, carry, may_spin(tree))
         if carry.h == 0.0:
-            h = method.first_step(compiled, carry, h, t)
+            h = method.first_step(compiled, carry, h, t, spin)
         alpha_m, alpha_f, beta, _ = method.coefficients
-        begun = method.filtered(compiled, carry, h, t, full=False)
-        a, rates = joint_accelerations(compiled, tree, carry, begun, h)
+        begun = method.filtered(compiled, carry, h, t, full=False, spin=spin)
+        a, rates = joint_accelerations(compiled, tree, carry, begun, h, spin)
         a, u_dot = a + (alpha_m - alpha_f) * h * rates, begun.u_dot
         rows = rows_closed_by_positions(compiled.model, self.stabilized)[tree.kept_row >= 0]
         if rows.any():
-            begun = method.filtered(compiled, carry, h, t, full=True)
-            now, rates = joint_accelerations(compiled, tree, carry, begun, h)
+            begun = method.filtered(compiled, carry, h, t, full=True, spin=None)
+            now, rates = joint_accelerations(compiled, tree, carry, begun, h, None)
             way = 0.5 * now + ((alpha_m - alpha_f) / 2 + beta) * h * rates
             carry = shifted(system, carry, way, h, method.coefficients, t, rows)
         return replace(carry, u_dot=u_dot, a=a, h=h, h_next=h)
@@ -239,19 +236,42 @@ def in_slots(tree: Tree, joints: JointWork, of_bodies: Array, of_columns: Array)
     return result
 
 
+def may_spin(tree: Tree) -> NDArray[np.bool_]:
+    """Return the bodies whose spin steps in joint coordinates may take by itself, (n_b,)."""
+    return tree.spin_axis.any(axis=1)
+
+
 def joint_accelerations(
-    compiled: CompiledSystem, tree: Tree, carry: Carry, begun: Beginning, h: float
+    compiled: CompiledSystem, tree: Tree, carry: Carry, begun: Beginning, h: float, spin: Spin | None
 ) -> tuple[Array, Array]:
-    """Return s_ddot and its rate in the slots of the unknowns, (n_u,), of a motion that begins so."""
-    state, u_dot, jerk, s = carry.state, begun.u_dot, begun.rates, NEAR_BY * h
+    """Return s_ddot and its rate in the slots of the unknowns, (n_u,), of a motion that begins so.
+
+    spin: bodies that spin by themselves, whose rates are those of s_ddot without the turn of their axes, in axes that
+    do not spin.
+    """
+    state, u_dot, s = carry.state, begun.u_dot, NEAR_BY * h
+    jerk = begun.rates if spin is None else begun.rates - spin.further
+    spinning = [] if spin is None else np.flatnonzero(spin.bodies).tolist()
+    start, by_spin = {}, {}
 
     def at(t: float) -> Array:
         place = displaced(compiled.model, state, t * state.u + 0.5 * t**2 * u_dot + t**3 / 6 * jerk)
         moved = State(place.r, place.p, place.q, state.u + t * u_dot + 0.5 * t**2 * jerk)
         _, joints = joint_iterate(compiled, tree, moved, u_dot + t * jerk)
+        for i in spinning:
+            first, e = tree.column0[i + 1] - 3, tree.spin_axis[i]
+            columns = slice(first, first + 3)
+            to_body = -joints.Q[i] if tree.is_reversed[i] else np.eye(3)
+            omega, alpha = to_body @ joints.rate[columns], to_body @ joints.acceleration[columns]
+            if t == 0.0:
+                start[i], by_spin[i] = to_body, e @ omega
+            else:
+                rest = alpha - (e @ omega) * np.cross(omega, e)
+                joints.acceleration[columns] = start[i].T @ rotation_exp(by_spin[i] * t * e) @ rest
         return in_slots(tree, joints, u_dot + t * jerk, joints.acceleration)
 
-    return at(0.0), (at(s) - at(-s)) / (2 * s)
+    now = at(0.0)
+    return now, (at(s) - at(-s)) / (2 * s)
 
 
 def shifted(

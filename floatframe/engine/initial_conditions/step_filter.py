@@ -153,8 +153,8 @@ class Spin:
     further: Array  #: by which rates of the rest, in axes that do not spin, differ from those of u_dot, (n_u,)
 
 
-def spin_of(compiled: CompiledSystem, consistent: ConsistentState) -> Spin:
-    """Return the bodies whose spin the next step takes by itself."""
+def spin_of(compiled: CompiledSystem, consistent: ConsistentState, may: NDArray[np.bool_] | None = None) -> Spin:
+    """Return the bodies whose spin the next step takes by itself; may, (n_b,): of those, None for all."""
     from floatframe.engine.kernels.generalized_alpha import STEADY
 
     model, u, u_dot = compiled.model, consistent.state.u, consistent.u_dot
@@ -164,7 +164,7 @@ def spin_of(compiled: CompiledSystem, consistent: ConsistentState) -> Spin:
         omega, alpha = u[part], u_dot[part]
         by_turn = (e @ omega) * np.cross(omega, e)
         rest = alpha - by_turn
-        if by_turn.any() and np.linalg.norm(alpha) >= STEADY * np.linalg.norm(rest):
+        if (may is None or may[i]) and by_turn.any() and np.linalg.norm(alpha) >= STEADY * np.linalg.norm(rest):
             bodies[i], turn[part] = 1, by_turn
             rate_of_turn = (e @ alpha) * np.cross(omega, e) + (e @ omega) * np.cross(alpha, e)
             further[part] = (e @ omega) * np.cross(e, rest) - rate_of_turn

@@ -11,9 +11,9 @@ from floatframe.engine.kernels.marker import (
     marker_stiffness,
     wrench_to_body,
 )
-from floatframe.engine.kernels.rotation import right_jacobian, split_spin, turned_about
+from floatframe.engine.kernels.rotation import right_jacobian, spin_jacobian
 from floatframe.engine.kernels.time_function import time_function
-from floatframe.engine.kernels.vector import add, put, put_matrix, put_sum, scaled, sub, turned, turned_back, vector
+from floatframe.engine.kernels.vector import put, put_matrix, put_sum, scaled, turned, turned_back, vector
 
 __all__ = ["evaluate", "evaluate_bodies", "evaluate_markers", "linearize", "slide_markers", "tangent_of_body"]
 
@@ -109,15 +109,7 @@ def turning_by_unknown(model, work, i):
     theta = vector(work.state.theta[i])
     if work.state.spins[i] == 0:
         return right_jacobian(theta)
-    e = vector(model.body_types.axis[model.bodies.kind[i]])
-    along, across = split_spin(e, theta)
-    T = right_jacobian(turned_about(e, -along, across))
-    bent = sub(e, turned(T, e))
-    return (
-        add(T[0], scaled(bent[0], e)),
-        add(T[1], scaled(bent[1], e)),
-        add(T[2], scaled(bent[2], e)),
-    )
+    return spin_jacobian(vector(model.body_types.axis[model.bodies.kind[i]]), theta)
 
 
 @inner

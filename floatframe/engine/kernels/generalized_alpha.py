@@ -13,11 +13,15 @@ from floatframe.engine.kernels.memory import WORK_GIVEN, WORK_TAKEN
 from floatframe.engine.kernels.model import JOINT, MASS, STIFFNESS
 from floatframe.engine.kernels.past import keep_past
 from floatframe.engine.kernels.rotation import (
+    after_spin,
+    changed_spin,
     exp_matrix,
     matrix_of_euler_parameters,
     rotate_euler_parameters,
     split_spin,
+    turn_of_axis,
     turned_about,
+    turned_by_spin,
 )
 from floatframe.engine.kernels.schur import (
     correction,
@@ -64,9 +68,11 @@ __all__ = [
     "keep_iterate",
     "load_state",
     "mean_square",
+    "next_acceleration",
     "ratio_of_steps",
     "shares",
     "take_stiffness",
+    "takes_spin",
     "time_loop",
     "write_row",
 ]
@@ -138,9 +144,7 @@ def turn_body(model, state, memory, i):
     if state.spins[i] == 0:
         put_matrix(state.R[i], product(R_start, exp_matrix(theta)))
         return
-    e = spin_axis(model, i)
-    along, across = split_spin(e, theta)
-    put_matrix(state.R[i], product(product(R_start, exp_matrix(across)), exp_matrix(scaled(along, e))))
+    put_matrix(state.R[i], product(R_start, turned_by_spin(spin_axis(model, i), theta)))
 
 
 @small
@@ -149,11 +153,11 @@ def spin_axis(model, i):
     return vector(model.body_types.axis[model.bodies.kind[i]])
 
 
-@inner
-def turn_of_axis(model, i, omega):
-    """Return the part of the angular acceleration by which the axis e of body i carries its spin about: w omega × e."""
-    e = spin_axis(model, i)
-    return scaled(dot(e, omega), cross(omega, e))
+@small
+def takes_spin(turn, alpha):
+    """Whether a step takes a spin by itself: alpha is not much smaller than without the turn of the axis."""
+    rest = sub(alpha, turn)
+    return dot(turn, turn) > 0.0 and dot(alpha, alpha) >= STEADY * STEADY * dot(rest, rest)
 
 
 @inner
@@ -164,10 +168,9 @@ def begin_spin(model, work, memory, i):
     angular acceleration is small without w omega × e, or is not much smaller with it.
     """
     u0, zero = model.bodies.u0[i] + 3, (0.0, 0.0, 0.0)
-    turn, alpha = turn_of_axis(model, i, memory.u[u0:]), vector(memory.u_dot[u0:])
-    rest = sub(alpha, turn)
+    turn = turn_of_axis(spin_axis(model, i), vector(memory.u[u0:]))
     work.state.spins[i] = 0
-    if dot(turn, turn) > 0.0 and dot(alpha, alpha) >= STEADY * STEADY * dot(rest, rest):
+    if takes_spin(turn, vector(memory.u_dot[u0:])):
         work.state.spins[i] = 1
         return turn
     return zero
@@ -180,11 +183,10 @@ def take_to_body(model, state, i):
     These axes are those of the beginning of the step turned by exp(across).
     """
     e, u0 = spin_axis(model, i), model.bodies.u0[i] + 3
-    angle = -dot(e, vector(state.theta[i]))
-    omega = turned_about(e, angle, vector(state.u[u0:]))
-    rest = turned_about(e, angle, vector(state.u_dot[u0:]))
+    along = dot(e, vector(state.theta[i]))
+    omega, alpha = after_spin(e, along, vector(state.u[u0:]), vector(state.u_dot[u0:]))
     put(state.u, u0, omega)
-    put(state.u_dot, u0, add(rest, turn_of_axis(model, i, omega)))
+    put(state.u_dot, u0, alpha)
 
 
 @inner
@@ -271,14 +273,12 @@ def change_rates(model, work, i, by_theta, by_rate, by_acceleration):
         put_sum(state.u, u0 + 3, scaled(by_rate, turning))
         put_sum(state.u_dot, u0 + 3, scaled(by_acceleration, turning))
         return
-    e = spin_axis(model, i)
-    rest = sub(vector(state.u_dot[u0 + 3 :]), turn_of_axis(model, i, omega))
-    put_sum(state.theta[i], 0, turned_about(e, dot(e, vector(state.theta[i])), by_theta))
-    further = -dot(e, by_theta)
-    omega = turned_about(e, further, add(omega, scaled(by_rate, turning)))
-    rest = turned_about(e, further, add(rest, scaled(by_acceleration, turning)))
+    by_omega, by_alpha = scaled(by_rate, turning), scaled(by_acceleration, turning)
+    theta, alpha = vector(state.theta[i]), vector(state.u_dot[u0 + 3 :])
+    theta, omega, alpha = changed_spin(spin_axis(model, i), theta, omega, alpha, by_theta, by_omega, by_alpha)
+    put(state.theta[i], 0, theta)
     put(state.u, u0 + 3, omega)
-    put(state.u_dot, u0 + 3, add(rest, turn_of_axis(model, i, omega)))
+    put(state.u_dot, u0 + 3, alpha)
 
 
 @inner
@@ -557,7 +557,7 @@ def accept(model, work, memory, h, alpha_m, alpha_f):
         if work.state.spins[i] != 0:
             e = spin_axis(model, i)
             along, across = split_spin(e, theta)
-            now = turn_of_axis(model, i, vector(work.state.u[u0 + 3 :]))
+            now = turn_of_axis(e, vector(work.state.u[u0 + 3 :]))
             put(memory.a, u0 + 3, add(turned_about(e, -along, turning), now))
             p[0], p[1], p[2], p[3] = rotate_euler_parameters(p, across)
             theta = scaled(along, e)
@@ -572,12 +572,17 @@ def angular_accelerations(model, work, memory, i, alpha_m, alpha_f):
     a, before, now = vector(memory.a[u0:]), vector(memory.u_dot[u0:]), vector(work.state.u_dot[u0:])
     if work.state.spins[i] != 0:
         e = spin_axis(model, i)
-        turn = turn_of_axis(model, i, vector(memory.u[u0:]))
+        turn, along = turn_of_axis(e, vector(memory.u[u0:])), dot(e, vector(work.state.theta[i]))
         a, before = sub(a, turn), sub(before, turn)
-        rest = sub(now, turn_of_axis(model, i, vector(work.state.u[u0:])))
-        now = turned_about(e, dot(e, vector(work.state.theta[i])), rest)
+        now = turned_about(e, along, sub(now, turn_of_axis(e, vector(work.state.u[u0:]))))
+    return a, next_acceleration(a, before, now, alpha_m, alpha_f)
+
+
+@inner
+def next_acceleration(a, before, now, alpha_m, alpha_f):
+    """Return (3), the algorithmic acceleration after a step, of vectors in axes that are one."""
     mean = add(scaled(1 - alpha_f, now), scaled(alpha_f, before))
-    return a, scaled(1 / (1 - alpha_m), sub(mean, scaled(alpha_m, a)))
+    return scaled(1 / (1 - alpha_m), sub(mean, scaled(alpha_m, a)))
 
 
 @inner

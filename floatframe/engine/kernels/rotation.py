@@ -7,17 +7,22 @@ s = sin t / t, a = (1 - cos t)/t², b = (t - sin t)/t³; below t = 1/2 their ser
 import math
 
 from floatframe.engine.kernels.compiler.compilation import inner
-from floatframe.engine.kernels.vector import add, cross, dot, scaled, sub, unit
+from floatframe.engine.kernels.vector import add, cross, dot, product, scaled, sub, turned, unit
 
 __all__ = [
+    "after_spin",
+    "changed_spin",
     "exp_matrix",
     "left_jacobian",
     "left_jacobian_derivative",
     "matrix_of_euler_parameters",
     "right_jacobian",
     "rotate_euler_parameters",
+    "spin_jacobian",
     "split_spin",
+    "turn_of_axis",
     "turned_about",
+    "turned_by_spin",
 ]
 
 SERIES_BELOW = 0.25  # t² at the switch
@@ -143,6 +148,57 @@ def split_spin(e, th):
     """Return the part of th along the unit vector e, as a number, and the part across it."""
     along = dot(e, th)
     return along, sub(th, scaled(along, e))
+
+
+@inner
+def turn_of_axis(e, omega):
+    """Return the part of the angular acceleration by which the axis e of a body carries its spin w about: w omega × e.
+
+    omega, alpha and all that follows are in axes of the body.
+    """
+    return scaled(dot(e, omega), cross(omega, e))
+
+
+@inner
+def after_spin(e, along, omega, rest):
+    """Return omega and alpha of omega and alpha - w omega × e in axes that the body has left by a turn `along` e."""
+    omega = turned_about(e, -along, omega)
+    return omega, add(turned_about(e, -along, rest), turn_of_axis(e, omega))
+
+
+@inner
+def changed_spin(e, theta, omega, alpha, by_theta, by_omega, by_alpha):
+    """Return theta, omega and alpha of a body that spins, changed by what is linear in axes that do not spin with it.
+
+    These are those of the beginning of the step turned by exp(across): omega and alpha - w omega × e are changed there,
+    and carried along by the change of theta, which is across + along e.
+    """
+    rest = sub(alpha, turn_of_axis(e, omega))
+    theta = add(theta, turned_about(e, dot(e, theta), by_theta))
+    further = -dot(e, by_theta)
+    omega = turned_about(e, further, add(omega, by_omega))
+    rest = turned_about(e, further, add(rest, by_alpha))
+    return theta, omega, add(rest, turn_of_axis(e, omega))
+
+
+@inner
+def turned_by_spin(e, theta):
+    """Return exp(across) exp(along e)."""
+    along, across = split_spin(e, theta)
+    return product(exp_matrix(across), exp_matrix(scaled(along, e)))
+
+
+@inner
+def spin_jacobian(e, theta):
+    """Return the rotation of a body that spins by a change of theta, both in its axes: e along e, T(across) else."""
+    along, across = split_spin(e, theta)
+    T = right_jacobian(turned_about(e, -along, across))
+    bent = sub(e, turned(T, e))
+    return (
+        add(T[0], scaled(bent[0], e)),
+        add(T[1], scaled(bent[1], e)),
+        add(T[2], scaled(bent[2], e)),
+    )
 
 
 @inner

@@ -15,9 +15,9 @@ import numpy as np
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.engine.compiling.markers import joint_markers, marker_pose, n_q_of
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
-from floatframe.engine.kernels.model import JOINT, Model
+from floatframe.engine.kernels.model import COUPLER, JOINT, Model
 from floatframe.engine.kernels.records import filled
-from floatframe.engine.tree.charts import FREE, Column, chart_of
+from floatframe.engine.tree.charts import FREE, SIDE_B, Column, chart_of
 from floatframe.engine.tree.kernels.tree import COLUMN, FAR_MODE, NEAR_MODE, Tree
 from floatframe.model.functions.time_functions import TimeFunction
 from floatframe.model.system import System
@@ -235,6 +235,14 @@ def jets_of(
     return jet0, jets
 
 
+def spin_axis(model: Model, each: Branch, far: int) -> Array:
+    """Return the axis of symmetry of a body that is free or on a ball joint, axes of its end, (3,); zero for others."""
+    if [column.side for column in each.columns[-3:]] != [SIDE_B] * 3:
+        return np.zeros(3)
+    axis: Array = model.body_types.axis[model.bodies.kind[each.body]]
+    return axis if far < 0 else model.markers.triad[far].T @ axis
+
+
 def loop_markers(model: Model, ordered: list[Branch], near: list[int], kept: list[int]) -> list[tuple[int, int]]:
     """Return the bodies that loops go through, each with the marker by which a loop leaves it outwards."""
     found: set[tuple[int, int]] = set()
@@ -321,6 +329,8 @@ def tree_record(compiled: CompiledSystem, branches: list[Branch]) -> Tree:
         kept=kept,
         is_kept=is_kept,
         kept_row=np.where(row_is_kept, np.cumsum(row_is_kept) - 1, -1),
+        held=[c for c in kept if model.connections.law[c] in (JOINT, COUPLER)],
+        spin_axis=[spin_axis(model, each, far[i]) for i, each in enumerate(ordered)],
         loop_body=[body for body, _ in loops],
         loop_marker=[marker for _, marker in loops],
         jet0=jet0,

@@ -154,10 +154,52 @@ def test_a_spinning_rotor_precesses_as_its_weight_asks(system, rho_inf, turn):
     assert height < 1e-4 * L
 
 
+@pytest.mark.parametrize("is_reversed", [False, True], ids=["rotor second", "rotor first"])
+@pytest.mark.parametrize("turn", [0.4, 5.0])
+def test_a_top_in_joint_coordinates_precesses_as_its_weight_asks(turn, is_reversed):
+    spin = 1000.0 if turn > 1 else 200.0
+    rate = M * G * L / (J * spin)
+    ends = (at("rotor", -L), on_ground()) if is_reversed else (on_ground(), at("rotor", -L))
+    system = System([rotor(spin, rate)], [SphericalJoint("pin", *ends)], [Gravity(-G * TURN[:, 2])])
+    motion = integrate(system, GeneralizedAlpha(0.8), 1.0, turn / spin, formulation="relative")
+    found, height = precession(motion)
+    assert_allclose(found, rate, rtol=1e-4, atol=0)
+    assert height < 1e-4 * L
+    assert motion.head.summary["n_iterations"] < 2.5 * motion.head.summary["n_steps"]  # the tangent knows the spin
+
+
+@pytest.mark.parametrize(
+    ("h", "error"), [(2.5e-3, 2e-3), (1e-2, 4e-2)], ids=["0.5 rad a step", "2 rad a step, 0.4 rad of nutation"]
+)
+def test_a_top_on_a_turntable_in_joint_coordinates_follows_a_fine_run(h, error):
+    """The parent turns and is slowed by the top: what spins is the motion of the rotor against it."""
+    spin, turning, place = 200.0, 3.0, 0.4 + L
+    table = body_at("table", 5.0, np.diag([0.5, 0.5, 1.0]), (0, 0, 0), (0, 0, 0), (0, 0, turning))
+    inertia = np.diag([J, ACROSS, ACROSS])
+    body = body_at("rotor", M, inertia, (place, 0, 0), (0, place * turning, 0), (spin, 0, turning))
+    joints = [
+        RevoluteJoint("bearing", on_ground(), at("table", 0.0), axis=TURN[:, 2]),
+        SphericalJoint("pin", at("table", 0.4), at("rotor", -L)),
+    ]
+    system, method = System([table, body], joints, [Gravity(-G * TURN[:, 2])]), GeneralizedAlpha(0.8)
+    fine = integrate(system, method, 0.5, 2e-4, output_every=50)
+    coarse = integrate(system, method, 0.5, h, output_every=round(0.01 / h), formulation="relative")
+    assert_allclose(coarse.body("rotor").r, fine.body("rotor").r, rtol=0, atol=error * L)
+
+
 def test_a_spinning_rotor_precesses_with_a_step_that_follows_its_error():
     rate = M * G * L / (J * 200.0)
     motion = integrate(gyroscope(200.0, rate), GeneralizedAlpha(0.8, error_tolerance=1e-6), 1.0, 0.02)
     assert_allclose(precession(motion)[0], rate, rtol=2e-3, atol=0)
+
+
+def test_a_top_takes_steps_of_one_size_in_both_formulations_for_one_error():
+    """Its axis is let go at rest, so that it nods; the error counts what happens in axes that do not spin."""
+    system = top(200.0, 0.0)
+    method = GeneralizedAlpha(0.8, error_tolerance=1e-6)
+    one, other = (integrate(system, method, 0.5, 0.05, formulation=each) for each in ("absolute", "relative"))
+    assert_allclose(other.head.summary["n_steps"], one.head.summary["n_steps"], rtol=0.1, atol=0)
+    assert_allclose(other.body("rotor").r, one.body("rotor").r, rtol=0, atol=2e-3 * L)
 
 
 @pytest.mark.parametrize("turn", [0.3, 3.0])
@@ -173,7 +215,8 @@ def test_a_wheel_tilted_on_its_shaft_turns_steadily_in_steps_of_any_size(turn):
     assert_allclose(moment, (J - ACROSS) * spin**2 * np.sin(tilt) * np.cos(tilt), rtol=1e-9, atol=0)
 
 
-def test_a_free_axisymmetric_body_follows_its_closed_form_with_second_order():
+@pytest.mark.parametrize("formulation", ["absolute", "relative"])
+def test_a_free_axisymmetric_body_follows_its_closed_form_with_second_order(formulation):
     """Its axis goes about the angular momentum H with |H|/J' while it spins by w (1 - J/J') against that."""
     omega, inertia, end = np.array([8.0, 1.5, -1.0]), np.array([J, ACROSS, ACROSS]), 1.0
     H = TURN @ (inertia * omega)
@@ -182,7 +225,7 @@ def test_a_free_axisymmetric_body_follows_its_closed_form_with_second_order():
     steps, errors = np.array([0.04, 0.02, 0.01, 0.005]), []
     for h in steps:
         body = body_at("free", M, np.diag(inertia), (0, 0, 0), (1, 2, 3), omega)
-        motion = integrate(System([body], []), GeneralizedAlpha(0.8, 1e-11), end, h)
+        motion = integrate(System([body], []), GeneralizedAlpha(0.8, 1e-11), end, h, formulation=formulation)
         errors.append(np.abs(rotation_matrix(motion.body("free").p[-1]) - exact).max())
     assert abs(slope(steps, errors) - 2) < 0.15
 

@@ -15,7 +15,7 @@ theta = T(x) dx, and the rates z_dot, z_ddot, in axes of B, change by d(z_dot) =
 
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.marker import bent_by, bent_rate, shape
-from floatframe.engine.kernels.rotation import left_jacobian_derivative, right_jacobian
+from floatframe.engine.kernels.rotation import left_jacobian_derivative
 from floatframe.engine.kernels.vector import add, cross, put, scaled, sub, turned, vector
 from floatframe.engine.tree.kernels.elastic_turning import deformation_accelerations, second_turning
 from floatframe.engine.tree.kernels.kinematics import end_acceleration, end_motion
@@ -27,6 +27,7 @@ from floatframe.engine.tree.kernels.spatial import (
     spatial_motion,
     world_screw,
 )
+from floatframe.engine.tree.kernels.spins import spin_variations, turning_by_columns
 from floatframe.engine.tree.kernels.tree import COLUMN, FAR_MODE, NEAR_MODE
 
 __all__ = ["carrier", "mode_rate", "mode_screw", "mode_screws", "put_jets", "put_mode_jet", "write_jets"]
@@ -175,14 +176,13 @@ def column_jets(model, work, tree, joints, tangent, i, c_m, c_d, c_k, rate):
     p_a, p_b = sub(r_a, origin), sub(r_b, origin)
     V_a, V_a_dot = spatial_motion(p_a, v_a, omega_a, a_a, alpha_a)
     V_b, V_b_dot = spatial_motion(p_b, v_b, omega_b, a_b, alpha_b)
-    x, spin, spin_dot = zero, zero, zero  # of the rotations fixed in B, axes of B
+    spin, spin_dot = zero, zero  # of the rotations fixed in B, axes of B
     for k in range(tree.column0[i], tree.column0[i + 1]):
         if tree.side[k] != 0:
             alpha = vector(tree.alpha[k])
-            x = add(x, scaled(joints.x[k], alpha))
             spin = add(spin, scaled(joints.rate[k], alpha))
             spin_dot = add(spin_dot, scaled(joints.acceleration[k], alpha))
-    T = right_jacobian(x)
+    T = turning_by_columns(tree, joints, i)
     sense = -1.0 if tree.is_reversed[i] != 0 else 1.0
     for j in range(tree.jet0[i], tree.jet0[i + 1]):
         if tree.jet_kind[j] != COLUMN:
@@ -200,8 +200,12 @@ def column_jets(model, work, tree, joints, tangent, i, c_m, c_d, c_k, rate):
             put_pair_of(screw, 0, world_screw(A_b, p_b, (zero, alpha)))
             th_1 = sub(scaled(c_d, alpha), scaled(c_k, cross(spin, theta)))
             th_2 = sub(sub(scaled(c_m, alpha), scaled(c_k, cross(spin_dot, theta))), cross(spin, th_1))
+            if joints.spins[i] != 0:
+                th_1, th_2 = spin_variations(tree, joints, i, alpha, theta, c_m, c_d, c_k)
             S_0 = world_screw(A_b, p_b, (zero, scaled(c_k, theta)))
             S_1, S_2 = world_screw(A_b, p_b, (zero, th_1)), world_screw(A_b, p_b, (zero, th_2))
             put_jets(jet, S_0, S_1, S_2, V_b, V_b_dot)
             th_1 = sub(scaled(rate, alpha), cross(spin, theta))
+            if joints.spins[i] != 0:
+                th_1, _ = spin_variations(tree, joints, i, alpha, theta, 0.0, rate, 1.0)
             put_reach(reach, world_screw(A_b, p_b, (zero, theta)), world_screw(A_b, p_b, (zero, th_1)), V_b)

@@ -36,6 +36,7 @@ from floatframe.engine.kernels.vector import (
     unit_matrix,
     vector,
 )
+from floatframe.engine.tree.kernels.spins import turn_spinning_joint
 
 __all__ = ["end_acceleration", "end_motion", "joint_motion", "move_joints", "place_bodies"]
 
@@ -231,4 +232,7 @@ def move_joints(tree, joints):
             else:
                 right = add(right, turn)
         put(joints.d[i], 0, d)
+        if joints.spins[i] != 0:
+            turn_spinning_joint(tree, joints, i)
+            continue
         put_matrix(joints.Q[i], product(exp_matrix(left), product(joints.Q_start[i], exp_matrix(right))))

@@ -9,6 +9,7 @@ from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.step_start import begin_step
 from floatframe.engine.kernels.time_function import time_function
 from floatframe.engine.tree.kernels.kinematics import move_joints, place_bodies
+from floatframe.engine.tree.kernels.spins import begin_spin
 
 __all__ = ["learn", "predict"]
 
@@ -52,6 +53,9 @@ def predict(model, work, tree, joints, tangent, memory, order, h):
             joints.x[k] = factor * (value - before)
             joints.rate[k] = factor * rate
             joints.acceleration[k] = factor * second
+    if order.stabilized != 0:
+        for i in range(tree.parent.shape[0]):
+            begin_spin(tree, joints, memory, i, alpha_f, h)
     move_joints(tree, joints)
     place_bodies(model, work, tree, joints)
 

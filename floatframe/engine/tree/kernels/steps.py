@@ -35,16 +35,22 @@ from floatframe.engine.kernels.generalized_alpha import (
     time_loop,
     write_row,
 )
-from floatframe.engine.kernels.rotation import right_jacobian
 from floatframe.engine.kernels.schur import write_rates_to_close
 from floatframe.engine.kernels.step_start import hold_states
-from floatframe.engine.kernels.vector import add, cross, dot, norm, put, scaled, sub, turned, vector
+from floatframe.engine.kernels.vector import add, cross, dot, norm, put, put_sum, scaled, sub, turned, vector
 from floatframe.engine.tree.kernels.accelerations import accelerate
 from floatframe.engine.tree.kernels.evaluation import evaluate_placed, evaluate_tree
 from floatframe.engine.tree.kernels.kept_factors import factorize_poses, keep_bodies, solve_kept
 from floatframe.engine.tree.kernels.kinematics import joint_motion, move_joints, place_bodies
 from floatframe.engine.tree.kernels.predictor import learn, predict
 from floatframe.engine.tree.kernels.projection import put_reactions
+from floatframe.engine.tree.kernels.spins import (
+    change_spin,
+    first_rotation,
+    put_spin_acceleration,
+    spin_jump,
+    turning_by_columns,
+)
 from floatframe.engine.tree.kernels.tangent import write_tangent
 from floatframe.engine.tree.kernels.tree_factors import factorize_tree, solve_newton, solve_wrenches
 from floatframe.engine.tree.kernels.weights import sizes_of_step, squared_size, weigh
@@ -54,6 +60,7 @@ __all__ = ["SINGULAR", "advance_tree", "correct", "renew", "write_tree_row"]
 SINGULAR = 6  #: status: the Newton matrix is
 MANY = 4  # iterations of a step after which the next one starts with new factors
 EXACT_STEPS = 4  # steps that take exact matrices after those that are kept have failed
+FAR_SPIN = 0.2  # rad: of a body whose spin is taken by itself, above which steps take exact matrices
 MOST_PATIENCE = 31  # steps that make their own factors before older ones are tried again
 
 
@@ -66,6 +73,8 @@ def begin(model, work, tree, joints, memory):
         start_here(tree, joints)
     for k in range(joints.x.shape[0]):
         joints.x[k] = 0.0
+    for i in range(joints.spins.shape[0]):
+        joints.spins[i] = 0
 
 
 @inner
@@ -139,6 +148,16 @@ def correct(model, work, tree, joints, tangent, c_k):
 
 
 @inner
+def spins_far(tree, joints):
+    """Whether a body spins too far in the step for factors that leave gyroscopic terms out."""
+    for i in range(joints.spins.shape[0]):
+        if joints.spins[i] != 0:
+            if abs(dot(vector(tree.spin_axis[i]), vector(joints.x[first_rotation(tree, i) :]))) > FAR_SPIN:
+                return True
+    return False
+
+
+@inner
 def turns_too_far(work, tree, joints, length):
     """Return the first body of a loop that its joint would turn by more than `MOST_TURN` in the step, or -1.
 
@@ -166,48 +185,61 @@ def hold_velocities(model, work, tree, joints, tangent, by_rate, by_acceleration
 
     As `kernels.generalized_alpha.hold_velocities`, of unknowns s_dot by what joints and couplers that are kept hold.
     """
-    step, mu, state = tangent.step, work.solver.mu, work.state
+    step, mu = tangent.step, work.solver.mu
     for s in range(step.shape[0]):
         step[s] = 0.0
-    for e in range(tree.kept.shape[0]):
-        write_rates_to_close(model, work, tree.kept[e], by_rate)
-    for k in range(tree.kept_row.shape[0]):
-        if tree.kept_row[k] >= 0:
+    for r in range(tangent.mu.shape[0]):
+        tangent.mu[r] = 0.0
+    for e in range(tree.held.shape[0]):
+        c = tree.held[e]
+        write_rates_to_close(model, work, c, by_rate)
+        for k in range(model.connections.w0[c], model.connections.w0[c + 1]):
             tangent.mu[tree.kept_row[k]] = mu[k]
     solve_wrenches(tangent)
     turn_at_once(tree, joints, step)
-    for s in range(step.shape[0]):
-        k, slot = tree.column[s], tree.slot[s]
-        if k >= 0:
-            joints.rate[k] += by_rate * step[s]
-            joints.acceleration[k] += by_acceleration * step[s]
-        else:
-            state.u[slot] += by_rate * step[s]
-            state.u_dot[slot] += by_acceleration * step[s]
+    total = squared_size(model, work, tree, tangent)
+    change_joints(work, tree, joints, step, 0.0, by_rate, by_acceleration)
     for i in range(tree.parent.shape[0]):
         m0, end = tree.m0[i], tree.s0[i + 1]
         take_stiffness(model, i, step[m0:end], joints.residual[m0:end])
     for k in range(tree.kept_row.shape[0]):
         mu[k] = tangent.mu[tree.kept_row[k]] if tree.kept_row[k] >= 0 else 0.0
     add_reactions(model, work, c_k)
-    return squared_size(model, work, tree, tangent)
+    return total
 
 
 @inner
 def turn_at_once(tree, joints, step):
-    """Turn changes of rotation vectors x of columns that are fixed in B into T(x) of them, by which they turn B."""
+    """Turn changes of x of columns that are fixed in B into what they turn B by, as changes of rates do."""
     for i in range(tree.parent.shape[0]):
-        x, change = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        change, is_turned = (0.0, 0.0, 0.0), False
         for k in range(tree.column0[i], tree.column0[i + 1]):
-            if tree.side[k] != 0:
-                x = add(x, scaled(joints.x[k], vector(tree.alpha[k])))
-                if tree.unknown[k] >= 0:
-                    change = add(change, scaled(step[tree.unknown[k]], vector(tree.alpha[k])))
-        if dot(x, x) > 0.0:
-            turn = turned(right_jacobian(x), change)
+            if tree.side[k] != 0 and tree.unknown[k] >= 0:
+                change, is_turned = add(change, scaled(step[tree.unknown[k]], vector(tree.alpha[k]))), True
+        if is_turned:
+            turn = turned(turning_by_columns(tree, joints, i), change)
             for k in range(tree.column0[i], tree.column0[i + 1]):
                 if tree.side[k] != 0 and tree.unknown[k] >= 0:
                     step[tree.unknown[k]] = dot(vector(tree.alpha[k]), turn)
+
+
+@inner
+def change_joints(work, tree, joints, step, by_x, by_rate, by_acceleration):
+    """Add parts of a correction to increments of joints, and to rates and accelerations of all unknowns."""
+    for i in range(tree.parent.shape[0]):
+        end = tree.column0[i + 1]
+        if joints.spins[i] != 0:
+            end = first_rotation(tree, i)
+            change_spin(tree, joints, step, i, by_x, by_rate, by_acceleration)
+        for k in range(tree.column0[i], end):
+            s = tree.unknown[k]
+            if s >= 0:
+                joints.x[k] += by_x * step[s]
+                joints.rate[k] += by_rate * step[s]
+                joints.acceleration[k] += by_acceleration * step[s]
+        for s in range(tree.m0[i], tree.s0[i + 1]):
+            work.state.u[tree.slot[s]] += by_rate * step[s]
+            work.state.u_dot[tree.slot[s]] += by_acceleration * step[s]
 
 
 @inner
@@ -215,15 +247,9 @@ def update(model, work, tree, joints, tangent, by_rate, by_acceleration, c_k):
     """Add the correction to the iterate; return its squared norm."""
     total, step, state = squared_size(model, work, tree, tangent), tangent.step, work.state
     for s in range(tree.slot.shape[0]):
-        k, slot, x = tree.column[s], tree.slot[s], step[s]
-        if k >= 0:
-            joints.x[k] += x
-            joints.rate[k] += by_rate * x
-            joints.acceleration[k] += by_acceleration * x
-        else:
-            state.q[tree.mode[s]] += x
-            state.u[slot] += by_rate * x
-            state.u_dot[slot] += by_acceleration * x
+        if tree.mode[s] >= 0:
+            state.q[tree.mode[s]] += step[s]
+    change_joints(work, tree, joints, step, 1.0, by_rate, by_acceleration)
     for k in range(tree.kept_row.shape[0]):
         work.solver.mu[k] = tangent.mu[tree.kept_row[k]] if tree.kept_row[k] >= 0 else 0.0
         state.w[k] += work.solver.mu[k] / c_k
@@ -249,6 +275,12 @@ def local_error(model, work, tree, joints, tangent, memory, order, h):
         jump = ((1 - alpha_f) * now + alpha_f * before - alpha_m * a) / (1 - alpha_m) - a
         tangent.step[s] = now
         put_acceleration(work, tree, joints, s, now + jump)
+    for i in range(tree.parent.shape[0]):
+        if joints.spins[i] != 0:
+            k = first_rotation(tree, i)
+            now = vector(tangent.step[tree.unknown[k] :])
+            put(joints.acceleration, k, now)
+            put_sum(joints.acceleration, k, spin_jump(tree, joints, memory, i, alpha_m, alpha_f))
     place_bodies(model, work, tree, joints)
     largest = 0.0
     for i in range(tree.parent.shape[0]):
@@ -310,9 +342,15 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
         tangent.left -= 1
     if tangent.exactly > 0:
         tangent.exactly -= 1
-    is_old, made, begun = work.solver.is_due == 0, -1, 0  # iterations at which factors were made, the step begun anew
     is_last_try = False
     predict(model, work, tree, joints, tangent, memory, order, h)
+    holds = order.stabilized != 0 and tree.held.shape[0] > 0
+    if holds:  # by which velocities differ from the rates of positions, follows the factors
+        work.solver.is_due = 1
+    if spins_far(tree, joints):
+        tangent.exactly = max(tangent.exactly, 1)
+        work.solver.is_due = 1
+    is_old, made, begun = work.solver.is_due == 0, -1, 0  # iterations at which factors were made, the step begun anew
     factorisations = work.counted.factorisations
     is_open = tangent.V.shape[0] == 0  # wrenches that are kept are not in the norm
     has_states = model.states.row.shape[0] + model.laws.equation.shape[0] > 0
@@ -331,7 +369,7 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
                 work.solver.is_due = 1
                 return SINGULAR, -1, excess, -1.0
         of_rates = 0.0
-        if order.stabilized != 0 and not is_open:
+        if holds:
             of_rates = hold_velocities(model, work, tree, joints, tangent, c_d / c_k, c_m / c_k, c_k)
         correct(model, work, tree, joints, tangent, c_k)
         if iteration == 0:
@@ -414,10 +452,16 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
 def accept(model, work, memory, tree, joints, h, alpha_m, alpha_f):
     """(3): write the iterate and the new algorithmic accelerations into the memory."""
     put_reactions(model, work, tree, joints)
-    for s in range(tree.slot.shape[0]):
-        now, before = accelerations(work, tree, joints, memory, s)
-        slot = tree.slot[s]
-        memory.a[slot] = ((1 - alpha_f) * now + alpha_f * before - alpha_m * memory.a[slot]) / (1 - alpha_m)
+    for i in range(tree.parent.shape[0]):
+        s0, end = tree.s0[i], tree.m0[i]
+        if joints.spins[i] != 0:
+            end = tree.unknown[first_rotation(tree, i)]
+            put_spin_acceleration(tree, joints, memory, i, alpha_m, alpha_f)
+        for s in range(s0, tree.s0[i + 1]):
+            if s < end or s >= tree.m0[i]:
+                now, before = accelerations(work, tree, joints, memory, s)
+                slot = tree.slot[s]
+                memory.a[slot] = ((1 - alpha_f) * now + alpha_f * before - alpha_m * memory.a[slot]) / (1 - alpha_m)
     for i in range(model.bodies.kind.shape[0]):
         put_euler_parameters(work.state.R[i], memory.p[i])
     keep_iterate(model, work, memory, h)

@@ -54,6 +54,9 @@ class Tree(NamedTuple):
     kept: IntArray = integer(n_kept)  #: connections that are no joints of the tree
     is_kept: IntArray = integer(n_c)  #: whether a connection is among them
     kept_row: IntArray = integer(n_w)  #: number of a row among those of connections that are kept, -1 for others
+    held: IntArray = integer(Size("held"))  #: joints and couplers among those that are kept
+    #: axis of symmetry of a body that is free or on a ball joint, axes of its end of the joint; zero for others
+    spin_axis: Array = real(n_b, 3)
     loop_body: IntArray = integer(n_l)  #: a body that a loop goes through,
     loop_marker: IntArray = integer(n_l)  #: and the marker by which the loop leaves it outwards
     #: first of what moves a body with its subtree against its parent: columns that are unknown, modes of the parent at
@@ -79,6 +82,7 @@ class JointWork(NamedTuple):
     acceleration: Array = real(n_k, unit="m/s² or rad/s²")  #: z_ddot
     rate_start: Array = real(n_k, unit="m/s or rad/s")  #: z_dot at the beginning of a step
     acceleration_start: Array = real(n_k, unit="m/s² or rad/s²")
+    spins: IntArray = integer(n_b)  #: whether the step takes the spin about the axis of symmetry by itself
     is_known: IntArray = integer()  #: whether the beginning of a step is the motion in the memory
     t: Array = real(n_k, 3)  #: A_A tau, ground axes
     a: Array = real(n_k, 3)  #: rotation, ground axes

@@ -1,0 +1,190 @@
+"""Spin of axisymmetric bodies that are free or on a ball joint, taken by itself (docs/relative.md §6).
+
+As in absolute coordinates (`kernels.generalized_alpha`), with the motion of the body against its parent, omega and
+alpha in axes of the body's end of the joint: these are z_dot and z_ddot of the three columns of rotation, the last of
+the joint, where that end is B. Where it is A, they are -Q z_dot and -Q z_ddot. The increments x of these columns are
+theta = across + along e then, whichever end it is, and turn the body by exp(across) exp(along e).
+"""
+
+from floatframe.engine.kernels.compiler.compilation import inner, loops, small
+from floatframe.engine.kernels.generalized_alpha import next_acceleration, takes_spin
+from floatframe.engine.kernels.rotation import (
+    after_spin,
+    changed_spin,
+    right_jacobian,
+    spin_jacobian,
+    turn_of_axis,
+    turned_about,
+    turned_by_spin,
+)
+from floatframe.engine.kernels.vector import (
+    add,
+    cross,
+    dot,
+    matrix,
+    product,
+    put,
+    put_matrix,
+    scaled,
+    sub,
+    transposed,
+    turned,
+    turned_back,
+    vector,
+)
+
+__all__ = [
+    "begin_spin",
+    "change_spin",
+    "first_rotation",
+    "put_spin_acceleration",
+    "spin_jump",
+    "spin_variations",
+    "turn_spinning_joint",
+    "turning_by_columns",
+]
+
+
+@small
+def first_rotation(tree, i):
+    """Return the first of the three columns of rotation of the joint of body i."""
+    return tree.column0[i + 1] - 3
+
+
+@inner
+def of_body(tree, i, Q, x):
+    """Return three values of columns of rotation as those of body i against its parent, axes of its end."""
+    if tree.is_reversed[i] == 0:
+        return vector(x)
+    return scaled(-1.0, turned(Q, x))
+
+
+@inner
+def of_columns(tree, i, Q, x):
+    """Return a vector of body i against its parent as three values of columns of rotation."""
+    if tree.is_reversed[i] == 0:
+        return x
+    return scaled(-1.0, turned_back(Q, x))
+
+
+@inner
+def turn_spinning_joint(tree, joints, i):
+    """Write Q of the joint of a body that spins."""
+    theta, start = vector(joints.x[first_rotation(tree, i) :]), matrix(joints.Q_start[i])
+    turn = turned_by_spin(vector(tree.spin_axis[i]), theta)
+    if tree.is_reversed[i] == 0:
+        put_matrix(joints.Q[i], product(start, turn))
+    else:
+        put_matrix(joints.Q[i], product(transposed(turn), start))
+
+
+@inner
+def begin_spin(tree, joints, memory, i, alpha_f, h):
+    """Choose whether the step takes the spin of body i by itself; predict it so then, with a_new = a."""
+    e, k, Q = vector(tree.spin_axis[i]), first_rotation(tree, i), joints.Q_start[i]
+    joints.spins[i] = 0
+    if dot(e, e) == 0.0:
+        return
+    omega = of_body(tree, i, Q, joints.rate_start[k:])
+    alpha = of_body(tree, i, Q, joints.acceleration_start[k:])
+    turn = turn_of_axis(e, omega)
+    if not takes_spin(turn, alpha):
+        return
+    joints.spins[i] = 1
+    a = sub(of_body(tree, i, Q, memory.a[tree.slot[tree.unknown[k]] :]), turn)
+    rest = scaled(1.0 / (1.0 - alpha_f), sub(a, scaled(alpha_f, sub(alpha, turn))))
+    theta = scaled(h, add(omega, scaled(0.5 * h, a)))
+    put(joints.x, k, theta)
+    turn_spinning_joint(tree, joints, i)
+    omega, alpha = after_spin(e, dot(e, theta), add(omega, scaled(h, a)), rest)
+    put(joints.rate, k, of_columns(tree, i, joints.Q[i], omega))
+    put(joints.acceleration, k, of_columns(tree, i, joints.Q[i], alpha))
+
+
+@inner
+def change_spin(tree, joints, step, i, by_theta, by_rate, by_acceleration):
+    """Add the correction of the columns of rotation of a body that spins, by_theta of it to theta, to the iterate."""
+    k, Q = first_rotation(tree, i), joints.Q[i]
+    y = of_body(tree, i, Q, step[tree.unknown[k] :])
+    omega, alpha = of_body(tree, i, Q, joints.rate[k:]), of_body(tree, i, Q, joints.acceleration[k:])
+    theta, omega, alpha = changed_spin(
+        vector(tree.spin_axis[i]),
+        vector(joints.x[k:]),
+        omega,
+        alpha,
+        scaled(by_theta, y),
+        scaled(by_rate, y),
+        scaled(by_acceleration, y),
+    )
+    put(joints.x, k, theta)
+    turn_spinning_joint(tree, joints, i)
+    put(joints.rate, k, of_columns(tree, i, joints.Q[i], omega))
+    put(joints.acceleration, k, of_columns(tree, i, joints.Q[i], alpha))
+
+
+@inner
+def spin_accelerations(tree, joints, memory, i, alpha_m, alpha_f):
+    """Return the algorithmic acceleration of a body that spins before and after the step, in axes that do not spin."""
+    e, k, Q = vector(tree.spin_axis[i]), first_rotation(tree, i), joints.Q_start[i]
+    turn = turn_of_axis(e, of_body(tree, i, Q, joints.rate_start[k:]))
+    a = sub(of_body(tree, i, Q, memory.a[tree.slot[tree.unknown[k]] :]), turn)
+    before = sub(of_body(tree, i, Q, joints.acceleration_start[k:]), turn)
+    turn = turn_of_axis(e, of_body(tree, i, joints.Q[i], joints.rate[k:]))
+    rest = sub(of_body(tree, i, joints.Q[i], joints.acceleration[k:]), turn)
+    now = turned_about(e, dot(e, vector(joints.x[k:])), rest)
+    return a, next_acceleration(a, before, now, alpha_m, alpha_f)
+
+
+@inner
+def spin_jump(tree, joints, memory, i, alpha_m, alpha_f):
+    """Return by how much the algorithmic acceleration of a body that spins changes in a step, as values of columns."""
+    e, along = vector(tree.spin_axis[i]), dot(vector(tree.spin_axis[i]), vector(joints.x[first_rotation(tree, i) :]))
+    a, after = spin_accelerations(tree, joints, memory, i, alpha_m, alpha_f)
+    return of_columns(tree, i, joints.Q[i], turned_about(e, -along, sub(after, a)))
+
+
+@inner
+def put_spin_acceleration(tree, joints, memory, i, alpha_m, alpha_f):
+    """Write the algorithmic acceleration of a body that spins after the step into the memory."""
+    e, k, Q = vector(tree.spin_axis[i]), first_rotation(tree, i), joints.Q[i]
+    _, rest = spin_accelerations(tree, joints, memory, i, alpha_m, alpha_f)
+    omega, along = of_body(tree, i, Q, joints.rate[k:]), dot(e, vector(joints.x[k:]))
+    after = add(turned_about(e, -along, rest), turn_of_axis(e, omega))
+    put(memory.a, tree.slot[tree.unknown[k]], of_columns(tree, i, Q, after))
+
+
+@loops
+def turning_by_columns(tree, joints, i):
+    """Return the rotation of body i by changes of x of the columns of its joint that are fixed in B, axes of B."""
+    if joints.spins[i] != 0:
+        T = spin_jacobian(vector(tree.spin_axis[i]), vector(joints.x[first_rotation(tree, i) :]))
+        if tree.is_reversed[i] == 0:
+            return T
+        Q = matrix(joints.Q[i])
+        return product(transposed(Q), product(T, Q))
+    x = (0.0, 0.0, 0.0)
+    for k in range(tree.column0[i], tree.column0[i + 1]):
+        if tree.side[k] != 0:
+            x = add(x, scaled(joints.x[k], vector(tree.alpha[k])))
+    return right_jacobian(x)
+
+
+@inner
+def spin_variations(tree, joints, i, y, theta, c_m, c_d, c_k):
+    """Return theta_dot and theta_ddot of `kernels.jets` by the change y of unknowns of a body that spins, axes of B.
+
+    omega follows c_d y and alpha - w omega × e follows c_m y, both turned on by c_k (e · y) about -e.
+    """
+    k, Q = first_rotation(tree, i), joints.Q[i]
+    e, omega, alpha = vector(tree.spin_axis[i]), vector(joints.rate[k:]), vector(joints.acceleration[k:])
+    if tree.is_reversed[i] != 0:
+        e, omega, alpha = turned_back(Q, e), scaled(-1.0, omega), scaled(-1.0, alpha)
+    further, spin = c_k * dot(e, y), dot(e, omega)
+    rest = sub(alpha, turn_of_axis(e, omega))
+    by_omega = sub(scaled(c_d, y), scaled(further, cross(e, omega)))
+    by_alpha = sub(scaled(c_m, y), scaled(further, cross(e, rest)))
+    by_alpha = add(by_alpha, add(scaled(dot(e, by_omega), cross(omega, e)), scaled(spin, cross(by_omega, e))))
+    if tree.is_reversed[i] != 0:  # omega as the parent sees it
+        return by_omega, add(by_alpha, cross(omega, by_omega))
+    theta_1 = sub(by_omega, scaled(c_k, cross(omega, theta)))
+    return theta_1, sub(sub(by_alpha, scaled(c_k, cross(alpha, theta))), cross(omega, theta_1))
