@@ -90,8 +90,13 @@ def test_solid_and_beam_in_line_swing_like_a_beam_alone(kind):
 
 def test_either_side_of_a_joint_may_be_distributing():
     """The order of the two makes no difference; with the beam first, at an arm, PARDISO found the body singular."""
-    beam = line((0.6, 0.1, -0.05), (1, 0.2, 0.1), 3, "beam", {"root": "start", "tip": "end"})
-    bar = solid_bar(0.5, "distributing")
+    beam = line((0, 0, 0), (1, 0, 0), 3, "beam", {"root": "start", "tip": "end"})
+    bar = bodies.bar(3, 1, 1, height=0.06)
+    ends = [
+        fm.Interface(i.name, "distributing", i.nodes, i.reference + np.array([0.02, 0.01, -0.03]))
+        for i in bar.interfaces
+    ]
+    bar = cms.couple(bodies.with_interfaces(bar, *ends))
     sides = (("bar", "right"), ("beam", "root"))
     found = [cms.craig_bampton(fm.weld([bar, beam], [joint], name="w"), n_modes=4) for joint in (sides, sides[::-1])]
     first, second = (modes.frequencies[np.isfinite(modes.frequencies)] for modes in found)

@@ -4,11 +4,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from cms.linear_algebra.independent import gram_in_blocks
 from cms.linear_algebra.solvers.eigen import EigenResult
+from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
 from cms.linear_algebra.solvers.tall import combine
 from cms.modes.families.fixed_interface import FixedInterfaceBody
 from cms.modes.families.flexibility import Flexibility
-from fe_models.body.fe_body import FEBody
+from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.components import MOTION_COMPONENTS
 from fe_models.foundation.ranks.spread_columns import spread_parts
@@ -26,6 +28,7 @@ __all__ = [
     "unrestrained_attachment_modes",
 ]
 
+RESIDUAL = 1e-12  #: energy of a residual attachment mode relative to the attachment mode, below which it is rounding
 STIFF = 1e-14  #: compliance relative to the largest (rotations times body length squared), below which it is rounding
 STILL = 1e-24  #: the same for the energy of a response to inertia loads, where both factors are rounding
 BLOCK = 60  #: right-hand sides solved at a time; wider blocks are not faster and need more memory
@@ -162,7 +165,23 @@ def residual_attachment_modes(body: FEBody, Psi_U: Array, free_modes: EigenResul
         return Psi_U
     residual = Psi_U - combine(free_modes.Phi, (free_modes.Phi[body.b] / free_modes.omega2).T)
     residual[:, ~Psi_U.any(axis=0)] = 0.0  # a load without elastic response leaves no residual
-    return residual
+    n_multipliers = int((body.dofs[:, 1] == MULTIPLIER).sum())
+    n_elastic = body.n_dof - 2 * n_multipliers - 6  # motions that satisfy the constraints
+    is_full = n_multipliers and len(free_modes.omega2) + residual.shape[1] > n_elastic
+    return without_rounding(body, residual, Psi_U) if is_full else residual
+
+
+def without_rounding(body: FEBody, residual: Array, Psi_U: Array) -> Array:
+    """Return residual attachment modes without the combinations that are rounding of the attachment modes.
+
+    In a body with multipliers such a combination breaks the constraints. It would count as a motion without mass.
+    """
+    K = SymmetricProduct(body.K)
+    energy = np.diag(gram_in_blocks(Psi_U, K))
+    size = 1 / np.sqrt(np.where(energy > 0, energy, 1.0))
+    values, vectors = np.linalg.eigh(gram_in_blocks(residual, K) * np.outer(size, size))
+    kept = vectors[:, values > RESIDUAL]
+    return np.asarray(combine(residual, (size[:, None] * kept) @ (kept.T / size)))
 
 
 def _unit(body: FEBody, is_rotation: np.ndarray) -> Array:

@@ -13,7 +13,7 @@ import fe_models as fm
 from cms.errors import BodyError, ModeSetError
 from cms.modes.families import families, interface_cost
 from cms.modes.families.interface_cost import few_columns, large_interfaces, reduction_cost
-from tests.bodies import box_mesh
+from tests.bodies import box_mesh, distorted
 from tests.fe_models.small_shells import SI, STEEL
 
 SETS = {
@@ -149,6 +149,22 @@ def test_bricks_welded_at_distributing_interfaces_swing_as_the_constrained_penci
     expected = np.sqrt(la.eigh(Z.T @ K @ Z, Z.T @ M @ Z, eigvals_only=True)[6:10]) / (2 * np.pi)
     reduced = cms.reduce(whole, cms.rubin(cms.Families(whole, solver=solver), n_modes=4))
     assert_allclose(reduced.free_frequencies[:4], expected, rtol=1e-8)
+
+
+@pytest.mark.parametrize("make", [cms.rubin, cms.dual_craig_bampton, cms.craig_chang])
+@pytest.mark.parametrize("n_modes", [19, 27])
+def test_modes_and_residuals_that_fill_the_space_leave_no_massless_shape(make, n_modes):
+    """Two distributing interfaces: rounding of the residuals breaks their constraints, and came as four shapes more."""
+    mesh = distorted(box_mesh(2, 1, 1, 0.5, 0.2, 0.1), 0.1, seed=1)
+    mesh = dataclasses.replace(mesh, nodes=mesh.nodes + np.array([3.0, -1.0, 2.0]))
+    ends = [fm.Interface(side, "distributing", mesh.node_sets[side], [3.2, -1, 2.1]) for side in ("left", "right")]
+    body = fm.solid_body(mesh, STEEL, name="brick", units=SI)
+    coupled = cms.couple(body.with_interfaces(*ends))
+    reduced = cms.reduce(coupled, make(coupled, n_modes=n_modes), geometric=False)
+    expected = np.sqrt(la.eigh(body.K.toarray(), body.M.toarray(), eigvals_only=True)[6:]) / (2 * np.pi)
+    assert reduced.n_q == body.n_dof - 6
+    assert_allclose(reduced.M, np.eye(reduced.n_q), rtol=0, atol=1e-9)
+    assert_allclose(reduced.free_frequencies, expected, rtol=1e-7)  # modes are found to 1e-5, squared
 
 
 @pytest.mark.parametrize(
