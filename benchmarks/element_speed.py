@@ -23,7 +23,7 @@ STIFFNESS, DAMPING = 200.0, 1.0
 
 
 @njit
-def spring(t, x, z, lam, data, wrench, z_dot, g, seen):
+def spring(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Pull along the line of two markers: k (L - L0) + c L'."""
     k, c, free = data
     d0, d1, d2 = x[1, 0] - x[0, 0], x[1, 1] - x[0, 1], x[1, 2] - x[0, 2]

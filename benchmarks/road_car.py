@@ -19,7 +19,7 @@ from floatframe.components.wheels import read_tyre_file, shipped_tyre
 from floatframe.machines.road_car import CarOnPosts, Linkage, RoadCar, body_files
 from floatframe.machines.road_car.closed_forms import MODES, roll_control_stiffness
 from floatframe.machines.road_car.description import CORNERS
-from floatframe.machines.road_car.figures import Driven, body_twist_stiffness, car_mass, driven, steady_turn
+from floatframe.machines.road_car.figures import CarMotion, body_twist_stiffness, car_mass, driven, steady_turn
 from floatframe.machines.road_car.systems import (
     SUPPORTS,
     car_file,
@@ -43,7 +43,7 @@ def tyre(load: float, alpha: float, gamma: float, is_left: bool) -> tuple[float,
     return side * found[1], side * found[2], -found[3], side * found[4]
 
 
-def run(folder: Path, text: str) -> tuple[ff.System, Driven, float]:
+def run(folder: Path, text: str) -> tuple[ff.System, CarMotion, float]:
     """Return a system, what its motion shows, and the processor time of a second."""
     (folder / "car.toml").write_text(text)
     system, options = ff.read_system(folder / "car.toml")
@@ -131,7 +131,7 @@ def circle(folder: Path) -> None:
             print(f"{support} {words}: understeer gradient {slopes[0]:.4f}, at the end {slopes[1]:.4f} degrees/(m/s²)")
 
 
-def peaks(words: str, seen: Driven, cost: float) -> None:
+def peaks(words: str, seen: CarMotion, cost: float) -> None:
     """Print the largest values of a motion."""
     told = [
         f"a_y {np.abs(seen.lateral_acceleration).max():.3f} m/s²",

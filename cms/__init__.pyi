@@ -6,8 +6,8 @@ from .assessment.quality.reduction_check import check_reduction as check_reducti
 from .body.address import Address as Address
 from .body.address import FoundNodes as FoundNodes
 from .body.geometric_stiffness import GeometricStiffness as GeometricStiffness
+from .body.geometric_stiffness import RotatedLoads as RotatedLoads
 from .body.geometric_stiffness import SpreadLoads as SpreadLoads
-from .body.geometric_stiffness import TurnedLoads as TurnedLoads
 from .body.invariants import Moments as Moments
 from .body.kept_points import KeptPoints as KeptPoints
 from .body.modal_file.file import convert_units as convert_units

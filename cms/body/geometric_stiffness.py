@@ -11,7 +11,7 @@ from fe_models.foundation.arrays import SYMMETRY_DEFECT, Array, IntArray, frozen
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.units import Units
 
-__all__ = ["SPIN_PAIRS", "UNIT_LOADS", "GeometricStiffness", "SpreadLoads", "TurnedLoads", "stiffness_of_loads"]
+__all__ = ["SPIN_PAIRS", "UNIT_LOADS", "GeometricStiffness", "RotatedLoads", "SpreadLoads", "stiffness_of_loads"]
 
 #: kinds of unit loads; each is an array of `GeometricStiffness`
 UNIT_LOADS = ("translation", "rotation", "spin", "interfaces")
@@ -21,7 +21,7 @@ SPIN_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))  #: (a, b) of omeg
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
-class TurnedLoads:
+class RotatedLoads:
     """K_j between a rotation of the whole body and a mode: work on mode k of the balanced load j as it rotates too.
 
     It is (e_x × c)ᵀ K_geo(sigma_j) phi_k for rotations about the axes x of B. With it, K_j is transformed to the shapes
@@ -50,7 +50,7 @@ class SpreadLoads:
     """
 
     K: Array  #: as in `GeometricStiffness`, (6, n_q, n_q) [1/(kg m) and 1/kg per q²]
-    turned: Array  #: as in `TurnedLoads`, (6, 3, n_q) [1/sqrt(kg) and m/sqrt(kg) per q]
+    turned: Array  #: as in `RotatedLoads`, (6, 3, n_q) [1/sqrt(kg) and m/sqrt(kg) per q]
     turned_rigid: Array  #: work of load j alone, rotated about an axis, on the rotations e_b × c, (6, 3, 3) [m and m²]
 
     def __post_init__(self) -> None:
@@ -83,7 +83,7 @@ class GeometricStiffness:
     interfaces: Array
     #: needed to transform the matrices to other frames; None: not recorded, a rotation is then assumed to rotate the
     #: loads
-    turned: TurnedLoads | None = None
+    turned: RotatedLoads | None = None
     spread: SpreadLoads | None = None  #: needed to transform them to a Buckens frame; None: left out, or not recorded
     #: for each of `ReducedBody.interfaces`, whether its loads are in `interfaces`; loads of other interfaces do not
     #: stiffen the body; empty: all are included
@@ -194,7 +194,7 @@ def stiffness_of_loads(
         spread = SpreadLoads(K[-6:], turned[-6:], turned_rigid)
     return GeometricStiffness(
         **by_kind(K, n_loaded),
-        turned=None if turned is None else TurnedLoads(**by_kind(turned, n_loaded)),
+        turned=None if turned is None else RotatedLoads(**by_kind(turned, n_loaded)),
         spread=spread,
         is_loaded=is_loaded,
     )

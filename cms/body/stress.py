@@ -10,7 +10,7 @@ from fe_models.foundation.copies import frozen_copies
 
 __all__ = ["PointStress", "stress_of", "von_mises", "von_mises_of"]
 
-AT_ONCE = 2_000_000  #: number of stress values held at a time
+CHUNK_SIZE = 2_000_000  #: number of stress values held at a time
 
 
 @frozen_copies
@@ -60,6 +60,6 @@ def stress_of(modes: Array, q: Array) -> Array:
 
 def von_mises_of(modes: Array, q: Array) -> Iterator[Array]:
     """Yield the von Mises stress of many modal coordinates q (k, n_q) in blocks of rows: (rows, n) [Pa]."""
-    rows = max(1, AT_ONCE // max(1, modes[..., 0].size))
+    rows = max(1, CHUNK_SIZE // max(1, modes[..., 0].size))
     for first in range(0, len(q), rows):
         yield von_mises(stress_of(modes, q[first : first + rows])).T

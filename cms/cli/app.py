@@ -242,7 +242,7 @@ def import_command(
     damping: Annotated[
         float | None, typer.Option(help="Ratio of every mode, added to the damping of the files.")
     ] = None,
-    mend_mass: Annotated[bool, typer.Option("--mend-mass", help="Set slightly negative masses to zero.")] = False,
+    repair_mass: Annotated[bool, typer.Option("--repair-mass", help="Set slightly negative masses to zero.")] = False,
     accept: Annotated[list[str] | None, typer.Option(help="Findings to accept: units.")] = None,
     output: Output = None,
 ) -> None:
@@ -274,7 +274,7 @@ def import_command(
                 to,
                 at,
                 damping,
-                mend_mass,
+                repair_mass,
                 tuple(accept or ()),
             )
         )

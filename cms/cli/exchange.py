@@ -166,7 +166,7 @@ class ImportRequest:
     to: str = "tisserand"
     at: str | None = None
     damping: float | None = None
-    mend_mass: bool = False
+    repair_mass: bool = False
     accept: tuple[str, ...] = ()
 
 
@@ -204,7 +204,7 @@ def run_import(request: ImportRequest) -> "ReducedBody":
                 inertia=inertia_of(request),
                 frame=frame_of(request),
                 damping=damping_of(request),
-                mend_mass=request.mend_mass,
+                repair_mass=request.repair_mass,
                 accept=request.accept,
             )
         with clock("write"):

@@ -16,7 +16,7 @@ from fe_models.foundation.ranks.ranks import RankError, require_agreement, start
 __all__ = ["on_ranks", "one_job_of_ranks"]
 
 
-OF_RANKS = ("petsc", "petsc-disk", "slepc")  #: solvers that several ranks can share
+PARALLEL_SOLVERS = ("petsc", "petsc-disk", "slepc")  #: solvers that several ranks can share
 
 
 def one_job_of_ranks(jobs: Sequence[Path], workers: str | None, solver: str | None) -> None:
@@ -26,7 +26,7 @@ def one_job_of_ranks(jobs: Sequence[Path], workers: str | None, solver: str | No
         return
     if len(jobs) > 1 or workers is not None:
         raise JobError(f"{n} ranks work on one job together; several jobs are spread by --workers, without mpirun")
-    if solver not in OF_RANKS:
+    if solver not in PARALLEL_SOLVERS:
         named = "the default solver" if solver is None else f"solver {solver}"
         raise JobError(f"{n} ranks, but {named} works in one process; take --solver petsc, or start without mpirun")
 

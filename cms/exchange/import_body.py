@@ -129,7 +129,7 @@ def import_body(
     inertia: Inertia | None = None,
     frame: Frame | None = None,
     damping: Damping | None = None,
-    mend_mass: bool = False,
+    repair_mass: bool = False,
     accept: Sequence[str] = (),
 ) -> ReducedBody:
     """Make a reduced body of what another program has reduced.
@@ -161,7 +161,7 @@ def import_body(
         Of the body; Tisserand (mean axes) by default.
     damping
         Added to that of the files.
-    mend_mass
+    repair_mass
         Whether slightly negative eigenvalues of a reduced mass are set to zero, which is told.
     accept
         Findings to accept: "units", that size, density or wave speed are implausible.
@@ -175,7 +175,7 @@ def import_body(
     """
     options = ImportOptions(
         unit_system(units) if isinstance(units, str) else units,
-        interfaces, inertia, frame, damping, mend_mass, tuple(accept),
+        interfaces, inertia, frame, damping, repair_mass, tuple(accept),
     )  # fmt: skip
     places = places_of(nodes)
     if isinstance(files, ForeignMatrices):

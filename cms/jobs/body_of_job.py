@@ -63,7 +63,7 @@ def body_of_matrices(job: Job, stages: Stages, on_report: Callable[[Any], None] 
     with stages("check matrices"):
         body = body_from_foreign(
             read, geometry, name=str(job.body.name), units=unit_system(job.body.units), interfaces=interfaces,
-            held=bool(job.body.held), remove_supports=job.body.remove_supports, mend_mass=bool(job.body.mend_mass),
+            held=bool(job.body.held), remove_supports=job.body.remove_supports, repair_mass=bool(job.body.repair_mass),
             accept=[word for word in job.body.accept if word == "units"],
         )  # fmt: skip
     return body.with_load_cases(*load_cases_of(job, body, geometry))
@@ -78,7 +78,7 @@ def body_with_its_interfaces(job: Job, stages: Stages) -> FEBody:
     with stages("read matrices"):
         body = body_from_npz(
             Path(str(job.body.matrices)), name=job.body.name, units=unit_system(job.body.units),
-            held=bool(job.body.held), mend_mass=bool(job.body.mend_mass),
+            held=bool(job.body.held), repair_mass=bool(job.body.repair_mass),
             accept=[word for word in job.body.accept if word == "units"],
         )  # fmt: skip
         return body.with_load_cases(*load_cases_of(job, body))

@@ -190,7 +190,7 @@ class BodySection(Table):
     held: bool | None = Field(
         None, description="true or false, for matrices: whether the body is meant to be held to the ground"
     )
-    mend_mass: bool | None = Field(
+    repair_mass: bool | None = Field(
         None, description="true or false, for matrices: whether slightly negative masses are set to zero"
     )
     incompatible_modes: bool = Field(False, description="true or false: bricks of eight nodes bend by internal modes")
@@ -227,7 +227,7 @@ class BodySection(Table):
     def _one_source(self) -> "BodySection":
         if (self.nodes is None) != (self.lines is None):
             raise ValueError(f"{'lines' if self.nodes else 'nodes'}: missing; tables of nodes and lines come together")
-        for key in ("held", "mend_mass"):
+        for key in ("held", "repair_mass"):
             if getattr(self, key) is not None and self.matrices is None:
                 raise ValueError(f"{key}: belongs to matrices; a body built from a mesh is free, its mass positive")
         for key in ("geometry", "names", "remove_supports"):

@@ -205,12 +205,12 @@ def reduces_interfaces(job: Job) -> bool:
 
 def expected_columns(job: Job, body: FEBody) -> int:
     """Return a lower bound of the number of columns of the mode set of a job, before the set is made."""
-    from cms.modes.families.interface_cost import few_columns
+    from cms.modes.families.interface_cost import interface_reduction_size
     from cms.modes.mode_sets import INTERFACE_SETS
 
     found = len(body.b)
     if reduces_interfaces(job):
-        found = few_columns(body, job.reduction.interface_modes or 0)
+        found = interface_reduction_size(body, job.reduction.interface_modes or 0)
     if job.reduction.set not in INTERFACE_SETS:
         found = 0
     return found + (job.reduction.n_modes if isinstance(job.reduction.n_modes, int) else 0)

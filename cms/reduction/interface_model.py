@@ -31,7 +31,9 @@ from fe_models.foundation.components import MOTION_COMPONENTS
 __all__ = ["BoundaryNode", "InterfaceModel", "interface_model"]
 
 RANK_TOLERANCE = 1e-9  #: singular values of the scaled map below this share of the largest count as zero
-STILL = 1e-12  #: interface motion of a mode below this share of its largest is rounding: the frame holds the interface;
+ROUNDING_MOTION = (
+    1e-12  #: interface motion of a mode below this share of its largest is rounding: the frame holds the interface;
+)
 #: rotations are multiplied by the extent of the body
 MASSLESS = 1e-14  #: mass of a fixed-interface mode of unit stiffness below this share of the largest counts as zero
 
@@ -166,7 +168,7 @@ def still_modes(body: ReducedBody, motion: Array, components: IntArray) -> Array
     if not len(motion) or extent == 0.0:  # a point has no length to measure rotations by
         return np.zeros(body.n_q, dtype=bool)
     path = np.abs(motion) * np.where(components < 3, 1.0, extent)[:, None]
-    return np.asarray(path.max(axis=0) <= STILL * np.abs(body.Phi).max(axis=(0, 1)))
+    return np.asarray(path.max(axis=0) <= ROUNDING_MOTION * np.abs(body.Phi).max(axis=(0, 1)))
 
 
 def places_of(body: ReducedBody, interface: ReducedInterface) -> list[tuple[Array, Array]]:

@@ -150,7 +150,7 @@ def bogie() -> None:
     from floatframe.components import rails
     from floatframe.machines import copy_machine
     from floatframe.machines.bogie import RailVehicle, flexible_frames, vehicle
-    from floatframe.machines.bogie.running import blown
+    from floatframe.machines.bogie.running import with_lateral_kick
 
     speed, larger = 80.0, 20.0
     with tempfile.TemporaryDirectory() as name:
@@ -159,7 +159,7 @@ def bogie() -> None:
         data, frame = RailVehicle(), cms.reduce_job(folder / "frame.toml")
         laws = rails.ContactLaws(creep="fastsim", friction=0.4, strips=8)
         system = vehicle(data, speed, laws=laws, frames=flexible_frames(data, frame, speed))
-        system = replace(blown(system, 0.1), scene=())
+        system = replace(with_lateral_kick(system, 0.1), scene=())
         motion = ff.integrate(system, ff.GeneralizedAlpha(0.8, 1e-6), 2.0, 2e-3, output_every=2)
         rows = motion.t >= 1.0
         arrays = {key: values[rows] for key, values in motion.source.arrays.items() if len(values) == len(rows)}

@@ -40,20 +40,20 @@ class RigidForces:
     @property
     def is_free(self) -> bool:
         """Whether no motion meets a resistance beyond rounding."""
-        return not self.is_answered.any()
+        return not self.resists.any()
 
     @property
-    def is_answered(self) -> np.ndarray:
+    def resists(self) -> np.ndarray:
         """Whether each motion meets a resistance, (6,) bool."""
-        return np.asarray((self.largest > FREE) | self._answers.any(axis=0))
+        return np.asarray((self.largest > FREE) | self._resists.any(axis=0))
 
     @property
     def rows(self) -> IntArray:
         """Rows that resist some motion, ascending."""
-        return np.flatnonzero(self._answers.any(axis=1)).astype(np.int64)
+        return np.flatnonzero(self._resists.any(axis=1)).astype(np.int64)
 
     @property
-    def _answers(self) -> np.ndarray:
+    def _resists(self) -> np.ndarray:
         """Whether each row resists each motion, (n_dof, 6) bool.
 
         Translations do not depend on the digits of the node positions, so a soft spring shows as a row far above the
@@ -78,7 +78,7 @@ class RigidForces:
         return int(row), int(motion)
 
     @property
-    def swing(self) -> Array:
+    def rigid_body_frequency(self) -> Array:
         """Frequency at which the body would oscillate in each motion if it moved rigidly, (6,) [1 / time unit]."""
         mass = np.diag(self.mass)
         omega2 = np.diag(self.energy) / np.where(mass > 0, mass, np.inf)

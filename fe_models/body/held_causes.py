@@ -14,7 +14,7 @@ from fe_models.body.freedom import MOTIONS, RigidForces, rigid_forces
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.words import node_list
 
-__all__ = ["mistake_of", "support_words"]
+__all__ = ["mistake_description", "support_description"]
 
 Called = Callable[[int], str]  #: gives the user's name of a node, by its index
 
@@ -28,7 +28,7 @@ MOST_SOLVED = 3000  #: largest number of dofs of suspected nodes for which the t
 APART = 1e-3  #: distance from a node to its true position, relative to the size of the body, that counts as a mistake
 
 
-def mistake_of(
+def mistake_description(
     K: sp.csc_array,
     M: sp.csc_array,
     nodes: Array,
@@ -70,9 +70,9 @@ def mistake_of(
     for factor, words in LENGTHS.items():
         if rigid_forces(K, M, factor * nodes, dofs).is_free:
             return f"the nodes are in {words}: times {factor:.6g} everything fits; mend the nodes"
-    turns_only = not forces.is_answered[:3].any() and bool(forces.is_possible[:3].all())
+    turns_only = not forces.resists[:3].any() and bool(forces.is_possible[:3].all())
     if turns_only and (dofs[forces.rows, 1] < 3).any():  # (3)
-        moved = moved_words(K, nodes, dofs, forces, called)
+        moved = moved_description(K, nodes, dofs, forces, called)
         return f"K resists rotations but no translation: the positions of nodes do not fit K{moved}"
     missing = missing_rows(dofs, len(nodes))
     if with_rows and len(missing):  # (4)
@@ -94,7 +94,7 @@ def fitting_order(K: sp.csc_array, M: sp.csc_array, nodes: Array, dofs: IntArray
     return ""
 
 
-def moved_words(K: sp.csc_array, nodes: Array, dofs: IntArray, forces: RigidForces, called: Called) -> str:
+def moved_description(K: sp.csc_array, nodes: Array, dofs: IntArray, forces: RigidForces, called: Called) -> str:
     """Say which nodes are misplaced, as far as the matrices allow."""
     suspected = np.unique(dofs[forces.rows, 0])
     S = np.flatnonzero(np.isin(dofs[:, 0], suspected))
@@ -138,12 +138,12 @@ def missing_rows(dofs: IntArray, n_nodes: int) -> list[tuple[int, int]]:
     return [(int(node), int(component)) for node, component in np.argwhere(~has & wanted)]
 
 
-def support_words(forces: RigidForces, dofs: IntArray, time: float, *, called: Called = str) -> str:
+def support_description(forces: RigidForces, dofs: IntArray, time: float, *, called: Called = str) -> str:
     """Describe where a body is held and how stiffly; `time` is its time unit [s]."""
     row, motion = forces.place
     n_nodes = len(np.unique(dofs[forces.rows, 0]))
     return (
         f"{len(forces.rows)} rows of {n_nodes} nodes answer rigid-body motion by up to "
         f"{forces.largest.max():.1e} of the stiffest entry, most at node {called(dofs[row, 0])} for {MOTIONS[motion]}; "
-        f"the body would swing at {forces.swing.max() / time:.3g} Hz"
+        f"the body would swing at {forces.rigid_body_frequency.max() / time:.3g} Hz"
     )

@@ -18,11 +18,11 @@ __all__ = ["DENSE", "ROUNDING", "negative_mass", "positive_mass"]
 ROUNDING = 1e-10
 #: magnitude of a negative eigenvalue, relative to the largest, up to which it is repaired; beyond it M is no mass
 #: matrix
-MENDED = 1e-3
+REPAIR_LIMIT = 1e-3
 DENSE = 1500  #: number of dofs up to which all eigenvalues are computed
 MOST_NEGATIVE = 200  #: number of negative eigenvalues that are searched for in a large matrix
 #: entries of an eigenvector below this share of the largest are dropped, so that the matrix stays sparse
-NOTHING = 1e-13
+ROUNDING_OF_VECTORS = 1e-13
 
 
 def scales(M: sp.csc_array, dofs: IntArray) -> Array:
@@ -81,19 +81,18 @@ def positive_mass(body: FEBody) -> FEBody:
     Raises
     ------
     BodyError
-        If an eigenvalue is below `-MENDED` times the largest: the matrix is then no mass matrix with rounding errors.
+        If an eigenvalue is below `-REPAIR_LIMIT` times the largest: rounding of a mass matrix does not explain it.
     """
     where = f"body {body.name!r}"
     values, vectors = negative_mass(body.M, body.dofs)  # (1)
     if not len(values):
         return body
-    if values[0] < -MENDED:
+    if values[0] < -REPAIR_LIMIT:
         raise BodyError(
-            f"{where}: M has an eigenvalue of {values[0]:.1e} of its largest; expected -{MENDED:.0e} at the least, "
-            "which "
-            "could be mended: is this the mass matrix, with its rows in the order of dofs?"
+            f"{where}: M has an eigenvalue of {values[0]:.1e} of its largest; expected at least -{REPAIR_LIMIT:.0e}, "
+            "which could be repaired: is this the mass matrix, with its rows in the order of dofs?"
         )
-    local = np.where(np.abs(vectors) > NOTHING * np.abs(vectors).max(axis=0), vectors, 0.0)
+    local = np.where(np.abs(vectors) > ROUNDING_OF_VECTORS * np.abs(vectors).max(axis=0), vectors, 0.0)
     V = sp.csc_array(local * np.sqrt(np.abs(values)))
     M = sp.csc_array(body.M + V @ V.T)  # (2)
     Psi_R = rigid_motion_of_dofs(body.nodes, body.dofs, body.nodes.mean(axis=0))

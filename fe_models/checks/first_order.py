@@ -25,7 +25,7 @@ from fe_models.foundation.arrays import Array, IntArray
 from fe_models.meshes.boundary import boundary_nodes
 from fe_models.meshes.connectivity import facet_pairs
 from fe_models.meshes.mesh import Mesh
-from fe_models.meshes.raised import FIRST_ORDER, raised_mesh, tetrahedra_of
+from fe_models.meshes.quadratic_mesh import FIRST_ORDER, quadratic_mesh, tetrahedra_of
 from fe_models.meshes.unused_nodes import drop_unused_nodes
 
 __all__ = ["PROVENANCE", "FirstOrderError", "first_order_error"]
@@ -104,10 +104,10 @@ def first_order_error(
     K, M_s = assemble(piece, properties, by_type(piece, number), incompatible=incompatible_modes, tensors=tensors)
     coarse = LowestModes(K, expand_scalar_mass(M_s))  # (2)
     if set(piece.cells) in ({"tetra"}, {"hexahedron"}):  # (3)
-        finer, P = raised_mesh(piece)
+        finer, P = quadratic_mesh(piece)
     else:
         cut, P, owner = tetrahedra_of(piece)
-        finer, P_2 = raised_mesh(cut)
+        finer, P_2 = quadratic_mesh(cut)
         P, number = sp.csr_array(P_2 @ P), number[owner]
     K, M_s = assemble(finer, properties, by_type(finer, number), tensors=tensors)
     second = coarse.improved(K, expand_scalar_mass(M_s), finer.nodes, P)

@@ -73,7 +73,9 @@ def require_usable(content: Any, path: Path, error: type[Exception]) -> None:
                 items = value.items() if isinstance(value, dict) else enumerate(value)
                 inner += [((*where, key), item) for key, item in items]
             elif isinstance(value, int | float) and GREATEST < abs(value) != inf:
-                raise error(f"{path}: {key_path(where)} = {shown(value)}: expected a number up to {GREATEST:g} in size")
+                raise error(
+                    f"{path}: {key_path(where)} = {quoted_value(value)}: expected a number up to {GREATEST:g} in size"
+                )
         if not inner:
             return
         level = inner
@@ -121,8 +123,10 @@ def describe(model: type[BaseModel], detail: ErrorDetails) -> str:
     if detail["type"] == "value_error":
         text = str(detail["ctx"]["error"])
         shows_value = location and not isinstance(detail["input"], dict | BaseModel)
-        return f"{key} = {shown(detail['input'])}: {text}" if shows_value else f"{key}: {text}".removeprefix(": ")
-    return f"{key} = {shown(detail['input'])}: expected {expected}"
+        return (
+            f"{key} = {quoted_value(detail['input'])}: {text}" if shows_value else f"{key}: {text}".removeprefix(": ")
+        )
+    return f"{key} = {quoted_value(detail['input'])}: expected {expected}"
 
 
 def key_path(location: Sequence[str | int]) -> str:
@@ -148,7 +152,7 @@ def table_at(model: type[BaseModel], location: Sequence[str | int]) -> type[Base
     return here if isinstance(here, type) and issubclass(here, BaseModel) else None
 
 
-def shown(value: Any) -> str:
+def quoted_value(value: Any) -> str:
     """Return a value as the user wrote it, shortened."""
     if isinstance(value, bool):
         return "true" if value else "false"

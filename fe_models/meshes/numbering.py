@@ -218,9 +218,9 @@ class Numbering:
         """Return the numbering with n more nodes at the end, which have no user number."""
         return replace(
             self,
-            nodes=longer(self.nodes, n, NONE),
-            on_skin=longer(self.on_skin, n, 0),
-            node_instance=longer(self.node_instance, n, NONE),
+            nodes=extended_numbers(self.nodes, n, NONE),
+            on_skin=extended_numbers(self.on_skin, n, 0),
+            node_instance=extended_numbers(self.node_instance, n, NONE),
         )
 
     def of_rows(self, rows: IntArray, n_nodes: int) -> "Numbering":
@@ -269,7 +269,7 @@ def split_name(where: str, what: str, asked: int | str) -> tuple[str | None, int
     return (prefix if dot else None), int(number)
 
 
-def longer(values: IntArray, n: int, filling: int) -> IntArray:
+def extended_numbers(values: IntArray, n: int, filling: int) -> IntArray:
     """Return an array with n equal values appended; an empty array stays empty."""
     return np.concatenate([values, np.full(n, filling)]) if values.size else values
 
@@ -297,7 +297,7 @@ def numbering_side_by_side(
             joined[name] = np.concatenate(filled)
     if "on_skin" in joined and "nodes" not in joined:
         del joined["on_skin"]
-    prefixed = {} if share_numbers else told_apart(parts, joined)
+    prefixed = {} if share_numbers else distinguished_instances(parts, joined)
     sets: dict[tuple[str, str], NamedSet] = {}
     names = [(each.kind, each.name) for part in parts for each in part[1].sets]
     for (body, numbering, *_), node, triangle in zip(parts, n_nodes, n_triangles, strict=False):
@@ -312,7 +312,9 @@ def numbering_side_by_side(
     return Numbering(**joined, **prefixed, sets=tuple(sets.values()))  # type: ignore[arg-type]
 
 
-def told_apart(parts: Sequence[tuple[str, Numbering, int, int]], joined: Mapping[str, IntArray]) -> dict[str, object]:
+def distinguished_instances(
+    parts: Sequence[tuple[str, Numbering, int, int]], joined: Mapping[str, IntArray]
+) -> dict[str, object]:
     """Return the instances of nodes and triangles if several bodies have equal numbers; else an empty dict."""
     had = any(part[1].instances for part in parts)
     if not had and not any(overlap([part[1] for part in parts], name) for name in ("nodes", "elements")):

@@ -141,22 +141,22 @@ def told_in_python(placed: PlacedLaw, inputs: Array, where: str) -> list[str]:
     for _ in range(2):
         wrench, z_dot, g = np.zeros((n, 6)), np.zeros(len(law.states)), np.zeros(len(law.multipliers))
         width = placed.head[1]
-        seen, x = np.zeros(len(law.outputs)), inputs[1 : 1 + width * n].reshape(n, width).copy()
+        outputs, x = np.zeros(len(law.outputs)), inputs[1 : 1 + width * n].reshape(n, width).copy()
         z, lam = np.split(inputs[1 + width * n :].copy(), [len(law.states)])
         given = (x, z, lam, np.array(law.data))
         before = [each.copy() for each in given]
         try:
             with np.errstate(all="ignore"):
-                function(float(inputs[0]), *given, wrench, z_dot, g, seen)
+                function(float(inputs[0]), *given, wrench, z_dot, g, outputs)
         except Exception as error:
-            sizes = f"wrench {wrench.shape}, z_dot {z_dot.shape}, g {g.shape}, seen {seen.shape}"
+            sizes = f"wrench {wrench.shape}, z_dot {z_dot.shape}, g {g.shape}, outputs {outputs.shape}"
             return [
                 f"{where}: its function raised {type(error).__name__}: {error} (with {sizes}, data {given[3].shape})"
             ]
         for name, old, new in zip(("x", "z", "lam", "data"), before, given, strict=True):
             if not np.array_equal(old, new):
                 return [f"{where}: its function changes {name}, which is an input"]
-        results.append(np.concatenate([wrench.ravel(), z_dot, g, seen]))
+        results.append(np.concatenate([wrench.ravel(), z_dot, g, outputs]))
     if not np.array_equal(results[0], results[1], equal_nan=True):
         return [f"{where}: two calls with the same numbers give different results; it must depend on them alone"]
     values = values_of(placed, inputs)

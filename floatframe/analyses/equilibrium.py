@@ -24,7 +24,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.analyses.led_equilibrium import LARGEST, Balance, Led, is_left_by_none, led_equilibrium
+from floatframe.analyses.led_equilibrium import LARGEST, Balance, LoadPathEnd, is_left_by_none, led_equilibrium
 from floatframe.analyses.observed_state import observed_state
 from floatframe.analyses.relative.tree_flow import tree_flow
 from floatframe.analyses.system_matrices import held_rows, turning_matrices
@@ -178,7 +178,7 @@ class Progress:
 
 
 @dataclass(frozen=True, eq=False)
-class Lost:
+class FlowFailure:
     """The end of the flow without an equilibrium."""
 
     iteration: int
@@ -275,7 +275,9 @@ def steady_rotation(
     require_independent_constraints(compiled, work, tree_of(system).tree, state)
     holds = held_rows(model)
 
-    def followed(state: State, w: Array, *, by_newton: bool = False, runs_down: bool = False) -> "Equilibrium | Lost":
+    def followed(
+        state: State, w: Array, *, by_newton: bool = False, runs_down: bool = False
+    ) -> "Equilibrium | FlowFailure":
         """Follow the flow from a state, or Newton's method alone; with `runs_down`, forces may slow the rotation."""
         tau, last, progress, has_stood = np.inf if by_newton else 0.0, np.inf, Progress(), False
         for iteration in range(max_iterations + 1):
@@ -348,10 +350,10 @@ def steady_rotation(
                 state = displaced(model, state, part * moved)
             w = w + part * dw
             states.follow(w, dw)
-        return Lost(iteration, has_stood, error, state, tuple(W), forces)
+        return FlowFailure(iteration, has_stood, error, state, tuple(W), forces)
 
     found, tried = followed(state, w), ""
-    if isinstance(found, Lost) and flow is None and not states.own.any():
+    if isinstance(found, FlowFailure) and flow is None and not states.own.any():
         led, is_end = led_by_loads(compiled, work, omega, center, state, w)
         if is_end:
             again = followed(led.state, led.w)
@@ -359,11 +361,11 @@ def steady_rotation(
                 log.info("system %r: the equilibrium was found by loads that grow, in small steps", system.name)
                 return replace(again, n_iterations=found.iteration + again.n_iterations)
         tried = words_of(led, is_end)
-    if isinstance(found, Lost) and omega.any():
+    if isinstance(found, FlowFailure) and omega.any():
         again = followed(found.state, w, runs_down=True)
         if isinstance(again, Equilibrium):
             return replace(again, n_iterations=found.iteration + again.n_iterations)
-    if isinstance(found, Lost) and states.own.any():
+    if isinstance(found, FlowFailure) and states.own.any():
         again = followed(state, w, by_newton=True)
         if isinstance(again, Equilibrium):
             return replace(again, n_iterations=found.iteration + again.n_iterations)
@@ -410,7 +412,7 @@ def is_driven_turn(model: Model) -> NDArray[np.bool_]:
     return np.asarray((model.rows.motion >= 0) & ~is_held_length(model.rows.kind))
 
 
-def words_of(led: Led, is_stable: bool) -> str:
+def words_of(led: LoadPathEnd, is_stable: bool) -> str:
     """Return a description of where increasing loads have led; empty if they were not tried."""
     if led.n_solves == 0:
         return ""
@@ -421,11 +423,11 @@ def words_of(led: Led, is_stable: bool) -> str:
 
 def led_by_loads(
     compiled: CompiledSystem, work: Work, omega: Array, center: Array, state: State, w: Array
-) -> tuple[Led, bool]:
+) -> tuple[LoadPathEnd, bool]:
     """Return where increasing loads lead, and whether that is near a stable equilibrium of the system."""
     model, resting = compiled.model, compiled.resting_model
     if len(state.u) + len(w) > LARGEST:
-        return Led(state, w, 0.0, 0), False
+        return LoadPathEnd(state, w, 0.0, 0), False
 
     def tangents(state: State, w: Array) -> tuple[Linearized, tuple[Array, ...]]:
         moving, u_dot = turning(compiled, state, omega, center)

@@ -23,7 +23,7 @@ from fe_models.foundation.arrays import Array
 from floatframe.engine.initial_conditions.newton_equations import Linearized
 from floatframe.model.state import State
 
-__all__ = ["LARGEST", "Balance", "Led", "is_left_by_none", "led_equilibrium"]
+__all__ = ["LARGEST", "Balance", "LoadPathEnd", "is_left_by_none", "led_equilibrium"]
 
 FIRST, LEAST = 0.25, 1e-3  #: steps of p
 QUICK, MOST = 4, 8  #: iterations for one p: after at most QUICK, the next step is doubled; after MOST, it is abandoned
@@ -50,7 +50,7 @@ class Balance:
 
 
 @dataclass(frozen=True, eq=False)
-class Led:
+class LoadPathEnd:
     """The end of the path of increasing loads."""
 
     state: State
@@ -65,7 +65,7 @@ def led_equilibrium(
     balance: Callable[[State, Array], Balance | None],
     displaced: Callable[[State, Array], State],
     length_of: Callable[[Array], float],
-) -> Led:
+) -> LoadPathEnd:
     """Return the largest fraction of the loads reached, with its state and wrenches; p = 0 if none was reached.
 
     Parameters
@@ -81,7 +81,7 @@ def led_equilibrium(
     """
     begun = balance(state, w)
     if begun is None:
-        return Led(state, w, 0.0, 0)
+        return LoadPathEnd(state, w, 0.0, 0)
     p, step, n_solves, waiting = 0.0, FIRST, 0, 0
     seen = [(0, 0.0)]  #: solves and p; the first entry is more than `PATIENCE` solves ago, or the beginning
     while p < 1.0:
@@ -111,7 +111,7 @@ def led_equilibrium(
         is_slow = n_solves - seen[0][0] >= PATIENCE and p - seen[0][1] < ADVANCE
         if step < LEAST or is_slow or n_solves >= MOST_SOLVES:
             break
-    return Led(state, w, p, n_solves)
+    return LoadPathEnd(state, w, p, n_solves)
 
 
 def is_left_by_none(parts: Linearized, K: tuple[Array, ...], W: tuple[Array, ...]) -> bool:

@@ -21,7 +21,7 @@ __all__ = ["ELEMENTS", "LiftingSurface"]
 
 ELEMENTS = {"lifting-surface": "floatframe.components.aerodynamics:LiftingSurface"}
 
-STILL: Any = (0.0, 0.0, 0.0)
+NO_WIND: Any = (0.0, 0.0, 0.0)
 OUTPUTS = (
     ("lift", "N"), ("drag", "N"), ("alpha", "rad"), ("speed", "m/s"), ("lift coefficient", "1"), ("power lost", "W"),
 )  # fmt: skip
@@ -57,7 +57,7 @@ class LiftingSurface(Element):
     zero_drag: float = 0.0  #: C_D without lift
     induced_drag: float = 0.0  #: 1/(pi e aspect ratio)
     factor: TimeFunction | float = 1.0  #: factor on the lift as a function of time, such as for spoilers
-    wind: Array = STILL  #: velocity of the air, ground axes, (3,) [m/s]
+    wind: Array = NO_WIND  #: velocity of the air, ground axes, (3,) [m/s]
 
     def __post_init__(self) -> None:
         where = f"element {self.name!r}"
@@ -92,7 +92,7 @@ class LiftingSurface(Element):
 
 
 @njit
-def lifting_surface_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def lifting_surface_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write the aerodynamic force at the marker, and the outputs."""
     rho, area, slope, most, zero_drag, induced = data[0], data[1], data[2], data[4], data[5], data[6]
     v = x[0, 12] - data[7], x[0, 13] - data[8], x[0, 14] - data[9]
@@ -115,4 +115,4 @@ def lifting_surface_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     for k in range(3):
         wrench[0, k] = a * x[0, 3 + 3 * k] + b * x[0, 5 + 3 * k]
         lost -= wrench[0, k] * x[0, 12 + k]
-    seen[0], seen[1], seen[2], seen[3], seen[4], seen[5] = q * V * C, q * V * D, alpha, V, C, lost
+    outputs[0], outputs[1], outputs[2], outputs[3], outputs[4], outputs[5] = q * V * C, q * V * D, alpha, V, C, lost

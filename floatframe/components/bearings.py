@@ -151,7 +151,7 @@ AXIAL, TILT, DIRECTIONS = 8, 10, 12  #: indices in `data`
 
 
 @njit
-def bearing_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def bearing_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write the radial and axial forces, the tilting moment, and the outputs."""
     e_x, e_y = direction_of(x, 0, data, DIRECTIONS), direction_of(x, 0, data, DIRECTIONS + 3)
     e, s = direction_of(x, 0, data, DIRECTIONS + 6), direction_of(x, 1, data, DIRECTIONS + 9)
@@ -172,16 +172,16 @@ def bearing_law(t, x, z, lam, data, wrench, z_dot, g, seen):
         wrench[0, k] = -F[k]
         wrench[1, 3 + k] = M
         wrench[0, 3 + k] = -M - arm[k]
-    seen[0], seen[1], seen[2] = d_x, d_y, d_z
-    seen[3], seen[4] = inner_product(tilt, e_x), inner_product(tilt, e_y)
-    seen[5], seen[6], seen[7] = F_x, F_y, F_z
+    outputs[0], outputs[1], outputs[2] = d_x, d_y, d_z
+    outputs[3], outputs[4] = inner_product(tilt, e_x), inner_product(tilt, e_y)
+    outputs[5], outputs[6], outputs[7] = F_x, F_y, F_z
     mean = 0.5 * (data[1] + data[2])
     turned = inner_product(tilt, tilt) / (1.0 + inner_product(e, s))  # 1 - e · s without cancellation
-    seen[8] = 0.5 * (data[0] * d_x * d_x + data[3] * d_y * d_y + data[AXIAL] * d_z * d_z) + mean * d_x * d_y
-    seen[8] += data[TILT] * turned
+    outputs[8] = 0.5 * (data[0] * d_x * d_x + data[3] * d_y * d_y + data[AXIAL] * d_z * d_z) + mean * d_x * d_y
+    outputs[8] += data[TILT] * turned
     spring_x, spring_y = data[0] * d_x + mean * d_y, mean * d_x + data[3] * d_y
-    seen[9] = -(F_x + spring_x) * rate_x - (F_y + spring_y) * rate_y + data[AXIAL + 1] * rate_z * rate_z
-    seen[9] += data[TILT + 1] * inner_product(s_rate, s_rate)
+    outputs[9] = -(F_x + spring_x) * rate_x - (F_y + spring_y) * rate_y + data[AXIAL + 1] * rate_z * rate_z
+    outputs[9] += data[TILT + 1] * inner_product(s_rate, s_rate)
 
 
 @register_jitable

@@ -99,7 +99,7 @@ class Cable(Element):
 
 
 @njit
-def cable_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def cable_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write the force at every point, and the outputs."""
     stiffness, damping, free = data[0], data[1], data[2]
     total, rate = 0.0 * x[0, 0], 0.0 * x[0, 0]
@@ -108,11 +108,11 @@ def cable_law(t, x, z, lam, data, wrench, z_dot, g, seen):
         total += length
         rate += speed
     e = total - free
-    seen[1] = total
+    outputs[1] = total
     if e.real <= 0.0:
-        seen[2] = -e
+        outputs[2] = -e
         return
-    seen[3] = 0.5 * stiffness * e * e
+    outputs[3] = 0.5 * stiffness * e * e
     tension = stiffness * e + damping * rate
     if tension.real <= 0.0:
         tension = 0.0 * tension
@@ -121,5 +121,5 @@ def cable_law(t, x, z, lam, data, wrench, z_dot, g, seen):
         for i in range(3):
             wrench[k, i] += tension * d[i]
             wrench[k + 1, i] -= tension * d[i]
-    seen[0] = tension
-    seen[4] = (tension - stiffness * e) * rate
+    outputs[0] = tension
+    outputs[4] = (tension - stiffness * e) * rate

@@ -129,7 +129,7 @@ def slipping(z, v, steady, elastic, creeps):
 
 
 @njit
-def bristle_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def bristle_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write friction, the rate of the deflection and the outputs."""
     coulomb, static, stribeck, stiffness, damping, viscous = data[0], data[1], data[2], data[3], data[4], data[5]
     e = direction_of(x, 0, data, 9)
@@ -146,6 +146,6 @@ def bristle_law(t, x, z, lam, data, wrench, z_dot, g, seen):
         add_torque(wrench, 0, 1, -friction, e)
     else:
         add_axial_force(wrench, x, 0, 1, -friction, e)
-    seen[0], seen[1] = friction, v
-    seen[2] = 0.5 * stiffness * z[0] * z[0]
-    seen[3] = friction * v - stiffness * z[0] * z_dot[0]
+    outputs[0], outputs[1] = friction, v
+    outputs[2] = 0.5 * stiffness * z[0] * z[0]
+    outputs[3] = friction * v - stiffness * z[0] * z_dot[0]

@@ -9,7 +9,7 @@ from floatframe.engine.compiling.markers import MarkerData, find_marker
 from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import body_name
 from floatframe.model.elements.element import Element, markers_of
-from floatframe.model.shapes import Arrow, Drawn, Piece, Stretched
+from floatframe.model.shapes import Arrow, MarkerShapes, Piece, Stretched
 from floatframe.model.shapes.drawn import SECOND, STRETCH, StretchedPiece
 from floatframe.model.system import System
 from floatframe.results.joint_coordinates import end_motion
@@ -21,7 +21,7 @@ Placed = tuple[Piece, Array]  #: a piece, and its nodes in ground axes, (n, 3) o
 COLOR = "#2a7f62"
 
 
-def shown_of(system: System, element: Element) -> tuple[Drawn | Stretched | Arrow, ...]:
+def shown_of(system: System, element: Element) -> tuple[MarkerShapes | Stretched | Arrow, ...]:
     """Return the drawn parts of an element; those that stand in for shapes are omitted if its bodies have shapes.
 
     Raises
@@ -33,17 +33,17 @@ def shown_of(system: System, element: Element) -> tuple[Drawn | Stretched | Arro
     shapely = {body.name for body in system.bodies if body.shapes}
     for each in element.drawn():
         require_markers(where, each, len(markers))
-        if isinstance(each, Drawn) and each.is_default and each.marker is not None:
+        if isinstance(each, MarkerShapes) and each.is_default and each.marker is not None:
             if body_name(markers[each.marker].body) in shapely:
                 continue
         found.append(each)
     return tuple(found)
 
 
-def require_markers(where: str, shown: Drawn | Stretched | Arrow, n: int) -> None:
+def require_markers(where: str, shown: MarkerShapes | Stretched | Arrow, n: int) -> None:
     """Raise `ModelError` unless the drawn parts of an element refer to markers it has."""
-    if not isinstance(shown, Drawn | Stretched | Arrow):
-        raise ModelError(f"{where}: drawn: expected Drawn, Stretched or Arrow, got {shown!r}")
+    if not isinstance(shown, MarkerShapes | Stretched | Arrow):
+        raise ModelError(f"{where}: drawn: expected MarkerShapes, Stretched or Arrow, got {shown!r}")
     numbers = (shown.first, shown.second) if isinstance(shown, Stretched) else (shown.marker,)
     wrong = [number for number in numbers if number is not None and not 0 <= number < n]
     if wrong:
@@ -55,12 +55,12 @@ def dressed_bodies(system: System | None) -> set[str]:
     found = set()
     for element in () if system is None else system.elements:
         for each in shown_of(system, element):  # type: ignore[arg-type]
-            if isinstance(each, Drawn) and each.marker is not None:
+            if isinstance(each, MarkerShapes) and each.marker is not None:
                 found.add(body_name(markers_of(element)[each.marker].body))
     return found
 
 
-def drawn_pieces(drawn: Drawn, metres: float) -> list[Piece]:
+def drawn_pieces(drawn: MarkerShapes, metres: float) -> list[Piece]:
     """Return the pieces of a shape in units of a system whose unit of length has `metres` metres."""
     scale = 1 / metres if drawn.is_in_metres else 1.0
     return [replace(p, nodes=scale * p.nodes, color=p.color or COLOR) for p in drawn.shape.pieces()]
@@ -90,7 +90,7 @@ def pieces_of(system: System, trajectory: Trajectory, rows: IntArray, element: E
     ends = [find_marker(system, f"element {element.name!r}", marker) for marker in markers_of(element)]
     found: list[Placed] = []
     for each in shown:
-        if isinstance(each, Drawn):
+        if isinstance(each, MarkerShapes):
             end = None if each.marker is None else ends[each.marker]
             for piece in drawn_pieces(each, system.units.length):
                 found.append((piece, placed_nodes(system, trajectory, rows, end, piece.nodes)))

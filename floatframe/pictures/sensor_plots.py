@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["panels_of", "plot_measurement", "plot_sensors"]
 
-NOTHING = 1e-9  #: relative to the largest column of a unit; smaller curves would coincide with zero
+ROUNDING = 1e-9  #: relative to the largest column of a unit; smaller curves would coincide with zero
 LEFT_OUT = ("number in the mesh",)  #: units of columns that are not plotted
 
 
@@ -42,7 +42,7 @@ def plot_measurement(
     columns = panels[unit]
     size = {name: float(np.abs(measurement.columns[name]).max(initial=0.0)) for name in columns}
     # components that stay zero would crowd the legend; if all do, the last one is shown
-    shown = [name for name in columns if size[name] > NOTHING * max(size.values())] or [columns[-1]]
+    shown = [name for name in columns if size[name] > ROUNDING * max(size.values())] or [columns[-1]]
     for name in columns if len(columns) == 1 else shown:
         is_sum = name.split()[-1] in ("size", "total", "von")
         line = {"linewidth": 1.0, "color": "k"} if is_sum else {"linewidth": 1.5}

@@ -33,7 +33,7 @@ from floatframe.model.system import System
 from floatframe.results.head import BodyEntry, Head
 from floatframe.results.results_file import MemorySource, validity_text
 from floatframe.results.sensors import measured
-from floatframe.results.sensors.taken_places import taken_places
+from floatframe.results.sensors.sensor_points import sensor_points
 from floatframe.results.trajectory import Trajectory, read_results
 from floatframe.results.validity import ValidityNote, notes_from_json, notes_to_json
 from floatframe.results.writer import ResultsPlace, ResultsWriter, arrays_of, last_restart
@@ -570,7 +570,7 @@ def head_of(system: System, integrator: Integrator, t_start: float, t_end: float
         compiled.spring_names,
         tuple(int(k) for k in compiled.model.connections.w0),
         run,
-        places=taken_places(system),
+        places=sensor_points(system),
         loads=tuple(force.name for force in system.forces if isinstance(force, PointForce)),
         load_cases=tuple(force.name for force in system.forces if isinstance(force, BodyLoad)),
     )

@@ -1,6 +1,6 @@
 """Random sound bodies with all that a modal file can hold: solids, shells, beams, both together, all mode sets.
 
-Drawn in SI units, with a size of about one, turned, moved off the origin, and put into the units of the case.
+MarkerShapes in SI units, with a size of about one, turned, moved off the origin, and put into the units of the case.
 """
 
 from dataclasses import dataclass, replace

@@ -22,7 +22,7 @@ from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.stages import Stages
 from fe_models.foundation.units import Units
 from fe_models.meshes.mesh import Mesh
-from fe_models.meshes.raised import RAISED, raised_mesh
+from fe_models.meshes.quadratic_mesh import RAISED, quadratic_mesh
 from fe_models.meshes.refined import refined_mesh
 
 __all__ = ["MOST_DOFS", "MeshRefinement", "mesh_refinement"]
@@ -80,7 +80,7 @@ def mesh_refinement(
     stages = stages or Stages()
     with stages("finer mesh"):
         if all(kind in RAISED for kind in mesh.cells):
-            finer, how = raised_mesh(mesh)[0], "second order"
+            finer, how = quadratic_mesh(mesh)[0], "second order"
             sets = {g: {RAISED[kind]: rows for kind, rows in by.items()} for g, by in mesh.cell_sets.items()}
             finer = Mesh(finer.nodes, finer.cells, cell_sets=sets)
         else:

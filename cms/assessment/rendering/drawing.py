@@ -3,9 +3,9 @@
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from cms.assessment.rendering.annotations import compose, layout_of
 from cms.assessment.rendering.camera import Camera, fitted_camera
 from cms.assessment.rendering.film import Image, write_film, write_picture
-from cms.assessment.rendering.furniture import compose, layout_of
 from cms.assessment.rendering.scene import Scene
 
 __all__ = ["OnFrame", "ViewMaker", "draw_animation", "draw_picture"]

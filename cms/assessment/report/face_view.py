@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from cms.assessment.rendering import Drawing, Scene, Surface, Triad, render_picture
+from cms.assessment.rendering.annotations import layout_of
 from cms.assessment.rendering.camera import fitted_camera
-from cms.assessment.rendering.furniture import layout_of
 from cms.assessment.report.view import view_axes
 from fe_models.files.cad.cad_surface import CadSurface
 from fe_models.foundation.arrays import Array, IntArray

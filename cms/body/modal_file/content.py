@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from cms.body.geometric_stiffness import UNIT_LOADS, GeometricStiffness, SpreadLoads, TurnedLoads
+from cms.body.geometric_stiffness import UNIT_LOADS, GeometricStiffness, RotatedLoads, SpreadLoads
 from cms.body.invariants import Moments
 from cms.body.kept_points import KeptPoints
 from cms.body.modal_file.contents import Contents
@@ -317,7 +317,7 @@ def geometric_of(contents: Contents) -> GeometricStiffness:
     n = contents.array("/geometric/spin").shape[-1]
     turned = spread = None
     if contents.has(TURNED):
-        turned = TurnedLoads(**loads_of(contents, TURNED, "K_turned", (3, n), is_loaded))
+        turned = RotatedLoads(**loads_of(contents, TURNED, "K_turned", (3, n), is_loaded))
     if contents.has(SPREAD):
         shapes = {"K": (6, n, n), "turned": (6, 3, n), "turned_rigid": (6, 3, 3)}
         spread = SpreadLoads(**{name: shaped(contents, f"{SPREAD}/{name}", shape) for name, shape in shapes.items()})

@@ -11,7 +11,7 @@ import numpy as np
 from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 
-__all__ = ["CONTENT", "Made", "Request", "Writer", "in_ascii", "left_out"]
+__all__ = ["CONTENT", "Request", "Writer", "WrittenFiles", "in_ascii", "left_out"]
 
 OWN_AXES = "axes of the interfaces that are turned against those of the file"
 TURNED = 1e-12  #: difference of a direction cosine that is more than rounding
@@ -73,7 +73,7 @@ class Request:
 
 
 @dataclass(frozen=True)
-class Made:
+class WrittenFiles:
     """Files as bytes, and notes about them."""
 
     files: Mapping[Path, bytes]
@@ -84,7 +84,7 @@ class Made:
 class Writer:
     """One format: its function, and what it can hold."""
 
-    make: Callable[[Request], Made]
+    make: Callable[[Request], WrittenFiles]
     holds: frozenset[str] = field(default_factory=frozenset)  #: keys of `CONTENT`
     takes_held: bool = False  #: whether it can describe a body that is held to the ground
     takes_loads: bool = False  #: whether the file can hold constant loads

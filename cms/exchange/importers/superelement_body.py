@@ -36,7 +36,7 @@ __all__ = ["ImportOptions", "body_of_superelement", "fe_body_of_superelement"]
 
 RIGID = 1e-5  #: of the size of a motion: by how much recovered nodes may miss a rigid motion, digits of a file
 UNCOUPLED = 1e-9  #: coupling of modal coordinates and boundary in K, scaled, that is rounding
-NOTHING = 1e-13  #: stiffness of a boundary dof over the largest entry, that is rounding
+ROUNDING = 1e-13  #: stiffness of a boundary dof over the largest entry, that is rounding
 COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz")
 
 
@@ -49,7 +49,7 @@ class ImportOptions:
     inertia: Inertia | None = None  #: what the reduced mass does not say; None: it stays missing
     frame: Frame | None = None  #: Tisserand by default
     damping: Damping | None = None  #: beside that of the files
-    mend_mass: bool = False  #: set slightly negative eigenvalues of the mass to zero
+    repair_mass: bool = False  #: set slightly negative eigenvalues of the mass to zero
     accept: tuple[str, ...] = ()  #: findings that are accepted, such as "units"
 
 
@@ -71,7 +71,7 @@ def body_of_superelement(element: Superelement, options: ImportOptions) -> Reduc
     body = fe_body_of_superelement(element, options)  # (1)
     require_freedom(body, held=False)  # (2)
     require_units(body, accept=options.accept)
-    if options.mend_mass:
+    if options.repair_mass:
         body = positive_mass(body)
     else:
         require_positive_mass(body)
@@ -170,7 +170,7 @@ def without_rounding(element: Superelement) -> Array:
     length = float(np.linalg.norm(np.ptp(element.nodes, axis=0))) or 1.0
     size = np.where(element.dofs[:, 1] >= 3, length, 1.0)
     scaled = np.abs(K) / np.outer(size, size)
-    nothing = ~element.is_modal & (scaled.max(axis=1) <= NOTHING * scaled.max())
+    nothing = ~element.is_modal & (scaled.max(axis=1) <= ROUNDING * scaled.max())
     K[nothing], K[:, nothing] = 0.0, 0.0
     return K
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from cms.body.reduced_body import ReducedBody
-from cms.exchange.exporters.writer import Made, Request
+from cms.exchange.exporters.writer import Request, WrittenFiles
 from cms.reduction.interface_model import BoundaryNode, InterfaceModel, interface_model
 from fe_models.foundation.arrays import Array
 from fe_models.meshes.numbering import NONE
@@ -19,7 +19,7 @@ SAME_PLACE = 1e-9
 PER_LINE = 4  #: matrix entries per line
 
 
-def make_abaqus(request: Request) -> Made:
+def make_abaqus(request: Request) -> WrittenFiles:
     """Return a deck to include: nodes, `*USER ELEMENT, LINEAR` with its dofs and matrices, and a single element.
 
     Each mode is dof 1 of its own node, placed at the origin. Matrices list column j from row 1 to the diagonal.
@@ -32,7 +32,7 @@ def make_abaqus(request: Request) -> Made:
     lines = [*(f"** {line}" for line in request.header()), *told, *lines_of(model)]
     if model.n_modes:
         notes.append(f"modes: dof 1 of nodes {FIRST_MODE} to {FIRST_MODE + model.n_modes - 1}")
-    return Made({request.path: ("\n".join(lines) + "\n").encode("ascii")}, tuple(notes))
+    return WrittenFiles({request.path: ("\n".join(lines) + "\n").encode("ascii")}, tuple(notes))
 
 
 def in_mesh(body: ReducedBody, node: BoundaryNode) -> str:

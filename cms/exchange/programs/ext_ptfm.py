@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from cms.errors import ExportError, ForeignBodyError
-from cms.exchange.exporters.writer import Made, Request
+from cms.exchange.exporters.writer import Request, WrittenFiles
 from cms.exchange.importers.superelement import LARGEST, Superelement
 from cms.reduction.interface_model import InterfaceModel, interface_model
 from fe_models.files.matrices.foreign_matrices import SCALAR
@@ -24,7 +24,7 @@ __all__ = ["is_ext_ptfm", "make_ext_ptfm", "read_ext_ptfm"]
 LAST_TIME = 10000.0  #: the loads are constant from zero to this time [s]
 
 
-def make_ext_ptfm(request: Request) -> Made:
+def make_ext_ptfm(request: Request) -> WrittenFiles:
     """Return the file: mass, stiffness and damping (x, y, z, rotations about them, modes), and constant loads.
 
     Raises
@@ -55,7 +55,7 @@ def make_ext_ptfm(request: Request) -> Made:
     amplitudes = {case.name: request.loads.get(case.name, 0.0) for case in body.load_cases}
     notes += [f"static load {name}, amplitude {amplitude:g}" for name, amplitude in amplitudes.items()]
     text = "\n".join(lines_of(model, f, request)) + "\n"
-    return Made({request.path: text.encode("ascii")}, tuple(notes))
+    return WrittenFiles({request.path: text.encode("ascii")}, tuple(notes))
 
 
 def load_of(model: InterfaceModel, wanted: Mapping[str, float]) -> Array:

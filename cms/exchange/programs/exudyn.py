@@ -11,7 +11,7 @@ import numpy as np
 from cms.body.reduced_body import ReducedBody
 from cms.errors import ForeignBodyError
 from cms.exchange.exporters.nodes import reference_row
-from cms.exchange.exporters.writer import Made, Request
+from cms.exchange.exporters.writer import Request, WrittenFiles
 from cms.exchange.importers.integrals import moments_of_invariants
 from cms.exchange.importers.modal_body import ForeignInterface, ModalBody
 from fe_models.foundation.arrays import Array, tilde
@@ -28,14 +28,14 @@ BENT = 0.01  #: initial displacement in the script, relative to the size of the 
 FILE_VERSION = 1  #: version of the archive, as exudyn 1.9 to 1.13 write it
 
 
-def make_exudyn(request: Request) -> Made:
+def make_exudyn(request: Request) -> WrittenFiles:
     """Return the archive FILE.npz and the script FILE.py beside it."""
     archive = request.path.with_suffix(".npz")
     script = request.path.with_suffix(".py")
     image = io.BytesIO()
     np.savez(image, **archive_of(request.body), floatframe_header=np.array(request.header()))
     notes = tuple(f"interface {each.name}: {members_words(each)}" for each in request.body.interfaces)
-    return Made({archive: image.getvalue(), script: script_of(request, archive).encode("utf-8")}, notes)
+    return WrittenFiles({archive: image.getvalue(), script: script_of(request, archive).encode("utf-8")}, notes)
 
 
 def archive_of(body: ReducedBody) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from cms.errors import ExportError
-from cms.exchange.exporters.writer import Made, Request, in_ascii
+from cms.exchange.exporters.writer import Request, WrittenFiles, in_ascii
 from cms.reduction.interface_model import InterfaceModel, interface_model
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.components import MOTION_COMPONENTS
@@ -26,19 +26,19 @@ TEXT_OF_HEADER = 116  #: bytes of text at the beginning of every .mat file
 USER_BLOCK = 512  #: bytes before HDF5 in version 7.3, which hold the header
 
 
-def make_mat5(request: Request) -> Made:
+def make_mat5(request: Request) -> WrittenFiles:
     """Return a file of version 5, which MATLAB, Octave and SciPy can read."""
     model = interface_model(request.body)
-    return Made({request.path: mat5(variables(model, request), request)}, notes_of(model))
+    return WrittenFiles({request.path: mat5(variables(model, request), request)}, notes_of(model))
 
 
-def make_mat73(request: Request) -> Made:
+def make_mat73(request: Request) -> WrittenFiles:
     """Return a file of version 7.3: HDF5 with the header and class attributes of MATLAB."""
     model = interface_model(request.body)
-    return Made({request.path: mat73(variables(model, request), request)}, notes_of(model))
+    return WrittenFiles({request.path: mat73(variables(model, request), request)}, notes_of(model))
 
 
-def make_simscape(request: Request) -> Made:
+def make_simscape(request: Request) -> WrittenFiles:
     """Return a file of version 5 with the structure `rom`: P, K, M, C of a Reduced Order Flexible Solid.
 
     P holds the origins of the interface frames as rows; their axes are the mesh axes. K, M, C have six rows (three
@@ -53,7 +53,7 @@ def make_simscape(request: Request) -> Made:
             )
     rom = {"P": np.array([node.position for node in model.nodes]), "K": model.K, "M": model.M, "C": model.D}
     names = {"frames": rows_of_text([node.interface for node in model.nodes]), "header": rows_of_text(request.header())}
-    return Made({request.path: mat5({"rom": rom, **names}, request)}, notes_of(model))
+    return WrittenFiles({request.path: mat5({"rom": rom, **names}, request)}, notes_of(model))
 
 
 def variables(model: InterfaceModel, request: Request) -> dict[str, Any]:
@@ -144,7 +144,7 @@ def header_words(version: str, request: Request) -> bytes:
 # matrix Market: stiffness, mass and damping of a body over its interfaces, one text file for each matrix --------------
 
 
-def make_matrix_market(request: Request) -> Made:
+def make_matrix_market(request: Request) -> WrittenFiles:
     """Return FILE_K.mtx, FILE_M.mtx, FILE_C.mtx and, if there are load cases, FILE_F.mtx; comments name the rows."""
     model = interface_model(request.body)
     names = [f"{node.interface} {MOTION_COMPONENTS[c]}" for node in model.nodes for c in node.components]
@@ -156,7 +156,7 @@ def make_matrix_market(request: Request) -> Made:
             path = request.path.with_name(f"{request.path.stem}_{letter}.mtx")
             files[path] = text_of(matrix, comment, "general" if letter == "F" else "symmetric")
     cases = enumerate(model.body.load_cases)
-    return Made(files, tuple(f"load case {case.name}: column {k + 1} of F" for k, case in cases))
+    return WrittenFiles(files, tuple(f"load case {case.name}: column {k + 1} of F" for k, case in cases))
 
 
 def text_of(matrix: Array, comment: str, symmetry: str) -> bytes:

@@ -11,7 +11,7 @@ from cms.body.invariants import Moments
 from cms.body.reduced_body import BodyFrame, ReducedBody
 from cms.errors import ForeignBodyError
 from cms.exchange.exporters.nodes import NodeList, all_nodes, interface_nodes
-from cms.exchange.exporters.writer import Made, Request
+from cms.exchange.exporters.writer import Request, WrittenFiles
 from cms.exchange.importers.inertia import moments_in_frame
 from cms.exchange.importers.integrals import moments_of_invariants
 from cms.exchange.importers.modal_body import ModalBody
@@ -23,7 +23,7 @@ __all__ = ["is_mbdyn", "make_mbdyn", "read_mbdyn"]
 # MBDyn's modal joint: the .fem file with masses, nodal modes, invariants and stress stiffening ------------------------
 
 
-def make_mbdyn(request: Request) -> Made:
+def make_mbdyn(request: Request) -> WrittenFiles:
     """Return the file with all record groups except 3, 4 (initial state) and 11 (lumped masses).
 
     Group 11 is left out, because MBDyn would compute invariants from it. With integrals over mass, c and phi in the
@@ -47,7 +47,7 @@ def make_mbdyn(request: Request) -> Made:
             f"record group 19 counts on all {len(body.interfaces)} interfaces in the modal joint, in this order: "
             f"{names}; it needs `use automatic differentiation`",
         )
-    return Made({request.path: text.encode("ascii")}, notes)
+    return WrittenFiles({request.path: text.encode("ascii")}, notes)
 
 
 def lines_of(body: ReducedBody, nodes: NodeList, header: Iterable[str]) -> Iterator[str]:

@@ -11,7 +11,7 @@ from cms.body.invariants import Moments
 from cms.body.reduced_body import ReducedBody
 from cms.errors import ForeignBodyError
 from cms.exchange.exporters.nodes import all_nodes
-from cms.exchange.exporters.writer import Made, Request
+from cms.exchange.exporters.writer import Request, WrittenFiles
 from cms.exchange.importers.modal_body import ForeignInterface, ModalBody
 from fe_models.foundation.arrays import Array, IntArray
 
@@ -25,7 +25,7 @@ STRESS_ORDER = [0, 1, 2, 5, 3, 4]  #: xx yy zz xy yz zx as indices into our xx y
 UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  #: (a, b) of the blocks of int phi_a phi_b
 
 
-def make_mbsim(request: Request) -> Made:
+def make_mbsim(request: Request) -> WrittenFiles:
     """Return the file; docs/formats.md lists the datasets and their index orders."""
     import h5py
 
@@ -39,7 +39,7 @@ def make_mbsim(request: Request) -> Made:
         nodes = all_nodes(body)
         for name, row in nodes.of_interface.items():
             file.attrs.create(f"interface {name}", int(nodes.numbers[row]))
-    return Made({request.path: image.getvalue()}, nodes.notes())
+    return WrittenFiles({request.path: image.getvalue()}, nodes.notes())
 
 
 def datasets(body: ReducedBody) -> dict[str, Array]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from cms.errors import ExportError
 from cms.exchange.exporters.nodes import all_nodes, user_numbers
-from cms.exchange.exporters.writer import Made, Request
+from cms.exchange.exporters.writer import Request, WrittenFiles
 from cms.exchange.importers.element_rows import ForeignRows, force_rows, motion_rows, stress_rows
 from cms.exchange.importers.superelement import RecoveryRows, Superelement
 from cms.reduction.interface_model import InterfaceModel, interface_model
@@ -26,7 +26,7 @@ FIRST_NODE = 2000001  #: number of the first kept node, for recovery
 SYMMETRIC, RECTANGULAR, DOUBLE = 6, 9, 2  #: IFO and TIN of DMIG
 
 
-def make_op4(request: Request) -> Made:
+def make_op4(request: Request) -> WrittenFiles:
     """Return FILE.op4 (KXX, MXX, BXX, PX, MUG1), and FILE.asm and FILE.pch with the order of its rows.
 
     The rows are six (or three) dofs of each interface node, then the modes as SPOINTs, in the order of EXTRN in the
@@ -52,10 +52,10 @@ def make_op4(request: Request) -> Made:
     }
     notes = [f"interface {node.interface}: GRID {k + 1}" for k, node in enumerate(model.nodes)]
     notes += recovery_numbers(model)[1] if len(model.body.nodes) else ()
-    return Made(files, (*notes, *load_notes(model, "PX")))
+    return WrittenFiles(files, (*notes, *load_notes(model, "PX")))
 
 
-def make_dmig(request: Request) -> Made:
+def make_dmig(request: Request) -> WrittenFiles:
     """Return bulk data: GRIDs, SPOINTs, DMIG KAAX, MAAX, BAAX (one triangle) and PAX, for K2GG = KAAX and so on.
 
     A field of 16 characters holds 10 digits; the notes say so.
@@ -71,7 +71,7 @@ def make_dmig(request: Request) -> Made:
         lines += dmig_lines("PAX", model.loads, named, [(k + 1, 0) for k in range(model.loads.shape[1])], RECTANGULAR)
     notes = [f"interface {node.interface}: GRID {k + 1}" for k, node in enumerate(model.nodes)]
     notes.append("numbers have the 10 digits that a field of 16 characters holds; op4 holds all")
-    return Made({request.path: ("\n".join(lines) + "\n").encode("ascii")}, (*notes, *load_notes(model, "PAX")))
+    return WrittenFiles({request.path: ("\n".join(lines) + "\n").encode("ascii")}, (*notes, *load_notes(model, "PAX")))
 
 
 def comments(request: Request) -> list[str]:

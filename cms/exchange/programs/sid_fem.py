@@ -8,7 +8,7 @@ import numpy as np
 
 from cms.body.reduced_body import ReducedBody
 from cms.exchange.exporters.nodes import NodeList, all_nodes, interface_nodes
-from cms.exchange.exporters.writer import Made, Request
+from cms.exchange.exporters.writer import Request, WrittenFiles
 from fe_models.foundation.arrays import Array
 
 __all__ = ["DIALECTS", "Dialect", "Taylor", "make_sid_fem", "terms_of"]
@@ -42,14 +42,14 @@ class Taylor:
     m1: Array = field(default_factory=lambda: np.zeros(0))  #: (n_row, n_col, n_q); empty for a series of order 0
 
 
-def make_sid_fem(request: Request, *, dialect: str) -> Made:
+def make_sid_fem(request: Request, *, dialect: str) -> WrittenFiles:
     """Return the file; its nodes are the interfaces, unless all nodes are requested."""
     body, order = request.body, DIALECTS[dialect]
     nodes = interface_nodes(body) if request.nodes != "all" else all_nodes(body)
     lines = list(lines_of(body, nodes, order))
     comment = "; ".join([order.words, *request.header()])[:LONGEST_COMMENT]
     first = f"{len(nodes.numbers):5d}{body.n_q:4d}  :{comment}"
-    return Made({request.path: ("\n".join([first, *lines]) + "\n").encode("ascii")}, nodes.notes())
+    return WrittenFiles({request.path: ("\n".join([first, *lines]) + "\n").encode("ascii")}, nodes.notes())
 
 
 def terms_of(body: ReducedBody) -> dict[str, Taylor]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from cms.body.reduced_body import ReducedBody
 from cms.body.stress import von_mises
-from cms.exchange.exporters.writer import Made, Request
+from cms.exchange.exporters.writer import Request, WrittenFiles
 from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["make_vtk", "numbers_of_cells", "numbers_of_nodes"]
@@ -21,7 +21,7 @@ TRIANGLE, VERTEX = 5, 1  #: codes of cell types
 KINDS = {"f": ("Float64", "<f8"), "i": ("Int64", "<i8"), "u": ("UInt8", "u1")}
 
 
-def make_vtk(request: Request) -> Made:
+def make_vtk(request: Request) -> WrittenFiles:
     """Return FILE.pvd and FILE_1.vtu, FILE_2.vtu, ...: undeformed points in mesh coordinates, fields in mesh axes.
 
     The coordinate q of a mode is chosen so that its largest nodal displacement is a twentieth of the body size. Stress
@@ -45,7 +45,7 @@ def make_vtk(request: Request) -> Made:
         entries.append(f'<DataSet timestep="{k + 1}" file={quoteattr(name.name)}/>')
     collection = ['<VTKFile type="Collection" version="0.1">', "<Collection>", *entries, "</Collection>", "</VTKFile>"]
     files[path] = ("\n".join(['<?xml version="1.0"?>', *comment(request.header()), *collection]) + "\n").encode("utf-8")
-    return Made(files, ("time k of the collection is mode k; warp by the vector displacement",))
+    return WrittenFiles(files, ("time k of the collection is mode k; warp by the vector displacement",))
 
 
 def stress_fields(body: ReducedBody, k: int, q: float) -> dict[str, Array]:

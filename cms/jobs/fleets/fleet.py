@@ -52,7 +52,7 @@ class FleetRow:
     is_known: bool = False  #: whether the row comes from the journal
 
 
-class Kept(logging.Handler):
+class RecordingHandler(logging.Handler):
     """Keeps the warnings of one thread."""
 
     def __init__(self) -> None:
@@ -67,9 +67,9 @@ class Kept(logging.Handler):
 
 
 @contextmanager
-def notes_kept() -> Iterator[list[str]]:
+def recorded_notes() -> Iterator[list[str]]:
     """Collect warnings for the row, which reports them with the name of the job; they are not printed meanwhile."""
-    root, kept = logging.getLogger(), Kept()
+    root, kept = logging.getLogger(), RecordingHandler()
     before, root.handlers = root.handlers, [kept]
     try:
         yield kept.notes
@@ -83,7 +83,7 @@ def reduce_and_write_one(job: FleetJob) -> FleetRow:
     from cms.jobs.reduce_job import reduce_job
 
     began = time.perf_counter()
-    with notes_kept() as notes:
+    with recorded_notes() as notes:
         reduced = reduce_job(job.job, solver=job.solver)
         write(reduced, job.output)
     return FleetRow(job, reduced.name, reduced.n_q, time.perf_counter() - began, tuple(notes))

@@ -14,7 +14,7 @@ from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
 from cms.linear_algebra.solvers.mode_search import DenseSearch, KrylovSearch
 from cms.linear_algebra.solvers.orientation import orientation
 from cms.linear_algebra.solvers.petsc.factor import PetscFactor
-from cms.linear_algebra.solvers.shift_inverted import Modes, ShiftInverted, Wanted
+from cms.linear_algebra.solvers.shift_inverted import ModeRequest, Modes, ShiftInverted
 from cms.linear_algebra.solvers.slepc_modes import RankSpace, SlepcSearch
 from cms.linear_algebra.solvers.tall import combine
 from cms.linear_algebra.solvers.tall_space import ArraySpace
@@ -119,7 +119,7 @@ def eigenmodes(
     if K.shape != (n, n) or M.shape != (n, n):
         raise EigenError(f"eigenmodes: expected K and M of one square shape, got {K.shape} and {M.shape}")
     asked = mode_count(n_modes)
-    wanted = Wanted.of(asked)
+    wanted = ModeRequest.of(asked)
     if wanted.count is not None and wanted.count > n:
         raise EigenError(f"eigenmodes: {asked.words}, but there are {n} dofs; choose n_modes <= {n}")
     if not TIGHTEST <= tolerance <= LOOSEST:
@@ -183,7 +183,7 @@ def frequency_scale(K: Matrix, M: Matrix) -> float:
 
 
 def _proven_modes(
-    K: Matrix, M: Matrix, search: KrylovSearch | DenseSearch | SlepcSearch, modes: Modes, wanted: Wanted
+    K: Matrix, M: Matrix, search: KrylovSearch | DenseSearch | SlepcSearch, modes: Modes, wanted: ModeRequest
 ) -> Modes:
     """Return the modes when their number agrees with the inertia; search for more modes while it is larger."""
     operator = search.operator
@@ -203,7 +203,7 @@ def _proven_modes(
     )
 
 
-def counting_shift(omega2: Array, k: int, wanted: Wanted, shift: float) -> tuple[int, float]:
+def counting_shift(omega2: Array, k: int, wanted: ModeRequest, shift: float) -> tuple[int, float]:
     """Return the number of modes below a shift, and the shift, in a gap at or after the last wanted mode."""
     levels = np.concatenate([[shift], omega2])  # levels[j] is mode j, counted from 1
     for j in range(k, len(omega2)):

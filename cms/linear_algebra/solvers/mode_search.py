@@ -8,7 +8,13 @@ import numpy as np
 import scipy.linalg as la
 
 from cms.errors import EigenError
-from cms.linear_algebra.solvers.shift_inverted import Modes, ShiftInverted, Wanted, measured_residual, refined_modes
+from cms.linear_algebra.solvers.shift_inverted import (
+    ModeRequest,
+    Modes,
+    ShiftInverted,
+    measured_residual,
+    refined_modes,
+)
 from cms.linear_algebra.solvers.tall_space import TallProduct, TallSpace
 from fe_models.foundation.arrays import Array
 
@@ -213,7 +219,7 @@ MASSLESS = 1e-13  #: eigenvalue of M relative to the largest, below which a dire
 class KrylovSearch:
     """Block Lanczos, extended until the wanted modes have converged; more modes can be requested afterwards."""
 
-    def __init__(self, operator: ShiftInverted, wanted: Wanted) -> None:
+    def __init__(self, operator: ShiftInverted, wanted: ModeRequest) -> None:
         self.operator = operator
         guess = wanted.count or FIRST_GUESS
         block = WIDE if guess >= MANY else BLOCK
@@ -223,7 +229,7 @@ class KrylovSearch:
         )
         self._is_clean = operator.has_mass_everywhere  # otherwise S removes rounding in massless dofs
 
-    def modes(self, wanted: Wanted, at_least: int = 0) -> Modes:
+    def modes(self, wanted: ModeRequest, at_least: int = 0) -> Modes:
         """Return the wanted modes, or at least `at_least`, improved; their true residuals are below the tolerance."""
         operator, tolerance = self.operator, self.operator.tolerance
         for _ in range(MOST_REFINEMENTS):
@@ -245,7 +251,7 @@ class KrylovSearch:
             "K is too ill-conditioned for this tolerance: allow a larger one, or mend units and stiffness contrasts"
         )
 
-    def _converge(self, wanted: Wanted, at_least: int, tolerance: float) -> tuple[RitzPairs, int]:
+    def _converge(self, wanted: ModeRequest, at_least: int, tolerance: float) -> tuple[RitzPairs, int]:
         """Iterate until the wanted pairs have converged according to the recurrence; return all pairs and how many."""
         lanczos = self._lanczos
         next_look = 0
@@ -270,7 +276,7 @@ class KrylovSearch:
             lanczos.advance()
         raise EigenError(f"eigenmodes: no convergence after {lanczos.n_solves} columns; allow a larger tolerance")
 
-    def _judge(self, ritz: RitzPairs, wanted: Wanted, at_least: int, tolerance: float) -> tuple[int, bool]:
+    def _judge(self, ritz: RitzPairs, wanted: ModeRequest, at_least: int, tolerance: float) -> tuple[int, bool]:
         """Return how many pairs are wanted according to present knowledge, and whether all of them have converged."""
         is_exhausted = self._lanczos.is_exhausted
         theta, residuals = ritz.theta, ritz.residuals
@@ -327,7 +333,7 @@ class DenseSearch:
 
     description = "dense matrices"
 
-    def __init__(self, operator: ShiftInverted, wanted: Wanted) -> None:
+    def __init__(self, operator: ShiftInverted, wanted: ModeRequest) -> None:
         self.operator = operator
         M = operator.M_product @ np.eye(operator.n)
         size = np.sqrt(np.where(M.diagonal() > 0, M.diagonal(), 1.0))
@@ -342,7 +348,7 @@ class DenseSearch:
         self._theta, self._Q = theta[::-1], Q[:, ::-1]
         refuse_negative(self._theta)
 
-    def modes(self, wanted: Wanted, at_least: int = 0) -> Modes:
+    def modes(self, wanted: ModeRequest, at_least: int = 0) -> Modes:
         """Return the wanted modes, or at least `at_least`, refined."""
         operator, theta = self.operator, self._theta
         n_finite = leading_count(theta, 1, len(theta))
@@ -387,5 +393,5 @@ def refuse_negative(theta: Array) -> None:
             "eigenmodes: an eigenvalue omega² lies below the shift; expected a stiffness and a mass without negative "
             "energy, and a shift below the lowest mode. A mass that is slightly indefinite, as some programs write "
             "it, is "
-            "mended by mend_mass = true in the [body] of a job, mend_mass=True of body_from_matrices"
+            "mended by repair_mass = true in the [body] of a job, repair_mass=True of body_from_matrices"
         )

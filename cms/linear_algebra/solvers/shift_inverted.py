@@ -14,13 +14,13 @@ from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.linear_algebra.solvers.tall_space import ArraySpace, TallSpace
 from fe_models.foundation.arrays import Array
 
-__all__ = ["Modes", "ShiftInverted", "Wanted", "measured_residual", "refined_modes"]
+__all__ = ["ModeRequest", "Modes", "ShiftInverted", "measured_residual", "refined_modes"]
 
 SAMPLES = 4  #: number of columns for a common measurement of all residuals
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ModeRequest:
     """The wanted modes: the first `count`, or all up to `omega2`."""
 
     count: int | None
@@ -31,7 +31,7 @@ class Wanted:
             raise EigenError(f"eigenmodes: n_modes = {self.count}; expected at least 1")
 
     @classmethod
-    def of(cls, wanted: ModeCount) -> "Wanted":
+    def of(cls, wanted: ModeCount) -> "ModeRequest":
         """Convert a mode count to the quantities of the pencil."""
         return cls(wanted.n, None if wanted.cutoff is None else (2 * np.pi * wanted.cutoff) ** 2)
 

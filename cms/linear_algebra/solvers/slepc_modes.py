@@ -13,7 +13,7 @@ from cms.linear_algebra.solvers.factorization import Factorization, Matrix, lowe
 from cms.linear_algebra.solvers.inverse import Inverse
 from cms.linear_algebra.solvers.petsc.factor import CHUNK, PetscFactor, communicator, rows_here, solved_rows
 from cms.linear_algebra.solvers.petsc.libraries import petsc, slepc
-from cms.linear_algebra.solvers.shift_inverted import Modes, ShiftInverted, Wanted
+from cms.linear_algebra.solvers.shift_inverted import ModeRequest, Modes, ShiftInverted
 from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
 from cms.linear_algebra.solvers.tall import combine, inner, subtract
 from cms.linear_algebra.solvers.tall_space import ArrayBasis, ArraySpace, dealt
@@ -273,7 +273,7 @@ SHARPER = 1e-6
 class SlepcSearch:
     """Krylov-Schur with distributed vectors; rank 0 receives the modes."""
 
-    def __init__(self, operator: ShiftInverted, wanted: Wanted) -> None:
+    def __init__(self, operator: ShiftInverted, wanted: ModeRequest) -> None:
         assert isinstance(operator.factorization, Factorization)
         factor = operator.factorization.factor
         assert isinstance(factor, PetscFactor)
@@ -285,7 +285,7 @@ class SlepcSearch:
         factor.ranks.store[self.key] = lower_triangle(operator.M_product.A)
         factor.ranks.everywhere(spread_mass, self.key, factor.rows)
 
-    def modes(self, wanted: Wanted, at_least: int = 0) -> Modes:
+    def modes(self, wanted: ModeRequest, at_least: int = 0) -> Modes:
         """Return the wanted modes, or at least `at_least`."""
         operator = self.operator
         n_asked = max(wanted.count or FIRST_GUESS, at_least) + GUARDS

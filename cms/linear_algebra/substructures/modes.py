@@ -14,7 +14,7 @@ from cms.linear_algebra.solvers.factorization import Factorization, factorize, r
 from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.linear_algebra.solvers.orientation import orientation, turn
 from cms.linear_algebra.solvers.registry import solver_of
-from cms.linear_algebra.solvers.shift_inverted import Wanted
+from cms.linear_algebra.solvers.shift_inverted import ModeRequest
 from cms.linear_algebra.substructures.dissection import Dissection, dissect, node_graph
 from cms.linear_algebra.substructures.reduced_mass import ReducedMass
 from cms.linear_algebra.substructures.reduced_modes import ApproximateModes, reduced_modes, reduced_omega2
@@ -329,7 +329,7 @@ def _improved(modes: ApproximateModes, Z: Array, count: int, tolerance: float, h
 
 def _require_all(interior: Interior, omega2: Array, k: int, wanted: ModeCount, solver: Solver | None) -> None:
     """Count the modes below a gap after the wanted ones by Sylvester's law of inertia."""
-    last, sigma = counting_shift(omega2[: k + GUARDS], k, Wanted.of(wanted), 0.0)
+    last, sigma = counting_shift(omega2[: k + GUARDS], k, ModeRequest.of(wanted), 0.0)
     A = sp.csc_array(interior.K - sigma * interior.M)
     with factorize(A, definite=False, solver=solver) as factorization:
         inertia = factorization.inertia

@@ -7,7 +7,7 @@ import numpy as np
 
 from fe_models.body.fe_body import FEBody, Interface
 
-__all__ = ["ReductionCost", "few_columns", "large_interfaces", "reduction_cost"]
+__all__ = ["ReductionCost", "interface_reduction_size", "large_interfaces", "reduction_cost"]
 
 MANY = 600  #: boundary dofs of one interface from which its cost is reported
 PROPOSED = 20  #: number of interface modes that the report proposes
@@ -58,7 +58,7 @@ def reduction_cost(body: FEBody, n_columns: int, *, stress: bool = True, n_const
     return ReductionCost(k, memory, file, operations / operations_per_second())
 
 
-def few_columns(body: FEBody, interface_modes: int) -> int:
+def interface_reduction_size(body: FEBody, interface_modes: int) -> int:
     """Return the number of constraint modes that remain if interfaces of kind "nodes" keep this number of modes."""
     return sum(
         min(n_b, 6 + interface_modes) if interface.kind == "nodes" else n_b
@@ -73,7 +73,7 @@ def large_interfaces(body: FEBody) -> list[str]:
     if not large:
         return []
     whole = reduction_cost(body, len(body.b)).words
-    fewer = reduction_cost(body, few_columns(body, PROPOSED), n_constraint_modes=len(body.b)).words
+    fewer = reduction_cost(body, interface_reduction_size(body, PROPOSED), n_constraint_modes=len(body.b)).words
     return [
         f"body {body.name!r}: interface {interface.name!r} of {len(interface.nodes)} nodes has "
         f"{n_boundary(interface)} boundary dofs: as many static solves and modes of the body. With all of them: "

@@ -30,7 +30,7 @@ __all__ = [
 
 RESIDUAL = 1e-12  #: energy of a residual attachment mode relative to the attachment mode, below which it is rounding
 STIFF = 1e-14  #: compliance relative to the largest (rotations times body length squared), below which it is rounding
-STILL = 1e-24  #: the same for the energy of a response to inertia loads, where both factors are rounding
+ROUNDING_ENERGY = 1e-24  #: the same for the energy of a response to inertia loads, where both factors are rounding
 BLOCK = 60  #: right-hand sides solved at a time; wider blocks are not faster and need more memory
 BLOCK_OF_RANKS = 16  #: the same for a distributed body, whose columns pass through rank 0
 
@@ -118,7 +118,7 @@ def inertia_relief_modes(fixed: FixedInterfaceBody, Psi_R: Array) -> Array:
     Psi_H[fixed.i] = fixed.factorization.solve(F)
     is_rotation = np.arange(Psi_R.shape[1]) >= 3
     energy = np.einsum("nk,nk->k", F, Psi_H[fixed.i]) / _unit(fixed.body, is_rotation)
-    Psi_H[:, energy <= STILL * energy.max(initial=0.0)] = 0.0
+    Psi_H[:, energy <= ROUNDING_ENERGY * energy.max(initial=0.0)] = 0.0
     return Psi_H
 
 

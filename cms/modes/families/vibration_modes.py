@@ -7,7 +7,7 @@ import numpy as np
 from cms.errors import EigenError
 from cms.linear_algebra.solvers.eigen import EigenResult, counting_shift, eigenmodes
 from cms.linear_algebra.solvers.mode_count import ModeCount
-from cms.linear_algebra.solvers.shift_inverted import Wanted
+from cms.linear_algebra.solvers.shift_inverted import ModeRequest
 from cms.modes.families.fixed_interface import FixedInterfaceBody
 from cms.modes.families.flexibility import Flexibility
 from fe_models.body.couplings.submatrix import PrincipalBlock
@@ -53,7 +53,7 @@ def _proven(flexibility: Flexibility, modes: EigenResult, asked: ModeCount) -> E
     neither mass nor stiffness, only multipliers, so that its pivots there are zero.
     """
     k = len(modes.omega2)
-    wanted = Wanted(k, None) if asked.cutoff is None else Wanted.of(asked)
+    wanted = ModeRequest(k, None) if asked.cutoff is None else ModeRequest.of(asked)
     last, sigma = counting_shift(modes.omega2, k, wanted, 0.0)
     for n_extra in (4, 12, 36):  # a gap in which to count lies beyond the requested modes
         try:

@@ -10,7 +10,7 @@ from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["OVER", "coupled_columns", "tell_frequencies"]
+__all__ = ["OVER", "coupled_columns", "log_frequencies"]
 
 log = logging.getLogger(__name__)
 
@@ -52,7 +52,7 @@ def coupled_columns(where: str, body: FEBody, V: Array, over: str | None) -> tup
     ModeSetError
         If the number of rows fits neither, if it fits both and `over` is None, or if the columns contradict `over`.
     """
-    over = told_or_counted(where, body, V, over)  # (1)
+    over = stated_or_counted(where, body, V, over)  # (1)
     options = {"columns over": f"the {WORDS[over]}"}
     columns = V
     if over == "mesh":  # (2)
@@ -76,7 +76,7 @@ def coupled_columns(where: str, body: FEBody, V: Array, over: str | None) -> tup
     return columns, options
 
 
-def told_or_counted(where: str, body: FEBody, V: Array, over: str | None) -> str:
+def stated_or_counted(where: str, body: FEBody, V: Array, over: str | None) -> str:
     """Return over which dofs the columns are given."""
     if over is not None and over not in OVER:
         raise ModeSetError(f"{where}: columns_over = {quoted(over)}: unknown{nearest(str(over), OVER)}")
@@ -118,7 +118,7 @@ def rayleigh(body: FEBody, X: Array) -> Array:
     return np.divide(energy, mass, out=np.zeros_like(energy), where=mass > 0)
 
 
-def tell_frequencies(where: str, body: FEBody, X: Array, frequencies: Array) -> None:
+def log_frequencies(where: str, body: FEBody, X: Array, frequencies: Array) -> None:
     """Warn if stated frequencies are far from those of the energy of their columns: order, unit or body may be wrong.
 
     Parameters

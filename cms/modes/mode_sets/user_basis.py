@@ -11,7 +11,7 @@ import numpy as np
 from cms.errors import ModeSetError
 from cms.modes.families.sharing import body_of
 from cms.modes.mode_set import ModeSet
-from cms.modes.mode_sets.given_columns import coupled_columns, tell_frequencies
+from cms.modes.mode_sets.given_columns import coupled_columns, log_frequencies
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 
@@ -79,7 +79,7 @@ def user_basis(
         raise ModeSetError(
             f"{where}: {k} columns need as many labels and frequencies, got {len(labels)} and {frequencies.shape}"
         )
-    tell_frequencies(where, body, V, frequencies)
+    log_frequencies(where, body, V, frequencies)
     return ModeSet("user-basis", V, labels, frequencies, options, ("user",) * k)
 
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cms.body.geometric_stiffness import SPIN_PAIRS, GeometricStiffness, TurnedLoads, stiffness_of_loads
+from cms.body.geometric_stiffness import SPIN_PAIRS, GeometricStiffness, RotatedLoads, stiffness_of_loads
 from cms.body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.errors import BodyError
 from cms.reduction.geometric_stiffness.unit_loads import unit_mass_loads
@@ -200,7 +200,7 @@ def spread_resultants(reduced: ReducedBody) -> Array:
     return np.asarray(np.block([[np.eye(3), lever], [lever.T, np.trace(R) * np.eye(3) - R]]), np.float64)
 
 
-def of_balanced(old: GeometricStiffness | TurnedLoads, loads: Loads, spread: Array | None) -> Array:
+def of_balanced(old: GeometricStiffness | RotatedLoads, loads: Loads, spread: Array | None) -> Array:
     """Step (3): return the matrices of balanced loads over the old shapes, (k, ...), from those of the old unit loads.
 
     A c + b is a combination of the unit loads: b gives translations, the antisymmetric part of A gives rotations, and

@@ -108,7 +108,7 @@ def reduced_geometric_stiffness(body: FEBody | Families, Phi: Array, condition: 
 def stiffness_of_states(body: FEBody, Phi: Array, states: UnitStates) -> GeometricStiffness:
     """Steps (3) to (5) for the static states of the unit loads; the factorisation is no longer needed.
 
-    The matrices are computed over shapes and rotations about the axes of B; the mixed part becomes `TurnedLoads`.
+    The matrices are computed over shapes and rotations about the axes of B; the mixed part becomes `RotatedLoads`.
     """
     frame = states.condition.frame
     rotations = geometric_rigid_modes(body, origin=frame.origin)[:, 3:] @ frame.axes

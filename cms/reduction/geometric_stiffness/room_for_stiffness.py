@@ -10,7 +10,7 @@ import os
 from collections.abc import Sequence
 
 from cms.errors import BodyError
-from cms.modes.families.interface_cost import PROPOSED, duration, few_columns, operations_per_second
+from cms.modes.families.interface_cost import PROPOSED, duration, interface_reduction_size, operations_per_second
 from cms.reduction.geometric_stiffness.unit_states import has_geometric_stiffness
 from fe_models.body.fe_body import FEBody
 
@@ -91,7 +91,7 @@ def chosen_words(body: FEBody, asked: Asked) -> str:
 
 def remedies(body: FEBody, n_modes: int) -> str:
     """Describe how to make the geometric stiffness small, with the lines to write."""
-    few = few_columns(body, PROPOSED) + max(0, n_modes - len(body.b))
+    few = interface_reduction_size(body, PROPOSED) + max(0, n_modes - len(body.b))
     reduced = ""
     if few < n_modes:
         reduced = (

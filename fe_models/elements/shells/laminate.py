@@ -89,7 +89,7 @@ class ShellLaw:
             Index of the layer, from the bottom, whose stress is wanted.
         """
         item = self.layers[layer]
-        at_height = turned_elasticity(item.material, item.angle) @ np.hstack([np.eye(3), z * np.eye(3)])
+        at_height = rotated_elasticity(item.material, item.angle) @ np.hstack([np.eye(3), z * np.eye(3)])
         S = np.zeros((5, 8))
         S[:3, :6] = at_height @ np.linalg.inv(self.stiffness[:6, :6])
         S[3:, 6:] = shear_flow(self.layers, self.z, self.A, self.B, self.D)(z, layer)
@@ -105,7 +105,7 @@ def shell_law(item: AnyShellProperty) -> ShellLaw:
     middle = (z[1:] + z[:-1]) / 2
     A, B, D, third = np.zeros((4, 3, 3))
     for layer, h, c in zip(layers, t, middle, strict=True):
-        Q = turned_elasticity(layer.material, layer.angle)
+        Q = rotated_elasticity(layer.material, layer.angle)
         A += h * Q
         B += h * c * Q
         D += (h**3 / 12 + h * c**2) * Q
@@ -146,7 +146,7 @@ def shear_flow(layers: tuple[Layer, ...], z: Array, A: Array, B: Array, D: Array
     """
     strain = np.linalg.solve(A, B)
     curvature = np.linalg.inv(D - B @ strain)
-    Q = [turned_elasticity(layer.material, layer.angle) for layer in layers]
+    Q = [rotated_elasticity(layer.material, layer.angle) for layer in layers]
 
     def between(k: int, low: float, high: float) -> Array:
         return np.asarray(Q[k] @ ((high**2 - low**2) / 2 * np.eye(3) - (high - low) * strain) @ curvature)
@@ -162,7 +162,7 @@ def shear_flow(layers: tuple[Layer, ...], z: Array, A: Array, B: Array, D: Array
     return flow
 
 
-def turned_elasticity(material: AnyMaterial, angle: float) -> Array:
+def rotated_elasticity(material: AnyMaterial, angle: float) -> Array:
     """Return the plane stress elasticity in layup axes, (3, 3) [Pa], rows xx yy xy, shear strain doubled.
 
     Parameters

@@ -155,7 +155,7 @@ def body_from_foreign(
     interfaces: Iterable[Interface] = (),
     held: bool = False,
     remove_supports: bool = False,
-    mend_mass: bool = False,
+    repair_mass: bool = False,
     accept: Iterable[str] = (),
 ) -> FEBody:
     """Make a body of matrices that were read, with the nodes of a deck or mesh beside them.
@@ -171,7 +171,7 @@ def body_from_foreign(
         Of `read_matrices`.
     geometry
         Of `read_geometry`; None: the files bring their nodes.
-    name, units, interfaces, held, mend_mass, accept
+    name, units, interfaces, held, repair_mass, accept
         As for `body_from_matrices`; interfaces by indices of the nodes of the geometry.
     remove_supports
         Whether springs and penalties between nodes and the ground are taken out of K.
@@ -216,7 +216,7 @@ def body_from_foreign(
     body = body_from_matrices(  # (4)
         matrices["M"], matrices["K"], nodes, dofs, name=name, units=units, interfaces=interfaces, D=matrices.get("D"),
         surface=boundary_triangles(geometry) if isinstance(geometry, Mesh) else None,
-        provenance=record, held=held, mend_mass=mend_mass, accept=accept,
+        provenance=record, held=held, repair_mass=repair_mass, accept=accept,
         numbering=foreign_numbering(read, geometry),
     )  # fmt: skip
     loads = {load: force[is_kept] for load, force in read.loads.items()}

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from fe_models.body.fe_body import FEBody, Interface, put_translations
 from fe_models.body.freedom import rigid_forces
-from fe_models.body.held_causes import mistake_of, support_words
+from fe_models.body.held_causes import mistake_description, support_description
 from fe_models.body.mass_loads import MassLoads
 from fe_models.body.positive_mass import DENSE, negative_mass, positive_mass
 from fe_models.checks.unit_check import implausible_matrices
@@ -103,7 +103,7 @@ def body_from_matrices(
     surface: Any = None,
     provenance: Mapping[str, str] | None = None,
     held: bool = False,
-    mend_mass: bool = False,
+    repair_mass: bool = False,
     accept: Iterable[str] = (),
     numbering: Numbering | None = None,
 ) -> FEBody:
@@ -127,7 +127,7 @@ def body_from_matrices(
     held
         Whether the body is intentionally held to the ground, by springs, supports or removed rows. The body is then
         labelled (`FEBody.is_held`). It can be checked, reduced, compared and exported, but a floating frame rejects it.
-    mend_mass
+    repair_mass
         Whether to set slightly negative eigenvalues of M, as some programs write them, to zero (`positive_mass`).
     accept
         Findings to accept: "units" accepts an implausible size, density or wave speed.
@@ -172,7 +172,7 @@ def body_from_matrices(
         raise BodyError(f"{where}: dofs: component {component} of node {node} is listed {count.max()} times")
     require_freedom(body, held=held)
     require_units(body, accept=tuple(accept))
-    if mend_mass:
+    if repair_mass:
         body = positive_mass(body)
         record |= {key: value for key, value in body.provenance.items() if key == "mass mended"}
     else:
@@ -197,10 +197,10 @@ def require_freedom(body: FEBody, *, held: bool) -> None:
             raise BodyError(f"{where}: held: K answers no rigid-body motion, so the body is free; remove held")
         return
     called = body.numbering.called
-    mistake = mistake_of(body.K, body.M, body.nodes, body.dofs, forces, with_rows=not held, called=called)
+    mistake = mistake_description(body.K, body.M, body.nodes, body.dofs, forces, with_rows=not held, called=called)
     if mistake is not None:
         raise BodyError(f"{where}: these are not the matrices of a free body: {mistake}")
-    words = support_words(forces, body.dofs, body.units.time, called=called)
+    words = support_description(forces, body.dofs, body.units.time, called=called)
     if not held:
         raise BodyError(
             f"{where}: these are not the matrices of a free body: {words}. Release it; or if it is meant to be held "
@@ -225,8 +225,8 @@ def require_positive_mass(body: FEBody) -> None:
             f"body {body.name!r}: M is indefinite: {len(values)} eigenvalues below zero, down to {values[0]:.1e} of "
             "the "
             "largest (translations and rotations scaled alike): motions with negative kinetic energy. If that is the "
-            "rounding of another program, mend_mass = true in the [body] of a job, mend_mass=True in Python sets them "
-            "to zero and tells what that changes; else mend the matrix"
+            "rounding of another program, repair_mass = true in the [body] of a job (repair_mass=True in Python) sets "
+            "them to zero and tells what that changes; else repair the matrix"
         )
 
 
@@ -301,7 +301,7 @@ def body_from_npz(
     name: str | None = None,
     units: Units | None = None,
     held: bool = False,
-    mend_mass: bool = False,
+    repair_mass: bool = False,
     accept: Iterable[str] = (),
 ) -> FEBody:
     """Read a body from an .npz archive of plain arrays (`numpy.savez`); pickled objects are rejected.
@@ -332,7 +332,7 @@ def body_from_npz(
         Name of the body; None: the name of the file without its suffix.
     units
         Unit system of the arrays; None: the one that the file names.
-    held, mend_mass, accept
+    held, repair_mass, accept
         As for `body_from_matrices`. The key `held` of the file also declares the body held.
 
     Raises
@@ -368,7 +368,7 @@ def body_from_npz(
         surface=arrays.get("surface"),
         provenance={"mesh": str(path), "mesh sha256": file_digest(path)},
         held=held or is_held(path, arrays),
-        mend_mass=mend_mass,
+        repair_mass=repair_mass,
         accept=accept,
     )
 

@@ -50,7 +50,7 @@ __all__ = ["Kinematics", "SingularityGuard", "free_coordinates", "kinematics"]
 
 SINGULAR = 1e-6  #: smallest singular value of the scaled constraint rows (length one each) at a singular position
 FREE = 1e-7  #: the same for a motion that no constraint resists
-TOLD = 1e-6  #: fraction of a motion from which a coordinate or body is reported as part of it
+REPORTED = 1e-6  #: fraction of a motion from which a coordinate or body is reported as part of it
 
 
 def free_coordinates(system: System, state: State, *, t: float = 0.0) -> tuple[str, ...]:
@@ -79,14 +79,14 @@ def free_coordinates(system: System, state: State, *, t: float = 0.0) -> tuple[s
         rates = np.array([rows[name][rigid] * scale for name in names]) @ motions.T
         rates[np.linalg.norm(rates, axis=1) < FREE] = 0.0
         _, R, order = la.qr(unit_rows(rates).T, mode="economic", pivoting=True)
-        rank = int((np.abs(np.diag(R)) > TOLD).sum())
+        rank = int((np.abs(np.diag(R)) > REPORTED).sum())
         chosen = sorted(order[:rank])
         named = [f"{names[k]!r}" for k in chosen]
         _, values, right = la.svd(rates[chosen])
         left = right[rank:] @ motions
     if len(left):
         share = (left**2).reshape(len(left), -1, 6).sum(axis=(0, 2))
-        moving = [name for name, part in zip(compiled.body_names, share, strict=True) if part > TOLD]
+        moving = [name for name, part in zip(compiled.body_names, share, strict=True) if part > REPORTED]
         named.append(
             f"{len(left)} motions of {', '.join(repr(name) for name in moving)} of which no joint coordinate tells"
         )

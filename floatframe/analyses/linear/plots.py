@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 __all__ = ["campbell_figure", "plot_campbell", "plot_frequency_response", "plot_root_locus"]
 
 
-NOTHING = 1e-12  #: of the largest amplitude of a unit, below which a response is rounding
+ROUNDING = 1e-12  #: of the largest amplitude of a unit, below which a response is rounding
 
 
 def plot_campbell(locus: Locus, ax: "Axes | None" = None, *, time_unit: float = 1.0) -> "Axes":
@@ -68,7 +68,7 @@ def campbell_figure(locus: Locus, *, time_unit: float = 1.0) -> "Figure":
     still = []
     for k, (name, unit) in enumerate(zip(locus.outputs, locus.output_units, strict=True)):
         values = locus.steady[:, k]
-        if float(np.abs(values).max(initial=0.0)) <= NOTHING * size[unit]:
+        if float(np.abs(values).max(initial=0.0)) <= ROUNDING * size[unit]:
             still.append(name)
             continue
         axes[1 + units.index(unit)].plot(locus.values, values, color=f"C{k % 10}", linewidth=1.4, label=name)
@@ -127,7 +127,7 @@ def plot_frequency_response(response: FrequencyResponse, *, time_unit: float = 1
     still = []
     for k, (o, i) in enumerate(pairs):
         unit, label = response.units[o][i], f"{response.outputs[o]} / {response.inputs[i]}"
-        if sizes[o, i] <= NOTHING * largest[unit]:
+        if sizes[o, i] <= ROUNDING * largest[unit]:
             still.append(label)
             continue
         curve = amplitudes[:, o, i]

@@ -14,7 +14,7 @@ ROUNDING = 1e-13  #: of the terms that make an entry of a matrix: what their sum
 MODEL = 1e-10  #: of an entry, by which it is known: motions are steady and equilibria balanced to about so much
 LOW = 1e-10  #: omega² by the highest one below which modes are solved for again among themselves
 FREE = 1e-7  #: rate of a unit motion by the highest, below which it costs nothing
-STILL = 1e-9  #: motion of bodies by that of states below which a mode is one of states alone
+LEAST_BODY_MOTION = 1e-9  #: motion of bodies by that of states below which a mode is one of states alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +98,7 @@ def system_modes(linear: LinearSystem) -> SystemModes:
     largest = shapes[np.abs(shapes).argmax(axis=0), np.arange(shapes.shape[1])]
     if system.states:  # a state that moves no body has a mode of its own
         own = of_states[np.abs(of_states).argmax(axis=0), np.arange(shapes.shape[1])]
-        largest = np.where(np.abs(largest) > STILL * np.abs(own), largest, own)
+        largest = np.where(np.abs(largest) > LEAST_BODY_MOTION * np.abs(own), largest, own)
     energies = np.array([np.einsum("uk,uv,vk->k", shapes[u].conj(), m, shapes[u]).real for u, m in linear.bodies()])
     total = energies.sum(axis=0)
     shares = np.divide(energies, total, out=np.zeros_like(energies), where=total > 0).T
@@ -188,9 +188,7 @@ def eigenvalues_with_errors(A: Array, dA: Array) -> tuple[Array, Array, Array]:
     return np.where(is_regular, values, plain), V, np.where(is_regular, errors, np.inf)
 
 
-def with_motions_that_cost_nothing(
-    A: Array, eigenvalues: Array, V: Array, errors: Array
-) -> tuple[Array, Array, Array]:
+def with_motions_that_cost_nothing(A: Array, eigenvalues: Array, V: Array, errors: Array) -> tuple[Array, Array, Array]:
     """Return one of each conjugate pair, and as many modes with lambda = 0 as there are motions that cost nothing.
 
     Q spans what belongs to zero; motions that cost nothing are what A takes to zero within it, without velocities.

@@ -85,13 +85,13 @@ class BallWithPlay(Element):
 
 
 @njit
-def ball_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def ball_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write the contact of the ball and the outputs."""
     p = x[1, 0], x[1, 1], x[1, 2]
     out = p[0] - x[0, 0], p[1] - x[0, 1], p[2] - x[0, 2]
-    seen[0] = length_of(out)
-    seen[4] = data[NUMBERS] - seen[0]
-    seen[1], seen[2], seen[3] = add_contact(wrench, x, p, out, seen[0], data[NUMBERS], data, 0)
+    outputs[0] = length_of(out)
+    outputs[4] = data[NUMBERS] - outputs[0]
+    outputs[1], outputs[2], outputs[3] = add_contact(wrench, x, p, out, outputs[0], data[NUMBERS], data, 0)
 
 
 # backlash -------------------------------------------------------------------------------------------------------------
@@ -155,7 +155,7 @@ class Backlash(Element):
 
 
 @njit
-def backlash_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def backlash_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write the force of the stop that is touched, and the outputs."""
     lower, upper, is_turn = data[3], data[4], data[5] > 0.0
     e = direction_of(x, 0, data, 6)
@@ -170,5 +170,5 @@ def backlash_law(t, x, z, lam, data, wrench, z_dot, g, seen):
         add_torque(wrench, 0, 1, -side * N, e)
     else:
         add_axial_force(wrench, x, 0, 1, -side * N, e)
-    seen[0], seen[1], seen[2], seen[3] = way, side * N, energy, (N - spring) * side * speed
-    seen[4] = side * (end - way)
+    outputs[0], outputs[1], outputs[2], outputs[3] = way, side * N, energy, (N - spring) * side * speed
+    outputs[4] = side * (end - way)

@@ -131,7 +131,7 @@ ALONG, ABOUT, TURN = NUMBERS + 6, NUMBERS + 9, NUMBERS + 18
 
 
 @njit
-def hinge_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def hinge_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write the contacts in both planes and along the axis, and the outputs."""
     e, pin = direction_of(x, 0, data, ABOUT), direction_of(x, 1, data, ALONG)
     n_planes = 2 if data[LENGTH] > 0.0 else 1
@@ -139,31 +139,31 @@ def hinge_law(t, x, z, lam, data, wrench, z_dot, g, seen):
         s = 0.0 if n_planes == 1 else (k - 0.5) * data[LENGTH]
         p = x[1, 0] + s * pin[0], x[1, 1] + s * pin[1], x[1, 2] + s * pin[2]
         way, out = off_axis(x, p, e)
-        seen[8 + k] = data[PLAY] - way
+        outputs[8 + k] = data[PLAY] - way
         N, energy, lost = add_contact(wrench, x, p, out, way, data[PLAY], data, 0)
         if N.real > 0.0:
-            seen[5] += 1.0
-        seen[6] += energy
-        seen[7] += lost
+            outputs[5] += 1.0
+        outputs[6] += energy
+        outputs[7] += lost
     along, rate = axial_motion(x, 0, 1, e)
     if data[AXIAL_PLAY] >= 0.0:
         side = 1.0 if along.real >= 0.0 else -1.0
-        seen[10] = data[AXIAL_PLAY] - side * along
+        outputs[10] = data[AXIAL_PLAY] - side * along
         N, spring, energy = depth_force(side * along - data[AXIAL_PLAY], side * rate, data, AXIAL)
         add_axial_force(wrench, x, 0, 1, -side * N, e)
-        seen[6] += energy
-        seen[7] += (N - spring) * side * rate
-    seen[4] = length_of((wrench[1, 0], wrench[1, 1], wrench[1, 2]))
-    seen[0], speed = angle_about(x, 0, 1, data, ABOUT), turning_speed(x, 0, 1, e)
-    turn = seen[0] - data[TURN + 2]
+        outputs[6] += energy
+        outputs[7] += (N - spring) * side * rate
+    outputs[4] = length_of((wrench[1, 0], wrench[1, 1], wrench[1, 2]))
+    outputs[0], speed = angle_about(x, 0, 1, data, ABOUT), turning_speed(x, 0, 1, e)
+    turn = outputs[0] - data[TURN + 2]
     add_torque(wrench, 0, 1, -data[TURN] * turn - data[TURN + 1] * speed, e)
-    seen[6] += 0.5 * data[TURN] * turn * turn
-    seen[7] += data[TURN + 1] * speed * speed
-    seen[1], _ = off_axis(x, (x[1, 0], x[1, 1], x[1, 2]), e)
-    seen[2] = along
+    outputs[6] += 0.5 * data[TURN] * turn * turn
+    outputs[7] += data[TURN + 1] * speed * speed
+    outputs[1], _ = off_axis(x, (x[1, 0], x[1, 1], x[1, 2]), e)
+    outputs[2] = along
     cosine = inner_product(e, pin)
     across = pin[0] - cosine * e[0], pin[1] - cosine * e[1], pin[2] - cosine * e[2]
-    seen[3] = np.arctan(length_of(across) / absolute(cosine))
+    outputs[3] = np.arctan(length_of(across) / absolute(cosine))
 
 
 @register_jitable

@@ -134,7 +134,7 @@ def hyperbolic_tangent(x):
 
 
 @register_jitable
-def brake(t, x, z, data, wrench, z_dot, seen, is_watched):
+def brake(t, x, z, data, wrench, z_dot, outputs, is_watched):
     """Write torque, rates and outputs; steps (1) to (5) of `AntiSkidBrake`."""
     gain, build, release, R, slip, slip_band = data[0], data[1], data[2], data[3], data[4], data[5]
     falling, drop_out, deceleration, band = data[6], data[7], data[8], data[9]
@@ -159,17 +159,17 @@ def brake(t, x, z, data, wrench, z_dot, seen, is_watched):
     z_dot[3] = (z[2] - z[3]) / lag  # (5)
     torque = -gain * z[3] * hyperbolic_tangent(omega / data[13])
     add_torque(wrench, 0, 1, torque, e)
-    seen[0], seen[1], seen[2], seen[3], seen[4] = torque, z[3], pilot, omega, v_w
-    seen[5], seen[6], seen[7], seen[8] = v, s, skid, -torque * omega
+    outputs[0], outputs[1], outputs[2], outputs[3], outputs[4] = torque, z[3], pilot, omega, v_w
+    outputs[5], outputs[6], outputs[7], outputs[8] = v, s, skid, -torque * omega
 
 
 @njit
-def anti_skid_brake_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def anti_skid_brake_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write torque, rates and outputs of a brake with anti-skid."""
-    brake(t, x, z, data, wrench, z_dot, seen, True)
+    brake(t, x, z, data, wrench, z_dot, outputs, True)
 
 
 @njit
-def brake_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def brake_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write torque, rates and outputs of a brake that follows only the pilot's pressure."""
-    brake(t, x, z, data, wrench, z_dot, seen, False)
+    brake(t, x, z, data, wrench, z_dot, outputs, False)

@@ -120,7 +120,7 @@ class DcMotor(Element):
 
 
 @njit
-def dc_motor_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def dc_motor_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write the torque of a motor, the rates of its current and its controller, and its outputs."""
     R, L, k, ratio, mode = data[0], data[1], data[2], data[3], int(data[7])
     e = direction_of(x, 0, data, 8)
@@ -137,5 +137,10 @@ def dc_motor_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     friction = data[4] * omega / np.sqrt(omega * omega + data[5] * data[5]) + data[6] * omega
     torque = ratio * (k * i - friction)
     add_torque(wrench, 0, 1, torque, e)
-    seen[0], seen[1], seen[2], seen[3], seen[4] = i, u, torque, speed, angle
-    seen[5], seen[6], seen[7], seen[8] = u * i, R * i * i + friction * omega, torque * speed, 0.5 * L * i * i
+    outputs[0], outputs[1], outputs[2], outputs[3], outputs[4] = i, u, torque, speed, angle
+    outputs[5], outputs[6], outputs[7], outputs[8] = (
+        u * i,
+        R * i * i + friction * omega,
+        torque * speed,
+        0.5 * L * i * i,
+    )

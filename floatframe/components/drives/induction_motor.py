@@ -149,7 +149,7 @@ class InductionMotor(Element):
 
 
 @njit
-def induction_motor_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def induction_motor_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write the torque of a motor, the rates of its fluxes, and its outputs; see the module docstring."""
     R_s, R_r, L_s, L_r, L_m, p, ratio = data[0], data[1], data[2], data[3], data[4], data[5], data[6]
     n_harmonics, at_frequency, at_amplitude = int(data[19]), int(data[20]), int(data[21])
@@ -176,14 +176,14 @@ def induction_motor_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     air_gap = 1.5 * p * (psi_sa * i_sb - psi_sb * i_sa)
     torque = ratio * (air_gap - data[7] * omega)
     add_torque(wrench, 0, 1, torque, e)
-    seen[0], seen[1], seen[3], seen[4] = torque, speed, f, U
-    seen[2] = 1.0 - p * omega / (2.0 * pi * f) if f != 0.0 else 0.0 * omega
-    seen[5] = np.sqrt(i_sa * i_sa + i_sb * i_sb)
-    seen[6] = i_sa
-    seen[7], seen[8] = -0.5 * i_sa + np.sqrt(0.75) * i_sb, -0.5 * i_sa - np.sqrt(0.75) * i_sb
-    seen[9] = np.sqrt(i_ra * i_ra + i_rb * i_rb)
-    seen[10] = 1.5 * (u_a * i_sa + u_b * i_sb)
+    outputs[0], outputs[1], outputs[3], outputs[4] = torque, speed, f, U
+    outputs[2] = 1.0 - p * omega / (2.0 * pi * f) if f != 0.0 else 0.0 * omega
+    outputs[5] = np.sqrt(i_sa * i_sa + i_sb * i_sb)
+    outputs[6] = i_sa
+    outputs[7], outputs[8] = -0.5 * i_sa + np.sqrt(0.75) * i_sb, -0.5 * i_sa - np.sqrt(0.75) * i_sb
+    outputs[9] = np.sqrt(i_ra * i_ra + i_rb * i_rb)
+    outputs[10] = 1.5 * (u_a * i_sa + u_b * i_sb)
     heat = R_s * (i_sa * i_sa + i_sb * i_sb) + R_r * (i_ra * i_ra + i_rb * i_rb)
-    seen[11] = 1.5 * heat + data[7] * omega * omega
-    seen[12] = torque * speed
-    seen[13] = 0.75 * (psi_sa * i_sa + psi_sb * i_sb + psi_ra * i_ra + psi_rb * i_rb)
+    outputs[11] = 1.5 * heat + data[7] * omega * omega
+    outputs[12] = torque * speed
+    outputs[13] = 0.75 * (psi_sa * i_sa + psi_sb * i_sb + psi_ra * i_ra + psi_rb * i_rb)

@@ -75,7 +75,7 @@ class PidDrive(Element):
 
 
 @njit
-def pid_drive_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def pid_drive_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write the torque or force of the drive, the rates of its states and its outputs."""
     mode, lag = int(data[0]), data[1]
     e = direction_of(x, 0, data, 2)
@@ -100,5 +100,5 @@ def pid_drive_law(t, x, z, lam, data, wrench, z_dot, g, seen):
         add_torque(wrench, 0, 1, u, e)
     else:
         add_axial_force(wrench, x, 0, 1, u, e)
-    seen[0], seen[1], seen[2] = value, u, u * rate
-    seen[3] = target_of(t, data, CONTROLLER) - value
+    outputs[0], outputs[1], outputs[2] = value, u, u * rate
+    outputs[3] = target_of(t, data, CONTROLLER) - value

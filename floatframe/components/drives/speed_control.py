@@ -71,7 +71,7 @@ class SpeedControl(Element):
 
 
 @njit
-def speed_control_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def speed_control_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write the torque, the rate of the filtered speed and the outputs."""
     gain, rate_time, filter_time, limit = data[0], data[1], data[2], data[3]
     e = direction_of(x, 0, data, 4)
@@ -87,4 +87,4 @@ def speed_control_law(t, x, z, lam, data, wrench, z_dot, g, seen):
         elif torque.real < -limit:
             torque = 0.0 * torque - limit
     add_torque(wrench, 0, 1, torque, e)
-    seen[0], seen[1], seen[2], seen[3] = torque, omega, target, torque * omega
+    outputs[0], outputs[1], outputs[2], outputs[3] = torque, omega, target, torque * omega

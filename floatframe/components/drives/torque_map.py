@@ -118,7 +118,7 @@ class TorqueMap(Element):
 
 
 @njit
-def torque_map_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def torque_map_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write the torque from a map, the rates of its states, and its outputs."""
     ratio, lag = data[0], data[1]
     at, at_efficiency, at_supply = int(data[6]), int(data[7]), int(data[8])
@@ -140,5 +140,5 @@ def torque_map_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     if at_efficiency > 0:
         eta = grid_at(data, at_efficiency, ratio * speed, -motor if motor.real < 0.0 else motor)
         given = power / eta if power.real > 0.0 else power * eta
-    seen[0], seen[1], seen[2], seen[3] = torque, speed, throttle, eta
-    seen[4], seen[5], seen[6] = given, given - power, power
+    outputs[0], outputs[1], outputs[2], outputs[3] = torque, speed, throttle, eta
+    outputs[4], outputs[5], outputs[6] = given, given - power, power

@@ -67,10 +67,10 @@ def size(x):
 
 
 @register_jitable
-def chamber(data, c, seen, is_rod):
+def chamber(data, c, outputs, is_rod):
     """Return volume and rate of a chamber of the cylinder whose record begins at index c."""
     n, s = c + FIRST_NUMBER, int(data[c + SEEN])
-    stroke, rate = seen[s], seen[s + 1]
+    stroke, rate = outputs[s], outputs[s + 1]
     if is_rod:
         volume, dead = data[n + 1] * (data[n + 2] - stroke) + data[n + 5], data[n + 5]
         growth = -data[n + 1] * rate
@@ -83,7 +83,7 @@ def chamber(data, c, seen, is_rod):
 
 
 @register_jitable
-def node_volume(data, i, p, seen):
+def node_volume(data, i, p, outputs):
     """Return volume, its rate at constant pressure, its pressure derivative, energy of walls and gas, and inflow."""
     node = int(data[NODES]) + NODE_WIDTH * i
     P = p - data[AMBIENT]
@@ -94,20 +94,20 @@ def node_volume(data, i, p, seen):
     for k in range(first, first + count):
         how, index = int(data[int(data[ATTACHED]) + 2 * k]), int(data[int(data[ATTACHED]) + 2 * k + 1])
         if how == INTO:
-            Q = Q + seen[index]
+            Q = Q + outputs[index]
         elif how == OUT_OF:
-            Q = Q - seen[index]
+            Q = Q - outputs[index]
         elif how == GAS:
             U, dU, area = oil_in_accumulator(p, data, index)
             V, slope, energy = V + U, slope + dU, energy + P * U - area
         else:
-            part, rate = chamber(data, index, seen, how == ROD_CHAMBER)
+            part, rate = chamber(data, index, outputs, how == ROD_CHAMBER)
             V, growth = V + part, growth + rate
     return V, growth, slope, energy, Q
 
 
 @njit
-def circuit_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def circuit_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write forces, rates of pressures and flows, and outputs of a circuit, equations (1) to (5) of the module."""
     n_nodes, n_free = int(data[N_NODES]), int(data[N_FREE])
     for m in range(wrench.shape[0]):
@@ -115,18 +115,18 @@ def circuit_law(t, x, z, lam, data, wrench, z_dot, g, seen):
             wrench[m, j] = 0.0
     for i in range(n_nodes):
         node = int(data[NODES]) + NODE_WIDTH * i
-        seen[i] = z[i] if i < n_free else function_at(data, int(data[node + FUNCTION]), t)
-    total = seen.shape[0] - 5
+        outputs[i] = z[i] if i < n_free else function_at(data, int(data[node + FUNCTION]), t)
+    total = outputs.shape[0] - 5
     for k in range(total, total + 5):
-        seen[k] = 0.0
+        outputs[k] = 0.0
     p_a = data[AMBIENT]
     for k in range(int(data[N_COMPONENTS])):
         c = int(data[COMPONENTS]) + COMPONENT_WIDTH * k
         kind, a, b, s, n = int(data[c]), int(data[c + A]), int(data[c + B]), int(data[c + SEEN]), c + FIRST_NUMBER
-        h_a, h_b, dp = 0.0 * seen[0], 0.0 * seen[0], 0.0 * seen[0]
+        h_a, h_b, dp = 0.0 * outputs[0], 0.0 * outputs[0], 0.0 * outputs[0]
         if kind != SPOOL and kind != ACCUMULATOR:
-            p_from = seen[a] if a >= 0 else p_a + 0.0 * seen[0]
-            p_to = seen[b] if b >= 0 else p_a + 0.0 * seen[0]
+            p_from = outputs[a] if a >= 0 else p_a + 0.0 * outputs[0]
+            p_to = outputs[b] if b >= 0 else p_a + 0.0 * outputs[0]
             h_a, h_b = compression(p_from, data, FLUID)[2], compression(p_to, data, FLUID)[2]
             dp = p_from - p_to
         if kind == ORIFICE:  # conductance, transition, opening, at, overlap, leakage
@@ -134,33 +134,33 @@ def circuit_law(t, x, z, lam, data, wrench, z_dot, g, seen):
             if how == BY_FUNCTION:
                 part = function_at(data, at, t) + 0.0 * dp
             elif how != ALWAYS:
-                u = seen[at] if how == BY_SPOOL else -seen[at]
+                u = outputs[at] if how == BY_SPOOL else -outputs[at]
                 part = (u - data[n + 4]) / (1.0 - data[n + 4])
             if part.real < 0.0 or (part.real == 0.0 and how == BY_SPOOL_BACK):  # one slope for a spool in the middle
                 part = 0.0 * part
             q = part * data[n] * turbulent(dp, data[n + 1]) + data[n + 5] * dp
-            seen[s] = q
-            seen[total + 1] += q * (h_a - h_b)
+            outputs[s] = q
+            outputs[total + 1] += q * (h_a - h_b)
         elif kind == VALVE:  # conductance, transition, opens at, is open at, leakage
             part = ramp((dp - data[n + 2]) / (data[n + 3] - data[n + 2]))
             q = part * data[n] * turbulent(dp, data[n + 1]) + data[n + 4] * dp
-            seen[s] = q
-            seen[total + 1] += q * (h_a - h_b)
+            outputs[s] = q
+            outputs[total + 1] += q * (h_a - h_b)
         elif kind == RESISTANCE:  # conductance
             q = data[n] * dp
-            seen[s] = q
-            seen[total + 1] += q * (h_a - h_b)
+            outputs[s] = q
+            outputs[total + 1] += q * (h_a - h_b)
         elif kind == INERTIA:  # inertia, resistance, of turbulence
             q = z[int(data[c + STATE])]
             drop = data[n + 1] * q + data[n + 2] * q * size(q)
             z_dot[int(data[c + STATE])] = (h_a - h_b - drop) / data[n]
-            seen[s] = q
-            seen[total + 1] += q * drop
-            seen[total + 2] += 0.5 * data[n] * q * q
+            outputs[s] = q
+            outputs[total + 1] += q * drop
+            outputs[total + 2] += 0.5 * data[n] * q * q
         elif kind == FLOW:  # at
             q = function_at(data, int(data[n]), t) + 0.0 * dp
-            seen[s] = q
-            seen[total] += q * (h_b - h_a)
+            outputs[s] = q
+            outputs[total] += q * (h_b - h_a)
         elif kind == PUMP:  # displacement, leakage, drag, axis
             i, j = int(data[c + MARKER_A]), int(data[c + MARKER_B])
             e = direction_of(x, i, data, n + 3)
@@ -168,9 +168,9 @@ def circuit_law(t, x, z, lam, data, wrench, z_dot, g, seen):
             torque = data[n] * (h_a - h_b) - data[n + 2] * speed
             leak = data[n + 1] * dp
             add_torque(wrench, i, j, torque, e)
-            seen[s], seen[s + 1], seen[s + 2] = data[n] * speed + leak, torque, speed
-            seen[total + 1] += leak * (h_a - h_b) + data[n + 2] * speed * speed
-            seen[total + 3] += torque * speed
+            outputs[s], outputs[s + 1], outputs[s + 2] = data[n] * speed + leak, torque, speed
+            outputs[total + 1] += leak * (h_a - h_b) + data[n + 2] * speed * speed
+            outputs[total + 3] += torque * speed
         elif kind == CYLINDER:
             # areas of head and rod, stroke, length when in, dead volumes, leakage, friction, its speed, damping, stops
             i, j = int(data[c + MARKER_A]), int(data[c + MARKER_B])
@@ -184,15 +184,15 @@ def circuit_law(t, x, z, lam, data, wrench, z_dot, g, seen):
                 wrench[j, m] += force * e[m]
                 wrench[i, m] -= force * e[m]
             leak = data[n + 6] * dp
-            seen[s], seen[s + 1], seen[s + 2], seen[s + 3] = stroke, rate, force, leak
-            seen[s + 4] = data[n + 2] - stroke
-            seen[total + 1] += leak * (h_a - h_b) + friction * rate + low_lost + high_lost
-            seen[total + 2] += low_energy + high_energy
-            seen[total + 3] += force * rate
+            outputs[s], outputs[s + 1], outputs[s + 2], outputs[s + 3] = stroke, rate, force, leak
+            outputs[s + 4] = data[n + 2] - stroke
+            outputs[total + 1] += leak * (h_a - h_b) + friction * rate + low_lost + high_lost
+            outputs[total + 2] += low_energy + high_energy
+            outputs[total + 3] += force * rate
         elif kind == SPOOL:  # time constant, command at, gain, stroke at
-            u = function_at(data, int(data[n + 1]), t) + 0.0 * seen[0]
+            u = function_at(data, int(data[n + 1]), t) + 0.0 * outputs[0]
             if data[n + 2] != 0.0:
-                u = data[n + 2] * (u - seen[int(data[n + 3])])
+                u = data[n + 2] * (u - outputs[int(data[n + 3])])
             if u.real > 1.0:
                 u = 0.0 * u + 1.0
             if u.real < -1.0:
@@ -200,23 +200,23 @@ def circuit_law(t, x, z, lam, data, wrench, z_dot, g, seen):
             if data[n] > 0.0:
                 z_dot[int(data[c + STATE])] = (u - z[int(data[c + STATE])]) / data[n]
                 u = z[int(data[c + STATE])]
-            seen[s] = u
+            outputs[s] = u
         else:  # an accumulator
-            seen[s] = oil_in_accumulator(seen[a], data, n)[0]
+            outputs[s] = oil_in_accumulator(outputs[a], data, n)[0]
     for i in range(n_nodes):
-        p = seen[i]
+        p = outputs[i]
         v, dv, h = compression(p, data, FLUID)
-        V, growth, slope, energy, Q = node_volume(data, i, p, seen)
+        V, growth, slope, energy, Q = node_volume(data, i, p, outputs)
         if i < n_free:
             z_dot[i] = v * (v * Q - growth) / (v * slope - V * dv)
-            seen[total + 2] += V * (h / v - (p - p_a)) + energy
-            seen[total + 4] += V / v
+            outputs[total + 2] += V * (h / v - (p - p_a)) + energy
+            outputs[total + 4] += V / v
         else:
-            seen[total] += (p - p_a) * growth - Q * h
+            outputs[total] += (p - p_a) * growth - Q * h
 
 
 @njit
-def circuit_rest(t, x, z, lam, data, wrench, z_dot, g, seen):
+def circuit_rest(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write the same as `circuit_law`, except rates of pressures with the same zeros that are easier to solve.
 
     The flow Q into a node depends on roots of pressure differences, with which Newton's method steps back and forth
@@ -226,12 +226,12 @@ def circuit_rest(t, x, z, lam, data, wrench, z_dot, g, seen):
     For one node of each isolated part, the rate is the error of the content of the part: nothing flows into or out of
     such a part, so its content at the start determines its pressures at rest.
     """
-    circuit_law(t, x, z, lam, data, wrench, z_dot, g, seen)
+    circuit_law(t, x, z, lam, data, wrench, z_dot, g, outputs)
     for i in range(int(data[N_FREE])):
         scale = data[int(data[NODES]) + NODE_WIDTH * i + LAMINAR]
         if scale > 0.0:
             v, dv, _ = compression(z[i], data, FLUID)
-            V, _, slope, _, Q = node_volume(data, i, z[i], seen)
+            V, _, slope, _, Q = node_volume(data, i, z[i], outputs)
             z_dot[i] = v * v * Q * np.sqrt(Q * Q + scale * scale) / scale / (v * slope - V * dv)
     at = int(data[ISLANDS])
     for _ in range(int(data[N_ISLANDS])):  # number of nodes, content, pressure for a relative defect of one, nodes
@@ -239,6 +239,6 @@ def circuit_rest(t, x, z, lam, data, wrench, z_dot, g, seen):
         held = 0.0 * z[0]
         for k in range(n):
             i = int(data[at + 3 + k])
-            held = held + node_volume(data, i, z[i], seen)[0] / compression(z[i], data, FLUID)[0]
+            held = held + node_volume(data, i, z[i], outputs)[0] / compression(z[i], data, FLUID)[0]
         z_dot[int(data[at + 3])] = scale * (1.0 - held / content)
         at += 3 + n

@@ -35,7 +35,7 @@ def gas_spring(V, V_0, charge, n, p_a, least):
 
 
 @njit
-def oleo_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def oleo_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write the force of a strut, the rate of its oil pressure, and its outputs."""
     p_a, p_v, width, rho = data[3], data[4], data[5], data[6]
     V_0, charge, A_g, A_o, n, discharge = data[7], data[8], data[9], data[10], data[11], data[12]
@@ -71,8 +71,8 @@ def oleo_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     gas, oil, stops = (p_g - p_a) * A_g, (p_o - p_g) * A_o, bottom - top
     force = gas + oil + friction + stops
     add_axial_force(wrench, x, 0, 1, force, e)
-    seen[0], seen[1], seen[2], seen[3], seen[4], seen[5] = s, rate, force, p_g, p_o, q
-    seen[6], seen[7], seen[8], seen[9] = gas, oil, friction, stops
-    seen[10] = (p_o - p_g) * q + friction * rate + top_lost + bottom_lost
-    seen[11] = -force * rate
-    seen[12], seen[13] = energy + top_energy + bottom_energy, data[13] - s
+    outputs[0], outputs[1], outputs[2], outputs[3], outputs[4], outputs[5] = s, rate, force, p_g, p_o, q
+    outputs[6], outputs[7], outputs[8], outputs[9] = gas, oil, friction, stops
+    outputs[10] = (p_o - p_g) * q + friction * rate + top_lost + bottom_lost
+    outputs[11] = -force * rate
+    outputs[12], outputs[13] = energy + top_energy + bottom_energy, data[13] - s

@@ -140,7 +140,7 @@ def contact_fields(data, table, part, v, roll, sine, field):
 
 
 @numba.njit(cache=True)
-def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, seen):
+def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write the wrench of all wheels of the element on its marker, see the module docstring."""
     n_parts = int(data[1])
     law, options = int(data[2]), data[3:8]
@@ -233,9 +233,9 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, seen):
                         factor = 0 * factor
                     N = N * factor
             out = first + n_w_out + part * n_c_out
-            seen[out + 1] = np.arctan(slope)
-            seen[out + 2] = field[5]
-            seen[out + 11] = depth
+            outputs[out + 1] = np.arctan(slope)
+            outputs[out + 2] = field[5]
+            outputs[out + 11] = depth
             if N.real <= 0:
                 # a constrained wheel can also be pulled; there are no creep forces then
                 if is_constraint and part == 0:
@@ -245,7 +245,7 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, seen):
                     wrench[0, 3] += N * (py * mz - pz * my)
                     wrench[0, 4] += N * (pz * mx - px * mz)
                     wrench[0, 5] += N * (px * my - py * mx)
-                    seen[out] = N
+                    outputs[out] = N
                     N_all += N
                     Q += N * cos
                     Y += N * sin
@@ -286,32 +286,32 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, seen):
             wrench[0, 4] += pz * force_x - px * force_z + moment * my
             wrench[0, 5] += px * force_y - py * force_x + moment * mz
             tread = -(fx * xi + fy * eta + moment * spin)
-            seen[out] = N
-            seen[out + 3] = a
-            seen[out + 4] = b
-            seen[out + 5] = xi
-            seen[out + 6] = eta
-            seen[out + 7] = spin
-            seen[out + 8] = fx
-            seen[out + 9] = fy
-            seen[out + 10] = moment
+            outputs[out] = N
+            outputs[out + 3] = a
+            outputs[out + 4] = b
+            outputs[out + 5] = xi
+            outputs[out + 6] = eta
+            outputs[out + 7] = spin
+            outputs[out + 8] = fx
+            outputs[out + 9] = fy
+            outputs[out + 10] = moment
             N_all += N
             Q += force_x * bx + force_y * by + force_z * bz
             Y -= side * (force_x * nx + force_y * ny + force_z * nz)
             wear += tread
             lost += tread * V
-        seen[first] = v
-        seen[first + 1] = N_all
-        seen[first + 2] = Q
-        seen[first + 3] = Y
+        outputs[first] = v
+        outputs[first + 1] = N_all
+        outputs[first + 2] = Q
+        outputs[first + 3] = Y
         if Q.real > 1.0 or Q.real < -1.0:
-            seen[first + 4] = Y / Q
-        seen[first + 5] = wear
-        seen[first + 6] = s
+            outputs[first + 4] = Y / Q
+        outputs[first + 5] = wear
+        outputs[first + 6] = s
         off = v - u_off
         if (lift - LIFTED).real > off.real:
             off = lift - LIFTED
-        seen[first + 7] = off
+        outputs[first + 7] = off
         if off.real > worst.real:
             worst = off
     last = int(data[0]) * (n_w_out + n_parts * n_c_out)
@@ -323,6 +323,6 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, seen):
         wrench[0, 4] -= about * ay + momentum * (wz_ * ax - wx_ * az)
         wrench[0, 5] -= about * az + momentum * (wx_ * ay - wy_ * ax)
         energy += 0.5 * momentum * spin_rate
-    seen[last] = worst
-    seen[last + 1] = energy
-    seen[last + 2] = lost
+    outputs[last] = worst
+    outputs[last + 1] = energy
+    outputs[last + 2] = lost

@@ -20,7 +20,7 @@ from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.checked_values import number
 from floatframe.model.elements import POSITION, Element, ElementLaw, Placed
-from floatframe.model.shapes.drawn import Drawn
+from floatframe.model.shapes.drawn import MarkerShapes
 from floatframe.model.shapes.grounds import Track as DrawnTrack
 from floatframe.model.shapes.shape import Shape
 from floatframe.model.shapes.wheels import RailWheel
@@ -66,7 +66,7 @@ class Wheelset(Element):
         half = 0.5 * self.pair.running_circles
         return law_of_wheels(self, placed, (Wheel(1, half, self.pair), Wheel(-1, -half, self.pair)))
 
-    def drawn(self) -> tuple[Drawn, ...]:
+    def drawn(self) -> tuple[MarkerShapes, ...]:
         """Return the drawn wheels; the track belongs to the scene, where it is drawn once for all wheels."""
         half = 0.5 * self.pair.running_circles
         return tuple(wheel_shape(self.pair, side, side * half) for side in (1, -1))
@@ -106,7 +106,7 @@ class WheelOnRail(Element):
         """Return the law of the wheel."""
         return law_of_wheels(self, placed, (Wheel(SIDES[self.side], 0.0, self.pair),))
 
-    def drawn(self) -> tuple[Drawn, ...]:
+    def drawn(self) -> tuple[MarkerShapes, ...]:
         """Return the drawn wheel."""
         return (wheel_shape(self.pair, SIDES[self.side], 0.0),)
 
@@ -208,10 +208,10 @@ def nearest_frame(track: Track, point: Any) -> Any:
     return track.frame(s)
 
 
-def wheel_shape(pair: Pair, side: int, arm: float) -> Drawn:
+def wheel_shape(pair: Pair, side: int, arm: float) -> MarkerShapes:
     """Return the drawn shape of a wheel in the axes of the marker; the flange is on its inner side."""
     shape = RailWheel(pair.radius, flange_side=-side if pair.has_flange else 0)
-    return Drawn(Shape(shape, position=np.array([0.0, arm, 0.0])), 0)
+    return MarkerShapes(Shape(shape, position=np.array([0.0, arm, 0.0])), 0)
 
 
 def track_shape(

@@ -32,7 +32,7 @@ from floatframe.components.wheels.slip import direction, hold_tread, tread_slip
 from floatframe.components.wheels.tyre_fields import check_common, common_numbers
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.elements import Element, ElementLaw, Placed
-from floatframe.model.shapes import Arrow, Drawn
+from floatframe.model.shapes import Arrow, MarkerShapes
 
 __all__ = ["BrushTyre", "brush_law", "brush_law_at_rest"]
 
@@ -45,7 +45,7 @@ SLIP_STIFFNESS, HALF_LENGTH, LOAD, FRICTION, FLATTENING, RESISTANCE = range(COMM
 
 
 @njit(error_model="numpy")
-def brush_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def brush_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write wrenches, rates and outputs of a brush tyre.
 
     The contact length is 2a, a = a_0 sqrt(F_z/F_0), with the pressure q(s) = 3 F_z/(4a) (1 - s²/a²). Bristles of
@@ -92,15 +92,15 @@ def brush_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     energy, rising = zero, zero
     if is_down:
         energy, rising = 0.5 * data[STIFFNESS] * d * d, data[STIFFNESS] * d * rate
-    show(seen, F, M, (sigma_x, sigma_y, sine), (d, rho), (V_x, V_sx, V_y), point)
-    show_energy(seen, energy, -power - rising, left, zero)
+    show(outputs, F, M, (sigma_x, sigma_y, sine), (d, rho), (V_x, V_sx, V_y), point)
+    show_energy(outputs, energy, -power - rising, left, zero)
 
 
 @njit(error_model="numpy")
-def brush_law_at_rest(t, x, z, lam, data, wrench, z_dot, g, seen):
+def brush_law_at_rest(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write the same for a standing wheel, whose tread is deformed by the displacement of the wheel."""
-    brush_law(t, x, z, lam, data, wrench, z_dot, g, seen)
-    hold_tread(x, data, seen[10], z, z_dot)
+    brush_law(t, x, z, lam, data, wrench, z_dot, g, outputs)
+    hold_tread(x, data, outputs[10], z, z_dot)
 
 
 # brush tyre -----------------------------------------------------------------------------------------------------------
@@ -151,7 +151,7 @@ class BrushTyre(Element):
         """Return the tyre of [elements.NAME]."""
         return tyre_of_table(name, table, read, cls)
 
-    def drawn(self) -> tuple[Drawn | Arrow, ...]:
+    def drawn(self) -> tuple[MarkerShapes | Arrow, ...]:
         """Return the drawn wheel, road and force."""
         return tyre_looks(self.radius, self.axis, self.road)
 

@@ -32,7 +32,7 @@ from floatframe.components.wheels.slip import direction, hold_tread, tread_slip
 from floatframe.components.wheels.tyre_fields import check_common, common_numbers
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.elements import Element, ElementLaw, Placed
-from floatframe.model.shapes import Arrow, Drawn
+from floatframe.model.shapes import Arrow, MarkerShapes
 
 __all__ = ["LinearTyre", "linear_law", "linear_law_at_rest"]
 
@@ -44,7 +44,7 @@ C_X, C_Y, C_GAMMA, TRAIL, FRICTION, FLATTENING, RESISTANCE = range(COMMON, COMMO
 
 
 @njit(error_model="numpy")
-def linear_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def linear_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write wrenches, rates and outputs of a linear tyre.
 
     (1) contact; normal force F_z from k d; V_sx = V_x - R_e Omega, R_e = R_0 - q d
@@ -88,15 +88,15 @@ def linear_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     if data[SIGMA_Y] > 0.0:
         energy += 0.5 * data[C_Y] / data[SIGMA_Y] * z[k] * z[k]
         rising += data[C_Y] / data[SIGMA_Y] * z[k] * z_dot[k]
-    show(seen, F, M, (kappa, tangent, sine), (d, rho), (V_x, V_sx, V_y), point)
-    show_energy(seen, energy, -power - rising, left, zero)
+    show(outputs, F, M, (kappa, tangent, sine), (d, rho), (V_x, V_sx, V_y), point)
+    show_energy(outputs, energy, -power - rising, left, zero)
 
 
 @njit(error_model="numpy")
-def linear_law_at_rest(t, x, z, lam, data, wrench, z_dot, g, seen):
+def linear_law_at_rest(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write the same for a standing wheel, whose tread is deformed by the displacement of the wheel."""
-    linear_law(t, x, z, lam, data, wrench, z_dot, g, seen)
-    hold_tread(x, data, seen[10], z, z_dot)
+    linear_law(t, x, z, lam, data, wrench, z_dot, g, outputs)
+    hold_tread(x, data, outputs[10], z, z_dot)
 
 
 # linear tyre ----------------------------------------------------------------------------------------------------------
@@ -147,7 +147,7 @@ class LinearTyre(Element):
         """Return the tyre of [elements.NAME]."""
         return tyre_of_table(name, table, read, cls)
 
-    def drawn(self) -> tuple[Drawn | Arrow, ...]:
+    def drawn(self) -> tuple[MarkerShapes | Arrow, ...]:
         """Return the drawn wheel, road and force."""
         return tyre_looks(self.radius, self.axis, self.road)
 

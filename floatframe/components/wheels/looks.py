@@ -4,7 +4,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.components.wheels.roads.road import GridRoad, Road
-from floatframe.model.shapes import Arrow, Drawn, Plane, Shape, Terrain, Wheel
+from floatframe.model.shapes import Arrow, MarkerShapes, Plane, Shape, Terrain, Wheel
 
 __all__ = ["tyre_looks"]
 
@@ -15,7 +15,7 @@ MOST_KNOTS = 3000  #: largest number of knots of a drawn road
 
 def tyre_looks(
     radius: float, axis: Array, road: Road, *, width: float | None = None, is_in_metres: bool = False
-) -> tuple[Drawn | Arrow, ...]:
+) -> tuple[MarkerShapes | Arrow, ...]:
     """Return the shapes of the wheel (unless its body has shapes of its own), the road and the force.
 
     Parameters
@@ -31,8 +31,8 @@ def tyre_looks(
     """
     wheel = Shape(Wheel(radius, width or WIDTH * radius, axis=axis))
     return (
-        Drawn(wheel, marker=1, is_default=True, is_in_metres=is_in_metres),
-        Drawn(Shape(ground(road)), marker=0),
+        MarkerShapes(wheel, marker=1, is_default=True, is_in_metres=is_in_metres),
+        MarkerShapes(Shape(ground(road)), marker=0),
         Arrow(None, marker=1, at=("px", "py", "pz")),
     )
 

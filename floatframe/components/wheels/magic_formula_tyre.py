@@ -81,7 +81,7 @@ from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.checked_values import number, unit_vector
 from floatframe.model.elements import Element, ElementLaw, Placed
-from floatframe.model.shapes import Arrow, Drawn
+from floatframe.model.shapes import Arrow, MarkerShapes
 
 __all__ = ["MagicFormulaTyre", "magic_formula_law", "magic_formula_law_at_rest"]
 
@@ -128,7 +128,7 @@ def relaxation(data, df, load, K_x, K_y, gamma):
 
 
 @njit(error_model="numpy")
-def magic_formula_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def magic_formula_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write wrenches, rates and outputs of a tyre with the Magic Formula.
 
     (1) contact; R_free = R_0 (q_re0 + q_V1 (R_0 Omega/V_0)²), deflection d = R_free - rho
@@ -184,15 +184,15 @@ def magic_formula_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     if is_down:
         energy = (1.0 + data[PFZ1] * data[DP]) * (data[QFZ1] / 2.0 + data[QFZ2] * q / 3.0) * q * d * F_0
         rising = spring * rate
-    show(seen, F, M, (kappa, tangent, sine), (d, rho), (V_x, V_sx, V_y), point)
-    show_energy(seen, energy, -power - rising, left, clamped + zero)
+    show(outputs, F, M, (kappa, tangent, sine), (d, rho), (V_x, V_sx, V_y), point)
+    show_energy(outputs, energy, -power - rising, left, clamped + zero)
 
 
 @njit(error_model="numpy")
-def magic_formula_law_at_rest(t, x, z, lam, data, wrench, z_dot, g, seen):
+def magic_formula_law_at_rest(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write the same for a standing wheel, whose tread is deformed by the displacement of the wheel."""
-    magic_formula_law(t, x, z, lam, data, wrench, z_dot, g, seen)
-    hold_tread(x, data, seen[10], z, z_dot)
+    magic_formula_law(t, x, z, lam, data, wrench, z_dot, g, outputs)
+    hold_tread(x, data, outputs[10], z, z_dot)
 
 
 # magic formula tyre ---------------------------------------------------------------------------------------------------
@@ -291,7 +291,7 @@ class MagicFormulaTyre(Element):
         values = dict(table)
         return tyre_of_table(name, values, read, cls, tyre=properties_of_table(values, read))
 
-    def drawn(self) -> tuple[Drawn | Arrow, ...]:
+    def drawn(self) -> tuple[MarkerShapes | Arrow, ...]:
         """Return the drawn wheel, road and force."""
         return tyre_looks(self.tyre.radius, self.axis, self.road, width=self.tyre.width, is_in_metres=True)
 

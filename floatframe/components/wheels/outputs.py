@@ -15,25 +15,25 @@ OUTPUTS = {
 
 
 @register_jitable(error_model="numpy")
-def show(seen, F, M, slips, shape, speeds, point):
+def show(outputs, F, M, slips, shape, speeds, point):
     """Write forces, moments, slips (kappa, tan alpha, sin gamma), deflection, loaded radius, velocities and point."""
     for k in range(3):
-        seen[k] = F[k]
-        seen[3 + k] = M[k]
-        seen[11 + k] = speeds[k]
-        seen[14 + k] = point[k]
-    seen[6] = slips[0]
-    seen[7] = np.arctan(slips[1])
-    seen[8] = np.arctan(slips[2] / np.sqrt(1.0 - slips[2] * slips[2] + 1e-24))
-    seen[9] = shape[0]
-    seen[10] = shape[1]
+        outputs[k] = F[k]
+        outputs[3 + k] = M[k]
+        outputs[11 + k] = speeds[k]
+        outputs[14 + k] = point[k]
+    outputs[6] = slips[0]
+    outputs[7] = np.arctan(slips[1])
+    outputs[8] = np.arctan(slips[2] / np.sqrt(1.0 - slips[2] * slips[2] + 1e-24))
+    outputs[9] = shape[0]
+    outputs[10] = shape[1]
 
 
 @register_jitable(error_model="numpy")
-def show_energy(seen, energy, lost, left, clamped):
+def show_energy(outputs, energy, lost, left, clamped):
     """Write the energy stored, the power lost, the length of road left and the number of clamped inputs."""
-    seen[17] = energy
-    seen[18] = lost
-    seen[19] = left
-    seen[20] = clamped
-    seen[21] = -left
+    outputs[17] = energy
+    outputs[18] = lost
+    outputs[19] = left
+    outputs[20] = clamped
+    outputs[21] = -left

@@ -24,7 +24,7 @@ from floatframe.results.sensors import EnergySensor, MomentumSensor, Sensor, mea
 from floatframe.results.trajectory import Trajectory
 from floatframe.simulation.integration import joint_rows
 
-__all__ = ["Column", "Take", "Wanted", "columns_of", "moved", "values_at", "wanted_of", "weights_of"]
+__all__ = ["Column", "OutputRequest", "Take", "columns_of", "moved", "values_at", "wanted_of", "weights_of"]
 
 #: what is taken of values over time, (n_t,): a key of `TAKES`, or a function that returns a number and its derivatives
 Take = str | Callable[[Array], tuple[float, Array]]
@@ -33,7 +33,7 @@ OF_THE_WAY = ("work", "dissipated", "balance")  #: energies that are sums over t
 
 
 @dataclass(frozen=True)
-class Wanted:
+class OutputRequest:
     """An output by name."""
 
     name: str
@@ -49,7 +49,7 @@ class Column:
     column: str
 
 
-def wanted_of(outputs: Sequence[str] | Mapping[str, str | tuple[str, Take]]) -> tuple[Wanted, ...]:
+def wanted_of(outputs: Sequence[str] | Mapping[str, str | tuple[str, Take]]) -> tuple[OutputRequest, ...]:
     """Return outputs as they are given: "tip x" (its last value), or by name, with what is taken of the values."""
     if isinstance(outputs, str):
         raise ModelError(f"sensitivities: outputs: expected a list of sensor columns, got the text {outputs!r}")
@@ -61,11 +61,11 @@ def wanted_of(outputs: Sequence[str] | Mapping[str, str | tuple[str, Take]]) -> 
         of, take = (given, "last") if isinstance(given, str) else given
         if not callable(take) and take not in TAKES:
             raise ModelError(f"sensitivities: output {name!r}: no way to take {quoted(take)}{nearest(take, TAKES)}")
-        found.append(Wanted(name, of, take))
+        found.append(OutputRequest(name, of, take))
     return tuple(found)
 
 
-def columns_of(system: System, wanted: tuple[Wanted, ...]) -> tuple[Column, ...]:
+def columns_of(system: System, wanted: tuple[OutputRequest, ...]) -> tuple[Column, ...]:
     """Return the columns of outputs; `ModelError` with the nearest name if there is no such sensor."""
     coordinates = [f"{joint.name}.{name}" for joint in system.joints for name in joint.coordinates]
     sensors = [*(sensor.name for sensor in system.sensors), *coordinates]

@@ -28,8 +28,8 @@ from floatframe.design.gradients.eigenvalues import (
 )
 from floatframe.design.gradients.outputs import (
     Column,
+    OutputRequest,
     Take,
-    Wanted,
     columns_of,
     moved,
     values_at,
@@ -272,7 +272,7 @@ def require_smooth_run(family: Family, t_start: float, h: float, n_steps: int) -
 
 
 def of_motion(
-    family: Family, own: Neighbour, wanted: tuple[Wanted, ...], columns: tuple[Column, ...], method: str,
+    family: Family, own: Neighbour, wanted: tuple[OutputRequest, ...], columns: tuple[Column, ...], method: str,
     scheme: GeneralizedAlpha, times: tuple[float, float, int], state: State | None,
 ) -> Sensitivities:  # fmt: skip
     """Return the derivatives of a motion."""
@@ -306,7 +306,7 @@ def of_motion(
 
 
 def require_columns_of_states(
-    own: Neighbour, wanted: tuple[Wanted, ...], columns: tuple[Column, ...], points: Sequence[Point]
+    own: Neighbour, wanted: tuple[OutputRequest, ...], columns: tuple[Column, ...], points: Sequence[Point]
 ) -> None:
     """Raise `ModelError` if a column is not a function of the state at its time alone, as a spectrum is not."""
     beside, alone = values_at(own, columns, points[-2:])[0][-1], values_at(own, columns, points[-1:])[0][0]
@@ -319,7 +319,7 @@ def require_columns_of_states(
 
 
 def made(
-    family: Family, wanted: tuple[Wanted, ...], values: Array, gradient: Array, units: list[str],
+    family: Family, wanted: tuple[OutputRequest, ...], values: Array, gradient: Array, units: list[str],
     repeated: tuple[str, ...] = (),
 ) -> Sensitivities:  # fmt: skip
     """Return the result with its names."""
@@ -390,7 +390,7 @@ def modal_size(own: Neighbour, point: Point) -> float:
 
 
 def of_equilibrium(
-    family: Family, own: Neighbour, wanted: tuple[Wanted, ...], columns: tuple[Column, ...], method: str
+    family: Family, own: Neighbour, wanted: tuple[OutputRequest, ...], columns: tuple[Column, ...], method: str
 ) -> Sensitivities:
     """Return the derivatives of the equilibrium at rest."""
     point, group, matrix, by_p = balanced(family, own)
@@ -408,7 +408,7 @@ def of_equilibrium(
 
 
 def of_rotation(
-    family: Family, own: Neighbour, wanted: tuple[Wanted, ...], columns: tuple[Column, ...], method: str,
+    family: Family, own: Neighbour, wanted: tuple[OutputRequest, ...], columns: tuple[Column, ...], method: str,
     steady: SteadyRotation,
 ) -> Sensitivities:  # fmt: skip
     """Return the derivatives of a steady rotation; `ModelError` if an output depends on how far it has turned."""
@@ -438,7 +438,7 @@ def balanced(family: Family, own: Neighbour) -> tuple[Point, Configurations, Arr
     return point, Configurations(np.array(model.bodies.n_q)), matrix, parameter_residuals(family.parameters, [point])[0]
 
 
-def of_modes(family: Family, own: Neighbour, wanted: tuple[Wanted, ...]) -> Sensitivities:
+def of_modes(family: Family, own: Neighbour, wanted: tuple[OutputRequest, ...]) -> Sensitivities:
     """Return the derivatives of frequencies, damping ratios and eigenvalues about the equilibrium at rest."""
     point, group, matrix, by_p = balanced(family, own)
     changes = equilibrium_columns(matrix, by_p)
@@ -467,7 +467,7 @@ def of_modes(family: Family, own: Neighbour, wanted: tuple[Wanted, ...]) -> Sens
     return made(family, wanted, np.array(values), np.array(gradient), units, tuple(repeated))
 
 
-def part_and_mode(wanted: Wanted, n_modes: int) -> tuple[str, int]:
+def part_and_mode(wanted: OutputRequest, n_modes: int) -> tuple[str, int]:
     """Return what of which mode an output is."""
     part, _, digits = wanted.of.partition(" ")
     if part not in OF_MODES or not digits.isdigit() or int(digits) < 1:

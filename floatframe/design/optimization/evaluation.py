@@ -19,7 +19,7 @@ from floatframe.analyses.linear.frequency_response import resolved_frequencies
 from floatframe.analyses.linear.linearization import LinearSystem, linearize
 from floatframe.analyses.linear.system_modes import system_modes
 from floatframe.design.optimization.design import Design, Quantity
-from floatframe.design.studies.study import StudyPoint, column_of, taken, taken_of_modes
+from floatframe.design.studies.study import StudyPoint, column_of, output_value, output_value_of_modes
 from floatframe.errors import ModelError, ResultsError
 from floatframe.model.system import System
 from floatframe.results.trajectory import Trajectory
@@ -146,7 +146,7 @@ class EvaluationFunction:
         numbers: list[tuple[float, ...]] = []
         for q in design.quantities:
             if q.analysis == "eig":
-                numbers.append((taken_of_modes(q.output, found["eig"], per_second)[0],))
+                numbers.append((output_value_of_modes(q.output, found["eig"], per_second)[0],))
             elif q.analysis == "response":
                 numbers.append((response_number(q, found["response"], per_second),))
             else:
@@ -166,7 +166,7 @@ class EvaluationFunction:
 def numbers_of(quantity: Quantity, system: System, motion: Trajectory) -> tuple[float, ...]:
     """Return the number of a quantity, or its values at the times of its table."""
     if quantity.times is None:
-        return (taken(quantity.output, system, motion)[0],)
+        return (output_value(quantity.output, system, motion)[0],)
     values, _ = column_of(quantity.output, system, motion)
     t, wanted = np.asarray(motion.t), quantity.times
     slack = 1e-9 * max(abs(t[-1]), abs(t[0]))

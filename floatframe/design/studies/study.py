@@ -256,7 +256,7 @@ def check(study: Study, point: tuple[Any, ...]) -> None:
     except Exception:  # a failure caused by this point is a row, if the unchanged file does not fail
         system, placed = plain, as_placed(plain)
     for output in study.outputs:
-        taken(output, system, placed)
+        output_value(output, system, placed)
 
 
 def as_placed(system: System) -> Trajectory:
@@ -288,10 +288,10 @@ class StudyPoint:
         system, given = read_system(self.study.system, self.study.changes(point))
         if self.study.analysis == "eig":
             modes = system_modes(linearize(system, formulation=formulation_of(given)))
-            found = [taken_of_modes(output, modes, 1 / system.units.time) for output in self.study.outputs]
+            found = [output_value_of_modes(output, modes, 1 / system.units.time) for output in self.study.outputs]
         else:
             motion = self.motion(system, given)
-            found = [taken(output, system, motion) for output in self.study.outputs]
+            found = [output_value(output, system, motion) for output in self.study.outputs]
         return StudyRow(point, tuple(value for value, _ in found), tuple(unit for _, unit in found))
 
     def failed(self, point: tuple[Any, ...], error: Exception) -> StudyRow:
@@ -327,7 +327,7 @@ MOTIONS: dict[str, Callable[[System, RunOptions], Trajectory]] = {
 }
 
 
-def taken(output: Output, system: System, motion: Trajectory) -> tuple[float, str]:
+def output_value(output: Output, system: System, motion: Trajectory) -> tuple[float, str]:
     """Return the value of an output and its unit; `ModelError` with the choices if there is no such column."""
     values, unit = column_of(output, system, motion)
     return float(TAKES[output.take](values)), unit
@@ -354,7 +354,7 @@ def column_of(output: Output, system: System, motion: Trajectory) -> tuple[Array
     return measurement.columns[column], measurement.units[column]
 
 
-def taken_of_modes(output: Output, modes: SystemModes, per_second: float) -> tuple[float, str]:
+def output_value_of_modes(output: Output, modes: SystemModes, per_second: float) -> tuple[float, str]:
     """Return the value of an output of the modes about the equilibrium, and its unit."""
     part, which = mode_and_part(output)
     k = which if isinstance(which, int) else 1

@@ -61,7 +61,7 @@ ROUNDING = 1.0 + 1e-9  #: of everything upwards
 ROUNDS = 6  #: of the iteration for C
 BINS, LEVELS = 2000, 1500  #: of rho and of lam
 FLOOR = 1e-9  #: least standard deviation over the largest that C is given
-AT_ONCE = 20_000  #: nodes
+CHUNK_SIZE = 20_000  #: nodes
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,8 +111,8 @@ def stress_bounds(stress: Array, found: Envelope, criterion: Criterion) -> tuple
     """Return lam of (1) and the sum of (3) for stress shapes (n, 6, n_q), each times c, (n,) [Pa]."""
     A, c = criterion.norm_root(), criterion.bound_factor
     lam, total = np.zeros(len(stress)), np.zeros(len(stress))
-    for first in range(0, len(stress), AT_ONCE):
-        part = slice(first, first + AT_ONCE)
+    for first in range(0, len(stress), CHUNK_SIZE):
+        part = slice(first, first + CHUNK_SIZE)
         rows = A @ np.asarray(stress[part])
         lam[part] = largest_size(rows @ found.L)
         total[part] = np.linalg.norm(rows, axis=1) @ found.largest_q

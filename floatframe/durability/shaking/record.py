@@ -14,12 +14,12 @@ from floatframe.durability.shaking.loads.sine import SineRun
 from floatframe.durability.shaking.shake import ShakeResult
 from floatframe.durability.shaking.structure.model import Output, ShakenModel
 
-__all__ = ["COLUMNS", "NOTHING", "conversions", "in_tables", "shake_csv", "shake_record", "table_rows", "worst_nodes"]
+__all__ = ["COLUMNS", "ROUNDING", "conversions", "in_tables", "shake_csv", "shake_record", "table_rows", "worst_nodes"]
 
 FEW = 50  #: numbers in a row, beyond which it is a curve
 DIGITS = 7  #: of the numbers of a curve
 
-NOTHING = 1e-9  #: of the largest output of a kind, below which a value is rounding
+ROUNDING = 1e-9  #: of the largest output of a kind, below which a value is rounding
 COLUMNS = (
     "test",
     "kind",
@@ -332,7 +332,7 @@ def told(outputs: tuple[Output, ...], values: Array) -> list[int]:
     largest: dict[str, float] = {}
     for output, value in zip(outputs, values, strict=True):
         largest[output.kind] = max(largest.get(output.kind, 0.0), float(value))
-    return [k for k, (o, v) in enumerate(zip(outputs, values, strict=True)) if v > NOTHING * largest[o.kind]]
+    return [k for k, (o, v) in enumerate(zip(outputs, values, strict=True)) if v > ROUNDING * largest[o.kind]]
 
 
 def shake_csv(result: ShakeResult) -> str:

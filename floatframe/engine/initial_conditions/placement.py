@@ -17,7 +17,7 @@ __all__ = ["require_placed_near"]
 
 log = logging.getLogger(__name__)
 
-TOLD = 0.1  #: of the size of a body: a way that is told
+REPORTED = 0.1  #: of the size of a body: a way that is told
 REFUSED = 3.0  #: of the size of the largest body: a way that is no placement of it
 
 
@@ -37,7 +37,7 @@ def require_placed_near(compiled: CompiledSystem, placed: State, closed: State) 
     size = body_sizes(compiled)
     is_driven = bool((compiled.model.rows.motion >= 0).any())
     i = int(np.argmax(way / size))
-    if way[i] <= TOLD * size[i]:
+    if way[i] <= REPORTED * size[i]:
         return
     words = (
         f"body {compiled.body_names[i]!r} was placed {way[i]:.3g} from where its joints hold it, "

@@ -16,7 +16,7 @@ __all__ = ["RawTable", "read_csv"]
 DELIMITERS = (";", "\t", "|", ",", " ")
 LOOKED_AT = 50  #: lines by which delimiter and decimal sign are judged
 MOST_HEAD = 100  #: lines before the first number
-NOTHING = {"", "nan", "NaN", "NAN", "null", "NULL", "-", "n/a", "N/A", "#N/A"}  #: fields without a number
+EMPTY_FIELDS = {"", "nan", "NaN", "NAN", "null", "NULL", "-", "n/a", "N/A", "#N/A"}  #: fields without a number
 POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
 COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eEdD][+-]?\d+)?")
 UNIT_AT_END = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\]|\(([^()]*(?:\([^()]*\)[^()]*)*)\))\s*")
@@ -151,7 +151,7 @@ def is_numeric(fields: list[str], decimal: str) -> bool:
     """Whether all fields are numbers or empty, and one is a number."""
     pattern = COMMA if decimal == "," else POINT
     known = [pattern.fullmatch(field) is not None for field in fields]
-    return any(known) and all(ok or field in NOTHING for ok, field in zip(known, fields, strict=True))
+    return any(known) and all(ok or field in EMPTY_FIELDS for ok, field in zip(known, fields, strict=True))
 
 
 def head_of(lines: list[tuple[int, list[str]]], width: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -200,7 +200,7 @@ def numbers_of(path: Path, split: list[tuple[int, list[str]]], width: int, decim
 
 def number_or_nan(path: Path, field: str, line: int, column: int) -> float:
     """Return a number, NaN for an empty field; `SignalError` for other text."""
-    if field in NOTHING:
+    if field in EMPTY_FIELDS:
         return np.nan
     try:
         return float(field.replace("d", "e").replace("D", "e"))

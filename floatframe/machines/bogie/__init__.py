@@ -3,8 +3,8 @@
 from floatframe.machines.bogie.curves_and_comfort import circle, in_circle, weighted_rms
 from floatframe.machines.bogie.frame import frame_files
 from floatframe.machines.bogie.running import (
-    Falling,
     Hunting,
+    SpeedSweep,
     critical_speed,
     falling_speed,
     hunting,
@@ -15,9 +15,9 @@ from floatframe.machines.bogie.vehicle import RailVehicle, flexible_frames, vehi
 from floatframe.machines.bogie.write_files import bogie_files
 
 __all__ = [
-    "Falling",
     "Hunting",
     "RailVehicle",
+    "SpeedSweep",
     "bogie_files",
     "circle",
     "critical_speed",

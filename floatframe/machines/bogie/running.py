@@ -19,8 +19,8 @@ from floatframe.model.system import System
 from floatframe.simulation.integration import integrate
 
 __all__ = [
-    "Falling",
     "Hunting",
+    "SpeedSweep",
     "critical_speed",
     "falling_speed",
     "hunting",
@@ -142,7 +142,7 @@ def critical_speed(
     return 0.5 * (low + high)
 
 
-def blown(system: System, kick: float) -> System:
+def with_lateral_kick(system: System, kick: float) -> System:
     """Return a vehicle on straight track with an initial lateral velocity of all axles [m/s]."""
     bodies = [
         replace(each, velocity=np.array([float(np.asarray(each.velocity)[0]), kick, 0.0]))
@@ -153,7 +153,7 @@ def blown(system: System, kick: float) -> System:
     return replace(system, bodies=bodies)
 
 
-class Falling(NamedTuple):
+class SpeedSweep(NamedTuple):
     """Hunting of a vehicle with decreasing speed."""
 
     speed: Array  #: (n,) [m/s]
@@ -170,7 +170,7 @@ def falling_speed(
     window: float = 1.0,
     h: float = 2e-3,
     kick: float = 0.02,
-) -> Falling:
+) -> SpeedSweep:
     """Return the amplitude of hunting with decreasing speed: the stable branch of limit cycles down to its end.
 
     All bodies are braked by forces equal to their mass times the deceleration, so that no creep force brakes; only the
@@ -193,7 +193,7 @@ def falling_speed(
     kick
         Lateral velocity of all axles at the start [m/s].
     """
-    begin, bodies = float(np.asarray(system.bodies[0].velocity)[0]), blown(system, kick).bodies
+    begin, bodies = float(np.asarray(system.bodies[0].velocity)[0]), with_lateral_kick(system, kick).bodies
     brakes = [
         PointForce(f"brake_{each.name}", Marker(each.name), force=np.array([-deceleration * each.mass, 0.0, 0.0]))
         for each in system.bodies
@@ -204,7 +204,7 @@ def falling_speed(
     y, t = motion.body(axle).r[:, 1], motion.t
     n = max(2, round(window / float(t[1] - t[0])))
     rows = [slice(i, i + n) for i in range(0, len(t) - n + 1, n)]
-    return Falling(
+    return SpeedSweep(
         np.array([begin - deceleration * float(t[row].mean()) for row in rows]),
         np.array([0.5 * float(np.ptp(y[row])) for row in rows]),
         np.array([float(y[row].mean()) for row in rows]),

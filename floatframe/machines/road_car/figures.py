@@ -16,7 +16,7 @@ from floatframe.model.system import System
 from floatframe.results.element_motion import element_motion
 from floatframe.results.trajectory import Trajectory
 
-__all__ = ["CarMass", "Driven", "SteadyTurn", "body_twist_stiffness", "car_mass", "driven", "steady_turn"]
+__all__ = ["CarMass", "CarMotion", "SteadyTurn", "body_twist_stiffness", "car_mass", "driven", "steady_turn"]
 
 
 # a steady turn of the car from four wheels, the linkage and the springs, as an independent check ----------------------
@@ -153,7 +153,7 @@ def steady_turn(car: RoadCar, mass: CarMass, tyre: Tyre, speed: float, rack: flo
 
 
 @dataclass(frozen=True, eq=False)
-class Driven:
+class CarMotion:
     """Motion of the car over time, measured at its cockpit."""
 
     t: Array  #: (n_t,) [s]
@@ -168,7 +168,7 @@ class Driven:
     error: Array  #: of the path, (n_t,) [m]; none without a driver, (0,)
 
 
-def driven(system: System, motion: Trajectory) -> Driven:
+def driven(system: System, motion: Trajectory) -> CarMotion:
     """Return the quantities of a motion of the car."""
     seen = element_motion(system, motion, "seen").outputs
     names = [element.name for element in system.elements]
@@ -178,7 +178,7 @@ def driven(system: System, motion: Trajectory) -> Driven:
         lines = [circuit[f"pressure line_{side}"] for side in ("left", "right")]
     vx, vy = (np.gradient(seen[key], motion.t) for key in ("x", "y"))
     a_x, a_y = np.gradient(vx, motion.t), np.gradient(vy, motion.t)
-    return Driven(
+    return CarMotion(
         t=motion.t,
         place=np.stack([seen["x"], seen["y"]], axis=1),
         speed=seen["speed"],

@@ -2,13 +2,13 @@
 
 The function of a law, with n markers, n_z states and n_lam multipliers,
 
-    function(t, x, z, lam, data, wrench, z_dot, g, seen)
+    function(t, x, z, lam, data, wrench, z_dot, g, outputs)
 
 reads the time t; x, (n, 18), with the position (3), axes (9, row by row: A[i, j] = x[3 + 3 i + j], with the axes as
 columns), velocity (3) and angular velocity (3) of each marker, all in ground axes; the states z; the multipliers lam;
 and the numbers `data` of the element. It writes wrench, (n, 6), the force and the moment about the marker's origin on
-the body of each marker, in ground axes; z_dot, (n_z,); g, (n_lam,), which is to be zero; and seen, (n_outputs,), the
-outputs. All output arrays are zero before the call.
+the body of each marker, in ground axes; z_dot, (n_z,); g, (n_lam,), which is to be zero; and outputs,
+(n_outputs,). All output arrays are zero before the call.
 
 Compiled with `numba.njit`, the function runs at the speed of the kernels; a Python function is slow. It must depend
 only on its arguments, because it is called several times per step, also for motions that are discarded.
@@ -28,7 +28,7 @@ from floatframe.errors import ModelError
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.checked_values import array_of_shape, number
 from floatframe.model.joints.rows import NOTHING, POSITION, VELOCITY
-from floatframe.model.shapes.drawn import Arrow, Drawn, Stretched
+from floatframe.model.shapes.drawn import Arrow, MarkerShapes, Stretched
 
 __all__ = [
     "ACTS", "NOTHING", "POSITION", "TANGENTS", "VELOCITY", "Element", "ElementLaw", "GapSpring", "Placed", "markers_of",
@@ -226,7 +226,7 @@ class Element:
         """
         return None
 
-    def drawn(self) -> Sequence[Drawn | Stretched | Arrow]:
+    def drawn(self) -> Sequence[MarkerShapes | Stretched | Arrow]:
         """Return the shapes, fixed to its markers, by which it is drawn in films and pages; by default none."""
         return ()
 

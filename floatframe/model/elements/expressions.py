@@ -226,7 +226,7 @@ def write_quantities(x, m, out, o):
 
 
 @njit
-def expression_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def expression_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Evaluate all expressions; data: largest number of operations, number of terms, tape indices (or -1), tapes."""
     n, n_z, n_terms = x.shape[0], z.shape[0], int(data[1])
     n_inputs = 1 + 12 * (n - 1) + n_z
@@ -258,8 +258,8 @@ def expression_law(t, x, z, lam, data, wrench, z_dot, g, seen):
             wrench[0, 3 + k] -= arm
     for k in range(n_z):
         z_dot[k] = tape_at(data, int(data[at + k]), inputs, results)
-    for k in range(seen.shape[0]):
-        seen[k] = tape_at(data, int(data[at + n_z + k]), inputs, results)
+    for k in range(outputs.shape[0]):
+        outputs[k] = tape_at(data, int(data[at + n_z + k]), inputs, results)
 
 
 @frozen_copies

@@ -57,7 +57,7 @@ def times_off(events: Sequence[Any], happened: Sequence[Mapping[str, Any]], t: A
 
 
 @njit
-def still(t, x, z, lam, data, wrench, z_dot, g, seen):
+def still(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write the outputs of an element that does nothing."""
     for k in range(lam.shape[0]):
         g[k] = lam[k]

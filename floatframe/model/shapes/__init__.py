@@ -3,11 +3,11 @@
 A *geometry* (box, cylinder, wheel, road, ...) has its own axes and returns `Piece`s: triangles and lines of one colour.
 A `Shape` is a geometry with a position, a colour and, on a flexible body, the interface that carries it. Bodies carry
 shapes (`RigidBody(shapes=...)`, `FlexibleBody(shapes=...)`), and a system has surroundings (`System(scene=...)`).
-`Element.drawn()` returns `Drawn`, `Stretched` and `Arrow`, which follow the markers of the element. Shapes do not
-affect the motion.
+`Element.drawn()` returns `MarkerShapes`, `Stretched` and `Arrow`, which follow the markers of the element. Shapes do
+not affect the motion.
 """
 
-from floatframe.model.shapes.drawn import Arrow, Drawn, Stretched
+from floatframe.model.shapes.drawn import Arrow, MarkerShapes, Stretched
 from floatframe.model.shapes.grounds import Plane, Road, Terrain, Track
 from floatframe.model.shapes.line import Line
 from floatframe.model.shapes.mesh import Mesh
@@ -23,10 +23,10 @@ __all__ = [
     "Arrow",
     "Box",
     "Cylinder",
-    "Drawn",
     "Extrusion",
     "Geometry",
     "Line",
+    "MarkerShapes",
     "Mesh",
     "Piece",
     "Plane",

@@ -15,7 +15,7 @@ from floatframe.model.shapes.rounds import revolved
 from floatframe.model.shapes.shape import Shape, color_of
 from floatframe.model.shapes.sweeps import carried_axes, swept
 
-__all__ = ["STRETCHED", "Arrow", "Drawn", "Stretched", "StretchedPiece"]
+__all__ = ["STRETCHED", "Arrow", "MarkerShapes", "Stretched", "StretchedPiece"]
 
 Z = np.array([0.0, 0.0, 1.0])
 SPRING, OUTER, INNER = "#2a7f62", "#5d6f80", "#b9c3cc"
@@ -24,7 +24,7 @@ STRETCH, FIRST, SECOND = "stretch", "first", "second"  #: how a part follows its
 
 
 @dataclass(frozen=True, eq=False)
-class Drawn:
+class MarkerShapes:
     """A shape in the axes of a marker of the element, or in ground axes."""
 
     shape: Shape

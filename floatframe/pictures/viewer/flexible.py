@@ -22,7 +22,7 @@ __all__ = ["FlexibleSurface", "flexible_surface", "nodes_within"]
 
 MOVES, STRESSES = 1e-5, 1e-3  #: shares of the largest displacement and stress below which a mode is left out
 FEWEST, MOST = 300, 20_000  #: nodes shown of a body
-AT_ONCE = 2_000_000  #: numbers of displacement held at a time
+CHUNK_SIZE = 2_000_000  #: numbers of displacement held at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +97,7 @@ def largest_displacement(shapes: Array, amplitudes: Array) -> float:
     """Return the largest displacement of a node in any row [m]."""
     n_a, n = shapes.shape[:2]
     flat, largest = shapes.reshape(n_a, 3 * n), 0.0
-    at_once = max(1, AT_ONCE // max(3 * n, 1))
+    at_once = max(1, CHUNK_SIZE // max(3 * n, 1))
     for first in range(0, len(amplitudes), at_once):
         d = (amplitudes[first : first + at_once] @ flat).reshape(-1, n, 3)
         largest = max(largest, float(np.einsum("tna,tna->tn", d, d).max(initial=0.0)))

@@ -16,7 +16,7 @@ from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.bodies.rigid_body import RigidBody
 from floatframe.model.elements.element import Element, markers_of
 from floatframe.model.rotations import rotation_exp, rotation_matrix
-from floatframe.model.shapes import Arrow, Drawn, Piece, Plane, Stretched
+from floatframe.model.shapes import Arrow, MarkerShapes, Piece, Plane, Stretched
 from floatframe.model.system import System
 from floatframe.pictures.animation import diagonal, rotations, up_of
 from floatframe.pictures.body_colors import BODY_COLORS
@@ -56,7 +56,7 @@ def element_cast(cast: Cast, element: Element) -> None:
     ends = [carriers.of_marker(marker, find_marker(system, where, marker)) for marker in markers_of(element)]
     motion = None
     for each in shown:
-        if isinstance(each, Drawn):
+        if isinstance(each, MarkerShapes):
             carrier = GROUND_CARRIER if each.marker is None else ends[each.marker]
             drawn_cast(cast, each, carrier, system.units.length)
         elif isinstance(each, Stretched):
@@ -69,7 +69,7 @@ def element_cast(cast: Cast, element: Element) -> None:
             cast.forces.append(element_force(cast, element.name, each, ends[each.marker], motion))
 
 
-def drawn_cast(cast: Cast, drawn: Drawn, carrier: int, metres: float) -> None:
+def drawn_cast(cast: Cast, drawn: MarkerShapes, carrier: int, metres: float) -> None:
     """Add a shape on a carrier; one that stands on the ground once, though several elements show it."""
     found = cast.carriers.found[carrier]
     if found.body < 0 and isinstance(drawn.shape.geometry, Plane):

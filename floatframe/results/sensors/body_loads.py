@@ -32,7 +32,7 @@ from floatframe.results.trajectory import Trajectory
 __all__ = ["INTERFACE_AXES", "InterfaceForceSensor", "RecoverySensor", "SpringSensor"]
 
 INTERFACE_AXES = ("ground", "body")
-NOTHING = 1e-12  #: relative to the largest wrench; smaller values are rounding errors
+ROUNDING = 1e-12  #: relative to the largest wrench; smaller values are rounding errors
 
 
 def interface_loads(system: System, trajectory: Trajectory, body: FlexibleBody) -> Array:
@@ -186,7 +186,7 @@ class InterfaceForceSensor:
             if self.axes == "body":
                 part = (part + frame.turned.turned(tilde(frame.axes @ value))).turned(frame.axes.T)
             unit = unit_words(small.system.units, key)
-            found.append(vector_linear(part, value, unit, prefix=f"{key} ", least=NOTHING * small.largest_wrench))
+            found.append(vector_linear(part, value, unit, prefix=f"{key} ", least=ROUNDING * small.largest_wrench))
         force, moment = found
         return LinearColumns(
             {**force.columns, **moment.columns},

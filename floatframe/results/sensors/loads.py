@@ -28,7 +28,7 @@ from floatframe.results.trajectory import Energies, Trajectory
 __all__ = ["AXES", "CoordinateSensor", "EnergySensor", "ModeSensor", "MomentumSensor", "ReactionSensor"]
 
 AXES = ("ground", "marker")
-NOTHING = 1e-12  #: relative to the largest wrench; smaller values are rounding errors
+ROUNDING = 1e-12  #: relative to the largest wrench; smaller values are rounding errors
 ENERGIES = (*Energies.__dataclass_fields__, "total", "balance")
 
 
@@ -75,7 +75,7 @@ class ReactionSensor:
                 rows = (rows + place.turned.turned(tilde(value))).turned(place.axes.T)
                 value = place.axes.T @ value
             unit = unit_words(small.system.units, key.strip())
-            found.append(vector_linear(rows, value, unit, prefix=key, least=NOTHING * small.largest_wrench))
+            found.append(vector_linear(rows, value, unit, prefix=key, least=ROUNDING * small.largest_wrench))
         force, moment = found
         return LinearColumns(
             {**force.columns, **moment.columns},

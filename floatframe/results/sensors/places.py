@@ -47,7 +47,7 @@ __all__ = [
     "small_place",
 ]
 
-STILL = 1e-12  #: relative to the size of the system; smaller lengths and angles are rounding errors
+ROUNDING_OF_MOTION = 1e-12  #: relative to the size of the system; smaller lengths and angles are rounding errors
 
 TURNING = ("rotation-vector", "angular-velocity")  #: quantities of the axes of a point
 PLACE_QUANTITIES = {
@@ -208,9 +208,9 @@ class PlaceSensor:
             other = small_place(small, f"{where}: relative_to", self.relative_to)
             rows = relative_rows(place, other, self.quantity)
         unit = unit_words(small.system.units, PLACE_QUANTITIES[self.quantity])
-        least = STILL * (1.0 if self.quantity == "rotation-vector" else small.compiled.length)
+        least = ROUNDING_OF_MOTION * (1.0 if self.quantity == "rotation-vector" else small.compiled.length)
         if self.quantity in ("velocity", "acceleration", "angular-velocity"):
-            least = STILL * small.speed_scale ** (2 if self.quantity == "acceleration" else 1)
+            least = ROUNDING_OF_MOTION * small.speed_scale ** (2 if self.quantity == "acceleration" else 1)
         return vector_linear(rows, np.array([value[axis][0] for axis in "xyz"]), unit, least=least)
 
 
@@ -362,7 +362,7 @@ class DisplacementSensor:
         body, shape = self.shape_of(small.system)
         q = small.now.body(body.name).q[0]
         rows = small.coordinates(body.name).turned(shape.shapes(q)[:3])
-        least = STILL * small.compiled.length
+        least = ROUNDING_OF_MOTION * small.compiled.length
         return vector_linear(rows, shape.deformation(q)[:3], small.system.units.length_symbol, least=least)
 
     def shape_of(self, system: System) -> tuple[FlexibleBody, MarkerShape]:

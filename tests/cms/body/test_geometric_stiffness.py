@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from cms.body.geometric_stiffness import GeometricStiffness, SpreadLoads, TurnedLoads
+from cms.body.geometric_stiffness import GeometricStiffness, RotatedLoads, SpreadLoads
 from cms.body.modal_file.file import convert_units
 from cms.body.nodal_sums import NodalSums
 from cms.errors import BodyError
@@ -24,7 +24,7 @@ def random_stiffness(n_q=N_Q, n_interfaces=2, seed=0):
         A = rng.normal(size=(*shape, n_q, n_q))
         return A + np.swapaxes(A, -1, -2)
 
-    turned = TurnedLoads(*(rng.normal(size=(*loads, 3, n_q)) for loads in ((3,), (3,), (6,), (n_interfaces, 6))))
+    turned = RotatedLoads(*(rng.normal(size=(*loads, 3, n_q)) for loads in ((3,), (3,), (6,), (n_interfaces, 6))))
     spread = SpreadLoads(symmetric(6), rng.normal(size=(6, 3, n_q)), rng.normal(size=(6, 3, 3)))
     return GeometricStiffness(symmetric(3), symmetric(3), symmetric(6), symmetric(n_interfaces, 6), turned, spread)
 

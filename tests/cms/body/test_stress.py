@@ -10,7 +10,7 @@ from cms.body.stress import stress_of, von_mises, von_mises_of
 
 @pytest.mark.parametrize("at_once", [1, 100, 10**9])
 def test_blocks_of_rows_have_the_stress_of_each_row(monkeypatch, at_once):
-    monkeypatch.setattr(room, "AT_ONCE", at_once)
+    monkeypatch.setattr(room, "CHUNK_SIZE", at_once)
     rng = np.random.default_rng(4)
     modes, q = rng.normal(size=(7, 6, 3)), rng.normal(size=(11, 3))
     found = np.concatenate(list(von_mises_of(modes, q)))

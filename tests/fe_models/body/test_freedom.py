@@ -47,7 +47,7 @@ def test_energy_and_frequency_of_a_rigid_body_on_springs():
     forces = rigid_forces(K, free.M, free.nodes, free.dofs)
     mass = free.M.sum() / 3
     assert_allclose(np.diag(forces.energy)[:3], 2e4, rtol=1e-5)
-    assert_allclose(forces.swing[:3], np.sqrt(2e4 / mass) / (2 * np.pi), rtol=1e-5)
+    assert_allclose(forces.rigid_body_frequency[:3], np.sqrt(2e4 / mass) / (2 * np.pi), rtol=1e-5)
     assert not forces.is_free
     assert forces.n_free == 0
     assert set(free.dofs[forces.rows, 0]) == {0, 7, 20, 44}
@@ -195,9 +195,9 @@ def indefinite(free, least):
 def test_a_slightly_indefinite_mass_is_refused_with_the_remedy_and_mended_by_it():
     free = BODIES["solid"]
     M = indefinite(free, -2e-6)
-    with pytest.raises(BodyError, match=r"M is indefinite: 1 eigenvalues below zero, down to -2.*mend_mass = true"):
+    with pytest.raises(BodyError, match=r"M is indefinite: 1 eigenvalues below zero, down to -2.*repair_mass = true"):
         made(free, M=M)
-    mended = made(free, M=M, mend_mass=True)
+    mended = made(free, M=M, repair_mass=True)
     values = la.eigvalsh(mended.M.toarray())
     assert values[0] > -1e-12 * values[-1]
     assert_allclose(mended.M.toarray(), M, rtol=0, atol=3e-6 * values[-1])
@@ -206,8 +206,8 @@ def test_a_slightly_indefinite_mass_is_refused_with_the_remedy_and_mended_by_it(
 
 def test_another_matrix_is_not_mended():
     free = BODIES["solid"]
-    with pytest.raises(BodyError, match=r"expected -1e-03 at the least, which could be mended"):
-        made(free, M=indefinite(free, -0.1), mend_mass=True)
+    with pytest.raises(BodyError, match=r"expected at least -1e-03, which could be repaired"):
+        made(free, M=indefinite(free, -0.1), repair_mass=True)
     with pytest.raises(BodyError, match=r"M: expected a positive mass"):
         made(free, M=-free.M)
 

@@ -11,7 +11,7 @@ from fe_models.elements.solids.body import solid_body
 from fe_models.foundation.units import unit_system
 from fe_models.meshes.boundary import boundary_triangles
 from fe_models.meshes.mesh import Mesh
-from fe_models.meshes.raised import raised_mesh, tetrahedra_of
+from fe_models.meshes.quadratic_mesh import quadratic_mesh, tetrahedra_of
 from tests.bodies import ALUMINIUM, STEEL, box_mesh, distorted
 
 BAR = (20, 2, 1, 1.0, 0.1, 0.05)
@@ -92,7 +92,7 @@ def test_of_a_large_mesh_a_piece_of_the_thinnest_wall_is_measured():
 @pytest.mark.parametrize("kind", ["tetra", "hexahedron"])
 def test_a_raised_mesh_holds_the_field_and_the_cells_of_the_old_one(kind):
     mesh = box_mesh(2, 2, 1, kind=kind)
-    raised, P = raised_mesh(mesh)
+    raised, P = quadratic_mesh(mesh)
     second = box_mesh(2, 2, 1, kind={"tetra": "tetra10", "hexahedron": "hexahedron27"}[kind])
     assert sorted(map(tuple, raised.nodes.round(9))) == sorted(map(tuple, second.nodes.round(9)))
     u = np.random.default_rng(0).normal(size=3 * len(mesh.nodes))

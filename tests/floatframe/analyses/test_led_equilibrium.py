@@ -6,7 +6,7 @@ import scipy.sparse as sp
 from numpy.testing import assert_allclose
 
 from floatframe.analyses.equilibrium import words_of
-from floatframe.analyses.led_equilibrium import Balance, Led, is_left_by_none, led_equilibrium
+from floatframe.analyses.led_equilibrium import Balance, LoadPathEnd, is_left_by_none, led_equilibrium
 from floatframe.engine.initial_conditions.newton_equations import Linearized
 
 
@@ -53,7 +53,7 @@ def test_an_equilibrium_that_the_flow_leaves_is_told(k, is_stable):
 
 def test_where_loads_have_led_is_told():
     def words(p, n_solves, *, is_stable=False):
-        return words_of(Led(np.zeros(1), np.zeros(0), p, n_solves), is_stable)
+        return words_of(LoadPathEnd(np.zeros(1), np.zeros(0), p, n_solves), is_stable)
 
     assert words(0.0, 0) == ""
     assert words(0.37, 52) == ", nor by loads that grow (52 solves, to 37 % of them)"

@@ -248,13 +248,13 @@ def test_a_tyre_that_lands_in_too_long_steps_is_told(stiffness):
 
 
 @njit
-def wall_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def wall_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """A spring beyond a wall at data[1]."""
     depth = x[0, 0] - data[1]
-    seen[0] = -depth
+    outputs[0] = -depth
     if depth > 0.0:
         wrench[0, 0] = -data[0] * depth
-        seen[1] = 0.5 * data[0] * depth * depth
+        outputs[1] = 0.5 * data[0] * depth * depth
 
 
 class Wall(Element):

@@ -46,7 +46,7 @@ from floatframe.results.sensors import (
     VonMisesSensor,
     measured,
 )
-from floatframe.results.sensors.taken_places import taken_places
+from floatframe.results.sensors.sensor_points import sensor_points
 from tests.bodies import STEEL, box_mesh
 
 UNITS = unit_system("m-kg-s")
@@ -169,7 +169,7 @@ def test_a_sensor_at_a_node_of_a_line_is_an_interface_there():
         ours = np.stack([found[name].columns[axis] for axis in "xyz"], axis=1)
         assert_allclose(ours, values, rtol=0, atol=1e-9 * np.abs(values).max())
     assert found["s"].columns["von Mises"].max() > 0  # of the skin: a line itself has no stress
-    assert taken_places(system)["a"] == ("node 60 at [0.625, 0, 0]",)
+    assert sensor_points(system)["a"] == ("node 60 at [0.625, 0, 0]",)
     local = reduced.interface("middle").position
     assert_allclose(point_motion(motion, "bar", local, reduced=reduced).omega, exact.omega, rtol=0, atol=1e-9)
 

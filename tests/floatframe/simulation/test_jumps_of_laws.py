@@ -73,7 +73,7 @@ def user_force(text, **given):
 
 
 @njit
-def switched_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def switched_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     if data[0] <= t < data[1]:
         for k in range(3):
             wrench[0, k] = data[2] * x[0, 3 + 3 * k]

@@ -69,15 +69,15 @@ def speed_along(motion):
 
 
 @njit
-def wall_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def wall_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write a force along the axis of the second marker while it is beyond a place seen from the first, and the gap."""
     way = 0.0
     for k in range(3):
         way += (x[1, k] - x[0, k]) * data[2 + k]
-    seen[0] = way - data[1]
+    outputs[0] = way - data[1]
     sign = data[5]
     if sign == 0.0:
-        sign = -1.0 if seen[0] < 0.0 else 1.0
+        sign = -1.0 if outputs[0] < 0.0 else 1.0
     for k in range(3):
         wrench[1, k] = -data[0] * 0.5 * (1.0 + sign) * data[2 + k]
         wrench[0, k] = -wrench[1, k]

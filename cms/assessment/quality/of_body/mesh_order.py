@@ -3,7 +3,7 @@
 from cms.assessment.quality.record import QualityRecord, information, judge
 from cms.body.reduced_body import ReducedBody
 from fe_models.checks.first_order import PROVENANCE
-from fe_models.meshes.raised import FIRST_ORDER
+from fe_models.meshes.quadratic_mesh import FIRST_ORDER
 
 __all__ = ["check_mesh_order"]
 

@@ -21,7 +21,7 @@ from floatframe.errors import FatigueError
 
 __all__ = ["count_spectra", "mean_factor", "stress_moments"]
 
-AT_ONCE = 2_000_000  #: numbers of rows held at a time
+CHUNK_SIZE = 2_000_000  #: numbers of rows held at a time
 
 
 def count_spectra(
@@ -52,7 +52,7 @@ def count_spectra(
         np.zeros(n, np.int64),
     )  # fmt: skip
     moments = [modal_moments(each) for each in spectra]
-    step = max(1, AT_ONCE // (criterion.n_rows() * n_q))
+    step = max(1, CHUNK_SIZE // (criterion.n_rows() * n_q))
     for first in range(0, n, step):
         part = slice(first, min(first + step, n))
         rows = linear_rows(np.asarray(stress[part]), None if frames is None else frames[part], criterion)

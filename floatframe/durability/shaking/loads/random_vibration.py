@@ -30,7 +30,7 @@ from floatframe.errors import ModelError
 __all__ = ["CrossSpectrum", "Miles", "RandomRun", "RandomTest", "input_density", "random_run", "random_runs"]
 
 ROUNDING = 1e-9  #: least eigenvalue of a coherence matrix that is taken for rounding of zero
-AT_ONCE = 4_000_000  #: numbers of stress held at a time
+CHUNK_SIZE = 4_000_000  #: numbers of stress held at a time
 
 
 @dataclass(frozen=True)
@@ -301,7 +301,7 @@ def von_mises_field(model: ShakenModel, band: ResolvedBand, columns: Sequence[in
     L = axes * np.sqrt(np.maximum(values, 0.0))
     n_nodes = len(stress_modes)
     rms = np.empty(n_nodes)
-    rows = max(1, AT_ONCE // max(1, 6 * L.shape[1]))
+    rows = max(1, CHUNK_SIZE // max(1, 6 * L.shape[1]))
     for first in range(0, n_nodes, rows):
         s = stress_modes[first : first + rows] @ L
         rms[first : first + rows] = np.sqrt(np.maximum(np.einsum("nak,ab,nbk->n", s, VON_MISES, s, optimize=True), 0.0))

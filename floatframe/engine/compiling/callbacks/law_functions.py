@@ -23,7 +23,7 @@ __all__ = ["called_law", "law_callbacks"]
 WHOLE, REAL = ctypes.POINTER(ctypes.c_int64), ctypes.POINTER(ctypes.c_double)
 C_FUNCTION = ctypes.CFUNCTYPE(None, WHOLE, REAL, REAL, REAL)
 SIGNATURES = {
-    "function": "function(t, x, z, lam, data, wrench, z_dot, g, seen)",
+    "function": "function(t, x, z, lam, data, wrench, z_dot, g, outputs)",
     "tangent": "tangent(t, x, z, lam, data, slopes)",
 }
 

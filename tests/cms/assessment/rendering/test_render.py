@@ -19,10 +19,10 @@ from cms.assessment.rendering import (
     render_animation,
     render_picture,
 )
+from cms.assessment.rendering.annotations import layout_of, round_ticks
 from cms.assessment.rendering.camera import FILL, fitted_camera
 from cms.assessment.rendering.drawing import draw_picture
 from cms.assessment.rendering.film import average_of_blocks, write_film
-from cms.assessment.rendering.furniture import layout_of, round_ticks
 from cms.assessment.rendering.matplotlib_view import matplotlib_view
 from cms.assessment.rendering.scene_file import read_scene, write_scene
 from cms.assessment.rendering.shape import cie_lab, colormap, smooth_neighbours, surface_edges

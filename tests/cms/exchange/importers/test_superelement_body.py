@@ -284,9 +284,9 @@ def test_slightly_negative_mass_is_mended_when_asked(element, own):
     M = np.array(element.M)
     values, vectors = la.eigh(M)
     M += np.outer(vectors[:, 0], vectors[:, 0]) * (-values[0] - 1e-7 * values[-1])
-    with pytest.raises(BodyError, match="mend_mass"):
+    with pytest.raises(BodyError, match="repair_mass"):
         body_of_superelement(spoilt(element, M=M), options())
-    body = body_of_superelement(spoilt(element, M=M), options(mend_mass=True))
+    body = body_of_superelement(spoilt(element, M=M), options(repair_mass=True))
     assert "mass mended" in body.provenance
     assert_allclose(body.free_frequencies[:3], own.free_frequencies[:3], rtol=1e-3)
 

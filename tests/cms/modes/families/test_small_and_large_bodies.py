@@ -12,7 +12,7 @@ import cms
 import fe_models as fm
 from cms.errors import BodyError, ModeSetError
 from cms.modes.families import families, interface_cost
-from cms.modes.families.interface_cost import few_columns, large_interfaces, reduction_cost
+from cms.modes.families.interface_cost import interface_reduction_size, large_interfaces, reduction_cost
 from tests.bodies import box_mesh, distorted
 from tests.fe_models.small_shells import SI, STEEL
 
@@ -86,7 +86,7 @@ def test_the_cost_of_a_reduction_grows_as_its_arrays_do():
         fm.rigid_interface(mesh, "right", fm.NodeSet("right")),
     ]
     body = cms.couple(fm.solid_body(mesh, STEEL, name="block", units=SI, interfaces=sides))
-    assert (few_columns(body, 20), few_columns(body, 100)) == (32, 51)
+    assert (interface_reduction_size(body, 20), interface_reduction_size(body, 100)) == (32, 51)
     bare, whole = (reduction_cost(body, 51, stress=stress) for stress in (False, True))
     n_kept = len(np.unique(np.concatenate([body.surface.ravel(), *(each.nodes for each in body.interfaces)])))
     assert whole.file - bare.file == 8 * 6 * n_kept * 51

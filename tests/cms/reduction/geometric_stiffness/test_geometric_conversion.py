@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import cms
 import fe_models as fm
-from cms.body.geometric_stiffness import UNIT_LOADS, GeometricStiffness, SpreadLoads, TurnedLoads
+from cms.body.geometric_stiffness import UNIT_LOADS, GeometricStiffness, RotatedLoads, SpreadLoads
 from cms.errors import BodyError, ModalFileError
 from cms.reduction.basis.frames import BuckensFrame, NodalFrame, TisserandFrame
 from fe_models.body.loads import gravity_load
@@ -229,7 +229,7 @@ def test_other_units_are_those_of_the_class():
     body = synthetic_reduced_body(n_q=3)
     arrays = [rng.standard_normal((*n, 3, 3)) for n in ((3,), (3,), (6,), (len(body.interfaces), 6))]
     arrays = [K + np.swapaxes(K, -1, -2) for K in arrays]
-    turned = TurnedLoads(
+    turned = RotatedLoads(
         *(rng.standard_normal(n) for n in ((3, 3, 3), (3, 3, 3), (6, 3, 3), (len(body.interfaces), 6, 3, 3)))
     )
     K = rng.standard_normal((6, 3, 3))

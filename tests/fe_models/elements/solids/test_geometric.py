@@ -17,7 +17,7 @@ from fe_models.elements.solids.elements import INTEGRATIONS, quadrature, referen
 from fe_models.foundation.units import unit_system
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.mesh import SOLID_TYPES
-from fe_models.meshes.raised import raised_mesh
+from fe_models.meshes.quadratic_mesh import quadratic_mesh
 from tests.bodies import ALUMINIUM, STEEL, box_mesh, distorted
 
 ROUNDOFF = 1e-12
@@ -309,7 +309,7 @@ def test_straight_quadratic_tetrahedra_take_the_points_of_their_stress():
     from fe_models.elements.solids.geometric import bends_of_cells, integrated_cells
 
     corners = distorted(box_mesh(2, 1, 1, 1.0, 0.7, 0.6, "tetra"), 0.1, seed=3)
-    mesh, _ = raised_mesh(replace(corners, nodes=corners.nodes + 1e3))
+    mesh, _ = quadratic_mesh(replace(corners, nodes=corners.nodes + 1e3))
     assert bends_of_cells(mesh.nodes, mesh.cells["tetra10"]).max() < 1e-9
     (part,) = integrated_cells(mesh, "tetra10", {"tetra10": np.zeros(len(mesh.cells["tetra10"]), np.int64)})
     assert len(part.table.weights) == 4

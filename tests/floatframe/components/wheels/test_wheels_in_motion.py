@@ -181,7 +181,7 @@ def test_roads_of_a_system_file_are_read(tmp_path, road):
 
 @pytest.mark.parametrize("version", [52, 61])
 def test_a_rolling_wheel_of_a_tyre_file_settles_at_the_slips_and_forces_of_the_formula(version):
-    """Drawn at 20 m/s, turned by 3 degrees, spinning 4 % too fast: as the formula written a second time."""
+    """MarkerShapes at 20 m/s, turned by 3 degrees, spinning 4 % too fast: as the formula written a second time."""
     tyre = wheels.read_tyre_file(wheels.shipped_tyre(f"passenger_car_{version}"))
     yaw, speed, height = np.radians(3.0), 20.0, tyre.radius - 0.015
     spin = 1.04 * speed * np.cos(yaw) / (tyre.radius - 0.005)

@@ -162,13 +162,13 @@ def test_what_is_taken_over_time_has_its_derivative(take):
     assert_allclose(adjoint.gradient, direct.gradient, rtol=1e-8, atol=1e-12)
     from floatframe.design.studies.study_file import TAKES
 
-    def taken(value):
+    def output_value(value):
         changed = with_value(system, path, value)
         motion = ff.integrate(changed, ff.GeneralizedAlpha(0.8, tolerance=1e-13, stabilized=False), **run)
         return TAKES[take](ff.measured(changed, motion)["v"].columns["x"])
 
     p, step = value_at(system, path), 1e-4
-    by_runs = (taken(p + step) - taken(p - step)) / (2 * step)
+    by_runs = (output_value(p + step) - output_value(p - step)) / (2 * step)
     assert_allclose(direct.of("v", path), by_runs, rtol=1e-5)
 
 

@@ -8,11 +8,11 @@ from floatframe.engine.compiling.callbacks.law_source import digest_of
 from floatframe.engine.compiling.callbacks.law_templates import given_template, value_template
 
 
-def stiff(t, x, z, lam, data, wrench, z_dot, g, seen):
+def stiff(t, x, z, lam, data, wrench, z_dot, g, outputs):
     wrench[0, 0] = 2.0 * data[0]
 
 
-def soft(t, x, z, lam, data, wrench, z_dot, g, seen):
+def soft(t, x, z, lam, data, wrench, z_dot, g, outputs):
     wrench[0, 0] = 1.0 * data[0]
 
 

@@ -12,7 +12,7 @@ MASS = 1000.0
 
 
 @njit
-def tie_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def tie_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Pull by lam between two points, 0 = lam - k (L - L0)."""
     k, free = data
     d0, d1, d2 = x[1, 0] - x[0, 0], x[1, 1] - x[0, 1], x[1, 2] - x[0, 2]
@@ -21,7 +21,7 @@ def tie_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     f = lam[0] / length
     wrench[0, 0], wrench[0, 1], wrench[0, 2] = f * d0, f * d1, f * d2
     wrench[1, 0], wrench[1, 1], wrench[1, 2] = -f * d0, -f * d1, -f * d2
-    seen[0] = 0.5 * k * (length - free) ** 2
+    outputs[0] = 0.5 * k * (length - free) ** 2
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,7 +27,7 @@ CONSERVING = {"momentum": EnergyMomentum(), "decaying": EnergyDecaying(0.5)}
 
 
 @njit
-def piston_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def piston_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Pull by A p between two points, p' = B L'."""
     area, modulus = data
     d0, d1, d2 = x[1, 0] - x[0, 0], x[1, 1] - x[0, 1], x[1, 2] - x[0, 2]

@@ -27,7 +27,7 @@ AXIS = np.array([1.0, 2.0, -2.0]) / 3
 
 
 @njit
-def spring_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def spring_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Write a spring m w² s (1 + 5 s²/L²) along the axis between two points."""
     s = 0.0
     for k in range(3):

@@ -16,7 +16,7 @@ SPIN = 2.0 * np.array([0, 1, 0.3])
 
 
 @njit
-def heavy_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def heavy_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Inertia of a body about its centre of mass at the marker: -m (a - gravity), -(J alpha + omega x J omega)."""
     m, gravity = data[0], data[1]
     H, H_dot = np.zeros_like(x[0, :3]), np.zeros_like(x[0, :3])

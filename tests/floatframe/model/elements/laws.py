@@ -10,7 +10,7 @@ from floatframe.model.elements import NOTHING, POSITION, VELOCITY, Element, Elem
 
 
 @njit
-def spring_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def spring_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Tension k (L - L0) + d L' + preload along the line of two markers."""
     k, d, free, preload = data
     d0, d1, d2 = x[1, 0] - x[0, 0], x[1, 1] - x[0, 1], x[1, 2] - x[0, 2]
@@ -20,9 +20,9 @@ def spring_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     f = tension / length
     wrench[0, 0], wrench[0, 1], wrench[0, 2] = f * d0, f * d1, f * d2
     wrench[1, 0], wrench[1, 1], wrench[1, 2] = -f * d0, -f * d1, -f * d2
-    seen[0] = tension
-    seen[1] = 0.5 * k * (length - free) ** 2 + preload * length
-    seen[2] = d * rate * rate
+    outputs[0] = tension
+    outputs[1] = 0.5 * k * (length - free) ** 2 + preload * length
+    outputs[2] = d * rate * rate
 
 
 @njit
@@ -43,7 +43,7 @@ def spring_slopes(t, x, z, lam, data, slopes):
                     slopes[6 * b + r, 12 * a + 6 + j] = s_b * s_a * c * e[r] * e[j]
 
 
-def spring_in_python(t, x, z, lam, data, wrench, z_dot, g, seen):
+def spring_in_python(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Do the same with NumPy, uncompiled."""
     k, d, free, preload = data
     line, v = x[1, :3] - x[0, :3], x[1, 12:15] - x[0, 12:15]
@@ -52,7 +52,7 @@ def spring_in_python(t, x, z, lam, data, wrench, z_dot, g, seen):
     tension = k * (length - free) + d * rate + preload
     wrench[0, :3] = tension / length * line
     wrench[1, :3] = -wrench[0, :3]
-    seen[:] = tension, 0.5 * k * (length - free) ** 2 + preload * length, d * rate * rate
+    outputs[:] = tension, 0.5 * k * (length - free) ** 2 + preload * length, d * rate * rate
 
 
 FUNCTIONS = {
@@ -93,7 +93,7 @@ class Spring(Element):
 
 
 @njit
-def ball_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def ball_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Hold two points together by three reactions on the first of them."""
     for k in range(3):
         g[k] = x[0, k] - x[1, k]
@@ -120,19 +120,19 @@ class Ball(Element):
 
 
 @njit
-def jack_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def jack_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Lift with a pressure: p' = B (c (p_s - p) - A v), force A p along z."""
     area, leak, supply, stiffness = data
     wrench[0, 2] = area * z[0]
     z_dot[0] = stiffness * (leak * (supply - z[0]) - area * x[0, 14])
-    seen[0] = area * z[0]
-    seen[1] = supply * leak * (supply - z[0])  # the power of the supply less its throttle's
-    seen[2] = 0.5 * z[0] * z[0] / stiffness
-    seen[3] = leak * (supply - z[0]) * (supply - z[0])
+    outputs[0] = area * z[0]
+    outputs[1] = supply * leak * (supply - z[0])  # the power of the supply less its throttle's
+    outputs[2] = 0.5 * z[0] * z[0] / stiffness
+    outputs[3] = leak * (supply - z[0]) * (supply - z[0])
 
 
 @njit
-def closed_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def closed_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Hold another pressure at rest."""
     z_dot[0] = 2 * data[2] - z[0]
     wrench[0, 2] = data[0] * z[0]
@@ -169,7 +169,7 @@ class Jack(Element):
 
 
 @njit
-def circuit_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def circuit_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Follow b stiffly by the cube root a, with a flow lam that splits: lam + lam³ = b."""
     z_dot[0] = -data[0] * (z[0] * z[0] * z[0] - z[1])
     z_dot[1] = np.cos(t) - z[1]
@@ -197,7 +197,7 @@ class Circuit(Element):
 
 
 @njit
-def disc_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def disc_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Roll a disc, whose axis is y of its marker, on the plane z = 0.
 
     Its lowest point is rho = R (n (n · z) - z)/|...| from the centre, n the axis; the point touches the plane, and
@@ -233,7 +233,7 @@ class Disc(Element):
 
 
 @njit
-def mount_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def mount_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Follow the energy k p²/2 + a p⁴/4 - kappa (tr Q - 3)/2: p the place of b as a sees it, Q the turn of b against a.
 
     A damper takes what the velocity of b against the body of a gives.
@@ -261,8 +261,8 @@ def mount_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     wrench[0, 3] = -m0 - (d1 * f2 - d2 * f1)
     wrench[0, 4] = -m1 - (d2 * f0 - d0 * f2)
     wrench[0, 5] = -m2 - (d0 * f1 - d1 * f0)
-    seen[0] = 0.5 * k * square + 0.25 * a * square * square - 0.5 * kappa * (trace - 3.0)
-    seen[1] = c * (v0 * v0 + v1 * v1 + v2 * v2)
+    outputs[0] = 0.5 * k * square + 0.25 * a * square * square - 0.5 * kappa * (trace - 3.0)
+    outputs[1] = c * (v0 * v0 + v1 * v1 + v2 * v2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -290,13 +290,13 @@ class Mount(Element):
 
 
 @njit
-def loop_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def loop_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Follow the energy k/4 (|d|² - L²)² of each side d of a loop through three points, also of none."""
     for side in range(3):
         a, b = side, (side + 1) % 3
         d0, d1, d2 = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
         more = d0 * d0 + d1 * d1 + d2 * d2 - data[1] * data[1]
-        seen[0] += 0.25 * data[0] * more * more
+        outputs[0] += 0.25 * data[0] * more * more
         for k, d in enumerate((d0, d1, d2)):
             wrench[a, k] += data[0] * more * d
             wrench[b, k] -= data[0] * more * d
@@ -326,7 +326,7 @@ class Loop(Element):
 
 
 @njit
-def creep_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def creep_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Pull with k (L - z) between two points, z' = (L - z)/T."""
     k, T = data
     d0, d1, d2 = x[1, 0] - x[0, 0], x[1, 1] - x[0, 1], x[1, 2] - x[0, 2]
@@ -362,7 +362,7 @@ class Creeping(Element):
 
 
 @njit
-def plane_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def plane_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Keep point b in the plane through point a normal to the axis z of a, by the reaction lam along it."""
     e0, e1, e2 = x[0, 5], x[0, 8], x[0, 11]
     d0, d1, d2 = x[1, 0] - x[0, 0], x[1, 1] - x[0, 1], x[1, 2] - x[0, 2]

@@ -89,11 +89,11 @@ def test_analyses_without_accelerations_name_the_element():
 
 
 @njit
-def shown_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def shown_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Add a mass without moment, and show its inertia force."""
     for i in range(3):
         wrench[0, i] = -data[0] * x[0, 18 + i]
-    seen[0] = data[0] * x[0, 18]
+    outputs[0] = data[0] * x[0, 18]
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,11 +108,11 @@ class Shown(Element):
 
 
 @njit
-def follow_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def follow_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Push against the acceleration that a filter of first order shows."""
     z_dot[0] = (x[0, 18] - z[0]) / data[1]
     wrench[0, 0] = -data[0] * z[0]
-    seen[0] = x[0, 18]
+    outputs[0] = x[0, 18]
 
 
 @dataclass(frozen=True, eq=False)

@@ -83,12 +83,12 @@ def test_a_good_element_is_found_good(case):
 
 
 @njit
-def square(t, x, z, lam, data, wrench, z_dot, g, seen):
+def square(t, x, z, lam, data, wrench, z_dot, g, outputs):
     wrench[1, 2] = x[1, 14] ** 2
 
 
 @njit
-def powered(t, x, z, lam, data, wrench, z_dot, g, seen):
+def powered(t, x, z, lam, data, wrench, z_dot, g, outputs):
     wrench[1, 2] = x[1, 14] ** data[0]
 
 
@@ -98,31 +98,31 @@ def wrong_slopes(t, x, z, lam, data, slopes):
 
 
 @njit
-def two_parts(t, x, z, lam, data, wrench, z_dot, g, seen):
+def two_parts(t, x, z, lam, data, wrench, z_dot, g, outputs):
     wrench[1, 2] = -x[1, 14] * x[1, 14]
     wrench[1, 3] = 1.0
 
 
-def outside(t, x, z, lam, data, wrench, z_dot, g, seen):
+def outside(t, x, z, lam, data, wrench, z_dot, g, outputs):
     wrench[2, 0] = 1.0
 
 
-def counting(t, x, z, lam, data, wrench, z_dot, g, seen, calls=[0]):  # noqa: B006
+def counting(t, x, z, lam, data, wrench, z_dot, g, outputs, calls=[0]):  # noqa: B006
     calls[0] += 1
     wrench[1, 0] = calls[0]
 
 
-def greedy(t, x, z, lam, data, wrench, z_dot, g, seen):
+def greedy(t, x, z, lam, data, wrench, z_dot, g, outputs):
     data[0] = 2.0
 
 
 @njit
-def rooted(t, x, z, lam, data, wrench, z_dot, g, seen):
+def rooted(t, x, z, lam, data, wrench, z_dot, g, outputs):
     wrench[1, 2] = np.sqrt(data[0] - x[1, 2])
 
 
 @njit
-def held_speed(t, x, z, lam, data, wrench, z_dot, g, seen):
+def held_speed(t, x, z, lam, data, wrench, z_dot, g, outputs):
     wrench[1, 2] = lam[0]
     g[0] = x[1, 2] + x[1, 14]
 
@@ -169,11 +169,11 @@ def two_arguments(t, x):
 
 
 @njit
-def real_only(t, x, z, lam, data, wrench, z_dot, g, seen):
+def real_only(t, x, z, lam, data, wrench, z_dot, g, outputs):
     wrench[1, 0] = max(x[1, 0], 0.0)
 
 
-def failing(t, x, z, lam, data, wrench, z_dot, g, seen):
+def failing(t, x, z, lam, data, wrench, z_dot, g, outputs):
     raise ArithmeticError("out of reach")
 
 
@@ -228,13 +228,13 @@ def test_what_becomes_no_number_in_a_motion_is_told_with_the_motion_so_far():
 
 
 @njit
-def watched(t, x, z, lam, data, wrench, z_dot, g, seen):
-    seen[0] = x[0, 2] - 0.04
+def watched(t, x, z, lam, data, wrench, z_dot, g, outputs):
+    outputs[0] = x[0, 2] - 0.04
 
 
 @njit
-def rooted_and_watched(t, x, z, lam, data, wrench, z_dot, g, seen):
-    seen[0] = x[0, 2] - 0.04
+def rooted_and_watched(t, x, z, lam, data, wrench, z_dot, g, outputs):
+    outputs[0] = x[0, 2] - 0.04
     wrench[0, 2] = 1e-3 * np.sqrt(0.044 - x[0, 2])
 
 

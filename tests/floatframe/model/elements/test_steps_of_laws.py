@@ -30,7 +30,7 @@ DIRECTION = np.array([2.0, -1.0, 2.0]) / 3
 
 
 @njit
-def held_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def held_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     """Hold the place or the speed along a direction at a sin(w t + phi), about a place far away."""
     value = -data[0] * np.sin(data[1] * t + data[2])
     at = 12 if data[3] > 0.0 else 0
@@ -99,7 +99,7 @@ def test_a_motion_that_a_law_holds_at_50_hz(method, formulation):
 
 
 @njit
-def wall_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+def wall_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
     depth = x[0, 0] - data[1]
     if depth > 0.0:
         wrench[0, 0] = -data[0] * depth * np.sqrt(depth) - data[2] * np.tanh((x[0, 12] - data[3]) / data[4])

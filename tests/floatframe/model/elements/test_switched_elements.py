@@ -99,15 +99,15 @@ def test_what_is_not_in_its_place_is_not_caught():
 
 
 @njit
-def open_valve(t, x, z, lam, data, wrench, z_dot, g, seen):
+def open_valve(t, x, z, lam, data, wrench, z_dot, g, outputs):
     z_dot[0] = -z[0] / data[0]
-    seen[0] = z[0]
+    outputs[0] = z[0]
 
 
 @njit
-def shut_valve(t, x, z, lam, data, wrench, z_dot, g, seen):
+def shut_valve(t, x, z, lam, data, wrench, z_dot, g, outputs):
     z_dot[0] = -0.1 * z[0] / data[0]
-    seen[0] = -1.0
+    outputs[0] = -1.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,7 +26,7 @@ from floatframe import (
 from floatframe.components import wheels
 from floatframe.errors import ModelError
 from floatframe.model.rotations import rotation_matrix
-from floatframe.model.shapes import Arrow, Box, Drawn, Road, Shape, Stretched, Wheel
+from floatframe.model.shapes import Arrow, Box, MarkerShapes, Road, Shape, Stretched, Wheel
 from floatframe.model.shapes.drawn import SPRING
 from floatframe.pictures.animation import motion_scene
 from floatframe.pictures.film_times import film_times
@@ -234,11 +234,12 @@ class ShownSpring(Spring):
 
     def drawn(self):
         if self.wrong:
-            return {"marker": (Drawn(Shape(Box((1, 1, 1))), marker=2),), "output": (Arrow(("Fx", "lost", "lost")),),
+            return {"marker": (MarkerShapes(Shape(Box((1, 1, 1))), marker=2),),
+                    "output": (Arrow(("Fx", "lost", "lost")),),
                     "kind": (Box((1, 1, 1)),)}[self.wrong]  # fmt: skip
         wheel, road = Shape(Wheel(0.3, 0.1)), Shape(Road([(-1, 0, 0), (1, 0, 0)], 1.0))
         arrow = Arrow(("tension", "lost", "lost"), marker=1, is_in_marker_axes=True)
-        return Drawn(wheel, marker=1), Drawn(road, marker=None), Stretched("coil"), arrow
+        return MarkerShapes(wheel, marker=1), MarkerShapes(road, marker=None), Stretched("coil"), arrow
 
 
 def sprung(wrong=""):
@@ -279,7 +280,7 @@ def test_elements_show_themselves_at_their_markers_with_their_forces(tmp_path):
     [
         ("marker", "marker 2: expected 0 to 1"),
         ("output", "no output 'Fx'"),
-        ("kind", "expected Drawn, Stretched or Arrow"),
+        ("kind", "expected MarkerShapes, Stretched or Arrow"),
     ],
 )
 def test_elements_that_show_what_they_have_not_are_refused(tmp_path, wrong, words):

@@ -7,14 +7,14 @@ from fe_models.foundation.arrays import IntArray
 from fe_models.meshes.cell_shapes import CELL_SHAPES, facet_tables
 from fe_models.meshes.mesh import Mesh
 
-__all__ = ["FIRST_ORDER", "raised_mesh", "tetrahedra_of"]
+__all__ = ["FIRST_ORDER", "quadratic_mesh", "tetrahedra_of"]
 
 FIRST_ORDER = ("tetra", "hexahedron", "wedge", "pyramid")  #: solid cells with corner nodes only
 #: raised cell type, whose field contains that of the first-order cell
 RAISED = {"tetra": "tetra10", "hexahedron": "hexahedron27"}
 
 
-def raised_mesh(mesh: Mesh) -> tuple[Mesh, sp.csr_array]:
+def quadratic_mesh(mesh: Mesh) -> tuple[Mesh, sp.csr_array]:
     """Return a mesh of tetrahedra or bricks with middle nodes added on straight edges.
 
     Returns

@@ -16,10 +16,10 @@ from floatframe.results.sensors import (
 from floatframe.results.sensors.places import found_at, found_nodes, is_at_node
 from floatframe.results.sensors.stresses import address_of, flexible_body
 
-__all__ = ["taken_places"]
+__all__ = ["sensor_points"]
 
 
-def taken_places(system: System) -> dict[str, tuple[str, ...]]:
+def sensor_points(system: System) -> dict[str, tuple[str, ...]]:
     """Return, by sensor, the points on flexible bodies that are not interfaces; sensors without any are omitted.
 
     Raises
