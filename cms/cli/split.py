@@ -15,6 +15,7 @@ from cms.errors import JobError
 from cms.jobs.job import Job, read_job
 from cms.jobs.reduction_table import FRAMES, named_interfaces
 from fe_models.foundation.paths import replace_file
+from fe_models.foundation.stages import Stages
 
 if TYPE_CHECKING:
     from fe_models.meshes.split import Cut
@@ -126,14 +127,16 @@ def stiffness_damping(job: Job) -> StiffnessDamping | None:
     Ratios belong to the modes of one body. The modes of a part lie far above the first modes of the whole, so ratios of
     the parts would damp the latter far too little. D = beta K is the same for the parts and for the whole.
     """
-    from cms.jobs.reduce_job import reduce_job
+    from cms.jobs.body_of_job import job_body
+    from cms.modes.families.families import Families
     from cms.reduction.basis.damping import PerModeDamping, RayleighDamping, damping_ratios
 
     damping = None if job.damping is None else job.damping.damping
     if damping is None or isinstance(damping, RayleighDamping):
         return None
-    whole = reduce_job(job.model_copy(update={"damping": None}))
-    omega = 2 * np.pi * float(np.asarray(whole.free_frequencies)[0])
+    whole = job_body(job, Stages())
+    with Families(whole, solver=job.reduction.solver) as families:
+        omega = float(np.sqrt(families.free_modes(1).omega2[0]))
     if isinstance(damping, PerModeDamping):
         ratio = damping.ratios[0]
     else:

@@ -26,7 +26,8 @@ from fe_models.foundation.solver import Solver
 from fe_models.foundation.tall.on_disk import in_memory
 from fe_models.foundation.threads import one_blas_thread
 
-__all__ = ["EigenResult", "eigenmodes"]
+__all__ = ["EigenResult", "FactorMismatchError", "eigenmodes"]
+
 
 SMALL = 300  #: number of dofs up to which dense matrices are faster
 LARGEST_DENSE = 3000  #: number of dofs up to which dense matrices are affordable, if many of the modes are wanted
@@ -34,11 +35,15 @@ SHIFT = 1e-6  #: shift for a free body, relative to the median of K_kk / M_kk; n
 SHIFT_SMALL = 1e-4  #: the same for a dense pencil with few dofs
 ZERO = 1e-13  #: omega² relative to that median below which it is rounding of K: a rigid-body mode
 TIGHTEST, LOOSEST = 1e-13, 0.1  #: tightest tolerance that rounding allows, and loosest tolerance that is meaningful
-MISMATCH = 1e-3  #: defect of K x = omega² M x that only a factorisation of another matrix explains
+MISMATCH = 1e-3  #: defect of K x = omega² M x that a factorisation of another matrix explains, or rounding of K
 MOST_PROOFS = 3
 #: mode search of a solver, if it is not block Lanczos on rank 0
 SEARCHES: dict[str, type[SlepcSearch]] = {"slepc": SlepcSearch}
 GAP = 1e-4  #: relative gap between two values of omega² in which modes can be counted
+
+
+class FactorMismatchError(EigenError):
+    """The modes that a factorisation gives are not those of K and M."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,7 +257,7 @@ def _require_match(K: Matrix, M: Matrix, Phi: Array, omega2: Array, shift: float
     size = np.linalg.norm(force) + np.linalg.norm(M @ _combination(Phi, (omega2 - shift) * signs))
     defect = np.linalg.norm(force - inertia) / size
     if not defect < max(MISMATCH, 1e3 * tolerance):
-        raise EigenError(
+        raise FactorMismatchError(
             f"eigenmodes: K x - omega² M x is {defect:.1e} of its terms; expected a factorisation of K - shift M "
             f"(shift = {shift:g}) of these very matrices"
         )

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from cms.errors import EigenError
-from cms.linear_algebra.solvers.eigen import EigenResult, counting_shift, eigenmodes
+from cms.linear_algebra.solvers.eigen import EigenResult, FactorMismatchError, counting_shift, eigenmodes
 from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.linear_algebra.solvers.shift_inverted import ModeRequest
 from cms.modes.families.fixed_interface import FixedInterfaceBody
@@ -40,7 +40,17 @@ def elastic_modes(flexibility: Flexibility, wanted: ModeCount) -> EigenResult:
     dofs. The rigid-body motions that the conditions leave free are known in advance, and are not among the modes.
     """
     K, M, numbering = flexibility.K, flexibility.M, flexibility.numbering
-    modes = eigenmodes(K, M, replace(wanted, verify=False), factorization=flexibility, numbering=numbering)
+    try:
+        modes = eigenmodes(K, M, replace(wanted, verify=False), factorization=flexibility, numbering=numbering)
+    except FactorMismatchError as error:
+        body, load = flexibility.condensed.body, flexibility.conditions.K_load
+        largest = float(np.abs(K.diagonal()).max())
+        softest = "" if load is None else f", those of its neighbours {np.abs(np.diag(load)).max():.1e} at most"
+        raise EigenError(
+            f"body {body.name!r}: its slowest modes are lost in rounding: some motion besides the rigid ones is held "
+            f"by almost nothing beside the largest stiffness, {largest:.1e}{softest}; rounding is some "
+            f"{np.finfo(float).eps * largest:.1e}: hold that motion by more, or take away what holds it"
+        ) from error
     if wanted.verify:
         modes = _proven(flexibility, modes, wanted)
     return replace(modes, Phi=flexibility.expand(modes.Phi))

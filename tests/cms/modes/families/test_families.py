@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -6,7 +7,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from numpy.testing import assert_allclose, assert_array_equal
 
-from cms.errors import BodyError, ModeSetError
+from cms.errors import BodyError, EigenError, ModeSetError
 from cms.linear_algebra.solvers.factorization import factorize
 from cms.linear_algebra.solvers.mode_count import ModeCount
 from cms.modes.families.families import Families
@@ -339,6 +340,27 @@ def test_a_load_across_the_hinge_holds_the_mechanism(stiffness):
     omega2 = la.eigvalsh(Psi[body.b].T @ K_load @ Psi[body.b], Psi.T @ body.M @ Psi)
     modes = benfield_hruda(body, n_modes=7, loads=loads)
     assert_allclose(modes.frequencies[-7:], np.sqrt(omega2) / (2 * np.pi), rtol=10 * stiffness / 2e11 + 1e-6)
+
+
+@pytest.mark.parametrize("exponent", range(-6, 2))
+def test_a_load_that_hardly_holds_the_mechanism_gives_its_modes_or_is_refused_by_name(exponent):
+    """Springs of 1 uN/m to 10 N/m on steel: a mechanism, modes that are lost in rounding, or right ones."""
+    from tests.cms.examples import hinged_bricks
+
+    body, stiffness = couple(hinged_bricks()), 10.0**exponent
+    arm = body.interface("right").reference - HINGE
+
+    def frequencies(stiffness):
+        loads = springs_of_hinged_bricks(stiffness, np.cross([0.0, 0.0, 1.0], arm))
+        return benfield_hruda(body, n_modes=7, loads=loads).frequencies[-7:]
+
+    try:
+        found = frequencies(stiffness)
+    except (BodyError, EigenError) as error:
+        assert exponent < -1
+        assert re.search("costs? no energy: a mechanism|slowest modes are lost in rounding", str(error))  # noqa: PT017
+    else:
+        assert_allclose(found, np.sqrt(stiffness / 1e5) * frequencies(1e5), rtol=1e-3)
 
 
 def test_an_uncoupled_body_is_sent_to_couple():
