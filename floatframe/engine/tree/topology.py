@@ -235,12 +235,24 @@ def jets_of(
     return jet0, jets
 
 
-def spin_axis(model: Model, each: Branch, far: int) -> Array:
-    """Return the axis of symmetry of a body that is free or on a ball joint, axes of its end, (3,); zero for others."""
-    if [column.side for column in each.columns[-3:]] != [SIDE_B] * 3:
-        return np.zeros(3)
-    axis: Array = model.body_types.axis[model.bodies.kind[each.body]]
-    return axis if far < 0 else model.markers.triad[far].T @ axis
+def spin_axes(model: Model, ordered: list[Branch], far: list[int]) -> Array:
+    """Return the axis of symmetry of each body that spins by itself, axes of its end of the joint, (n_b, 3).
+
+    These are bodies that are free or on a ball joint, rigid with all that hangs at them; zero for others. Modes and
+    coordinates that are carried around by the spin would be in other axes than the rotation that they are added to,
+    and stiff ones make such steps unstable.
+    """
+    axes: Array = model.body_types.axis[model.bodies.kind].copy()
+    for i, each in enumerate(ordered):
+        if far[i] >= 0:
+            axes[i] = model.markers.triad[far[i]].T @ axes[i]
+        if [column.side for column in each.columns[-3:]] != [SIDE_B] * 3:
+            axes[i] = 0.0
+        moving = i if model.bodies.n_q[i] > 0 else each.parent if each.columns else -1
+        while moving >= 0:
+            axes[moving] = 0.0
+            moving = ordered[moving].parent
+    return axes
 
 
 def loop_markers(model: Model, ordered: list[Branch], near: list[int], kept: list[int]) -> list[tuple[int, int]]:
@@ -330,7 +342,7 @@ def tree_record(compiled: CompiledSystem, branches: list[Branch]) -> Tree:
         is_kept=is_kept,
         kept_row=np.where(row_is_kept, np.cumsum(row_is_kept) - 1, -1),
         held=[c for c in kept if model.connections.law[c] in (JOINT, COUPLER)],
-        spin_axis=[spin_axis(model, each, far[i]) for i, each in enumerate(ordered)],
+        spin_axis=spin_axes(model, ordered, far),
         loop_body=[body for body, _ in loops],
         loop_marker=[marker for _, marker in loops],
         jet0=jet0,
