@@ -1,15 +1,15 @@
 """The campaign runs every case in a worker process with a limit of time, and counts what became of it.
 
     python -m tests --campaign                     1400 bad inputs, 100 kills, 300 motions, 300 bodies,
-                                                   200 verdicts, 300 decks beside an assembler
+                                                   200 verdicts, 300 decks of each program beside an assembler
     python -m tests --campaign motions jobs        two families
     python -m tests --campaign jobs 147            one case, its verdict in words
     python -m tests --campaign motions --count 1000 --seed 5      so many cases of each, seeds from 5 on
 
-Motions, bodies, verdicts and deck-bodies have new seeds in each run, the other families those from 0 on; --seed gives
-the first. A fault prints its family and seed, which repeat it. A hang is a case beyond `LIMIT` seconds; a worker that
-ends is a traceback of its case. The exit code is 0 if there is no traceback, no hang, no wrong acceptance and no
-unclear message.
+Motions, bodies, verdicts and decks beside an assembler have new seeds in each run, the other families those from 0 on;
+--seed gives the first. A fault prints its family and seed, which repeat it. A hang is a case beyond `LIMIT` seconds; a
+worker that ends is a traceback of its case. The exit code is 0 if there is no traceback, no hang, no wrong acceptance
+and no unclear message.
 """
 
 import argparse
@@ -45,8 +45,17 @@ FAMILIES: dict[str, tuple[str, int]] = {  # what it is -> the function of a case
     "bodies": ("tests.campaign.bodies:body_case", 300),
     "verdicts": ("tests.campaign.verdicts:verdict_case", 200),
     "deck-bodies": ("tests.campaign.deck_bodies:body_case", 300),
+    "abaqus-bodies": ("tests.campaign.abaqus_bodies:body_case", 300),
+    "ansys-bodies": ("tests.campaign.ansys_bodies:body_case", 300),
 }
-NEW_SEEDS = ("motions", "bodies", "verdicts", "deck-bodies")  #: families whose seeds are new in each run
+NEW_SEEDS = (
+    "motions",
+    "bodies",
+    "verdicts",
+    "deck-bodies",
+    "abaqus-bodies",
+    "ansys-bodies",
+)  #: families whose seeds are new in each run
 LIMIT = 60.0  #: seconds of a case
 FIRST = 600.0  #: of the first one in a worker, before which it may compile the kernels
 PROCESSES = 2

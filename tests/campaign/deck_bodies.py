@@ -4,15 +4,17 @@ Two chains of bars: axes of their own at points (CD), offsets along them, releas
 mass, point masses off their points, a bush, springs and dampers, and a rigid link in some components.
 """
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from scipy.linalg import block_diag
 
+from fe_models.body.fe_body import FEBody
 from tests.campaign.verdict import ACCEPTED, REFUSED, WRONG, Verdict
 from tests.cms.jobs.decks.nastran_bodies import RHO, A, E, J, arm, axes_of, bar_stiffness, body_of, released
 
-__all__ = ["body_case"]
+__all__ = ["Expected", "body_case", "wrong_body"]
 
 PINS = (("", ""), ("", "56"), ("45", "6"), ("5", ""), ("", "3"), ("6", "2"), ("1", ""), ("", "12"))
 LINKS = ("123456", "123", "13", "246", "2", "456", "1256")
@@ -160,39 +162,59 @@ def random_deck(seed: int) -> RandomDeck:
 def wrong_deck(deck: RandomDeck, folder: Path) -> str:
     """Return what of the body differs from the assembler; empty: nothing."""
     body, _ = body_of(folder, "\n".join(deck.lines) + "\n")
-    place = {(int(node), int(c)): k for k, (node, c) in enumerate(body.recovery.dofs)}
     numbers = body.numbering.nodes
-    T = body.recovery.matrix.toarray()
     nodes = [int(np.flatnonzero(numbers[: len(body.nodes)] == k + 1)[0]) for k in range(deck.n)]
-    used = [k for k, node in enumerate(nodes) if (node, 0) in place]
-    if len(used) < deck.n:
+    return wrong_body(body, nodes, Expected(deck.K, deck.D, np.array(deck.rows), deck.M))
+
+
+@dataclass(frozen=True, eq=False)
+class Expected:
+    """What the assembler says of n points."""
+
+    K: np.ndarray  #: over six components of each point
+    D: np.ndarray
+    rows: np.ndarray  #: equations between these components, which are zero
+    M: np.ndarray  #: of the rigid motions about the origin, (6, 6)
+
+
+def wrong_body(body: FEBody, nodes: list[int], expected: Expected) -> str:
+    """Return what of a body differs from the assembler; empty: nothing.
+
+    Parameters
+    ----------
+    nodes
+        Node of the body at each point. Other dofs, such as those of released ends, are condensed.
+    """
+    place = {(int(node), int(c)): k for k, (node, c) in enumerate(body.recovery.dofs)}
+    T = body.recovery.matrix.toarray()
+    n = len(nodes)
+    if any((node, 0) not in place for node in nodes):
         return "a point is lost"
     full = np.array([T[place[node, c]] for node in nodes for c in range(6)])
     of_points = np.flatnonzero(np.abs(full).sum(axis=0))
     own = np.setdiff1d(np.arange(body.n_dof), of_points)
     full = full[:, of_points]
-    if len(deck.rows) and np.abs(np.array(deck.rows) @ full).max() > ROUNDING:
+    n_rows = len(expected.rows)
+    if n_rows and np.abs(expected.rows @ full).max() > ROUNDING:
         return "the link is not kept"
-    if np.linalg.matrix_rank(full) != 6 * deck.n - len(deck.rows) or full.shape[1] != 6 * deck.n - len(deck.rows):
-        return f"{full.shape[1]} motions of the points, expected {6 * deck.n - len(deck.rows)}"
-    for name, ours, theirs in (("K", body.K, deck.K), ("D", body.D, deck.D)):
+    if np.linalg.matrix_rank(full) != 6 * n - n_rows or full.shape[1] != 6 * n - n_rows:
+        return f"{full.shape[1]} motions of the points, expected {6 * n - n_rows}"
+    for name, ours, theirs in (("K", body.K, expected.K), ("D", body.D, expected.D)):
         B = np.zeros((body.n_dof, body.n_dof)) if ours is None else ours.toarray()
         inner = B[np.ix_(own, own)]
         B = (
             B[np.ix_(of_points, of_points)]
             - B[np.ix_(of_points, own)] @ np.linalg.pinv(inner, rcond=1e-11) @ B[np.ix_(own, of_points)]
         )
-        expected = full.T @ theirs @ full
         scale = max(np.abs(theirs).max(), 1e-9)  # not of what a link leaves of it, which may be nothing
-        if np.abs(B - expected).max() > ROUNDING * scale:
-            return f"{name} differs by {np.abs(B - expected).max() / scale:.2g}"
+        difference = np.abs(B - full.T @ theirs @ full).max() / scale
+        if difference > ROUNDING:
+            return f"{name} differs by {difference:.2g}"
     rigid = np.zeros((body.n_dof, 6))
     for k, (node, c) in enumerate(body.dofs):
         rigid[k] = arm(body.nodes[node])[c]
-    M = rigid.T @ body.M @ rigid
-    if np.abs(M - deck.M).max() > ROUNDING * np.abs(deck.M).max():
-        return f"the rigid mass differs by {np.abs(M - deck.M).max() / np.abs(deck.M).max():.2g}"
-    return ""
+    difference = np.abs(rigid.T @ body.M @ rigid - expected.M).max() / np.abs(expected.M).max()
+    return f"the rigid mass differs by {difference:.2g}" if difference > ROUNDING else ""
 
 
 def body_case(seed: int, folder: Path) -> Verdict:

@@ -19,7 +19,8 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["TURNED", "flat_assembly"]
 
-TURNED = "TURNED WITH ITS INSTANCE"  #: parameter added here: the nine numbers of R, of equations in its axes
+#: parameter added here to blocks whose components are along the axes of an instance: the nine numbers of R
+TURNED = "TURNED WITH ITS INSTANCE"
 
 SETS = {"NSET": "NSET", "ELSET": "ELSET", "NODE": "NSET", "ELEMENT": "ELSET"}  #: keyword -> parameter with its name
 NAMES = (
@@ -156,7 +157,7 @@ def _placed(block: DeckBlock, instance: str, offset: int, R: Array, t: Array) ->
             x = R @ np.array([float(word or 0) for word in [*words[1:4], "0", "0", "0"][:3]]) + t
             lines.append(", ".join([words[0], *(repr(float(value)) for value in x)]))
         return replace(block, parameters=parameters, lines=lines)
-    if block.keyword in ("SPRING", "DASHPOT") and not np.array_equal(R, np.eye(3)):
+    if block.keyword in ("SPRING", "DASHPOT", "KINEMATIC") and not np.array_equal(R, np.eye(3)):
         parameters = parameters | {TURNED: " ".join(repr(float(x)) for x in R.ravel())}
     if block.keyword == "EQUATION":
         turned = {} if np.array_equal(R, np.eye(3)) else {TURNED: " ".join(repr(float(x)) for x in R.ravel())}

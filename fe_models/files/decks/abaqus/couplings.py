@@ -142,8 +142,9 @@ def _coupling(here: str, block: DeckBlock, draft: Draft) -> None:
     if block.keyword == "KINEMATIC":
         components = tuple(sorted(_limits(block))) or (0, 1, 2, 3, 4, 5)
         whole = all(set(part) <= set(components) or not set(part) & set(components) for part in ((0, 1, 2), (3, 4, 5)))
-        if not whole and ("ORIENTATION" in given or draft.transformed.keys() & {leader, *members.tolist()}):
-            why = "single components along axes of their own (ORIENTATION, *TRANSFORM)"
+        has_axes = "ORIENTATION" in given or TURNED in block.parameters
+        if not whole and (has_axes or draft.transformed.keys() & {leader, *members.tolist()}):
+            why = "single components along axes of their own (ORIENTATION, *TRANSFORM, a turned instance)"
             draft.ledger.refuse("*KINEMATIC", why, line=block.line_number)
             return
         _rigid_group(here, draft, leader, members, components)
