@@ -1,8 +1,8 @@
 """Random legal .cdb files of ANSYS beside an assembler of this file.
 
-A block of curved bricks (SOLID186, reduced or full) or of tetrahedra (SOLID187, or SOLID186 with equal nodes), some left
-out, of isotropic and orthotropic materials by major or minor ratios, blank constants, tables over temperature, element
-types by number or name, gaps in numbers, several widths of fields, two EBLOCKs.
+A block of curved bricks (SOLID186, reduced or full) or of tetrahedra (SOLID187, or SOLID186 with equal nodes), some of
+them left out, of isotropic and orthotropic materials by major or minor ratios, blank constants, tables over
+temperature, element types by number or name, gaps in numbers, several widths of fields, two EBLOCKs.
 """
 
 from itertools import product
