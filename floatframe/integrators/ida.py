@@ -7,6 +7,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.initial_conditions.gaps import gaps_at, has_gaps
 from floatframe.engine.initial_conditions.initial import (
     assembled,
     consistent_motion,
@@ -29,7 +30,7 @@ from floatframe.integrators.carry import (
     turned_on,
     with_angles,
 )
-from floatframe.integrators.passed_contacts import Stretch, gaps_at, has_gaps, stretches_of_passed_contact
+from floatframe.integrators.passed_contacts import Stretch, stretches_of_passed_contact
 from floatframe.integrators.remembered_contacts import require_no_remembered_contacts
 from floatframe.model.rotations import euler_parameter_rates
 from floatframe.model.state import State

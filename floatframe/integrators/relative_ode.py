@@ -11,6 +11,7 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest
 from floatframe.engine.compiling.callbacks import raise_errors_of
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.initial_conditions.gaps import gaps_at, has_gaps
 from floatframe.engine.initial_conditions.initial import consistent_motion, has_normal_friction
 from floatframe.engine.initial_conditions.newton_equations import set_iterate
 from floatframe.engine.kernels.memory import WORK_GIVEN, WORK_TAKEN, Rows, new_rows
@@ -33,7 +34,7 @@ from floatframe.integrators.carry import (
     turned_on,
     with_angles,
 )
-from floatframe.integrators.passed_contacts import Stretch, gaps_at, has_gaps, stretches_of_passed_contact
+from floatframe.integrators.passed_contacts import Stretch, stretches_of_passed_contact
 from floatframe.integrators.remembered_contacts import require_no_remembered_contacts
 from floatframe.model.joints.rows import is_held, is_held_length, is_held_position
 from floatframe.model.rotations import euler_parameters, right_jacobian

@@ -10,10 +10,11 @@ joints/rows/kinds.py; unknown reactions w, their lines GAUGE and SPRING included
 W adds the stiffness, scaled, to the mass, so that (1) and (2) move bodies rather than deform them.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array
 from floatframe.engine.compiling.callbacks import raise_errors_of
@@ -21,6 +22,7 @@ from floatframe.engine.compiling.file_frames import motion_of_file, state_of_eng
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.initial_conditions.constraint_words import conflict_of_drives, drive_name, open_joints
 from floatframe.engine.initial_conditions.freedoms import Mobility, constraint_mobility, scaled_constraints
+from floatframe.engine.initial_conditions.gaps import gaps_at, has_gaps
 from floatframe.engine.initial_conditions.initial_checks import (
     driven_angles,
     led_by,
@@ -67,6 +69,7 @@ __all__ = [
 ASSEMBLED = 1e-12  #: largest |g| of an assembled system, points relative to its size
 MOST_ITERATIONS = 30
 OF_STEP = 0.1  #: of a step: over which rates of accelerations are differences
+NEAREST = 1e-6  #: of a step: such differences where a contact is near
 NEAR_BY = 1e-3  #: rad, and part of the size of the system: a small way from a position
 ALLOWED = 1e-10  #: singular value of what rigid bodies are held by, relative to the largest, of a motion that is free
 
@@ -374,17 +377,29 @@ def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState, t:
     """Return d(u_dot)/dt at a consistent state, (n_u,), by a difference along the motion over a tenth of a step h.
 
     Its error is of second order in h. The difference is central, but forward in time where something may depend on it,
-    since that may begin or jump at t.
+    since that may begin or jump at t. It reaches over no contact that closes or opens, whose force the first step has
+    not met yet; zero where a contact is nearer than a millionth of the step.
     """
     model, state, u_dot = compiled.model, consistent.state, consistent.u_dot
     work, s = work_from(model, consistent.w), OF_STEP * h
 
-    def u_dot_after(step: float) -> Array:
-        moved = displaced(model, state, step * state.u + 0.5 * step**2 * u_dot)
-        work.state.time[...] = t + step
-        after = State(moved.r, moved.p, moved.q, state.u + step * u_dot)
-        return solve_accelerations(compiled, work, after, consistent.w)[0]
+    def moved(step: float) -> State:
+        after = displaced(model, state, step * state.u + 0.5 * step**2 * u_dot)
+        return replace(after, u=state.u + step * u_dot)
 
+    def u_dot_after(step: float) -> Array:
+        work.state.time[...] = t + step
+        return solve_accelerations(compiled, work, moved(step), consistent.w)[0]
+
+    def closed(step: float) -> NDArray[np.bool_]:
+        return gaps_at(compiled, work, t + step, moved(step), consistent.w) < 0.0
+
+    if has_gaps(compiled):
+        now = closed(0.0)
+        while (closed(-s) != now).any() or (closed(s) != now).any() or (closed(2 * s) != now).any():
+            s *= 0.5
+            if s < NEAREST * h:
+                return np.zeros_like(u_dot)
     if len(model.functions.begin) or compiled.laws or len(model.users.n_forces):
         return (-3 * u_dot_after(0.0) + 4 * u_dot_after(s) - u_dot_after(2 * s)) / (2 * s)
     return (u_dot_after(s) - u_dot_after(-s)) / (2 * s)

@@ -67,6 +67,30 @@ def test_balls_meet_on_a_tilted_carrier_that_moves_far_from_the_origin():
     assert_allclose(momentum, 4.0 * drift - 20.0 * n, rtol=1e-9)
 
 
+def steel_ball(gap, speed):
+    """A steel ball of 20 mm on its way to a steel plane, 5 km off, by Hertz: a contact of 0.1 ms at 1 m/s."""
+    R, n, place = 0.01, np.array([2.0, -1.0, 2.0]) / 3, np.array([3e3, -4e3, 1e3])
+    m, stiffness = 7800 * 4 / 3 * np.pi * R**3, 4 / 3 * 1.15e11 * np.sqrt(R)
+    body = RigidBody("b", m, 0.4 * m * R**2 * np.eye(3), position=place + (R + gap) * n, velocity=-speed * n)
+    plane = Marker("ground", position=place)
+    contact = ff.SphereContact("c", plane, BODY, radius_b=R, stiffness=stiffness, exponent=1.5, axis=n)
+    return System([body], [], [contact]), n
+
+
+@pytest.mark.parametrize("part", [1e-4, 3e-3, 0.05, 0.6])
+@pytest.mark.parametrize(
+    ("method", "formulation"),
+    [*((GeneralizedAlpha(0.8), each) for each in FORMULATIONS), *((each, "absolute") for each in SCHEMES)],
+)
+def test_a_steel_ball_that_lands_in_the_first_step_leaves_as_fast(method, formulation, part):
+    """The start looked a tenth of a step ahead, into the contact: five times the energy and more."""
+    speed, h = 10.0, 2e-3
+    system, n = steel_ball(part * speed * h, speed)
+    motion = ff.integrate(system, method, 4 * h, h, formulation=formulation)
+    assert_allclose(motion.body("b").v[-1], speed * n, rtol=0, atol=OF_CONTACT * speed)
+    assert not motion.validity
+
+
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_schemes_from_body_to_body_resolve_contacts(scheme):
     """Restitution of a ball, a fast sphere on a sphere, stops of a slide."""
