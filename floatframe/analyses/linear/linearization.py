@@ -69,6 +69,8 @@ __all__ = ["LinearSystem", "NamedMotions", "linearize"]
 
 RANK = 1e-10  #: singular value of the scaled rows below which a row is redundant
 NOISE = 1e-10  #: relative to the largest component of a motion; smaller ones are rounding errors
+#: motion of a joint, by that of bodies that move as far as the farthest, below which it is a state of last choice
+FAINT = 1e-6
 #: largest distance of a state from rest, or its change per unit of time, relative to its size, in a steady motion
 STEADY = 1e-6
 TINY = float(np.finfo(float).tiny)
@@ -82,7 +84,8 @@ class NamedMotions:
     names: tuple[str, ...]
     units: tuple[str, ...]
     rows: Array  #: (n_names, n_z)
-    ranks: tuple[int, ...]  #: joint coordinates 0, modal coordinates 1, motions of body frames 2
+    #: joint coordinates 0, modal coordinates 1, motions of body frames 2, joint coordinates that hardly move 3
+    ranks: tuple[int, ...]
     time_unit: str
 
 
@@ -550,10 +553,14 @@ def named_motions(
 ) -> NamedMotions:
     """Return the joint coordinates that move, the modal coordinates and the motions of body frames, over z."""
     length, found = system.units.length_symbol, []
+    sizes = sizes_as_lengths(system)
+    N, by_bodies = without_noise(N, sizes), without_noise(by_bodies, sizes)
     for name, row in of_joints.items():
         unit = "rad" if name.rpartition(".")[2].startswith("angle") else length
-        found.append((name, unit, settled(row @ N, (row, N)), 0))
-    first, by_bodies = 0, without_noise(system, by_bodies)
+        over_z = settled(row @ N, (row, N))
+        most = np.abs(row) @ (1 / sizes) * (np.abs(N) * sizes[:, None]).max(axis=0, initial=0.0)
+        found.append((name, unit, over_z, 0 if (np.abs(over_z) > FAINT * most).any() else 3))
+    first = 0
     for body in system.bodies:
         n_q = body.reduced.n_q if isinstance(body, FlexibleBody) else 0
         rows = by_bodies[first : first + 6 + n_q]
@@ -567,14 +574,21 @@ def named_motions(
     return NamedMotions(names, units, rows, ranks, system.units.time_symbol)
 
 
-def without_noise(system: System, by_bodies: Array) -> Array:
+def sizes_as_lengths(system: System) -> Array:
+    """Return how far a unit of each motion of a body moves it, (n_u,): rotations by the length, modes by 1/sqrt(m)."""
+    compiled = compiled_system(system)
+    model = compiled.model
+    sizes = np.ones(int(model.bodies.u0[-1]))
+    for i, first in enumerate(map(int, model.bodies.u0[:-1])):
+        sizes[first + 3 : first + 6] = compiled.length
+        sizes[first + 6 : int(model.bodies.u0[i + 1])] = 1 / np.sqrt(model.body_types.mass[model.bodies.kind[i]])
+    return sizes
+
+
+def without_noise(motions: Array, sizes: Array) -> Array:
     """Return motions of bodies over z with zeros for what is rounding beside the largest of each column, as lengths."""
-    scale, first = np.ones(len(by_bodies)), 0
-    for body in system.bodies:
-        scale[first + 3 : first + 6] = compiled_system(system).length
-        first += 6 + (body.reduced.n_q if isinstance(body, FlexibleBody) else 0)
-    size = np.abs(by_bodies) * scale[:, None]
-    return np.where(size <= NOISE * size.max(axis=0, initial=0.0), 0.0, by_bodies)
+    size = np.abs(motions) * sizes[:, None]
+    return np.where(size <= NOISE * size.max(axis=0, initial=0.0), 0.0, motions)
 
 
 def seen_from(T: Array, mass: Array) -> Array:

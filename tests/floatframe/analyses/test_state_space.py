@@ -19,9 +19,15 @@ from floatframe import (
     ControlSensor,
     CoordinateChannel,
     JointCoordinate,
+    JointForce,
     Marker,
     ModelError,
+    RevoluteJoint,
+    RigidBody,
+    SphericalJoint,
     State,
+    System,
+    UniversalJoint,
     UserForce,
     consistent_state,
     integrate,
@@ -34,7 +40,7 @@ from floatframe import (
 )
 from floatframe.components.mechanisms import double_pendulum, pendulum
 from floatframe.model.bodies.mode_choice import with_modes
-from floatframe.model.rotations import euler_parameters, rotation_matrix
+from floatframe.model.rotations import euler_parameters, euler_parameters_of_rotation_vector, rotation_matrix
 
 LENGTH = 1.2
 
@@ -81,6 +87,41 @@ def test_transfer_functions_are_those_of_the_matrices(linear):
             found = space.C @ np.linalg.solve(s * np.eye(len(space.A)) - space.A, space.B) + space.D
             expected = each.response([f])[0]
             assert_allclose(found, expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize(("apart", "off"), [(1.0, 0.0), (1.0, 1e4), (1e-3, 1e4), (1e-8, 0.0)])
+def test_joint_coordinates_of_a_held_body_are_no_states(apart, off):
+    """A body spins on two points, and holds another one, whose universal joint to the ground moves by rounding alone.
+
+    Closed form: I phi'' + c phi' + k phi = e · (r × f) of a force f at r, I about the axis e. States of rounding had
+    entries of 1e15.
+    """
+    R = rotation_matrix(euler_parameters_of_rotation_vector(np.array([0.3, -0.5, 0.8])))
+    place, m, J, k, c = off * np.array([0.6, 0.8, -0.3]), 2.0, np.diag([0.1, 0.12, 0.14]), 30.0, 0.1
+    at_A, at_B = (place + R @ np.array(x) for x in ((0.1, 0.2, 0.05), (0.1, -0.2, 0.3)))
+    bodies = [RigidBody("A", m, J, position=at_A), RigidBody("B", 1.0, J, position=at_B)]
+
+    def marker(name, *x):
+        begin = {"A": at_A, "B": at_B, GROUND: np.zeros(3)}[name]
+        return Marker(name, position=place + R @ np.array(x) - begin)
+
+    joints = [
+        UniversalJoint("cross", marker(GROUND, 0, 0, 0), marker("B", 0, 0, 0), axis=R[:, 0], axis_b=R[:, 1]),
+        SphericalJoint("low", marker(GROUND, 0, 0, 0), marker("A", 0, 0, 0)),
+        SphericalJoint("high", marker(GROUND, 0, 0, apart), marker("A", 0, 0, apart)),
+        RevoluteJoint("hinge", marker("A", 0, 0, 0.3), marker("B", 0, 0, 0.3), axis=R[:, 2]),
+    ]
+    spring = JointForce("spring", "hinge", "angle", stiffness=k, damping=c)
+    system = System(bodies, joints, [spring], redundant="minimum-norm")
+    push, angle = Channel("push", marker("A", 0.3, 0.1, 0.2), R[:, 1]), CoordinateChannel("angle", "hinge", "angle")
+    space = named_state_space(linearize(system, inputs=[push], outputs=[angle]))
+    assert space.states == ("hinge.angle", "hinge.angle rate")
+    e, r = R[:, 2], R @ np.array([0.1, 0.2, 0.05])
+    inertia = e @ J @ e + m * (r @ r - (e @ r) ** 2)
+    close = 1e-9 + 10 * np.finfo(float).eps * max(off, 1.0) / apart  # rounding of places turns the axis
+    assert_allclose(space.A, [[0, 1], [-k / inertia, -c / inertia]], rtol=close, atol=0)
+    assert_allclose(space.B[1], -0.3 / inertia, rtol=close)  # the angle is that of B relative to A
+    assert_allclose(space.C, [[1, 0]], rtol=0, atol=close)
 
 
 def test_python_control_and_scipy_get_the_same_system(linear):

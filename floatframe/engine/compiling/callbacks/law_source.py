@@ -53,7 +53,8 @@ def add_value(digest: Any, value: Any, seen: set[int]) -> None:
 
 
 def add_function(digest: Any, function: FunctionType, seen: set[int]) -> None:
-    """Add the code of a function and all that its names stand for."""
+    """Add the code of a function, its module, which compiled code asks for, and all that its names stand for."""
+    digest.update(str(function.__module__).encode())
     add_code(digest, function.__code__)
     for cell in function.__closure__ or ():
         add_value(digest, cell.cell_contents, seen)

@@ -1,5 +1,7 @@
 """Where the machine code of laws of elements is kept."""
 
+from types import FunctionType
+
 from numba import njit
 from numba.core.caching import FunctionCache
 
@@ -25,3 +27,10 @@ def test_each_law_has_an_index_of_its_own_in_the_cache():
     """In one index, two processes that add a law each at the same moment give both the same file."""
     assert index_of(value_template, stiff) == index_of(value_template, stiff)
     assert len({index_of(template, law) for template in (value_template, given_template) for law in (stiff, soft)}) == 4
+
+
+def test_a_law_that_moved_to_another_module_is_compiled_anew():
+    """Its code in the cache asks for the module where it stood, which is gone."""
+    here, there = (FunctionType(stiff.__code__, {"__name__": name}) for name in ("here", "there"))
+    assert digest_of(njit(here)) != digest_of(njit(there))
+    assert digest_of(njit(here)) == digest_of(njit(FunctionType(stiff.__code__, {"__name__": "here"})))
