@@ -557,9 +557,9 @@ def named_motions(
     N, by_bodies = without_noise(N, sizes), without_noise(by_bodies, sizes)
     for name, row in of_joints.items():
         unit = "rad" if name.rpartition(".")[2].startswith("angle") else length
-        over_z = settled(row @ N, (row, N))
+        moved = settled(row @ N, (row, N))
         most = np.abs(row) @ (1 / sizes) * (np.abs(N) * sizes[:, None]).max(axis=0, initial=0.0)
-        found.append((name, unit, over_z, 0 if (np.abs(over_z) > FAINT * most).any() else 3))
+        found.append((name, unit, moved, 0 if (np.abs(moved) > FAINT * most).any() else 3))
     first = 0
     for body in system.bodies:
         n_q = body.reduced.n_q if isinstance(body, FlexibleBody) else 0
