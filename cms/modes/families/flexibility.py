@@ -214,7 +214,7 @@ class Flexibility:
         M_N = self.M @ motions
         G = motions.T @ M_N
         size = np.sqrt(np.maximum(np.diag(G), 0.0))
-        if not size.all() or la.eigvalsh(G / np.outer(size, size))[0] < 1e-10:
+        if not size.all() or la.eigvalsh(G / np.outer(size, size))[0] < 1e-12:
             raise BodyError(
                 f"body {self.condensed.body.name!r}: has no inertia in some rigid-body motion; free and attachment "
                 "modes need all of them; take constraint modes (guyan, craig-bampton), or add the missing mass"

@@ -18,7 +18,7 @@ from cms.linear_algebra.independent import (
     within,
 )
 from cms.linear_algebra.solvers.orientation import orientation
-from cms.linear_algebra.solvers.tall import combine, combined, inner, subtract
+from cms.linear_algebra.solvers.tall import combine, combined, inner, squares, subtract
 from cms.modes.families.mechanism import mechanism_words, rounding_of_energy, without_energy
 from cms.modes.mode_set import ModeSet
 from cms.reduction.basis.frames import FrameCondition
@@ -34,7 +34,10 @@ __all__ = ["FinishedBasis", "finish"]
 SUSPECT_ENERGY = 1e3
 #: rounding error in PhiᵀMPhi, below which shapes are formed directly from the columns of the set
 TRUSTED_ROUNDING = 1e-11
-ORTHONORMAL_DEFECT = 1e-9  #: largest accepted entry of Phi.T M Phi - 1
+ORTHONORMAL_DEFECT = 1e-9  #: largest accepted entry of Phi.T M Phi - 1, unless M is known less well
+LOST_MASS = 1e-6  #: largest rounding of M in the mass of a shape, relative
+LOST_STIFFNESS = 1e-2  #: the same of K in its stiffness; its frequency is then known to half of that
+MARGIN = 10.0  #: factor on the rounding of the masses of shapes, for that of products
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,12 +88,22 @@ def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedB
         again, defect = normalised_again(Phi, is_massive, products)
         Z, Phi = Z @ again, combined(Phi, again)
         omega2 = diagonal_within(gram_in_blocks(Phi, products.K), np.eye(len(again)))
-    is_suspect = is_massive & (omega2 < SUSPECT_ENERGY * rounding_of_energy(body, Phi))
+    rounding = rounding_of_energy(body, Phi)
+    is_suspect = is_massive & (omega2 < SUSPECT_ENERGY * rounding)
     suspect = in_memory(Phi[:, is_suspect])
     free = suspect[:, without_energy(body, suspect)]
     if free.shape[1]:
         raise BodyError(mechanism_words(body, free))
-    if defect > ORTHONORMAL_DEFECT:
+    of_mass = np.finfo(float).eps * squares(np.abs(body.M.diagonal()), Phi)[is_massive].max(initial=0.0)
+    of_stiffness = (rounding / np.maximum(omega2, np.finfo(float).tiny))[is_massive].max(initial=0.0)
+    for lost, most, words in ((of_mass, LOST_MASS, "mass"), (of_stiffness, LOST_STIFFNESS, "stiffness")):
+        if lost > most:
+            raise BodyError(
+                f"{where}: the {words} of a shape is known to {lost:.1e} of it only, expected {most:.0e}: the matrix "
+                "has it beside much larger terms, as torsion and bending of a thin wire across the mesh axes; "
+                "turn the mesh so that the wire lies along an axis, or make it thicker"
+            )
+    if defect > max(ORTHONORMAL_DEFECT, MARGIN * of_mass):
         raise ModeSetError(
             f"{where}: shapes are M-orthonormal to {defect:.1e} only, expected {ORTHONORMAL_DEFECT:.0e}; "
             "its columns are too ill-conditioned"

@@ -28,7 +28,7 @@ __all__ = [
     "determinate_rows", "frame_condition",
 ]  # fmt: skip
 
-NO_INERTIA = 1e-10  #: moment of inertia about an axis, relative to the largest one, below which there is none
+NO_INERTIA = 1e-12  #: moment of inertia about an axis, relative to the largest one, below which there is none
 RANK_TOLERANCE = 1e-8  #: smallest pivot of the held dofs: a lever arm divided by the extent of the nodes
 Axes = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 
@@ -287,6 +287,6 @@ def cholesky_of_inertia(name: str, rigid_mass: Array) -> tuple[Array, bool]:
         raise BodyError(
             f"body {name!r}: has no moment of inertia about {words} through its centre of mass, as where all "
             "masses lie on one line; no frame can turn with it: give masses an inertia (CONM2 I11 to I33, [masses.NAME]"
-            " inertia), or the beams a density"
+            f" inertia), or the beams a density (expected {NO_INERTIA:.0e} of the largest inertia)"
         )
     return la.cho_factor(rigid_mass)
