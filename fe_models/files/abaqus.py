@@ -32,7 +32,7 @@ _FACES = {
     "8": ("quad8", 8),
     "9": ("quad9", 9),
 }
-_FACE = re.compile(r"(?:STRI|S|DS|CPS|CPE|CPEG|M3D|SFM3D|R3D)(\d+)(?:R|RS|RSW|5|R5|H|I|T|RT)?$")
+_FACE = re.compile(r"(?:STRI|S|DS|CPS|CPE|CPEG|CAX|M3D|SFM3D|R3D)(\d+)(?:R|RS|RSW|5|R5|H|I|T|RT)?$")
 _LINES = {
     "B31": 2,
     "B31R": 2,

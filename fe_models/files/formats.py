@@ -35,7 +35,8 @@ FORMATS = (
         reads=True,
         key="cms job",
         tried="ANSYS 2019 R2",
-        lost="all but SOLID185, 186, 187, materials, components, supports, forces: each listed with its count",
+        lost="all but SOLID185, 186, 187, SHELL181, 281, materials, components, supports, forces: each listed with "
+        "its count",
     ),
     FileFormat(
         "input deck",

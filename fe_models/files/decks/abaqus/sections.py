@@ -23,6 +23,12 @@ __all__ = ["ellipses_in_numbers", "read_section"]
 
 _SHELLS = ("triangle", "triangle6", "quad", "quad8", "quad9")
 _LINES = ("line", "line3")
+#: first letters of elements -> why they are refused
+_PLANAR = {
+    "CPS": "plane stress along axes of its own (ORIENTATION)",
+    "CPE": "plane strain: a body that goes on without end across its plane; only plane stress (CPS) is a body",
+    "CAX": "axisymmetric: a body of revolution; mesh it in space",
+}
 ALONG = 1e-9  #: part of a vector across a line, below which it is along it
 
 
@@ -70,11 +76,14 @@ def _solid_section(here: str, block: DeckBlock, draft: Draft) -> None:
         if kind_name == "T3D2":
             _rods(name, block, draft, elements)
             continue
+        if kind_name.startswith("CPS") and kind in _SHELLS and "ORIENTATION" not in block.parameters:
+            _sheet(name, kind_name, block, draft, elements)
+            continue
         rule = SOLID_RULES[draft.program].get(kind_name)
         if rule is None:
-            why = (
-                "no solid, shell or beam in space" if kind_name.startswith(PLANE) else "this element is not known here"
-            )
+            is_plane = kind_name.startswith(PLANE)
+            why = "no solid, shell or beam in space" if is_plane else "this element is not known here"
+            why = next((text for start, text in _PLANAR.items() if kind_name.startswith(start)), why)
             draft.ledger.refuse(kind_name, why, count=len(elements), line=block.line_number)
             continue
         if rule[2]:
@@ -85,6 +94,16 @@ def _solid_section(here: str, block: DeckBlock, draft: Draft) -> None:
         orientation = block.parameters.get("ORIENTATION", "").strip('"')
         group = draft.cell_group(own, np.concatenate(parts))
         draft.solids.append(SolidSection(group, material, integration, mass, orientation))
+
+
+def _sheet(name: str, kind: str, block: DeckBlock, draft: Draft, elements: IntArray) -> None:
+    """Take plane stress elements as membranes of a planar body; their thickness is 1 where none is given."""
+    thickness = (numbers(block.lines[0])[0] if block.lines else 0.0) or 1.0
+    group = draft.cell_group(name if not draft.sheets else f"{name}_{kind}", elements)
+    draft.sheets.append(group)
+    draft.shells.append(ShellSection(group, _material_of(block, draft), thickness))
+    why = "a membrane with rotations at its nodes; the body is planar, plane = 'xy'"
+    draft.ledger.note(kind, why, count=len(elements), line=block.line_number)
 
 
 def _rods(name: str, block: DeckBlock, draft: Draft, elements: IntArray) -> None:

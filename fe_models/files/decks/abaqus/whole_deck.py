@@ -63,6 +63,7 @@ _NONLINEAR = {
 }  #: keyword -> why it cannot be taken over: these carry mass, stiffness or constraints
 #: keyword without blanks, which CalculiX lets one leave out -> keyword
 _SQUEEZED = {name.replace(" ", ""): name for name in (*PARAMETERS, *HARMLESS, *_NONLINEAR)}
+SAME_PLANE = 1e-9  #: differences in z of plane elements, relative to the size of the deck
 _FIRST = ("ELEMENT", "TRANSFORM", "SURFACE")  #: read before the others, which may stand above them
 _SILENT = ("STEP", "END STEP", "ENDSTEP", "NO ANALYSIS")
 
@@ -156,6 +157,19 @@ def _take(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
         draft.ledger.refuse(f"*{keyword}", "this keyword is not known here", line=block.line_number)
 
 
+def _check_plane(draft: Draft) -> None:
+    """Refuse plane stress elements beside elements in space, or out of a plane across z."""
+    if not draft.sheets:
+        return
+    if len(draft.shells) > len(draft.sheets) or draft.solids or draft.lines or draft.rods:
+        draft.ledger.refuse("CPS", "plane elements beside elements in space", count=len(draft.sheets))
+    points = draft.mesh.coordinates[
+        draft.mesh.rows_of(np.unique(np.concatenate([table[:, 1:].ravel() for _, _, table in draft.mesh.elements])))
+    ]
+    if np.ptp(points[:, 2]) > SAME_PLANE * max(np.ptp(points, axis=0)):
+        draft.ledger.refuse("CPS", "plane elements whose nodes do not lie in one plane across z")
+
+
 def _finished(path: Path, draft: Draft) -> Deck:
     """Return the deck of a draft whose blocks are all taken."""
     equations_in_basic_axes(draft)
@@ -167,6 +181,7 @@ def _finished(path: Path, draft: Draft) -> Deck:
     except ValueError as error:
         raise MeshError(f"{draft.where}: {error}") from error
     draft.close()
+    _check_plane(draft)
     supports = tuple(draft.supports_of_groups())
     mesh = raw_mesh_of(draft.mesh, [])
     if draft.moved:
@@ -205,5 +220,6 @@ def _finished(path: Path, draft: Draft) -> Deck:
         supports,
         tuple(draft.loads),
         tuple(draft.rods),
+        plane=2 if draft.sheets else None,
         lumped=frozenset(("rods",) if draft.program == "abaqus" else ()),
     )

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from fe_models.errors import MeshError
-from fe_models.files.decks.ansys.command_fields import COMMANDS, HARMLESS, check_columns, check_command
-from fe_models.files.decks.deck import Deck, DeckMaterial, Load, SolidSection, Support
+from fe_models.files.decks.ansys.command_fields import COMMANDS, HARMLESS, check_columns, check_command, says_something
+from fe_models.files.decks.deck import Deck, DeckLayer, DeckMaterial, Load, ShellSection, SolidSection, Support
 from fe_models.files.decks.ledger import Ledger
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.meshes.cells.raw_mesh import RawBlock, RawMesh
@@ -27,6 +27,7 @@ SOLIDS = {
     186: ("reduced", "14-point", ""),
     187: ("reduced", "consistent", ""),
 }
+SHELLS = {181: (4, "quad"), 281: (8, "quad8")}  #: element -> nodes, cell; equal third and fourth corners: a triangle
 _DOFS = {"UX": 0, "UY": 1, "UZ": 2, "ROTX": 3, "ROTY": 4, "ROTZ": 5}
 _FORCES = {"FX": 0, "FY": 1, "FZ": 2, "MX": 3, "MY": 4, "MZ": 5}
 #: element -> number of KEYOPT -> its values, and the integration that each means; "": as without it
@@ -34,6 +35,8 @@ KEYOPTS: dict[int, dict[int, dict[int, str]]] = {
     185: {2: {0: "", 2: "", 3: ""}},
     186: {2: {0: "reduced", 1: "full"}},
     187: {},
+    181: {1: {0: ""}, 3: {0: "", 2: ""}},
+    281: {1: {0: ""}},
 }
 OUTPUT_KEYOPTS = (4, 5, 8, 9, 10, 15)  #: output, layers, boundary layers of waves: they change no mass or stiffness
 DAMPING_LABELS = ("DMPR", "DMPS", "ALPD", "BETD")
@@ -61,6 +64,10 @@ class _Draft:
     constants: dict[int, dict[str, dict[int, float]]] = field(default_factory=dict)
     keyopts: dict[int, dict[int, int]] = field(default_factory=dict)  #: number of the type -> KEYOPT -> value
     is_lumped: bool = False  #: LUMPM,ON
+    section: int = 0  #: number of the last SECTYPE
+    #: number of a section -> thickness, material, angle of its layers, bottom to top
+    layers: dict[int, list[tuple[float, int, float]]] = field(default_factory=dict)
+    offsets: dict[int, str] = field(default_factory=dict)  #: number of a section -> MID, TOP or BOT
     held: dict[int, set[int]] = field(default_factory=dict)
     forces: dict[int, Array] = field(default_factory=dict)
 
@@ -85,8 +92,8 @@ def read_cdb_deck(path: Path, data: bytes) -> Deck:
         try:
             if name in COMMANDS:
                 check_command(name, words, draft.ledger, number)
-            if name in ("NBLOCK", "EBLOCK", "CMBLOCK"):
-                {"NBLOCK": _nodes, "EBLOCK": _elements, "CMBLOCK": _component}[name](here, words, lines, draft)
+            if name in BLOCKS:
+                BLOCKS[name](here, words, lines, draft)
             else:
                 _command(name, words, draft, number)
         except (ValueError, IndexError, StopIteration) as error:
@@ -154,6 +161,22 @@ def _component(here: str, words: list[str], lines: Iterator[tuple[int, str]], dr
     draft.components[words[1]] = (words[2].upper(), np.array(members, dtype=np.int64))
 
 
+def _section_block(here: str, words: list[str], lines: Iterator[tuple[int, str]], draft: _Draft) -> None:
+    """Layers of the last SECTYPE, one a line: thickness, material, angle, points."""
+    for _ in range(int(words[1])):
+        _, line = next(lines)
+        _layer([word.strip() for word in line.split(",")], draft)
+
+
+def _layer(words: list[str], draft: _Draft) -> None:
+    thickness, material, angle = (*words, "", "", "")[:3]
+    draft.layers.setdefault(draft.section, []).append((float(thickness), int(material or 0), float(angle or 0.0)))
+
+
+#: command -> reader of the lines below it
+BLOCKS = {"NBLOCK": _nodes, "EBLOCK": _elements, "CMBLOCK": _component, "SECBLOCK": _section_block}
+
+
 def _command(name: str, words: list[str], draft: _Draft, line: int) -> None:
     """Take one command, or count it."""
     if name == "ET" and len(words) > 2 and words[1].isdigit():
@@ -165,6 +188,16 @@ def _command(name: str, words: list[str], draft: _Draft, line: int) -> None:
         draft.constants.setdefault(int(words[2]), {})[words[1].upper()] = {1: float(words[3])}
     elif name in ("KEYOP", "KEYOPT") and len(words) > 3 and words[1].isdigit():
         draft.keyopts.setdefault(int(words[1]), {})[int(words[2])] = int(float(words[3] or 0))
+    elif name == "SECTYPE":
+        draft.section = int(words[1])
+        if words[2].upper() != "SHELL":
+            draft.ledger.refuse(name, f"TYPE = {words[2]}: only SHELL", line=line)
+    elif name == "SECDATA":
+        _layer(words[1:], draft)
+    elif name == "SECOFFSET":
+        draft.offsets[draft.section] = words[1].upper()
+    elif name == "SECCONTROL" and any(says_something(word) for word in words[1:] if word):
+        draft.ledger.refuse(name, "stiffness or mass that is added to a section", line=line)
     elif name == "LUMPM":
         draft.is_lumped = words[1].upper() == "ON" or (words[1].isdigit() and words[1] != "0")
     elif name == "SFE" and len(words) > 3 and words[3].upper() == "PRES":
@@ -194,9 +227,18 @@ def _deck(path: Path, draft: _Draft) -> Deck:
     if (np.diff(numbers[order]) == 0).any():
         raise MeshError(f"{draft.where}: nodes are defined twice; keep one of each")
     sections: dict[str, SolidSection] = {}
+    shells: dict[str, ShellSection] = {}
     cells: dict[tuple[str, str], tuple[list[int], list[list[int]]]] = {}
     for row in draft.elements:
         kind = draft.kinds.get(row[1], 0)
+        if kind in SHELLS:
+            found = _shell(draft, kind, row)
+            if found is not None:
+                shells[found[1].group] = found[1]
+                listed = cells.setdefault((found[0], found[1].group), ([], []))
+                listed[0].append(row[10])
+                listed[1].append(found[2])
+            continue
         if kind not in SOLIDS:
             draft.ledger.refuse(f"element {kind or 'of type ' + str(row[1])}", "this element is not known here")
             continue
@@ -241,6 +283,7 @@ def _deck(path: Path, draft: _Draft) -> Deck:
             given[f"node_{number}"] = tuple(force.tolist())
         loads.append(Load("forces", forces=given))
     used_materials = {row[0] for row in draft.elements}
+    used_materials |= {material for layers in draft.layers.values() for _, material, _ in layers}
     materials = {
         str(number): _material(draft, number, labels, number in used_materials)
         for number, labels in draft.constants.items()
@@ -252,9 +295,41 @@ def _deck(path: Path, draft: _Draft) -> Deck:
         draft.ledger,
         materials,
         solids=tuple(sections.values()),
+        shells=tuple(shells.values()),
         supports=tuple(supports),
         loads=tuple(loads),
+        lumped=frozenset(("shells",) if draft.is_lumped else ()),
     )
+
+
+def _shell(draft: _Draft, kind: int, row: list[int]) -> tuple[str, ShellSection, list[int]] | None:
+    """Return the cell of a shell element, its section and its nodes; None if it is refused.
+
+    The nodes lie on the middle surface, or on the top or bottom one (SECOFFSET). Layers of isotropic materials are read
+    as they are; directions of orthotropic ones would follow the axes of the element.
+    """
+    layers = draft.layers.get(row[3])
+    offset = draft.offsets.get(row[3], "MID")
+    n_nodes, cell = SHELLS[kind]
+    _integration(draft, row[1], kind)
+    materials = [material or row[0] for _, material, _ in layers or ()]
+    is_orthotropic = any(label in draft.constants.get(m, {}) for m in materials for label in ORTHOTROPIC)
+    if not layers or offset not in ("MID", "TOP", "BOT") or is_orthotropic or len(row) - COLUMNS < n_nodes:
+        why = f"section {row[3]}: expected SECBLOCK or SECDATA with thicknesses of isotropic materials"
+        draft.ledger.refuse(f"SHELL{kind}", f"{why}, and SECOFFSET MID, TOP or BOT")
+        return None
+    thickness = sum(t for t, _, _ in layers)
+    middle = {"MID": 0.0, "TOP": -thickness / 2, "BOT": thickness / 2}[offset]
+    group = f"sec_{row[3]}" + ("" if all(m for _, m, _ in layers) else f"_mat_{row[0]}")
+    section = ShellSection(group, str(materials[0]), thickness, middle)
+    if len(layers) > 1:
+        listed = tuple(DeckLayer(str(m), t) for (t, _, _), m in zip(layers, materials, strict=True))
+        section = replace(section, material="", layers=listed)
+    draft.ledger.note(f"SHELL{kind}", "flat shells in place of the elements of ANSYS")
+    n = row[COLUMNS : COLUMNS + n_nodes]
+    if n[2] == n[3]:
+        return ("triangle", section, n[:3]) if kind == 181 else ("triangle6", section, [*n[:3], n[4], n[5], n[7]])
+    return cell, section, n
 
 
 def _plain_type(draft: _Draft, number: int) -> bool:
@@ -270,7 +345,8 @@ def _integration(draft: _Draft, number: int, kind: int) -> str:
         if value in known:
             chosen = known[value] or chosen
         elif key not in OUTPUT_KEYOPTS:
-            draft.ledger.refuse(f"KEYOPT({key}) = {value} of SOLID{kind}", "this formulation is not known here")
+            name = "SHELL" if kind in SHELLS else "SOLID"
+            draft.ledger.refuse(f"KEYOPT({key}) = {value} of {name}{kind}", "this formulation is not known here")
     return chosen
 
 

@@ -8,7 +8,7 @@ refused by name.
 from fe_models.files.decks.field_table import TableField, has_default, parse_fields
 from fe_models.files.decks.ledger import Ledger
 
-__all__ = ["COLUMNS", "COMMANDS", "HARMLESS", "check_columns", "check_command", "fields_of_command"]
+__all__ = ["COLUMNS", "COMMANDS", "HARMLESS", "check_columns", "check_command", "fields_of_command", "says_something"]
 
 COMMANDS = {
     "NBLOCK": "NUMFIELD~ SOLKEY~ NDMAX~ NDSEL~", "EBLOCK": "NUM_NODES=19 SOLKEY~ NELMAX~ NELSEL~",
@@ -20,10 +20,12 @@ COMMANDS = {
     "F": "NODE LAB VALUE VALUE2~ NEND! NINC~ MESHFLAG~",
     "SFE": "ELEM~ LKEY~ LAB KVAL~ ...",
     "LUMPM": "KEY",
+    "SECTYPE": "SECID TYPE SUBTYPE~ NAME~ REFINEKEY~", "SECBLOCK": "N", "SECDATA": "...", "SECOFFSET": "LOCATION",
+    "SECCONTROL": "...",
     "ALPHAD": "VALUE^", "BETAD": "VALUE^", "DMPRAT": "RATIO^", "DMPSTR": "COEFF^", "DMPSTRUCT": "COEFF^",
     "MDAMP": "STLOC~ V1^ V2^ V3^ V4^ V5^ V6^",
 }  # fmt: skip
-COLUMNS = "MAT TYPE REAL~ SECNUM~ ESYS DEATH=0 SOLID~ SHAPE~ COUNT EXCLUDE~ NUMBER"
+COLUMNS = "MAT TYPE REAL~ SECNUM ESYS DEATH=0 SOLID~ SHAPE~ COUNT EXCLUDE~ NUMBER"
 #: commands that say nothing about the body: structure of the file, loads and controls of an analysis
 HARMLESS = frozenset(
     "ACEL ACELL ANTYPE AUTOTS BF BFE BFBLOCK BFEBLOCK BFUNIF CGLOC CGOMEGA CGOMGA CLOCAL CLWRITE CM CMDELE CMGRP "
@@ -50,12 +52,12 @@ def check_command(name: str, words: list[str], ledger: Ledger, line: int) -> Non
             continue
         if item.use == "default":
             ledger.refuse(name, f"{item.name} = {word}: this field is not taken over", line=line)
-        elif item.use == "left out" and _number(word):
+        elif item.use == "left out" and says_something(word):
             why = f"damping ({item.name} = {word}) is left out: give the job a table [damping]"
             ledger.note(name, why, line=line)
     has_rest = COMMANDS[name].endswith("...")
     for number, word in enumerate(words[len(fields) + 1 :], start=len(fields) + 1):
-        if word and not has_rest and _number(word):
+        if word and not has_rest and says_something(word):
             ledger.refuse(name, f"field {number} = {word}: this command has {len(fields)} fields here", line=line)
 
 
@@ -67,7 +69,7 @@ def check_columns(row: list[int], ledger: Ledger) -> None:
             ledger.refuse("EBLOCK", f"{item.name} = {value} of an element: this column is not taken over")
 
 
-def _number(word: str) -> bool:
+def says_something(word: str) -> bool:
     """Whether a field is text or a number that is not zero."""
     try:
         return float(word) != 0

@@ -86,7 +86,7 @@ def test_damaged_files_are_refused(tmp_path, old, new, words):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("ET,        1,186", "ET,        1,181", "40 element 181: this element is not known here"),
+        ("ET,        1,186", "ET,        1,188", "40 element 188: this element is not known here"),
         ("EXTOPT,ATTR", "CE,1,0,2,UX,1,3,UX,-1\nEXTOPT,ATTR", "1 CE "),
         ("EXTOPT,ATTR", "SWGEN,1\nEXTOPT,ATTR", "1 SWGEN .*: this command is not known here"),
         ("EXTOPT,ATTR", "KEYOP,1,6,1\nEXTOPT,ATTR", r"40 KEYOPT\(6\) = 1 of SOLID186"),

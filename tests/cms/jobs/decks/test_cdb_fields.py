@@ -26,6 +26,12 @@ CMBLOCK,LEFT,NODE,       4
 D,1,UX,0.
 F,2,FY,3.5
 LUMPM,0
+SECTYPE,1,SHELL
+SECOFFSET,MID
+SECBLOCK,1
+0.1,1,0.,3
+SECDATA,.1
+SECCONTROL,0
 ALPHAD,0.
 BETAD,0.
 DMPRAT,0.
@@ -86,6 +92,8 @@ READ = {
     "KEYOPT": {"ITYPE": None, "KNUM": "3", "VALUE": None}, "MP": {"LAB": "GXY", "MAT": None, "C0": ".2"},
     "MPDATA": {"LAB": "EY", "MAT": None, "STLOC": None}, "D": {"NODE": "2", "LAB": "UY"},
     "F": {"NODE": "3", "LAB": "FZ", "VALUE": "2."}, "SFE": {"LAB": None}, "LUMPM": {"KEY": "1"},
+    "SECTYPE": {"SECID": None, "TYPE": "BEAM"}, "SECBLOCK": {"N": None}, "SECDATA": {}, "SECOFFSET": {"LOCATION": None},
+    "SECCONTROL": {},
     "ALPHAD": {}, "BETAD": {}, "DMPRAT": {}, "DMPSTR": {}, "DMPSTRUCT": {}, "MDAMP": {},
 }  # fmt: skip
 
@@ -133,13 +141,17 @@ def test_every_field_changes_the_body_or_is_refused(tmp_path, name):
         assert "this command has" in after
 
 
+#: columns that solids do not read, but shells do (test_planar_and_shells.py)
+OF_SHELLS = {"SECNUM"}
+
+
 @pytest.mark.parametrize("item", parse_fields(COLUMNS.split()), ids=lambda item: item.name)
 def test_every_column_of_an_element_changes_the_body_or_is_refused(tmp_path, item):
     before = model_of(tmp_path)
     changed = {"MAT": 2, "TYPE": 2, "NUMBER": 7, "COUNT": 21, "ESYS": 11}.get(item.name, 3)
     commands = COMMANDS_OF_CUBE + ("MP,GXY,1,5.E10\n" if item.name == "ESYS" else "")
     after = model_of(tmp_path, commands, {item.name: changed})
-    if item.use in ("read", "default"):
+    if item.use in ("read", "default") and item.name not in OF_SHELLS:
         assert isinstance(after, str) or differs(before, after), item.name
     else:
         assert not differs(before, after), item.name
