@@ -27,7 +27,7 @@ class FoundNodes:
     names: tuple[str, ...]  #: the user's names of the nodes, (n,)
     place: Array  #: mean of the undeformed positions in mesh axes, (3,) [m]
 
-    def words(self) -> str:
+    def description(self) -> str:
         """Describe the selected place, and its distance from the requested one."""
         x = ", ".join(f"{value:.6g}" for value in self.place)
         if len(self.rows) == 1 and self.asked == f"node {self.names[0]}":

@@ -155,7 +155,7 @@ def print_peaks(
     unit = response_unit
     rows = []
     for motion, force in pairs:
-        magnitude = np.abs(shown(own, request.is_inertance)[:, motion, force])
+        magnitude = np.abs(plotted_response(own, request.is_inertance)[:, motion, force])
         found = peaks(own.frequencies, magnitude)[:6]
         where = ", ".join(f"{f:.5g}" for f in sorted(f for f, _ in found)) or "none in the band"
         rows.append((pair_words(motion, force), where, f"{magnitude.max():.4g}", unit(reduced, motion, force, request)))
@@ -175,7 +175,7 @@ def print_peaks(
         )
 
 
-def shown(response: FrequencyResponse, is_inertance: bool) -> np.ndarray:
+def plotted_response(response: FrequencyResponse, is_inertance: bool) -> np.ndarray:
     """Return inertance or receptance, (n_f, 6, 6)."""
     return response.inertance if is_inertance else response.H
 
@@ -209,7 +209,7 @@ def write_table(
         if response is None:
             continue
         for motion, force in pairs:
-            values = shown(response, is_inertance)[:, motion, force]
+            values = plotted_response(response, is_inertance)[:, motion, force]
             words = f"{source} {pair_words(motion, force)}"
             columns += [(f"{words} real", values.real), (f"{words} imag", values.imag)]
     stream = io.StringIO(newline="")

@@ -126,7 +126,7 @@ def show(part: "CadPart", faces: "Iterable[CadFace]") -> None:
     from fe_models.files.cad.face_selectors import face_words
 
     symbol = part.units.length_symbol
-    say(f"{part.path}: {part.words}")
+    say(f"{part.path}: {part.description}")
     say(f"size {vector_words(part.hi - part.lo)} {symbol}, from {vector_words(part.lo)} to {vector_words(part.hi)}")
     size = float(abs(part.hi - part.lo).max())
     rows = []

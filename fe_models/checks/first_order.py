@@ -60,7 +60,7 @@ class FirstOrderError:
         """Return the entries for the provenance of a body."""
         return {PROVENANCE: f"{self.error:.3g} {self.finding}"}
 
-    def words(self) -> str:
+    def description(self) -> str:
         """Describe the result, and what to do."""
         cures = {
             "tetra": "mesh with ten-node tetrahedra (tetra10)",

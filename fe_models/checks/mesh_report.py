@@ -193,7 +193,7 @@ def report_mesh(
         mass, centre = _mass(geometry, given, number)
     first_order = _first_order(mesh, materials, incompatible_modes, findings)
     if first_order is not None and first_order.error > FIRST_ORDER_NOTED:
-        findings.append(Finding("first-order", False, first_order.words()))
+        findings.append(Finding("first-order", False, first_order.description()))
     findings += [Finding("units", is_error, text) for is_error, text in implausible_units(units, size, given)]
     return MeshReport(
         source=mesh.source,

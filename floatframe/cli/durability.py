@@ -330,7 +330,7 @@ def print_result(result: "ShakeResult") -> None:
     for base in model.bases:
         x = ", ".join(f"{value:.6g}" for value in base.point)
         say(f"base {base.name}: holds {', '.join(base.holds) or 'the body, to the ground'}; forces about [{x}]")
-    say(f"damping: {result.job.damping.words}; uncertainty: {result.job.uncertainty.words}")
+    say(f"damping: {result.job.damping.description}; uncertainty: {result.job.uncertainty.description}")
     main = [k for k in range(len(masses.frequencies)) if masses.share[k].max() > 0.02][:15]
     print_table(
         "Modes with the base held that move more than 2 % of a mass or inertia [%]",

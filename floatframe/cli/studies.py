@@ -111,11 +111,11 @@ def headers(table: "StudyTable") -> list[str]:
 
 def print_study(table: "StudyTable") -> None:
     """Print the table, and the reasons of failed points."""
-    from floatframe.design.studies.study_plots import shown
+    from floatframe.design.studies.study_plots import value_label
 
     rows = [
         (
-            *(shown(value) for value in row.values),
+            *(value_label(value) for value in row.values),
             *(("failed",) * len(row.outputs) if row.error else (f"{value:.6g}" for value in row.outputs)),
         )
         for row in table.rows
@@ -126,7 +126,9 @@ def print_study(table: "StudyTable") -> None:
     if len(rows) > MOST_ROWS:
         say(f"... and {len(rows) - MOST_ROWS} more points, in the files written")
     for row in [row for row in table.rows if row.error][:5]:
-        point = ", ".join(f"{p.name} = {shown(v)}" for p, v in zip(table.study.parameters, row.values, strict=True))
+        point = ", ".join(
+            f"{p.name} = {value_label(v)}" for p, v in zip(table.study.parameters, row.values, strict=True)
+        )
         say(f"failed at {point}: {row.error}")
     if table.n_known:
         say(f"{table.n_known} of {len(table.rows)} points were in the journal")
@@ -255,11 +257,11 @@ def print_result(result: "LaboratoryResult") -> None:
     rows = []
     for r in result.cases:
         if r.failure:
-            rows.append((r.case.words, str(r.case.n_modes), "", "fails", "", "", "", r.failure))
+            rows.append((r.case.description, str(r.case.n_modes), "", "fails", "", "", "", r.failure))
             continue
         note = "" if not r.notes else r.notes[0] + (f" ({len(r.notes)} notes)" if len(r.notes) > 1 else "")
         told = (str(r.n_q), f"{100 * r.error:.3g}", r.worst, r.fails_first, f"{r.seconds:.3g}", note)
-        rows.append((r.case.words, str(r.case.n_modes), *told))
+        rows.append((r.case.description, str(r.case.n_modes), *told))
     settled = "" if result.settled is None else f", itself settled to {100 * result.settled:.2g} %"
     print_table(
         f"{result.name}, against {result.reference}{settled}",

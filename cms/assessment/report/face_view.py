@@ -70,7 +70,7 @@ def _scene(surface: CadSurface, direction: Array, up: Array, chosen: set[int], w
             for number, rows in surface.triangles.items()
         ),
         title=f"{part.path.name}: faces{words}",
-        captions=(part.words, f"{extent} {symbol}"),
+        captions=(part.description, f"{extent} {symbol}"),
         direction=direction,
         up=up,
         size=SIZE,

@@ -126,7 +126,7 @@ def eigenmodes(
     asked = mode_count(n_modes)
     wanted = ModeRequest.of(asked)
     if wanted.count is not None and wanted.count > n:
-        raise EigenError(f"eigenmodes: {asked.words}, but there are {n} dofs; choose n_modes <= {n}")
+        raise EigenError(f"eigenmodes: {asked.description}, but there are {n} dofs; choose n_modes <= {n}")
     if not TIGHTEST <= tolerance <= LOOSEST:
         raise EigenError(f"eigenmodes: tolerance = {tolerance:g}; expected {TIGHTEST:g} to {LOOSEST:g}")
     is_large_part = wanted.count is not None and 3 * wanted.count > n

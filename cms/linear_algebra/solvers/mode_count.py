@@ -47,7 +47,7 @@ class ModeCount:
             raise ModeSetError(f"n_modes: cutoff = {self.cutoff}: expected a finite frequency above 0")
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """Description for messages and records."""
         return f"n_modes = {self.n}" if self.cutoff is None else f"cutoff = {self.cutoff:g}"
 

@@ -194,7 +194,7 @@ def multilevel_modes(
     else:
         if SHARE * int(wanted.n or 0) > n > LEAF:
             raise ModeSetError(
-                f"multilevel: {wanted.words} of {n} interior dofs; expected at most 1 in {SHARE} of them; "
+                f"multilevel: {wanted.description} of {n} interior dofs; expected at most 1 in {SHARE} of them; "
                 "take craig-bampton"
             )
         highest = guessed_omega2(dissection, interior.K, interior.M, int(wanted.n or 0))
@@ -210,7 +210,7 @@ def multilevel_modes(
         if wanted.n is not None:
             if wanted.n > len(own):
                 raise EigenError(
-                    f"multilevel: {wanted.words}, but the substructures have {len(own)} modes up to {factor:g} "
+                    f"multilevel: {wanted.description}, but the substructures have {len(own)} modes up to {factor:g} "
                     "times the estimated frequency; choose a larger cutoff_factor, or fewer modes"
                 )
             bound = min(bound, factor**2 * _highest(own, mass, highest, wanted.n))  # (4)
@@ -229,8 +229,8 @@ def multilevel_modes(
     k = count if wanted.n is not None else int((modes.omega2 <= highest).sum())
     if wanted.n is None and k == p < kept.sum():
         raise EigenError(
-            f"multilevel: {wanted.words}: all {p} modes that take part came to lie below it, so that others may be "
-            "missing; choose a larger cutoff_factor"
+            f"multilevel: {wanted.description}: all {p} modes that take part came to lie below it, so that others "
+            "may be missing; choose a larger cutoff_factor"
         )
     errors = errors[:k]
     if (worst := errors > tolerance).any():

@@ -27,7 +27,7 @@ class ReductionCost:
     seconds: float  #: [s] of one processor, without factorisation and solves
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """Description in one line."""
         return (
             f"{self.n_columns} columns, about {self.memory / 1e9:.2g} GB of memory, a file of {self.file / 1e9:.2g} GB "
@@ -72,8 +72,8 @@ def large_interfaces(body: FEBody) -> list[str]:
     large = [interface for interface in body.interfaces if n_boundary(interface) >= MANY]
     if not large:
         return []
-    whole = reduction_cost(body, len(body.b)).words
-    fewer = reduction_cost(body, interface_reduction_size(body, PROPOSED), n_constraint_modes=len(body.b)).words
+    whole = reduction_cost(body, len(body.b)).description
+    fewer = reduction_cost(body, interface_reduction_size(body, PROPOSED), n_constraint_modes=len(body.b)).description
     return [
         f"body {body.name!r}: interface {interface.name!r} of {len(interface.nodes)} nodes has "
         f"{n_boundary(interface)} boundary dofs: as many static solves and modes of the body. With all of them: "

@@ -131,7 +131,7 @@ def stress_block(body: FEBody, rows: Rows) -> Block:
                 f"body {body.name!r}: recovery of {rows.quantity}: the model knows no stress at nodes (bare matrices, "
                 "or beams without a skin); ask for forces in its elements"
             )
-        nodes += shown(body, places, at, places.nodes(at, skin=True)).tolist()
+        nodes += stressed_nodes(body, places, at, places.nodes(at, skin=True)).tolist()
     for node in nodes:
         number, word = places.number(node), places.word(node)
         names += [RowName(rows.quantity, "node", number, word, c, dimensions) for c in STRESS_COMPONENTS]
@@ -179,7 +179,7 @@ def stress_values(body: FEBody, nodes: IntArray, points: list[int]) -> Callable[
     return values
 
 
-def shown(body: FEBody, places: Places, at: str | int, nodes: IntArray) -> IntArray:
+def stressed_nodes(body: FEBody, places: Places, at: str | int, nodes: IntArray) -> IntArray:
     """Return the nodes that have stress when the body deforms, without reference nodes and beam axes.
 
     Raises

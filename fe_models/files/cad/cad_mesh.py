@@ -54,7 +54,7 @@ class MeshSize:
                 f"mesh size: curvature: expected 3 to 1000 elements around a circle, or 0, got {self.curvature:g}"
             )
 
-    def words(self, symbol: str) -> str:
+    def description(self, symbol: str) -> str:
         """Return the size in words, with the symbol of the length unit."""
         curvature = f", {self.curvature:g} elements around a circle" if self.curvature else ""
         optimised = "" if self.optimise else ", not optimised"
@@ -170,5 +170,5 @@ def _require_whole(where: str, gmsh: ModuleType, advice: str) -> None:
 
 
 def _origin(part: CadPart, size: MeshSize, gmsh: ModuleType) -> dict[str, str]:
-    made = {"geometry": part.words, "mesh size": size.words(part.units.length_symbol)}
+    made = {"geometry": part.description, "mesh size": size.description(part.units.length_symbol)}
     return made | {"gmsh": str(gmsh.GMSH_API_VERSION)}

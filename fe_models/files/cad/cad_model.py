@@ -49,7 +49,7 @@ class CadPart:
     hi: Array
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """What the file is and how its unit met that of the job."""
         symbol = self.units.length_symbol
         unit = f"in {self.unit}, taken to {symbol}" if self.unit else f"without unit, its numbers taken as {symbol}"

@@ -47,7 +47,7 @@ class Rod:
         self.forces: tuple[Force, ...] = ()
         self.bodies: tuple[Body, ...]
         if reduced is None:
-            orientation = turned(end - start, np.array([1.0, 0.0, 0.0]))
+            orientation = rotation_onto(end - start, np.array([1.0, 0.0, 0.0]))
             self.bodies = (
                 RigidBody(
                     name,
@@ -61,7 +61,7 @@ class Rod:
             self.start, self.end = Marker(name), Marker(name, position=np.array([self.length, 0, 0]))
             return
         if not isinstance(reduced, ReducedBody):
-            part = reduced(name, position=start, orientation=turned(end - start, np.array([1.0, 0.0, 0.0])))
+            part = reduced(name, position=start, orientation=rotation_onto(end - start, np.array([1.0, 0.0, 0.0])))
             self.bodies, self.joints, self.forces = part.bodies, part.joints, part.forces
             self.start, self.end = (part.marker(place) for place in ends)
             return
@@ -71,7 +71,7 @@ class Rod:
             raise ModelError(
                 f"rod {name!r}: its interfaces {ends[0]} and {ends[1]} are {size:.6g} apart, expected {self.length:.6g}"
             )
-        orientation = turned(end - start, b - a)
+        orientation = rotation_onto(end - start, b - a)
         position = start - rotation_matrix(orientation) @ a
         self.bodies = (FlexibleBody(name, reduced, position=position, orientation=orientation),)
         self.start, self.end = Marker(name, ends[0]), Marker(name, ends[1])
@@ -97,7 +97,7 @@ def between(reduced: ReducedBody, interface: str) -> Array:
     return np.asarray(reduced.frame.origin + reduced.frame.axes @ reduced.interface(interface).position)
 
 
-def turned(to: Array, direction: Array) -> Array:
+def rotation_onto(to: Array, direction: Array) -> Array:
     """Return Euler parameters, (4,), of the smallest rotation that takes one direction to another."""
     a, b = direction / np.linalg.norm(direction), to / np.linalg.norm(to)
     axis, cosine = np.cross(a, b), float(a @ b)

@@ -22,7 +22,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
 from floatframe.components.rails.profile import Profile
-from floatframe.components.rails.standard_profiles import GAUGE_DEPTH, inclined, rail_60e1, turned, wheel_s1002
+from floatframe.components.rails.standard_profiles import GAUGE_DEPTH, inclined, rail_60e1, rotated_rail, wheel_s1002
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import number
 
@@ -92,7 +92,7 @@ class Pair:
     @cached_property
     def gauge_point(self) -> float:
         """Position y of the gauge face on the head, the innermost point within 14 mm below its top, y < 0 [m]."""
-        y, z, _ = turned(self.rail, self.inclination)
+        y, z, _ = rotated_rail(self.rail, self.inclination)
         inner = slice(0, int(np.argmax(z)) + 1)
         y, z = y[inner], z[inner]
         if z[0] > -GAUGE_DEPTH:

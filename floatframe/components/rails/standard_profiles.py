@@ -9,7 +9,7 @@ from floatframe.components.rails.profile import Profile
 from floatframe.errors import ModelError
 from floatframe.model.checked_values import number
 
-__all__ = ["GAUGE_DEPTH", "PROFILES", "cone", "inclined", "rail_60e1", "s1002", "turned", "wheel_s1002"]
+__all__ = ["GAUGE_DEPTH", "PROFILES", "cone", "inclined", "rail_60e1", "rotated_rail", "s1002", "wheel_s1002"]
 
 GAUGE_DEPTH = 0.014  #: depth below the top of the rails at which the gauge is measured [m]
 SPACING = 1e-4  #: spacing of the points that represent a curve [m]
@@ -149,7 +149,7 @@ def inclined(rail: Profile, inclination: float) -> Profile:
     The outer side of an inclined rail is higher than before: heights become about z + inclination y. Parts that are
     then undercut, or steeper than STEEPEST, are removed.
     """
-    y, z, angle = turned(rail, inclination)
+    y, z, angle = rotated_rail(rail, inclination)
     top = int(np.argmax(z))
     flat = np.diff(y) * STEEPEST > np.abs(np.diff(z))
     last = top + int(np.argmin(np.append(flat[top:], False)))
@@ -157,7 +157,7 @@ def inclined(rail: Profile, inclination: float) -> Profile:
     return replace(rail, y=y[first : last + 1], z=z[first : last + 1], inclination=rail.inclination + angle)
 
 
-def turned(rail: Profile, inclination: float) -> tuple[Array, Array, float]:
+def rotated_rail(rail: Profile, inclination: float) -> tuple[Array, Array, float]:
     """Return all points of a rail rotated inward, including its sides, with the top at z = 0, and the angle [rad]."""
     angle = float(np.arctan(number("inclination of the rail", inclination)))
     if abs(angle) > 0.2:

@@ -43,7 +43,7 @@ def along(c, a, s, b):
 
 
 @register_jitable(error_model="numpy")
-def turned(x, m, a):
+def rotated_vector(x, m, a):
     """Return in ground axes a vector a given in axes of marker m: A a."""
     return (
         x[m, 3] * a[0] + x[m, 4] * a[1] + x[m, 5] * a[2],
@@ -88,7 +88,7 @@ def contact(x, data):
         Length of the road that is left, ahead or behind [m].
     """
     R_0, at = data[RADIUS], int(data[ROAD])
-    e = turned(x, 1, (data[AXIS], data[AXIS + 1], data[AXIS + 2]))
+    e = rotated_vector(x, 1, (data[AXIS], data[AXIS + 1], data[AXIS + 2]))
     apart = x[1, 0] - x[0, 0], x[1, 1] - x[0, 1], x[1, 2] - x[0, 2]
     c = turned_back(x, 0, apart)  # in axes of the road
     e_road = turned_back(x, 0, e)
@@ -110,7 +110,7 @@ def contact(x, data):
         up = cross(x_road, e_road)
         rho = h / cosine
         foot_x, foot_y = c[0] - rho * up[0], c[1] - rho * up[1]
-    x_W, normal, u = turned(x, 0, x_road), turned(x, 0, n), turned(x, 0, up)
+    x_W, normal, u = rotated_vector(x, 0, x_road), rotated_vector(x, 0, n), rotated_vector(x, 0, up)
     y_W = cross(normal, x_W)
     point = x[1, 0] - rho * u[0], x[1, 1] - rho * u[1], x[1, 2] - rho * u[2]
     arm = -rho * u[0], -rho * u[1], -rho * u[2]  # (3)
@@ -146,7 +146,7 @@ def moved(x, data):
     axis = data[AXIS], data[AXIS + 1], data[AXIS + 2]
     c = turned_back(x, 0, (x[1, 0] - x[0, 0], x[1, 1] - x[0, 1], x[1, 2] - x[0, 2]))
     gone = c[0] - data[CENTRE_AT], c[1] - data[CENTRE_AT + 1], c[2] - data[CENTRE_AT + 2]
-    e = turned_back(x, 0, turned(x, 1, axis))
+    e = turned_back(x, 0, rotated_vector(x, 1, axis))
     length = np.sqrt(e[0] * e[0] + e[1] * e[1])
     ahead = e[1] / length, -e[0] / length
     turn, lean = 0.0 * gone[0], 0.0 * gone[0]

@@ -236,7 +236,7 @@ def body_study(
     condition = frame_condition(body, TisserandFrame())
     results = []
 
-    def told(result: SetError) -> None:
+    def report(result: SetError) -> None:
         results.append(result)
         if on_case is not None:
             on_case(result)
@@ -251,18 +251,18 @@ def body_study(
                 )
             except (CmsError, ReportedError) as error:
                 for key in loadings:
-                    told(SetError(key, set_name, n_modes, failure=str(error)))
+                    report(SetError(key, set_name, n_modes, failure=str(error)))
                 continue
             for key, each in loadings.items():
                 system = replace(with_body(each.system, name, [reduced], stiffening=False), sensors=())
                 try:
                     motion = integrate(system, each.integrator, each.t_end, each.h)
                 except ReportedError as error:
-                    told(SetError(key, set_name, n_modes, reduced.n_q, failure=str(error)))
+                    report(SetError(key, set_name, n_modes, reduced.n_q, failure=str(error)))
                     continue
                 q = motion.body(name).q[:: each.every].T
                 forces = {b: bushing_force(system, name, motion, b)[:: each.every] for b in full[key].forces}
-                told(
+                report(
                     SetError(
                         key, set_name, n_modes, reduced.n_q, references[key].errors(Phi, q),
                         {place: references[key].history_error(rows, Phi, q) for place, rows in (stress or {}).items()},

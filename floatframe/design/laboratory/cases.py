@@ -32,7 +32,7 @@ class Case:
         return (self.mode_set, self.frame, self.stiffening, self.parts)
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """The case in words, without the number of modes."""
         parts = f", {self.parts} parts" if self.parts > 1 else ""
         return f"{self.mode_set}, {self.frame}{'' if self.stiffening else ', linear'}{parts}"

@@ -30,7 +30,7 @@ class ExactBeam:
             raise ModelError(f"exact beam: elements: expected a whole number from 1, got {self.elements}")
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """The reference in words."""
         return "geometrically exact beams"
 

@@ -39,7 +39,7 @@ def convergence_figure(result: LaboratoryResult) -> "Figure":
         error = np.maximum([r.error for r in rows], FLOOR)
         style = {"color": COLORS[k % 8], "marker": MARKERS[k // 8 % 8 if len(families) > 8 else k], "markersize": 4.5,
                  "linewidth": 1.4, "linestyle": "-" if rows[0].case.stiffening else "--"}  # fmt: skip
-        left.plot([r.n_q for r in rows], error, label=rows[0].case.words, **style)
+        left.plot([r.n_q for r in rows], error, label=rows[0].case.description, **style)
         right.plot([r.seconds for r in rows], error, **style)
     left.set(xlabel="modal coordinates", ylabel="largest error / range of the reference", yscale="log")
     right.set(xlabel="processor time of the run [s]", xlim=(0, None))

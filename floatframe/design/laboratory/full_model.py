@@ -26,7 +26,7 @@ class FullModel:
     most_dofs: int = MOST_DOFS  #: more are refused: matrices are dense, a factorisation costs their third power
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """The reference in words."""
         return "the full finite element model"
 

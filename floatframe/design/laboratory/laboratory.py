@@ -200,25 +200,25 @@ def study(
             return Run(changed, columns, np.asarray(motion.t), seconds, notes)
 
         def run(case: Case) -> None:
-            with stages(f"reduce {case.words}, {case.n_modes} modes"):
+            with stages(f"reduce {case.description}, {case.n_modes} modes"):
                 changed = with_body(system, body, shelf.reduced(case), stiffening=case.stiffening)
-            with stages(f"run {case.words}, {case.n_modes} modes"):
+            with stages(f"run {case.description}, {case.n_modes} modes"):
                 found[case] = moved(changed)
 
         if isinstance(reference, Case):
             run(reference)
-            told = found[reference].reference(f"{reference.words}, {reference.n_modes} modes")
+            told = found[reference].reference(f"{reference.description}, {reference.n_modes} modes")
         elif isinstance(reference, FullModel):
             with stages("full model"):
                 whole = shelf.unreduced(reference)
                 told = moved(with_body(system, body, [whole], stiffening=whole.geometric is not None)).reference(
-                    f"{reference.words}, {whole.n_q} shapes"
+                    f"{reference.description}, {whole.n_q} shapes"
                 )
         elif isinstance(reference, ExactBeam):
             coarse, fine = (with_exact_beams(system, body, shelf.model(), k * reference.elements) for k in (1, 2))
             with stages("exact beams"):
                 before, after = moved(coarse), moved(fine)
-            told = after.reference(f"{reference.words}, twice {reference.elements} elements")
+            told = after.reference(f"{reference.description}, twice {reference.elements} elements")
             settled = {name: distance(before.columns[name], values, float(np.ptp(values)) or 1.0) / 3
                        for name, values in told.columns.items()}  # fmt: skip
             lost = [name for name in wanted if name not in {sensor.name for sensor in fine.sensors}]

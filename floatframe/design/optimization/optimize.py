@@ -144,13 +144,13 @@ def best_of(design: Design, history: Sequence[Evaluated]) -> Evaluated:
         nearest = min(history, key=lambda row: row.violation)
         raise ModelError(
             f"{design.source}: none of {len(history)} evaluations keeps all constraints; the nearest one, at "
-            f"{told(design, nearest.evaluation.values)}, misses a limit by {nearest.violation:.3g} of it; widen limits "
-            "or bounds, or begin elsewhere"
+            f"{values_of(design, nearest.evaluation.values)}, misses a limit by {nearest.violation:.3g} of it; widen "
+            "limits or bounds, or begin elsewhere"
         )
     return min(kept, key=lambda row: row.objective)
 
 
-def told(design: Design, values: Iterable[float]) -> str:
+def values_of(design: Design, values: Iterable[float]) -> str:
     """Return values of the parameters in words."""
     return ", ".join(f"{p.name} = {value:.6g}" for p, value in zip(design.parameters, values, strict=True))
 
@@ -241,7 +241,7 @@ class Evaluator:
                 reason = self.at([ends[k][0]])[0].evaluation.error
                 name = self.design.parameters[k].name
                 raise ModelError(
-                    f"{self.design.source}: no derivative by {name} at {told(self.design, self.values(z))}: the "
+                    f"{self.design.source}: no derivative by {name} at {values_of(self.design, self.values(z))}: the "
                     f"evaluations beside it fail: {reason}; take narrower bounds, or differential-evolution"
                 )
             upper, lower = (of(self.at([p])[0].evaluation) for p in sides)

@@ -53,7 +53,7 @@ def plot_study_output(table: StudyTable, name: str, ax: "Axes") -> "Axes":
     for i, curve in enumerate(curves):
         rows = np.array([repr(other) == curve for other in others])
         other = next(o for o in others if repr(o) == curve)
-        told = ", ".join(f"{p.name} = {shown(v)}" for p, v in zip(study.parameters[1:], other, strict=False))
+        told = ", ".join(f"{p.name} = {value_label(v)}" for p, v in zip(study.parameters[1:], other, strict=False))
         color = f"C{i}" if len(curves) <= MOST_CURVES else "C0"
         label = told if told and len(curves) <= MOST_CURVES else None
         ax.plot(x[rows], values[rows], "o-", markersize=4, linewidth=1.4, color=color, label=label)
@@ -67,7 +67,7 @@ def plot_study_output(table: StudyTable, name: str, ax: "Axes") -> "Axes":
         if span >= 50 and len(steps):
             ax.set_xscale("log")
     else:
-        ax.set_xticks(range(len(first.values)), [shown(value) for value in first.values])
+        ax.set_xticks(range(len(first.values)), [value_label(value) for value in first.values])
     unit = table.units[k]
     take = study.outputs[k].take
     ax.set_xlabel(f"{first.name} ({first.path})" if first.name != first.path else first.path)
@@ -78,6 +78,6 @@ def plot_study_output(table: StudyTable, name: str, ax: "Axes") -> "Axes":
     return ax
 
 
-def shown(value: object) -> str:
+def value_label(value: object) -> str:
     """Return a value of a parameter in a short form."""
     return f"{value:g}" if isinstance(value, int | float) and not isinstance(value, bool) else str(value)

@@ -131,7 +131,7 @@ def with_factors(curve: SNCurve, factors: Mapping[str, float | FactorSection], m
     strength = (material.tensile_strength or 0.0) * STRESS_UNITS[material.stress_unit] / 1e6  # [MPa]
     for name, factor in factors.items():
         if isinstance(factor, FactorSection):
-            curve = curve.scaled(factor.value(strength), f"factor {name} ({factor.words})")
+            curve = curve.scaled(factor.value(strength), f"factor {name} ({factor.description})")
         else:
             curve = curve.scaled(factor, f"factor {name}")
     return curve

@@ -148,7 +148,7 @@ def of_group(what: str, group: str, known: Mapping[str, tuple[float, float]]) ->
 class FactorMethod:
     """A formula as the fatigue file names it."""
 
-    words: str
+    description: str
     needs: tuple[str, ...]  #: keys beside the method
     needs_strength: bool
     value: Callable[[Mapping[str, Number], float], float]  #: of the keys and the tensile strength [MPa]

@@ -135,10 +135,10 @@ class FactorSection(Table):
         return FACTOR_METHODS[self.method].value(given, tensile_strength)
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """The formula and what went in."""
         method = FACTOR_METHODS[self.method]
-        return f"{method.words}, " + ", ".join(f"{key} {getattr(self, key)}" for key in method.needs)
+        return f"{method.description}, " + ", ".join(f"{key} {getattr(self, key)}" for key in method.needs)
 
 
 def factor(value: Any) -> Any:

@@ -69,7 +69,7 @@ class MeanStress:
         return MEAN_STRESS[self.name][0]
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """The correction and its number in words."""
         key = MEAN_STRESS[self.name][1].replace("_", " ")
         return f"{self.name} ({key} {self.value:.6g})" if key else self.name

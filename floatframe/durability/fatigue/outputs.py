@@ -40,14 +40,14 @@ def fatigue_record(made: Assessment) -> dict[str, Any]:
         "programme": {"amount": programme.amount, "unit": programme.unit, "target": programme.target},
         "criterion": result.criterion.name,
         "tensor": result.criterion.tensor,
-        "mean_stress": result.mean_stress.words,
+        "mean_stress": result.mean_stress.description,
         "method": result.method_words,
         "curve": curve_record(result.curve, next(iter(given.all_materials.values())).stress_unit),
         "materials": [
             {
                 "name": material.name,
                 "n_places": int((result.material == number).sum()),
-                "mean_stress": material.mean_stress.words,
+                "mean_stress": material.mean_stress.description,
                 "curve": curve_record(material.curve, section.stress_unit),
             }
             for number, (material, section) in enumerate(
@@ -88,7 +88,7 @@ def place_record(made: Assessment, place: int) -> dict[str, Any]:
     x, y, z = (float(value) for value in result.positions(np.array([place]))[0])
     return {
         "node": result.name(place),
-        "place": result.words(place),
+        "place": result.description(place),
         "material": result.materials[result.material[place]].name,
         "x": x,
         "y": y,
@@ -199,12 +199,12 @@ def fatigue_scene(made: Assessment) -> Scene:
     at = result.positions(order)
     worst = separated(at, 0.08 * size)
     labels = tuple(
-        Triad(at[k], np.eye(3), size=1e-6 * size, label=f"{k + 1}: {result.words(int(order[k]))}")
+        Triad(at[k], np.eye(3), size=1e-6 * size, label=f"{k + 1}: {result.description(int(order[k]))}")
         for k in worst[:NUMBERED]
     )
     direction, up = towards(made, order)
     life = made.life[order[0]] if len(order) else math.inf
-    first = result.words(int(order[0])) if len(order) else "none"
+    first = result.description(int(order[0])) if len(order) else "none"
     return Scene(
         surfaces=(Surface(body.surface, points, scalars),),
         triads=labels,

@@ -77,7 +77,7 @@ class FatigueResult:
         """Return what the user calls a place: the number of a node, the name of a stress point."""
         return name_of(self.body, int(self.nodes[place]), int(self.points[place]))
 
-    def words(self, place: int) -> str:
+    def description(self, place: int) -> str:
         """Return a place in words: "node 17", "beam 3 end A point 0"."""
         return f"node {self.name(place)}" if self.nodes[place] != NONE else self.name(place)
 

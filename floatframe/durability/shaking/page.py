@@ -18,7 +18,7 @@ from floatframe.durability.shaking.page_charts import (
     sine_chart,
     spectra_chart,
 )
-from floatframe.durability.shaking.record import conversions, in_tables, level_scale, told, worst_nodes
+from floatframe.durability.shaking.record import conversions, in_tables, level_scale, reported_rows, worst_nodes
 from floatframe.durability.shaking.shake import ShakeResult
 
 __all__ = ["shake_html"]
@@ -57,8 +57,8 @@ def header(result: ShakeResult, title: str) -> str:
     facts = (
         f"mass {model.mass[0, 0]:.5g} {model.units.mass_symbol}; base {held}; {len(model.omega)} modes from "
         f"{masses.frequencies[0]:.4g} to {masses.frequencies[-1]:.4g} Hz with the base held; damping "
-        f"{result.job.damping.words}; "
-        f"uncertainty {result.job.uncertainty.words}"
+        f"{result.job.damping.description}; "
+        f"uncertainty {result.job.uncertainty.description}"
     )
     figures = [(f"{masses.frequencies[0]:.4g} Hz", "first mode on the base")]
     for name in ("x", "y", "z"):
@@ -102,7 +102,7 @@ def summary_section(result: ShakeResult) -> Section:
     rows = []
     for run, peaks, uncertain, what in every_run(result):
         best: dict[str, int] = {}
-        for k in told(run.outputs, peaks):
+        for k in reported_rows(run.outputs, peaks):
             kind = run.outputs[k].kind
             if kind not in best or peaks[k] > peaks[best[kind]]:
                 best[kind] = k
@@ -194,7 +194,7 @@ def kind_charts(result: ShakeResult, run, peaks, key: str, chart) -> tuple[str, 
     """Return one figure for each kind of output that a run has."""
     charts, figures = {}, []
     for kind in KINDS:
-        if not any(run.outputs[k].kind == kind for k in told(run.outputs, peaks)):
+        if not any(run.outputs[k].kind == kind for k in reported_rows(run.outputs, peaks)):
             continue
         if kind == "stress" and any(o.kind == "von Mises" for o in run.outputs):
             continue
@@ -220,7 +220,7 @@ def sine_section(result: ShakeResult, run: SineRun, number_: int) -> Section:
     headings = ["output", "amplitude>", "at Hz>", "amplification>", "quasi-static>", "with uncertainty>"]
     headings += ["swept>"] * (swept is not None) + ["notched>"] * (notched is not None) + ["unit"]
     rows = []
-    for k in told(run.outputs, run.peaks):
+    for k in reported_rows(run.outputs, run.peaks):
         s, unit = in_tables(result.model, run.outputs[k])
         at = int(run.sizes[:, k].argmax())
         still = run.static[at, k]
@@ -292,7 +292,7 @@ def random_section(result: ShakeResult, run: RandomRun, number_: int) -> Section
     headings = ["output", "rms>", "3 sigma>", "crossings [1/s]>"] + ["largest expected>"] * (run.expected is not None)
     headings += ["rms with uncertainty>"] + ["rms notched>"] * (notched is not None) + ["unit"]
     rows = []
-    for k in told(run.outputs, run.rms):
+    for k in reported_rows(run.outputs, run.rms):
         s, unit = in_tables(result.model, run.outputs[k])
         is_von_mises = run.outputs[k].kind == "von Mises"
         place = run.von_mises.get(run.outputs[k].group) if is_von_mises else None
@@ -390,7 +390,7 @@ def time_section(result: ShakeResult, run: TimeRun, number_: int) -> Section:
             height=400,
         )
     rows = []
-    for k in told(run.outputs, run.peaks):
+    for k in reported_rows(run.outputs, run.peaks):
         s, unit = in_tables(result.model, run.outputs[k])
         rows.append(
             [
@@ -437,7 +437,7 @@ def method_section(result: ShakeResult) -> Section:
         ),
         (
             "uncertainty",
-            result.job.uncertainty.words
+            result.job.uncertainty.description
             + ": largest transfer function within the share of the frequency, times the factor",
         ),
         (

@@ -11,7 +11,7 @@ from floatframe.durability.shaking.loads.notching import NotchedRun
 from floatframe.durability.shaking.loads.random_vibration import RandomRun
 from floatframe.durability.shaking.loads.shock import TimeRun
 from floatframe.durability.shaking.loads.sine import SineRun
-from floatframe.durability.shaking.record import in_tables, level_scale, told
+from floatframe.durability.shaking.record import in_tables, level_scale, reported_rows
 from floatframe.durability.shaking.shake import EffectiveMasses
 from floatframe.durability.shaking.structure.model import Output, ShakenModel
 
@@ -42,7 +42,7 @@ def log_log(x: str, y: str) -> Chart:
 
 def largest(outputs: Sequence[Output], sizes: Array, kind: str) -> list[int]:
     """Return the outputs of a kind with the largest values, at most MOST_LINES, in their order."""
-    keep = [k for k in told(tuple(outputs), sizes) if outputs[k].kind == kind]
+    keep = [k for k in reported_rows(tuple(outputs), sizes) if outputs[k].kind == kind]
     return sorted(sorted(keep, key=lambda k: -sizes[k])[:MOST_LINES])
 
 

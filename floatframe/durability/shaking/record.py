@@ -74,8 +74,8 @@ def shake_record(result: ShakeResult) -> dict[str, Any]:
             {"name": base.name, "holds": list(base.holds), "point": plain(base.point), "axes": plain(base.axes)}
             for base in model.bases
         ],
-        "damping": result.job.damping.words,
-        "uncertainty": result.job.uncertainty.words,
+        "damping": result.job.damping.description,
+        "uncertainty": result.job.uncertainty.description,
         "notes": list(result.notes),
         "mass_matrix": plain(model.mass),
         "modes": [
@@ -255,7 +255,7 @@ def table_rows(result: ShakeResult) -> list[tuple[Any, ...]]:
     """Return one row an output and run, as `COLUMNS` names them; what is rounding of zero is left out."""
     model, rows = result.model, []
     for sine in result.sine:
-        scale, keep = factors(model, sine.outputs), told(sine.outputs, sine.peaks)
+        scale, keep = factors(model, sine.outputs), reported_rows(sine.outputs, sine.peaks)
         swept, notched = sine.swept_peaks, result.notched.get(("sine", sine.test, sine.direction))
         static = sine.static.max(axis=0)
         for k in keep:
@@ -279,7 +279,7 @@ def table_rows(result: ShakeResult) -> list[tuple[Any, ...]]:
                 )
             )
     for random in result.random:
-        scale, keep = factors(model, random.outputs), told(random.outputs, random.rms)
+        scale, keep = factors(model, random.outputs), reported_rows(random.outputs, random.rms)
         notched = result.notched.get(("random", random.test, random.direction))
         for k in keep:
             o, s = random.outputs[k], scale[k]
@@ -303,7 +303,7 @@ def table_rows(result: ShakeResult) -> list[tuple[Any, ...]]:
                 )
             )
     for run in result.time:
-        scale, keep = factors(model, run.outputs), told(run.outputs, run.peaks)
+        scale, keep = factors(model, run.outputs), reported_rows(run.outputs, run.peaks)
         for k in keep:
             o, s = run.outputs[k], scale[k]
             rows.append(
@@ -327,7 +327,7 @@ def table_rows(result: ShakeResult) -> list[tuple[Any, ...]]:
     return [tuple(float(v) if isinstance(v, np.floating) else v for v in row) for row in rows]
 
 
-def told(outputs: tuple[Output, ...], values: Array) -> list[int]:
+def reported_rows(outputs: tuple[Output, ...], values: Array) -> list[int]:
     """Return the outputs that are more than rounding beside others of their kind."""
     largest: dict[str, float] = {}
     for output, value in zip(outputs, values, strict=True):

@@ -34,7 +34,7 @@ class ResamplingReport:
     above_nyquist: float  #: part of the mean square, without the mean, above half the new rate
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """One line."""
         change = [100 * (b - a) / a if a else 0.0 for a, b in ((self.peak_before, self.peak_after),
                                                                 (self.rms_before, self.rms_after))]  # fmt: skip
@@ -116,7 +116,7 @@ def resampled(signal: Signal, rate: float, *, anti_alias: bool = True) -> tuple[
         new_values = np.interp(times, signal.time, values)
     result = Signal(signal.name, times[: len(new_values)], new_values, signal.unit, (*signal.notes, *notes))
     report = compared(given, result, rate)
-    return replace(result, notes=(*result.notes, report.words)), report
+    return replace(result, notes=(*result.notes, report.description)), report
 
 
 def low_passed(values: Array, old: float, new: float) -> Array:

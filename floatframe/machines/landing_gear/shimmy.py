@@ -40,7 +40,7 @@ class Retraction:
     potential: Array
 
 
-def turned(theta: Array, point: tuple[float, float]) -> Array:
+def rotated_point(theta: Array, point: tuple[float, float]) -> Array:
     """Return a point of the rotated leg, (n, 2)."""
     y, z = point
     return np.stack([y * np.cos(theta) - z * np.sin(theta), y * np.sin(theta) + z * np.cos(theta)], axis=1)
@@ -49,13 +49,13 @@ def turned(theta: Array, point: tuple[float, float]) -> Array:
 def retraction(theta: Array) -> Retraction:
     """Return the mechanism at the angles theta of the leg, (n,) [rad]; zero is the extended gear."""
     theta = np.atleast_1d(np.asarray(theta, dtype=float))
-    hinge, foot = np.array(BRACE), turned(theta, FOOT)
+    hinge, foot = np.array(BRACE), rotated_point(theta, FOOT)
     between = foot - hinge
     d = np.linalg.norm(between, axis=1, keepdims=True)
     normal = np.stack([between[:, 1], -between[:, 0]], axis=1) / d  # to the side of the knee, less
     knee = hinge + between / 2 - np.sqrt(LINK**2 - (d / 2) ** 2) * normal
-    jack = np.linalg.norm(turned(theta, HORN) - np.array(JACK), axis=1)
-    centre = turned(theta, LEG_CENTRE)[:, 1]
+    jack = np.linalg.norm(rotated_point(theta, HORN) - np.array(JACK), axis=1)
+    centre = rotated_point(theta, LEG_CENTRE)[:, 1]
     links = (hinge[1] + knee[:, 1]) / 2 + (knee[:, 1] + foot[:, 1]) / 2
     return Retraction(knee, jack, LEG_MASS * centre + LINK_MASS * links)
 

@@ -52,7 +52,7 @@ class CornerPlace:
         return float(np.arcsin(self.axle[2]))
 
 
-def turned(point: Array, origin: Array, axis: Array, angle: float) -> Array:
+def rotated_point(point: Array, origin: Array, axis: Array, angle: float) -> Array:
     """Return a point rotated about a line (Rodrigues), (3,)."""
     d = point - origin
     c, s = np.cos(angle), np.sin(angle)
@@ -82,7 +82,7 @@ class Linkage:
         hinge = p["lower_rear"] - p["lower_front"]
         hinge /= np.linalg.norm(hinge)
         on_arm = ("lower_ball", "seat", "jack")
-        low, seat, jack = (turned(p[name], p["lower_front"], hinge, phi) for name in on_arm)  # (1)
+        low, seat, jack = (rotated_point(p[name], p["lower_front"], hinge, phi) for name in on_arm)  # (1)
         up = self._upper_ball(low)
         out = self._rod_end(low, up)
         now = frame(low, up, out)

@@ -36,11 +36,11 @@ def places_of(system: System, sensor: Sensor) -> tuple[str, ...]:
     where = f"sensor {sensor.name!r}"
     if isinstance(sensor, StressSensor | StrainGauge | VonMisesSensor):
         body, address = flexible_body(system, sensor.name, sensor.body), address_of(sensor)
-        return () if address is None else (found_at(body, where, address, of_stress=True).words(),)
+        return () if address is None else (found_at(body, where, address, of_stress=True).description(),)
     if isinstance(sensor, ElongationSensor):
-        return tuple(each.words() for each in sensor.ends(flexible_body(system, sensor.name, sensor.body)))
+        return tuple(each.description() for each in sensor.ends(flexible_body(system, sensor.name, sensor.body)))
     at_nodes = [marker for marker in markers_of(sensor) if is_at_node(system, marker)]
-    return tuple(found_nodes(system, where, marker)[1].words() for marker in at_nodes)
+    return tuple(found_nodes(system, where, marker)[1].description() for marker in at_nodes)
 
 
 def markers_of(sensor: Sensor) -> tuple[Marker, ...]:

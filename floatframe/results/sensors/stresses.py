@@ -152,7 +152,7 @@ class StressSensor:
         if len(found.rows) > 1:
             largest, where = largest_von_mises(trajectory, self.body, body.reduced, rows=found.rows)
             row = int(where[int(largest.argmax())])
-        return np.asarray(modes[row]), (f"{found.words()}; measured at node {body.reduced.node_name(row)}",)
+        return np.asarray(modes[row]), (f"{found.description()}; measured at node {body.reduced.node_name(row)}",)
 
     def linear(self, small: SmallMotions) -> LinearColumns:
         """Return the components as functions of small motions, and the von Mises stress if the stress is not zero."""
@@ -205,7 +205,8 @@ class VonMisesSensor:
             columns["instance"], units["instance"] = numbering.node_instance[where].astype(float), names
         hot = int(where[int(largest.argmax())]) if len(where) else None
         words = () if hot is None else (f"largest at {node_words(reduced, hot)}",)
-        return Measurement(self.name, trajectory.t, columns, units, (*((found.words(),) if found else ()), *words))
+        place = (found.description(),) if found else ()
+        return Measurement(self.name, trajectory.t, columns, units, (*place, *words))
 
     def linear(self, small: SmallMotions) -> LinearColumns:
         """Return the von Mises stress as a function of small motions, at the node where it is largest now."""

@@ -71,7 +71,7 @@ class Uncertainty:
         return np.asarray(widest * factor.reshape(-1, *([1] * (sizes.ndim - 1))))
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """Say what it is."""
         if self.is_none:
             return "none"

@@ -89,7 +89,7 @@ class Damping:
         return zeta
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """Say what it is."""
         if self.own:
             return "damping of the model itself"

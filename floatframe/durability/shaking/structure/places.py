@@ -105,7 +105,7 @@ def found_places(body: ReducedBody, each: Observed) -> list[Place]:
             int(row),
             each,
             each.name if single else f"{each.name} {name}",
-            found.words() if single else f"node {name}",
+            found.description() if single else f"node {name}",
         )
         for row, name in zip(found.rows, found.names, strict=True)
     ]

@@ -92,7 +92,7 @@ def test_the_cost_of_a_reduction_grows_as_its_arrays_do():
     assert whole.file - bare.file == 8 * 6 * n_kept * 51
     assert 8 * 9 * 51**2 < bare.file < 8 * (27 * 51**2 + 3 * n_kept * 51)
     assert bare.memory > bare.file + 8 * 2 * body.n_dof * 51
-    assert "51 columns" in bare.words
+    assert "51 columns" in bare.description
     few = reduction_cost(body, 9, n_constraint_modes=1000)
     assert few.memory == 8 * 2 * body.n_dof * 1000  # they are all made before few are left
 

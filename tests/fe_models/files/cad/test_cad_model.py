@@ -47,7 +47,7 @@ def test_a_step_file_meets_the_unit_of_the_job(tmp_path, unit, units, length):
     assert_allclose(part.volume, PLATE_VOLUME * (METRES[unit] / length) ** 3, rtol=1e-9, atol=0)
     (bore,) = [face for face in part.faces if face.kind == "cylinder"]
     assert_allclose(bore.radius, 6 * METRES[unit] / length, rtol=1e-9, atol=0)
-    assert f"STEP in {unit}, taken to {part.units.length_symbol}" in part.words
+    assert f"STEP in {unit}, taken to {part.units.length_symbol}" in part.description
 
 
 @pytest.mark.parametrize(("flag", "name", "metres"), [(1, "IN", 0.0254), (6, "M", 1.0), (10, "CM", 0.01)])
@@ -60,7 +60,7 @@ def test_an_iges_file_meets_the_unit_of_the_job(tmp_path, flag, name, metres):
 def test_a_brep_file_has_no_unit_and_says_so(tmp_path):
     part = read_cad(plate_file(tmp_path / "plate.brep"), units="m-kg-s")
     assert_allclose(part.hi, PLATE["size"], rtol=1e-9, atol=0)
-    assert "without unit, its numbers taken as m" in part.words
+    assert "without unit, its numbers taken as m" in part.description
 
 
 def test_colours_of_faces_are_kept(tmp_path):

@@ -386,7 +386,7 @@ def test_exact_beams_are_a_reference_for_bodies_of_lines(tmp_path):
         + '[reference]\nkind = "exact-beam"\nelements = 16\n'
     )
     found = run_laboratory(read_laboratory(tmp_path / "laboratory.toml"))
-    by_words = {row.case.words: row.errors["tip y"] for row in found.cases}
+    by_words = {row.case.description: row.errors["tip y"] for row in found.cases}
     assert 0 < found.settled < 2e-3
     assert by_words["craig-bampton, nodal:root"] < by_words["craig-bampton, nodal:root, linear"] / 3
     assert by_words["craig-bampton, tisserand, 4 parts"] < 3 * found.settled + 1e-4

@@ -39,7 +39,7 @@ def test_points_see_the_section_forces_of_a_tip_load(mast):
     assert_allclose(found.largest[corners], amplitude[corners], rtol=1e-6, atol=1e-6 * amplitude.max())
     expected = (amplitude[corners] / 1e6) ** 5 / 1e6
     assert_allclose(found.damage[corners], expected, rtol=1e-5, atol=1e-9 * expected.max())
-    assert found.words(int(found.worst()[0])).startswith("beam 11 end A point")
+    assert found.description(int(found.worst()[0])).startswith("beam 11 end A point")
 
 
 @pytest.mark.parametrize("negligible", [0.0, 1e-3])
@@ -117,7 +117,7 @@ def read(folder, where='sets = ["ROOT"]', places="all") -> FatigueFile:
 def test_a_file_names_the_places_of_a_material(folder, mast, where):
     made = assess(read(folder, where))
     result = made.result
-    weld = [result.words(int(k)) for k in np.flatnonzero(result.material == 1)]
+    weld = [result.description(int(k)) for k in np.flatnonzero(result.material == 1)]
     assert sum(name.startswith("beam 11 ") for name in weld) == 2 * 8
     assert not any(name.startswith("beam") and not name.startswith("beam 11 ") for name in weld)
     assert any(name.startswith("node") for name in weld) == ("points" not in where)

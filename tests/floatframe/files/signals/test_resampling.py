@@ -42,8 +42,8 @@ def test_the_report_is_about_the_acceleration_of_a_position():
     assert report.of == "acceleration"
     assert_allclose(report.above_nyquist, weights[1] / weights.sum(), rtol=0.02, atol=0)
     assert_allclose(report.rms_before / report.rms_after, np.sqrt(weights.sum() / weights[0]), rtol=0.02, atol=0)
-    assert "peak acceleration -" in report.words
-    assert "lay above 250 Hz" in report.words
+    assert "peak acceleration -" in report.description
+    assert "lay above 250 Hz" in report.description
 
 
 def test_uneven_times_become_even_and_that_is_said():
