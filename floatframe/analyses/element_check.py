@@ -24,11 +24,11 @@ from floatframe.results.element_motion import placed_law
 
 __all__ = ["ElementCheck", "check_element"]
 
-N_SAMPLES = 3  #: number of motions at which it is evaluated, the first as assembled
-NEAR = 1e-3  #: distance of the others from it, relative to the size of the system, or in rad
-MOVING = 0.1  #: their velocities, in system sizes per unit of time, or in rad per unit of time
-DERIVATIVE = 1e-5  #: difference of derivatives, relative to the largest in the row, from which it is reported
-ROUNDING = 1e-9  #: relative to the values
+N_SAMPLES = 3  #: number of samples (motions at which the law is evaluated); the first is the assembled state
+NEAR = 1e-3  #: distance of the other samples from the first, relative to the size of the system, or in rad
+MOVING = 0.1  #: velocities of the other samples, in system sizes per unit of time, or in rad per unit of time
+DERIVATIVE = 1e-5  #: smallest reported error of a derivative, relative to the largest derivative in its row
+ROUNDING = 1e-9  #: rounding error of values, relative to their size
 AXES = "xyz"
 
 
@@ -75,7 +75,7 @@ def check_element(system: System, name: str, state: State | None = None) -> Elem
         values = values_of(placed, inputs)
         if not np.isfinite(values).all():
             at = [row_name(placed, int(k)) for k in np.flatnonzero(~np.isfinite(values))]
-            findings.append(f"{where}: {', '.join(at[:3])}: no number (NaN or infinity)")
+            findings.append(f"{where}: {', '.join(at[:3])}: expected a finite number, got NaN or infinity")
             continue
         findings += balance(placed, values, where)
         own, other = own_slopes(placed, inputs), differences(placed, inputs)
@@ -249,7 +249,11 @@ def wrong_dependence(placed: PlacedLaw, slopes: Array, where: str) -> list[str]:
         if not holds or not (np.abs(row[~allowed]) > DERIVATIVE * np.abs(row).max()).any():
             continue
         column = int(np.abs(np.where(allowed, 0.0, row)).argmax())
-        what = "a position: places and the time alone" if holds == POSITION else "a velocity: not multipliers"
+        what = (
+            "a position, which may depend only on positions and time"
+            if holds == POSITION
+            else "a velocity, which may not depend on multipliers"
+        )
         found.append(
             f"{where}: {row_name(placed, 6 * n + n_z + j)} depends on {column_name(placed, column)}, but holds {what}"
         )

@@ -1,4 +1,4 @@
-"""What the kernels tell of one state: a row of results, and the power of loads and dampers."""
+"""A row of results at one state, and the power of loads and dampers."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ __all__ = ["observed_state"]
 def observed_state(
     compiled: CompiledSystem, work: Work, state: State, u_dot: Array, w: Array, t: float
 ) -> tuple[Rows, Array]:
-    """Return the row of results of a state of the engine and the power of loads and dampers at it, (2,)."""
+    """Return the row of results at a state of the engine, and the power of loads and of dampers, (2,)."""
     from floatframe.engine.kernels.entry import observe_state
 
     work.state.time[...] = t

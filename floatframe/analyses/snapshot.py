@@ -1,4 +1,4 @@
-"""One state as a motion of one time, so that sensors, tables and pictures of motions serve for it too."""
+"""Single states as trajectories, so that sensors, tables and pictures of motions also work for them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ __all__ = ["snapshot", "states_as_motion"]
 
 @dataclass(frozen=True)
 class Snapshot:
-    """What stands in the place of the integrator in the record of one state."""
+    """Replaces the integrator in the record of single states."""
 
 
 def snapshot(
@@ -34,7 +34,7 @@ def snapshot(
     *,
     t: float = 0.0,
 ) -> Trajectory:
-    """Return one state as a trajectory of one time, so that sensors, exports and pictures of motions serve for it.
+    """Return one state as a trajectory with one time, for sensors, exports and pictures of motions.
 
     Parameters
     ----------
@@ -45,9 +45,9 @@ def snapshot(
     u_dot
         Accelerations, (n_u,), in the order of `State.u`; default: those of the equilibrium, zero for a state.
     w
-        Wrenches of the connections on their markers A, ground axes, (n_w,); default likewise.
+        Wrenches of the connections on their markers A, ground axes, (n_w,); default: as for `u_dot`.
     t
-        The time of all functions of time [s].
+        The time at which all functions of time are evaluated [s].
     """
     if isinstance(state, Equilibrium):
         u_dot = state.u_dot if u_dot is None else u_dot
@@ -63,7 +63,7 @@ def snapshot(
 
 
 def states_as_motion(system: System, states: Sequence[State]) -> Trajectory:
-    """Return states one after the other, without forces, as a trajectory at the times 0, 1, 2, ..., for pictures."""
+    """Return a sequence of states as a trajectory at the times 0, 1, 2, ..., without forces, for pictures."""
     compiled = compiled_system(system)
     model, work = compiled.model, new_work(compiled.model)
     still, w = np.zeros(int(model.bodies.u0[-1])), np.zeros(int(model.connections.w0[-1]))

@@ -1,4 +1,4 @@
-"""Parameter sweeps: one function at many values, in parallel processes or on a cluster."""
+"""Parameter sweeps: evaluation of one function at many values, in parallel processes or on a cluster."""
 
 from collections.abc import Callable, Iterable
 from typing import TypeVar
@@ -24,27 +24,28 @@ def sweep(
     Parameters
     ----------
     study
-        A function at the top level of a module (it is sent to other processes by name), such as one that builds a
-        system for a value, integrates it and returns the numbers of interest.
+        A function at the top level of a module, because it is sent to other processes by name. For example, it builds a
+        system for a value, integrates it and returns the results of interest.
     values
-        What to call it with.
+        Arguments of `study`.
     workers
-        Where (docs/cluster.md): how many processes at once, by default one per processor; 1: in this process, where
-        `study` may be any callable; "dask", or "dask://host:port". Each has one thread, so that results are the same.
+        Number of parallel processes, by default one per processor, or "dask" or "dask://host:port" for a cluster
+        (docs/cluster.md). With 1, `study` runs in this process, and may be any callable. Each process has one thread,
+        so that results do not depend on the number of workers.
     failed
-        What stands in the place of a value whose call failed, made from the value and the error; then no value can
-        lose the others, not even one whose process is killed. None: the first error is raised.
+        Returns the result for a value whose call failed, from the value and the error. The other values are then
+        computed even if a process is killed. None: the first error is raised.
     progress
-        Called with the numbers of values done and of all values.
+        Called with the number of completed values and the number of all values.
 
     Raises
     ------
     Exception
-        Without `failed`: what `study` raised, for the first value in order that did.
+        Without `failed`: the error of `study` for the first value that failed, in the order of the values.
     ProcessError
         If `study` cannot be sent to other processes.
     WorkerError
-        If no workers can be had.
+        If no workers are available.
     """
     values = list(values)
     if not values:

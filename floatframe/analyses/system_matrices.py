@@ -1,30 +1,32 @@
-"""Mass, damping and stiffness of the whole system at one state, as they follow from the Newton matrix.
+"""Mass, damping and stiffness matrices of the whole system at one state, from the Newton matrix.
 
-Small motions about a steady one: axes in which nothing changes turn with omega, the same for all bodies, which turn
-with it, or spin in them with a constant sigma besides (a wheel, whose inertia and forces do not see by how much):
+Small motions are described in axes that rotate with omega, in which the steady motion does not change. Every body
+rotates with these axes; it may in addition spin with a constant sigma, such as a wheel, whose inertia and forces do not
+depend on its angle.
 
-    xi    position of the frame origin and rotation in the axes that coincide with those of the body now and turn with
-          omega, modal coordinates
-    nu    change of the velocities (v_G, omega_B turned to these axes, q_dot):     nu  = xi_dot + Omega xi
-    eta   change of the accelerations (v_G_dot turned to these axes, ...):         eta = nu_dot + Omega' nu
+    xi    position of the frame origin and rotation, in axes that coincide with the body axes now and rotate with omega;
+          modal coordinates
+    nu    change of the velocities (v_G and omega_B in these axes, q_dot):         nu  = xi_dot + Omega xi
+    eta   change of the accelerations (v_G_dot in these axes, ...):                eta = nu_dot + Omega' nu
 
-with Omega = diag(omega~, omega~, 0) and Omega' = diag(omega~, -sigma~, 0) for every body, since components in its own
-axes have the rate d/dt - sigma × in these. Without spin they are body axes. The equations of motion become
+with Omega = diag(omega~, omega~, 0) and Omega' = diag(omega~, -sigma~, 0) for every body, because the time derivative
+of components in body axes is d/dt - sigma × in these axes. Without spin, these axes are the body axes. The equations
+of motion become
 
     M eta + C nu + K xi - Jᵀ dw = F s            bodies
-    G_x xi + G_v nu + V dw + E s + E' s' = 0     rows: V = 0 and G_v = 0 for what joints hold
+    G_x xi + G_v nu + V dw + E s + E' s' = 0     rows: V = 0 and G_v = 0 for joint constraints
 
-(derivation: docs/analyses.md, "Small motions about a steady one"). Rows with V, which say what a wrench is (a moment
-about a free axis, the tension of a spring), are solved for their wrench. With Z a basis of what they leave open,
-V_f Z = 0, and r the left side of the bodies without Jᵀ Z lam,
+(derivation: docs/analyses.md, "Small motions about a steady one"). Rows with V are laws of a wrench, such as a moment
+about a free axis or the tension of a spring; they are solved for the wrench. Let Z be a basis of the wrenches that the
+laws leave undetermined, V_f Z = 0, and r the left side of the equations of the bodies without Jᵀ Z lam. Then
 
     dw = -V_f⁺ (G_f xi + G_vf nu + E_f s + E'_f s') + Z lam,   Jᵀ Z lam = r,
 
-so that r follows from motions alone, and wrenches are linear in xi, nu, eta and s.
+where r depends only on motions, so that wrenches are linear in xi, nu, eta and s.
 
-States z of elements and user forces stand among the unknowns w, each with its rate. They enter like inputs, as their
-columns of V in the place of E; their rates z' = -(G_x xi + G_v nu + V dw), of the rows that say what these are, are
-read off like outputs.
+States z of elements and user forces are among the unknowns w, each with its rate. They enter the equations like inputs,
+with their columns of V in place of E. Their rates z' = -(G_x xi + G_v nu + V dw) follow from the rows of the rates,
+like outputs.
 """
 
 from dataclasses import dataclass
@@ -43,57 +45,57 @@ from floatframe.model.rotations import tilde
 
 __all__ = ["Inputs", "Tangents", "Wrenches", "held_rows", "settled", "tangents", "turning_matrices"]
 
-CANCELLED = 1e-10  #: of terms: what is left of their sum is rounding
-RANK = 1e-10  #: singular value, relative to the largest, below which one repeats others
-SPINLESS = 1e-12  #: of the angular velocity: a spin that is rounding
+CANCELLED = 1e-10  #: magnitude of a sum, relative to its terms, below which it is a rounding error
+RANK = 1e-10  #: singular value, relative to the largest, below which a row is redundant
+SPINLESS = 1e-12  #: magnitude of a spin, relative to the angular velocity, below which it is a rounding error
 
 
 @dataclass(frozen=True, eq=False)
 class Inputs:
-    """How inputs s enter the equations."""
+    """Coefficients of inputs s in the equations."""
 
     F: Array  #: generalised forces on the bodies, body axes, (n_u, n_s)
-    E: Array  #: in the rows, (n_w, n_s)
-    E_rate: Array  #: their rates in the rows, (n_w, n_s)
+    E: Array  #: coefficients of s in the rows, (n_w, n_s)
+    E_rate: Array  #: coefficients of s' in the rows, E', (n_w, n_s)
 
     def beside(self, others: "Inputs") -> "Inputs":
-        """Return these inputs and others after them."""
+        """Return these inputs, followed by others."""
         return Inputs(*(np.hstack([getattr(each, name) for each in (self, others)]) for name in ("F", "E", "E_rate")))
 
 
 @dataclass(frozen=True, eq=False)
 class Tangents:
-    """Matrices of small motions; unknowns in body axes, dense. Rows that say what a wrench is are eliminated."""
+    """Dense matrices of small motions, with unknowns in body axes, after elimination of the laws of wrenches."""
 
     M: Array  #: (n_u, n_u)
     C: Array  #: (n_u, n_u)
     K: Array  #: (n_u, n_u)
-    G: Array  #: what the joints hold of positions, (n_held, n_u)
-    J: Array  #: from wrenches to the forces on bodies, (n_w, n_u)
-    G_x: Array  #: all rows by positions, (n_w, n_u)
-    G_v: Array  #: by velocities, (n_w, n_u)
-    G_a: Array  #: of rows that say what a wrench is, by accelerations, zero for all others, (n_w, n_u)
-    V: Array  #: by wrenches, (n_w, n_w)
-    holds: NDArray[np.bool_]  #: which rows hold a position, (n_w,) bool
-    rolls: NDArray[np.bool_]  #: which rows hold a velocity, (n_w,) bool
-    free: NDArray[np.bool_]  #: which say what a wrench is, (n_w,) bool
-    states: IntArray  #: rows of the values of states, those of their rates follow, (n_states,)
-    soft: Array  #: compliance of held rows that share their reactions, zero for all others, (n_w,)
-    by_rows: Array  #: V_f⁺, (n_w, n_free)
+    G: Array  #: position constraints of the joints, (n_held, n_u)
+    J: Array  #: Jᵀ gives the forces of wrenches on bodies, (n_w, n_u)
+    G_x: Array  #: derivatives of all rows by positions, (n_w, n_u)
+    G_v: Array  #: derivatives of all rows by velocities, (n_w, n_u)
+    G_a: Array  #: derivatives of laws of wrenches by accelerations, zero for other rows, (n_w, n_u)
+    V: Array  #: derivatives of all rows by wrenches, (n_w, n_w)
+    holds: NDArray[np.bool_]  #: whether a row constrains a position, (n_w,)
+    rolls: NDArray[np.bool_]  #: whether a row constrains a velocity, (n_w,)
+    free: NDArray[np.bool_]  #: whether a row is a law of a wrench, (n_w,)
+    states: IntArray  #: rows of the values of states; each is followed by the row of the rate, (n_states,)
+    soft: Array  #: compliance of constraints that share their reactions, zero for other rows, (n_w,)
+    by_rows: Array  #: V_f⁺, from laws of wrenches to wrenches, (n_w, n_free)
 
     def body_forces(self, inputs: Inputs) -> tuple[Array, Array]:
-        """Return the forces of inputs and of their rates on the bodies, rows eliminated, (n_u, n_s) each."""
+        """Return the forces of inputs and of their rates on the bodies, including eliminated rows, (n_u, n_s) each."""
         to_bodies = self.J.T @ self.by_rows
         free = self.free
         return inputs.F - to_bodies @ inputs.E[free], -to_bodies @ inputs.E_rate[free]
 
     def open_wrenches(self) -> tuple[Array, Array]:
-        """Return Z, (n_w, n_open), and (Jᵀ Z)⁺, (n_open, n_u); reactions that repeat others share by their compliance.
+        """Return Z, (n_w, n_open), and (Jᵀ Z)⁺, (n_open, n_u); redundant reactions share the load by their compliance.
 
         Raises
         ------
         ModelError
-            If reactions cannot be told apart, and the system does not say how they share.
+            If reactions are not unique, and the system does not define how they share the load.
         """
         unknown = ~self.of_states
         V = self.V[np.ix_(self.free, unknown)]
@@ -119,13 +121,13 @@ class Tangents:
         by_share = weights @ Z @ repeated
         if np.linalg.matrix_rank(by_share) < repeated.shape[1]:
             raise ModelError(
-                "reactions of constraints that repeat others cannot be told apart: take the constraints out, or give "
-                'the system redundant = "minimum-norm"'
+                "reactions of redundant constraints are not unique: remove these constraints, or set "
+                'redundant = "minimum-norm" in the system'
             )
         return Z, back - repeated @ np.linalg.lstsq(by_share, weights @ Z @ back, rcond=None)[0]
 
     def wrenches(self, inputs: Inputs, Omega: Array, Omega_t: Array) -> "Wrenches":
-        """Return dw as linear in xi, xi', xi'' and s, s'."""
+        """Return the coefficients of xi, xi', xi'', s and s' in dw."""
         free, D = self.free, self.full(Omega, Omega_t)
         force, force_rate = self.body_forces(inputs)
         Z, back = self.open_wrenches()
@@ -133,7 +135,7 @@ class Tangents:
         G_x, G_v, G_a = self.G_x[free], self.G_v[free], self.G_a[free]
         E, E_rate = inputs.E[free], inputs.E_rate[free]
         of_states = np.zeros((len(self.V), E.shape[1]))
-        if len(self.states):  # the last inputs
+        if len(self.states):  # states are the last inputs
             of_states[self.states, E.shape[1] - len(self.states) + np.arange(len(self.states))] = 1.0
         return Wrenches(
             x=sum_of_products(
@@ -147,17 +149,17 @@ class Tangents:
 
     @property
     def of_states(self) -> NDArray[np.bool_]:
-        """Which rows are values, rates and algorithmic rates of states, (n_w,)."""
+        """Whether each row is a value, rate or algorithmic rate of a state, (n_w,)."""
         return rows_of_states(self.states, len(self.V))
 
     @property
     def by_states(self) -> Inputs:
-        """How states enter the equations."""
+        """The coefficients of states in the equations."""
         zero = np.zeros((len(self.V), len(self.states)))
         return Inputs(np.zeros((self.J.shape[1], len(self.states))), self.V[:, self.states], zero)
 
     def rates_of_states(self, Omega: Array) -> tuple[Array, Array, Array]:
-        """Return the rates of states by xi and xi', (n_states, n_u), and by wrenches and states, (n_states, n_w)."""
+        """Return the derivatives of z' by xi and xi', (n_states, n_u), and by wrenches and states, (n_states, n_w)."""
         rows = self.states + 1
         by_wrench = -self.V[rows]
         by_wrench[:, rows] = 0.0
@@ -171,7 +173,7 @@ class Tangents:
 
 @dataclass(frozen=True, eq=False)
 class Wrenches:
-    """dw = x xi + v xi' + a xi'' + s s + s_rate s'."""
+    """Coefficients of dw = x xi + v xi' + a xi'' + s s + s_rate s'."""
 
     x: Array  #: (n_w, n_u)
     v: Array  #: (n_w, n_u)
@@ -181,18 +183,18 @@ class Wrenches:
 
 
 def settled(result: Array, *products: tuple[Array, Array]) -> Array:
-    """Return a sum of products A B with zeros where what is left is rounding of what cancelled."""
+    """Return a sum of products A B, with zeros for entries that are rounding errors of cancelled terms."""
     size = sum(np.abs(A) @ np.abs(B) for A, B in products)
     return np.where(np.abs(result) <= CANCELLED * size, 0.0, result)
 
 
 def sum_of_products(*products: tuple[Array, Array]) -> Array:
-    """Return Σ A B, settled."""
+    """Return Σ A B without rounding errors, see `settled`."""
     return settled(np.asarray(sum(A @ B for A, B in products)), *products)
 
 
 def held_rows(model: Model) -> np.ndarray:
-    """Return which rows hold a distance or an angle, (n_w,) bool; the others say what a wrench is."""
+    """Return whether each row constrains a distance or an angle, (n_w,) bool; other rows are laws of wrenches."""
     return is_held(model.rows.kind)
 
 
@@ -214,7 +216,7 @@ def tangents(model: Model, work: Work) -> Tangents:
     by_rows = np.zeros((len(V), int(free.sum())))
     if free.any():
         by_rows[~of_states] = np.linalg.pinv(V[np.ix_(free, ~of_states)])
-        # dw = -V⁺ (G_x xi + G_v nu): reactions along what joints hold do no work in motions they allow
+        # dw = -V⁺ (G_x xi + G_v nu); reactions of joint constraints do no work in allowed motions
         to_bodies = J.T @ by_rows
         K += to_bodies @ G[free]
         C += to_bodies @ G_v[free]
@@ -224,7 +226,7 @@ def tangents(model: Model, work: Work) -> Tangents:
 
 
 def rows_of_states(states: IntArray, n_w: int) -> NDArray[np.bool_]:
-    """Return which rows are values, rates and algorithmic rates of states, (n_w,)."""
+    """Return whether each row is a value, rate or algorithmic rate of a state, (n_w,)."""
     found = np.zeros(n_w, dtype=bool)
     for k in range(3):
         found[states + k] = True
@@ -232,7 +234,7 @@ def rows_of_states(states: IntArray, n_w: int) -> NDArray[np.bool_]:
 
 
 def turning_matrices(model: Model, work: Work, omega: Array) -> tuple[Array, Array]:
-    """Return Omega and Omega' for the velocities in `work`, in axes that turn with omega (ground axes), (n_u, n_u)."""
+    """Return Omega and Omega' for the velocities in `work` and axes rotating with omega (ground axes), (n_u, n_u)."""
     n_u = int(model.bodies.u0[-1])
     Omega, Omega_t = np.zeros((n_u, n_u)), np.zeros((n_u, n_u))
     for i, u0 in enumerate(model.bodies.u0[:-1]):

@@ -162,7 +162,7 @@ def band_of(text: str, linear: "LinearSystem", seconds: float) -> tuple[float, f
             raise ValueError
     except ValueError:
         raise ModelError(
-            f'--band {shortened(text)}: expected "from:to" in Hz, a rising band above 0, such as 1:500'
+            f'--band {shortened(text)}: expected "from:to" in Hz, an ascending band above 0, such as 1:500'
         ) from None
     return first, last
 

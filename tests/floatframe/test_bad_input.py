@@ -73,7 +73,7 @@ def test_impossible_systems_are_refused_by_the_command(tmp_path, old, new, words
 def test_drives_that_prescribe_one_motion_are_named_whether_they_agree_or_not(tmp_path, place):
     message = refused(tmp_path, CRANK.replace("\n[run]", TURN + PUSH.format(place, 0.0) + "\n[run]"))
     assert "conflicting drives: the drive of 'distance' of joint 'guide' and the drive of 'angle' of" in message
-    assert "take one away" in message
+    assert "remove one of them" in message
 
 
 def test_a_drive_against_what_the_joints_hold_is_named():

@@ -123,8 +123,8 @@ def quasi_static_bodies(compiled: CompiledSystem, work: Work, state: State, t: f
         if change <= SETTLED * size or size <= none:
             return replace(now, n_iterations=n)
     raise ConvergenceError(
-        f"the deformation at t = {t:g} did not settle in {MOST_ITERATIONS} iterations (last change {change:.2g} of "
-        f"{size:.2g}): the loads are beyond what these bodies carry, or buckle them; freeze them, or integrate",
+        f"the deformation at t = {t:g} did not converge in {MOST_ITERATIONS} iterations (last change {change:.2g} of "
+        f"{size:.2g}): the loads exceed what these bodies carry, or buckle them; use frozen_bodies, or integrate",
         t=t,
         h=0.0,
         residual=change,
@@ -208,7 +208,7 @@ def closed(
         x[rigid] = y
         state = displaced(model, state, in_ground_axes(model, state, x))
     raise ConvergenceError(
-        f"the drives cannot be followed at t = {t:g}: {open_joints(compiled, error) or 'a joint opens'}; a drive goes "
+        f"the drives cannot be followed at t = {t:g}: {open_joints(compiled, error) or 'a joint opens'}; a drive leads "
         "beyond the reach of the mechanism, or through a singular position: keep it within, or drive "
         "another coordinate",
         t=t,

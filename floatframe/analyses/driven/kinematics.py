@@ -49,8 +49,8 @@ __all__ = ["Kinematics", "SingularityGuard", "free_coordinates", "kinematics"]
 
 
 SINGULAR = 1e-6  #: smallest singular value of the scaled constraint rows (length one each) at a singular position
-FREE = 1e-7  #: the same for a motion that no constraint resists
-REPORTED = 1e-6  #: fraction of a motion from which a coordinate or body is reported as part of it
+FREE = 1e-7  #: singular value of the scaled constraint rows below which a motion is free
+REPORTED = 1e-6  #: smallest share of a coordinate or body in a free motion at which it is reported
 
 
 def free_coordinates(system: System, state: State, *, t: float = 0.0) -> tuple[str, ...]:
@@ -88,7 +88,7 @@ def free_coordinates(system: System, state: State, *, t: float = 0.0) -> tuple[s
         share = (left**2).reshape(len(left), -1, 6).sum(axis=(0, 2))
         moving = [name for name, part in zip(compiled.body_names, share, strict=True) if part > REPORTED]
         named.append(
-            f"{len(left)} motions of {', '.join(repr(name) for name in moving)} of which no joint coordinate tells"
+            f"{len(left)} motions of {', '.join(repr(name) for name in moving)} that change no joint coordinate"
         )
     return tuple(named)
 
@@ -132,7 +132,7 @@ class SingularityGuard:
         involved = [name for name in names if sum(s for s, o in zip(share, owner, strict=True) if o == name) > 0.02]
         raise ConvergenceError(
             f"a singular position {where}: the constraints of joints {', '.join(repr(name) for name in involved)} "
-            f"depend on each other there (smallest singular value {values[-1]:.2g}), so that the drives do not decide "
+            f"depend on each other there (smallest singular value {values[-1]:.2g}): the drives do not determine "
             "which way the mechanism goes on; drive another coordinate, or keep away from this position",
             t=now.t,
             h=0.0,
@@ -193,7 +193,7 @@ def kinematics(
     """
     t = np.asarray(times, dtype=float)
     if t.ndim != 1 or len(t) < 2 or not np.isfinite(t).all() or (np.diff(t) <= 0).any():
-        raise ModelError("kinematics: times: expected two or more rising numbers")
+        raise ModelError("kinematics: times: expected at least two increasing numbers")
     name = next((key for key, value in ELASTICITY.items() if value is elasticity), "user")
     compiled = compiled_system(system)
     work = new_work(compiled.model)
@@ -255,26 +255,26 @@ def first_instant(system: System, work: Work, state: State, t: float, elasticity
     own = [each for each in compiled.laws if each.law.states or each.law.multipliers]
     if own:
         raise ModelError(
-            f"kinematics: element {own[0].element.name!r} has states or multipliers of its own, which need a motion in "
-            "time: integrate it, or take the element out"
+            f"kinematics: element {own[0].element.name!r} has states or multipliers, which follow only from "
+            "integration in time; integrate the motion, or remove the element"
         )
     felt = [each.element.name for each in compiled.laws if each.law.accelerations]
     if felt:
         raise ModelError(
-            f"kinematics: element {felt[0]!r} asks for accelerations, which a driven motion does not give to "
-            "elements; give its masses as bodies, or integrate the motion"
+            f"kinematics: element {felt[0]!r} uses accelerations, which a driven motion does not provide to "
+            "elements; model its masses as bodies, or integrate the motion"
         )
     rolling = np.flatnonzero(is_held_velocity(compiled.model.rows.kind))
     if len(rolling):
         raise ModelError(
-            f"kinematics: joint {compiled.owners[rolling[0]]!r} rolls: it holds velocities, and where that leads "
-            "follows by integration only; integrate the motion"
+            f"kinematics: joint {compiled.owners[rolling[0]]!r} rolls: it constrains velocities, and the positions "
+            "follow only by integration; integrate the motion"
         )
     shapes = state.q  # assembled shapes, because closing joints with modes may bend bodies
     state = assembled(compiled, work, state)
     conflict = conflict_of_drives(compiled, work, state)
     if conflict:
-        raise ModelError(f"conflicting drives: {conflict}; take one away, or free what it drives against")
+        raise ModelError(f"conflicting drives: {conflict}; remove one of them, or free the coordinate that opposes it")
     free = free_coordinates(system, state, t=t)
     if free:
         driven = driven_coordinates(system)
@@ -289,8 +289,8 @@ def first_instant(system: System, work: Work, state: State, t: float, elasticity
             ", ".join(f"{count} of joint {name!r}" for name, count in counted.redundant.items()) or "with rigid bodies"
         )
         raise ModelError(
-            f"kinematics: {counted.n_redundant_rigid} constraints repeat others ({told}), so that reactions are not "
-            'unique; replace a joint by one that holds less, or share the load: redundant = "minimum-norm"'
+            f"kinematics: {counted.n_redundant_rigid} constraints are redundant ({told}), so that reactions are not "
+            'unique; replace a joint by one with fewer constraints, or set redundant = "minimum-norm"'
         )
     return elasticity(compiled, work, replace(state, q=shapes), t)
 
@@ -318,8 +318,8 @@ def moved_on(
         parts += 1
         if parts > MOST_PARTS:
             raise ConvergenceError(
-                f"kinematics: the way from t = {begin:g} to {t:g} has more than {MOST_PARTS} parts in which a body "
-                f"turns by {LARGEST_TURN} rad; give more times, or look for a singular position",
+                f"kinematics: the motion from t = {begin:g} to {t:g} needs over {MOST_PARTS} parts in which a body "
+                f"rotates by {LARGEST_TURN} rad; give more times, or look for a singular position",
                 t=now.t,
                 h=h,
                 residual=0.0,

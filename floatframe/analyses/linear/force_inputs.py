@@ -59,7 +59,7 @@ def force_of(system: System, channel: ForceInput) -> Any:
     known = forces_with_amplitude(system)
     if channel.force not in known:
         names = [force.name for force in system.forces if hasattr(force, "name")]
-        what = "has no amplitude or motor" if channel.force in names else "is not there"
+        what = "has no amplitude or motor" if channel.force in names else "does not exist"
         raise ModelError(
             f"input {channel.name!r}: force {quoted(channel.force)} {what}; expected a point force, a load case or a "
             f"joint force{nearest(channel.force, list(known))}"

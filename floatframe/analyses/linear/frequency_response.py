@@ -55,7 +55,7 @@ def frequency_response(linear: LinearSystem, frequencies: Array) -> FrequencyRes
     """
     f = np.asarray(frequencies, dtype=float)
     if f.ndim != 1 or not len(f) or not np.isfinite(f).all() or f[0] < 0 or (np.diff(f) <= 0).any():
-        raise ModelError("frequency_response: frequencies: expected rising numbers of 0 or more")
+        raise ModelError("frequency_response: frequencies: expected ascending numbers of 0 or more")
     for kind in ("inputs", "outputs"):
         if not getattr(linear, kind):
             raise ModelError(
@@ -78,9 +78,10 @@ def resolved_frequencies(linear: LinearSystem, first: float, last: float, *, n: 
         If the band is empty or does not begin above zero.
     """
     if not 0 < first < last:
-        raise ModelError(f"frequency response: expected a rising band above 0, got {first:g} to {last:g}")
+        raise ModelError(f"frequency response: expected an ascending band above 0, got {first:g} to {last:g}")
     modes = system_modes(linear)
-    f = modes.natural_frequencies * np.sqrt(np.maximum(1 - 2 * modes.damping_ratios**2, 0.0))  # of the peaks
+    # frequencies of the peaks
+    f = modes.natural_frequencies * np.sqrt(np.maximum(1 - 2 * modes.damping_ratios**2, 0.0))
     width = np.maximum(modes.damping_ratios, LEAST_DAMPING)
     inside = (f > first) & (f < last) & (modes.damping_ratios < 0.5)
     spread = AROUND * np.linspace(-1.0, 1.0, POINTS_AROUND) ** 3

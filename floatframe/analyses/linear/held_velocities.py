@@ -54,21 +54,22 @@ def rolling(parts: Tangents, Omega: Array, N: Array, inputs: Inputs) -> Rolling 
         return None
     if inputs.E[rows].any() or inputs.E_rate[rows].any() or parts.V[rows].any():
         raise ModelError(
-            "linearize: a held velocity that an input, a state or a wrench changes is not known here; take the input "
-            "out, or give the element a state in the place of its multiplier"
+            "linearize: a velocity constraint that depends on an input, a state or a wrench is not supported; remove "
+            "the input, or give the element a state instead of its multiplier"
         )
     A = parts.G_v[rows] @ N
     B = (parts.G_x[rows] + parts.G_v[rows] @ Omega) @ N
     size = np.linalg.norm(A, axis=1)
     if not (size > 0).all():
-        raise ModelError("linearize: an element holds a velocity that no motion changes")
+        raise ModelError("linearize: an element constrains a velocity that no motion changes")
     left, values, right = la.svd(A / size[:, None])
     rank = int((values > RANK * values[0]).sum())
     known = left[:, :rank].T @ (B / size[:, None])
     repeated = left[:, rank:].T @ (B / size[:, None])
     if np.abs(repeated).max(initial=0.0) > 1e-8 * np.abs(B / size[:, None]).max(initial=1.0):
         raise ModelError(
-            "linearize: joints that roll contradict each other: velocities they hold repeat, places do not"
+            "linearize: rolling joints contradict each other: their velocity constraints are redundant, but the "
+            "positions that follow from them differ"
         )
     S, T = right[rank:].T, right[:rank].T
     known = known / values[:rank, None]
@@ -83,7 +84,7 @@ def rolled(parts: dict[str, Array], roll: Rolling, n_states: int) -> dict[str, A
     n = n_y + n_eta + n_states
 
     def motions(by_y: Array, by_eta: Array, by_states: Array) -> Array:
-        """Return columns of (z, states) by (y, eta, states)."""
+        """Return the matrix from (y, eta, states) to (z, states)."""
         of_z = np.hstack([by_y, by_eta, zero((n_z, n_states))])
         return np.vstack([of_z, np.hstack([zero((n_states, n_y + n_eta)), by_states])])
 

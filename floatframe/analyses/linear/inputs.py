@@ -154,12 +154,12 @@ def base_column(system: System, base: BaseMotion) -> BaseColumn:
     }
     for name in base.joints or ():
         if name not in on_ground:
-            what = "does not stand on the ground" if name in names else "is not there"
+            what = "is not attached to the ground" if name in names else "does not exist"
             hint = nearest(name, sorted(on_ground))
             raise ModelError(f"input {base.name!r}: joint or force {quoted(name)} {what}{hint}")
     moved = frozenset(on_ground if base.joints is None else base.joints)
     if not moved:
-        raise ModelError(f"input {base.name!r}: nothing stands on the ground that a base could move")
+        raise ModelError(f"input {base.name!r}: no joint or force is attached to the ground; a base moves nothing")
     key = "translation" if base.quantity == "translation" else "rotation"
     return BaseColumn(moved, **{key: base.direction}, about=base.about)
 
@@ -260,7 +260,7 @@ def base_rows(small: SmallMotions, base: BaseColumn, channel: BaseMotion) -> tup
         if model.markers.accelerated[m] >= 0:
             name = small.compiled.connection_names[c]
             raise ModelError(
-                f"input {channel.name!r}: element {name!r} asks for the acceleration of a marker that the base moves; "
+                f"input {channel.name!r}: element {name!r} uses the acceleration of a marker that the base moves; "
                 "put the marker on a body that is fixed to it"
             )
         rows, P = small.wrench(small.compiled.connection_names[c]), work.connections.P[m]

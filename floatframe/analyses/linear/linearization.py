@@ -266,8 +266,8 @@ class LinearSystem:
             is_force = rate == 0 and not self.Y[:, k].any()
             if not is_force and any(part[:, k].any() for part in above):
                 raise ModelError(
-                    f"state space: input {self.inputs[k]!r} is a {('displacement', 'velocity')[rate]}, and inertia or "
-                    "damping needs its derivatives: give it as an acceleration (rate = 2), or take the "
+                    f"state space: input {self.inputs[k]!r} is a {('displacement', 'velocity')[rate]}, but inertia or "
+                    "damping needs its derivatives; give it as an acceleration (rate = 2), or compute the "
                     "frequency response"
                 )
 
@@ -353,7 +353,7 @@ def linearize(
     ------
     ModelError
         If there is no such formulation, nothing can move, the state moves but is not steady, a channel is at a place
-        that does not exist, or a column asked for is not linear here.
+        that does not exist, or a requested column is not linear here.
     """
     inputs = inputs_of(system.inputs) if inputs is None else tuple(inputs)
     outputs = outputs_of(system.outputs) if outputs is None else tuple(outputs)
@@ -450,18 +450,18 @@ class NamedStates:
     units: tuple[str, ...]
 
     def behind(self, roll: Rolling, unit: str) -> "NamedStates":
-        """Return them behind the ways along which held velocities let nothing slip."""
+        """Return these states after the displacements along velocity constraints (`eta` of `held_velocities`)."""
         n = len(roll.by_eta)
         return NamedStates((*(f"rolled way {k + 1}" for k in range(n)), *self.names), (*(unit,) * n, *self.units))
 
 
 def require_slow_states(compiled: CompiledSystem) -> None:
-    """Raise `ModelError` if states of an element may follow accelerations: z' would take part in the masses."""
+    """Raise `ModelError` if rates of states of an element may depend on accelerations, which would change M."""
     for each in compiled.laws:
         if each.law.accelerations and each.law.states:
             raise ModelError(
-                f"linearize: element {each.element.name!r} has states beside accelerations, which a linear system does "
-                "not know; give its states to an element that asks for velocities"
+                f"linearize: element {each.element.name!r} has states and uses accelerations, which small motions do "
+                "not support; move its states to an element that uses only velocities"
             )
 
 
@@ -479,22 +479,23 @@ def states_of(system: System, compiled: CompiledSystem, work: Work, parts: Tange
         if abs(rate) > STEADY * max(abs(value), least) * (1 + abs(parts.V[row + 1, row])):
             raise ModelError(
                 f"linearize: state {name!r} is not at rest: its rate is {rate:.3g} at {value:.6g}; linearise about a "
-                "motion in which it stands (of a user force: let it start there)"
+                "motion in which it is constant (for a user force: set its initial state to the constant value)"
             )
     return NamedStates(tuple(name for name, _ in found), tuple(unit for _, unit in found))
 
 
 def rates_of_states(small: SmallMotions, parts: Tangents, Omega: Array) -> Rows:
-    """Return the rates of states by small motions."""
+    """Return the rates of states as functions of small motions."""
     by_place, by_rate, by_wrench = parts.rates_of_states(Omega)
     rows = small.by_motion(by_place)
     return Rows(rows.x, small.by_motion(by_rate).x, rows.a, by_wrench)
 
 
 def with_states(parts: dict[str, Array], n_states: int) -> dict[str, Array]:
-    """Return the matrices over motions and states, from those that have states as last inputs, rates as last outputs.
+    """Return the matrices over motions and states.
 
-    Their rates are L z + L_rate z' + L_acceleration z'' + D s.
+    The given matrices have the states as their last inputs, and the rates of the states, L z + L_rate z' +
+    L_acceleration z'' + D s, as their last outputs.
     """
     if not n_states:
         return parts
@@ -517,10 +518,15 @@ def with_states(parts: dict[str, Array], n_states: int) -> dict[str, Array]:
 def motions_of_inputs(
     small: SmallMotions, parts: Tangents, by_inputs: Inputs, N: Array, K_z: Array, D_0: Array, moves: NDArray[np.bool_]
 ) -> tuple[Array, Array]:
-    """Return Y, (n_u, n_s): G Y + E = 0, with no force along what K_z resists; and the sizes of its terms.
+    """Return Y and the magnitudes of its terms, (n_u, n_s): G Y + E = 0, without force along motions that K_z resists.
 
-    A base that carries everything moves it as one, Y rigid; other motions begin with the smallest Y. moves: which
-    inputs are motions, (n_s,) bool; forces move nothing by themselves.
+    Y begins as a rigid motion if a base carries the whole system, and otherwise as the smallest solution of
+    G Y + E = 0. A motion allowed by the joints is then added, which removes the forces.
+
+    Parameters
+    ----------
+    moves
+        Whether each input is a motion, (n_s,) bool; Y is zero for forces.
     """
     E = by_inputs.E[parts.holds]
     Y = np.zeros((small.n_u, E.shape[1]))
@@ -544,14 +550,20 @@ def motions_of_inputs(
 
 
 def without_rounding(N: Array, force: Array, D: Array, Y: Array, size: Array) -> Array:
-    """Return Nᵀ (force - D Y) with zeros where what is left is rounding of what cancelled; size: of the terms of Y."""
+    """Return Nᵀ (force - D Y), with zeros for entries that are rounding errors of cancelled terms.
+
+    Parameters
+    ----------
+    size
+        Magnitudes of the terms of Y, (n_u, n_s).
+    """
     return settled(N.T @ (force - D @ Y), (N.T, force), (N.T, np.abs(D) @ size))
 
 
 def named_motions(
     system: System, by_bodies: Array, of_joints: dict[str, Array], N: Array, n_states: int
 ) -> NamedMotions:
-    """Return the joint coordinates that move, the modal coordinates and the motions of body frames, over z."""
+    """Return the moving joint coordinates, the modal coordinates, and the motions of body frames, as rows over z."""
     length, found = system.units.length_symbol, []
     sizes = sizes_as_lengths(system)
     N, by_bodies = without_noise(N, sizes), without_noise(by_bodies, sizes)
@@ -575,7 +587,7 @@ def named_motions(
 
 
 def sizes_as_lengths(system: System) -> Array:
-    """Return how far a unit of each motion of a body moves it, (n_u,): rotations by the length, modes by 1/sqrt(m)."""
+    """Return a length for a unit of each motion, (n_u,): the system size for rotations, 1/sqrt(mass) for modes."""
     compiled = compiled_system(system)
     model = compiled.model
     sizes = np.ones(int(model.bodies.u0[-1]))
@@ -586,13 +598,16 @@ def sizes_as_lengths(system: System) -> Array:
 
 
 def without_noise(motions: Array, sizes: Array) -> Array:
-    """Return motions of bodies over z with zeros for what is rounding beside the largest of each column, as lengths."""
+    """Return motions of bodies over z, with zeros for rounding errors.
+
+    An entry is a rounding error if it is small compared with the largest entry of its column, both taken as lengths.
+    """
     size = np.abs(motions) * sizes[:, None]
     return np.where(size <= NOISE * size.max(axis=0, initial=0.0), 0.0, motions)
 
 
 def seen_from(T: Array, mass: Array) -> Array:
-    """Return a mass matrix over the motions T x of what it is over x."""
+    """Return the mass matrix over T x, from the mass matrix over x."""
     by_x = np.linalg.inv(T)
     return np.asarray(by_x.T @ mass @ by_x)
 

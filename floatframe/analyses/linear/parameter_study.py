@@ -1,4 +1,4 @@
-"""System modes over a parameter: root locus and Campbell diagram, modes followed by their shapes."""
+"""System modes as functions of a parameter (root locus, Campbell diagram), tracked by their shapes."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -20,31 +20,31 @@ from floatframe.model.system import System
 
 __all__ = ["Locus", "campbell", "root_locus"]
 
-LIKE = 0.5  #: part of a shape that lies in another one, by squares, of what may be one mode
-SAME = 1e-2  #: difference of eigenvalues, relative, of which shapes mix
-CLOSE = 0.1  #: weight of distances of eigenvalues beside those of shapes
-MOST_HALVINGS = 3  #: of a step between values, where a mode is not met again
+LIKE = 0.5  #: smallest squared cosine between the shapes of one mode at neighbouring values
+SAME = 1e-2  #: relative difference below which eigenvalues count as equal, so that their shapes mix
+CLOSE = 0.1  #: weight of the distance between eigenvalues, relative to the distance between shapes
+MOST_HALVINGS = 3  #: largest number of halvings of a step between values in which a mode is lost
 
 
 @dataclass(frozen=True, eq=False)
 class Locus:
-    """Eigenvalues over a parameter; a column follows one mode."""
+    """Eigenvalues as functions of a parameter; each column follows one mode."""
 
-    parameter: str  #: its name, with its unit
+    parameter: str  #: name of the parameter, with its unit
     values: Array  #: (n_values,)
-    eigenvalues: Array  #: (n_values, n_modes) complex [1/s]; NaN where a mode has no counterpart, or is not yet there
-    outputs: tuple[str, ...] = ()  #: of `campbell`
+    eigenvalues: Array  #: (n_values, n_modes) complex [1/s]; NaN where the mode does not exist
+    outputs: tuple[str, ...] = ()  #: names of the outputs of `campbell`
     output_units: tuple[str, ...] = ()
-    steady: Array = field(default_factory=lambda: np.zeros((0, 0)))  #: their steady values, (n_values, n_outputs)
+    steady: Array = field(default_factory=lambda: np.zeros((0, 0)))  #: steady values of outputs, (n_values, n_outputs)
 
     @property
     def frequencies(self) -> Array:
-        """Im(lambda)/2 pi, (n_values, n_modes) [Hz]."""
+        """Damped frequencies |Im(lambda)|/2 pi, (n_values, n_modes) [1/unit of time]."""
         return np.abs(self.eigenvalues.imag) / (2 * np.pi)
 
     @property
     def damping_ratios(self) -> Array:
-        """-Re(lambda)/|lambda|, (n_values, n_modes)."""
+        """Damping ratios -Re(lambda)/|lambda|, (n_values, n_modes)."""
         size = np.abs(self.eigenvalues)
         return np.divide(-self.eigenvalues.real, size, out=np.zeros(size.shape), where=size > 0)
 
@@ -59,21 +59,22 @@ def root_locus(
 ) -> Locus:
     """Follow the modes of a system while a parameter changes.
 
-    A mode is joined to one of which more than half of the shape is its own, by kinetic energy; a step in which one is
-    not met again is halved, up to three times. Then its column ends, and what is new has a column of its own.
+    Two modes at neighbouring values are the same mode if their shapes share more than half of their kinetic energy. If
+    a mode is lost in a step, the step is halved, up to three times. After that, its column ends. A new mode begins a
+    new column.
 
     Parameters
     ----------
     build
-        From a value of the parameter to the linearised system (same bodies and modes for every value).
+        Returns the linearised system for a value of the parameter; all systems have the same bodies and modes.
     values
-        In steps small enough that shapes change little from one to the next, (n_values,).
+        Values of the parameter, in steps so small that shapes change little from one to the next, (n_values,).
     parameter
-        What it is, for tables and plots.
+        Name of the parameter, for tables and plots.
     n_modes
-        How many to follow at each value, by ascending |lambda|; all by default.
+        Number of modes to follow at each value, by ascending |lambda|; default: all.
     progress
-        Called with the numbers of values done and of all values.
+        Called with the number of completed values and the number of all values.
     """
     values = np.asarray(values, dtype=float)
     if values.ndim != 1 or len(values) == 0:
@@ -99,27 +100,30 @@ def root_locus(
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """Modes at one value; shapes are measured by their kinetic energy, states below by their largest share."""
+    """Modes at one value of the parameter.
+
+    Shapes are scaled so that their squared length is the kinetic energy; states are appended with their largest share.
+    """
 
     eigenvalues: Array
-    shapes: Array  #: of length one, (n_u + n_states, n_modes)
+    shapes: Array  #: shapes of length one, (n_u + n_states, n_modes)
     has_states: bool
 
 
 @dataclass(eq=False)
 class Branch:
-    """A mode that is followed, where it was met last."""
+    """A followed mode at the last value at which it was found."""
 
     modes: Modes
     number: int
-    at: float | None = None  #: the value
-    shape: Array = field(init=False)  #: its own, also where others have the same eigenvalue, of length one
+    at: float | None = None  #: last value of the parameter at which the mode was found
+    shape: Array = field(init=False)  #: shape of length one, separated from other modes with the same eigenvalue
 
     def __post_init__(self) -> None:
         self.shape = self.modes.shapes[:, self.number]
 
     def meet(self, modes: Modes, number: int, value: float) -> None:
-        """Go on with a mode: the part of its shape that lies in those of one eigenvalue, where there are several."""
+        """Continue with a mode at a value; if several modes have its eigenvalue, project the last shape onto them."""
         Q = of_same(modes, number)
         own = Q @ (Q.conj().T @ self.shape) if Q.shape[1] > 1 else modes.shapes[:, number]
         self.shape = own / np.linalg.norm(own)
@@ -127,7 +131,7 @@ class Branch:
 
     @property
     def eigenvalue(self) -> complex:
-        """Its eigenvalue there."""
+        """The eigenvalue at the last value."""
         return complex(self.modes.eigenvalues[self.number])
 
 
@@ -144,7 +148,7 @@ def modes_at(linear: LinearSystem) -> Modes:
 
 
 def root_of(mass: Array) -> Array:
-    """Return the symmetric S with S S the mass matrix of a body: the one that changes as little as the matrix does."""
+    """Return the symmetric square root of the mass matrix of a body, which changes continuously with the matrix."""
     values, vectors = np.linalg.eigh(mass)
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)
 
@@ -152,7 +156,7 @@ def root_of(mass: Array) -> Array:
 def follow(
     build: Callable[[float], LinearSystem], followed: list[Branch], before: float, value: float, n_halvings: int
 ) -> Modes:
-    """Follow branches to a value, by half the way first where one is not met again; return all modes there."""
+    """Follow branches to a value, in two half steps if one is lost; return all modes at the value."""
     now = modes_at(build(value))
     pairs = matches(followed, now, before)
     if n_halvings and len(pairs) < sum(branch.at in (None, before) for branch in followed):
@@ -168,10 +172,11 @@ def follow(
 
 
 def matches(followed: list[Branch], now: Modes, before: float) -> list[tuple[Branch, int]]:
-    """Return which of the branches met at the last value is which mode now; those that none is like are left out.
+    """Return pairs of a branch found at the last value and its mode at this value; lost branches are left out.
 
-    A branch is like a mode of whose shape more than half lies in its own, or in those of the same eigenvalue as it has:
-    where eigenvalues cross, or are double as those of a rotor that stands, shapes of one eigenvalue mix.
+    A branch may continue in a mode if more than half of the mode's shape lies in the shape of the branch, or in the
+    space of all shapes with the same eigenvalue. Shapes mix where eigenvalues cross or are double, as for a rotor at
+    rest.
     """
     alive = [branch for branch in followed if branch.at in (None, before)]
     if not alive or not len(now.eigenvalues):
@@ -183,26 +188,26 @@ def matches(followed: list[Branch], now: Modes, before: float) -> list[tuple[Bra
     like = np.maximum(like, back.T)
     alone = np.abs(shapes.conj().T @ now.shapes) ** 2
     apart = 1 - 0.5 * (like + alone) + CLOSE * far(last, now.eigenvalues)
-    if now.has_states:  # modes of states alone, or that decay, have shapes which tell little
+    if now.has_states:  # shapes of decaying modes, and of modes that consist of states, identify a mode poorly
         apart = apart + far(last, now.eigenvalues)
     rows, columns = linear_sum_assignment(apart)
     return [(alive[i], int(j)) for i, j in zip(rows, columns, strict=True) if like[i, j] >= LIKE]
 
 
 def of_same(modes: Modes, number: int) -> Array:
-    """Return an orthonormal basis of the shapes that have the eigenvalue of a mode."""
+    """Return an orthonormal basis of the shapes with the same eigenvalue as a mode."""
     own = modes.eigenvalues[number]
     Q, _ = np.linalg.qr(modes.shapes[:, np.abs(modes.eigenvalues - own) <= SAME * np.abs(own)])
     return np.asarray(Q)
 
 
 def part_within(Q: Array, shapes: Array) -> Array:
-    """Return the part of shapes, by squares, that lies in a basis, (n,)."""
+    """Return the squared length of the projection of each shape onto a basis, (n,)."""
     return np.asarray((np.abs(Q.conj().T @ shapes) ** 2).sum(axis=0))
 
 
 def far(eigenvalues: Array, others: Array) -> Array:
-    """Return how far eigenvalues are from others, relative to their sizes, between 0 and 1, (n, n_others)."""
+    """Return the distances between eigenvalues and others, relative to their magnitudes, 0 to 1, (n, n_others)."""
     a, b = eigenvalues[:, None], others[None]
     size = np.abs(a) + np.abs(b)
     return np.asarray(np.divide(np.abs(a - b), size, out=np.zeros(size.shape), where=size > 0))
@@ -218,23 +223,24 @@ def campbell(
     outputs: Sequence[AnyOutput] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Locus:
-    """Frequencies and damping of a system that turns steadily, over its speed, as seen from the turning system.
+    """Return frequencies and damping of a steadily rotating system over its speed, in the rotating frame.
 
     Parameters
     ----------
     system
-        Its joints to the ground must allow the rotation; drives of angles against the ground turn with each speed.
+        The system. Its joints to the ground must allow the rotation; prescribed angles relative to the ground are
+        replaced by rotations at each speed.
     speeds
         Angular speeds, ascending, (n_speeds,) [rad/s].
     axis, center
         Direction and a point of the axis of rotation, ground axes, (3,).
     n_modes
-        How many modes to follow.
+        Number of modes to follow; default: all.
     outputs
-        Sensors and channels whose steady values are kept (`Locus.steady`), such as bearing forces over the speed.
-        None: those of the system.
+        Sensors and channels whose steady values are returned (`Locus.steady`), such as bearing forces over the speed.
+        None: the outputs of the system.
     progress
-        Called with the numbers of speeds done and of all speeds.
+        Called with the number of completed speeds and the number of all speeds.
     """
     axis = unit_vector("campbell: axis", axis)
     center = array_of_shape("campbell: center", center, (3,))
@@ -247,7 +253,7 @@ def campbell(
         driven = turning_with(system, speed * axis)
         try:
             last[:] = [steady_rotation(driven, speed * axis, center=center, state=state)]
-        except ConvergenceError:  # that of another speed may be too far, as beyond a critical one
+        except ConvergenceError:  # the equilibrium at another speed may be too far away, as beyond a critical speed
             last[:] = [steady_rotation(driven, speed * axis, center=center)]
         seen_at[speed] = steady_values(driven, last[0], observed)
         return linearize(driven, last[0], inputs=(), outputs=())
@@ -260,12 +266,12 @@ def campbell(
 
 
 def steady_values(system: System, about: Equilibrium, outputs: Sequence[AnyOutput]) -> dict[str, tuple[float, str]]:
-    """Return value and unit of every column of outputs in a steady motion; one of one column goes by its own name.
+    """Return value and unit of every column of outputs in a steady motion; a sensor with one column keeps its own name.
 
     Raises
     ------
     ModelError
-        If two columns have one name.
+        If two columns have the same name.
     """
     now = snapshot(system, about)
     found: dict[str, tuple[float, str]] = {}
@@ -274,6 +280,6 @@ def steady_values(system: System, about: Equilibrium, outputs: Sequence[AnyOutpu
         for column, values in measured.columns.items():
             name = output.name if len(measured.columns) == 1 else f"{output.name}.{column}"
             if name in found:
-                raise ModelError(f"campbell: two outputs are called {name!r}; give each its own name")
+                raise ModelError(f"campbell: two outputs are called {name!r}; rename one")
             found[name] = (float(values[0]), measured.units[column])
     return found

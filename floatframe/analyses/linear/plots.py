@@ -1,4 +1,4 @@
-"""Plots of the analyses; they read results and compute nothing."""
+"""Plots of results of the analyses."""
 
 from typing import TYPE_CHECKING
 
@@ -14,20 +14,20 @@ if TYPE_CHECKING:
 __all__ = ["campbell_figure", "plot_campbell", "plot_frequency_response", "plot_root_locus"]
 
 
-ROUNDING = 1e-12  #: of the largest amplitude of a unit, below which a response is rounding
+ROUNDING = 1e-12  #: rounding error of a response, relative to the largest amplitude with the same unit
 
 
 def plot_campbell(locus: Locus, ax: "Axes | None" = None, *, time_unit: float = 1.0) -> "Axes":
-    """Plot frequencies over the speed, with the lines of once, twice and three times per revolution.
+    """Plot frequencies over the speed, with lines for the first three orders of the speed of rotation.
 
     Parameters
     ----------
     locus
-        As `campbell` returns it.
+        Result of `campbell`.
     ax
-        Where to draw; a new figure by default.
+        Axes to draw in; default: a new figure.
     time_unit
-        Seconds in the unit of time of the system.
+        Unit of time of the system [s].
     """
     ax = _axes() if ax is None else ax
     ax.plot(locus.values, locus.frequencies / time_unit, color="#1f4e79", linewidth=1.6)
@@ -45,15 +45,22 @@ def plot_campbell(locus: Locus, ax: "Axes | None" = None, *, time_unit: float = 
     ax.set_ylim(0, 1.05 * largest if largest > 0 else 1)
     ax.set_xlim(locus.values.min(), max(locus.values.max(), locus.values.min() + 1e-12))
     ax.set_xlabel(locus.parameter)
-    ax.set_ylabel("frequency in the turning system [Hz]")
+    ax.set_ylabel("frequency in the rotating frame [Hz]")
     ax.grid(alpha=0.3)
     return ax
 
 
 def campbell_figure(locus: Locus, *, time_unit: float = 1.0) -> "Figure":
-    """Return the diagram with the steady values of its outputs below, a panel for each unit.
+    """Return the Campbell diagram, with the steady values of outputs below it in one panel for each unit.
 
-    Outputs that stay zero at all speeds, beside the largest of their unit, are named and not drawn.
+    An output is not drawn but listed if it is zero at all speeds, compared with the largest output of the same unit.
+
+    Parameters
+    ----------
+    locus
+        Result of `campbell`.
+    time_unit
+        Unit of time of the system [s].
     """
     from matplotlib.figure import Figure
 
@@ -102,14 +109,14 @@ def plot_root_locus(locus: Locus, ax: "Axes | None" = None) -> "Axes":
 
 
 def plot_frequency_response(response: FrequencyResponse, *, time_unit: float = 1.0) -> "Figure":
-    """Return a Bode plot: amplitudes, a panel for each unit, and phases below; a curve for each output and input.
+    """Return a Bode plot with a curve for each output and input: amplitudes in a panel for each unit, phases below.
 
     Parameters
     ----------
     response
-        As `frequency_response` returns it.
+        Result of `frequency_response`.
     time_unit
-        Seconds in the unit of time of the system.
+        Unit of time of the system [s].
     """
     from matplotlib.figure import Figure
 

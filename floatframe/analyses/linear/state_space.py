@@ -1,7 +1,7 @@
-"""The state space of a linearised system in states that have names: joint coordinates, modes, motions of bodies.
+"""The state space of a linearised system with named states: joint coordinates, modes, motions of bodies.
 
-x = R z with as many rows of R as there are independent motions; with the state space of `LinearSystem.state_space` over
-(z, z_dot) and T = diag(R, R)
+The states are x = R z and their rates, where R is a square matrix whose rows are named motions. With T = diag(R, R),
+they follow from the state space over (z, z_dot) of `LinearSystem.state_space`:
 
     A = T A_z T⁻¹,  B = T B_z,  C = C_z T⁻¹,  D = D_z.
 """
@@ -27,13 +27,13 @@ if TYPE_CHECKING:
 
 __all__ = ["WRITERS", "NamedStateSpace", "named_state_space", "write_state_space"]
 
-CLEAR = 0.02  #: part of a motion that must be new to those already chosen; a smaller one makes states that nearly agree
-NEW = 1e-9  #: part that tells rounding from a motion, where nothing clearer is left
+CLEAR = 0.02  #: smallest independent part of a motion that makes a well conditioned state
+NEW = 1e-9  #: smallest independent part that is not a rounding error, used if no motion reaches `CLEAR`
 
 
 @dataclass(frozen=True, eq=False)
 class NamedStateSpace:
-    """x_dot = A x + B u,  y = C x + D u, with the name and unit of each state, input and output."""
+    """A state space x_dot = A x + B u,  y = C x + D u, with the name and unit of each state, input and output."""
 
     A: Array  #: (n_x, n_x)
     B: Array  #: (n_x, n_inputs)
@@ -51,13 +51,13 @@ class NamedStateSpace:
             object.__setattr__(self, name, frozen(np.array(getattr(self, name), dtype=float)))
 
     def scipy(self) -> "StateSpace":
-        """Return it as `scipy.signal.StateSpace`, which keeps no names."""
+        """Return the state space as `scipy.signal.StateSpace`, which has no names."""
         from scipy.signal import StateSpace
 
         return StateSpace(self.A, self.B, self.C, self.D)
 
     def control(self) -> Any:
-        """Return it as `control.StateSpace` of python-control, with names; "." in them, not allowed there, is " ".
+        """Return the state space as `control.StateSpace` of python-control, with "." in names replaced by " ".
 
         Raises
         ------
@@ -72,23 +72,22 @@ class NamedStateSpace:
 
 
 def named_state_space(linear: LinearSystem) -> NamedStateSpace:
-    """Return the state space of a linearised system in named states.
+    """Return the state space of a linearised system with named states.
 
-    (1) motions without mass are taken out, which follow the others
-    (2) joint coordinates are chosen, then modal coordinates, then motions of body frames, each time the one of which
-        most is new to those chosen before, by the mass matrix, until there are as many as independent motions
-    (3) they and their rates are the states, after them those of elements and user forces, and then what is below inputs
-        that are velocities or accelerations.
+    (1) massless motions are eliminated, because they follow the others
+    (2) named motions are chosen until there are as many as independent motions: first joint coordinates, then modal
+        coordinates, then motions of body frames; each time the one with the largest part that is independent of those
+        already chosen, in the norm of the mass matrix
+    (3) the states are the chosen motions, their rates, the states of elements and user forces, and the integrals of
+        inputs that are velocities or accelerations
 
     Raises
     ------
     ModelError
-        If the system was not made by `linearize`, and knows no names.
+        If the system has no names of motions, because it was not made by `linearize`.
     """
     if linear.motions is None:
-        raise ModelError(
-            "named_state_space: expected a system as linearize returns it; this one has no names of motions"
-        )
+        raise ModelError("named_state_space: expected a system returned by linearize, got one without names of motions")
     system, T_mass = linear.with_mass()
     motions = linear.motions
     n_z, rows = system.n_z, settled(motions.rows @ T_mass, (motions.rows, T_mass))  # (1)
@@ -98,12 +97,12 @@ def named_state_space(linear: LinearSystem) -> NamedStateSpace:
     kept = system.kept_inputs()
     T = la.block_diag(R, R, np.eye(len(system.states) + len(kept)))  # (3)
     by_states, states = rows[chosen, n_z:], slice(2 * n, 2 * n + len(system.states))
-    if by_states.any():  # ways of held velocities are places too
+    if by_states.any():  # displacements along velocity constraints are positions too
         T[:n, states] = by_states
         T[n : 2 * n] += by_states @ space.A[states]
     backward = np.linalg.inv(T)  # well conditioned by (2)
     A = T @ space.A @ backward
-    A[:n] = np.eye(n, len(A), k=n)  # as it is but for rounding
+    A[:n] = np.eye(n, len(A), k=n)  # exact, without rounding errors
     names = [motions.names[k] for k in chosen]
     units = [motions.units[k] for k in chosen]
     of_inputs = [kept_name(linear, k, r, motions.time_unit) for k, r in kept]
@@ -134,7 +133,7 @@ def kept_name(linear: LinearSystem, k: int, r: int, time_unit: str) -> tuple[str
 
 
 def independent_rows(rows: Array, M: Array, motions: NamedMotions) -> list[int]:
-    """Return the numbers of the rows that are states, in their order; see `named_state_space` (2)."""
+    """Return the indices of the rows that become states, in their order: step (2) of `named_state_space`."""
     n = rows.shape[1]
     scaled = la.solve_triangular(la.cholesky(M, lower=True), rows.T, lower=True).T
     size = np.linalg.norm(scaled, axis=1)
@@ -148,7 +147,7 @@ def independent_rows(rows: Array, M: Array, motions: NamedMotions) -> list[int]:
                 if np.linalg.norm(scaled[best]) < least:
                     break
                 direction = scaled[best] / np.linalg.norm(scaled[best])
-                for _ in range(2):  # twice: what rounding left the first time
+                for _ in range(2):  # twice, to remove the rounding errors of the first time
                     scaled = scaled - np.outer(scaled @ direction, direction)
                 candidates.remove(best)
                 chosen.append(best)
@@ -158,12 +157,19 @@ def independent_rows(rows: Array, M: Array, motions: NamedMotions) -> list[int]:
 
 
 def write_state_space(linear: LinearSystem, path: Path) -> NamedStateSpace:
-    """Write a linearised system to .npz, .mat (MATLAB 5) or .h5: A, B, C, D with names and units, and M, C, K over z.
+    """Write A, B, C, D with names and units, and M, C, K over z, to a file.
+
+    Parameters
+    ----------
+    linear
+        The linearised system.
+    path
+        File with the suffix .npz, .mat (MATLAB 5) or .h5.
 
     Raises
     ------
     ModelError
-        If the name of the file ends otherwise.
+        If the file has another suffix.
     """
     kind = path.suffix.lower()
     if kind not in WRITERS:
@@ -181,7 +187,7 @@ def write_state_space(linear: LinearSystem, path: Path) -> NamedStateSpace:
 
 
 def npz_bytes(arrays: dict[str, Any], words: dict[str, Any]) -> bytes:
-    """Return an .npz file."""
+    """Return the bytes of an .npz file."""
     data = io.BytesIO()
     named: dict[str, Any] = {name: np.array(texts, dtype=str) for name, texts in words.items()}
     np.savez(data, **arrays, **named)
@@ -189,7 +195,7 @@ def npz_bytes(arrays: dict[str, Any], words: dict[str, Any]) -> bytes:
 
 
 def mat_bytes(arrays: dict[str, Any], words: dict[str, Any]) -> bytes:
-    """Return a .mat file (MATLAB 5): matrices, and cell arrays of texts."""
+    """Return the bytes of a .mat file (MATLAB 5): matrices, and cell arrays of texts."""
     from scipy.io import savemat
 
     cells = {name: np.array([*texts, ""], dtype=object)[:-1] for name, texts in words.items()}
@@ -199,7 +205,7 @@ def mat_bytes(arrays: dict[str, Any], words: dict[str, Any]) -> bytes:
 
 
 def h5_bytes(arrays: dict[str, Any], words: dict[str, Any]) -> bytes:
-    """Return an HDF5 file: matrices as datasets, names and units as attributes of the root."""
+    """Return the bytes of an HDF5 file: matrices as datasets, names and units as attributes of the root."""
     import h5py
 
     data = io.BytesIO()

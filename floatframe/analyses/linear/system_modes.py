@@ -1,4 +1,4 @@
-"""Vibration modes of a whole system: complex eigenvalues with frequency and damping, and what moves in each."""
+"""Vibration modes of a whole system: complex eigenvalues, frequencies, damping ratios and shapes."""
 
 from dataclasses import dataclass, field
 
@@ -10,27 +10,29 @@ from floatframe.analyses.linear.linearization import LinearSystem
 
 __all__ = ["SystemModes", "system_modes"]
 
-ROUNDING = 1e-13  #: of the terms that make an entry of a matrix: what their sum does not tell from zero
-MODEL = 1e-10  #: of an entry, by which it is known: motions are steady and equilibria balanced to about so much
-LOW = 1e-10  #: omega² by the highest one below which modes are solved for again among themselves
-FREE = 1e-7  #: rate of a unit motion by the highest, below which it costs nothing
-LEAST_BODY_MOTION = 1e-9  #: motion of bodies by that of states below which a mode is one of states alone
+ROUNDING = 1e-13  #: rounding error of a matrix entry, relative to the terms of its sum
+MODEL = 1e-10  #: relative error of a matrix entry, because steady motions and equilibria have about this error
+LOW = 1e-10  #: omega², relative to the highest one, below which modes are solved for again in their own subspace
+FREE = 1e-7  #: rate of a unit motion, relative to the highest frequency, below which the motion meets no resistance
+LEAST_BODY_MOTION = 1e-9  #: motion of bodies, relative to the change of states, below which a mode has only states
 
 
 @dataclass(frozen=True, eq=False)
 class SystemModes:
-    """Modes exp(lambda t): one of each conjugate pair, by ascending |lambda|.
+    """Modes exp(lambda t) by ascending |lambda|; only one mode of each conjugate pair is listed.
 
-    A motion that costs nothing is one mode with lambda = 0, though two eigenvalues belong to it: place and velocity.
+    A motion without resistance is listed as one mode with lambda = 0, although it has two eigenvalues, one for its
+    position and one for its velocity.
     """
 
     eigenvalues: Array  #: lambda, imaginary part >= 0, (n_modes,) complex [1/s]
-    shapes: Array  #: motions of the bodies (body axes), the largest entry 1, (n_u, n_modes) complex
+    shapes: Array  #: motions of the bodies (body axes), with 1 as the largest entry, (n_u, n_modes) complex
     energy_shares: Array  #: share of each body in the kinetic energy of the mode, (n_modes, n_bodies)
-    bodies: tuple[str, ...]  #: their names
-    states: tuple[str, ...] = ()  #: of elements and user forces
-    state_shapes: Array = field(default_factory=lambda: np.zeros((0, 0)))  #: by the same factor, (n_states, n_modes)
-    errors: Array = field(default_factory=lambda: np.zeros(0))  #: by which lambda may be off, (n_modes,) [1/s]
+    bodies: tuple[str, ...]  #: names of the bodies
+    states: tuple[str, ...] = ()  #: names of the states of elements and user forces
+    #: changes of states, scaled like the shapes, (n_states, n_modes) complex
+    state_shapes: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    errors: Array = field(default_factory=lambda: np.zeros(0))  #: error bounds of lambda, (n_modes,) [1/s]
 
     @property
     def frequencies(self) -> Array:
@@ -50,7 +52,7 @@ class SystemModes:
 
     @property
     def is_stable(self) -> bool:
-        """Whether no mode grows, each judged by how well its own eigenvalue is known."""
+        """Whether no mode grows by more than the error bound of its eigenvalue."""
         errors = self.errors if len(self.errors) else 0.0
         return bool((self.eigenvalues.real <= errors).all())
 
@@ -58,14 +60,14 @@ class SystemModes:
 def system_modes(linear: LinearSystem) -> SystemModes:
     """Return all modes of a linearised system.
 
-    Without damping, gyroscopic and circulatory terms the symmetric pencil (K, M) is solved, so that frequencies are
-    real; otherwise the first-order pencil of (z, z_dot).
+    Without damping, gyroscopic and circulatory terms, the symmetric pencil (K, M) is solved, which gives real
+    frequencies. Otherwise, the first-order pencil of (z, z_dot) is solved.
     """
     system, _ = linear.with_mass()
     n = system.n_z
     M, C, K = (np.asarray(a)[:n, :n] for a in (system.M, system.C, system.K))
     omega2, Z = undamped_modes((K + K.T) / 2, (M + M.T) / 2)
-    highest = float(np.sqrt(np.abs(omega2).max(initial=0.0))) or 1.0  # 1: nothing is sprung but by states
+    highest = float(np.sqrt(np.abs(omega2).max(initial=0.0))) or 1.0  # 1 if only states act as springs
     modal_C = Z.T @ C @ Z
     is_conservative = not system.states and (
         np.abs(modal_C).max(initial=0.0) <= 1e-12 * highest
@@ -79,7 +81,7 @@ def system_modes(linear: LinearSystem) -> SystemModes:
         root = np.sqrt(omega2.astype(complex))
         eigenvalues, shapes = np.where(omega2 >= 0, 1j * root.real, root.imag), Z.astype(complex)
         errors = np.divide(noise, 2 * np.abs(root), out=np.zeros(len(noise)), where=omega2 != 0)
-        for k in np.flatnonzero(omega2 < 0):  # an unstable one has a decaying twin
+        for k in np.flatnonzero(omega2 < 0):  # an unstable mode and a decaying one belong together
             eigenvalues, errors = np.append(eigenvalues, -eigenvalues[k]), np.append(errors, errors[k])
             shapes = np.column_stack([shapes, shapes[:, k]])
     else:
@@ -114,9 +116,10 @@ def system_modes(linear: LinearSystem) -> SystemModes:
 
 
 def undamped_modes(K: Array, M: Array) -> tuple[Array, Array]:
-    """Return omega², ascending, and the modes of a symmetric pencil, low ones as well known as high ones.
+    """Return omega², ascending, and the modes of a symmetric pencil, with low modes as accurate as high ones.
 
-    An error of the solver goes with the highest omega²: modes far below are solved for again among themselves.
+    Errors of the solver are proportional to the highest omega², so that much lower modes are solved for again in their
+    own subspace.
     """
     omega2, Z = la.eigh(K, M)
     n = len(omega2)
@@ -136,9 +139,9 @@ def undamped_modes(K: Array, M: Array) -> tuple[Array, Array]:
 
 
 def state_matrix(system: LinearSystem, Z: Array, highest: float) -> tuple[Array, Array]:
-    """Return A of the first-order equations in the coordinates of undamped modes, and the sizes of its terms.
+    """Return A of the first-order equations in the coordinates of undamped modes, and the magnitudes of its terms.
 
-    Velocities are scaled by the highest frequency, so that the matrix is well scaled.
+    Velocities are divided by the highest frequency, so that the matrix is well scaled.
     """
     n, m = system.n_z, len(system.states)
     rates, states = slice(n, 2 * n), slice(2 * n, 2 * n + m)
@@ -159,10 +162,11 @@ def state_matrix(system: LinearSystem, Z: Array, highest: float) -> tuple[Array,
 
 
 def motions_beside(system: LinearSystem, Z: Array) -> Array:
-    """Return how far the motions coupled with those of modes go where they have as much kinetic energy, (n_z, n).
+    """Return the sizes of the motions that are coupled with modes, at equal kinetic energy, (n_z, n).
 
-    Directions (of axes, of a steady rotation) are known to `ROUNDING`, so that a motion has so much of these in it. One
-    that costs nothing then costs the square of that: K of a free motion is as small, of either sign.
+    Directions of axes and of a steady rotation have the relative error `ROUNDING`, so that every motion contains
+    that fraction of coupled motions. K of a free motion is then not zero, but of the order of its square, with either
+    sign.
     """
     n = system.n_z
     M, C, K = (np.abs(a[:n, :n]) for a in (system.M, system.C, system.K))
@@ -172,11 +176,12 @@ def motions_beside(system: LinearSystem, Z: Array) -> Array:
 
 
 def eigenvalues_with_errors(A: Array, dA: Array) -> tuple[Array, Array, Array]:
-    """Return all eigenvalues, their unit vectors, and by how much each may be off.
+    """Return all eigenvalues, their eigenvectors of length one, and error bounds of the eigenvalues.
 
-    The two-sided Rayleigh quotient takes away what the solver adds, which goes with the size of the whole matrix. What
-    is not known of the matrix moves lambda by |w|ᵀ |dA| |v| / |wᴴ v|: little for a mode to which only small entries
-    belong, much where eigenvectors are nearly parallel.
+    The two-sided Rayleigh quotient removes the error of the solver, which is proportional to the norm of the whole
+    matrix. An error dA of the matrix changes lambda by up to |w|ᵀ |dA| |v| / |wᴴ v|, with left eigenvector w and right
+    eigenvector v. This is small for modes that involve only small entries, and large if eigenvectors are nearly
+    parallel.
     """
     _, W, V = la.eig(A, left=True, right=True)
     overlap = np.einsum("xk,xk->k", W.conj(), V)
@@ -184,14 +189,14 @@ def eigenvalues_with_errors(A: Array, dA: Array) -> tuple[Array, Array, Array]:
     safe = np.where(is_regular, overlap, 1.0)
     values = np.einsum("xk,xk->k", W.conj(), A @ V) / safe
     errors = np.einsum("xk,xk->k", np.abs(W), dA @ np.abs(V)) / np.abs(safe)
-    plain = np.einsum("xk,xk->k", V.conj(), A @ V)  # of a defective one, which is as it is
+    plain = np.einsum("xk,xk->k", V.conj(), A @ V)  # for a defective eigenvalue, which is not improved
     return np.where(is_regular, values, plain), V, np.where(is_regular, errors, np.inf)
 
 
 def with_motions_that_cost_nothing(A: Array, eigenvalues: Array, V: Array, errors: Array) -> tuple[Array, Array, Array]:
-    """Return one of each conjugate pair, and as many modes with lambda = 0 as there are motions that cost nothing.
+    """Return one mode of each conjugate pair, and one mode with lambda = 0 for each motion without resistance.
 
-    Q spans what belongs to zero; motions that cost nothing are what A takes to zero within it, without velocities.
+    Q spans the eigenvectors of zero. Motions without resistance are the null space of A within Q, without velocities.
     """
     is_zero = np.abs(eigenvalues) <= errors
     kept = ~is_zero & (eigenvalues.imag >= 0)

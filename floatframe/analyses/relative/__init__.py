@@ -1,1 +1,1 @@
-"""Analyses in the coordinates of joints: small motions that have names, equilibria and driven motions along a tree."""
+"""Analyses in joint coordinates: a basis of named small motions, and steps towards an equilibrium."""

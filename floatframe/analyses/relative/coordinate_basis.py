@@ -1,13 +1,13 @@
-"""Small motions in the coordinates of joints and modes: a basis whose every motion has a name.
+"""A basis of small motions in joint and modal coordinates, in which every motion has a name.
 
-With s the coordinates of the joints of the tree and the modes (docs/relative.md §2), a body moves by xi = N_s ds, which
-keeps the joints of the tree closed; column k is the velocity of all bodies at rate one of coordinate k. Where loops
-close, G N_s ds = 0 besides, with as many dependent coordinates as G N_s has rank:
+Let s be the coordinates of the joints of the tree and of the modes (docs/relative.md §2). The bodies move by
+xi = N_s ds, which satisfies the joints of the tree; column k of N_s is the velocity of all bodies at unit rate of
+coordinate k. If there are loops, their constraints G N_s ds = 0 make as many coordinates dependent as G N_s has rank:
 
     ds_d = -(G N_s)_d⁺ (G N_s)_i ds_i,        N = N_s [1; -(G N_s)_d⁺ (G N_s)_i]
 
-Dependent are coordinates far out in the tree, before those near the ground, and joints before modes, as long as they
-move what is held by a tenth of what the best one does.
+Dependent coordinates are chosen far from the ground rather than near it, and joints rather than modes, provided that
+their column is at least a tenth of the largest one.
 """
 
 from dataclasses import dataclass
@@ -26,35 +26,35 @@ from floatframe.results.sensors.measurement import unit_words
 
 __all__ = ["CoordinateBasis", "coordinate_basis", "coordinate_names", "dependent_coordinates"]
 
-RANK = 1e-10  #: of the largest row of what coordinates move, below which what is left repeats others
-NEARLY = 0.1  #: of the largest column that is left: one of these may be dependent
-MODE = 1e-3  #: size of a modal coordinate against that of a joint, so that modes are dependent last
+RANK = 1e-10  #: size of a column after elimination, relative to the largest, below which it is a rounding error
+NEARLY = 0.1  #: smallest column that may become dependent, relative to the largest remaining one
+MODE = 1e-3  #: scale of modal coordinates relative to joint coordinates, so that modes become dependent last
 FRAME = ("x", "y", "z", "rx", "ry", "rz")
 
 
 @dataclass(frozen=True, eq=False)
 class CoordinateBasis:
-    """Independent coordinates and what they move."""
+    """Independent coordinates, and the motions of the bodies along them."""
 
     names: tuple[str, ...]  #: "joint.coordinate", "body mode k", "body x"
     units: tuple[str, ...]
-    N: Array  #: motions of the bodies (body axes of the engine) by them, (n_u, n_z)
+    N: Array  #: motions of the bodies (body axes of the engine) per coordinate, (n_u, n_z)
 
 
 def coordinate_basis(system: System, state: State, G: Array, shown: tuple[Array, ...]) -> CoordinateBasis:
-    """Return the independent coordinates at a state, and the motions of the bodies by them.
+    """Return the independent coordinates at a state, and the motions of the bodies along them.
 
     Parameters
     ----------
     system
         The system.
     state
-        In the frames of the engine, joints closed.
+        A state of the engine that satisfies the joints.
     G
-        Rows of all positions that are held, over the motions of the bodies, (n_held, n_u).
+        Rows of all position constraints over the motions of the bodies, (n_held, n_u).
     shown
-        Of each body, its motions in the frame of its file by those in the frame of the engine, (6 + n, 6 + n): those of
-        a body that hangs at nothing are named as its file has it.
+        For each body, the matrix from motions in the frame of the engine to motions in the frame of its file,
+        (6 + n, 6 + n). The motions of a body without joints are named in the frame of its file.
     """
     compiled, tree = compiled_system(system), tree_of(system).tree
     N, units = coordinate_motions(compiled, tree, state), coordinate_units(system)
@@ -80,7 +80,7 @@ def coordinate_basis(system: System, state: State, G: Array, shown: tuple[Array,
 
 
 def coordinate_names(system: System) -> tuple[str, ...]:
-    """Return the names of all coordinates that are unknown, body by body, first those of its joint, (n_s,)."""
+    """Return the names of all unknown coordinates, (n_s,), body by body: coordinates of its joint, then its modes."""
     parts, body_names = tree_of(system), compiled_system(system).body_names
     tree, names = parts.tree, []
     for i, body in enumerate(body_names):
@@ -94,13 +94,13 @@ def coordinate_names(system: System) -> tuple[str, ...]:
 
 
 def coordinate_units(system: System) -> tuple[str, ...]:
-    """Return "rad", "m" for a length, or "" for a mode, of all coordinates that are unknown, (n_s,)."""
+    """Return the units of all unknown coordinates, (n_s,): "rad", "m" for a length, "" for a mode."""
     parts = tree_of(system)
     return tuple("" if column < 0 else parts.columns[column].unit for column in parts.tree.column)
 
 
 def free_frames(compiled: CompiledSystem, tree: Tree, N: Array, shown: tuple[Array, ...]) -> Array | None:
-    """Return coordinates as they are named by those of the tree, (n_s, n_s); None if no body hangs at nothing."""
+    """Return the matrix from tree coordinates to named coordinates, (n_s, n_s); None if all bodies have joints."""
     free = np.flatnonzero(tree.joint < 0)
     if not len(free):
         return None
@@ -112,7 +112,7 @@ def free_frames(compiled: CompiledSystem, tree: Tree, N: Array, shown: tuple[Arr
 
 
 def preference(tree: Tree) -> IntArray:
-    """Return how far out in the tree each coordinate is, modes nearer than any joint, (n_s,)."""
+    """Return the distance of each coordinate from the ground in the tree, (n_s,); modes are nearer than any joint."""
     depth: dict[int, int] = {-1: 0}
     for i in tree.order:
         depth[int(i)] = depth[int(tree.parent[i])] + 1
@@ -121,9 +121,10 @@ def preference(tree: Tree) -> IntArray:
 
 
 def dependent_coordinates(C: Array, preferred: IntArray) -> IntArray:
-    """Return the columns of C that depend on the others, as many as it has rank, by elimination with chosen pivots.
+    """Return as many columns of C as it has rank, which are dependent, by elimination with preferred pivots.
 
-    Of columns whose part that is new is at least a tenth of the largest, the one most preferred, the last of these.
+    Candidates are the columns whose remaining part is at least a tenth of the largest one. Among them, the pivot is the
+    column with the highest preference, the last one of several.
     """
     left = C.copy()
     first = np.linalg.norm(left, axis=0).max(initial=0.0)
@@ -136,7 +137,7 @@ def dependent_coordinates(C: Array, preferred: IntArray) -> IntArray:
         good = np.flatnonzero(size >= NEARLY * size.max())
         best = good[np.lexsort((good, preferred[good]))[-1]]
         direction = left[:, best] / size[best]
-        for _ in range(2):  # twice: what rounding left the first time
+        for _ in range(2):  # twice, to remove the rounding errors of the first time
             left -= np.outer(direction, direction @ left)
         chosen.append(int(best))
     return np.array(sorted(chosen), dtype=np.int64)

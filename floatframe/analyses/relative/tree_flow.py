@@ -1,15 +1,17 @@
-"""Steps towards an equilibrium in the coordinates of joints and modes, for `analyses.equilibrium`.
+"""Steps towards an equilibrium in joint and modal coordinates, for `analyses.equilibrium`.
 
-In the place of (2) there, with the tree of the system and the wrenches w of what closes loops (docs/relative.md §5):
+Step (2) of that module is replaced by the following equations, with the tree of the system and the wrenches w of the
+loop-closing connections (docs/relative.md §5):
 
     (2) (M/tau + K) ds + B dw = -rho,   C ds + V dw = -g
 
-where K is the Newton matrix with c_k alone: rates of joints stay as they are. In a steady rotation those of joints at
-the ground may change with their coordinates (a body on a ball, or at nothing): ds_dot = S ds, ds_ddot = S' ds, by
-differences, and K + C S + M S' stands for K, where C and M are the Newton matrices of rates and accelerations.
+K is the Newton matrix of positions (c_k alone), because the rates of joints do not change. In a steady rotation, the
+rates of a joint at the ground may depend on its coordinates, for example of a body on a ball joint or without a joint:
+ds_dot = S ds, ds_ddot = S' ds, with S and S' from finite differences. K is then replaced by K + C S + M S', where C and
+M are the Newton matrices of rates and accelerations.
 
-Reactions of joints of the tree follow from what hangs at them; along a coordinate they are changed to what springs,
-motors and friction give there, so that what is left over stands as a force out of balance at the bodies.
+The reactions of the joints of the tree follow from the bodies that they carry. Along a free coordinate, the reaction is
+replaced by the force of springs, motors and friction, so that the difference appears as unbalanced force of the bodies.
 """
 
 from collections.abc import Callable
@@ -31,16 +33,17 @@ from floatframe.model.system import System
 
 __all__ = ["TreeFlow", "tree_flow"]
 
-NEAR_BY = 1e-6  #: rad, or part of the size of the system, of the differences for S
+NEAR_BY = 1e-6  #: step of the finite differences for S [rad, or relative to the size of the system]
 
-Turning = Callable[[State], tuple[State, Array]]  #: a state to that with the velocities of the rotation, and its u_dot
+#: from a state to the state with the velocities of the rotation, and its accelerations
+Turning = Callable[[State], tuple[State, Array]]
 
 
 @dataclass(frozen=True, eq=False)
 class TreeFlow:
-    """A system on its way to an equilibrium along its coordinates; working arrays are those of the caller."""
+    """Steps of a system towards an equilibrium in its coordinates; the caller provides the working arrays."""
 
-    model: Model  #: with what elements say of equilibrium
+    model: Model  #: the model, with the contributions of elements to the equilibrium
     tree: Tree
     joints: JointWork
     turning: Turning
@@ -48,7 +51,7 @@ class TreeFlow:
     at_ground: IntArray  #: coordinates of joints at the ground whose rates may change in a steady rotation
 
     def wrenches(self, work: Work, state: State, u_dot: Array, w: Array) -> Array:
-        """Return w with the reactions of the joints of the tree at a motion, (n_w,); arrays end at that iterate."""
+        """Return w with the reactions of the joints of the tree at a motion, (n_w,); `work` then holds this iterate."""
         from floatframe.engine.tree.kernels.entry import projected
 
         set_iterate(work, state, u_dot, w)
@@ -66,7 +69,7 @@ class TreeFlow:
         return w
 
     def placed(self, work: Work) -> JointWork:
-        """Return the joints as the iterate in `work` has them, increments counted from there."""
+        """Return the joints at the iterate in `work`, with zero increments."""
         from floatframe.engine.tree.kernels.entry import motion_of_joints
 
         joints = self.joints
@@ -75,7 +78,7 @@ class TreeFlow:
         return joints
 
     def step(self, work: Work, state: State, u_dot: Array, w: Array, tau: float) -> tuple[Array, Array, Array]:
-        """(2): return the changes of coordinates, (n_s,), of bodies, ground axes, (n_u,), and of wrenches, (n_w,)."""
+        """Return the changes of coordinates, (n_s,), bodies (ground axes), (n_u,), and wrenches, (n_w,), by (2)."""
         from floatframe.engine.tree.kernels.entry import motion_of_bodies, newton_step
 
         slopes = self.slopes(work, state)
@@ -95,7 +98,7 @@ class TreeFlow:
         return ds, work.state.u.copy(), dw
 
     def slopes(self, work: Work, state: State) -> tuple[Array, Array] | None:
-        """Return S and S', (n_s, n_s), of a steady rotation at a state; None where rates of joints stay."""
+        """Return S and S' of a steady rotation at a state, (n_s, n_s); None if rates of joints do not change."""
         if not len(self.at_ground):
             return None
         n_s, columns = len(self.tree.slot), self.tree.column
@@ -114,7 +117,7 @@ class TreeFlow:
         return S[0], S[1]
 
     def turning_step(self, work: Work, tau: float, S: Array, S_dot: Array) -> tuple[Array, Array]:
-        """Return the changes of coordinates and kept wrenches in a steady rotation, by dense matrices."""
+        """Return the changes of coordinates and of loop-closing wrenches in a steady rotation, by dense matrices."""
         from floatframe.engine.tree.kernels.entry import newton_matrix
 
         n_s = len(S)
@@ -132,7 +135,7 @@ class TreeFlow:
         return solution[:n_s], solution[n_s:]
 
     def displaced(self, work: Work, state: State, ds: Array) -> State:
-        """Return the state moved by ds along the coordinates, (n_s,)."""
+        """Return the state after the changes ds of the coordinates, (n_s,)."""
         from floatframe.engine.tree.kernels.entry import moved
 
         set_iterate(work, state)
@@ -147,9 +150,10 @@ class TreeFlow:
 
 
 def tree_flow(system: System, turning: Turning, *, rests: bool) -> TreeFlow:
-    """Return the way to an equilibrium at rest, or in a steady rotation, of a system."""
+    """Return the flow of a system towards an equilibrium at rest, or in a steady rotation."""
     compiled, tree = compiled_system(system), tree_of(system).tree
     model, roots = compiled.resting_model, np.flatnonzero((tree.parent < 0) & (np.diff(tree.column0) > 1))
-    several = [s for i in roots for s in range(tree.s0[i], tree.m0[i])]  # one column turns or slides at its own rate
+    # the rate of a single coordinate does not change
+    several = [s for i in roots for s in range(tree.s0[i], tree.m0[i])]
     at_ground = np.array([] if rests else several, dtype=np.int64)
     return TreeFlow(model, tree, new_joint_work(model, tree), turning, compiled.length, at_ground)

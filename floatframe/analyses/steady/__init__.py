@@ -1,1 +1,1 @@
-"""Steady running: vehicles that go straight on or turn with a constant radius, their wheels spinning."""
+"""Steady running: vehicles with spinning wheels that run straight or in a circle."""

@@ -1,7 +1,7 @@
-"""The frame that runs along with a system in steady motion.
+"""The frame that moves with a system in steady motion.
 
-The carrier has a constant angular velocity Omega, and the velocity v_0 at a point r_0 that stands in the ground; every
-body moves with it but for a spin s e about an axis e of its own:
+The carrier has a constant angular velocity Omega, and the velocity v_0 at a point r_0 fixed in the ground. Every body
+moves with the carrier, except for a spin s e about its own axis e:
 
     v = v_0 + Omega × (r - r_0),   omega_B = R_GBᵀ Omega + s e
     v' = Omega × v,                omega_B' = R_GBᵀ Omega × s e
@@ -30,13 +30,13 @@ class Carrier:
     omega: Array  #: Omega, ground axes, (3,) [rad/s]
 
     def velocity_at(self, r: Array) -> Array:
-        """Return the velocity at points r, ground axes, (..., 3)."""
+        """Return the velocity of the carrier at points r, ground axes, (..., 3)."""
         return np.asarray(self.velocity + np.cross(self.omega, r - self.point))
 
 
 @dataclass(frozen=True, eq=False)
 class Spin:
-    """A body that spins in the carrier."""
+    """A body that spins relative to the carrier."""
 
     body: int
     axis: Array  #: e, unit vector, body axes, (3,)
@@ -45,7 +45,10 @@ class Spin:
 def carried(model: Model, state: State, carrier: Carrier, spins: tuple[Spin, ...], s: Array) -> tuple[State, Array]:
     """Return a state of the engine with the velocities of the steady motion, and the accelerations, (n_u,).
 
-    s: speeds of the spins, (n_spins,) [rad/s].
+    Parameters
+    ----------
+    s
+        Speeds of the spins, (n_spins,) [rad/s].
     """
     u, u_dot = np.zeros_like(state.u), np.zeros_like(state.u)
     own = {spin.body: speed * spin.axis for spin, speed in zip(spins, s, strict=True)}
@@ -59,7 +62,7 @@ def carried(model: Model, state: State, carrier: Carrier, spins: tuple[Spin, ...
 
 
 def by_spin(model: Model, work: Work, omega: Array, spin: Spin) -> tuple[Array, Array]:
-    """Return nu and eta for a spin that is faster by one, each (n_u,)."""
+    """Return the derivatives nu and eta of velocities and accelerations by the speed of a spin, (n_u,) each."""
     nu, eta = np.zeros((2, int(model.bodies.u0[-1])))
     turn = slice(int(model.bodies.u0[spin.body]) + 3, int(model.bodies.u0[spin.body]) + 6)
     nu[turn], eta[turn] = spin.axis, np.cross(work.state.R[spin.body].T @ omega, spin.axis)
@@ -67,7 +70,7 @@ def by_spin(model: Model, work: Work, omega: Array, spin: Spin) -> tuple[Array, 
 
 
 def by_carrier(model: Model, work: Work, carrier: Carrier, change: Array) -> tuple[Array, Array]:
-    """Return nu and eta for a carrier whose angular velocity is another by `change`, ground axes, each (n_u,)."""
+    """Return nu and eta for a `change` of the angular velocity of the carrier, ground axes, (n_u,) each."""
     nu, eta = np.zeros((2, int(model.bodies.u0[-1])))
     for i, u0 in enumerate(model.bodies.u0[:-1]):
         R, r = work.state.R[i], work.state.r[i]
@@ -83,11 +86,16 @@ def by_carrier(model: Model, work: Work, carrier: Carrier, change: Array) -> tup
 def moved_on(model: Model, state: State, carrier: Carrier, spins: Sequence[Array], later: float) -> tuple[State, Array]:
     """Return the state of the engine, and its accelerations, after a time of the steady motion.
 
-    spins: angular velocities against the carrier, body axes, (3,) of each body.
+    Parameters
+    ----------
+    spins
+        Angular velocity of each body relative to the carrier, body axes, (3,) [rad/s].
+    later
+        The time after the given state [s].
     """
     R_t, Omega2 = rotation_exp(later * carrier.omega), float(carrier.omega @ carrier.omega)
     along, center = carrier.velocity, carrier.point
-    if Omega2 > 0:  # a screw about an axis through its center
+    if Omega2 > 0:  # a helical motion about an axis through `center`
         along = (carrier.velocity @ carrier.omega) / Omega2 * carrier.omega
         center = carrier.point + np.cross(carrier.omega, carrier.velocity) / Omega2
     r, p, u, u_dot = state.r.copy(), state.p.copy(), state.u.copy(), np.zeros_like(state.u)
@@ -104,7 +112,7 @@ def moved_on(model: Model, state: State, carrier: Carrier, spins: Sequence[Array
 
 
 def turned_axes(model: Model, spins: Sequence[Array], later: float) -> Array:
-    """Return the rotations from the axes of bodies after a time to those that turned with the carrier, (n_u, n_u)."""
+    """Return the rotations from body axes after a time to axes that turned only with the carrier, (n_u, n_u)."""
     turned = np.eye(int(model.bodies.u0[-1]))
     for u0, spin in zip(model.bodies.u0[:-1], spins, strict=True):
         Q = rotation_exp(later * spin)

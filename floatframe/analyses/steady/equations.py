@@ -1,15 +1,15 @@
 """The equations of steady running and their derivatives.
 
-Unknowns are the motions xi of the bodies, the wrenches, multipliers and states w of connections, the speeds s of the
-spins, the curvature where it is not given, and numbers p of the system that the user leaves open (a steer angle, a
-torque). With the carrier of `carrier.py`:
+The unknowns are the motions xi of the bodies; the wrenches, multipliers and states w of connections; the speeds s of
+the spins; the curvature, unless it is given; and open parameters p of the system, such as a steer angle or a torque.
+With the carrier of `carrier.py`:
 
-    (1) velocities and accelerations of the steady motion belong to every trial (xi, s, curvature)
-    (2) residuals: forces f of the bodies, rows g of connections, rates of what joints hold, rates z' of states, and
-        where the body of reference passes: neither ahead of its point nor beside it
-    (3) least squares of smallest size for the linear equations, scaled by rows and columns: motions that cost nothing
-        (a wheel on its axle, the place along the road) stay where they are
-    (4) the tangent is exact in xi, w, s and the curvature, and a difference in p.
+    (1) every trial (xi, s, curvature) has the velocities and accelerations of the steady motion
+    (2) residuals: forces f of the bodies, rows g of connections, rates of joint constraints, rates z' of states, and
+        the distances of the reference body from its point, along and across its path
+    (3) the linear equations are scaled by rows and columns, and solved by least squares with the smallest norm, so that
+        motions without resistance (the angle of a wheel on its axle, the position along the road) do not change
+    (4) the tangent is exact for xi, w, s and the curvature; for p, it is a finite difference
 """
 
 from collections.abc import Callable
@@ -44,36 +44,36 @@ from floatframe.simulation.stop_events import require_off_stops
 
 __all__ = ["Equations", "Family", "Place", "Step", "Trial", "timed"]
 
-SINGULAR = 1e-12  #: singular value of the scaled equations below which a motion costs nothing
-DIFFERENCE = 1e-4  #: step of open numbers, of their size, at least one
+SINGULAR = 1e-12  #: singular value of the scaled equations below which a motion has no resistance
+DIFFERENCE = 1e-4  #: finite difference of an open parameter, relative to max(1, its magnitude)
 
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """A system by its open numbers."""
+    """A system as a function of its open parameters."""
 
     system: System | Callable[..., System]
     start: dict[str, float]
 
     @property
     def first(self) -> System:
-        """The system to begin with."""
+        """The system for the initial values of the open parameters."""
         return self.at(np.array(list(self.start.values()), dtype=float))
 
     def at(self, p: Array) -> System:
-        """Return the system for open numbers p, (n_p,)."""
+        """Return the system for open parameters p, (n_p,)."""
         if isinstance(self.system, System):
             if self.start:
                 raise ModelError(
-                    f"steady_motion: unknown {sorted(self.start)}: expected a function that returns the system from "
-                    "these numbers, got a system"
+                    f"steady_motion: unknown {sorted(self.start)}: expected a function that returns the system for "
+                    "these parameters, got a system"
                 )
             return self.system
         return self.system(**dict(zip(self.start, (float(value) for value in p), strict=True)))
 
 
 def timed(work: Work, t: float) -> Work:
-    """Return working arrays at a time."""
+    """Return the working arrays with another time."""
     work.state.time[...] = t
     return work
 
@@ -83,27 +83,27 @@ class Evaluated:
     """The equations at a trial."""
 
     parts: Linearized
-    D: Array  #: of the forces by xi, (n_u, n_u)
-    G: Array  #: of the rows by xi, (n_w, n_u)
-    C: Array  #: of the forces by nu
+    D: Array  #: derivatives of the forces by xi, (n_u, n_u)
+    G: Array  #: derivatives of the rows by xi, (n_w, n_u)
+    C: Array  #: derivatives of the forces by nu, (n_u, n_u)
     M: Array
     G_v: Array
-    f: Array  #: forces out of balance, (n_u,)
+    f: Array  #: unbalanced forces, (n_u,)
     g: Array  #: rows, (n_w,)
-    rate: Array  #: of what joints hold, (n_w,)
-    W: tuple[Array, ...]  #: masses with modal stiffness
-    scale: float  #: of the forces at work
+    rate: Array  #: rates of joint constraints, (n_w,)
+    W: tuple[Array, ...]  #: mass and modal stiffness of each body
+    scale: float  #: norm of the acting forces
 
     @property
     def error(self) -> float:
-        """Forces out of balance, relative to those at work."""
+        """Unbalanced forces, relative to the acting forces."""
         size = size_of(self.W, self.f)
         return size / self.scale if self.scale > 0 else size
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """Unknowns."""
+    """Values of all unknowns."""
 
     state: State
     w: Array
@@ -114,7 +114,7 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """A trial and the equations there."""
+    """A trial and its equations."""
 
     system: System
     compiled: CompiledSystem
@@ -128,11 +128,11 @@ class Step:
     """A step of Newton's method."""
 
     x: Array  #: changes of all unknowns, (n_x,)
-    inverse: Array  #: by which they follow from the residual, (n_x, n_rows)
-    sizes: Array  #: of the unknowns, (n_x,)
+    inverse: Array  #: from the residual to the changes, (n_x, n_rows)
+    sizes: Array  #: typical magnitudes of the unknowns, (n_x,)
 
     def length(self, x: Array) -> float:
-        """Return the length of a change by the sizes of its parts."""
+        """Return the norm of a change, scaled by the magnitudes of the unknowns."""
         return float(np.linalg.norm(x / self.sizes))
 
 
@@ -147,7 +147,7 @@ class Equations:
     t: float
 
     def at(self, trial: Trial) -> Place:
-        """Return a trial with its joints closed and its equations."""
+        """Return a trial, corrected to satisfy its joints, with its equations."""
         system = self.family.at(trial.p)
         compiled, work = compiled_system(system), timed(new_work(compiled_system(system).model), self.t)
         if len(trial.w) != int(compiled.model.connections.w0[-1]):
@@ -176,7 +176,7 @@ class Equations:
         )
 
     def change(self, here: Place, x: Array) -> float:
-        """Return the size of the changes x, relative to those of the unknowns."""
+        """Return the largest of the changes x, relative to the magnitudes of the unknowns."""
         trial, model, length = here.trial, here.compiled.model, here.compiled.length
         after = self.moved(here, x)
         dw, of_states = after.w - trial.w, np.concatenate([model.states.row, model.laws.equation]).astype(int)
@@ -195,7 +195,7 @@ class Equations:
         return float(max(changes))
 
     def evaluated(self, compiled: CompiledSystem, work: Work, trial: Trial) -> Evaluated:
-        """Return (2) with its derivatives by motions."""
+        """Return the residuals (2) with their derivatives by motions."""
         from floatframe.engine.kernels.entry import rates_of_constraints
 
         model = compiled.model
@@ -214,7 +214,7 @@ class Equations:
         Omega, Omega_t = turning_matrices(model, work, trial.carrier.omega)
         W = with_modal_weight(model, mass)
         f = work.bodies.residual.copy()
-        # forces in axes of the carrier: turned with a body, they stay what they are
+        # forces in carrier axes do not change if a body rotates
         D = K + C @ Omega + M @ Omega_t @ Omega - turned_forces(compiled, f)
         return Evaluated(
             parts, D, G_x + G_v @ Omega, C, M, G_v, f, work.connections.g.copy(), rate, W,
@@ -222,20 +222,20 @@ class Equations:
         )  # fmt: skip
 
     def fastest(self, trial: Trial) -> float:
-        """Return the speed of the system, or that of its spins where it stands, in units of length one."""
+        """Return the speed of the system, or of its fastest spin if it stands, in system sizes per unit of time."""
         return self.path.speed or float(np.abs(trial.s).max(initial=0.0)) or 1.0
 
     def used_rows(self, compiled: CompiledSystem) -> tuple[IntArray, IntArray, IntArray]:
-        """Return which rows are equations, which unknowns of connections are such, and which rows hold positions."""
+        """Return the rows that are equations, the unknowns of connections, and the rows that constrain positions."""
         model = compiled.model
         n_w = int(model.connections.w0[-1])
         steps, rates = np.zeros(n_w, dtype=bool), np.zeros(n_w, dtype=bool)
-        steps[model.states.row] = steps[model.states.row + 2] = True  # equations of steps in time
-        rates[model.states.row + 1] = rates[model.states.row + 2] = True  # zero
+        steps[model.states.row] = steps[model.states.row + 2] = True  # these rows are equations of time integration
+        rates[model.states.row + 1] = rates[model.states.row + 2] = True  # these unknowns are zero
         return np.flatnonzero(~steps), np.flatnonzero(~rates), np.flatnonzero(is_held_position(model.rows.kind))
 
     def gauges(self, compiled: CompiledSystem, trial: Trial) -> tuple[Array, Array]:
-        """Return where the body of reference is from its point, ahead and aside, and the derivative by xi."""
+        """Return the distances of the reference body from its point, ahead and aside, and their derivatives by xi."""
         i, n_u = self.path.body, int(compiled.model.bodies.u0[-1])
         u0 = int(compiled.model.bodies.u0[i])
         directions = [] if not self.path.speed else [self.path.ahead]
@@ -246,7 +246,7 @@ class Equations:
         return toward @ (trial.state.r[i] - self.path.point), rows
 
     def residual(self, here: Place) -> Array:
-        """Return (2), negative."""
+        """Return the negative residuals (2)."""
         rows, _, held = self.used_rows(here.compiled)
         gap, _ = self.gauges(here.compiled, here.trial)
         return -np.concatenate([here.now.f, here.now.g[rows], here.now.rate[held], gap])
@@ -276,7 +276,7 @@ class Equations:
         if columns:
             A[:, n_u + len(unknowns) :] = np.stack(columns, axis=1)
         sizes = self.sizes(compiled, trial, now, unknowns)
-        of_rows = np.zeros(len(A))  # rates that no spin changes are rounding
+        of_rows = np.zeros(len(A))  # rates that depend on no spin are rounding errors
         of_rows[n_u + len(rows) : len(A) - len(gap)] = (
             np.abs(G_x[held]) @ sizes[:n_u] * self.fastest(trial) / compiled.length
         )
@@ -284,7 +284,7 @@ class Equations:
         return Step(inverse @ self.residual(here), inverse, sizes)
 
     def sizes(self, compiled: CompiledSystem, trial: Trial, now: Evaluated, unknowns: IntArray) -> Array:
-        """Return typical sizes of the unknowns of a step."""
+        """Return typical magnitudes of the unknowns of a step."""
         model = compiled.model
         motions = np.ones(len(now.f))
         force = max(float(np.abs(trial.w).max(initial=0.0)), weight_of(now), 1e-300)
@@ -300,7 +300,7 @@ class Equations:
         return np.concatenate([motions, w[unknowns], others, np.maximum(np.abs(trial.p), 1.0)])
 
     def by_numbers(self, trial: Trial, now: Evaluated, rows: IntArray, held: IntArray, n_gaps: int) -> list[Array]:
-        """Return the derivatives (4) by the open numbers."""
+        """Return the derivatives by the open parameters, step (4)."""
         columns = []
         for k, value in enumerate(trial.p):
             h = DIFFERENCE * max(abs(value), 1.0)
@@ -309,30 +309,30 @@ class Equations:
             compiled = compiled_system(self.family.at(p))
             work = timed(new_work(compiled.model), self.t)
             after = self.evaluated(compiled, work, replace(trial, p=p))
-            # rates follow where the joints are closed again, as they do for motions
+            # rates are evaluated after the joints are satisfied again, as for motions
             parts = [after.f - now.f, (after.g - now.g)[rows], np.zeros(len(held) + n_gaps)]
             columns.append(np.concatenate(parts) / h)
         return columns
 
     def is_closed(self, here: Place) -> bool:
-        """Whether what is held is, at its place and its rate."""
+        """Whether joint constraints and their rates are satisfied."""
         holds, length, now = is_held(here.compiled.model.rows.kind), here.compiled.length, here.now
         gap = largest(now.g[holds]) / max(length, 1.0)
         return max(gap, largest(now.rate) / max(self.path.speed, self.path.speed / length, 1.0)) <= CLOSED
 
 
 def largest(values: Array) -> float:
-    """Return the largest size of values, 0 of none."""
+    """Return the largest magnitude of values; 0 if there are none."""
     return float(np.abs(values).max(initial=0.0))
 
 
 def weight_of(now: Evaluated) -> float:
-    """Return a force such as there are in the system."""
+    """Return a typical force in the system."""
     return now.scale * np.sqrt(float(sum(block[0, 0] for block in now.W)))
 
 
 def turned_forces(compiled: CompiledSystem, f: Array) -> Array:
-    """Return the derivative of forces f on the bodies, body axes, by rotations with them, (n_u, n_u)."""
+    """Return the derivative of forces f on the bodies (body axes) that rotate with the bodies, (n_u, n_u)."""
     by_turn = np.zeros((len(f), len(f)))
     for u0 in compiled.model.bodies.u0[:-1]:
         for k in (u0, u0 + 3):
@@ -341,9 +341,18 @@ def turned_forces(compiled: CompiledSystem, f: Array) -> Array:
 
 
 def smallest_inverse(A: Array, rows: Array, columns: Array, n_p: int) -> tuple[Array, Array]:
-    """Return the matrix by which the x of least |A x - b| that is smallest follows from b, and the sizes of x.
+    """Return the matrix from b to the smallest x with least |A x - b|, and the magnitudes of x.
 
-    rows: least sizes of rows, which are scaled to one. columns: sizes of unknowns; of the last n_p they follow from A.
+    Parameters
+    ----------
+    A
+        Coefficients, (n_rows, n_x).
+    rows
+        Smallest magnitudes of rows, (n_rows,); rows are scaled to one.
+    columns
+        Magnitudes of the unknowns, (n_x,). Those of the last n_p are computed from A.
+    n_p
+        Number of open parameters.
     """
     others = slice(None, A.shape[1] - n_p)
     size = np.maximum(np.abs(A[:, others] * columns[others]).max(axis=1, initial=0.0), rows)

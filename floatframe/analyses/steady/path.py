@@ -1,4 +1,4 @@
-"""Where the body of reference of a steady motion goes, and what spins in it."""
+"""The path of the reference body of a steady motion, and the bodies that spin."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,21 +17,21 @@ from floatframe.model.system import System
 
 __all__ = ["Path", "path_of", "require_body", "spins_of"]
 
-SPINS = 1e-9  #: speed of a spin, in turns of a body per time in which it moves by the size of the system
+SPINS = 1e-9  #: smallest speed of a spin, relative to the speed of the system divided by its size
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """Where the body of reference goes."""
+    """The path of the reference body."""
 
     body: int
     name: str
-    point: Array  #: it passes, ground axes, (3,) [m]
-    ahead: Array  #: direction of its motion there, ground axes, (3,)
-    axis: Array  #: of the circle, ground axes, (3,)
+    point: Array  #: a point of the path, ground axes, (3,) [m]
+    ahead: Array  #: direction of the motion at the point, ground axes, (3,)
+    axis: Array  #: axis of the circle, ground axes, (3,)
     speed: float
     placed_speed: float
-    is_open: bool  #: the curvature is to be found
+    is_open: bool  #: whether the curvature is unknown
 
     @property
     def aside(self) -> Array:
@@ -40,7 +40,7 @@ class Path:
 
 
 def require_body(system: System, name: str) -> None:
-    """Raise `ModelError` with the nearest name if a body is not there."""
+    """Raise `ModelError` with the nearest name if a body does not exist."""
     names = [each.name for each in system.bodies]
     if name not in names:
         raise ModelError(f"steady_motion: no body {quoted(name)}{nearest(name, names)}")
@@ -55,12 +55,12 @@ def path_of(
     center: Array | Sequence[float] | None,
     axis: Array,
 ) -> tuple[Carrier, Path]:
-    """Return the carrier to begin with and the path of the body of reference.
+    """Return the initial carrier and the path of the reference body.
 
     Raises
     ------
     ModelError
-        If the body has no velocity across the axis, or center and curvature do not go together.
+        If the body has no velocity perpendicular to the axis, or center and curvature do not agree.
     """
     i = compiled.body_names.index(name)
     u0 = int(compiled.model.bodies.u0[i])
@@ -72,27 +72,27 @@ def path_of(
         raise ModelError(f"steady_motion: speed: expected a number of at least 0, got {speed}")
     if speed > 0 and placed_speed == 0:
         raise ModelError(
-            f"steady_motion: body {name!r} is placed without a velocity across the axis {axis.tolist()}; give it the "
-            "velocity with which it runs, which says the direction"
+            f"steady_motion: body {name!r} is placed without a velocity perpendicular to the axis {axis.tolist()}; "
+            "give it its running velocity, which defines the direction"
         )
     ahead = v / (placed_speed or 1.0)
     path = Path(i, name, point, ahead, axis, speed, placed_speed, curvature is None)
     if center is not None:
         center = array_of_shape("steady_motion: center", center, (3,))
         if not curvature:
-            raise ModelError("steady_motion: center: expected a curvature too, whose sign says to which side it turns")
+            raise ModelError("steady_motion: center: expected a curvature too, whose sign is the side of the turn")
         arm = point - center
         arm = arm - (arm @ axis) * axis
         distance = float(np.linalg.norm(arm))
         if distance == 0 or abs(distance * abs(curvature) - 1) > 0.1:
             raise ModelError(
-                f"steady_motion: center: {distance:g} from body {name!r}, but the curvature is {curvature:g}; expected "
-                "its distance to be one over the curvature, within a tenth"
+                f"steady_motion: center: its distance from body {name!r} is {distance:g}, but the curvature is "
+                f"{curvature:g}; expected the distance 1/curvature, within a tenth"
             )
         omega = np.sign(curvature) * speed / distance * axis
         return Carrier(center, np.zeros(3), omega), replace(path, ahead=np.cross(omega, arm) / speed)
     if speed == 0 and curvature != 0:
-        raise ModelError("steady_motion: a system that stands has no curvature; give curvature = 0")
+        raise ModelError("steady_motion: a system at rest has no curvature; give curvature = 0")
     if curvature is not None and not np.isfinite(curvature):
         raise ModelError(f"steady_motion: curvature: expected a number or None, got {curvature}")
     return Carrier(point, speed * ahead, speed * (curvature or 0.0) * axis), path
@@ -105,12 +105,15 @@ def spins_of(
     path: Path,
     more: Mapping[str, Sequence[float]],
 ) -> tuple[tuple[Spin, ...], Array]:
-    """Return the bodies that spin and their speeds to begin with: as placed, faster as the body of reference is.
+    """Return the bodies that spin, and their initial speeds.
+
+    The speeds are those of the placed bodies, scaled by the ratio of the requested to the placed speed of the reference
+    body.
 
     Raises
     ------
     ModelError
-        If a body that is named is not there, or a flexible one spins.
+        If a named body does not exist, or a flexible body spins.
     """
     for name in more:
         require_body(system, name)
@@ -131,7 +134,7 @@ def spins_of(
     for spin in spins:
         if compiled.model.bodies.n_q[spin.body]:
             raise ModelError(
-                f"steady_motion: body {compiled.body_names[spin.body]!r} is flexible and spins beside body "
+                f"steady_motion: body {compiled.body_names[spin.body]!r} is flexible and spins relative to body "
                 f"{path.name!r}: its modes would turn with it; make it rigid (is_rigid), or take steady_rotation"
             )
     return tuple(spins), np.array(s, dtype=float)

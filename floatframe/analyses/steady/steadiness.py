@@ -1,9 +1,10 @@
-"""Whether a state that moves is a steady one, about which small motions have constant coefficients.
+"""Check of whether a moving state is steady, so that small motions about it have constant coefficients.
 
-(1) now: one velocity field v_0 + Omega × r for all bodies, forces in balance with accelerations of the steady motion
-(2) a little later, all bodies moved on and spinning ones turned: forces in balance again with wrenches of their own,
-    and the same matrices in axes that turn with the system. A wheel that is not round, a road that is not even, or a
-    function of time that is not constant show themselves here.
+(1) at the state, all bodies have one velocity field v_0 + Omega × r, and forces balance the accelerations of the steady
+    motion
+(2) a little later, after all bodies have moved and spinning bodies have turned, forces balance again with new wrenches,
+    and the matrices in axes that turn with the system are the same. This check fails if a wheel is not round, a road is
+    uneven, or a function of time is not constant.
 """
 
 from collections.abc import Sequence
@@ -29,57 +30,58 @@ from floatframe.model.state import State
 
 __all__ = ["require_steady"]
 
-BALANCED = 1e-5  #: forces out of balance, relative to those at work
-BALANCED_LATER = 1e-4  #: the same later, where tables of roads and rails are read anew: 1e-5 by flanges in a curve
-LEAST = 1e-3  #: of the forces that turn velocities round: what counts as forces at work
-ALONG = 1e-6  #: velocities against the common motion, relative to the largest
-SAME = 1e-5  #: change of a matrix, relative to its largest entry: 3e-6 by flanges in a curve
-ROUND = 1e-6  #: change of a mass
-TURN = 1.234  #: angle by which the fastest body has turned later, no part of a circle [rad]
-AHEAD = 0.1  #: way of a system in which nothing spins, by its size
+BALANCED = 1e-5  #: largest unbalanced force, relative to the acting forces
+#: the same at the later time, with tables of roads and rails interpolated elsewhere; flanges in a curve give 1e-5
+BALANCED_LATER = 1e-4
+LEAST = 1e-3  #: smallest value taken for the acting forces, relative to the forces that would reverse all velocities
+ALONG = 1e-6  #: largest deviation of a velocity from the common motion, relative to the largest velocity
+SAME = 1e-5  #: largest change of a matrix, relative to its largest entry; flanges in a curve give 3e-6
+ROUND = 1e-6  #: largest relative change of a mass matrix
+TURN = 1.234  #: angle by which the fastest body turns until the later time, not a fraction of a circle [rad]
+AHEAD = 0.1  #: distance travelled until the later time if nothing spins, relative to the size of the system
 MOST_ITERATIONS = 10
 NOT = "linearize: this state is not steady:"
 
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """Forces out of balance at a state."""
+    """The unbalanced forces at a state."""
 
-    error: float  #: relative to the forces at work
-    body: str  #: where most
-    w: Array  #: wrenches with which they are in balance best
+    error: float  #: unbalanced forces, relative to the acting forces
+    body: str  #: body with the largest unbalanced force
+    w: Array  #: wrenches with the smallest unbalanced forces, (n_w,)
 
 
 def require_steady(
     compiled: CompiledSystem, about: Equilibrium, work: Work, parts: Tangents, N: Array, S: Array
 ) -> None:
-    """Raise `ModelError` if a state that moves is not steady, naming what is not.
+    """Raise `ModelError` with the reason if a moving state is not steady.
 
     Parameters
     ----------
     compiled
         The system.
     about
-        The state; one at rest is not looked at.
+        The state; a state at rest is accepted without a check.
     work
-        Evaluated at it.
+        Working arrays, evaluated at the state.
     parts
-        Its matrices.
+        Matrices of small motions at the state.
     N
-        The motions that joints allow, (n_u, n_z).
+        Basis of the motions that joints allow, (n_u, n_z).
     S
-        Those of them that held velocities allow, (n_z, n_y).
+        Basis of the motions, over z, that velocity constraints allow, (n_z, n_y).
     """
     state, _ = motion_of_engine(compiled, about.state, about.u_dot)
     if not state.u.any():
         return
     carrier = carrier_of(compiled, state, about.omega)
     now = balance(compiled, work, about.w)
-    require_balance(now, max(BALANCED, 10 * about.residual), "forces are out of balance")
+    require_balance(now, max(BALANCED, 10 * about.residual), "forces are unbalanced")
     model, spins = compiled.model, spins_in(compiled, state, about.omega)
     fastest = max((float(np.linalg.norm(spin)) for spin in spins), default=0.0)
     speed, turning = float(np.abs(carrier.velocity).max()), float(np.linalg.norm(about.omega))
-    if not fastest and speed <= turning * compiled.length:  # the axis is in the system
+    if not fastest and speed <= turning * compiled.length:  # the axis passes through the system
         fastest = turning
     later = TURN / fastest if fastest else AHEAD * compiled.length / speed
     moved, moved_u_dot = moved_on(model, state, carrier, spins, later)
@@ -91,7 +93,7 @@ def require_steady(
     require_round(compiled, work, other, turned)
     after = balance(compiled, other, about.w)
     require_balance(
-        after, max(BALANCED_LATER, 10 * about.residual), f"moved on by {later:.3g}, forces are out of balance"
+        after, max(BALANCED_LATER, 10 * about.residual), f"{later:.3g} time units later, forces are unbalanced"
     )
     set_iterate(other, moved, moved_u_dot, after.w)
     others = tangents(model, other)
@@ -101,26 +103,26 @@ def require_steady(
     size = np.abs(parts.G).max(initial=0.0) * max(compiled.length, 1.0)
     gaps = others.G @ N_later
     if np.abs(gaps).max(initial=0.0) > SAME * size:
-        raise ModelError(f"{NOT} moved on by {later:.3g}, its joints allow other motions")
+        raise ModelError(f"{NOT} {later:.3g} time units later, its joints allow other motions")
     for name, one, two in zip(("stiffness", "damping"), of_now, of_then, strict=False):
         first, second = S.T @ (N.T @ one @ N), S.T @ (N_later.T @ two @ N_later)
         change = np.abs(second - first)
         if change.max(initial=0.0) > SAME * np.abs(first).max(initial=0.0):
             motion = np.abs(N) @ change.max(axis=0)
             raise ModelError(
-                f"{NOT} moved on by {later:.3g}, its {name} is another by "
-                f"{change.max() / np.abs(first).max():.2g}, most at body {body_of(compiled, motion)!r}: what spins "
-                "must look the same however far it is turned, and the road wherever it is"
+                f"{NOT} {later:.3g} time units later, its {name} differs by "
+                f"{change.max() / np.abs(first).max():.2g}, most at body {body_of(compiled, motion)!r}; "
+                "spinning bodies must be round, and roads even along the path"
             )
 
 
 def carrier_of(compiled: CompiledSystem, state: State, omega: Array) -> Carrier:
-    """Return the common motion of the bodies of a state that turns with omega.
+    """Return the common motion of the bodies of a state that rotates with omega.
 
     Raises
     ------
     ModelError
-        If a body has another velocity, or modes that move.
+        If a body moves relative to the others, or its modal coordinates change.
     """
     bodies = compiled.model.bodies
     v = np.array([state.u[u0 : u0 + 3] for u0 in bodies.u0[:-1]])
@@ -130,7 +132,7 @@ def carrier_of(compiled: CompiledSystem, state: State, omega: Array) -> Carrier:
     if apart.max() > ALONG * size:
         i = int(np.argmax(apart))
         raise ModelError(
-            f"{NOT} body {compiled.body_names[i]!r} moves by {apart[i]:.3g} against the others; take the state of "
+            f"{NOT} body {compiled.body_names[i]!r} moves at {apart[i]:.3g} relative to the others; use the state of "
             "steady_motion or steady_rotation"
         )
     for i, u0 in enumerate(bodies.u0[:-1]):
@@ -138,19 +140,19 @@ def carrier_of(compiled: CompiledSystem, state: State, omega: Array) -> Carrier:
         own = state.q[bodies.q0[i] : bodies.q0[i + 1]]
         if np.abs(rates).max(initial=0.0) * compiled.length > ALONG * size * max(np.abs(own).max(initial=0.0), 1.0):
             raise ModelError(
-                f"{NOT} modes of body {compiled.body_names[i]!r} move; take the state of steady_motion, or let them "
-                "settle first"
+                f"{NOT} modal coordinates of body {compiled.body_names[i]!r} change; use the state of steady_motion, "
+                "or integrate until they are constant"
             )
     return Carrier(state.r[0], np.median(rest, axis=0), omega)
 
 
 def spins_in(compiled: CompiledSystem, state: State, omega: Array) -> list[Array]:
-    """Return the angular velocity of each body against the turning system, body axes, (3,).
+    """Return the angular velocity of each body relative to the rotating system, body axes, (3,).
 
     Raises
     ------
     ModelError
-        If a flexible body has one.
+        If a flexible body spins.
     """
     spins = []
     for i, u0 in enumerate(compiled.model.bodies.u0[:-1]):
@@ -160,15 +162,15 @@ def spins_in(compiled: CompiledSystem, state: State, omega: Array) -> list[Array
             own = np.zeros(3)
         elif compiled.model.bodies.n_q[i]:
             raise ModelError(
-                f"{NOT} body {compiled.body_names[i]!r} is flexible and spins by {np.linalg.norm(own):.3g} against the "
-                "turning system, its modes with it; make it rigid (is_rigid)"
+                f"{NOT} body {compiled.body_names[i]!r} is flexible and spins at {np.linalg.norm(own):.3g} relative to "
+                "the rotating system, so that its modes spin too; make it rigid (is_rigid)"
             )
         spins.append(own)
     return spins
 
 
 def balance(compiled: CompiledSystem, work: Work, w: Array) -> Balance:
-    """Return what forces are out of balance at the motion in `work` with the wrenches that leave least of them."""
+    """Return the unbalanced forces at the motion in `work`, with the wrenches that make them smallest."""
     model, w = compiled.model, w.copy()
     own = rows_of_states(np.asarray(model.states.row), len(w))
     free = ~is_held(model.rows.kind) & ~own
@@ -188,7 +190,7 @@ def balance(compiled: CompiledSystem, work: Work, w: Array) -> Balance:
 
 
 def speed_changes(compiled: CompiledSystem, work: Work, mass: Sequence[Array]) -> float:
-    """Return the size of the forces that would turn all velocities round while bodies move by their size."""
+    """Return the norm of the forces that would reverse all velocities while the system moves by its size."""
     u, total, speed, turning = work.state.u, 0.0, 0.0, 0.0
     for R, block, (first, last) in zip(work.state.R, mass, pairwise(compiled.model.bodies.u0.tolist()), strict=True):
         own = np.concatenate([R.T @ u[first : first + 3], u[first + 3 : last]])
@@ -199,7 +201,7 @@ def speed_changes(compiled: CompiledSystem, work: Work, mass: Sequence[Array]) -
 
 
 def next_wrenches(parts: Linearized, f: Array, g: Array, free: NDArray[np.bool_], unknown: NDArray[np.bool_]) -> Array:
-    """Return the smallest change of wrenches that brings forces and laws nearest to balance."""
+    """Return the smallest change of wrenches that minimises the residuals of forces and laws."""
     if not unknown.any():
         return np.zeros(0)
     J, V = parts.J.toarray()[unknown], parts.V.toarray()[np.ix_(free, unknown)]
@@ -209,16 +211,16 @@ def next_wrenches(parts: Linearized, f: Array, g: Array, free: NDArray[np.bool_]
 
 
 def require_balance(found: Balance, most: float, words: str) -> None:
-    """Raise `ModelError` if forces are out of balance by more than `most` of those at work."""
+    """Raise `ModelError` if unbalanced forces, relative to the acting forces, exceed `most`."""
     if not found.error <= most:
         raise ModelError(
-            f"{NOT} {words} by {found.error:.2g} of those at work, most at body {found.body!r}; take the state of "
+            f"{NOT} {words} by {found.error:.2g} of the acting forces, most at body {found.body!r}; use the state of "
             "steady_motion or steady_rotation"
         )
 
 
 def require_round(compiled: CompiledSystem, work: Work, later: Work, turned: Array) -> None:
-    """Raise `ModelError` naming a body whose mass another turn shows."""
+    """Raise `ModelError` with the name of a spinning body whose mass matrix changes as it turns."""
     masses = (linearized(compiled.model, each, 1.0, 0.0, 0.0).H for each in (work, later))
     for i, (one, two) in enumerate(zip(*masses, strict=True)):
         u = slice(int(compiled.model.bodies.u0[i]), int(compiled.model.bodies.u0[i + 1]))
@@ -227,12 +229,12 @@ def require_round(compiled: CompiledSystem, work: Work, later: Work, turned: Arr
         allowed = ROUND * np.kron([[m, np.sqrt(m * J)], [np.sqrt(m * J), J]], np.ones((3, 3)))
         if (change > allowed).any():
             raise ModelError(
-                f"{NOT} body {compiled.body_names[i]!r} spins about an axis about which its mass is not round: its "
-                "centre belongs on the axis, and its moments of inertia across it should be alike"
+                f"{NOT} body {compiled.body_names[i]!r} spins about an axis about which its mass is not symmetric; "
+                "move its centre of mass onto the axis, and give it equal moments of inertia across the axis"
             )
 
 
 def body_of(compiled: CompiledSystem, motion: Array) -> str:
-    """Return the body that moves most in a motion, (n_u,)."""
+    """Return the name of the body that moves most in a motion, (n_u,)."""
     u0 = compiled.model.bodies.u0
     return compiled.body_names[int(np.argmax([np.abs(motion[a:b]).max() for a, b in pairwise(u0)]))]

@@ -1,6 +1,6 @@
-"""Steady running: the state in which a vehicle goes straight on or round a curve and nothing in it changes.
+"""Steady running: the state of a vehicle that runs straight or in a circle without any change in the moving frame.
 
-Found by damped Newton steps for the equations of `equations.py`.
+It is found by damped Newton steps for the equations of `equations.py`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -24,21 +24,21 @@ from floatframe.model.system import System
 
 __all__ = ["SteadyMotion", "steady_motion"]
 
-SETTLED = 1e-7  #: last change of all unknowns, relative to their sizes
-STUCK = 1e-4  #: the same, below which forces that do not fall will not
-SHORTEST = 1e-4  #: part of a step
+SETTLED = 1e-7  #: last change of all unknowns, relative to their magnitudes
+STUCK = 1e-4  #: change of all unknowns, relative to their magnitudes, below which a constant residual ends the search
+SHORTEST = 1e-4  #: smallest damping factor of a Newton step
 
 
 @dataclass(frozen=True, eq=False)
 class SteadyMotion:
     """A system in steady running."""
 
-    system: System  #: with what was found
-    equilibrium: Equilibrium  #: its state; `linearize(system, equilibrium)` is about it
-    speed: float  #: of the body of reference [m/s]
-    curvature: float  #: of its path, positive about the axis [1/m]
-    found: Mapping[str, float]  #: open numbers of the system
-    spins: Mapping[str, float]  #: speeds of bodies about axes of their own, relative to the turning vehicle [rad/s]
+    system: System  #: the system with the values found for its open parameters
+    equilibrium: Equilibrium  #: the steady state; `linearize(system, equilibrium)` gives small motions about it
+    speed: float  #: speed of the reference body [m/s]
+    curvature: float  #: curvature of its path, positive about the axis [1/m]
+    found: Mapping[str, float]  #: values of the open parameters, by name
+    spins: Mapping[str, float]  #: speeds of spinning bodies about their axes, relative to the moving frame [rad/s]
 
 
 def steady_motion(
@@ -57,50 +57,52 @@ def steady_motion(
     tolerance: float = 1e-9,
     max_iterations: int = 60,
 ) -> SteadyMotion:
-    """Return the state in which a system runs straight on or in a circle with a constant speed.
+    """Return the state in which a system runs straight or in a circle at constant speed.
 
-    Bodies that are placed with another angular velocity than that of `body` about `axis` (wheels that roll) spin about
-    that axis of theirs; all others go along with it. Rolling without slip and states of elements are parts of it.
+    A body spins, such as a rolling wheel, if its placed angular velocity differs from that of `body` about `axis`; the
+    difference is its axis of spin. All other bodies move with `body`. Rolling without slip and states of elements are
+    included.
 
     Parameters
     ----------
     system
-        The system, its bodies placed near the motion and with their velocities, or a function that returns it from
-        the numbers of `unknown`, by name.
+        The system, with its bodies placed near the steady motion and with their velocities; or a function that takes
+        the parameters of `unknown` as keyword arguments and returns such a system.
     body
-        The body of reference: its frame passes the point where it is placed, or `state` has it, in the direction of
-        its velocity.
+        The reference body. Its frame passes the point at which it is placed (or at which it is in `state`), in the
+        direction of its velocity.
     speed
-        Of it; default: as placed. 0: the system stands, but for what spins in it [m/s].
+        Speed of the reference body [m/s]; default: its placed speed. 0: only spinning bodies move.
     curvature
-        Of its path, positive about `axis`; None: to be found, the steer angle is given [1/m].
+        Curvature of its path, positive about `axis` [1/m]. None: it is unknown, because the steer angle is given.
     unknown
-        Where to begin with numbers of the system that are to be found, by name: steer angle, drive torque.
+        Initial values of open parameters of the system, by name, such as a steer angle or a drive torque.
     center
-        A point of the axis of the circle, ground axes, (3,) [m], where a track gives it; default: beside the body of
-        reference, where the curvature says. Only with a curvature, whose size is then one over the distance.
+        A point on the axis of the circle, ground axes, (3,) [m], if a track determines it. It needs a curvature, whose
+        magnitude is one over the distance to the reference body. Default: beside the reference body, at this distance.
     guided
-        Whether a track says where the system is across it. Else the body of reference stays beside its point neither.
+        Whether a track determines the lateral position of the system. If not, the reference body passes exactly through
+        its point.
     spinning
-        Axes of bodies that spin, body axes, (3,), by name, beside those that are placed with a spin; also of a body of
-        reference that spins itself and leans.
+        Axes of spinning bodies, by name, body axes, (3,), in addition to the bodies that are placed with a spin. It is
+        needed for a reference body that itself spins and leans.
     state
-        Where to begin, such as the end of a motion; of its velocities the spins are used. Default: as placed.
+        Initial state, such as the end of a motion; only the spins of its velocities are used. Default: as placed.
     t
-        The time of all functions of time, which should not change then [s].
+        The time at which all functions of time are evaluated; they should be constant near it [s].
     axis
-        About which the circle turns, ground axes, (3,).
+        Axis of the circle, ground axes, (3,).
     tolerance
-        Largest force out of balance, relative to the forces at work.
+        Largest unbalanced force, relative to the acting forces.
     max_iterations
-        Steps of Newton's method.
+        Largest number of Newton steps.
 
     Raises
     ------
     ConvergenceError
         If no steady motion is found.
     ModelError
-        If a body has no speed or is not there, a flexible body spins, or joints do not allow the motion.
+        If the reference body has no speed or does not exist, a flexible body spins, or joints do not allow the motion.
     """
     family = Family(system, dict(unknown or {}))
     trial = family.first
@@ -122,7 +124,7 @@ class Search:
     tolerance: float
 
     def run(self, state: State, w: Array, s: Array, carrier: Carrier, max_iterations: int) -> SteadyMotion:
-        """Return the steady motion next to a trial."""
+        """Return the steady motion near a trial."""
         equations, path = self.equations, self.equations.path
         here = equations.at(Trial(state, w, s, carrier, np.array(list(equations.family.start.values()), dtype=float)))
         errors, is_stuck = [np.inf], False
@@ -139,20 +141,23 @@ class Search:
                 break
             here = following
         why = (
-            "the system cannot run steadily like this: leave a number of it unknown (a drive torque, a steer angle), "
+            "the system cannot run steadily with these values; make a parameter unknown (drive torque, steer angle), "
             "or the curvature (None)"
             if is_stuck
-            else "start nearer: place it closer to its steady state, or begin with the end of a motion (state)"
+            else "place the system nearer to its steady state, or give the end of a motion as state"
         )
         raise ConvergenceError(
             f"no steady motion of body {path.name!r} at {path.speed:g} found in {iteration} steps: forces "
-            f"are out of balance by {error:.2g} of those at work, most at body "
+            f"are unbalanced by {error:.2g} of the acting forces, most at body "
             f"{worst_body(here.compiled, here.now.W, here.now.f)!r}; {why}",
             t=equations.t, h=0.0, residual=error,
         )  # fmt: skip
 
     def followed(self, here: Place, step: Step) -> Place | None:
-        """Return what lies along a step: so far that the next one by the same matrix is shorter (natural monotony)."""
+        """Return the trial after a damped step; damping ensures that the simplified Newton step decreases.
+
+        This is the natural monotonicity test: the next step, with the same matrix, must be shorter.
+        """
         equations = self.equations
         y = step.x[: len(here.now.f)]
         part, length = min(1.0, LARGEST_TURN / max(largest_motion(here.compiled, y), 1e-300)), step.length(step.x)
@@ -160,7 +165,7 @@ class Search:
         while part >= SHORTEST:
             try:
                 there = equations.at(equations.moved(here, part * step.x))
-            except ModelError:  # joints that do not close there, a law that gives no number
+            except ModelError:  # the joints cannot be satisfied, or a law returns NaN
                 part /= 2
                 continue
             following = step.length(step.inverse @ equations.residual(there))
@@ -170,7 +175,7 @@ class Search:
         return there
 
     def result(self, here: Place, iteration: int) -> SteadyMotion:
-        """Return what was found."""
+        """Return the result at a converged trial."""
         equations, path, compiled, trial = self.equations, self.equations.path, here.compiled, here.trial
         state, u_dot = carried(compiled.model, trial.state, trial.carrier, equations.spins, trial.s)
         notes = notes_at(here.system, here.work, state, u_dot, trial.w)

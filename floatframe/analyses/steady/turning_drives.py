@@ -1,4 +1,4 @@
-"""Drives that turn a system against the ground, at the speed of a steady rotation that is looked at."""
+"""Drives that rotate a system relative to the ground, set to the speed of a steady rotation."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -15,13 +15,19 @@ from floatframe.model.system import System
 
 __all__ = ["turning_with"]
 
-SAME = 1e-9  #: difference of rates, relative to the speed, that are one
+SAME = 1e-9  #: difference below which two rates are equal, relative to the speed
 
 
 def turning_with(system: System, omega: Array) -> System:
-    """Return a system whose drives of angles against the ground turn with omega, ground axes, (3,), from t = 0 on.
+    """Return the system with prescribed angles relative to the ground that rotate with omega from t = 0 on.
 
-    Each keeps its angle of t = 0. The system itself, where all do or nothing turns.
+    Every drive keeps its angle at t = 0. The system is returned unchanged if omega is zero, or if all drives already
+    rotate with omega.
+
+    Parameters
+    ----------
+    omega
+        Angular velocity, ground axes, (3,) [rad/s].
     """
     speed = float(np.linalg.norm(omega))
     if speed == 0.0:

@@ -1,1 +1,1 @@
-"""Specialised code for one system: its recursive equations as expressions, written out in other languages."""
+"""Generated code for one system: its recursive equations as simplified expressions, written in other languages."""

@@ -1,6 +1,6 @@
-"""Markers and modes of flexible bodies over terms: their motion and their forces (docs/recursive.md §2, theory §6, §7).
+"""Motions and forces of markers and modes of flexible bodies, as terms (docs/recursive.md §2, theory §6, §7).
 
-A marker stands displaced by d and turned by exp(th) in the frame of the node of its body:
+A marker is displaced by d and rotated by exp(th) in the node frame of its body:
 
     [d; th] = Psi q - 1/2 qᵀ K_P q,  Psi(q) = Psi - K_P q
     nu     = T th_dot = w + a x + b y                          w = th_dot, x = th × w, y = th × x
@@ -10,13 +10,14 @@ with a = c_2, b = c_3, a' = (da/dt)/t = 2 c_4 - c_3, b' = 3 c_5 - c_4 of `rotati
 
     P_k = int phi_k cᵀ = X_k + S_kl q_l,   U = alpha~ + omega~ omega~,   s_dot = C1_k(q) q_dot_k
 
-what modes add to force and moment of a body, and their own forces, are
+The contribution of modes to the force and moment of a body, and the modal forces are
 
     f   s_ddot + 2 omega × s_dot
     t   B_k q_ddot_k + q_dot K_r q_dot + 2 (tr Q omega - Q omega),  B_k = axial(P_k),  Q = P_k q_dot_k
     h_k C1_k(q)·a + U:P_k + 2 omega·4C_kl q_dot_l + (M q_ddot + D q_dot + K q)_k
 
-and the body has the first and second moment of its rigid part and C1 q + 1/2 q K_t q, q_k sym(2 X_k + S_kl q_l).
+The first and second moment of the body are those of its rigid part, plus C1 q + 1/2 q K_t q and
+q_k sym(2 X_k + S_kl q_l).
 """
 
 from dataclasses import dataclass
@@ -31,7 +32,7 @@ __all__ = ["MarkerPlace", "MarkerRates", "ModalForces", "ModalMoments", "axial",
 
 
 def cross(a: Terms, b: Terms) -> Terms:
-    """Return a × b of terms."""
+    """Return the cross product a × b."""
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]], dtype=object)
 
 
@@ -55,7 +56,7 @@ def mean_summed(q: Terms, A: Terms, B: Terms) -> Terms:
 
 
 def quadratic(x: Terms, A: Terms) -> Terms:
-    """Return Σ A_kl x_k x_l of symmetric A, (n, n, 3): each product of two coordinates is one term for all of them."""
+    """Return Σ A_kl x_k x_l of symmetric A, (n, n, 3); the product of each pair of coordinates is used only once."""
     n = len(x)
     total = A[0, 0] * (x[0] * x[0])
     for k in range(n):
@@ -65,7 +66,7 @@ def quadratic(x: Terms, A: Terms) -> Terms:
 
 
 class MarkerPlace:
-    """Where a marker stands in its flexible body, frame of the node."""
+    """Position and rotation of a marker in its flexible body, in the node frame."""
 
     def __init__(self, graph: Graph, marker: ElasticMarker, x: Terms) -> None:
         n = len(marker.shift)
@@ -82,28 +83,28 @@ class MarkerPlace:
 
     @property
     def rates(self) -> slice:
-        """Its modes among the rates."""
+        """The rates of the modes among all rates."""
         return slice(self.marker.v0, self.marker.v0 + len(self.q))
 
     def spun(self, v: Terms) -> Terms:
-        """Return T v."""
+        """Return T v, the angular velocity for the rate v of the rotation vector."""
         return v + cross(self.th, self.c[2] * v + self.c[3] * cross(self.th, v))
 
     def spun_back(self, t: Terms) -> Terms:
-        """Return Tᵀ t."""
+        """Return Tᵀ t, the generalised moment for a moment t."""
         return t - cross(self.th, self.c[2] * t - self.c[3] * cross(self.th, t))
 
     def modal_forces(self, f: Terms, t: Terms) -> Terms:
-        """Return the modal forces of a wrench on the marker, at its point, (n,)."""
+        """Return the modal forces of a wrench at the marker, (n,)."""
         return self.shift @ f + self.turn @ self.spun_back(t)
 
     def columns(self) -> tuple[Terms, Terms]:
-        """Return displacement and rotation of the marker by each mode, (n, 3) each."""
+        """Return the displacement and rotation of the marker per modal coordinate, (n, 3) each."""
         return self.shift, np.array([self.spun(each) for each in self.turn], dtype=object)
 
 
 class MarkerRates:
-    """How a marker moves in its flexible body, frame of the node; v, a: rates and accelerations of the tree."""
+    """Velocity and acceleration of a marker relative to its flexible body, in the node frame."""
 
     def __init__(self, place: MarkerPlace, v: Terms, a: Terms) -> None:
         marker, q_dot, q_ddot = place.marker, v[place.rates], a[place.rates]
@@ -121,17 +122,17 @@ class MarkerRates:
 
 @dataclass(frozen=True, eq=False)
 class ModalMoments:
-    """First and second moments of a flexible body as it is deformed."""
+    """First and second moments of a deformed flexible body."""
 
     first: Terms  #: C1_k(q), (n, 3)
     P: Terms  #: P_k, (n, 3, 3)
     B: Terms  #: (n, 3)
-    s: Terms  #: what modes add to the first moment, (3,)
-    second: Terms  #: and to the second, (3, 3)
+    s: Terms  #: contribution of modes to the first moment, (3,)
+    second: Terms  #: contribution of modes to the second moment, (3, 3)
 
     @classmethod
     def of(cls, graph: Graph, modes: Modes, x: Terms) -> "ModalMoments":
-        """Return those of a body at positions of the tree."""
+        """Return the moments of a body at positions of the tree."""
         q = x[modes.x0 : modes.x0 + modes.n]
         bent = summed(q, modes.K_t)
         P = modes.X + np.array([summed(q, each) for each in modes.S], dtype=object)
@@ -146,7 +147,7 @@ class ModalMoments:
 
 
 class ModalForces:
-    """What modes add to force and moment of a body, and their own forces."""
+    """Contribution of modes to the force and moment of a body, and the modal forces."""
 
     def __init__(self, modes: Modes, moments: ModalMoments, x: Terms, v: Terms, a: Terms) -> None:
         rates = slice(modes.v0, modes.v0 + modes.n)
@@ -154,7 +155,7 @@ class ModalForces:
         self.q, self.q_dot, self.q_ddot = x[modes.x0 : modes.x0 + modes.n], v[rates], a[rates]
 
     def wrench(self, omega: Terms) -> tuple[Terms, Terms]:
-        """Return force and moment beside those of the moments, frame of the node."""
+        """Return the force and moment that do not follow from the moments of the body, in the node frame."""
         modes, moments, q_dot, q_ddot = self.modes, self.moments, self.q_dot, self.q_ddot
         f = summed(q_ddot, moments.first) + quadratic(q_dot, modes.K_t)
         f = f + 2.0 * cross(omega, summed(q_dot, moments.first))

@@ -1,4 +1,4 @@
-"""Code for one system: its recursive equations with its numbers, zeros and ones gone, common terms shared."""
+"""Code for one system: its recursive equations with its numbers, without zeros and ones, and with shared terms."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -54,21 +54,21 @@ LANGUAGES: dict[str, Callable[[Routine, Sequence[str]], dict[str, str]]] = {
 
 @dataclass(frozen=True, eq=False)
 class GeneratedCode:
-    """The text of a routine, and what it costs."""
+    """The text of a routine, and its number of operations."""
 
-    name: str  #: of the function
+    name: str  #: name of the function
     what: str
     language: str
-    files: dict[str, str]  #: name of the file -> text
-    inputs: dict[str, int]  #: name -> length, in the order of the arguments
-    outputs: dict[str, tuple[int, ...]]  #: name -> shape, in their order
-    operations: Operations  #: of a call
-    general: tuple[int, int]  #: additions and multiplications of the same recursion with all zeros and ones
-    parameter_names: tuple[str, ...]  #: of the input `parameters`, in its order
-    parameter_values: Array  #: that they have in the system [kg, kg m, kg m², m/s²]
+    files: dict[str, str]  #: text by file name
+    inputs: dict[str, int]  #: length of each input by name, in the order of the arguments
+    outputs: dict[str, tuple[int, ...]]  #: shape of each output by name, in the order of the results
+    operations: Operations  #: operations of one call
+    general: tuple[int, int]  #: additions and multiplications of the same recursion without simplification
+    parameter_names: tuple[str, ...]  #: names of the entries of the input `parameters`, in order
+    parameter_values: Array  #: values of `parameters` in the system [kg, kg m, kg m², m/s²]
 
     def write(self, directory: str | Path) -> tuple[Path, ...]:
-        """Write the files into a directory, which is made if there is none; return their paths."""
+        """Write the files into a directory, which is created if it does not exist; return their paths."""
         folder = Path(directory)
         folder.mkdir(parents=True, exist_ok=True)
         replace_files({folder / name: text.encode() for name, text in self.files.items()})
@@ -76,7 +76,7 @@ class GeneratedCode:
 
 
 def identifier(text: str) -> str:
-    """Return a text as a name in any language."""
+    """Return a text as a valid name in all languages."""
     name = re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_").lower()
     return name if name and name[0].isalpha() else f"f_{name}".rstrip("_")
 
@@ -90,25 +90,25 @@ def generate(
     Parameters
     ----------
     system
-        A tree of rigid and flexible bodies. Of its forces, gravity and linear joint forces (stiffness, damping,
-        preload; angles counted without end) are in the code; what else acts is given as `force`.
+        A tree of rigid and flexible bodies. The code contains gravity and the linear joint forces (stiffness, damping,
+        preload; angles are counted without limit). All other forces are given as the input `force`.
     what
-        "inverse" (forces of a motion), "residual" (those less given forces), "mass" (matrix), "forward"
-        (accelerations), "kinematics" (places and velocities of all bodies), "jacobian" (derivatives of the forces of a
-        motion), "sensitivity" (their derivatives by parameters).
+        "inverse" (forces for a motion), "residual" (these forces minus given forces), "mass" (mass matrix), "forward"
+        (accelerations), "kinematics" (positions and velocities of all bodies), "jacobian" (derivatives of the forces by
+        the motion), "sensitivity" (derivatives of the forces by parameters).
     language
         "c", "python", "casadi" or "matlab".
     parameters
-        Numbers that stay symbols, an input of their own: "link1/m", a body ("link1": its ten inertial parameters),
-        "gravity", or patterns ("*/m"). All others are numbers in the code.
+        Parameters that remain symbols, as an input of the function: "link1/m", a body ("link1": its ten inertial
+        parameters), "gravity", or patterns ("*/m"). All others are constants in the code.
     name
-        Of the function; None: that of the system and what is generated.
+        Name of the function; None: made from the names of the system and the routine.
 
     Raises
     ------
     ModelError
-        If there is no such routine, language or parameter, the system is no tree, holds other forces, couplers or
-        elements, or (forward) prescribes a coordinate, or the name is none.
+        If the routine, language or parameter does not exist; the system is not a tree, or has other forces, couplers or
+        elements; "forward" meets a prescribed coordinate; or the name is invalid.
     """
     for role, value, choices in (("what", what, ROUTINES), ("language", language, LANGUAGES)):
         if value not in choices:
@@ -133,7 +133,7 @@ def generate(
 
 
 def require_free(model: RelativeModel) -> None:
-    """Raise `ModelError` if a coordinate is prescribed, which accelerations under forces do not know."""
+    """Raise `ModelError` if a coordinate is prescribed, because forward dynamics does not support that."""
     if model.driven:
         raise ModelError(
             f"generate: coordinate {quoted(model.driven[0])} is prescribed by a function of time, which forward does "
@@ -142,7 +142,7 @@ def require_free(model: RelativeModel) -> None:
 
 
 def notes_of(system: System, routine: Routine, model: RelativeModel, tree: TreeTerms) -> list[str]:
-    """Return what stands at the head of the code: what it is, sizes, units, the order of coordinates."""
+    """Return the comment at the head of the code: meaning, operations, units, and the order of coordinates."""
     count, units = routine.operations, system.units
     notes = [
         f"{routine.meaning} of {quoted(system.name)}, generated by floatframe.", "",
@@ -150,7 +150,7 @@ def notes_of(system: System, routine: Routine, model: RelativeModel, tree: TreeT
         f"{count.functions} sines and cosines, {count.signs} changes of sign.", "",
     ]  # fmt: skip
     if routine.has_series:
-        notes += ["Elastic rotations of markers: to rounding up to 4 rad, meaningless beyond 5 rad.", ""]
+        notes += ["Elastic rotations of markers: exact to rounding errors up to 4 rad, invalid beyond 5 rad.", ""]
     notes += [f"{name}, {n}: {meaning}" for name, n, meaning in routine.inputs]
     notes += [f"{out.name}, {' x '.join(map(str, out.values.shape))}: {out.meaning}" for out in routine.outputs]
     if units.name != "m-kg-s":
@@ -158,7 +158,7 @@ def notes_of(system: System, routine: Routine, model: RelativeModel, tree: TreeT
         words = ", ".join(f"{si} for {own}" for si, own in zip(("m", "kg", "s", "N"), symbols, strict=True))
         notes += [f"All in units of {units.name}: {words}."]
     if tree.springs:
-        notes += ["Springs and dampers of joints are in it; angles of springs are counted without end."]
+        notes += ["The code includes springs and dampers of joints; angles of springs are counted without limit."]
     unit = {each.name: each.unit for each in model.expansion.tree.columns}
     force = {"rad": "N m", "m": "N"}
     notes += ["", "order of z"]

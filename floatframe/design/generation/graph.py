@@ -1,13 +1,13 @@
-"""Scalar expressions as a graph in which every term stands once, simplified as it is built.
+"""Scalar expressions as a graph without duplicate terms, simplified during construction.
 
-(1) numbers are folded; x + 0, 1 x, 0 x, x - x vanish
-(2) signs go outwards: (-a) b = -(a b), a + (-b) = a - b, b - a = -(a - b), sin(-a) = -sin a, so that terms that
-    differ by their sign are one term
-(3) multiples of one term are gathered: 2 x + 3 x = 5 x
-(4) every operation is looked up among those there are before it is made: common terms are shared
+(1) constants are folded; x + 0, 1 x, 0 x and x - x are simplified
+(2) signs are moved outwards: (-a) b = -(a b), a + (-b) = a - b, b - a = -(a - b), sin(-a) = -sin a, so that terms that
+    differ only by their sign are one term
+(3) multiples of one term are collected: 2 x + 3 x = 5 x
+(4) an operation is created only if the graph does not contain it yet, so that common terms are shared
 
-An expression is worth the numbers of its operations only; the graph keeps as well how often each was asked for, which
-is what a routine does that knows nothing of its numbers.
+The cost of an expression is its number of operations. The graph also counts all requested operations, which is the cost
+of a routine without simplification.
 """
 
 import math
@@ -32,13 +32,13 @@ Terms: TypeAlias = np.ndarray[tuple[Any, ...], np.dtype[np.object_]]  #: arrays 
 
 @dataclass(frozen=True)
 class Operations:
-    """Operations that terms need, each counted once."""
+    """Numbers of operations of terms; a shared term counts once."""
 
-    additions: int = 0  #: subtractions too
+    additions: int = 0  #: including subtractions
     multiplications: int = 0
     divisions: int = 0
     functions: int = 0  #: sines and cosines
-    signs: int = 0  #: changes of sign that no subtraction takes in
+    signs: int = 0  #: sign changes that are not part of a subtraction
 
     @property
     def total(self) -> int:
@@ -47,7 +47,7 @@ class Operations:
 
 
 class Scalar:
-    """One term of a graph, made by its operators; arrays of terms take an operation element by element."""
+    """One term of a graph, created by operators; operations on arrays of terms are elementwise."""
 
     __slots__ = ("args", "graph", "index", "kind", "name", "value")
 
@@ -88,17 +88,17 @@ class Scalar:
         return self.name or f"term {self.index}"
 
     def is_constant(self, value: float) -> bool:
-        """Whether it is that number."""
+        """Whether the term is the given constant."""
         return self.kind == CONSTANT and self.value == value
 
 
 class Graph:
-    """Terms in the order in which they were made: arguments before what needs them."""
+    """Terms in the order of creation, in which arguments precede the terms that use them."""
 
     def __init__(self) -> None:
         self.terms: list[Scalar] = []
         self.known: dict[tuple, Scalar] = {}
-        self.asked = [0, 0]  #: additions and multiplications asked for, whatever became of them
+        self.asked = [0, 0]  #: requested additions and multiplications, including simplified ones
         self.zero, self.one = self.constant(0.0), self.constant(1.0)
 
     def constant(self, value: float) -> Scalar:
@@ -108,7 +108,7 @@ class Graph:
         return self.made(CONSTANT, (), "", float(value) + 0.0)
 
     def symbol(self, name: str) -> Scalar:
-        """Return the symbol of that name."""
+        """Return the symbol with a name."""
         return self.made(SYMBOL, (), name)
 
     def scalar(self, value: Number) -> Scalar:
@@ -116,7 +116,7 @@ class Graph:
         return value if isinstance(value, Scalar) else self.constant(value)
 
     def made(self, kind: int, args: tuple[Scalar, ...], name: str = "", value: float = 0.0) -> Scalar:
-        """Return the term with these arguments, made only if there is none (4)."""
+        """Return the term with these arguments; it is created only if it does not exist (4)."""
         key = (kind, tuple(arg.index for arg in args), name, value)
         found = self.known.get(key)
         if found is None:
@@ -148,7 +148,7 @@ class Graph:
         return self.add(a, self.neg(b))
 
     def summed(self, a: Scalar, b: Scalar) -> Scalar:
-        """Return a + b of terms without signs."""
+        """Return a + b for terms without signs."""
         (n, x), (m, y) = multiple(a), multiple(b)
         if x is y:
             return self.times(n + m, x)
@@ -159,7 +159,7 @@ class Graph:
         return self.made(ADD, (a, b) if a.index < b.index else (b, a))
 
     def subtracted(self, a: Scalar, b: Scalar) -> Scalar:
-        """Return a - b of terms without signs, the older term first (2)."""
+        """Return a - b for terms without signs, with the older term first (2)."""
         (n, x), (m, y) = multiple(a), multiple(b)
         if x is y:
             return self.times(n - m, x)
@@ -182,7 +182,7 @@ class Graph:
         return self.product(a, b)
 
     def product(self, a: Scalar, b: Scalar) -> Scalar:
-        """Return a b, signs outwards (2)."""
+        """Return a b, with signs moved outwards (2)."""
         if b.kind == CONSTANT:
             a, b = b, a
         if a.kind == CONSTANT:
@@ -207,7 +207,7 @@ class Graph:
         """Return a / b."""
         if b.kind == CONSTANT:
             if b.value == 0.0:
-                raise ModelError("generate: expected divisors that are not zero, got a term divided by zero")
+                raise ModelError("generate: expected nonzero divisors, got a term divided by zero")
             return self.mul(self.constant(1.0 / b.value), a)
         if a.is_constant(0.0):
             return self.zero
@@ -232,14 +232,14 @@ class Graph:
         return self.cos(a.args[0]) if a.kind == NEG else self.made(COS, (a,))
 
     def stumpff(self, k: int, x: Scalar) -> Scalar:
-        """Return c_k(x) = Σ (-x)^j / (2 j + k)!, which is written out in the end (`rotation_series`)."""
+        """Return c_k(x) = Σ (-x)^j / (2 j + k)!, which is expanded at the end (`rotation_series`)."""
         if x.is_constant(0.0):
             return self.constant(1.0 / math.factorial(k))
         return self.made(STUMPFF, (x,), "", float(k))
 
 
 def terms(graph: Graph, numbers: Any) -> Terms:
-    """Return an array of terms of numbers and terms."""
+    """Return an array of numbers and terms as an array of terms."""
     out: Terms = np.array(numbers, dtype=object)
     for place, value in np.ndenumerate(out):
         out[place] = graph.scalar(value)
@@ -247,7 +247,7 @@ def terms(graph: Graph, numbers: Any) -> Terms:
 
 
 def multiple(a: Scalar) -> tuple[float, Scalar]:
-    """Return n, x with a = n x, n a number (3)."""
+    """Return n and x with a = n x, where n is a number (3)."""
     if a.kind == NEG:
         n, x = multiple(a.args[0])
         return -n, x
@@ -259,7 +259,7 @@ def multiple(a: Scalar) -> tuple[float, Scalar]:
 
 
 def reachable(outputs: Iterable[Scalar]) -> list[Scalar]:
-    """Return all terms that outputs need, themselves included, arguments first."""
+    """Return all terms that outputs depend on, including the outputs, with arguments first."""
     found: dict[int, Scalar] = {}
     waiting = list(outputs)
     while waiting:
@@ -271,7 +271,7 @@ def reachable(outputs: Iterable[Scalar]) -> list[Scalar]:
 
 
 def operations(outputs: Iterable[Scalar]) -> Operations:
-    """Return the operations that outputs need."""
+    """Return the operations that outputs require."""
     terms = reachable(outputs)
     count = [0] * (STUMPFF + 1)
     for term in terms:

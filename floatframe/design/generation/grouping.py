@@ -1,23 +1,23 @@
-"""Masses carried inwards: other moments of the bodies of a tree, the same forces along all its rates.
+"""Transfer of masses towards the root of a tree: other moments of the bodies, the same forces along all rates.
 
-What moves with the inner frame of a joint as it does with the outer one can be counted to the parent. Of mass, first
-and second moment m, s, P = ∫ c cᵀ dm of a node these are
+If a part of the mass of a node moves in the same way with the inner frame of its joint as with the outer frame, it can
+be assigned to the parent. Of the mass, first and second moment m, s, P = ∫ c cᵀ dm of a node, these parts are
 
-    hinge        all that lies on its axis: m, s_z, P_zz
-    screw        P_zz alone: a direction along the axis, that no place belongs to
-    slider       P: directions that do not turn against the parent
-    rotation     m, in its centre
-    nothing      all
-    marker that moves with modes   nothing
+        hinge        the mass on its axis: m, s_z, P_zz
+        screw        only P_zz, a direction along the axis without position
+        slider       P, because its directions do not rotate relative to the parent
+        rotation     m, at its centre
+        fixed        all
+        marker that moves with modes   none
 
-and what comes to the ground vanishes. Seven numbers are left of the ten of a body on a hinge. Reactions in joints are
-others than before: only the forces along the rates are the same, and all that follows from them.
+Moments that reach the ground vanish. A body on a hinge keeps seven of its ten parameters. Reactions in joints differ
+from those of the original tree; only forces along the rates, and all results that follow from them, are the same.
 
-A rigid body that hangs at the tip of the tree on a hinge or screw and is the same all around its axis, as a wheel,
+A rigid body at the tip of the tree, on a hinge or screw, may be symmetric about its axis, such as a wheel:
 
     s_x = s_y = 0,  P_xx = P_yy,  P_xy = P_xz = P_yz = 0,
 
-has these moments in a frame that does not turn with it as well: no force depends on its angle.
+It then has the same moments in a frame that does not rotate with it, so that no force depends on its angle.
 """
 
 from dataclasses import replace
@@ -34,7 +34,7 @@ __all__ = ["carried_inwards"]
 
 
 def carried_inwards(tree: TreeTerms) -> TreeTerms:
-    """Return a tree with as few moments as its joints allow; unchanged where moments are symbols."""
+    """Return a tree with as few moments as its joints allow; moments that are symbols do not change."""
     links = list(tree.links)
     moments = [value for link in links for value in (link.mass, *link.s, *link.P.ravel())]
     if any(value.kind != CONSTANT for value in moments):
@@ -51,17 +51,17 @@ def carried_inwards(tree: TreeTerms) -> TreeTerms:
 
 
 def with_moments(link: Link, moments: tuple) -> Link:
-    """Return a node that carries other moments."""
+    """Return a node with other moments."""
     return replace(link, mass=moments[0], s=moments[1], P=moments[2])
 
 
 def less(link: Link, moved: Link) -> Link:
-    """Return a node without what was moved."""
+    """Return a node without the transferred moments."""
     return with_moments(link, (link.mass - moved.mass, link.s - moved.s, link.P - moved.P))
 
 
 def taken_along(graph: Graph, link: Link) -> tuple:
-    """Return m, s, P that move with the inner frame as well, its axes where the joint is at zero."""
+    """Return the parts of m, s, P that move with the inner frame of the joint, in its axes at joint position zero."""
     s, P = terms(graph, np.zeros(3)), terms(graph, np.zeros((3, 3)))
     if link.above is not None or link.own is not None:
         return graph.zero, s, P
@@ -79,19 +79,19 @@ def taken_along(graph: Graph, link: Link) -> tuple:
 
 
 def cleaned(graph: Graph, link: Link, before: Link) -> Link:
-    """Return a node whose moments that vanish but for rounding are zero; before: what they were taken from."""
+    """Return a node in which rounding errors of moments are zero; `before` has the moments before the transfer."""
     s, P = (terms(graph, without_rounding(values_of(now), float(np.abs(values_of(was)).max())))
             for now, was in ((link.s, before.s), (link.P, before.P)))  # fmt: skip
     return with_moments(link, (link.mass, s, P))
 
 
 def values_of(numbers: Terms) -> Array:
-    """Return an array of constants as one of numbers."""
+    """Return an array of constant terms as an array of numbers."""
     return np.array([each.value for each in numbers.ravel()]).reshape(numbers.shape)
 
 
 def rounded(links: list[Link]) -> tuple[Link, ...]:
-    """Return nodes with those marked that are round, rigid, and carry no other that moves or weighs."""
+    """Return the nodes; `is_round` marks rigid, axisymmetric nodes that carry no other node with modes or mass."""
     counts = [False] * len(links)
     out = list(links)
     for k in range(len(links) - 1, -1, -1):
@@ -104,7 +104,7 @@ def rounded(links: list[Link]) -> tuple[Link, ...]:
 
 
 def is_round(link: Link) -> bool:
-    """Whether the moments of a node are the same all around its third axis."""
+    """Return whether the moments of a node are symmetric about its third axis."""
     (x, y), P = link.s[:2], link.P
     if not all(value.is_constant(0.0) for value in (x, y, P[0, 1], P[0, 2], P[1, 2])):
         return False

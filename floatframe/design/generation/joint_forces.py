@@ -1,7 +1,7 @@
-"""Joint forces that are linear, as terms: Q = -k (x - x_0) - c x_dot + preload along a coordinate x of a joint.
+"""Linear joint forces as terms: Q = -k (x - x_0) - c x_dot + preload along a coordinate x of a joint.
 
-They act as gravity does: a motion needs M z_ddot + h - Q from outside, and accelerations follow from what is given
-and Q. A spring counts an angle from where it is free without end, not within half a turn.
+They act like gravity: a motion requires the external forces M z_ddot + h - Q, and accelerations follow from the given
+forces plus Q. Angles of springs are counted from the free angle without limit, not within half a turn.
 """
 
 from collections.abc import Sequence
@@ -19,18 +19,18 @@ from floatframe.model.system import System
 
 __all__ = ["model_terms", "spring_forces"]
 
-LINEAR = "gravity, or joint forces of stiffness, damping and preload alone"
-REMEDY = "leave it out and give what it does along the rates as the input force"
+LINEAR = "gravity, or joint forces with only stiffness, damping and preload"
+REMEDY = "remove it, and include its forces along the rates in the input force"
 
 
 def model_terms(system: System, parameters: Sequence[str] = ()) -> tuple[RelativeModel, TreeTerms]:
-    """Return the recursive model of a system without its joint forces, and its tree as terms with them.
+    """Return the recursive model of a system without its joint forces, and its tree as terms with these forces.
 
     Raises
     ------
     ModelError
-        If a force is another than gravity and linear joint forces, the rest is no tree of bodies, or a parameter is
-        not known.
+        If a force is neither gravity nor a linear joint force, the rest is not a tree of bodies, or a parameter does
+        not exist.
     """
     forces = [each for each in system.forces if not isinstance(each, Gravity)]
     for force in forces:
@@ -42,7 +42,7 @@ def model_terms(system: System, parameters: Sequence[str] = ()) -> tuple[Relativ
 
 
 def what_is_not_linear(force: object) -> str | None:
-    """Return in words why a force is no linear joint force, None if it is one."""
+    """Return the reason why a force is not a linear joint force, as text; None if it is one."""
     if not isinstance(force, JointForce):
         return f"a {type(force).__name__}"
     parts = {
@@ -54,7 +54,7 @@ def what_is_not_linear(force: object) -> str | None:
 
 
 def spring_of(force: JointForce, model: RelativeModel) -> JointSpring:
-    """Return a linear joint force with the places of its coordinate."""
+    """Return a linear joint force with the indices of its coordinate."""
     name = f"{force.joint}/{force.coordinate}"
     both = [each for each in model.names if each in model.rate_names]
     if name not in both:

@@ -1,9 +1,9 @@
-"""The tree of a system for expressions: nodes of docs/recursive.md §1 with numbers and symbols for what they hold.
+"""The tree of a system for expressions: the nodes of docs/recursive.md §1, with numbers and symbols.
 
-The frame of a node is the outer frame of its joint, that of a flexible body (`modes.py`) while undeformed.
+The node frame is the outer frame of the joint; for a flexible body (`modes.py`), it is this frame while undeformed.
 
-Numbers that vanish but for rounding (cos 90°, products with it) are zero here: entries of rotation matrices within
-4 ulp of a whole number, lengths and moments below 4 ulp of the largest of their kind.
+Rounding errors (cos 90° and products with it) are zero here: entries of rotation matrices within 4 ulp of an integer,
+and lengths and moments below 4 ulp of the largest of their kind.
 """
 
 from collections.abc import Sequence
@@ -35,7 +35,7 @@ ROUNDING = 4 * np.finfo(float).eps
 
 @dataclass(frozen=True, eq=False)
 class Link:
-    """A node: its joint, and the moments of what it carries in its own frame; arrays hold terms."""
+    """A node: its joint, and the moments of its body in the node frame; arrays contain terms."""
 
     parent: int
     kind: int
@@ -45,20 +45,20 @@ class Link:
     n_z: int
     slide: Scalar
     turn: Scalar
-    A: Terms  #: inner frame of the joint in the parent, (3, 3)
-    r: Terms  #: its origin, (3,) [m]
-    body: int  #: -1 for none
+    A: Terms  #: axes of the inner frame of the joint in the parent, (3, 3)
+    r: Terms  #: origin of the inner frame, (3,) [m]
+    body: int  #: index of the body; -1 if there is none
     mass: Scalar
     s: Terms  #: first moment, (3,) [kg m]
-    P: Terms  #: second moment, integral of c cᵀ over mass, (3, 3) [kg m²]
-    modes: Modes | None = None  #: of a flexible body; mass, s, P are those of its undeformed shape
-    above: ElasticMarker | None = None  #: that carries the joint on a flexible parent, where it moves in that
-    own: ElasticMarker | None = None  #: of a flexible body at its joint, where it moves in the body
-    is_round: bool = False  #: a hinge that nothing turns out of place: what it carries is the same all around its axis
+    P: Terms  #: second moment, the integral of c cᵀ over mass, (3, 3) [kg m²]
+    modes: Modes | None = None  #: modes of a flexible body; mass, s, P belong to its undeformed shape
+    above: ElasticMarker | None = None  #: marker that carries the joint on a flexible parent, if modes move it
+    own: ElasticMarker | None = None  #: marker of a flexible body at its own joint, if modes move it
+    is_round: bool = False  #: whether the node is a hinge with an axisymmetric body
 
     @property
     def has_moments(self) -> bool:
-        """Whether it carries anything: a body, or what was counted to a node without one."""
+        """Whether the node has a body or moments that were transferred to it."""
         return not all(value.is_constant(0.0) for value in (self.mass, *self.s, *self.P.ravel()))
 
 
@@ -68,54 +68,54 @@ class Frame:
 
     name: str
     node: int
-    marker: ElasticMarker | None  #: that carries it where it moves with modes
-    axes: Terms  #: in those of the node, or of the marker, (3, 3)
+    marker: ElasticMarker | None  #: marker that carries the frame, if modes move it
+    axes: Terms  #: axes in the node frame, or in the marker, (3, 3)
     origin: Terms  #: (3,) [m]
 
 
 @dataclass(frozen=True)
 class JointSpring:
-    """A linear force along a coordinate."""
+    """A linear force along a joint coordinate."""
 
-    position: int  #: of the coordinate among the positions
-    rate: int  #: among the rates
+    position: int  #: index of the coordinate among the positions
+    rate: int  #: index of the rate
     stiffness: float  #: [N/m, N m/rad]
-    free: float  #: [m, rad]
+    free: float  #: coordinate at which the spring is free [m, rad]
     damping: float  #: [N s/m, N m s/rad]
     preload: float  #: [N, N m]
 
 
 @dataclass(frozen=True, eq=False)
 class TreeTerms:
-    """A tree with its graph: what the recursions work on."""
+    """A tree with its graph, as input of the recursions."""
 
     graph: Graph
     links: tuple[Link, ...]
     gravity: Terms  #: (3,) [m/s²]
     x: Terms  #: symbols of the positions, (n_z,)
-    v: Terms  #: of the rates, (n,)
-    a: Terms  #: of the accelerations, (n,)
-    parameters: tuple[Scalar, ...]  #: symbols in the place of numbers
+    v: Terms  #: symbols of the rates, (n,)
+    a: Terms  #: symbols of the accelerations, (n,)
+    parameters: tuple[Scalar, ...]  #: symbols of the parameters that are not constants
     parameter_names: tuple[str, ...]
     parameter_values: tuple[float, ...]
-    frames: tuple["Frame", ...]  #: of the files of all bodies
-    interfaces: tuple["Frame", ...]  #: of all flexible bodies
+    frames: tuple["Frame", ...]  #: frames of the files of all bodies
+    interfaces: tuple["Frame", ...]  #: interfaces of all flexible bodies
     springs: tuple[JointSpring, ...] = ()  #: linear forces along coordinates
 
 
 def whole(R: Array) -> Array:
-    """Return an array of 0, 1, -1 and other numbers with those that are whole but for rounding made whole."""
+    """Return an array in which entries within rounding errors of 0, 1 or -1 are exact."""
     near = np.round(R)
     return np.asarray(np.where(np.abs(R - near) < ROUNDING, near, R) + 0.0)
 
 
 def without_rounding(x: Array, size: float) -> Array:
-    """Return numbers with those that are rounding errors of a size made zero."""
+    """Return numbers with rounding errors, relative to a size, replaced by zero."""
     return np.asarray(np.where(np.abs(x) < ROUNDING * size, 0.0, x))
 
 
 def parameter_names(expansion: Expansion) -> dict[str, float]:
-    """Return names and values of all numbers that can be symbols: inertial parameters of bodies, gravity."""
+    """Return names and values of all possible parameters: inertial parameters of bodies, and gravity."""
     found: dict[str, float] = {}
     for body in expansion.system.bodies:
         if isinstance(body, RigidBody):
@@ -125,19 +125,19 @@ def parameter_names(expansion: Expansion) -> dict[str, float]:
 
 
 def is_meant(pattern: str, name: str) -> bool:
-    """Whether a pattern is a name or fits it."""
+    """Return whether a name matches a pattern."""
     return name == pattern or fnmatchcase(name, pattern)
 
 
 def chosen(patterns: Sequence[str], values: dict[str, float]) -> tuple[str, ...]:
-    """Return the names that patterns match, in their own order; a body and "gravity" stand for all of their own."""
+    """Return the names that match patterns, in their own order; a body or "gravity" stands for all its parameters."""
     wanted = set()
     for pattern in patterns:
         matched = {name for name in values if is_meant(pattern, name) or is_meant(pattern, name.rsplit("/", 1)[0])}
         if not matched:
             some = ", ".join(list(values)[:11])
             raise ModelError(
-                f"generate: parameters: {quoted(pattern)} is the name of no parameter, body or pattern; there are "
+                f"generate: parameters: {quoted(pattern)} matches no parameter or body; there are "
                 f"{some}, ..., {', '.join(GRAVITY)}"
             )
         wanted |= matched
@@ -145,7 +145,7 @@ def chosen(patterns: Sequence[str], values: dict[str, float]) -> tuple[str, ...]
 
 
 def second_moment(J: Any) -> Any:
-    """Return the integral of c cᵀ from an inertia tensor, (3, 3), of numbers or terms."""
+    """Return the integral of c cᵀ for an inertia tensor, (3, 3), of numbers or terms."""
     half = 0.5 * (J[0, 0] + J[1, 1] + J[2, 2])
     P = -J
     for k in range(3):
@@ -154,7 +154,7 @@ def second_moment(J: Any) -> Any:
 
 
 def tree_terms(expansion: Expansion, parameters: Sequence[str] = ()) -> TreeTerms:
-    """Return a tree of bodies as terms, parameters of some names as symbols.
+    """Return a tree of bodies as terms, with selected parameters as symbols.
 
     Raises
     ------
@@ -190,7 +190,7 @@ def tree_terms(expansion: Expansion, parameters: Sequence[str] = ()) -> TreeTerm
 
 
 def body_frame(graph: Graph, expansion: Expansion, i: int, length: float) -> Frame:
-    """Return the frame of the file of body i; the engine may move the body in mean axes."""
+    """Return the frame of the file of body i, because the engine may use mean axes."""
     name, node, mean = expansion.system.bodies[i].name, expansion.node_of[i], expansion.compiled.mean_axes[i]
     if mean is not None:
         frame = moving_frame(graph, expansion, i, name, mean.frame, length)
@@ -223,7 +223,7 @@ def moving_frame(
 
 
 def frame_in_body(expansion: Expansion, i: int, length: float) -> tuple[Array, Array]:
-    """Return axes, (3, 3), and origin, (3,), of the node of body i in the frame of the body."""
+    """Return the axes, (3, 3), and origin, (3,), of the node of body i in the body frame."""
     F, origin = expansion.frame_of[i]
     return whole(F), without_rounding(origin, length)
 
@@ -263,7 +263,7 @@ def link_of(
 
 
 def undeformed_moments(graph: Graph, expansion: Expansion, i: int, length: float) -> tuple[Scalar, Terms, Terms]:
-    """Return mass, first and second moment of the flexible body i, undeformed, in the frame of its node."""
+    """Return mass, first and second moment of the undeformed flexible body i in its node frame."""
     types, t = expansion.compiled.model.body_types, int(expansion.compiled.model.bodies.kind[i])
     F, c = frame_in_body(expansion, i, length)
     m, S, P = float(types.mass[t]), types.S[t], second_moment(types.J0[t])
@@ -277,7 +277,7 @@ def undeformed_moments(graph: Graph, expansion: Expansion, i: int, length: float
 
 
 def elastic_parts(graph: Graph, expansion: Expansion, k: int, length: float) -> dict[str, Any]:
-    """Return modes and moving markers of node k, and the inner frame of its joint in the frame of its parent."""
+    """Return the modes and moving markers of node k, and the inner frame of its joint in the frame of its parent."""
     nodes, compiled = expansion.nodes, expansion.compiled
     A, r = nodes.A[k], nodes.r[k]
     parts: dict[str, Any] = {}
@@ -305,7 +305,7 @@ def symbols_of(graph: Graph, name: str, n: int) -> Terms:
 
 
 def moments_in_node(phi: Terms, F: Terms, c: Terms) -> tuple[Scalar, Terms, Terms]:
-    """Return mass, first and second moment in the frame of a node, axes F at c, of parameters of the body, (10,)."""
+    """Return mass, first and second moment in a node with axes F at c, from the parameters of the body, (10,)."""
     m, S = phi[0], phi[1:4]
     xx, xy, xz, yy, yz, zz = phi[4:]
     P = second_moment(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], dtype=object))

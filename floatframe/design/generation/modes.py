@@ -1,18 +1,18 @@
-"""What modes add to a body, as numbers in the frame of its node: invariants and the shapes of its markers.
+"""Invariants of a flexible body and shapes of its markers, as numbers in its node frame.
 
-The node of a flexible body is the outer frame of its joint while the body is undeformed, axes F at o in the frame of
-the body, so that a body that is clamped there needs no transformation but that of the joint. With phi_k and
-c = c_0 + phi q in the frame of the body, moments of a mode in that of the node are (docs/theory.md §6, §7)
+The node of a flexible body is the outer frame of its joint while the body is undeformed, with axes F at o in the body
+frame. A body that is clamped at this frame then needs only the transformation of the joint. With phi_k and
+c = c_0 + phi q in the body frame, the moments of a mode in the node frame are (docs/theory.md §6, §7)
 
     C1'_k = Fᵀ C1_k                          int phi_k
-    X'_k  = Fᵀ (X_k - C1_k oᵀ) F             int phi_k c_0ᵀ, of which 2C_k and 3C_k = (tr X_k) 1 - X_k are made
-    S'_kl = Fᵀ (S_kl - K_t,kl oᵀ) F          int phi_k phi_lᵀ, and what geometric stiffness adds to it
+    X'_k  = Fᵀ (X_k - C1_k oᵀ) F             int phi_k c_0ᵀ, from which 2C_k and 3C_k = (tr X_k) 1 - X_k follow
+    S'_kl = Fᵀ (S_kl - K_t,kl oᵀ) F          int phi_k phi_lᵀ, with the contribution of geometric stiffness
     K_r'  = Fᵀ (K_r - o × K_t)
 
-Numbers that vanish but for rounding are zero here. What counts as rounding is a part of 1e-14 of what an entry can be
-at most, by Schwarz's inequality: of C1_k (m M_kk)^(1/2), of X_k (tr P M_kk)^(1/2), of S_kl and 4C_kl
-(M_kk M_ll)^(1/2), or of the largest of its kind if that is more (geometric stiffness; shapes of markers); M, K and D
-likewise by their diagonals. Forces change by less than 1e-14 of the largest term of their kind for each such number.
+Rounding errors are zero here. An entry is a rounding error if it is below 1e-14 of its bound by Schwarz's inequality:
+(m M_kk)^(1/2) for C1_k, (tr P M_kk)^(1/2) for X_k, (M_kk M_ll)^(1/2) for S_kl and 4C_kl; or of the largest entry of its
+kind if that is larger (geometric stiffness, shapes of markers). M, K and D are treated alike, with their diagonals.
+Each such number changes forces by less than 1e-14 of the largest term of their kind.
 """
 
 from dataclasses import dataclass
@@ -32,14 +32,14 @@ ROUNDING = 1e-14
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """Modal coordinates of a body and their moments, in the frame of its node; arrays of constant terms."""
+    """Modal coordinates of a body and their moments in its node frame; arrays contain constant terms."""
 
     n: int
-    x0: int  #: first of them among the positions
-    v0: int  #: among the rates
+    x0: int  #: index of the first mode among the positions
+    v0: int  #: index of the first mode among the rates
     C1: Terms  #: (n, 3)
-    X: Terms  #: (n, 3, 3) [k, a, b]: phi_k along a, place along b
-    S: Terms  #: (n, n, 3, 3) [k, l, a, b]: phi_k along a, phi_l along b
+    X: Terms  #: (n, 3, 3) [k, a, b]: component a of phi_k, component b of the position
+    S: Terms  #: (n, n, 3, 3) [k, l, a, b]: component a of phi_k, component b of phi_l
     C4: Terms  #: (n, n, 3) [k, l]
     M: Terms  #: (n, n)
     K: Terms
@@ -49,32 +49,32 @@ class Modes:
 
     @property
     def rates(self) -> slice:
-        """Its place among the rates."""
+        """The rates of the modes among all rates."""
         return slice(self.v0, self.v0 + self.n)
 
 
 @dataclass(frozen=True, eq=False)
 class ElasticMarker:
-    """A marker that moves with modes, in the frame of the node of its body."""
+    """A marker that moves with modes, in the node frame of its body."""
 
-    x0: int  #: first mode among the positions
+    x0: int  #: index of the first mode among the positions
     v0: int  #: among the rates
-    place: Terms  #: undeformed, (3,)
-    axes: Terms  #: undeformed, (3, 3)
-    shift: Terms  #: displacement by the modes, (n, 3)
-    turn: Terms  #: rotation by them, (n, 3)
+    place: Terms  #: undeformed position, (3,)
+    axes: Terms  #: undeformed axes, (3, 3)
+    shift: Terms  #: displacement per modal coordinate, (n, 3)
+    turn: Terms  #: rotation per modal coordinate, (n, 3)
     shift_bend: Terms  #: K_P, (n, n, 3), symmetric; zero unless stiffened
     turn_bend: Terms
 
     @property
     def moves(self) -> bool:
-        """Whether it moves with the modes at all."""
+        """Whether modes move the marker at all."""
         parts = (self.shift, self.turn, self.shift_bend, self.turn_bend)
         return not all(value.is_constant(0.0) for part in parts for value in part.ravel())
 
 
 def without_noise(x: Array, bound: Array) -> Array:
-    """Return numbers with those below rounding of a bound, or of the largest beside it, made zero."""
+    """Return numbers with entries replaced by zero that are rounding errors of a bound or of the largest entry."""
     bound = np.broadcast_to(bound, x.shape)
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(bound > 0, np.abs(x) / bound, np.where(x == 0, 0.0, 1.0))
@@ -82,7 +82,7 @@ def without_noise(x: Array, bound: Array) -> Array:
 
 
 def blocks_of(expansion: Expansion, i: int) -> dict[int, Array]:
-    """Return the numbers of body i by their names in `kernels.model`; geometric stiffness of a body without is zero."""
+    """Return the numbers of body i by their names in `kernels.model`; missing geometric stiffness is zero."""
     model = expansion.compiled.model
     types, t, n = model.body_types, int(model.bodies.kind[i]), int(model.bodies.n_q[i])
     shapes: dict[int, tuple[int, ...]] = {
@@ -102,7 +102,7 @@ def blocks_of(expansion: Expansion, i: int) -> dict[int, Array]:
 
 
 def modes_of(graph: Graph, expansion: Expansion, i: int, frame: tuple[Array, Array]) -> Modes:
-    """Return the modes of body i; frame: axes and origin of its node in the body."""
+    """Return the modes of body i; `frame` has the axes and origin of its node in the body."""
     F, origin = frame
     model, numbers = expansion.compiled.model, blocks_of(expansion, i)
     t, n = int(model.bodies.kind[i]), int(model.bodies.n_q[i])
@@ -118,7 +118,7 @@ def modes_of(graph: Graph, expansion: Expansion, i: int, frame: tuple[Array, Arr
     size = np.sqrt(np.maximum(np.diag(M), 0.0))  # of modes
     pair = size[:, None] * size
     moved = J + mass * ((origin @ origin) * np.eye(3) - np.outer(origin, origin))
-    spread = np.sqrt(0.5 * max(float(np.trace(J)), float(np.trace(moved))))  # of the masses about either frame
+    spread = np.sqrt(0.5 * max(float(np.trace(J)), float(np.trace(moved))))  # radius of gyration about either frame
     stiff, damped = (np.sqrt(np.abs(np.diag(each))) for each in (K, D))
 
     def kept(x: Array, bound: Array) -> Terms:
@@ -174,7 +174,7 @@ def elastic_marker(
 
 
 def largest_shapes(expansion: Expansion, i: int) -> tuple[Array, Array]:
-    """Return the largest displacement and rotation by each mode over all interfaces of body i, (n,) each."""
+    """Return the largest displacement and rotation per modal coordinate over all interfaces of body i, (n,) each."""
     markers = expansion.compiled.model.markers
     n = expansion.xq_of[i].stop - expansion.xq_of[i].start
     found = [np.zeros((6, n))]

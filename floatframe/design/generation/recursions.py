@@ -1,15 +1,15 @@
-"""The recursions of a tree over terms: every sum and product is simplified as it is written.
+"""The recursions of a tree as terms; every sum and product is simplified when it is created.
 
-Frames as in docs/recursive.md: A, r the inner frame of a joint in the parent, E, d its outer frame in the inner one.
-A vector goes through both one after the other, since A mostly only exchanges axes; through their product where A has
-more than one angle.
+Frames are those of docs/recursive.md: A, r for the inner frame of a joint in the parent, and E, d for its outer frame
+in the inner one. A vector is transformed by A and E separately, because A mostly only exchanges axes; it is transformed
+by their product if A contains more than one angle.
 
-With the second moment P = ∫ c cᵀ dm and U = alpha~ + omega~ omega~, c_ddot = U c for all points of a body, its force
+With the second moment P = ∫ c cᵀ dm and U = alpha~ + omega~ omega~, all points of a body have c_ddot = U c. Its force
 and moment are
 
     f = m a + U s,    t = s × a + the axial vector of U P - (U P)ᵀ
 
-which needs fewer products than J alpha + omega × J omega.
+These need fewer products than J alpha + omega × J omega.
 """
 
 from collections.abc import Sequence
@@ -24,21 +24,21 @@ from floatframe.engine.tree.recursion.nodes import ROTATION, SCREW, TRANSLATION
 __all__ = ["Joint", "forward_dynamics", "inverse_dynamics", "joints_of", "mass_matrix", "solved"]
 
 
-DENSE = 6  #: products with a matrix up to which it is not made one with another
+DENSE = 6  #: largest number of products of two matrices that are applied one after the other
 
 
 def is_vanishing(values: Terms) -> bool:
-    """Whether all are zero."""
+    """Return whether all values are zero."""
     return all(value.is_constant(0.0) for value in values.ravel())
 
 
 def n_products(R: Terms) -> int:
-    """Return how many products it takes to turn a vector by a matrix."""
+    """Return the number of products to rotate a vector by a matrix."""
     return sum(not any(value.is_constant(whole) for whole in (0.0, 1.0, -1.0)) for value in R.ravel())
 
 
 class Joint:
-    """Where the joint of a node stands: A, E, (3, 3), and d, (3,), and the motion S by its rates, outer frame.
+    """The position of a joint: A, E, (3, 3), d, (3,), and its motion S per rate in the outer frame.
 
     The frame of a round link stays with the inner one. Where asked (is_whole), A that is not sparse is one with E, and
     an identity beside it: for many vectors that go through both.
@@ -74,7 +74,7 @@ class Joint:
 
 
 def rotation_of(graph: Graph, p: Terms) -> Terms:
-    """Return the rotation matrix of Euler parameters of length one."""
+    """Return the rotation matrix of Euler parameters with length one."""
     w, x, y, z = p
     X, Y, Z = 2.0 * x, 2.0 * y, 2.0 * z
     return terms(graph, [
@@ -85,7 +85,7 @@ def rotation_of(graph: Graph, p: Terms) -> Terms:
 
 
 def joint_columns(graph: Graph, link: Link, E: Terms) -> Terms:
-    """Return the motion (translation, rotation) of the outer frame by each rate, its axes, (n_z, 6)."""
+    """Return the motion (translation, rotation) of the outer frame per rate, in its axes, (n_z, 6)."""
     columns = terms(graph, np.zeros((link.n_z, 6)))
     if link.kind == SCREW:
         columns[0, 2], columns[0, 5] = link.slide, link.turn
@@ -113,7 +113,7 @@ def spin_terms(omega: Terms, alpha: Terms) -> Terms:
 
 
 def axial_of_product(U: Terms, P: Terms) -> Terms:
-    """Return the axial vector of U P - (U P)ᵀ, P symmetric, (3,)."""
+    """Return the axial vector of U P - (U P)ᵀ for a symmetric P, (3,)."""
     t = []
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         t.append(P[i, j] * U[k, i] - P[i, k] * U[j, i] + P[j, k] * (U[k, k] - U[j, j]) + P[j, j] * U[k, j]
@@ -122,7 +122,7 @@ def axial_of_product(U: Terms, P: Terms) -> Terms:
 
 
 def motion_through(link: Link, joint: Joint, v: Terms, a: Terms, omega: Terms, alpha: Terms, acc: Terms) -> tuple:
-    """Return omega, alpha, a of the outer frame of a joint from those of its inner one at the same point."""
+    """Return omega, alpha, a of the outer frame of a joint from those of the inner frame at the same point."""
     E = joint.E.T
     acc = acc + spin_terms(omega, alpha) @ joint.d
     omega, alpha, acc = E @ omega, E @ alpha, E @ acc
@@ -137,11 +137,11 @@ def motion_through(link: Link, joint: Joint, v: Terms, a: Terms, omega: Terms, a
 
 
 def inverse_dynamics(tree: TreeTerms, v: Terms, a: Terms, joints: Sequence[Joint]) -> Terms:
-    """Return the forces along all rates that a motion needs, (n,): recursive Newton-Euler (docs/recursive.md §2).
+    """Return the forces along all rates for a motion, (n,), by recursive Newton-Euler (docs/recursive.md §2).
 
-    (1) forward   omega, alpha and a minus gravity of each node, through A, r, d, E
+    (1) forward   omega, alpha and a minus gravity of each node, from A, r, d, E
     (2) body      f = m a + U s, t = s × a + axial(U P)
-    (3) backward  the wrench along the rates of the joint, then on to the parent
+    (3) backward  the wrench is projected on the rates of the joint, and transferred to the parent
     """
     n, zero = len(tree.links), terms(tree.graph, np.zeros(3))
     base = (zero, zero, -tree.gravity, spin_terms(zero, zero))
@@ -188,7 +188,7 @@ def inner_motion(link: Link, joint: Joint, v: Terms, a: Terms, above: tuple) -> 
 def motion_of_body(
     place: MarkerPlace, rates: MarkerRates, omega: Terms, alpha: Terms, acc: Terms
 ) -> tuple[Terms, Terms, Terms]:
-    """Return omega, alpha, a of a flexible body from those of its marker at the joint, axes of that."""
+    """Return omega, alpha, a of a flexible body from those of its marker at the joint, in the axes of the marker."""
     omega, alpha, acc = place.E @ omega - rates.nu, place.E @ alpha - rates.nu_dot, place.E @ acc
     alpha = alpha - cross(omega, rates.nu)
     acc = acc - (spin_terms(omega, alpha) @ place.d + 2.0 * cross(omega, rates.d_dot) + rates.d_ddot)
@@ -196,9 +196,9 @@ def motion_of_body(
 
 
 def along_joint(link: Link, joint: Joint, f: Terms, t: Terms, force: Terms) -> tuple[Terms, Terms]:
-    """Write what a wrench of the frame of a node does along the rates of its joint; return it in the outer frame.
+    """Add the forces of a wrench (node frame) along the rates of the joint; return the wrench in the outer frame.
 
-    It does work on the modes of the body too, by the marker at the joint.
+    The wrench also acts on the modes of the body, through the marker at the joint.
     """
     if joint.own is not None:
         own = joint.own
@@ -211,7 +211,7 @@ def along_joint(link: Link, joint: Joint, f: Terms, t: Terms, force: Terms) -> t
 
 
 def to_parent(link: Link, joint: Joint, f: Terms, t: Terms, force: Terms) -> tuple[Terms, Terms]:
-    """Return a wrench of the outer frame of a joint in the parent, and add its work on the modes of that."""
+    """Return a wrench (outer frame of a joint) in the parent, and add its modal forces on the parent."""
     f, t = joint.E @ f, joint.E @ t
     f, t = joint.A @ f, joint.A @ (t + cross(joint.d, f))
     if joint.above is None:
@@ -223,7 +223,7 @@ def to_parent(link: Link, joint: Joint, f: Terms, t: Terms, force: Terms) -> tup
 
 
 def turned_moment(R: Terms, P: Terms) -> Terms:
-    """Return R P Rᵀ of a symmetric P, the entries below the diagonal those above."""
+    """Return R P Rᵀ for a symmetric P; entries below the diagonal equal those above."""
     half = R @ P
     out = np.empty((3, 3), dtype=object)
     for i in range(3):
@@ -233,7 +233,7 @@ def turned_moment(R: Terms, P: Terms) -> Terms:
 
 
 def shifted_moments(m: Scalar, s: Terms, P: Terms, r: Terms) -> tuple[Terms, Terms]:
-    """Return first and second moment about a point from which r leads to the one before."""
+    """Return first and second moment about another point; r is the vector from it to the present one."""
     s_r = s + m * r
     out = np.empty((3, 3), dtype=object)
     for i in range(3):
@@ -243,11 +243,12 @@ def shifted_moments(m: Scalar, s: Terms, P: Terms, r: Terms) -> tuple[Terms, Ter
 
 
 def mass_matrix(tree: TreeTerms, joints: Sequence[Joint]) -> Terms:
-    """Return the mass matrix, (n, n), by composite bodies (docs/recursive.md §3), in the frames of the nodes.
+    """Return the mass matrix, (n, n), by composite bodies (docs/recursive.md §3), in node frames.
 
-    (1) m, s, P of each subtree; of a flexible body the wrenches by its modes and their block, with all it carries
-    (2) the wrench of each rate, f = m v + w × s, t = s × v + (tr P) w - P w, along the rates of its node
-    (3) the same along the rates of all nodes above
+    (1) m, s, P of each subtree; for a flexible body also the wrench of each mode and the modal mass matrix of the
+        subtree
+    (2) the wrench of each rate, f = m v + w × s, t = s × v + (tr P) w - P w, projected on the rates of its node
+    (3) the same wrench, projected on the rates of all nodes above
     """
     links, n = tree.links, len(tree.v)
     bodies = [Composite(link, joint) for link, joint in zip(links, joints, strict=True)]
@@ -276,7 +277,7 @@ def mass_matrix(tree: TreeTerms, joints: Sequence[Joint]) -> Terms:
 
 
 def motion_of_rate(joint: Joint, j: int) -> tuple[Terms, Terms]:
-    """Return translation and rotation of the frame of a node by rate j of its joint."""
+    """Return the translation and rotation of the frame of a node per rate j of its joint."""
     v, w = joint.columns[j, :3], joint.columns[j, 3:]
     if joint.own is None:
         return v, w
@@ -285,7 +286,7 @@ def motion_of_rate(joint: Joint, j: int) -> tuple[Terms, Terms]:
 
 
 class Composite:
-    """Mass, first and second moment of a subtree in the frame of its node; of a flexible body those of its modes."""
+    """Mass, first and second moment of a subtree in the node frame; for a flexible body also those of its modes."""
 
     def __init__(self, link: Link, joint: Joint) -> None:
         self.m, self.s, self.P = link.mass, joint.s, joint.P
@@ -300,7 +301,7 @@ class Composite:
         return self.m * v + cross(w, self.s), t
 
     def modal_block(self, joint: Joint) -> tuple[Terms, list[tuple[Terms, Terms]]]:
-        """Return the block of the modes, the joint held, and the wrench of each of them."""
+        """Return the modal mass matrix with the joint fixed, and the wrench of each mode."""
         if joint.own is None:
             return self.H, list(zip(self.f, self.t, strict=True))
         shift, turn = joint.own.columns()
@@ -316,7 +317,7 @@ class Composite:
         return H, wrenches
 
     def carry(self, link: Link, joint: Joint, body: "Composite") -> None:
-        """Add a subtree below."""
+        """Add the subtree of a child."""
         m, s, P = body.m, body.s, body.P
         if joint.own is not None:
             s, P = shifted_moments(m, s, P, -joint.own.d)
@@ -330,7 +331,7 @@ class Composite:
         self.m, self.s, self.P = self.m + m, self.s + s, self.P + P
 
     def carry_on_modes(self, place: MarkerPlace, m: Scalar, s: Terms, P: Terms) -> None:
-        """Add to the modes what a subtree at a marker says, moments about that."""
+        """Add the contribution of a subtree at a marker to the modes, with moments about the marker."""
         columns = list(zip(*place.columns(), strict=True))
         trace = P[0, 0] + P[1, 1] + P[2, 2]
         H, f_modes, t_modes = self.H.copy(), self.f.copy(), self.t.copy()
@@ -343,13 +344,13 @@ class Composite:
 
 
 def rates_of(link: Link) -> list[int]:
-    """Return the rates of the joint of a node, then those of the modes of its body."""
+    """Return the rates of the joint of a node, followed by the rates of the modes of its body."""
     modes = [] if link.modes is None else list(range(link.modes.v0, link.modes.v0 + link.modes.n))
     return [*range(link.v0, link.v0 + link.n_z), *modes]
 
 
 def solved(tree: TreeTerms, M: Terms, right: Terms) -> Terms:
-    """Return M⁻¹ right, (n,), by M = Lᵀ D L from the tips inwards, which fills nothing in."""
+    """Return M⁻¹ right, (n,), by M = Lᵀ D L from the tips inwards, which creates no fill-in."""
     order = [rate for link in tree.links for rate in rates_of(link)]
     H, y, graph = M.copy(), right.copy(), tree.graph
     inverse: dict[int, Scalar] = {}

@@ -1,15 +1,15 @@
-"""Functions of a rotation vector without a branch: rotation matrix and left Jacobian, derivatives of any order.
+"""Functions of a rotation vector without a branch: rotation matrix, left Jacobian, and their derivatives of any order.
 
-With x = t², t the angle, and the series of Stumpff
+With x = t², the angle t, and the Stumpff series
 
     c_k(x) = Σ_j (-x)^j / (2 j + k)!:   c_1 = sin t / t,  c_2 = (1 - cos t)/t²,  c_3 = (t - sin t)/t³
 
     exp(th) v = v + c_1 th × v + c_2 th × (th × v),    T v = v + c_2 th × v + c_3 th × (th × v)
-    (1) dc_k/dx = (k c_k+2 - c_k+1) / 2     so that derivatives need further c_k of the same x and nothing else
-    (2) c_k = 1/k! - x c_k+2                so that the two highest are a polynomial each, and the others follow
+        (1) dc_k/dx = (k c_k+2 - c_k+1) / 2     derivatives need only further c_k of the same x
+        (2) c_k = 1/k! - x c_k+2                only the two highest c_k are polynomials, and the others follow
 
-The polynomials have 15 terms: what is left out is below 1e-15 of the sum up to an angle of 4 rad and below 2e-13 up to
-5 rad, where elastic rotations of a body mean nothing any more.
+The polynomials have 15 terms. Their error is below 1e-15 of the sum up to an angle of 4 rad, and below 2e-13 up to 5
+rad; larger elastic rotations of a body are meaningless.
 """
 
 import math
@@ -37,7 +37,7 @@ N_TERMS = 15
 
 
 def rotation_matrix(graph: Graph, th: Terms) -> Terms:
-    """Return exp(th), (3, 3): by sine and cosine where th lies along one axis for good."""
+    """Return exp(th), (3, 3), by sine and cosine if th always lies along one axis."""
     turning = [k for k in range(3) if not th[k].is_constant(0.0)]
     if len(turning) < 2:
         k = turning[0] if turning else 0
@@ -60,7 +60,7 @@ def rotation_matrix(graph: Graph, th: Terms) -> Terms:
 
 
 def polynomial(graph: Graph, k: int, x: Scalar) -> Scalar:
-    """Return c_k(x) as its first terms: even and odd powers apart, which halves the chain of operations."""
+    """Return c_k(x) as a polynomial, with even and odd powers separated, which halves the chain of operations."""
     y = x * x
     parts = []
     for first in (0, 1):
@@ -72,7 +72,7 @@ def polynomial(graph: Graph, k: int, x: Scalar) -> Scalar:
 
 
 def stumpff_terms(graph: Graph, found: Sequence[Scalar], written: dict[int, Scalar]) -> None:
-    """Write out the functions c_k of one argument (2), by the index of their terms."""
+    """Expand the functions c_k of one argument by (2); the result is stored by the index of their terms."""
     x = written[found[0].args[0].index]
     wanted = {int(term.value): term.index for term in found}
     for parity in (0, 1):
@@ -88,7 +88,7 @@ def stumpff_terms(graph: Graph, found: Sequence[Scalar], written: dict[int, Scal
 
 
 def expanded(graph: Graph, outputs: Sequence[Scalar]) -> list[Scalar]:
-    """Return outputs with all functions c_k written out as polynomials."""
+    """Return outputs in which all functions c_k are polynomials."""
     order = reachable(outputs)
     groups: dict[int, list[Scalar]] = {}
     for term in order:

@@ -1,4 +1,4 @@
-"""What can be generated: inputs and outputs of a routine, and its outputs as terms."""
+"""Routines that can be generated: their inputs, and their outputs as terms."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -44,9 +44,9 @@ __all__ = ["ROUTINES", "Output", "Routine", "derivative", "jacobian", "position_
 
 
 def derivative(graph: Graph, terms: Sequence[Scalar], seed: Mapping[Scalar, Scalar]) -> dict[int, Scalar]:
-    """Return the derivatives that do not vanish, by the index of their term; terms stand after their arguments.
+    """Return the nonzero derivatives by the index of their term; terms must follow their arguments.
 
-    seed: those of symbols.
+    seed: derivatives of the symbols.
     """
     dot: dict[int, Scalar] = {symbol.index: change for symbol, change in seed.items()}
     for term in terms:
@@ -96,7 +96,7 @@ def seeds_of(graph: Graph, symbols: Sequence[Scalar]) -> list[dict[Scalar, Scala
 
 
 def position_seeds(tree: TreeTerms) -> list[dict[Scalar, Scalar]]:
-    """Return the seeds of derivatives by positions along the rates: rotations turn by R exp(dz), p' = p (0, e) / 2."""
+    """Return the seeds of derivatives by positions along the rates: R exp(dz) for rotations, p' = p (0, e) / 2."""
     graph = tree.graph
     seeds: list[dict[Scalar, Scalar]] = [{} for _ in tree.v]
     for link in tree.links:
@@ -122,30 +122,30 @@ class Output:
     """One array of results."""
 
     name: str
-    values: Terms  #: terms, of the shape that the array has
+    values: Terms  #: terms, in the shape of the array
     meaning: str
 
 
 @dataclass(frozen=True, eq=False)
 class Routine:
-    """A function to be written out."""
+    """A function to be written in a language."""
 
     name: str
     inputs: tuple[tuple[str, int, str], ...]  #: name, length, meaning
     outputs: tuple[Output, ...]
     graph: Graph
     meaning: str
-    asked: tuple[int, int]  #: additions and multiplications of the same recursion with all zeros and ones
-    has_series: bool  #: whether elastic rotations are polynomials, good up to 4 rad
+    asked: tuple[int, int]  #: additions and multiplications of the same recursion without simplification
+    has_series: bool  #: whether elastic rotations are polynomials, which are valid up to 4 rad
 
     @property
     def values(self) -> list[Scalar]:
-        """Return all outputs one after the other, rows first."""
+        """Return the terms of all outputs in order, by rows."""
         return [value for output in self.outputs for value in output.values.ravel()]
 
     @property
     def operations(self) -> Operations:
-        """Return the operations of a call."""
+        """Return the operations of one call."""
         return operations(self.values)
 
 
@@ -155,17 +155,17 @@ def force_output(name: str, values: Terms) -> Output:
 
 
 def needed_forces(tree: TreeTerms, joints: Sequence[Joint]) -> Terms:
-    """Return the forces along the rates that a motion needs beside those of springs and dampers, (n,)."""
+    """Return the forces along the rates for a motion, without those of springs and dampers, (n,)."""
     return np.asarray(inverse_dynamics(tree, tree.v, tree.a, joints) - spring_forces(tree))
 
 
 def inverse(tree: TreeTerms) -> list[Output]:
-    """Return the forces that a motion needs."""
+    """Return the forces for a motion."""
     return [force_output("force", needed_forces(tree, joints_of(tree)))]
 
 
 def residual(tree: TreeTerms) -> list[Output]:
-    """Return what is left of the equations of motion."""
+    """Return the residual of the equations of motion."""
     given = symbols_of(tree.graph, "force", len(tree.v))
     force = needed_forces(tree, joints_of(tree))
     return [Output("residual", force - given, "M z_ddot + h - force [N, N m]")]
@@ -184,7 +184,7 @@ def forward(tree: TreeTerms) -> list[Output]:
 
 
 def derivatives(tree: TreeTerms) -> list[Output]:
-    """Return the derivatives of the forces of a motion."""
+    """Return the derivatives, by the motion, of the forces for a motion."""
     joints = joints_of(tree)
     force = needed_forces(tree, joints)
     return [
@@ -195,17 +195,17 @@ def derivatives(tree: TreeTerms) -> list[Output]:
 
 
 def sensitivity(tree: TreeTerms) -> list[Output]:
-    """Return the derivatives of the forces of a motion by parameters."""
+    """Return the derivatives, by parameters, of the forces for a motion."""
     force = needed_forces(tree, joints_of(tree))
     by = jacobian(tree.graph, force, seeds_of(tree.graph, tree.parameters))
     return [Output("by_parameters", by, "force by parameters, (rates, parameters)")]
 
 
-Motion = tuple[Terms, Terms, Terms, Terms]  #: r, R_GN, v, omega of a frame, ground axes
+Motion = tuple[Terms, Terms, Terms, Terms]  #: r, R_GN, v, omega of a frame, in ground axes
 
 
 def carried(graph: Graph, tree: TreeTerms, motion: Motion, marker: ElasticMarker) -> Motion:
-    """Return the motion of a marker on a flexible body from that of the body."""
+    """Return the motion of a marker on a flexible body from the motion of the body."""
     (r, R, v, omega), place = motion, MarkerPlace(graph, marker, tree.x)
     rates = MarkerRates(place, tree.v, np.full(len(tree.v), graph.zero, dtype=object))
     p = R @ place.rho
@@ -213,7 +213,7 @@ def carried(graph: Graph, tree: TreeTerms, motion: Motion, marker: ElasticMarker
 
 
 def taken_back(motion: Motion, place: MarkerPlace, rates: MarkerRates) -> Motion:
-    """Return the motion of a flexible body from that of its marker at the joint."""
+    """Return the motion of a flexible body from the motion of its marker at the joint."""
     r, R, v, omega = motion
     R = R @ place.E.T
     p, omega = R @ place.d, omega - R @ rates.nu
@@ -221,7 +221,7 @@ def taken_back(motion: Motion, place: MarkerPlace, rates: MarkerRates) -> Motion
 
 
 def placed_nodes(tree: TreeTerms, joints: Sequence[Joint]) -> list[Motion]:
-    """Return the motion of the frames of all nodes."""
+    """Return the motions of all node frames."""
     graph, zero = tree.graph, terms(tree.graph, np.zeros(3))
     placed: list[Motion] = []
     for link, joint in zip(tree.links, joints, strict=True):
@@ -256,7 +256,7 @@ def placed_frame(tree: TreeTerms, frame: Frame, placed: Sequence[Motion]) -> Mot
 
 
 def kinematics(tree: TreeTerms) -> list[Output]:
-    """Return place, axes and velocity of the frames of all bodies, ground axes."""
+    """Return positions, axes and velocities of the frames of all bodies, in ground axes."""
     placed = placed_nodes(tree, joints_of(tree, is_whole=False))
     meanings = {
         "position": "origins of the body frames, (bodies, 3) [m]",
@@ -278,21 +278,21 @@ def kinematics(tree: TreeTerms) -> list[Output]:
 
 @dataclass(frozen=True)
 class Kind:
-    """What a name of a routine stands for."""
+    """The function, inputs and meaning of a routine."""
 
     make: Callable[[TreeTerms], list[Output]]
     inputs: tuple[str, ...]
     meaning: str
-    is_force: bool = True  #: follows from the forces along the rates alone
+    is_force: bool = True  #: whether the outputs follow only from the forces along the rates
 
 
 MOTION = ("z", "z_dot", "z_ddot")
 ROUTINES = {
-    "inverse": Kind(inverse, MOTION, "Inverse dynamics: the forces that a motion needs"),
+    "inverse": Kind(inverse, MOTION, "Inverse dynamics: the forces for a motion"),
     "residual": Kind(residual, (*MOTION, "force"), "Residual of the equations of motion"),
     "mass": Kind(mass, ("z",), "Mass matrix"),
     "forward": Kind(forward, ("z", "z_dot", "force"), "Forward dynamics: accelerations under forces"),
-    "kinematics": Kind(kinematics, ("z", "z_dot"), "Places and velocities of all bodies", is_force=False),
+    "kinematics": Kind(kinematics, ("z", "z_dot"), "Positions and velocities of all bodies", is_force=False),
     "jacobian": Kind(derivatives, MOTION, "Derivatives of the forces of a motion"),
     "sensitivity": Kind(sensitivity, MOTION, "Derivatives of the forces of a motion by parameters"),
 }
@@ -301,12 +301,12 @@ INPUTS = {
     "z_dot": "rates",
     "z_ddot": "rates of the rates",
     "force": "forces along the rates [N, N m]",
-    "parameters": "numbers kept as symbols",
+    "parameters": "parameters that remain symbols",
 }
 
 
 def written_out(graph: Graph, outputs: Sequence[Output]) -> tuple[Output, ...]:
-    """Return outputs without functions of rotations that languages do not have."""
+    """Return outputs without the series of rotations, which the languages do not have."""
     values = expanded(graph, [value for output in outputs for value in output.values.ravel()])
     results, first = [], 0
     for output in outputs:
@@ -317,7 +317,7 @@ def written_out(graph: Graph, outputs: Sequence[Output]) -> tuple[Output, ...]:
 
 
 def routine_of(tree: TreeTerms, what: str, name: str) -> Routine:
-    """Return a routine by one of the names in `ROUTINES`."""
+    """Return the routine with a name in `ROUTINES`."""
     kind = ROUTINES[what]
     if kind.is_force:
         tree = carried_inwards(tree)

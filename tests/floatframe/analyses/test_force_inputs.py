@@ -103,7 +103,7 @@ def test_the_static_part_of_a_load_case_is_fed_through():
 
 def test_what_is_refused(rest):
     system, about = rest
-    for force, words in (("pusch", "is not there.*did you mean 'push'"), ("mount", "has no amplitude or motor")):
+    for force, words in (("pusch", "does not exist.*did you mean 'push'"), ("mount", "has no amplitude or motor")):
         with pytest.raises(ModelError, match=words):
             linearize(system, about, inputs=[ForceInput("x", force)])
 

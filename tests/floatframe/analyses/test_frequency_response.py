@@ -135,7 +135,7 @@ def test_resonances_are_met_by_their_frequencies():
     peak = frequency_response(linear, f).amplitudes.max()
     zeta = 0.01 / (2 * np.sqrt(K_ * M_))
     assert_allclose(peak, 1 / (2 * zeta * K_), rtol=1e-4)
-    with pytest.raises(ModelError, match="a rising band above 0"):
+    with pytest.raises(ModelError, match="an ascending band above 0"):
         resolved_frequencies(linear, 1.0, 0.5)
 
 
@@ -285,7 +285,7 @@ def test_mistakes_in_channels_are_answered(pendulum, old, new, words):
     (["linearize", "-o", "out.txt"], "expected a file name that ends in .npz, .mat, .h5"),
     (["linearize", "-i", "torqe"], "did you mean 'torque'"),
     (["response", "--band", "1-2"], 'expected "from:to" in Hz'),
-    (["response", "--band", "5:1"], "a rising band above 0"),
+    (["response", "--band", "5:1"], "an ascending band above 0"),
 ])  # fmt: skip
 def test_commands_refuse_what_they_cannot_do(pendulum, words, message):
     assert message in run(words[0], pendulum, *words[1:], code=2)

@@ -218,7 +218,7 @@ def test_results_in_a_file_are_those_in_memory(tmp_path):
 
 @pytest.mark.parametrize("times", [[0.0], [0.0, 0.0], [[0.0, 1.0]], [0.0, np.nan]])
 def test_impossible_times_are_refused(times):
-    with pytest.raises(ModelError, match="two or more rising numbers"):
+    with pytest.raises(ModelError, match="at least two increasing numbers"):
         kinematics(CRANK, times)
 
 

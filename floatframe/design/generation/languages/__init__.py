@@ -1,1 +1,1 @@
-"""Routines written out, a module for each language."""
+"""Output of routines as code, with one module for each language."""

@@ -1,4 +1,4 @@
-"""Routines in C: one function without dependencies but for <math.h>."""
+"""Routines in C: one function that depends only on <math.h>."""
 
 from collections.abc import Sequence
 
@@ -7,8 +7,9 @@ from floatframe.design.generation.routines import Routine
 
 __all__ = ["c_files"]
 
-#: Sine and cosine of one angle: k quarter turns, of pi/2 in two parts of which the first has 33 bits (so that k times
-#: it is exact), then polynomials in r², |r| <= pi/4, through the Chebyshev points: 1.4e-17 off the functions.
+#: Sine and cosine of one angle: the angle is reduced by k quarter turns, with pi/2 as a sum of two numbers, the first
+#: with 33 bits, so that k times it is exact. Polynomials in r², |r| <= pi/4, through Chebyshev points follow, with
+#: 1.4e-17 error.
 SINE_COSINE = """\
 /* sine and cosine of x, to 2e-16; far from zero those of the library */
 static inline void {name}(double x, double *sine, double *cosine)
@@ -38,7 +39,7 @@ static inline void {name}(double x, double *sine, double *cosine)
 
 
 def c_files(routine: Routine, notes: Sequence[str]) -> dict[str, str]:
-    """Return NAME.c and NAME.h: void NAME(inputs, outputs), arrays row by row."""
+    """Return NAME.c and NAME.h with void NAME(inputs, outputs); arrays are stored by rows."""
     lines = lines_of(routine, symbol=str)
     arguments = [f"const double *restrict {name}" for name, _, _ in routine.inputs]
     arguments += [f"double *restrict {output.name}" for output in routine.outputs]
@@ -61,7 +62,7 @@ def c_files(routine: Routine, notes: Sequence[str]) -> dict[str, str]:
 
 
 def use_of(name: str, sizes: Sequence[tuple[str, int]]) -> str:
-    """Return how the function is called, as a comment."""
+    """Return a comment that shows how to call the function."""
     arrays = ", ".join(f"{each}[{name}_n_{each}]" for each, _ in sizes)
     call = f"{name}({', '.join(each for each, _ in sizes)});"
     lines = [f"double {arrays};", call, f"cc -O2 main.c {name}.c -lm"]
@@ -69,7 +70,7 @@ def use_of(name: str, sizes: Sequence[tuple[str, int]]) -> str:
 
 
 def statements(lines: Lines, both: str) -> list[str]:
-    """Return named terms as statements, sine and cosine of one angle by one call of a function."""
+    """Return named terms as statements; the sine and cosine of one angle are computed by one call."""
     turns = {name: turn for turn in lines.turns for name in turn[1:]}
     body, done = [], set()
     for name, text in lines.named:

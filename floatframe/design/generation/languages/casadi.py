@@ -1,4 +1,4 @@
-"""Routines as CasADi functions: a Python file that makes one."""
+"""Routines as CasADi functions: a Python file that creates one."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ __all__ = ["casadi_files", "rows_of"]
 
 
 def rows_of(output: Output, results: Sequence[str]) -> list[Sequence[str]]:
-    """Return results in rows: a vector as a column, what has more axes than two with its rows one below the other."""
+    """Return results as rows: a vector becomes a column; an array with more than two axes is stacked by rows."""
     width = output.values.shape[-1] if output.values.ndim > 1 else 1
     return [results[k : k + width] for k in range(0, len(results), width)]
 

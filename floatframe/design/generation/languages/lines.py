@@ -1,7 +1,8 @@
-"""Statements and expressions of a routine, in what all languages have in common.
+"""Statements and expressions of a routine, independent of the language.
 
-A term that is needed once stands where it is needed, as long as lines stay readable; all others are given a name.
-Parentheses keep the order in which the graph computes, so that all languages round alike.
+A term that is used once is written inside the expression that uses it, unless the line becomes too long. All other
+terms are named. Parentheses preserve the order of the operations in the graph, so that all languages have the same
+rounding.
 """
 
 from collections import Counter
@@ -13,22 +14,22 @@ from floatframe.design.generation.routines import Routine
 
 __all__ = ["Lines", "lines_of", "needed_inputs", "with_subscript"]
 
-LONGEST = 80  #: characters of an expression that stands inside another
-SUM, PRODUCT, ATOM = range(3)  #: how tightly an expression holds together
+LONGEST = 80  #: largest number of characters of an expression inside another one
+SUM, PRODUCT, ATOM = range(3)  #: precedence of an expression
 SIGNS = {ADD: "+", SUB: "-", MUL: "*", DIV: "/"}
 
 
 @dataclass(frozen=True)
 class Lines:
-    """A routine as text: named terms in their order, and its results, output by output, rows first."""
+    """A routine as text: named terms in order, and its results, output by output, by rows."""
 
     named: tuple[tuple[str, str], ...]
-    turns: tuple[tuple[str, str, str], ...]  #: text of an angle, names of its sine and cosine, where both are needed
+    turns: tuple[tuple[str, str, str], ...]  #: text of an angle and names of its sine and cosine, if both are needed
     results: tuple[tuple[str, ...], ...]
 
 
 def with_subscript(name: str, first: int, brackets: str) -> str:
-    """Return the symbol name[k] with other brackets and a first index of its own."""
+    """Return the symbol name[k] with other brackets and another first index."""
     stem, _, k = name[:-1].partition("[")
     return f"{stem}{brackets[0]}{int(k) + first}{brackets[1]}"
 
@@ -39,7 +40,13 @@ def needed_inputs(routine: Routine) -> set[str]:
 
 
 def lines_of(routine: Routine, *, symbol: Callable[[str], str]) -> Lines:
-    """Return the text of a routine; symbol: writes one of its inputs."""
+    """Return the text of a routine.
+
+    Parameters
+    ----------
+    symbol
+        Returns the text of an input of the routine.
+    """
     order = reachable(routine.values)
     used = Counter(arg.index for term in order for arg in term.args)
     used.update(value.index for value in routine.values)

@@ -1,4 +1,4 @@
-"""Routines in Python with NumPy: one motion with plain numbers, or many at once."""
+"""Routines in Python with NumPy, for one motion with plain numbers, or for many motions at once."""
 
 from collections.abc import Sequence
 
@@ -27,9 +27,9 @@ def docstring(notes: Sequence[str], indent: str) -> str:
 
 
 def python_files(routine: Routine, notes: Sequence[str]) -> dict[str, str]:
-    """Return NAME.py with the function NAME(inputs), which returns its output, or a tuple of them.
+    """Return NAME.py with the function NAME(inputs), which returns its output, or a tuple of outputs.
 
-    Each input is an array (n,), or (n, ...) for many motions at once; results then end in the same axes.
+    Each input is an array (n,), or (n, ...) for many motions at once; the results then have the same trailing axes.
     """
     lines, needed = lines_of(routine, symbol=str), needed_inputs(routine)
     names = [name for name, _, _ in routine.inputs]

@@ -1,1 +1,1 @@
-"""Generated equations as a unit for other programs: an FMU of compiled C that needs nothing where it runs."""
+"""Generated equations as an FMU for other programs: compiled C code without dependencies."""

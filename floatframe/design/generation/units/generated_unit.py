@@ -1,4 +1,4 @@
-"""A system as an FMU of generated C: model exchange and co-simulation, and nothing that it needs where it runs."""
+"""A system as an FMU of generated C for model exchange and co-simulation, without runtime dependencies."""
 
 import hashlib
 import math
@@ -36,11 +36,12 @@ from floatframe.model.system import System
 __all__ = ["GeneratedUnit", "compiled_library", "generate_fmu", "platform_folder"]
 
 
-# sources in C made a shared library by the C compiler of this machine -------------------------------------------------
+# compilation of C sources to a shared library by the C compiler of this machine
+# -----------------------------------------
 
 
 FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared", "-fvisibility=hidden")
-#: system and machine as Python names them -> folder of binaries in FMI 2.0 (those of its text alone) and FMI 3.0
+#: folder of binaries in FMI 2.0 (depends only on the name) and FMI 3.0, by system and machine as Python names them
 FOLDERS = {
     ("linux", "x86_64"): ("linux64", "x86_64-linux"),
     ("linux", "aarch64"): ("aarch64-linux", "aarch64-linux"),
@@ -52,7 +53,7 @@ SUFFIXES = {"linux": ".so", "darwin": ".dylib", "win32": ".dll"}
 
 
 def platform_folder(fmi: int) -> str:
-    """Return the folder that binaries of this machine have in an FMU; `ModelError` where FMI has no name for it."""
+    """Return the folder of binaries of this machine in an FMU; `ModelError` if FMI has no name for the machine."""
     here = (sys.platform, platform.machine())
     if here not in FOLDERS:
         raise ModelError(f"generate: FMI has no name for binaries of this machine ({here[0]}, {here[1]})")
@@ -60,9 +61,9 @@ def platform_folder(fmi: int) -> str:
 
 
 def compiled_library(sources: Mapping[str, bytes]) -> tuple[str, bytes]:
-    """Return the ending and the content of a shared library of C sources and headers, by name.
+    """Return the suffix and content of a shared library made from C sources and headers, given by name.
 
-    The compiler is that of the environment variable CC, else `cc`.
+    The compiler is given by the environment variable CC; default: `cc`.
 
     Raises
     ------
@@ -73,7 +74,7 @@ def compiled_library(sources: Mapping[str, bytes]) -> tuple[str, bytes]:
     program = shutil.which(command[0])
     if program is None:
         raise ModelError(
-            f"generate: there is no C compiler {command[0]!r}; install one (Debian, Ubuntu: apt install gcc; macOS: "
+            f"generate: C compiler {command[0]!r} not found; install one (Debian, Ubuntu: apt install gcc; macOS: "
             "xcode-select --install; Windows: MinGW-w64), or name yours in the environment variable CC"
         )
     suffix = SUFFIXES[sys.platform]
@@ -94,21 +95,21 @@ def compiled_library(sources: Mapping[str, bytes]) -> tuple[str, bytes]:
 
 VERSIONS = (2, 3)
 WORDS = "Multibody system {}: equations of motion as generated C, without needs where it runs."
-STEP = "step"  #: the parameter of the unit
-#: on the page of documentation
+STEP = "step"  #: name of the parameter of the unit
+#: text of the documentation page
 PAGE = """<p>The sources are in the folder sources.</p>
 <p>Time is in seconds. In co-simulation forces are held over a communication step, which is taken by the classical
 Runge-Kutta method in equal steps of at most the parameter {}. States can be kept, restored and serialised.</p>"""
-STABLE = 2.6  #: step times the fastest frequency
+STABLE = 2.6  #: largest product of the step and the fastest frequency
 
 
 @dataclass(frozen=True)
 class GeneratedUnit:
-    """What was written."""
+    """The result of `generate_fmu`."""
 
     path: Path
     variables: tuple[Variable, ...]
-    platform: str  #: folder of its binary, such as linux64
+    platform: str  #: folder of the binary, such as linux64
 
 
 def generate_fmu(
@@ -117,29 +118,29 @@ def generate_fmu(
 ) -> GeneratedUnit:  # fmt: skip
     """Write the equations of motion of one system as an FMU of compiled C, for model exchange and co-simulation.
 
-    States are the positions z and rates of `relative_model(system)`, which begin as the system is placed; inputs the
-    forces along the rates; derivatives those of the generated forward dynamics. In co-simulation inputs are held and
-    the classical Runge-Kutta method takes equal steps of at most `step`, which is a parameter of the unit.
+    The states are the positions z and rates of `relative_model(system)`, which begin at the placed system. The inputs
+    are forces along the rates, and the derivatives come from generated forward dynamics. In co-simulation, inputs are
+    held constant, and the classical Runge-Kutta method takes equal steps of at most `step`, a parameter of the unit.
 
     Parameters
     ----------
     system
-        As for `generate`: a tree, gravity and linear joint forces.
+        As for `generate`: a tree with gravity and linear joint forces.
     path
-        The FMU; it holds its sources too, so that other machines can compile it.
+        The FMU. It also contains its sources, so that it can be compiled on other machines.
     fmi
-        Version, 2 or 3.
+        Version of FMI, 2 or 3.
     step
         Longest step in co-simulation [s].
     parameters
-        Numbers that can be set in the unit, as in `generate`: "link1/m", "link1", "gravity", patterns.
+        Parameters that can be set in the unit, as for `generate`: "link1/m", "link1", "gravity", patterns.
     stop_time
-        That a simulation ends at unless told otherwise [s].
+        Default end of a simulation [s].
 
     Raises
     ------
     ModelError
-        If the system is no such tree, a coordinate is prescribed, it holds events or units, a value is impossible,
+        If the system is not such a tree, a coordinate is prescribed, the system has events or FMUs, a value is invalid,
         there is no C compiler, or the file cannot be written.
     """
     if fmi not in VERSIONS:
@@ -190,10 +191,10 @@ def generate_fmu(
 
 
 def require_stable(model: RelativeModel, tree: TreeTerms, step: float) -> None:
-    """Raise `ModelError` if steps of the Runge-Kutta method are too long for flexible bodies and springs of joints.
+    """Raise `ModelError` if Runge-Kutta steps are too long for flexible bodies and springs of joints.
 
-    step: in units of time of the system. The method is stable up to 2.785 along the negative and 2.83 along the
-    imaginary axis; frequencies are those of small motions about the system as placed.
+    `step` is in time units of the system. The method is stable up to 2.785 along the negative real axis and up to 2.83
+    along the imaginary axis. Frequencies are those of small motions about the placed system.
     """
     if not tree.springs and all(link.modes is None for link in tree.links):
         return
@@ -215,12 +216,12 @@ def require_stable(model: RelativeModel, tree: TreeTerms, step: float) -> None:
 
 
 def rotations(tree: TreeTerms) -> list[tuple[int, int]]:
-    """Return first position and first rate of each rotation of three rates."""
+    """Return the first position and first rate of each joint rotation with three rates."""
     return [(link.x0, link.v0) for link in tree.links if link.kind == ROTATION]
 
 
 def slides(tree: TreeTerms) -> list[tuple[int, int]]:
-    """Return position and rate of all positions that change by their rate."""
+    """Return position and rate of all positions whose derivative is their rate."""
     found = rotations(tree)
     x = set(range(len(tree.x))) - {x0 + k for x0, _ in found for k in range(4)}
     v = set(range(len(tree.v))) - {v0 + k for _, v0 in found for k in range(3)}
@@ -228,7 +229,7 @@ def slides(tree: TreeTerms) -> list[tuple[int, int]]:
 
 
 def dotted(name: str) -> str:
-    """Return the name of a coordinate as sensors name it."""
+    """Return the name of a coordinate in the notation of sensors."""
     return name.replace("/", ".")
 
 
@@ -238,7 +239,7 @@ def unit_variables(model: RelativeModel, tree: TreeTerms, routine: Routine, step
     z, z_dot = model.positions()
     symbols = {"rad": "rad", "m": units.length_symbol}
     unit_of = {each.name: symbols[each.unit] for each in model.expansion.tree.columns}
-    place = [unit_of.get(name, "") for name in model.names]  # of modes and Euler parameters none
+    place = [unit_of.get(name, "") for name in model.names]  # none for modes and Euler parameters
     rate = [unit_of.get(name, "") for name in model.rate_names]
     forces = {"rad": f"{units.force_symbol} {units.length_symbol}", units.length_symbol: units.force_symbol}
     force = [forces.get(unit, "") for unit in rate]
@@ -282,7 +283,7 @@ def derivative(name: str, unit: str, needs: Sequence[str]) -> Variable:
 
 
 def needed(term: Scalar, names: dict[str, list[str]], whole: dict[int, list[str]]) -> list[str]:
-    """Return the names of the symbols that a term needs; of Euler parameters all four, which are made one in length."""
+    """Return the names of the symbols in a term; Euler parameters appear as all four, because they are normalised."""
     found: dict[str, None] = {}
     for each in reachable([term]):
         stem, _, k = each.name[:-1].partition("[") if each.kind == SYMBOL else ("", "", "")
@@ -294,7 +295,7 @@ def needed(term: Scalar, names: dict[str, list[str]], whole: dict[int, list[str]
 
 
 def per(unit: str, time: str) -> str:
-    """Return a unit by time."""
+    """Return the unit of a rate."""
     if "/" not in unit:
         return f"{unit or '1'}/{time}"
     above, below = unit.split("/")
@@ -302,7 +303,7 @@ def per(unit: str, time: str) -> str:
 
 
 def model_header(tree: TreeTerms, routine: Routine, variables: Sequence[Variable], about: Description) -> str:
-    """Return model.h: sizes, starts and the call of the generated function."""
+    """Return model.h: sizes, initial values and the call of the generated function."""
     pairs = {"turns": rotations(tree), "slides": slides(tree)}
     n_values = 1 + len(tree.x) + 2 * len(tree.v) + len(tree.parameters) + 1
     tables = []

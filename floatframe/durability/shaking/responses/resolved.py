@@ -62,7 +62,7 @@ def resolved_band(
         Further frequencies at which panels end [Hz].
     """
     if not 0 < first < last:
-        raise ModelError(f"shake: expected a rising band above 0 Hz, got {first:g} to {last:g}")
+        raise ModelError(f"shake: expected an ascending band above 0 Hz, got {first:g} to {last:g}")
     n = max(1, int(np.ceil(PER_OCTAVE * np.log2(last / first))))
     around = np.concatenate([np.zeros(0), *(edges_around(f, zeta) for f, zeta in zip(modes, damping, strict=True))])
     edges = np.concatenate([np.geomspace(first, last, n + 1), around, np.asarray(corners, dtype=float)])

@@ -91,5 +91,5 @@ def test_forces_that_are_not_linear_are_refused_by_name(case, changes, message):
 def test_elements_of_force_between_bodies_are_refused_by_name(case):
     names = [body.name for body in case.system.bodies]
     strut = ff.SpringDamper("strut", ff.Marker(names[0]), ff.Marker(names[1]), stiffness=1e3)
-    with pytest.raises(ModelError, match=r"force 'strut': .* got a SpringDamper; .* as the input force"):
+    with pytest.raises(ModelError, match=r"force 'strut': .* got a SpringDamper; .* in the input force"):
         generate(replace(case.system, forces=(*case.system.forces, strut)))

@@ -54,5 +54,5 @@ def test_the_weights_are_exact_for_polynomials():
 
 
 def test_a_band_that_does_not_rise_is_refused():
-    with pytest.raises(ModelError, match="rising band above 0 Hz, got 10 to 5"):
+    with pytest.raises(ModelError, match="ascending band above 0 Hz, got 10 to 5"):
         resolved_band(10.0, 5.0, np.array([7.0]), np.array([0.01]))
