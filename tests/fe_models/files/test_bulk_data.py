@@ -99,6 +99,15 @@ def test_systems_of_three_grid_points():
     assert_allclose(points.axes[4], [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-14)
 
 
+def test_a_card_of_three_grid_points_may_define_two_systems():
+    """Of the second one z is along y of the mesh, and x along z."""
+    places = "GRID,1\nGRID,2,,0.,0.,1.\nGRID,3,,1.,0.,0.\nGRID,11,,1.,2.,3.\nGRID,12,,1.,5.,3.\nGRID,13,,1.,2.,7.\n"
+    points = points_of(places + "CORD1R,8,1,2,3,9,11,12,13\nGRID,20,8,1.,2.,3.,8\nGRID,21,9,1.,2.,3.,9")
+    assert_allclose(points.positions[20], [1, 2, 3], atol=1e-14)
+    assert_allclose(points.positions[21], [1 + 2, 2 + 3, 3 + 1], atol=1e-14)
+    assert_allclose(points.axes[21], [[0, 1, 0], [0, 0, 1], [1, 0, 0]], atol=1e-14)
+
+
 @pytest.mark.parametrize("shape", ["C", "S"])
 def test_axes_are_the_directions_in_which_coordinates_grow(shape):
     """Central differences of the place, along each coordinate."""

@@ -29,6 +29,13 @@ def test_what_lies_below_the_new_nyquist_frequency_stays(rate):
     assert_allclose([report.rms_before, report.rms_after], [np.sqrt(0.5 * 1.25), rms], rtol=4e-3, atol=0)
 
 
+@pytest.mark.parametrize("rate", [500.0, 333.3, 2000.0, 6000.0])
+def test_new_samples_reach_the_last_old_time_and_not_beyond(rate):
+    found, _ = resampled(sines(), rate)
+    assert found.time[0] == 0.0
+    assert 0 <= t[-1] - found.time[-1] < (1 - 1e-6) / rate
+
+
 def test_without_the_filter_what_lies_above_is_mirrored():
     found, _ = resampled(sines(high=0.5), 500.0, anti_alias=False)
     expected = np.sin(2 * np.pi * 40 * found.time) + 0.5 * np.sin(2 * np.pi * 100 * found.time)  # 600 - 500
@@ -52,6 +59,14 @@ def test_uneven_times_become_even_and_that_is_said():
     assert found.step is not None
     assert_allclose(found.values, np.sin(20 * found.time), rtol=0, atol=2e-3)
     assert "made even along the monotone cubic" in found.notes[0]
+
+
+def test_the_report_of_uneven_times_is_that_of_even_ones():
+    """Two tones below and above the new Nyquist frequency: a fifth of the mean square lay above."""
+    uneven = t + 2e-5 * np.sin(np.arange(len(t)))
+    values = np.sin(2 * np.pi * 40 * uneven) + 0.5 * np.sin(2 * np.pi * 300 * uneven)
+    _, report = resampled(Signal("road", uneven, values, "m/s^2"), 400.0)
+    assert_allclose(report.above_nyquist, 0.2, rtol=0.02, atol=0)
 
 
 def test_filters_halve_the_amplitude_at_their_corner_without_shift():

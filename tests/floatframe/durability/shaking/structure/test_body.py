@@ -150,6 +150,13 @@ def test_random_loads_of_pyyeti_on_the_same_matrices(reduced):
     assert_allclose(response(model, FREQUENCIES)[:, :, 1].T, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
 
 
+def test_an_amplification_is_that_of_a_mass_at_its_frequency():
+    """|a / a_base| of one mode at its frequency is the root of 1 + Q²; Q = 1/(2 ratio)."""
+    f, Q = 50.0, 8.0
+    ratio = Damping(Q=Q).ratios(np.array([f]))
+    assert_allclose(np.abs((1 + 2j * ratio) / (2j * ratio)), np.hypot(1, Q), rtol=1e-12)
+
+
 def test_own_damping_of_the_body_couples_its_modes_and_changes_the_response():
     part = cms.couple(beam(n=3))
     body = cms.reduce(part, cms.craig_bampton(part, n_modes=12), damping=cms.ModalDamping(0.02))
