@@ -1,4 +1,4 @@
-"""Gradients: derivatives of motions, equilibria and vibrations by parameters, direct and adjoint."""
+"""Gradients: derivatives of motions, equilibria and vibration modes by parameters, direct and adjoint."""
 
 from floatframe.design.gradients.sensitivities import Sensitivities, sensitivities
 

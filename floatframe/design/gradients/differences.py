@@ -1,4 +1,4 @@
-"""Differences of fourth order: where they are taken and with which weights.
+"""Finite differences of fourth order: offsets and weights.
 
 f'(p) = Σ weights f(p + offsets step)/step + O(step⁴): central where both sides exist, else from one side, as for a
 damping of zero.
@@ -15,7 +15,7 @@ __all__ = ["CENTRAL", "CENTRAL_FIRST", "Stencil"]
 
 @dataclass(frozen=True, eq=False)
 class Stencil:
-    """Offsets, in steps, and weights."""
+    """Offsets of the evaluations, in steps, and their weights."""
 
     offsets: tuple[float, ...]
     weights: tuple[float, ...]

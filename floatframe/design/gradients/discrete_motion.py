@@ -1,4 +1,4 @@
-"""The steps of generalized-alpha differentiated: the derivatives of the motion that was computed, not of another.
+"""Derivatives of generalized-alpha steps: exact derivatives of the computed motion, including its time discretisation.
 
 With S = (x, u, u_dot, a) after a step, x varied along displacements (docs/theory.md §9), a step with the increment xi
 and the unknowns (xi, c_k w), c_k = beta h², is
@@ -43,7 +43,7 @@ __all__ = ["ComputedMotion", "Step", "adjoint_gradient", "computed_motion", "dir
 
 @dataclass(frozen=True, eq=False)
 class ComputedMotion:
-    """All that a run has computed: a point and a carry after each step, the start first."""
+    """The computed motion: a point and a carry after each step, beginning with the start."""
 
     method: GeneralizedAlpha
     h: float
@@ -52,14 +52,14 @@ class ComputedMotion:
 
     @property
     def c_k(self) -> float:
-        """Beta h²."""
+        """The factor beta h² of the increments."""
         return self.method.coefficients[2] * self.h**2
 
 
 def computed_motion(
     system: System, method: GeneralizedAlpha, t_start: float, h: float, n_steps: int, state: State | None
 ) -> ComputedMotion:
-    """Return the steps of a run, as `integrate` takes them.
+    """Return the steps of a run, identical to those of `integrate`.
 
     Raises
     ------
@@ -69,7 +69,8 @@ def computed_motion(
     from floatframe.engine.compiling.system import compiled_system
 
     work = new_work(compiled_system(system).model)
-    begun = method.start(system, t_start, state)  # results begin with it, the steps with velocities shifted by O(h²)
+    # results begin with the start; the steps begin with velocities shifted by O(h²)
+    begun = method.start(system, t_start, state)
     carry = method.prepared(system, begun, h, t_start)
     carries, points = [carry], [Point(t_start, begun.state, begun.u_dot, begun.w, angle=begun.angle)]
     for k in range(n_steps):
@@ -137,14 +138,14 @@ class ScaledSolver:
         return x + self.once(right - matrix @ x, is_transposed)
 
     def once(self, right: Array, is_transposed: bool) -> Array:
-        """Return it without refinement."""
+        """Return the solution without refinement."""
         if is_transposed:
             return self.rows[:, None] * solve_factored(self.lu, self.columns[:, None] * right, is_transposed=True)
         return self.columns[:, None] * solve_factored(self.lu, self.rows[:, None] * right)
 
 
 class Step:
-    """One step, linearised where it ended."""
+    """One step, linearised at its end."""
 
     def __init__(self, structure: Structure, own: Neighbour, group: Configurations, motion: ComputedMotion, k: int):
         """Linearise step k of a motion, from point k to point k + 1."""
@@ -182,7 +183,7 @@ class Step:
     def backward(self, S_bar: Array, w_bar: Array) -> tuple[Array, Array]:
         """Return the adjoint of S_0, (4 n_u, n_out), and that of the residuals, (n_u + n_w, n_out).
 
-        The transposed of `forward`, line by line.
+        This is the transpose of `forward`, line by line.
         """
         x, u, u_dot, a = np.split(S_bar, 4)
         xi = self.T.T @ x + self.of_u[0] * u + self.of_u_dot[0] * u_dot + self.of_a[0] * a
@@ -203,7 +204,7 @@ class Step:
 
 
 def linear(own: tuple[float, ...], factor: float, of_a: tuple[float, ...]) -> tuple[float, ...]:
-    """Return own + factor of_a, coefficient by coefficient."""
+    """Return own + factor * of_a, coefficient by coefficient."""
     return tuple(x + factor * y for x, y in zip(own, of_a, strict=True))
 
 
@@ -211,7 +212,7 @@ def direct_columns(
     family: Family, structure: Structure, own: Neighbour, group: Configurations, motion: ComputedMotion,
     S: Array, shown: Array, keep: set[int],
 ) -> dict[int, Array]:  # fmt: skip
-    """Return d(x, u, u_dot, w)/dp, (3 n_u + n_w, n_p), at the points that are to be kept."""
+    """Return d(x, u, u_dot, w)/dp, (3 n_u + n_w, n_p), at the points to keep."""
     n = group.n_v
     kept = {0: shown} if 0 in keep else {}
     points = motion.points[1 : max(keep, default=0) + 1]

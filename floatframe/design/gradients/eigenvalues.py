@@ -1,4 +1,4 @@
-"""Eigenvalues about the equilibrium differentiated, with the change of the equilibrium itself.
+"""Derivatives of eigenvalues at the equilibrium, including the change of the equilibrium.
 
 Small motions exp(lambda t) of the whole system, wrenches included, obey P(lambda) phi = 0 with
 
@@ -57,13 +57,13 @@ def equilibrium_matrix(at: PointTangents, name: str) -> Array:
     """
     matrix = np.block([[at.K, -at.J.T], [at.G_x, at.V]])
     scaled = matrix.copy()
-    for _ in range(5):  # rows and columns of one size, so that units do not decide
+    for _ in range(5):  # scale rows and columns to one size, so that units do not matter
         scaled /= np.sqrt(np.maximum(np.abs(scaled).max(axis=1, keepdims=True), np.finfo(float).tiny))
         scaled /= np.sqrt(np.maximum(np.abs(scaled).max(axis=0, keepdims=True), np.finfo(float).tiny))
     values = la.svdvals(scaled)
     if values[-1] <= SINGULAR_EQUILIBRIUM * values[0]:
         raise ModelError(
-            f"sensitivities: system {name!r}: its equilibrium is one of many (something can move at no cost), and has "
+            f"sensitivities: system {name!r}: its equilibrium is not unique (a motion meets no resistance) and has "
             "no derivative; hold it by a spring or a joint"
         )
     return np.asarray(matrix)
@@ -93,25 +93,27 @@ def equilibrium_adjoint(matrix: Array, slopes: Array, by_p: Array) -> Array:
 # solved with the least change; anything else that moves at no cost is refused.
 
 
-SINGULAR = 1e-10  #: of the largest singular value of the scaled matrix: below, a motion costs nothing
-MEETS = 1e-6  #: by which the motion at no cost may differ from a turn about the axis
-DEPENDS = 1e-6  #: change of an output by a turn of one radian, over its size, from which on it depends on the turn
+#: smallest singular value, relative to the largest one of the scaled matrix, of a motion with resistance
+SINGULAR = 1e-10
+MEETS = 1e-6  #: largest difference between the motion without resistance and a rotation about the axis
+#: smallest relative change of an output, per radian of rotation about the axis, that counts as dependence
+DEPENDS = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class SteadyRotation:
-    """A steady rotation, its matrix, and the right side of each parameter."""
+    """A steady rotation, its matrix, and the right-hand side for each parameter."""
 
     point: Point
     group: Configurations
-    matrix: Array  #: of (2), (n_u + n_w, n_u + n_w)
-    inverse: Array  #: its pseudo-inverse without the turn about the axis
+    matrix: Array  #: matrix of (2), (n_u + n_w, n_u + n_w)
+    inverse: Array  #: pseudo-inverse that excludes the rotation about the axis
     by_p: Array  #: derivatives of residual and rows by the parameters, (n_u + n_w, n_p)
     of_x: Array  #: d(u, u_dot)/dx, (2 n_u, n_u)
-    turn: Array  #: change of (x, w) by a turn about the axis, (n_u + n_w,); zero where the axis does not allow it
+    turn: Array  #: change of (x, w) by a rotation about the axis, (n_u + n_w,); zero if the axis does not allow it
 
     def whole(self, columns: Array) -> Array:
-        """Return changes of (x, u, u_dot, w) of those of (x, w), (3 n_u + n_w, k)."""
+        """Return changes of (x, u, u_dot, w), (3 n_u + n_w, k), from changes of (x, w)."""
         n = self.group.n_v
         return np.vstack([columns[:n], self.of_x @ columns[:n], columns[n:]])
 
@@ -127,7 +129,7 @@ class SteadyRotation:
 
 
 def steady_rotation_of(family: Family, own: Neighbour, omega: Array, center: Array) -> SteadyRotation:
-    """Return the steady rotation of a system with what its derivatives need.
+    """Return the steady rotation of a system, with the matrices of its derivatives.
 
     Raises
     ------
@@ -157,7 +159,7 @@ def steady_rotation_of(family: Family, own: Neighbour, omega: Array, center: Arr
 
 
 def without_turn(matrix: Array, turned: Array, name: str) -> tuple[Array, Array]:
-    """Return the pseudo-inverse of a matrix that a turn about the axis leaves alone, and that turn of (x, w)."""
+    """Return the pseudo-inverse of a matrix that excludes a rotation about the axis, and the change of (x, w) by it."""
     rows, columns = np.ones(len(matrix)), np.ones(len(matrix))
     scaled = matrix.copy()
     tiny = np.finfo(float).tiny
@@ -177,7 +179,7 @@ def without_turn(matrix: Array, turned: Array, name: str) -> tuple[Array, Array]
     factor = float(turned @ own) / float(own @ own) if own.any() else 0.0
     if n_free > 1 or np.abs(factor * own - turned).max() > MEETS * np.abs(turned).max():
         raise ModelError(
-            f"sensitivities: system {name!r}: its steady rotation is one of many (something besides the turn about its "
+            f"sensitivities: system {name!r}: its steady rotation is not unique (a motion besides rotation about its "
             "axis moves at no cost), and has no derivative; hold it by a spring or a joint"
         )
     return inverse, factor * turn
@@ -186,23 +188,23 @@ def without_turn(matrix: Array, turned: Array, name: str) -> tuple[Array, Array]
 # eigenvalues ----------------------------------------------------------------------------------------------------------
 
 
-NEAR = 1e-6  #: relative distance of eigenvalues that are one
-DEFECTIVE = 1e-9  #: |psiᴴ P_lambda phi| by the size of its terms, below which an eigenvalue has no derivative
+NEAR = 1e-6  #: relative distance below which eigenvalues count as equal
+DEFECTIVE = 1e-9  #: smallest |psiᴴ P_lambda phi|, relative to its terms, of an eigenvalue with a derivative
 
 
 @dataclass(frozen=True)
 class Branch:
-    """An eigenvalue and how often it is there."""
+    """An eigenvalue and its multiplicity."""
 
     value: complex
     n_times: int
-    place: int  #: of this mode among those
+    place: int  #: index of this mode among the equal eigenvalues
 
 
 def pencil_rates(
     parameter: Parameter, own: Neighbour, group: Configurations, point: Point, column: Array
 ) -> PointTangents:
-    """Return the derivatives of all matrices by a parameter, along the equilibrium that moves by `column`."""
+    """Return the derivatives of all matrices by a parameter, with the change `column` of the equilibrium."""
     n = group.n_v
     change = np.concatenate([column[:n], np.zeros(2 * n), column[n:]])
     found = []
@@ -228,7 +230,7 @@ def pencil_slope(at: PointTangents, value: complex) -> Array:
 
 
 def branch_of(eigenvalues: Array, k: int) -> Branch:
-    """Return mode k (from 0) with those that have the same eigenvalue.
+    """Return mode k (from 0), and all modes with the same eigenvalue.
 
     Raises
     ------
@@ -237,13 +239,13 @@ def branch_of(eigenvalues: Array, k: int) -> Branch:
     """
     value = complex(eigenvalues[k])
     if value == 0:
-        raise ModelError(f"sensitivities: mode {k + 1} costs nothing (eigenvalue zero, twice), and has no derivative")
+        raise ModelError(f"sensitivities: mode {k + 1} has a double zero eigenvalue, which has no derivative")
     same = np.flatnonzero(np.abs(eigenvalues - value) <= NEAR * abs(value))
     return Branch(value, len(same), int(np.flatnonzero(same == k)[0]))
 
 
 def null_vectors(P: Array, n_times: int) -> tuple[Array, Array]:
-    """Return left and right null vectors of P, (n, n_times) each, found on scaled rows and columns."""
+    """Return left and right null vectors of P, (n, n_times) each, from scaled rows and columns."""
     rows, columns = np.ones(len(P)), np.ones(len(P))
     scaled = P.copy()
     for _ in range(5):
@@ -256,7 +258,7 @@ def null_vectors(P: Array, n_times: int) -> tuple[Array, Array]:
 
 
 def eigenvalue_derivatives(at: PointTangents, rates: list[PointTangents], branch: Branch) -> Array:
-    """Return dlambda/dp of a mode by each parameter, (n_p,) complex; of branches in ascending order of their own.
+    """Return dlambda/dp of a mode by each parameter, (n_p,) complex, with branches in ascending order.
 
     Raises
     ------
@@ -268,7 +270,7 @@ def eigenvalue_derivatives(at: PointTangents, rates: list[PointTangents], branch
     size = np.abs(psi.conj().T) @ np.abs(pencil_slope(at, branch.value)) @ np.abs(phi)
     if la.svdvals(slope)[-1] <= DEFECTIVE * size.max():
         raise ModelError(
-            f"sensitivities: the eigenvalue {branch.value:.6g} is defective (modes run into one another, as at "
+            f"sensitivities: the eigenvalue {branch.value:.6g} is defective (modes coincide, as at "
             "critical damping), and has no derivative"
         )
     found = []

@@ -1,4 +1,4 @@
-"""Numbers that are differentiated: a column of a sensor, and what is taken of it over time."""
+"""Outputs to be differentiated: a sensor column, reduced over time to one number."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -26,19 +26,21 @@ from floatframe.simulation.integration import joint_rows
 
 __all__ = ["Column", "OutputRequest", "Take", "columns_of", "moved", "values_at", "wanted_of", "weights_of"]
 
-#: what is taken of values over time, (n_t,): a key of `TAKES`, or a function that returns a number and its derivatives
+#: how values over time, (n_t,), become a number: a key of `TAKES`, or a function that returns the number and its
+#: derivatives
 Take = str | Callable[[Array], tuple[float, Array]]
 
-OF_THE_WAY = ("work", "dissipated", "balance")  #: energies that are sums over the motion, not of its state
+#: energies that are integrals over the motion and not functions of its state
+OF_THE_WAY = ("work", "dissipated", "balance")
 
 
 @dataclass(frozen=True)
 class OutputRequest:
-    """An output by name."""
+    """A named output."""
 
     name: str
-    of: str  #: a sensor or joint coordinate and its column, "tip x"
-    take: Take  #: of its values over time, a key of `TAKES`, or a function of them
+    of: str  #: a sensor or joint coordinate, and its column, such as "tip x"
+    take: Take  #: how the values over time become a number: a key of `TAKES`, or a function
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +52,7 @@ class Column:
 
 
 def wanted_of(outputs: Sequence[str] | Mapping[str, str | tuple[str, Take]]) -> tuple[OutputRequest, ...]:
-    """Return outputs as they are given: "tip x" (its last value), or by name, with what is taken of the values."""
+    """Return outputs from a list of columns ("tip x", last value), or from a dict of names, columns and reductions."""
     if isinstance(outputs, str):
         raise ModelError(f"sensitivities: outputs: expected a list of sensor columns, got the text {outputs!r}")
     named = outputs if isinstance(outputs, Mapping) else {str(of): of for of in outputs}
@@ -79,7 +81,7 @@ def columns_of(system: System, wanted: tuple[OutputRequest, ...]) -> tuple[Colum
         sensor = sensor_of(system, name)
         if isinstance(sensor, EnergySensor) and column in OF_THE_WAY:
             raise ModelError(
-                f"output {each.name!r}: {column!r} is a sum over the whole motion, which this does not differentiate; "
+                f"output {each.name!r}: {column!r} is an integral over the whole motion, which is not differentiated; "
                 "take kinetic, strain, gravity, springs or total"
             )
         found.append(Column(sensor, column))
@@ -87,7 +89,7 @@ def columns_of(system: System, wanted: tuple[OutputRequest, ...]) -> tuple[Colum
 
 
 def values_at(neighbour: Neighbour, columns: tuple[Column, ...], points: Sequence[Point]) -> tuple[Array, list[str]]:
-    """Return what columns measure at points, (n_points, n_outputs), and their units; angles next to those counted."""
+    """Return the measured columns at points, (n_points, n_outputs), and their units; angles are continuous."""
     compiled = neighbour.compiled
     if any(isinstance(each.sensor, EnergySensor | MomentumSensor) for each in columns):
         rows = [observed_state(compiled, neighbour.work, p.state, p.u_dot, p.w, p.t)[0] for p in points]
@@ -116,7 +118,7 @@ def values_at(neighbour: Neighbour, columns: tuple[Column, ...], points: Sequenc
 
 
 def moved(group: Configurations, compiled: CompiledSystem, point: Point, change: Array, factor: float) -> Point:
-    """Return a point moved by factor times a change of (x, u, u_dot, w), (3 n_u + n_w,)."""
+    """Return a point after a change of (x, u, u_dot, w), (3 n_u + n_w,), times a factor."""
     n = group.n_v
     dx, du, da, dw = np.split(factor * change, [n, 2 * n, 3 * n])
     state = replace(point.state, u=point.state.u + du)
@@ -127,7 +129,7 @@ def moved(group: Configurations, compiled: CompiledSystem, point: Point, change:
 
 
 def vector_of(group: Configurations, compiled: CompiledSystem, state: State) -> Array:
-    """Return x of a state of the engine."""
+    """Return x for a state of the engine."""
     q0 = compiled.model.bodies.q0
     return np.concatenate(
         [part for i in range(len(state.r)) for part in (state.r[i], state.p[i], state.q[q0[i] : q0[i + 1]])]
@@ -135,7 +137,7 @@ def vector_of(group: Configurations, compiled: CompiledSystem, state: State) -> 
 
 
 def state_of(group: Configurations, compiled: CompiledSystem, x: Array, u: Array) -> State:
-    """Return the state of the engine of x and u."""
+    """Return the state of the engine for x and u."""
     r, p, q = [], [], [np.zeros(0)]
     for j, _, n in group.parts():
         r.append(x[j : j + 3])
@@ -145,7 +147,7 @@ def state_of(group: Configurations, compiled: CompiledSystem, x: Array, u: Array
 
 
 def weights_of(take: Take, values: Array) -> tuple[float, Array]:
-    """Return the number that is taken of values over time, and its derivatives by them, (n_t,)."""
+    """Return the number taken from values over time, and its derivatives by the values, (n_t,)."""
     if callable(take):
         value, slopes = take(values)
         slopes = np.asarray(slopes, dtype=float)

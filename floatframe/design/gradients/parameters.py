@@ -1,4 +1,4 @@
-"""Parameters of a system: their values, and the systems a little way off on both sides from which derivatives come."""
+"""Parameters of a system: their values, and the systems at small offsets, from which derivatives are computed."""
 
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -39,7 +39,7 @@ __all__ = ["Family", "Neighbour", "Parameter", "Source", "family_of", "size_besi
 
 LISTS = ("bodies", "joints", "forces", "couplers")
 TURN = "turn"
-SYMMETRIC = 1e-9  #: defect of a matrix by its largest entry, as `RigidBody` allows it
+SYMMETRIC = 1e-9  #: largest asymmetry of a matrix, relative to its largest entry, as in `RigidBody`
 
 
 def value_at(system: System, path: str) -> float:
@@ -54,12 +54,12 @@ def value_at(system: System, path: str) -> float:
 
 
 def with_value(system: System, path: str, value: float) -> System:
-    """Return the system with another number at a key path; `ModelError` if it is impossible there."""
+    """Return the system with another number at a key path; `ModelError` if the system does not accept it."""
     return visit(system, path, path, value)[0]
 
 
 def size_beside(system: System, path: str) -> float:
-    """Return the largest number of the array in which the one at the path stands, 0 for one that stands alone."""
+    """Return the largest number of the array that contains the path; 0 for a single number."""
     parts = path.split(".")
     for k in range(len(parts) - 1, 0, -1):
         found: Any = None
@@ -74,16 +74,16 @@ def size_beside(system: System, path: str) -> float:
 
 
 def part_at(system: System, path: str) -> Any:
-    """Return what stands at a path, whatever it is."""
+    """Return the object at a path, of any type."""
     found: list[Any] = []
     visit(system, path, path, None, found)
     return found[0]
 
 
 def visit(here: Any, left: str, path: str, value: float | None, found: list[Any] | None = None) -> tuple[Any, Any]:
-    """Return a copy of a part with the value at what is left of the path, and the value that was there.
+    """Return a copy of a part with the value at the rest of the path, and the previous value there.
 
-    `found`: takes what stands at the end, in place of a number.
+    `found`: receives the object at the end of the path, instead of a number.
     """
     if not left:
         if found is not None:
@@ -112,7 +112,7 @@ def visit(here: Any, left: str, path: str, value: float | None, found: list[Any]
 
 
 def visit_system(system: System, left: str, path: str, value: Any, found: list[Any] | None) -> tuple[System, Any]:
-    """Go on from a system: to its gravity, or to a part of one of its lists by name."""
+    """Follow a path from a system to its gravity, or to a named part of one of its lists."""
     head, _, rest = left.partition(".")
     if head == "gravity":
         forces = [k for k, force in enumerate(system.forces) if isinstance(force, Gravity)]
@@ -135,7 +135,7 @@ def visit_system(system: System, left: str, path: str, value: Any, found: list[A
 
 
 def visit_record(here: Any, left: str, path: str, value: Any, found: list[Any] | None) -> tuple[Any, Any]:
-    """Go on from a data class to one of its fields; a marker without position stands at the origin."""
+    """Follow a path from a data class to one of its fields; a marker without position is at the origin."""
     names = [part.name for part in fields(here)]
     key, _, rest = left.partition(".")
     if key == TURN and "orientation" in names:
@@ -162,7 +162,7 @@ def visit_record(here: Any, left: str, path: str, value: Any, found: list[Any] |
 
 
 def visit_array(here: np.ndarray, left: str, path: str, value: Any, found: list[Any] | None) -> tuple[Any, Any]:
-    """Go on to an entry of an array; of a symmetric matrix both entries of a pair change."""
+    """Follow a path to an entry of an array; for a symmetric matrix, both entries of a pair change."""
     parts = left.split(".")
     if len(parts) != here.ndim:
         raise ModelError(f"parameter {path!r}: expected {here.ndim} indices of an array {here.shape}, got {left!r}")
@@ -180,12 +180,12 @@ def visit_array(here: np.ndarray, left: str, path: str, value: Any, found: list[
 
 
 def is_symmetric(A: np.ndarray) -> bool:
-    """Whether a matrix is symmetric as bodies and forces take it: a turned tensor is but for the last bits."""
+    """Return whether a matrix is symmetric within the tolerance of bodies and forces."""
     return bool(np.abs(A - A.T).max() <= SYMMETRIC * np.abs(A).max())
 
 
 def longest(left: str, choices: list[Any], path: str) -> Any:
-    """Return the longest of the names with which a path goes on."""
+    """Return the longest name with which a path continues."""
     fitting = [key for key in choices if left == key or left.startswith(f"{key}.")]
     if not fitting:
         name = left.split(".")[0]
@@ -194,7 +194,7 @@ def longest(left: str, choices: list[Any], path: str) -> Any:
 
 
 def index_of(text: str, n: int, path: str) -> int:
-    """Return an index from its text."""
+    """Return the index in a text."""
     if not text.isdigit() or int(text) >= n:
         raise ModelError(f"parameter {path!r}: expected an index of 0 to {n - 1}, got {text!r}")
     return int(text)
@@ -205,16 +205,16 @@ def index_of(text: str, n: int, path: str) -> int:
 
 Source = System | str | os.PathLike[str] | Callable[[dict[str, float]], System]
 
-#: tables of a system file that do not change its motion
+#: tables of a system file that do not affect its motion
 OUTSIDE = ("run", "inputs", "outputs", "fmu", "fmus", "cosimulation", "scene")
-STEP = 1e-3  #: of differences by a parameter, relative to its size
-SHORTER: tuple[float, ...] = (1.0, 1e-1, 1e-2, 1e-3)  #: of the step, tried where a system does not exist
-SAME_ROW = 0.1  #: by which a direction of a row may differ within a step
+STEP = 1e-3  #: step of finite differences by a parameter, relative to its magnitude
+SHORTER: tuple[float, ...] = (1.0, 1e-1, 1e-2, 1e-3)  #: factors of the step, tried in order if a system does not exist
+SAME_ROW = 0.1  #: largest change of the direction of a row within a step
 
 
 @dataclass(frozen=True, eq=False)
 class Neighbour:
-    """The system with a parameter a little way off, as the kernels see it."""
+    """The system with a slightly changed parameter, compiled."""
 
     system: System
     compiled: CompiledSystem
@@ -222,13 +222,13 @@ class Neighbour:
 
     @cached_property
     def head(self) -> Head:
-        """What results of it begin with."""
+        """Header of its results."""
         return head_of(self.system, Snapshot(), 0.0, 0.0, 1.0, 1)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True, eq=False)
 class Parameter:
-    """One parameter: where it is, its value, and the systems around it."""
+    """One parameter: its path, value, and neighbouring systems."""
 
     name: str
     path: str
@@ -238,7 +238,7 @@ class Parameter:
     around: tuple[Neighbour, ...]  #: at the offsets of the stencil
 
     def derivative(self, values: list[Array]) -> Array:
-        """Return the derivative by the parameter of what has these values in the systems around it."""
+        """Return the derivative by the parameter from values in the neighbouring systems."""
         return self.stencil.derivative(values, self.step)
 
 
@@ -261,7 +261,7 @@ def family_of(
     *,
     steps: Mapping[str, float] | None = None,
 ) -> Family:
-    """Return a system with its neighbours in the directions of parameters.
+    """Return a system with its neighbours for each parameter.
 
     Raises
     ------
@@ -289,7 +289,7 @@ def family_of(
 
 
 def described(source: Source, parameters: Sequence[str] | Mapping[str, Any]):
-    """Return a function of a name and value that makes a system, the system itself, paths and values by name."""
+    """Return a function from a name and value to a system, the system itself, and paths and values by name."""
     if isinstance(parameters, str):
         raise ModelError(f"sensitivities: parameters: expected a list of key paths, got the text {parameters!r}")
     if not len(parameters):
@@ -315,7 +315,7 @@ def described(source: Source, parameters: Sequence[str] | Mapping[str, Any]):
 
 
 def numbers_of_file(path_of_file: str, paths: Mapping[str, str]) -> dict[str, float]:
-    """Return the numbers at key paths of a system file; `SystemFileError` if one is not there."""
+    """Return the numbers at key paths of a system file; `SystemFileError` if one does not exist."""
     from pathlib import Path
 
     from fe_models.foundation.toml_file import read_toml, value_of
@@ -324,7 +324,7 @@ def numbers_of_file(path_of_file: str, paths: Mapping[str, str]) -> dict[str, fl
     for path in paths.values():
         if (table := path.partition(".")[0]) in OUTSIDE:
             raise SystemFileError(
-                f"{path_of_file}: the key path {path!r}: the table [{table}] says how the system is run or looked at, "
+                f"{path_of_file}: the key path {path!r}: the table [{table}] describes the run or the display, "
                 "and is no part of it; derivatives are by numbers of bodies, joints, forces, sensors, signals"
             )
     content = read_toml(Path(path_of_file), SystemFileError)
@@ -340,7 +340,7 @@ def numbers_of_file(path_of_file: str, paths: Mapping[str, str]) -> dict[str, fl
 
 
 def natural_size(source: Source, system: System, compiled: CompiledSystem, path: str, value: float) -> float:
-    """Return the size of a parameter, for its step: its own, else that of the numbers beside it, else of the system."""
+    """Return the magnitude of a parameter: its own, or that of neighbouring numbers, or that of the system."""
     if value != 0.0:
         return abs(value)
     beside = size_beside(system, path) if isinstance(source, System) else 0.0
@@ -353,7 +353,7 @@ def with_neighbours(
     make: Callable[[str, float], System], compiled: CompiledSystem, name: str, path: str, value: float, step: float,
     tries: Sequence[float],
 ) -> Parameter:  # fmt: skip
-    """Return a parameter with the systems around it: central, else from one side, else with shorter steps."""
+    """Return a parameter with neighbouring systems: central, then one-sided, then with shorter steps."""
     first: Exception | None = None
     for factor in tries:
         for stencil in CENTRAL_FIRST:
@@ -369,7 +369,7 @@ def with_neighbours(
 
 
 def neighbour(system: System) -> Neighbour:
-    """Return a system compiled."""
+    """Return a compiled system as a neighbour."""
     compiled = compiled_system(system)
     return Neighbour(system, compiled, new_work(compiled.model))
 
@@ -386,7 +386,7 @@ def require_same_topology(compiled: CompiledSystem, other: CompiledSystem, path:
     names = (compiled.body_names, compiled.connection_names) == (other.body_names, other.connection_names)
     if not names or any(not np.array_equal(a, b) for a, b in pairs):
         raise ModelError(
-            f"parameter {path!r} changes the topology of the system (its bodies, modes, joints or what they hold), so "
+            f"parameter {path!r} changes the topology of the system (its bodies, modes, joints or constraints), so "
             "that motions before and after cannot be compared; it has no derivative"
         )
     for part in ("x", "y", "z", "u"):

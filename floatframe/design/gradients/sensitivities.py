@@ -1,4 +1,4 @@
-"""How numbers of motions, equilibria and vibrations change with parameters of a system: one call for a gradient."""
+"""Derivatives of outputs of motions, equilibria and modes by parameters of a system."""
 
 import logging
 import os
@@ -61,8 +61,8 @@ log = logging.getLogger(__name__)
 
 ANALYSES = ("run", "static", "rotation", "eig")
 METHODS = ("direct", "adjoint")
-TOLERANCE = 1e-12  #: of Newton's method in the steps that are differentiated
-SLOPE_STEP = 2e-4  #: of differences of sensors, relative to the size of what they see
+TOLERANCE = 1e-12  #: tolerance of Newton's method in the differentiated steps
+SLOPE_STEP = 2e-4  #: step of differences of sensors, relative to the magnitude of the state
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,9 +71,9 @@ class Sensitivities:
 
     outputs: tuple[str, ...]
     parameters: tuple[str, ...]
-    values: Array  #: of the outputs, (n_out,)
+    values: Array  #: values of the outputs, (n_out,)
     gradient: Array  #: d output/d parameter, (n_out, n_p)
-    units: tuple[str, ...]  #: of the outputs
+    units: tuple[str, ...]  #: units of the outputs
     parameter_values: Array  #: (n_p,)
     #: outputs of modes whose eigenvalue is repeated: their derivatives are those of one branch, parameter by parameter,
     #: and do not add up for changes of several parameters
@@ -84,7 +84,7 @@ class Sensitivities:
             object.__setattr__(self, name, frozen(np.array(getattr(self, name), dtype=float)))
 
     def of(self, output: str, parameter: str) -> float:
-        """Return one derivative by names; `ModelError` with the nearest if there is none."""
+        """Return one derivative by names; `ModelError` with the nearest name if it does not exist."""
         for name, choices in ((output, self.outputs), (parameter, self.parameters)):
             if name not in choices:
                 raise ModelError(f"sensitivities: there is no {quoted(name)}{nearest(name, choices)}")
@@ -92,7 +92,7 @@ class Sensitivities:
 
     @property
     def relative(self) -> Array:
-        """(p/y) dy/dp: percent of the output for a percent of the parameter, (n_out, n_p); nan where y is zero."""
+        """Relative derivatives (p/y) dy/dp of outputs y by parameters p, (n_out, n_p); NaN where y is zero."""
         y = np.where(self.values == 0, np.nan, self.values)
         return np.asarray(self.gradient * self.parameter_values / y[:, None])
 
@@ -187,7 +187,7 @@ def sensitivities(
 
 
 def run_of_file(path: Any, t_end: float | None, h: float | None, integrator: Integrator | None):
-    """Return end, step and method of a run, those of the file where they are not given."""
+    """Return end, step and method of a run; missing values are taken from the file."""
     from floatframe.files.system_file.read_system import read_system
 
     run = read_system(path)[1]
@@ -212,23 +212,23 @@ def required_scheme(integrator: Integrator) -> GeneralizedAlpha:
 
 
 def require_no_memory(system: System) -> None:
-    """Raise `ModelError` if a force has states of its own, which the derivatives do not follow."""
+    """Raise `ModelError` if a force has states, which the derivatives do not include."""
     for force in system.forces:
         if isinstance(force, UserForce) and force.states:
             raise ModelError(
-                f"sensitivities: force {force.name!r} has states of its own, which are not differentiated; give its "
+                f"sensitivities: force {force.name!r} has states, which are not differentiated; give its "
                 "forces without states"
             )
     for each in compiled_system(system).laws:
         if each.law.accelerations:
             raise ModelError(
-                f"sensitivities: element {each.element.name!r} asks for accelerations, which are not differentiated; "
+                f"sensitivities: element {each.element.name!r} uses accelerations, which are not differentiated; "
                 "give its masses as bodies"
             )
         if each.law.states or each.law.multipliers:
             what = "states" if each.law.states else "multipliers"
             raise ModelError(
-                f"sensitivities: element {each.element.name!r} has {what} of its own, which are not differentiated; "
+                f"sensitivities: element {each.element.name!r} has {what} , which are not differentiated; "
                 "those of elements without are; else vary its parameter by floatframe sweep"
             )
     compiled = compiled_system(system)
@@ -245,7 +245,7 @@ def require_no_memory(system: System) -> None:
 
 
 def require_smooth_run(family: Family, t_start: float, h: float, n_steps: int) -> None:
-    """Raise `ModelError` for events and jumps, over which a motion begins anew."""
+    """Raise `ModelError` if the motion has events or jumps, at which integration restarts."""
     system = family.system
     acting = [event for event in events_of(system) if getattr(event, "is_active", True)]
     if acting:
@@ -266,7 +266,7 @@ def require_smooth_run(family: Family, t_start: float, h: float, n_steps: int) -
         jumps = [t for times in jumps_of_steps(each, t_start, h, n_steps).values() for t in times]
         if jumps:
             raise ModelError(
-                f"sensitivities: a force jumps at t = {jumps[0]:.6g}, where the motion begins anew; smooth it "
+                f"sensitivities: a force jumps at t = {jumps[0]:.6g}, where the integration restarts; smooth it "
                 "(smooth_step), or end the run before it"
             )
 
@@ -308,7 +308,7 @@ def of_motion(
 def require_columns_of_states(
     own: Neighbour, wanted: tuple[OutputRequest, ...], columns: tuple[Column, ...], points: Sequence[Point]
 ) -> None:
-    """Raise `ModelError` if a column is not a function of the state at its time alone, as a spectrum is not."""
+    """Raise `ModelError` if a column is not a function of the state at one time, such as a spectrum."""
     beside, alone = values_at(own, columns, points[-2:])[0][-1], values_at(own, columns, points[-1:])[0][0]
     for j, each in enumerate(wanted):
         if not abs(beside[j] - alone[j]) <= 1e-9 * max(abs(alone[j]), abs(beside[j])):
@@ -329,16 +329,16 @@ def made(
 
 
 def seen_otherwise(family: Family, columns: tuple[Column, ...], points: Sequence[Point]) -> Array:
-    """Return the derivatives of what is measured by parameters at held points, (n_points, n_out, n_p).
+    """Return the derivatives of measurements by parameters at fixed points, (n_points, n_out, n_p).
 
-    A marker that is watched may move on its body with them, and frames of files may.
+    Parameters may move the markers of sensors, and the frames of body files.
     """
     found = [p.derivative([values_at(each, columns, points)[0] for each in p.around]) for p in family.parameters]
     return np.moveaxis(np.array(found), 0, -1)
 
 
 def along(own: Neighbour, group: Configurations, columns: tuple[Column, ...], point: Point, changes: Array) -> Array:
-    """Return the derivatives of what is measured, (n_out, n_p), when the point moves by changes of parameters.
+    """Return the derivatives of measurements, (n_out, n_p), along changes of the point by parameters.
 
     changes: d(x, u, u_dot, w)/dp, (3 n_u + n_w, n_p); each is followed so far that the point moves by `SLOPE_STEP`.
     """
@@ -356,7 +356,7 @@ def along(own: Neighbour, group: Configurations, columns: tuple[Column, ...], po
 def weighted_slopes(
     own: Neighbour, group: Configurations, columns: tuple[Column, ...], point: Point, weights: Array
 ) -> Array:
-    """Return `slopes_at` times weights, (n_out, 3 n_u + n_w), of the columns that have one."""
+    """Return `slopes_at` times weights, (n_out, 3 n_u + n_w), for the columns with nonzero weight."""
     result = np.zeros((len(columns), 3 * group.n_v + len(point.w)))
     used = np.flatnonzero(weights)
     result[used] = weights[used, None] * slopes_at(own, group, tuple(columns[j] for j in used), point)
@@ -364,13 +364,13 @@ def weighted_slopes(
 
 
 def slopes_at(own: Neighbour, group: Configurations, columns: tuple[Column, ...], point: Point) -> Array:
-    """Return the derivatives of what is measured by (x, u, u_dot, w) at a point, (n_out, 3 n_u + n_w)."""
+    """Return the derivatives of measurements by (x, u, u_dot, w) at a point, (n_out, 3 n_u + n_w)."""
     scale = scales_at(own, group, point)
     return along(own, group, columns, point, np.diag(scale)) / scale
 
 
 def scales_at(own: Neighbour, group: Configurations, point: Point) -> Array:
-    """Return sizes of (x, u, u_dot, w) at a point, of which a thousandth is a small change, (3 n_u + n_w,)."""
+    """Return typical magnitudes of (x, u, u_dot, w) at a point, (3 n_u + n_w,); a thousandth is a small change."""
     n, n_w = group.n_v, len(point.w)
     scale = np.ones(3 * n + n_w)
     for _, j, n_q in group.parts():
@@ -383,7 +383,7 @@ def scales_at(own: Neighbour, group: Configurations, point: Point) -> Array:
 
 
 def modal_size(own: Neighbour, point: Point) -> float:
-    """Return a modal coordinate of which a thousandth moves markers by little: 1 % of the system, or a present one."""
+    """Return a typical modal coordinate, which moves markers by 1 % of the system, or the present one if larger."""
     psi = float(np.abs(own.compiled.model.markers.psi).max(initial=0.0))
     size = 0.01 * own.compiled.length / psi if psi > 0 else 1.0
     return max(size, float(np.abs(point.state.q).max(initial=0.0)))
@@ -411,13 +411,13 @@ def of_rotation(
     family: Family, own: Neighbour, wanted: tuple[OutputRequest, ...], columns: tuple[Column, ...], method: str,
     steady: SteadyRotation,
 ) -> Sensitivities:  # fmt: skip
-    """Return the derivatives of a steady rotation; `ModelError` if an output depends on how far it has turned."""
+    """Return the derivatives of a steady rotation; `ModelError` if an output depends on the angle of rotation."""
     values, units = values_at(own, columns, [steady.point])
     turned = along(own, steady.group, columns, steady.point, steady.whole(steady.turn[:, None]))[:, 0]
     for each, value, slope in zip(wanted, values[0], turned, strict=True):
         if steady.turn.any() and abs(slope) > DEPENDS * max(abs(float(value)), np.abs(values[0]).max(initial=0.0)):
             raise ModelError(
-                f"output {each.name!r}: {each.of!r} changes while the system turns ({slope:.3g} a radian), so that it "
+                f"output {each.name!r}: {each.of!r} changes as the system rotates ({slope:.3g} per radian), so that it "
                 "has no one value; take a coordinate of a joint, a distance, a size, or axes that turn"
             )
     gradient = seen_otherwise(family, columns, [steady.point])[0]
@@ -429,7 +429,7 @@ def of_rotation(
 
 
 def balanced(family: Family, own: Neighbour) -> tuple[Point, Configurations, Array, Array]:
-    """Return the equilibrium at rest, its matrix and the derivatives of the equations by the parameters."""
+    """Return the equilibrium at rest, its matrix, and the derivatives of the equations by the parameters."""
     rest = static_equilibrium(family.system, tolerance=1e-12)
     state, u_dot = motion_of_engine(own.compiled, rest.state, rest.u_dot)
     point, model = Point(0.0, state, u_dot, rest.w), own.compiled.model
@@ -468,7 +468,7 @@ def of_modes(family: Family, own: Neighbour, wanted: tuple[OutputRequest, ...]) 
 
 
 def part_and_mode(wanted: OutputRequest, n_modes: int) -> tuple[str, int]:
-    """Return what of which mode an output is."""
+    """Return the quantity and the mode of an output."""
     part, _, digits = wanted.of.partition(" ")
     if part not in OF_MODES or not digits.isdigit() or int(digits) < 1:
         raise ModelError(
@@ -481,7 +481,7 @@ def part_and_mode(wanted: OutputRequest, n_modes: int) -> tuple[str, int]:
 
 
 def of_eigenvalue(part: str, value: complex, by_p: Array, per_second: float) -> tuple[float, Array]:
-    """Return a number of an eigenvalue and its derivatives, as `system_modes` and studies have them."""
+    """Return a quantity of an eigenvalue and its derivatives, with the definitions of `system_modes` and studies."""
     if part == "real":
         return value.real * per_second, by_p.real * per_second
     if part == "imaginary":

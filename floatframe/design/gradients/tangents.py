@@ -1,4 +1,4 @@
-"""Derivatives of residual and rows at one state over displacements in ground axes, and by parameters."""
+"""Derivatives of the residual and the rows at one state, by displacements in ground axes and by parameters."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -18,17 +18,17 @@ from floatframe.model.state import State
 __all__ = ["Evaluation", "Point", "PointTangents", "evaluation_of", "in_blocks", "parameter_residuals", "tangents_at"]
 
 
-# evaluations one after the other, with the tables that the kernels take made once -------------------------------------
-# A call of the kernels makes a table of addresses for each record it is handed and an order of some twenty arrays,
-# which takes longer than a small system does. Here they are made once for a system and its working arrays; an
-# evaluation writes three numbers and runs.
+# repeated evaluations with reused address tables for the kernels
+# -------------------------------------------------------- A call of the kernels makes a table of addresses for each
+# record it is handed and an order of some twenty arrays, which takes longer than a small system does. Here they are
+# made once for a system and its working arrays; an evaluation writes three numbers and runs.
 
 
-KEPT = 4  #: evaluations of the last systems
+KEPT = 4  #: number of systems whose evaluations are kept
 
 
 class Evaluation:
-    """Residuals and derivatives of a system for the iterate in its working arrays."""
+    """Residuals and derivatives of a system at the iterate in its working arrays."""
 
     def __init__(self, model: Model, work: Work) -> None:
         from floatframe.engine.kernels import entry
@@ -40,7 +40,8 @@ class Evaluation:
         self.run, self.model, self.work = entry.run, model, work
         self.order = filled(entry.Order(), **(entry.NOTHING._asdict() | {"what": entry.LINEARIZE}))
         self.memory = entry.no_memory()
-        records = (model, work, self.memory, entry.NO_ROWS, self.order)  # all live as long as this
+        # these records must live as long as this object
+        records = (model, work, self.memory, entry.NO_ROWS, self.order)
         self.tables = tuple(table_of(record) for record in records)
 
     def evaluate(self, c_m: float, c_d: float, c_k: float) -> None:
@@ -54,7 +55,7 @@ kept: list[Evaluation] = []
 
 
 def evaluation_of(model: Model, work: Work) -> Evaluation:
-    """Return the evaluation of a system with its working arrays, from those that are kept."""
+    """Return the evaluation of a system with its working arrays; recent ones are reused."""
     for known in kept:
         if known.model is model and known.work is work:
             return known
@@ -67,27 +68,28 @@ def evaluation_of(model: Model, work: Work) -> Evaluation:
 # tangents -------------------------------------------------------------------------------------------------------------
 
 
-BLOCK = 100  #: points at which derivatives by parameters are held at once
+BLOCK = 100  #: number of points whose derivatives by parameters are stored at once
 
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """A state with accelerations and wrenches, in the frames of the engine."""
+    """A state with accelerations and wrenches of the engine."""
 
     t: float
     state: State
     u_dot: Array  #: (n_u,)
     w: Array  #: (n_w,)
     w_start: Array | None = None  #: wrenches at the beginning of the step; None: w
-    angle: Array = field(default_factory=lambda: np.zeros(0))  #: angles counted through full turns; empty: from zero
+    #: continuous angles through full turns; empty: start from zero
+    angle: Array = field(default_factory=lambda: np.zeros(0))
 
     @cached_property
     def R(self) -> Array:
-        """R_GB of the bodies, (n_b, 3, 3): a point is written for every neighbour of the system."""
+        """R_GB of the bodies, (n_b, 3, 3), stored because a point is written for every neighbouring system."""
         return rotation_matrix(self.state.p)
 
     def write(self, work: Work) -> None:
-        """Write it into working arrays."""
+        """Write the point into working arrays."""
         set_iterate(work, self.state, self.u_dot, self.w, R=self.R)
         work.state.w_start[:] = self.w if self.w_start is None else self.w_start
         work.state.time[...] = self.t
@@ -95,22 +97,22 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class PointTangents:
-    """Matrices at a point; equations of motion times c_k, rows that say what wrenches are times c_k.
+    """Matrices at a point; equations of motion and laws of wrenches are multiplied by c_k.
 
     Unknowns: displacements, velocities, accelerations in ground axes (translations), and c_k times the wrenches.
     """
 
     M: Array  #: c_k times derivative by accelerations, (n_u, n_u)
-    C: Array  #: c_k times derivative by velocities
-    K: Array  #: c_k times derivative by displacements
-    J: Array  #: wrenches to bodies, forces = J.T @ w, (n_w, n_u)
-    G_x: Array  #: rows by displacements, (n_w, n_u)
-    G_v: Array  #: rows by velocities, (n_w, n_u)
-    V: Array  #: rows by c_k times the wrenches, (n_w, n_w)
+    C: Array  #: c_k times derivative by velocities, (n_u, n_u)
+    K: Array  #: c_k times derivative by displacements, (n_u, n_u)
+    J: Array  #: wrenches give the forces on bodies J.T @ w, (n_w, n_u)
+    G_x: Array  #: derivative of the rows by displacements, (n_w, n_u)
+    G_v: Array  #: derivative of the rows by velocities, (n_w, n_u)
+    V: Array  #: derivative of the rows by c_k times the wrenches, (n_w, n_w)
 
 
 def tangents_at(structure: Structure, model: Model, work: Work, point: Point, c_k: float = 1.0) -> PointTangents:
-    """Return the matrices at a point, where the equations of motion hold."""
+    """Return the matrices at a point that satisfies the equations of motion."""
     evaluation = evaluation_of(model, work)
     point.write(work)
     n_u, n_w = structure.n_u, len(structure.holds)
@@ -130,7 +132,7 @@ def tangents_at(structure: Structure, model: Model, work: Work, point: Point, c_
 
 
 def body_matrix(model: Model, work: Work) -> Array:
-    """Return H of all bodies, rows in body axes, columns over displacements in ground axes."""
+    """Return H of all bodies, with rows in body axes and columns for displacements in ground axes."""
     n_u = int(model.bodies.u0[-1])
     result = np.zeros((n_u, n_u))
     for i in range(len(model.bodies.kind)):
@@ -144,7 +146,7 @@ def body_matrix(model: Model, work: Work) -> Array:
 
 
 def whole(structure: Structure, parts: tuple[Array, ...], n_w: int) -> Array:
-    """Return the matrix of all rows from those of each end."""
+    """Return the matrix of all rows from the matrices of each end."""
     result = np.zeros((n_w, structure.n_u))
     for end, part in zip(structure.ends, parts, strict=True):
         result[end.w0 : end.w0 + end.size, end.u0 : end.u0 + end.n] += part
@@ -152,7 +154,7 @@ def whole(structure: Structure, parts: tuple[Array, ...], n_w: int) -> Array:
 
 
 def residuals_of(neighbour: Neighbour, point: Point, c_k: float) -> Array:
-    """Return c_k times the residual of the bodies (ground axes), then that of the rows, (n_u + n_w,)."""
+    """Return c_k times the residual of the bodies (ground axes), followed by the residual of the rows, (n_u + n_w,)."""
     work, model = neighbour.work, neighbour.compiled.model
     evaluation = evaluation_of(model, work)
     point.write(work)
@@ -166,14 +168,14 @@ def residuals_of(neighbour: Neighbour, point: Point, c_k: float) -> Array:
 def parameter_residuals(parameters: tuple[Parameter, ...], points: Sequence[Point], c_k: float = 1.0) -> Array:
     """Return the derivatives of c_k times the residual, and of the rows, by parameters, (n_points, n_u + n_w, n_p)."""
     columns = []
-    for p in parameters:  # system by system, so that the kernels keep what they know of each
+    for p in parameters:  # system by system, so that the kernels reuse the data of each
         values = [np.array([residuals_of(each, point, c_k) for point in points]) for each in p.around]
         columns.append(p.derivative(values))
     return np.moveaxis(np.array(columns), 0, -1)
 
 
 def in_blocks(parameters: tuple[Parameter, ...], points: Sequence[Point], c_k: float) -> Iterator[tuple[Point, Array]]:
-    """Yield each point with its `parameter_residuals`, made for many points at once."""
+    """Yield each point with its `parameter_residuals`, computed for many points at once."""
     for first in range(0, len(points), BLOCK):
         block = points[first : first + BLOCK]
         yield from zip(block, parameter_residuals(parameters, block, c_k), strict=True)

@@ -1,4 +1,4 @@
-"""Barycentric parameters of a tree: bodies augmented by the masses of all that hangs at them.
+"""Barycentric parameters of a tree: bodies augmented by the masses of their subtrees.
 
 The joints of a chain carry a mass as if it sat in the joint; with mass m' of a subtree and d from the origin of a body
 to the joint that carries c [1]_,
@@ -28,21 +28,22 @@ __all__ = ["BarycentricParameters", "barycentric_parameters"]
 
 @dataclass(frozen=True, eq=False)
 class BarycentricParameters:
-    """Parameters of augmented bodies, linear in those of the bodies."""
+    """Parameters of augmented bodies, which are linear in the parameters of the bodies."""
 
     names: tuple[str, ...]  #: "S_x'(link1)", ...
-    B: Array  #: (n, p), values B phi
-    kept: Array  #: columns of the linear form that belong to them, (n,)
+    B: Array  #: values = B phi, (n, p)
+    kept: Array  #: columns of the linear form that belong to the parameters, (n,)
 
     def values(self, phi: Array) -> Array:
-        """Return the values, (n,), of parameters, (p,)."""
+        """Return the values, (n,), from parameters, (p,)."""
         return self.B @ np.asarray(phi)
 
 
 def barycentric_parameters(form: LinearForm) -> BarycentricParameters:
     """Return the barycentric parameters of a tree of rigid bodies, in the axes of the bodies.
 
-    Bodies on joints that rotate about one point have nine, S' and K about it; others ten, with the mass.
+    Bodies on joints that rotate about one point have nine parameters, S' and K about it; others have ten, with the
+    mass.
     """
     tree = rigid_tree(form.system, f"system {form.system.name!r}: barycentric parameters").tree
     n_b, n_c = len(tree.parent), len(tree.side)
@@ -50,7 +51,7 @@ def barycentric_parameters(form: LinearForm) -> BarycentricParameters:
     placed = tree_samples(form.system, as_placed(form.system)[None], zero, zero)
     own = [parameters_in(placed.r[0, i], placed.R[0, i]) for i in range(n_b)]
     p = 10 * n_b
-    passed = np.eye(p)  # parameters of augmented bodies by those of the bodies
+    passed = np.eye(p)  # parameters of augmented bodies per parameter of the bodies
     has_mass = np.ones(n_b, dtype=bool)
     for place in range(n_b - 1, -1, -1):
         i = int(tree.order[place])

@@ -1,4 +1,4 @@
-"""Base parameters: the fewest combinations of parameters that torques or reactions can tell apart.
+"""Base parameters: the smallest set of parameter combinations that determines torques or reactions.
 
 All directions N of the parameters that change nothing, (p, k), are found either by rules (`transfer_rules`) or by the
 rank of a sampled linear form. Of the parameters k are then left out, chosen such that the rest is well determined, and
@@ -45,10 +45,10 @@ __all__ = [
 ]
 
 
-# which parameters of a tree never reach the ground, by rules over its joints: base parameters of reactions ------------
-# The reaction of the ground is the rate of the momentum of all bodies less their weight. Parameters do nothing to it
-# where they bring no linear and no angular momentum in any motion, and no weight or moment of weight where they are
-# placed: without momentum their first moment stays. In the words of `transfer_rules`:
+# rules for parameters of a tree without effect on the ground reaction: base parameters of reactions
+# ---------------------- The reaction of the ground is the rate of the momentum of all bodies less their weight.
+# Parameters do nothing to it where they bring no linear and no angular momentum in any motion, and no weight or moment
+# of weight where they are placed: without momentum their first moment stays. In the words of `transfer_rules`:
 #
 # (1) Transfers: masses along the axis of a rotation, inertia tensors without mass through a translation, and a first
 #     moment along the translation if all rotations before it, if any, have its direction. What passes to the ground has
@@ -63,7 +63,7 @@ __all__ = [
 
 
 def silent_at_base(form: LinearForm) -> Array:
-    """Return directions of the parameters, (p, k), along which no reaction of the ground changes; independent.
+    """Return independent directions of the parameters, (p, k), along which no ground reaction changes.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def silent_at_base(form: LinearForm) -> Array:
     moves = [moves_of(form, placed, tree, i) for i in range(n_b)]
     size = compiled_system(system).length
     to_ground = [parameters_in(placed.r[0, i], placed.R[0, i]) for i in range(n_b)]
-    found: list[Array] = []  # parameters of all bodies in ground axes about its origin, without momentum
+    found: list[Array] = []  # parameters of all bodies, in ground axes about its origin, without momentum
     for i in range(n_b):
         parent = int(tree.parent[i])
         before = [move for j in chain(tree, parent) for move in moves[j]]
@@ -107,13 +107,13 @@ def silent_at_base(form: LinearForm) -> Array:
 
 
 def unseen(weights: Array, least: np.floating) -> Array:
-    """Return orthonormal directions, (k, n), whose weight is at most `least`: that of transfers is rounding."""
+    """Return orthonormal directions, (k, n), whose weight is at most `least`, the rounding error of transfers."""
     _, s, Vt = la.svd(weights)
     return Vt[int((s > least).sum()) :].T
 
 
 def still_dipoles(before: list[Move], shift: Array) -> Array:
-    """(1) Return the first moment along a translation, (1, 10), if all rotations before it have its direction."""
+    """Return the first moment along a translation, (1, 10), if all preceding rotations have its direction (1)."""
     e, are_several = rotations(before)
     if are_several or (e is not None and np.linalg.norm(np.cross(e, shift)) >= SAME):
         return np.zeros((0, 10))
@@ -121,7 +121,7 @@ def still_dipoles(before: list[Move], shift: Array) -> Array:
 
 
 def without_momentum(way: list[Move]) -> list[Array]:
-    """(2) Return inertia tensors of a body, (10,) each, that never turn about an axis along which they have inertia."""
+    """Return the inertia tensors of a body, (10,) each, that never rotate about an axis with inertia (2)."""
     e, _ = rotations(way)
     if e is None:
         return []
@@ -130,7 +130,7 @@ def without_momentum(way: list[Move]) -> list[Array]:
 
 
 def weight(at_ground: Array, gravity: Array) -> Array:
-    """(4) Return force and moment of gravity about the origin, (6, k), of parameters in ground axes, (n_b, 10, k)."""
+    """Return force and moment of gravity about the origin, (6, k), of parameters in ground axes, (n_b, 10, k) (4)."""
     total = at_ground.sum(axis=0)
     return np.vstack([np.outer(gravity, total[0]), np.cross(total[1:4], gravity, axis=0)])
 
@@ -139,21 +139,22 @@ def weight(at_ground: Array, gravity: Array) -> Array:
 
 
 SOURCES = ("torques", "reactions", "both")
-RANK = 1e-9  #: singular values below this times the largest are zero, of columns of length one
-SHOWN = 1e-9  #: factors of combinations below this times the largest are zero
-N_SAMPLES = 60  #: random instants for a body, at least
-LOOP_REACH = 0.3  #: rad, or of the length of the system, about where a system with loops is placed: they stay closed
+RANK = 1e-9  #: largest singular value that counts as zero, relative to the largest one, for columns of length one
+SHOWN = 1e-9  #: largest factor of a combination that counts as zero, relative to the largest one
+N_SAMPLES = 60  #: smallest number of random instants per body
+#: range of samples of a system with loops about its placed position, so that loops stay closed [rad, or system sizes]
+LOOP_REACH = 0.3
 
 
 @dataclass(frozen=True, eq=False)
 class BaseParameters:
-    """Combinations beta = B phi."""
+    """Combinations beta = B phi of parameters."""
 
     form: LinearForm
-    source: str  #: of `SOURCES`
-    kept: IntArray  #: parameters that lead the combinations, (n_base,)
+    source: str  #: the measured quantities, one of `SOURCES`
+    kept: IntArray  #: leading parameter of each combination, (n_base,)
     B: Array  #: (n_base, p), the identity in the columns `kept`
-    silent: Array  #: orthonormal directions that change nothing, (p, k)
+    silent: Array  #: orthonormal directions without effect, (p, k)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -162,16 +163,16 @@ class BaseParameters:
 
     @property
     def without_effect(self) -> tuple[str, ...]:
-        """Parameters that change nothing at all, by name."""
+        """Names of parameters without any effect."""
         used = np.abs(self.B).max(axis=0, initial=0.0) > SHOWN
         return tuple(name for name, is_used in zip(self.form.names, used, strict=True) if not is_used)
 
     def values(self, phi: Array) -> Array:
-        """Return beta, (n_base,), of parameters, (p,)."""
+        """Return beta, (n_base,), from parameters, (p,)."""
         return self.B @ np.asarray(phi)
 
     def rows(self, Y: Array) -> Array:
-        """Return the columns of a linear form, (..., p), that belong to the combinations, (..., n_base)."""
+        """Return the columns of a linear form, (..., p), for the combinations, (..., n_base)."""
         return Y[..., self.kept]
 
 
@@ -197,7 +198,7 @@ def base_parameters(form: LinearForm, *, source: str = "torques", by: str = "rul
     if source not in SOURCES:
         raise ModelError(f"base_parameters: source: expected one of {', '.join(SOURCES)}, got {source!r}")
     if by not in ("rules", "samples"):
-        raise ModelError(f"base_parameters: by: no road {quoted(by)}{nearest(by, ['rules', 'samples'])}")
+        raise ModelError(f"base_parameters: by: no method {quoted(by)}{nearest(by, ['rules', 'samples'])}")
     if by == "rules":
         silent = silent_by_rules(form, source)
     else:
@@ -206,7 +207,7 @@ def base_parameters(form: LinearForm, *, source: str = "torques", by: str = "rul
 
 
 def silent_by_rules(form: LinearForm, source: str) -> Array:
-    """Return the directions of the parameters, (p, k), that rules find without effect on what is measured."""
+    """Return the directions of the parameters, (p, k), that have no effect on the measurements, by rules."""
     if form.independent is not None:
         raise ModelError(
             f"system {form.system.name!r}: rules of base parameters are those of trees, and its joints close loops; "
@@ -222,7 +223,7 @@ def silent_by_rules(form: LinearForm, source: str) -> Array:
 
 
 def random_samples(form: LinearForm, seed: int = 0) -> TreeSamples:
-    """Return random instants: angles over a turn (with loops near by), lengths and rates of the order of the system."""
+    """Return random instants with angles over a full turn, or near the placed position if there are loops."""
     rng = np.random.default_rng(seed)
     is_length = np.array([column.unit == "m" for column in form.columns])
     size = np.where(is_length, compiled_system(form.system).length, 1.0)
@@ -235,7 +236,7 @@ def random_samples(form: LinearForm, seed: int = 0) -> TreeSamples:
 
 
 def form_rows(form: LinearForm, samples: TreeSamples, source: str) -> Array:
-    """Return the rows of what is measured, (n rows, p)."""
+    """Return the rows of the measured quantities, (n rows, p)."""
     parts = []
     if source != "reactions":
         parts.append(form.torques(samples))
@@ -245,7 +246,7 @@ def form_rows(form: LinearForm, samples: TreeSamples, source: str) -> Array:
 
 
 def sampled_silence(rows: Array, form: LinearForm) -> Array:
-    """Return directions of no effect from the singular values of sampled rows whose columns are scaled to one."""
+    """Return directions without effect from the singular values of sampled rows, with columns scaled to one."""
     size = typical(form)
     scaled = rows * size
     _, s, Vt = la.svd(scaled, full_matrices=False)
@@ -254,7 +255,7 @@ def sampled_silence(rows: Array, form: LinearForm) -> Array:
 
 
 def typical(form: LinearForm) -> Array:
-    """Return the units of the parameters in the lengths of the system, (p,)."""
+    """Return typical magnitudes of the parameters, from the size of the system, (p,)."""
     size = compiled_system(form.system).length
     body = np.array([1.0] + [size] * 3 + [size**2] * 6)
     rest = len(form.names) - form.n_inertial
@@ -262,9 +263,9 @@ def typical(form: LinearForm) -> Array:
 
 
 def combined(form: LinearForm, source: str, silent: Array) -> BaseParameters:
-    """Return combinations in which parameters of outer bodies lead where they can, moments of inertia before masses.
+    """Return combinations led by parameters of outer bodies if possible, moments of inertia before masses.
 
-    Parameters are left out one by one, of the direction that shows them most, in the order of `preference`.
+    Parameters are eliminated one by one, each from the direction in which it is largest, in the order of `preference`.
     """
     p, k = silent.shape
     size = typical(form)
@@ -290,7 +291,7 @@ def combined(form: LinearForm, source: str, silent: Array) -> BaseParameters:
 
 
 def preference(form: LinearForm) -> list[int]:
-    """Return the parameters in the order in which they are left out: masses, first moments, inertias, from the tip."""
+    """Return the parameters in order of elimination, from the tips: masses, first moments, inertias."""
     order = (0, 3, 2, 1, 7, 4, 9, 5, 6, 8)
     bodies = range(len(form.system.bodies) - 1, -1, -1)
     inertial = [10 * i + k for k in order[:1] for i in bodies] + [10 * i + k for k in order[1:] for i in bodies]
@@ -298,7 +299,7 @@ def preference(form: LinearForm) -> list[int]:
 
 
 def formula(row: Array, names: Sequence[str], lead: int) -> str:
-    """Return a combination as a formula, its leading parameter first."""
+    """Return a combination as a formula that begins with its leading parameter."""
     words = names[lead]
     for j, name in enumerate(names):
         if j == lead or row[j] == 0.0:

@@ -27,29 +27,29 @@ from floatframe.errors import ModelError
 __all__ = ["METHODS", "Estimate", "Measured", "estimate"]
 
 METHODS = ("ordinary", "weighted", "robust")
-HUBER = 1.345  #: sigma from which a residual counts less; 95 % efficient where there are no outliers
-UNFIT = 0.3  #: misfit of a channel above which the model is not that of the measurement
-SURE = 4.0  #: deviations below zero by which a parameter that cannot be negative is so for sure
+HUBER = 1.345  #: residual, in sigma, above which a row loses weight; 95 % efficient without outliers
+UNFIT = 0.3  #: misfit of a channel above which the model does not describe the measurement
+SURE = 4.0  #: number of deviations below zero at which a nonnegative parameter is clearly negative
 POSITIVE = ("motor-inertia(", "viscous(", "coulomb(")  #: parameters of drives that cannot be negative
-POOR = 1e4  #: condition number of the weighted rows, columns scaled, above which a motion does not excite
-#: times 1/sqrt(n) that neighbouring residuals of white noise correlate at most, 99.5 %; the fit itself makes it less
+POOR = 1e4  #: condition number of the weighted rows, columns scaled, above which the excitation is poor
+#: largest correlation of neighbouring residuals of white noise, in 1/sqrt(n) (99.5 %); the fit itself reduces it
 WHITE = 2.6
-ROUNDS = 30  #: of weights, at most
+ROUNDS = 30  #: largest number of updates of weights
 BASE = ("base F_x", "base F_y", "base F_z", "base M_x", "base M_y", "base M_z")
 
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """A motion with what was measured on it."""
+    """A motion with its measurements."""
 
     samples: TreeSamples
-    torques: Array | None = None  #: of the coordinates, (n, n_c) [N, N m]
+    torques: Array | None = None  #: torques of the coordinates, (n, n_c) [N, N m]
     reactions: Array | None = None  #: force and moment of the ground on the tree about `point`, ground axes, (n, 6)
-    point: Array | None = None  #: (3,) [m]; None: the origin
+    point: Array | None = None  #: reference point of the reactions, (3,) [m]; None: the origin
     time: Array | None = None  #: (n,) [s]
-    #: filter over the instants, axis 0, of what was measured and of the linear form alike; None: neither
+    #: filter over the instants (axis 0), for the measurements and for the linear form; None: no filter
     smooth: Callable[[Array], Array] | None = None
-    used: slice = field(default_factory=lambda: slice(None))  #: instants that count, after it
+    used: slice = field(default_factory=lambda: slice(None))  #: instants to use, after filtering
 
     def __post_init__(self) -> None:
         n, n_c = len(self.samples.x), self.samples.n_independent
@@ -66,14 +66,14 @@ class Measured:
 
     @property
     def source(self) -> str:
-        """What was measured, of `base_parameters.SOURCES`."""
+        """The measured quantities, one of `base_parameters.SOURCES`."""
         if self.torques is None:
             return "reactions"
         return "torques" if self.reactions is None else "both"
 
     @property
     def times(self) -> Array:
-        """Times of the instants that count, or their numbers, (n_used,)."""
+        """Times of the used instants, or their indices, (n_used,)."""
         return (np.arange(float(len(self.samples.x))) if self.time is None else np.asarray(self.time))[self.used]
 
     def rows(self, form: LinearForm) -> tuple[Array, Array]:
@@ -93,16 +93,16 @@ class Measured:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Base parameters as estimated."""
+    """Estimated base parameters."""
 
     base: BaseParameters
     measured: Measured
     values: Array  #: beta, (n_base,)
     covariance: Array  #: (n_base, n_base)
-    sigma: Array  #: noise of the channels, (channels,) [N or N m]
-    residuals: Array  #: measured less modelled, (n, channels)
-    weights: Array  #: of robust estimation, 1 where a row counts whole, (n, channels)
-    condition: float  #: of the weighted rows, columns scaled to length one
+    sigma: Array  #: standard deviation of the noise of the channels, (channels,) [N or N m]
+    residuals: Array  #: measured minus modelled values, (n, channels)
+    weights: Array  #: weights of robust estimation, 1 for full weight, (n, channels)
+    condition: float  #: condition number of the weighted rows, with columns of length one
     whiteness: Array  #: correlation of neighbouring residuals of each channel, (channels,)
 
     @property
@@ -112,7 +112,7 @@ class Estimate:
 
     @property
     def relative_deviations(self) -> Array:
-        """Standard deviations over the values, (n_base,)."""
+        """Standard deviations divided by the values, (n_base,)."""
         return self.deviations / np.maximum(np.abs(self.values), np.finfo(float).tiny)
 
     @property
@@ -126,12 +126,12 @@ class Estimate:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What makes the deviations doubtful, in words."""
+        """Reasons why the deviations are unreliable, as text."""
         said = []
         if self.condition > POOR:
             worst = self.base.names[int(np.argmax(self.relative_deviations))]
             said.append(
-                f"the motion excites poorly: condition number {self.condition:.2g}, least known {worst}; measure "
+                f"poor excitation: condition number {self.condition:.2g}, least accurate {worst}; measure "
                 "another motion (exciting_motion finds one)"
             )
         unfit = [
@@ -151,7 +151,7 @@ class Estimate:
         ]
         if negative:
             said.append(
-                f"{', '.join(negative)} came out negative, which no drive is: look at the signs of torques, positions"
+                f"{', '.join(negative)} are negative, which is impossible; check the signs of torques and positions"
             )
         n = len(self.residuals)
         coloured = [name for name, r in zip(self.channels, self.whiteness, strict=True) if r > WHITE / np.sqrt(n)]
@@ -163,11 +163,11 @@ class Estimate:
         return tuple(said)
 
     def predicted(self, measured: Measured) -> Array:
-        """Return the channels of another motion as the estimate has them, (n, channels): for validation."""
+        """Return the channels of another motion, predicted by the estimate, (n, channels), for validation."""
         return self.compared(measured)[0]
 
     def misfit(self, measured: Measured) -> Array:
-        """Return the rms of measured less predicted over the rms of measured, of each channel of another motion."""
+        """Return the rms residual of each channel of another motion, relative to the rms of the measurement."""
         predicted, y = self.compared(measured)
         size = np.sqrt((y**2).mean(axis=0))
         return np.sqrt(((y - predicted) ** 2).mean(axis=0)) / np.where(size > 0, size, 1.0)
@@ -217,7 +217,7 @@ def estimate(
             f"estimate: {n} instants of {n_channels} channels cannot tell {n_base} parameters; measure longer"
         )
     if not y.any():
-        raise ModelError("estimate: all measured torques and reactions are zero: nothing was measured")
+        raise ModelError("estimate: all measured torques and reactions are zero")
     require_excited(base, W)
     sigma, weights = np.ones(n_channels), np.ones((n, n_channels))
     beta = solved(W, y, sigma, weights)
@@ -243,15 +243,15 @@ def estimate(
 
 
 def noise(e: Array, weights: Array, spent: float) -> Array:
-    """Return the noise of channels from their residuals, each of which has spent a share of the parameters."""
+    """Return the noise of channels from their residuals, corrected for the number of fitted parameters."""
     n = len(e)
-    if weights.min() < 1.0:  # the median does not see outliers
+    if weights.min() < 1.0:  # the median ignores outliers
         return np.median(np.abs(e), axis=0) / 0.6744897501960817 + np.finfo(float).tiny
     return np.sqrt((e**2).sum(axis=0) / max(n - spent, 1.0)) + np.finfo(float).tiny
 
 
 def solved(W: Array, y: Array, sigma: Array, weights: Array) -> Array:
-    """Return the weighted least squares solution, (n_base,), columns scaled."""
+    """Return the weighted least-squares solution, (n_base,), with scaled columns."""
     root = np.sqrt(weights) / sigma
     A = (W * root[..., None]).reshape(-1, W.shape[-1])
     size = np.linalg.norm(A, axis=0)
@@ -259,7 +259,7 @@ def solved(W: Array, y: Array, sigma: Array, weights: Array) -> Array:
 
 
 def require_excited(base: BaseParameters, W: Array) -> None:
-    """Raise `ModelError` with the combinations that a motion does not show."""
+    """Raise `ModelError` with the combinations that a motion does not excite."""
     A = W.reshape(-1, W.shape[-1])
     size = np.linalg.norm(A, axis=0)
     seen = size > 1e-10 * size.max()
@@ -271,6 +271,6 @@ def require_excited(base: BaseParameters, W: Array) -> None:
     if missing:
         shown = "; ".join(missing[:6]) + ("; ..." if len(missing) > 6 else "")
         raise ModelError(
-            f"estimate: this motion does not tell {len(missing)} of {len(base.names)} combinations: {shown}; move all "
-            "joints together, at several speeds (exciting_motion finds such a motion)"
+            f"estimate: the motion does not determine {len(missing)} of {len(base.names)} combinations: {shown}; move "
+            "all joints together, at several speeds (exciting_motion finds such a motion)"
         )

@@ -1,4 +1,4 @@
-"""Exciting motions: finite Fourier series within limits whose linear form is well conditioned.
+"""Exciting motions: finite Fourier series within limits, with a well conditioned linear form.
 
 Of coordinate k, over one period T = 2 pi / w, with N harmonics [1]_
 
@@ -27,29 +27,29 @@ from floatframe.errors import ModelError
 
 __all__ = ["ExcitingMotion", "MotionLimits", "exciting_motion"]
 
-SINGULAR = 1e-14  #: ratio of singular values that is zero
-SMALLER = 9  #: motions of falling size that are tried for the limits of torque
+SINGULAR = 1e-14  #: ratio of singular values that counts as zero
+SMALLER = 9  #: number of decreasing amplitudes that are tried to satisfy torque limits
 
 
 @dataclass(frozen=True)
 class MotionLimits:
-    """What a coordinate may do."""
+    """The limits of a coordinate."""
 
-    low: float  #: [m or rad]
+    low: float  #: lower limit of the position [m or rad]
     high: float
-    rate: float  #: largest, [m/s or rad/s]
-    acceleration: float = np.inf  #: [m/s² or rad/s²]
-    torque: float = np.inf  #: [N or N m], of the parameters of the system
+    rate: float  #: largest rate [m/s or rad/s]
+    acceleration: float = np.inf  #: largest acceleration [m/s² or rad/s²]
+    torque: float = np.inf  #: largest torque, with the parameters of the system [N or N m]
 
 
 @dataclass(frozen=True, eq=False)
 class ExcitingMotion:
     """A periodic motion."""
 
-    names: tuple[str, ...]  #: of the coordinates
-    period: float  #: [s]
+    names: tuple[str, ...]  #: names of the coordinates
+    period: float  #: period [s]
     coefficients: Array  #: c, a_1, b_1, ..., a_N, b_N of each coordinate, (n_c, 1 + 2 N)
-    condition: float  #: of the rows of base parameters in their typical size
+    condition: float  #: condition number of the rows of base parameters in typical units
 
     def at(self, t: Array) -> tuple[Array, Array, Array]:
         """Return positions, rates and accelerations, each (n, n_c), at times, (n,) [s]."""
@@ -58,7 +58,7 @@ class ExcitingMotion:
 
 
 def series(t: Array, period: float, n: int) -> tuple[Array, Array, Array]:
-    """Return the matrices from coefficients to positions, rates, accelerations, each (len(t), 1 + 2 n)."""
+    """Return the matrices from coefficients to positions, rates and accelerations, (len(t), 1 + 2 n) each."""
     w = 2 * np.pi / period
     x, v, a = (np.zeros((len(t), 1 + 2 * n)) for _ in range(3))
     x[:, 0] = 1.0
@@ -81,7 +81,7 @@ def exciting_motion(
     max_iterations: int = 40,
     seed: int = 0,
 ) -> ExcitingMotion:
-    """Return a motion within limits that tells the base parameters well.
+    """Return a motion within limits that determines the base parameters accurately.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def exciting_motion(
     largest = np.array([each.torque for each in bounds])
     is_limited = np.isfinite(largest)
 
-    known: dict[bytes, tuple[float, float]] = {}  # the objective and its limit ask for the same motions
+    known: dict[bytes, tuple[float, float]] = {}  # the objective and its constraint evaluate the same motions
 
     def judged(x: Array) -> tuple[float, float]:
         """Log of the condition number, and what the torques leave of their limits, the least share."""
@@ -176,7 +176,7 @@ def exciting_motion(
 
 
 def checked(name: str, limits: Mapping[str, MotionLimits], names: tuple[str, ...]) -> MotionLimits:
-    """Return the limits of a coordinate; `ModelError` if there are none, or nothing fits in."""
+    """Return the limits of a coordinate; `ModelError` if they are missing or empty."""
     for given in limits:
         if given not in names:
             raise ModelError(f"exciting_motion: limits: no coordinate {quoted(given)}{nearest(given, list(names))}")
@@ -192,7 +192,7 @@ def checked(name: str, limits: Mapping[str, MotionLimits], names: tuple[str, ...
 
 
 def ratios_of(c: Array, each: MotionLimits, blocks: tuple[Array, Array, Array]) -> float:
-    """Return the largest share of its limits that a coordinate takes, about its offset c[0]."""
+    """Return the largest fraction of its limits that a coordinate uses, about its offset c[0]."""
     room = min(each.high - c[0], c[0] - each.low)
     swing = np.abs(blocks[0][:, 1:] @ c[1:]).max() / max(room, 1e-12)
     return float(
@@ -201,7 +201,7 @@ def ratios_of(c: Array, each: MotionLimits, blocks: tuple[Array, Array, Array]) 
 
 
 def scaled_into(x: Array, bounds: list[MotionLimits], blocks: tuple[Array, Array, Array], share: float) -> Array:
-    """Return coefficients that take a share of their limits, about an offset in the inner third of the range."""
+    """Return coefficients that use a fraction of their limits, about an offset in the inner third of the range."""
     C = x.reshape(len(bounds), -1).copy()
     for c, each in zip(C, bounds, strict=True):
         if np.isfinite(each.high - each.low):
@@ -212,7 +212,7 @@ def scaled_into(x: Array, bounds: list[MotionLimits], blocks: tuple[Array, Array
 
 
 def kept_within(x: Array, bounds: list[MotionLimits], blocks: tuple[Array, Array, Array]) -> Array:
-    """Return coefficients as they are where they keep their limits, else reduced to them."""
+    """Return coefficients within their limits; those beyond are scaled down."""
     C = x.reshape(len(bounds), -1).copy()
     for c, each in zip(C, bounds, strict=True):
         c[1:] *= min(1.0, 1.0 / ratios_of(c, each, blocks))

@@ -30,16 +30,16 @@ from floatframe.model.system import System
 
 __all__ = ["MeasuredFile", "measured_coordinates", "read_measured"]
 
-LEAST_ROWS = 20  #: instants below which nothing is estimated
+LEAST_ROWS = 20  #: smallest number of instants for an estimate
 #: noise that passes the filter has the band of a sharp one at 0.898 of its cut-off, the integral of 1/(1 + x⁸)²
 BAND = 0.898
-ENDS = 3  #: periods of the cut-off that are left out at both ends, where filters and differences are not sure
+ENDS = 3  #: periods of the cut-off that are excluded at both ends, where filters and differences are inaccurate
 KINDS = {"": "position", " rate": "rate", " acceleration": "acceleration", " torque": "torque", " force": "torque"}
 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredFile:
-    """A measured motion, and what was done with it."""
+    """A measured motion, and notes on its processing."""
 
     measured: Measured
     notes: tuple[str, ...]
@@ -90,7 +90,7 @@ def read_measured(
     for has, what, all_names in ((has_torque, "torques", names), (has_base, "reactions", list(BASE))):
         if any(has) and not all(has):
             lacking = [name for name, is_there in zip(all_names, has, strict=True) if not is_there]
-            raise ModelError(f"{where}: {what}: expected all of them or none, missing {', '.join(lacking)}")
+            raise ModelError(f"{where}: {what}: expected all or none, missing {', '.join(lacking)}")
     if not any(has_torque) and not any(has_base):
         raise ModelError(
             f"{where}: neither torques ('{names[0]} torque') nor reactions ('base F_x', ...) were measured"
@@ -105,7 +105,7 @@ def read_measured(
 
 
 def measured_coordinates(path: str | os.PathLike[str], system: System) -> tuple[str, ...] | None:
-    """Return the coordinates whose positions a file has, those that move a system with loops; None: there are none."""
+    """Return the coordinates with measured positions, which drive a system with loops; None if there are none."""
     tree = tree_of(system)
     if not tree.cut:
         return None
@@ -117,7 +117,7 @@ def assembled(
     where: str, form: LinearForm, signals: Signals, columns: tuple, cutoff: float | None, thin: int | None,
     has_torque: bool, has_base: bool,
 ) -> MeasuredFile:  # fmt: skip
-    """Return the motion of channels that are known to be there."""
+    """Return the motion from channels that have been checked to exist."""
     t = np.asarray(signals.time)
     h, notes = float(t[-1] - t[0]) / (len(t) - 1), list(signals.notes)
     smooth = filter_of(where, cutoff, 1.0 / h)
@@ -173,7 +173,7 @@ def units_of(system: System) -> tuple[str, str, str]:
 
 
 def filter_of(where: str, cutoff: float | None, rate: float) -> Callable[[Array], Array]:
-    """Return what filters a channel."""
+    """Return the filter of a channel as a function."""
     if cutoff is None:
         return lambda values: values
     if not 0 < cutoff < 0.45 * rate:

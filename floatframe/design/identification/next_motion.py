@@ -1,4 +1,4 @@
-"""The motion that would tell more: an exciting one within what the robot did already, and how well it would tell."""
+"""A more informative motion, within the range of the measured one, and its expected accuracy."""
 
 from dataclasses import dataclass
 
@@ -13,22 +13,23 @@ from floatframe.design.identification.excitation import ExcitingMotion, MotionLi
 __all__ = ["NextMotion", "next_motion"]
 
 N_HARMONICS, N_INSTANTS, N_STARTS, MOST = 5, 40, 12, 8
-LEAST = 1e-3  #: rad or m, the range of a coordinate that hardly moved
+LEAST = 1e-3  #: range below which a coordinate hardly moved [rad or m]
 
 
 @dataclass(frozen=True, eq=False)
 class NextMotion:
-    """A motion, and the deviations with which it would tell the base parameters."""
+    """A motion, and the standard deviations that it would give for the base parameters."""
 
     motion: ExcitingMotion
-    deviations: Array  #: of as many rows with the same noise, (n_base,)
-    condition: float  #: of these rows over the noise, columns of length one; compare `Estimate.condition`
+    deviations: Array  #: deviations for the same number of rows and noise, (n_base,)
+    #: condition number of these rows divided by the noise, columns of length one; compare `Estimate.condition`
+    condition: float
 
 
 def next_motion(made: Estimate, *, seed: int = 0) -> NextMotion | None:
-    """Return an exciting motion within the positions, rates and accelerations of the one that was measured.
+    """Return an exciting motion within the positions, rates and accelerations of the measured motion.
 
-    None: none that was tried has a lower condition number than that one.
+    It is None if no tried motion has a lower condition number than the measured one.
 
     It lasts as long as what was measured, and is judged with as many rows and the noise that was found. Torques are not
     limited: those of the estimate stay near what was measured, as accelerations do.

@@ -1,4 +1,4 @@
-"""Parameters of any system from measured outputs: the motion that it computes is fitted to the one that was measured.
+"""Identification of any system from measured outputs, by fitting its computed motion to the measured one.
 
 What moves by itself (flexible links, elastic drives, loops) is not told by a linear form, whose motion has to be
 measured whole. It is computed, and its outputs y(t, p) are compared: the output error method, maximum likelihood for
@@ -40,22 +40,22 @@ from floatframe.simulation.integration import integrate
 
 __all__ = ["MeasuredOutputs", "OutputFit", "computed_outputs", "fit_outputs"]
 
-STEP = 1e-3  #: of central differences over the logarithm of a parameter
-MOST = 1.0  #: change of a logarithm at once
-STANDS = 1e-3  #: of the deviations: a step below this ends the search
-SHRINKS = 0.3  #: of the step before, up to which old derivatives serve
-ROUNDS = 40  #: of Gauss-Newton
+STEP = 1e-3  #: step of central differences, for the logarithm of a parameter
+MOST = 1.0  #: largest change of a logarithm in one iteration
+STANDS = 1e-3  #: change of the parameters, relative to their deviations, at which the search ends
+SHRINKS = 0.3  #: ratio of successive steps up to which old derivatives are reused
+ROUNDS = 40  #: largest number of Gauss-Newton iterations
 HALVINGS = 8
 ALIKE = 1e-4  #: singular value of J, columns of length one, below which parameters act alike: differences have 1e-5
-WHITE = 2.6  #: times 1/sqrt(n) that neighbouring residuals of white noise correlate at most, 99.5 %
-TOLERANCE = 1e-10  #: of the Newton iterations of runs that are compared
+WHITE = 2.6  #: largest correlation of neighbouring residuals of white noise, in 1/sqrt(n) (99.5 %)
+TOLERANCE = 1e-10  #: tolerance of Newton iterations in compared runs
 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredOutputs:
-    """Outputs that were measured at times of one distance, beginning with the run."""
+    """Outputs measured at equidistant times, from the beginning of the run."""
 
-    time: Array  #: (n,) [s]
+    time: Array  #: times, (n,) [s]
     values: Mapping[str, Array]  #: by column of a sensor or coordinate, "tip y", "shoulder.angle force", (n,) each
 
     def __post_init__(self) -> None:
@@ -75,13 +75,13 @@ class MeasuredOutputs:
 
     @property
     def table(self) -> Array:
-        """The values, (n, channels)."""
+        """The values of all channels, (n, channels)."""
         return np.column_stack([np.asarray(column, dtype=float) for column in self.values.values()])
 
 
 @dataclass(frozen=True, eq=False)
 class OutputFit:
-    """Parameters as estimated, and how well they fit."""
+    """Estimated parameters, and the quality of their fit."""
 
     names: tuple[str, ...]
     values: Array  #: (n_p,)
@@ -89,10 +89,10 @@ class OutputFit:
     channels: tuple[str, ...]
     sigma: Array  #: noise of the channels, (channels,)
     predicted: Array  #: outputs of the system with the values, (n, channels)
-    residuals: Array  #: measured less predicted, (n, channels)
+    residuals: Array  #: measured minus predicted outputs, (n, channels)
     slopes: Array  #: derivatives of the outputs by the parameters, (n, channels, n_p)
-    condition: float  #: of the derivatives over the noise, columns of length one
-    n_runs: int  #: motions that were computed
+    condition: float  #: condition number of the derivatives divided by the noise, columns of length one
+    n_runs: int  #: number of computed motions
 
     @property
     def deviations(self) -> Array:
@@ -112,7 +112,7 @@ class OutputFit:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What makes the deviations doubtful, in words."""
+        """Reasons why the deviations are unreliable, as text."""
         said = []
         coloured = [
             name
@@ -159,7 +159,7 @@ def fit_outputs(
     sigma: Mapping[str, float] | None = None,
     near: OutputFit | None = None,
 ) -> OutputFit:
-    """Return the parameters with which a system moves most like the one that was measured.
+    """Return the parameters with which the computed motion fits the measurements best.
 
     Parameters
     ----------
@@ -250,7 +250,7 @@ def computed_outputs(
     system: System, time: Array, outputs: Sequence[str], *, h: float | None = None,
     integrator: Integrator | None = None, state: State | None = None,
 ) -> MeasuredOutputs:  # fmt: skip
-    """Return what sensors would measure on the motion of a system, without noise; see `fit_outputs`.
+    """Return the outputs that sensors would measure during a motion, without noise; see `fit_outputs`.
 
     Raises
     ------
@@ -281,18 +281,18 @@ def computed_outputs(
 
 
 class Runs:
-    """Motions of a system with parameters, at the times of a measurement."""
+    """Motions of a system for given parameters, at the times of a measurement."""
 
     def __init__(
         self, system_of: Callable[[dict[str, float]], System], names: tuple[str, ...], measured: MeasuredOutputs,
         h: float | None, integrator: Integrator | None, state: State | None,
     ) -> None:  # fmt: skip
-        """Keep what all runs share."""
+        """Store the data that all runs share."""
         self.system_of, self.names, self.measured = system_of, names, measured
         self.h, self.integrator, self.state, self.count = h, integrator, state, 0
 
     def outputs(self, p: Array) -> Array:
-        """Return what is measured of the motion with parameters, (n, channels)."""
+        """Return the outputs of the motion for parameters, (n, channels)."""
         system = self.system_of(dict(zip(self.names, p.tolist(), strict=True)))
         self.count += 1
         with notes_of(is_first=self.count == 1):
@@ -302,7 +302,7 @@ class Runs:
             ).table  # fmt: skip
 
     def slopes(self, p: Array) -> Array:
-        """(1) Return the derivatives of the outputs by logarithms of the parameters, (n, channels, n_p)."""
+        """Return the derivatives of the outputs by logarithms of the parameters, (n, channels, n_p), step (1)."""
         found = []
         for k in range(len(p)):
             beside = []
@@ -321,7 +321,7 @@ class Runs:
 
 @contextmanager
 def notes_of(*, is_first: bool) -> Iterator[None]:
-    """Let the first of many runs say what it warns of, and the others errors alone."""
+    """Show all log messages of the first run, and only errors of the others."""
     log = logging.getLogger("floatframe")
     level = log.level
     if not is_first:
@@ -333,7 +333,7 @@ def notes_of(*, is_first: bool) -> Iterator[None]:
 
 
 def newton_step(S: Array, e: Array, noise: Array, names: tuple[str, ...]) -> tuple[Array, float]:
-    """(2) Return the step of the logarithms, and its length in deviations; `ModelError` where they act alike."""
+    """Return the change of the logarithms, and its length in deviations (2); `ModelError` if parameters act alike."""
     A = (S / noise[:, None]).reshape(-1, len(names))
     size = np.linalg.norm(A, axis=0)
     still = [name for name, each in zip(names, size, strict=True) if each == 0.0]
@@ -350,13 +350,13 @@ def newton_step(S: Array, e: Array, noise: Array, names: tuple[str, ...]) -> tup
 
 
 def noise_of(e: Array, n_p: int) -> Array:
-    """(3) Return the noise of each channel, (channels,), whose residuals have spent a share of the parameters."""
+    """Return the noise of each channel, (channels,), corrected for the number of fitted parameters, step (3)."""
     n, n_y = e.shape
     return np.sqrt((e**2).sum(axis=0) / max(n - n_p / n_y, 1.0)) + np.finfo(float).tiny
 
 
 def sigma_of(given: Mapping[str, float], channels: tuple[str, ...]) -> Array:
-    """Return the noise of the channels as given, (channels,)."""
+    """Return the given noise of the channels, (channels,)."""
     for name, value in given.items():
         if name not in channels:
             raise ModelError(f"fit_outputs: sigma: no output {quoted(name)}{nearest(name, list(channels))}")

@@ -1,4 +1,4 @@
-"""Parameters of real bodies that fit measurements: masses and inertias as some distribution of mass has them.
+"""Physically consistent parameters that fit measurements: masses and inertias of a real mass distribution.
 
 A rigid body is real where its pseudo-inertia (`inertial_parameters.pseudo_inertia`) is positive definite. It is written
 P = L Lᵀ with positive diagonal exp(.), so that every choice of the ten unknowns of a body is real, and fitted by
@@ -28,13 +28,13 @@ LOWER = np.tril_indices(4)
 
 @dataclass(frozen=True, eq=False)
 class RealParameters:
-    """Parameters that bodies can have, and how well they fit."""
+    """Physically consistent parameters, and the quality of their fit."""
 
-    phi: Array  #: (p,)
-    system: System  #: with these bodies
-    excess: float  #: squared weighted misfit over that of the base parameters, less one
-    least: Array  #: smallest eigenvalue of the pseudo-inertia over its largest, of each body
-    is_fit: bool  #: whether the misfit is one that noise makes: within 5 sigma of chi-squared of the base parameters
+    phi: Array  #: inertial parameters, (p,)
+    system: System  #: the system with these bodies
+    excess: float  #: squared weighted misfit divided by that of the base parameters, minus one
+    least: Array  #: smallest eigenvalue of the pseudo-inertia of each body, relative to its largest
+    is_fit: bool  #: whether the misfit can be noise: within 5 sigma of the chi-squared value of the base parameters
 
 
 def real_parameters(estimate: Estimate, *, prior: Array | None = None, weight: float = 1e-2) -> RealParameters:

@@ -66,10 +66,11 @@ __all__ = [
 # is placed, so that it stays on its branch.
 
 
-RANK = 1e-8  #: singular values of C, rows and columns in their sizes, below this times the largest are zero
-CLOSED = 1e-11  #: of lengths and angles
-MOST = 25  #: iterations
-STRIDE = 0.1  #: rad, or of the length of the system: what an independent coordinate moves at once
+#: largest singular value of C that counts as zero, relative to the largest one, with scaled rows and columns
+RANK = 1e-8
+CLOSED = 1e-11  #: largest gap of a closed loop, in scaled lengths and angles
+MOST = 25  #: largest number of iterations
+STRIDE = 0.1  #: largest step of an independent coordinate [rad, or system sizes]
 
 
 def looped_tree(system: System, where: str) -> SystemTree:
@@ -108,10 +109,10 @@ def looped_tree(system: System, where: str) -> SystemTree:
 
 
 class Loops:
-    """The cut joints of a system at work."""
+    """The cut joints of a system, with working arrays."""
 
     def __init__(self, system: System, where: str) -> None:
-        """Begin as placed."""
+        """Begin with the placed system."""
         compiled = compiled_system(system)
         self.where, self.parts = where, looped_tree(system, where)
         self.model, self.tree = compiled.model, self.parts.tree
@@ -127,7 +128,7 @@ class Loops:
         self.names = ", ".join(quoted(name) for name in (*self.parts.cut, *self.parts.constrained))
 
     def put(self, x: Array, rate: Array, acceleration: Array, *, by_increments: bool) -> Array:
-        """Move, and return C over rows and coordinates in their sizes, (n_rows, n_c); rates of g are in the work."""
+        """Set the motion, and return C in scaled rows and coordinates, (n_rows, n_c); `work` has the rates of g."""
         from floatframe.engine.tree.kernels.entry import constraints
 
         joints = self.joints
@@ -138,11 +139,11 @@ class Loops:
         return C * self.size / self.row_size[:, None]
 
     def gap(self) -> Array:
-        """Return what is held, in its sizes, (n_rows,)."""
+        """Return the scaled constraint errors, (n_rows,)."""
         return self.work.connections.g[self.rows] / self.row_size
 
     def close(self, x: Array, dependent: IntArray, at: str) -> Array:
-        """Return the coordinates with the dependent ones such that the loops are closed."""
+        """Return the coordinates with dependent ones that close the loops."""
         x, zero = x.copy(), np.zeros_like(x)
         for _ in range(MOST):
             C_d = self.put(x, zero, zero, by_increments=True)[:, dependent]
@@ -160,7 +161,7 @@ class Loops:
 
 
 def solved(C_d: Array, right: Array) -> Array:
-    """Return the dependent coordinates, least squares over rows that repeat each other."""
+    """Return the dependent coordinates, by least squares, because rows may be redundant."""
     return np.asarray(la.lstsq(C_d, right, cond=RANK, lapack_driver="gelsy")[0])
 
 
@@ -207,7 +208,7 @@ def independent_columns(system: System, names: Sequence[str] | None, where: str)
 
 
 def proposed(C: Array, names: list[str], n_d: int) -> list[str]:
-    """Return names of independent coordinates: those that pivoted columns leave, early ones of equals kept free."""
+    """Return names of independent coordinates by pivoted elimination, which prefers early coordinates."""
     _, _, pivot = la.qr(C[:, ::-1], mode="economic", pivoting=True)
     dependent = {len(names) - 1 - int(k) for k in pivot[:n_d]}
     return [name for k, name in enumerate(names) if k not in dependent]
@@ -269,7 +270,7 @@ def loop_samples(system: System, independent: IntArray, x: Array, rate: Array, a
 # regressors -----------------------------------------------------------------------------------------------------------
 
 
-#: terms of a drive beside those of the bodies: what they multiply, in words
+#: terms of a drive in addition to those of the bodies, with descriptions
 DRIVE_TERMS = {
     "motor-inertia": "inertia of rotor and gear, seen at the joint: times the acceleration",
     "viscous": "viscous friction: times the rate",
@@ -280,33 +281,33 @@ DRIVE_TERMS = {
 
 @dataclass(frozen=True, eq=False)
 class LinearForm:
-    """Which parameters a linear form has, in the order of its columns."""
+    """The parameters of a linear form, in the order of its columns."""
 
     system: System
     names: tuple[str, ...]  #: "m(link1)", ..., "viscous(hinge/angle)", (p,)
-    terms: tuple[str, ...]  #: of `DRIVE_TERMS`, of each coordinate
-    independent: IntArray | None = None  #: columns of the tree that move independently, where loops close; None: all
+    terms: tuple[str, ...]  #: `DRIVE_TERMS` of each coordinate
+    independent: IntArray | None = None  #: independent columns of the tree if there are loops; None: all columns
 
     @property
     def columns(self) -> tuple[CoordinateName, ...]:
-        """The coordinates that move independently, in the order of torques."""
+        """The independent coordinates, in the order of torques."""
         every = tree_of(self.system).columns
         return every if self.independent is None else tuple(every[k] for k in self.independent)
 
     def samples(self, x: Array, rate: Array, acceleration: Array) -> TreeSamples:
-        """Return the motion at given coordinates, (n, n_c) each, in the order of `columns`."""
+        """Return the motion for given coordinates, (n, n_c) each, in the order of `columns`."""
         if self.independent is None:
             return tree_samples(self.system, x, rate, acceleration)
         return loop_samples(self.system, self.independent, x, rate, acceleration)
 
     @property
     def n_inertial(self) -> int:
-        """Number of inertial parameters, the first of all."""
+        """Number of inertial parameters, which come first."""
         return 10 * len(self.system.bodies)
 
     @property
     def values(self) -> Array:
-        """What the system says they are, (p,); those of drives are not known to it: zero."""
+        """Values of the parameters in the system, (p,); parameters of drives are zero, because they are unknown."""
         own = np.concatenate([parameters_of(body) for body in self.system.bodies])  # type: ignore[arg-type]
         return np.concatenate([own, np.zeros(len(self.names) - len(own))])
 

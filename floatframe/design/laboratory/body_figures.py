@@ -1,4 +1,4 @@
-"""Pictures of mode sets beside the full model of a body: error over the number of coordinates and over time."""
+"""Figures of the errors of mode sets relative to the full model: over the number of coordinates and over time."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 __all__ = ["error_figure"]
 
-FLOOR = 1e-6  #: errors below are drawn there
+FLOOR = 1e-6  #: smallest error in figures; smaller errors are drawn at this value
 
 
 def error_figure(results: Sequence[SetError], *, n_shown: int) -> "Figure":

@@ -1,4 +1,4 @@
-"""Mode sets of one body against its full model, over the whole body: error over the number of modes and over time.
+"""Errors of mode sets of one body relative to its full model, over the number of modes and over time.
 
 (1) the full model moves in the system (`suspended_motion`), once for each system
 (2) each set with each number of modes is reduced in mean axes, put into the systems and run with the same steps
@@ -63,7 +63,7 @@ __all__ = [
 
 @dataclass(frozen=True, eq=False)
 class BodyErrors:
-    """Errors over time; largest ones as shares of the greatest value of the full model."""
+    """Errors over time, relative to the largest values of the full model."""
 
     t: Array  #: (n_t,) [s]
     mass: Array  #: epsilon_M, (n_t,)
@@ -71,7 +71,7 @@ class BodyErrors:
 
     @property
     def largest(self) -> tuple[float, float]:
-        """The greatest epsilon_M and epsilon_K."""
+        """The largest epsilon_M and epsilon_K."""
         return float(self.mass.max()), float(self.energy.max())
 
 
@@ -88,7 +88,7 @@ class BodyReference:
     body: FEBody
     t: Array  #: (n_t,) [s]
     u: Array  #: displacement over the dofs, mesh axes, (n_dof, n_t)
-    elastic: Array = field(init=False)  #: the same in mean axes, (n_dof, n_t)
+    elastic: Array = field(init=False)  #: displacement in mean axes, (n_dof, n_t)
     greatest: tuple[float, float] = field(init=False)  #: max |u|_M [kg^1/2 m], max |u|_K [J^1/2]
 
     def __post_init__(self) -> None:
@@ -105,7 +105,7 @@ class BodyReference:
         object.__setattr__(self, "greatest", greatest)
 
     def errors(self, Phi: Array, q: Array) -> BodyErrors:
-        """Return the errors of shapes Phi, (n_dof, n_q), that move by q, (n_q, n_t)."""
+        """Return the errors of the displacement Phi q, with shapes Phi, (n_dof, n_q), and coordinates q, (n_q, n_t)."""
         if Phi.shape[0] != self.body.n_dof or q.shape != (Phi.shape[1], len(self.t)):
             raise ModelError(
                 f"body errors: expected shapes over {self.body.n_dof} dofs and coordinates at {len(self.t)} times, got "
@@ -116,14 +116,14 @@ class BodyReference:
         return BodyErrors(self.t, mass, energy)
 
     def history_error(self, rows: sp.sparray | Array, Phi: Array, q: Array) -> float:
-        """Return max over time of |rows e| over max |rows u|: of a few results, such as the stress at one place."""
+        """Return max |rows e| / max |rows u| over time, for selected results such as the stress at one point."""
         there = rows @ self.elastic
         error = (rows @ without_rigid(self.body, Phi)) @ q - there
         return float(la.norm(error, axis=0).max() / la.norm(there, axis=0).max())
 
 
 def largest_difference(histories: Mapping[str, Array], full: Mapping[str, Array]) -> float:
-    """Return the greatest difference of vectors over time, (n_t, n) each, over the greatest of the full model."""
+    """Return the largest difference of vector histories, (n_t, n) each, relative to the largest of the full model."""
     difference = max(float(la.norm(histories[name] - of, axis=1).max()) for name, of in full.items())
     return difference / max(float(la.norm(of, axis=1).max()) for of in full.values())
 
@@ -148,31 +148,32 @@ MakeModes = Callable[[Families, int], ModeSet]
 
 @dataclass(frozen=True)
 class Loading:
-    """A system and how it is run."""
+    """A system and its time integration."""
 
     system: System
     integrator: GeneralizedAlpha
     t_end: float  #: [s]
     h: float  #: [s]
-    every: int = 1  #: errors are looked at every so many steps
+    every: int = 1  #: number of steps between evaluations of errors
 
 
 @dataclass(frozen=True, eq=False)
 class SetError:
-    """What one set with one number of modes makes of one loading."""
+    """The errors of one mode set with one number of modes under one loading."""
 
     loading: str
     mode_set: str
     n_modes: int
-    n_q: int = 0  #: modal coordinates
-    errors: BodyErrors | None = None  #: over time; None where it failed
-    stress: Mapping[str, float] = field(default_factory=dict)  #: place -> greatest error over the greatest stress there
-    force: float = float("nan")  #: of the bushings on the body, over their greatest
-    failure: str = ""  #: why there is none
+    n_q: int = 0  #: number of modal coordinates
+    errors: BodyErrors | None = None  #: errors over time; None if the case failed
+    #: largest error of stress by place, relative to the largest stress there
+    stress: Mapping[str, float] = field(default_factory=dict)
+    force: float = float("nan")  #: error of the bushing forces on the body, relative to their largest value
+    failure: str = ""  #: reason why the case failed
 
     @property
     def largest(self) -> tuple[float, float]:
-        """The greatest epsilon_M and epsilon_K; NaN where it failed."""
+        """The largest epsilon_M and epsilon_K; NaN if the case failed."""
         return (float("nan"), float("nan")) if self.errors is None else self.errors.largest
 
 
@@ -205,7 +206,7 @@ def body_study(
     stress: Mapping[str, sp.sparray] | None = None,
     on_case: Callable[[SetError], None] | None = None,
 ) -> tuple[SetError, ...]:
-    """Run every set under every loading beside the full model: steps (2) and (3).
+    """Run every mode set under every loading, and compare it with the full model: steps (2) and (3).
 
     Parameters
     ----------
@@ -273,7 +274,7 @@ def body_study(
 
 
 def lean_body(body: FEBody) -> FEBody:
-    """Return the body without surface and numbering, which no motion needs: reductions are quicker."""
+    """Return the body without surface and numbering, which no motion needs, so that reductions are faster."""
     return replace(body, surface=np.zeros((0, 3), np.int64), kept=np.zeros(0, np.int64), numbering=Numbering())
 
 

@@ -1,4 +1,4 @@
-"""Cases of the laboratory: how a flexible body is described."""
+"""Cases of the laboratory: descriptions of a flexible body."""
 
 import itertools
 from collections.abc import Sequence
@@ -14,10 +14,10 @@ class Case:
     """One description of the body."""
 
     mode_set: str = "craig-bampton"  #: name of a mode set, as in a job
-    n_modes: int = 10  #: vibration modes, of each part
+    n_modes: int = 10  #: number of vibration modes of each part
     frame: str = "tisserand"  #: "tisserand", "buckens", or "nodal:INTERFACE"
-    stiffening: bool = True  #: whether the geometric stiffness counts
-    parts: int = 1  #: of equal length, each with a frame of its own (mean axes where there are several)
+    stiffening: bool = True  #: whether geometric stiffness is included
+    parts: int = 1  #: number of parts of equal length, each with its own frame (mean axes if there are several)
 
     def __post_init__(self) -> None:
         kind, _, at = self.frame.partition(":")
@@ -28,12 +28,12 @@ class Case:
 
     @property
     def family(self) -> tuple[str, str, bool, int]:
-        """All but the number of modes."""
+        """The description without the number of modes."""
         return (self.mode_set, self.frame, self.stiffening, self.parts)
 
     @property
     def description(self) -> str:
-        """The case in words, without the number of modes."""
+        """The case as text, without the number of modes."""
         parts = f", {self.parts} parts" if self.parts > 1 else ""
         return f"{self.mode_set}, {self.frame}{'' if self.stiffening else ', linear'}{parts}"
 
@@ -46,7 +46,7 @@ def grid(
     stiffening: Sequence[bool] = (True,),
     parts: Sequence[int] = (1,),
 ) -> tuple[Case, ...]:
-    """Return every combination, numbers of modes running fastest; of several parts each has mean axes, once."""
+    """Return all combinations, with the number of modes varying fastest; several parts always have mean axes."""
     made = [
         Case(mode_set, n, frame if k == 1 else "tisserand", stiff, k)
         for mode_set, frame, stiff, k, n in itertools.product(mode_sets, frames, stiffening, parts, n_modes)

@@ -1,4 +1,4 @@
-"""Geometrically exact beams as a reference: no linear frame, no modes; two divisions tell how far it is settled."""
+"""Geometrically exact beams as a reference without linear frame and modes; two meshes give their error."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Pictures of the laboratory, fit for a paper: error over coordinates, cost beside error."""
+"""Figures of a laboratory study for publications: error over coordinates, error over cost."""
 
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,7 @@ __all__ = ["convergence_figure"]
 
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000", "#999999")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
-FLOOR = 1e-9  #: errors below are drawn there
+FLOOR = 1e-9  #: smallest error in figures; smaller errors are drawn at this value
 
 
 def convergence_figure(result: LaboratoryResult) -> "Figure":
@@ -44,7 +44,7 @@ def convergence_figure(result: LaboratoryResult) -> "Figure":
     left.set(xlabel="modal coordinates", ylabel="largest error / range of the reference", yscale="log")
     right.set(xlabel="processor time of the run [s]", xlim=(0, None))
     for axes in (left, right):
-        if result.settled is not None:  # below it the reference itself is not known
+        if result.settled is not None:  # below this level, the error of the reference itself dominates
             axes.axhline(max(result.settled, FLOOR), color="#666666", linewidth=0.8, linestyle=":")
         axes.grid(color="#e3e7eb", which="both", linewidth=0.6)
         for side in ("top", "right"):

@@ -1,4 +1,4 @@
-"""The finite element model itself as a reference: the body with all of its dofs, inside the multibody system.
+"""The full finite element model as a reference: the body with all of its dofs in the multibody system.
 
 With every displacement of the mesh among its shapes the floating frame loses nothing: no mode is left out, static or
 vibrating, so that what differs from it is the truncation of a case. It stays a description of small deformation about
@@ -16,7 +16,7 @@ from floatframe.errors import ModelError
 
 __all__ = ["MOST_DOFS", "FullModel", "all_dofs"]
 
-MOST_DOFS = 1200  #: dense matrices of that size are factorised in every few steps, and each unit load has one
+MOST_DOFS = 1200  #: largest number of dofs, because dense matrices of this size are factorised repeatedly
 
 
 @dataclass(frozen=True)

@@ -37,29 +37,29 @@ from floatframe.errors import ModelError
 
 __all__ = ["FrameAcceleration", "FullTransient", "full_transient"]
 
-MOST_NUMBERS = 2.5e8  #: of all results together, 2 GB
+MOST_NUMBERS = 2.5e8  #: largest number of results in memory, 2 GB
 
 
 @dataclass(frozen=True, eq=False)
 class FrameAcceleration:
-    """How the frame moves in which the body deforms: its inertia loads every mass. Components in mesh axes."""
+    """Motion of the frame relative to which the body deforms, as inertia load; components in mesh axes."""
 
-    acceleration: Array  #: of the point `origin`, less that of free fall, (n_t, 3) [m/s²]
+    acceleration: Array  #: acceleration of `origin` minus the acceleration of free fall, (n_t, 3) [m/s²]
     omega: Array  #: angular velocity, (n_t, 3) [rad/s]
     alpha: Array  #: angular acceleration, (n_t, 3) [rad/s²]
-    origin: Array = field(default_factory=lambda: np.zeros(3))  #: mesh coordinates, (3,) [m]
+    origin: Array = field(default_factory=lambda: np.zeros(3))  #: reference point in mesh coordinates, (3,) [m]
 
 
 @dataclass(frozen=True, eq=False)
 class FullTransient:
-    """Motion of the chosen rows, and what moves the interfaces whose motion was given."""
+    """Motion of the selected rows, and forces at the interfaces with prescribed motion."""
 
     t: Array  #: (n_t,)
-    u: Array  #: rows of the displacement, (n_t, n_rows)
+    u: Array  #: selected displacements, (n_t, n_rows)
     u_dot: Array  #: their rates, (n_t, n_rows)
     u_ddot: Array  #: their second rates, (n_t, n_rows)
-    forces: Mapping[str, Array]  #: interface -> forces on its dofs, (n_t, n_dofs) [N, N m]; mesh axes
-    n_dof: int  #: dofs that were integrated
+    forces: Mapping[str, Array]  #: forces on the dofs of each interface, mesh axes, (n_t, n_dofs) [N, N m]
+    n_dof: int  #: number of integrated dofs
 
 
 def full_transient(
@@ -151,7 +151,7 @@ def full_transient(
     rows_h = [sp.csr_array(X[held]) for X in (K, D, M)]
 
     def known(k: int) -> Array:
-        """Loads less what the given motion asks, over all dofs."""
+        """Return the loads minus the contribution of prescribed motions, over all dofs."""
         return np.asarray(F @ p[k] - M_h @ a_h[k] - D_h @ v_h[k] - K_h @ u_h[k])
 
     with factorize(sp.csc_array(A[i][:, i]), definite=False) as factor:
@@ -183,7 +183,7 @@ def full_transient(
 
 @dataclass(frozen=True)
 class Scheme:
-    """Numbers of generalized-alpha at one step."""
+    """Coefficients of generalized-alpha for one step."""
 
     h: float
     alpha_m: float
@@ -193,28 +193,28 @@ class Scheme:
 
     @classmethod
     def of(cls, rho_inf: float, h: float) -> "Scheme":
-        """Return those of a spectral radius at infinity and a step."""
+        """Return the coefficients for a spectral radius at infinity and a step."""
         alpha_f, alpha_m = rho_inf / (rho_inf + 1), (2 * rho_inf - 1) / (rho_inf + 1)
         gamma = 0.5 + alpha_f - alpha_m
         return cls(h, alpha_m, alpha_f, (gamma + 0.5) ** 2 / 4, gamma)
 
     @property
     def c_m(self) -> float:
-        """Of the new acceleration by the new algorithmic one."""
+        """Derivative of the new acceleration by the new algorithmic acceleration."""
         return (1 - self.alpha_m) / (1 - self.alpha_f)
 
     @property
     def c_d(self) -> float:
-        """Of the new velocity."""
+        """Derivative of the new velocity by the new algorithmic acceleration."""
         return self.gamma * self.h
 
     @property
     def c_k(self) -> float:
-        """Of the new displacement."""
+        """Derivative of the new displacement by the new algorithmic acceleration."""
         return self.beta * self.h**2
 
     def predicted(self, u: Array, v: Array, algorithmic: Array, acceleration: Array) -> tuple[Array, Array, Array]:
-        """Return what is known of displacement, velocity and acceleration a step on."""
+        """Return the known parts of displacement, velocity and acceleration after a step."""
         h = self.h
         return (
             u + h * v + h**2 * (0.5 - self.beta) * algorithmic,
@@ -284,7 +284,7 @@ def load_columns(
 
 
 def spin_columns(body: FEBody, origin: Array) -> Array:
-    """Return the loads of the products of angular velocities `SPIN_PAIRS` about a point, (n_dof, 6)."""
+    """Return the loads for the products `SPIN_PAIRS` of angular velocities about a point, (n_dof, 6)."""
     unit = unit_mass_loads(BodyFrame("", origin))
     spin = MassLoads(unit.A[6:], unit.b[6:])
     if body.element_model is not None and has_geometric_stiffness(body):
@@ -298,13 +298,13 @@ def spin_columns(body: FEBody, origin: Array) -> Array:
 
 
 def without_multipliers(body: FEBody, K: sp.csc_array) -> sp.csc_array:
-    """Return K without the rows and columns of multipliers, which are no stiffness."""
+    """Return K without the rows and columns of multipliers, which have no stiffness."""
     keep = sp.diags_array((body.dofs[:, 1] != MULTIPLIER).astype(float))
     return sp.csc_array(keep @ K @ keep)
 
 
 def equilibrium(where: str, K_i: sp.csc_array, f: Array) -> Array:
-    """Return K_i⁻¹ f; `ModelError` where the given motions do not hold the body."""
+    """Return K_i⁻¹ f; `ModelError` if the prescribed motions do not hold the body."""
     try:
         factor: Factorization = factorize(K_i, definite=False)
     except FactorizationError as error:

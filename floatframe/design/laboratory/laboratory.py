@@ -1,4 +1,4 @@
-"""One mechanism, many descriptions of its flexible body, each motion beside a reference: error, cost, what fails first.
+"""Comparison of descriptions of a flexible body in a mechanism with a reference: error, cost, cause of the error.
 
 (1) every case is reduced, put into the system and run; the first run is made twice, so that compilation is no cost
 (2) error of each column of each sensor: root mean square of its distance from the reference, over the range of the
@@ -35,12 +35,12 @@ from floatframe.simulation.integration import integrate
 
 __all__ = ["CaseResult", "LaboratoryResult", "Reference", "study"]
 
-LEAST_RANGE = 1e-6  #: of a column over the greatest of its sensor, below which it is no motion
+LEAST_RANGE = 1e-6  #: range of a column, relative to the largest column of its sensor, below which it does not move
 
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """Columns of a reference over time, from any source."""
+    """Columns of a reference over time."""
 
     words: str
     t: Array  #: (n_t,)
@@ -52,29 +52,30 @@ class Run:
     """A motion of the mechanism with one description of the body."""
 
     system: System
-    columns: Mapping[str, Array]  #: of the chosen sensors
+    columns: Mapping[str, Array]  #: columns of the selected sensors
     t: Array  #: (n_t,)
-    seconds: float  #: processor time
-    notes: tuple[str, ...]  #: that the frame left its range
+    seconds: float  #: processor time [s]
+    notes: tuple[str, ...]  #: notes on bodies beyond the linear range of their frame
 
     def reference(self, words: str) -> Reference:
-        """Return what was measured as a reference."""
+        """Return the measured columns as a reference."""
         return Reference(words, self.t, self.columns)
 
 
 @dataclass(frozen=True, eq=False)
 class CaseResult:
-    """What came out of a case."""
+    """The result of a case."""
 
     case: Case
-    n_q: int = 0  #: modal coordinates, of all parts
-    n_u: int = 0  #: velocities of the system, rigid motion included
-    errors: Mapping[str, float] = field(default_factory=dict)  #: of each column, share of the range of the reference
+    n_q: int = 0  #: number of modal coordinates of all parts
+    n_u: int = 0  #: number of velocities of the system, including rigid motion
+    #: error of each column, relative to the range of the reference
+    errors: Mapping[str, float] = field(default_factory=dict)
     truncation: float = float("nan")  #: distance from the same description with the most modes
-    description: float = float("nan")  #: distance of that one from the reference
-    seconds: float = float("nan")  #: processor time of the run
-    notes: tuple[str, ...] = ()  #: that the frame left its range
-    failure: str = ""  #: why there is no motion
+    description: float = float("nan")  #: error of that description with the most modes, relative to the reference
+    seconds: float = float("nan")  #: processor time of the run [s]
+    notes: tuple[str, ...] = ()  #: notes on bodies beyond the linear range of their frame
+    failure: str = ""  #: reason why the case has no motion
 
     @property
     def error(self) -> float:
@@ -88,7 +89,7 @@ class CaseResult:
 
     @property
     def fails_first(self) -> str:
-        """What makes most of the error: "truncation" or "description"; "" where nothing is known."""
+        """The dominant cause of the error: "truncation" or "description"; "" if unknown."""
         if not np.isfinite(self.description):
             return ""
         return "truncation" if self.truncation > self.description else "description"
@@ -96,16 +97,16 @@ class CaseResult:
 
 @dataclass(frozen=True, eq=False)
 class LaboratoryResult:
-    """All cases beside the reference."""
+    """All cases, compared with the reference."""
 
     name: str
-    reference: str  #: in words
-    columns: tuple[str, ...]  #: that were compared
+    reference: str  #: description of the reference
+    columns: tuple[str, ...]  #: compared columns
     cases: tuple[CaseResult, ...]
-    settled: float | None = None  #: how far the reference itself is from its limit, as an error; None: not known
+    settled: float | None = None  #: error of the reference itself; None if unknown
 
     def table(self) -> list[dict[str, Any]]:
-        """Return one row a case, tidy: ready for a data frame, CSV or JSON."""
+        """Return one row per case, for a data frame, CSV or JSON."""
         return [
             {
                 "mode_set": r.case.mode_set,
@@ -264,7 +265,7 @@ def study(
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Keep notes on the range of frames and on steps to the table."""
+    """Suppress log messages about frames and steps, which the table contains."""
     log = logging.getLogger("floatframe")
     level = log.level
     log.setLevel(logging.ERROR)
@@ -275,7 +276,7 @@ def quiet() -> Iterator[None]:
 
 
 def compared_columns(reference: Reference, found: Sequence[Mapping[str, Array]]) -> list[str]:
-    """Return the columns that the reference and every case have, and that move in the reference."""
+    """Return the columns that exist in the reference and in every case, and that move in the reference."""
     everywhere = [name for name in reference.columns if all(name in columns for columns in found)]
     largest: dict[str, float] = {}
     for name in everywhere:
@@ -293,7 +294,7 @@ def compared_columns(reference: Reference, found: Sequence[Mapping[str, Array]])
 
 
 def distance(a: Array, b: Array, scale: float) -> float:
-    """Return the root mean square of the difference over a scale; infinite where a motion is no number."""
+    """Return the root mean square of the difference divided by a scale; infinite if a motion is not finite."""
     if not (np.isfinite(a).all() and np.isfinite(b).all()):
         return float("inf")
     return float(np.sqrt(np.mean((a - b) ** 2)) / scale)

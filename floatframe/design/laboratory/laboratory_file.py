@@ -1,4 +1,4 @@
-"""The file of a laboratory study (TOML): a mechanism, the job of its flexible body, what is varied, the reference."""
+"""The file of a laboratory study (TOML): the mechanism, the job of its flexible body, the cases, the reference."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -27,7 +27,7 @@ def as_tuple(value: Any) -> Any:
 
 
 def counts(value: Any) -> Any:
-    """Return numbers of modes from a list, a number, or words such as "2:12:2"."""
+    """Return numbers of modes from a list, a number, or text such as "2:12:2"."""
     if isinstance(value, str):
         try:
             return mode_counts(value)
@@ -89,7 +89,7 @@ class ReferenceTable(Table):
 
     @property
     def asked(self) -> Case | FullModel | ExactBeam | None:
-        """The reference that is computed; None: it is read from a file."""
+        """The reference to compute; None if it is read from a file."""
         if self.kind == "full-model":
             return FullModel(self.most_dofs)
         if self.kind == "exact-beam":

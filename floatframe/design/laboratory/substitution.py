@@ -1,4 +1,4 @@
-"""A system with another description of one of its flexible bodies: the same body anew, or parts in its place."""
+"""Replacement of a flexible body of a system by another description: a new reduction, or several parts."""
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -23,13 +23,13 @@ from floatframe.results.sensors.places import DisplacementSensor
 
 __all__ = ["with_body", "with_part"]
 
-NOT_OF_BODIES = (DisplacementSensor, EnergySensor)  #: sensors that mean another thing of a part of several bodies
+NOT_OF_BODIES = (DisplacementSensor, EnergySensor)  #: sensors whose meaning changes for a body of several parts
 
-CUT = "cut_"  #: beginning of the names of interfaces at cuts
+CUT = "cut_"  #: prefix of the names of interfaces at cuts
 
 
 def with_body(system: System, name: str, reduced: Sequence[ReducedBody], *, stiffening: bool) -> System:
-    """Return the system with a flexible body in another description.
+    """Return the system with another description of a flexible body.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def with_body(system: System, name: str, reduced: Sequence[ReducedBody], *, stif
 
 
 def with_part(system: System, name: str, part: FlexiblePart) -> System:
-    """Return the system with a flexible body as a part of several bodies; sensors that it does not know are left out.
+    """Return the system with a flexible part in place of a body; sensors that the part does not support are removed.
 
     Raises
     ------
@@ -106,7 +106,7 @@ def with_part(system: System, name: str, part: FlexiblePart) -> System:
 def marker_of_part(
     marker: Marker, part: FlexiblePart, places: Mapping[str, Array], position: Array, R: Array
 ) -> Marker:
-    """Return the place of a marker on a part: an interface, a node of the mesh by number or by its position."""
+    """Return the marker on a part: an interface, or a node of the mesh by number or position."""
     if marker.interface is not None:
         found = part.marker(marker.interface)
     elif marker.node is not None:
@@ -127,7 +127,7 @@ def marker_of_part(
 
 
 def moved(part: Any, name: str, to: Callable[[Marker], Marker], n_parts: int) -> Any:
-    """Return a joint, force or sensor with every marker on the body where it is on its parts."""
+    """Return a joint, force or sensor with its markers on the body moved to the parts."""
     if isinstance(part, Marker):
         return to(part) if body_name(part.body) == name else part
     if isinstance(part, tuple | list):
@@ -155,7 +155,7 @@ def moved(part: Any, name: str, to: Callable[[Marker], Marker], n_parts: int) ->
 
 
 def marker_on_part(marker: Marker, parts: Sequence[FlexibleBody]) -> Marker:
-    """Return the same marker on the part that has its interface, or keeps the node nearest to its place."""
+    """Return a marker on the part that has its interface, or that keeps the node nearest to it."""
     if marker.interface is not None:
         for part in parts:
             if marker.interface in [interface.name for interface in part.reduced.interfaces]:

@@ -1,4 +1,4 @@
-"""A full finite element body on bushings, within a system: nothing is reduced, and the body may turn as it likes.
+"""A full finite element body on bushings in a multibody system, without reduction, with large rotations.
 
 (1) the system is run with the body rigid: motion of its frame B and of the other bodies, wrenches of the bushings
 (2) u, displacement of the body relative to B, and w_k, small motions of chosen rigid bodies relative to (1):
@@ -42,28 +42,28 @@ from floatframe.simulation.integration import integrate
 
 __all__ = ["SuspendedMotion", "suspended_motion"]
 
-ALIGNED = 1e-9  #: turn of a body as placed that is rounding
+ALIGNED = 1e-9  #: rotation of a placed body below which it is a rounding error
 
 
 @dataclass(frozen=True, eq=False)
 class SuspendedMotion:
-    """Motion of the full body in the frame of the rigid one, and what its bushings do to it."""
+    """Motion of the full body relative to the frame of the rigid body, and the forces of its bushings."""
 
     t: Array  #: (n_t,) [s]
     u: Array  #: displacement over the dofs of the body, mesh axes, with what little it moves as a whole, (n_dof, n_t)
-    u_dot: Array  #: its rate, (n_dof, n_t)
+    u_dot: Array  #: rate of the displacement, (n_dof, n_t)
     forces: dict[str, Array]  #: bushing -> force and moment on the body at its interface, body axes, (n_t, 6) [N, N m]
-    rigid: Trajectory  #: the motion (1), at every step
-    imbalance: float  #: resultant of inertia and bushings in (1), over the greatest of the terms it is made of
+    rigid: Trajectory  #: the rigid motion (1) at every step
+    imbalance: float  #: resultant of inertia and bushing forces in (1), relative to the largest of its terms
 
 
 @dataclass(frozen=True, eq=False)
 class _Link:
-    """A bushing between the body and another, or between others; its columns over the unknowns."""
+    """A bushing between the body and another, or between two others, with its columns over the unknowns."""
 
     bushing: Bushing
     B: sp.csr_array  #: deformation x over (u, w_1, ...), (6, n)
-    interface: str  #: of the body; "": it does not touch it
+    interface: str  #: interface of the body; "" if the bushing does not act on it
     is_b: bool  #: whether the body is at marker B
 
 
@@ -146,7 +146,7 @@ def suspended_motion(
 
 
 def _placed(where: str, system: System, name: str) -> Array:
-    """Return where the frame of a body is placed, (3,); `ModelError` unless its axes are those of the ground."""
+    """Return the position of the frame of a body, (3,); `ModelError` unless its axes are the ground axes."""
     body = system.body(name)
     if np.abs(np.asarray(body.orientation) - [1, 0, 0, 0]).max() > ALIGNED:
         raise ModelError(f"{where}: body {name!r} is turned as placed; expected axes along those of the ground")
@@ -164,7 +164,7 @@ def _rigid_mass(where: str, system: System, name: str) -> Array:
 
 
 def _link(where: str, system: System, body: FEBody, name: str, free: Sequence[str], force: object) -> _Link | None:
-    """Return a bushing as columns over the unknowns; None where it joins bodies that move as given."""
+    """Return a bushing as columns over the unknowns; None if both of its bodies move as in (1)."""
     if not isinstance(force, Bushing):
         touched = [body_name(m.body) for m in vars(force).values() if isinstance(m, Marker)]
         if name in touched or set(touched) & set(free):
@@ -200,7 +200,7 @@ def _end(place: object) -> tuple[str, Marker | None]:
 
 
 def _point(where: str, system: System, body: FEBody, owner: str, marker: Marker | None, name: str) -> Array | None:
-    """Return where a marker is placed, ground axes, (3,); None where it is placed by the other one."""
+    """Return the position of a marker, ground axes, (3,); None if the other marker determines it."""
     if marker is None:
         return None
     if marker.triad is not None and np.abs(marker.triad - np.eye(3)).max() > ALIGNED:
@@ -224,7 +224,7 @@ def _boundary(body: FEBody, interface: str) -> IntArray:
 def _loads(
     body: FEBody, flexible: FlexibleBody, name: str, rigid: Trajectory, links: Sequence[_Link]
 ) -> tuple[Array, Array, float]:
-    """Return load columns over the dofs, (n_dof, k), their amplitudes, (n_t, k), and the imbalance."""
+    """Return the load columns over the dofs, (n_dof, k), their amplitudes, (n_t, k), and the imbalance."""
     frame, motion = flexible.reduced.frame, rigid.body(name)
     R = rotation_matrix(motion.p) @ frame.axes.T  # from mesh axes to the ground
     acceleration = np.einsum("tab,ta->tb", R, motion.v_dot)
@@ -267,7 +267,7 @@ def _wrench(flexible: FlexibleBody, name: str, rigid: Trajectory, link: _Link) -
 
 
 def _marker_path(rigid: Trajectory, flexible: FlexibleBody, link: _Link, name: str) -> Array:
-    """Return where the point of marker A goes, ground axes, (n_t, 3)."""
+    """Return the path of the point of marker A, ground axes, (n_t, 3)."""
     owner, marker = _end(link.bushing.marker_a)
     motion, body = rigid.body(owner), rigid.body(name)
     if marker is not None and marker.position is not None:

@@ -1,4 +1,4 @@
-"""A design: the system, its free parameters, what is wanted of it, and how the best is found."""
+"""A design: the system, its free parameters, the objectives and constraints, and the method."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,7 +15,7 @@ class DesignParameter:
 
     name: str
     paths: tuple[str, ...]
-    factors: tuple[float, ...]  #: of each path: the number there is the factor times the value of the parameter
+    factors: tuple[float, ...]  #: factor of each path: the number in the file is the factor times the parameter
     lower: float
     upper: float
     start: float
@@ -23,23 +23,23 @@ class DesignParameter:
 
 @dataclass(frozen=True, eq=False)
 class Quantity:
-    """What is taken from an evaluation, and what is wanted of it."""
+    """A number taken from an evaluation, and its goal or limits."""
 
     output: Output
-    analysis: str  #: from which it is taken
-    band: tuple[float, float] | None = None  #: of a frequency response, over which it is taken [Hz]
-    at: float | None = None  #: or the one frequency [Hz]
+    analysis: str  #: analysis that gives the number
+    band: tuple[float, float] | None = None  #: frequency band of a frequency response [Hz]
+    at: float | None = None  #: single frequency of a frequency response [Hz]
     weight: float = 1.0
-    sign: float = 1.0  #: of an objective that is to be small (1) or great (-1)
+    sign: float = 1.0  #: 1 to minimise an objective, -1 to maximise it
     target: float | None = None
-    times: Array | None = None  #: of a table, (n_t,) [s]
-    values: Array | None = None  #: of a table, (n_t,)
-    least: float | None = None  #: of a constraint
-    most: float | None = None  #: of a constraint
+    times: Array | None = None  #: times of a table, (n_t,) [s]
+    values: Array | None = None  #: values of a table, (n_t,)
+    least: float | None = None  #: lower limit of a constraint
+    most: float | None = None  #: upper limit of a constraint
 
     @property
     def is_fit(self) -> bool:
-        """Its deviation counts, not its size."""
+        """Whether the deviation from a target or table is minimised."""
         return self.target is not None or self.values is not None
 
 
@@ -53,19 +53,19 @@ class Design:
     workers: int | str | None
     iterations: int
     tolerance: float
-    combine: str  #: how objectives make F: sum, or largest
+    combine: str  #: how objectives are combined in F: sum, or largest
     differences: str
-    step: float  #: of differences, as a part of upper - lower
+    step: float  #: step of differences, relative to upper - lower
     population: int
     seed: int
     parameters: tuple[DesignParameter, ...]
     objectives: tuple[Quantity, ...]
     constraints: tuple[Quantity, ...]
-    tables: tuple[Path, ...]  #: files of the objectives
+    tables: tuple[Path, ...]  #: files of tables of the objectives
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """Objectives and constraints."""
+        """Objectives, followed by constraints."""
         return (*self.objectives, *self.constraints)
 
     def point(self, values: tuple[float, ...]) -> tuple[float, ...]:
@@ -74,11 +74,11 @@ class Design:
 
     @property
     def analyses(self) -> tuple[str, ...]:
-        """All analyses that quantities are taken from."""
+        """All analyses that the quantities need."""
         return tuple(dict.fromkeys(q.analysis for q in self.quantities))
 
     def study_of(self, analysis: str) -> Study:
-        """Return the study of one analysis with what is taken from it."""
+        """Return the study of one analysis with its outputs."""
         return replace(
             self.study, analysis=analysis, outputs=tuple(q.output for q in self.quantities if q.analysis == analysis)
         )

@@ -1,4 +1,4 @@
-"""One evaluation of a design: the numbers that objectives and constraints are made of, or why there are none."""
+"""One evaluation of a design: the values of objectives and constraints, or the reason why they do not exist."""
 
 import hashlib
 from collections.abc import Callable
@@ -45,8 +45,8 @@ __all__ = [
 # Numbers of frequency responses: the greatest amplitude in a band, the least, means, or that at one frequency.
 
 
-GRID = 120  #: frequencies evenly over a band, beside those about its resonances
-LIKELY = 0.8  #: of the best on the grid, from which on an extreme between its neighbours is looked at
+GRID = 120  #: number of equidistant frequencies in a band, in addition to those near its resonances
+LIKELY = 0.8  #: amplitude on the grid, relative to the best, from which an extreme between the neighbours is searched
 
 
 def response_number(quantity: Quantity, linear: LinearSystem, per_second: float) -> float:
@@ -95,7 +95,7 @@ def amplitude_of(quantity: Quantity, linear: LinearSystem, per_second: float) ->
 
 
 def extreme(amplitude: Callable[[Array], Array], f: Array, a: Array, sign: float) -> float:
-    """Return the greatest (sign 1) or least (-1) amplitude, looked for between the points of the grid too."""
+    """Return the largest (sign 1) or smallest (-1) amplitude, including extremes between the points of the grid."""
     from scipy.optimize import minimize_scalar
 
     best = float((sign * a).max())
@@ -115,12 +115,12 @@ def extreme(amplitude: Callable[[Array], Array], f: Array, a: Array, sign: float
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Values of the parameters and what came out."""
+    """Values of the parameters and the resulting numbers."""
 
-    values: tuple[float, ...]  #: of the parameters
+    values: tuple[float, ...]  #: values of the parameters
     numbers: tuple[tuple[float, ...], ...] = ()  #: of every objective and constraint: one, or one a time of its table
-    error: str = ""  #: why there are none
-    is_lasting: bool = True  #: another try would give the same; not so for a process that was killed
+    error: str = ""  #: reason why there are no numbers
+    is_lasting: bool = True  #: whether another attempt would give the same error; not so if the process was killed
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,7 @@ class EvaluationFunction:
         return Evaluation(values, tuple(numbers))
 
     def failed(self, values: tuple[float, ...], error: Exception) -> Evaluation:
-        """Return the evaluation that went wrong, its error in words."""
+        """Return a failed evaluation, with the text of its error."""
         words = str(error) if isinstance(error, ReportedError) else f"{type(error).__name__}: {error}"
         told = " ".join(words.split()) or type(error).__name__
         return Evaluation(values, error=told, is_lasting=not isinstance(error, ProcessError))
@@ -180,7 +180,7 @@ def numbers_of(quantity: Quantity, system: System, motion: Trajectory) -> tuple[
 
 
 def residuals(design: Design, evaluation: Evaluation) -> Array:
-    """Return the deviations of all objectives that are fits, (n_r,), each times its weight over sqrt(its number)."""
+    """Return the deviations of all fitted objectives, (n_r,), times weight / sqrt(number of deviations)."""
     parts = [np.zeros(0)]
     for q, numbers in zip(design.objectives, evaluation.numbers, strict=False):
         if q.is_fit:
@@ -190,7 +190,7 @@ def residuals(design: Design, evaluation: Evaluation) -> Array:
 
 
 def terms(design: Design, evaluation: Evaluation) -> Array:
-    """Return what the largest is made small of, (n,): +-weight times number, and weight times deviation either way."""
+    """Return the terms whose largest is minimised, (n,): +-weight * number, and +weight, -weight times deviation."""
     found: list[Array] = []
     for q, numbers in zip(design.objectives, evaluation.numbers, strict=False):
         if not q.is_fit:
@@ -214,7 +214,7 @@ def scalar(design: Design, evaluation: Evaluation) -> float:
 
 
 def violations(design: Design, evaluation: Evaluation) -> Array:
-    """Return g, (n_g,), which a permitted point has at or below zero, in units of the limit (of 1 for a limit of 0)."""
+    """Return g, (n_g,), in units of the limit (of 1 for a limit of 0); a permitted point has g <= 0."""
     g: list[float] = []
     for q, numbers in zip(design.constraints, evaluation.numbers[len(design.objectives) :], strict=True):
         if q.least is not None:
@@ -224,21 +224,22 @@ def violations(design: Design, evaluation: Evaluation) -> Array:
     return np.array(g)
 
 
-# the journal of an optimisation: every evaluation is a line, for a second call to go on with --------------------------
+# the journal of an optimisation has one line for each evaluation, so that a later call can continue
+# ---------------------
 
 
 KIND = "floatframe optimize journal 1"
 
 
 class Journal:
-    """A file to which evaluations are appended, and what it held when it was opened."""
+    """A file to which evaluations are appended, and its content when it was opened."""
 
     def __init__(self, journal: TaskJournal, known: dict[tuple[float, ...], Evaluation]) -> None:
         self.journal = journal
         self.known = known
 
     def append(self, evaluation: Evaluation) -> None:
-        """Write an evaluation; not one that another try may give."""
+        """Write an evaluation, unless another attempt may succeed."""
         if not evaluation.is_lasting:
             return
         self.journal.append({"values": evaluation.values, "numbers": evaluation.numbers, "error": evaluation.error})
@@ -246,7 +247,7 @@ class Journal:
 
 
 def open_journal(path: Path, design: Design, files: tuple[str, ...]) -> Journal:
-    """Return the journal at a path, new or with what it holds.
+    """Return the journal at a path, new or with its content.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The best values of the parameters of a design, by SciPy's methods, by workers, kept in a journal.
+"""Optimisation of the parameters of a design by SciPy's methods, with parallel evaluations and a journal.
 
 design = read_design("four_bar_fit.toml")
 best = optimize(design)                # best.values, best.numbers, best.history
@@ -33,7 +33,7 @@ from floatframe.errors import ModelError
 
 __all__ = ["Evaluated", "OptimizationResult", "optimize"]
 
-PERMITTED = 1e-6  #: violation of a limit, in units of it, that counts as none
+PERMITTED = 1e-6  #: largest violation of a limit, in units of the limit, that is permitted
 
 
 @dataclass(frozen=True)
@@ -41,21 +41,22 @@ class Evaluated:
     """A row of the history."""
 
     evaluation: Evaluation
-    objective: float  #: F, what is made small; NaN where the evaluation failed
-    violation: float  #: greatest of a limit, in units of it; 0 where all are kept, infinite where it failed
-    is_difference: bool  #: computed for a derivative only
-    is_known: bool  #: from the journal
+    objective: float  #: F, which is minimised; NaN where the evaluation failed
+    #: largest violation of a limit, in units of the limit; 0 if there is none, infinite where the evaluation failed
+    violation: float
+    is_difference: bool  #: whether it was computed only for a derivative
+    is_known: bool  #: whether it comes from the journal
 
 
 @dataclass(frozen=True, eq=False)
 class OptimizationResult:
-    """The best point, and the way to it."""
+    """The best point, and the history of the search."""
 
     design: Design
     best: Evaluated
     history: tuple[Evaluated, ...]
     is_converged: bool
-    message: str  #: of the method, why it ended
+    message: str  #: reason why the method ended
 
     @property
     def values(self) -> dict[str, float]:
@@ -64,17 +65,17 @@ class OptimizationResult:
 
     @property
     def numbers(self) -> dict[str, float]:
-        """What objectives and constraints are at the best point, by name; of a table the rms deviation from it."""
+        """Objectives and constraints at the best point, by name; for a table, the rms deviation from it."""
         return numbers_by_name(self.design, self.best.evaluation)
 
     @property
     def n_computed(self) -> int:
-        """Evaluations that were made in this call, not found in the journal."""
+        """Number of evaluations computed in this call, not found in the journal."""
         return sum(not row.is_known for row in self.history)
 
     @property
     def n_failed(self) -> int:
-        """Evaluations without result."""
+        """Number of failed evaluations."""
         return sum(bool(row.evaluation.error) for row in self.history)
 
 
@@ -138,7 +139,7 @@ def optimize(
 
 
 def best_of(design: Design, history: Sequence[Evaluated]) -> Evaluated:
-    """Return the row with the smallest F of those that keep all limits; `ModelError` if there is none."""
+    """Return the row with the smallest F among those that satisfy all limits; `ModelError` if there is none."""
     kept = [row for row in history if not row.is_difference and row.violation <= PERMITTED]
     if not kept:
         nearest = min(history, key=lambda row: row.violation)
@@ -151,7 +152,7 @@ def best_of(design: Design, history: Sequence[Evaluated]) -> Evaluated:
 
 
 def values_of(design: Design, values: Iterable[float]) -> str:
-    """Return values of the parameters in words."""
+    """Return values of the parameters as text."""
     return ", ".join(f"{p.name} = {value:.6g}" for p, value in zip(design.parameters, values, strict=True))
 
 
@@ -178,7 +179,7 @@ class Evaluator:
         self.history: list[Evaluated] = []
 
     def scaled_start(self) -> Array:
-        """Return z of the start."""
+        """Return the scaled point z of the start."""
         start = np.array([p.start for p in self.design.parameters])
         return (start - self.lower) / (self.upper - self.lower)
 
@@ -206,7 +207,7 @@ class Evaluator:
         return np.clip(self.lower + z * (self.upper - self.lower), self.lower, self.upper)
 
     def compute(self, values: list[tuple[float, ...]]) -> list[Evaluation]:
-        """Return new evaluations, each in the journal as soon as it is known."""
+        """Return new evaluations; each is written to the journal as soon as it is known."""
         keep: Callable[[Evaluation], None] = (lambda _: None) if self.journal is None else self.journal.append
         return self.tasks.map(
             self.function, values, failed=self.function.failed, done=lambda _, evaluation: keep(evaluation),
@@ -250,7 +251,7 @@ class Evaluator:
 
 
 def least_squares_of(evaluator: Evaluator, start: Array) -> tuple[bool, str]:
-    """Make the sum of squares of all deviations small in trust regions; a failed trial shrinks its region."""
+    """Minimise the sum of squares of all deviations by a trust-region method; a failed trial shrinks the region."""
     from scipy.optimize import least_squares
 
     design = evaluator.design
@@ -269,12 +270,12 @@ def least_squares_of(evaluator: Evaluator, start: Array) -> tuple[bool, str]:
 
 
 def inside(z: Array) -> Array:
-    """Return a point that is not on a bound, where a method of interior points cannot begin."""
+    """Return a point that is not on a bound, because an interior-point method cannot start there."""
     return np.clip(z, 1e-10, 1.0 - 1e-10)
 
 
 def minimum_of(evaluator: Evaluator, start: Array) -> tuple[bool, str]:
-    """Make F small within limits by gradients; a failed trial is worse than all seen so far and breaks every limit.
+    """Minimise F within limits by gradients; a failed trial counts as worse than all others, and violates every limit.
 
     The largest of several terms has kinks: there s is made small with all terms of the objectives at or below it, s a
     further unknown behind z, both in units of F at the start.

@@ -293,7 +293,7 @@ def test_bad_input_is_told():
     refused("take turn.0", parameters=["bodies.rod.orientation.0"])
     refused("no such sensor", of=["xx x"])
     refused("no column", of=["x w"])
-    refused("sum over the whole motion", of=["energy work"])
+    refused("integral over the whole motion", of=["energy work"])
     refused("no method 'adjoined'", method="adjoined")
     refused("no analysis 'runs'", analysis="runs")
     refused("needs t_end and h", h=None)
@@ -307,7 +307,7 @@ def test_bad_input_is_told():
     )
     refused("a force jumps at t = 0.005", made=replace(system, forces=(*system.forces, jump)))
     free = replace(crank(), forces=())
-    refused("one of many", of=["frequency 1"], analysis="eig", made=free)
+    refused("is not unique", of=["frequency 1"], analysis="eig", made=free)
 
 
 @pytest.mark.parametrize("path", ["run.h", "run.t_end", "outputs.tip.position.0", "scene.0.color"])

@@ -127,7 +127,7 @@ def test_unknowns_of_a_pseudo_inertia_come_back():
 def test_what_a_motion_does_not_tell_is_named(robot):
     form, samples, phi = robot
     still = tree_samples(form.system, samples.x, 0 * samples.rate, 0 * samples.acceleration)
-    with pytest.raises(ModelError, match=r"does not tell .* J_zz\(link1\)"):
+    with pytest.raises(ModelError, match=r"does not determine .* J_zz\(link1\)"):
         estimate(form, Measured(still, form.torques(still) @ phi))
     few = tree_samples(form.system, samples.x[:5], samples.rate[:5], samples.acceleration[:5])
     with pytest.raises(ModelError, match="measure longer"):
