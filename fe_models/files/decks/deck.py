@@ -1,7 +1,7 @@
-"""What a deck says, whatever its program: mesh, materials, sections, attachments, couplings, supports, loads, ledger.
+"""The content of a deck of any program: mesh, materials, sections, attachments, couplings, supports, loads, ledger.
 
-Nodes are named by groups of the mesh (`RawMesh.node_sets`): readers add the groups that a deck leaves unnamed, such as
-`node_17` or `rbe2_5`, so that a job can name whatever the deck names by number.
+Nodes are referred to by groups of the mesh (`RawMesh.node_sets`). Readers add groups such as `node_17` or `rbe2_5` for
+what the deck refers to by number, so that a job can name it.
 """
 
 from collections.abc import Mapping
@@ -33,7 +33,7 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class DeckMaterial:
-    """A linear material, isotropic or orthotropic; what the deck does not say is None."""
+    """A linear material, isotropic or orthotropic. Constants that the deck does not give are None."""
 
     name: str
     young: float | Vector | None = None  #: three: orthotropic, E_1, E_2, E_3
@@ -63,7 +63,7 @@ class DeckLayer:
     material: str
     thickness: float
     angle: float = 0.0  #: of axis 1 of its material from the direction of the layup, about the normal [degree]
-    orientation: str = ""  #: name of axes, or an angle as the deck writes it; while a deck is read
+    orientation: str = ""  #: name of axes or an angle, as written in the deck; used only while the deck is read
 
 
 @dataclass(frozen=True)
@@ -74,16 +74,16 @@ class ShellSection:
     material: str  #: empty: each of the layers has its own
     thickness: float  #: of all layers
     offset: float = 0.0  #: of the middle surface from the nodes, along the normal
-    added_mass: float = 0.0  #: mass per area without stiffness
+    added_mass: float = 0.0  #: additional mass per area
     layers: tuple[DeckLayer, ...] = ()  #: bottom to top
-    direction: Vector = (1.0, 0.0, 0.0)  #: projected on the shell, angle 0 of layers
-    orientation: str = ""  #: name of the axes of its material; while a deck is read
-    bending_ratio: float = 1.0  #: stiffness in bending over that of the material and thickness
-    shear_ratio: float = 1.0  #: stiffness in transverse shear, likewise
+    direction: Vector = (1.0, 0.0, 0.0)  #: its projection onto the shell is angle 0 of the layers
+    orientation: str = ""  #: name of the axes of the material; used only while the deck is read
+    bending_ratio: float = 1.0  #: bending stiffness divided by that of the material and thickness
+    shear_ratio: float = 1.0  #: transverse shear stiffness divided by that of the material and thickness
 
     @property
     def materials(self) -> tuple[str, ...]:
-        """Of the layers, or the one."""
+        """Names of the materials of the layers, or of the one material."""
         return tuple(layer.material for layer in self.layers) or (self.material,)
 
 
@@ -98,12 +98,12 @@ class LineSection:
     offset: tuple[float, float] = (0.0, 0.0)
     shear: bool = True
     rotary_inertia: bool = True
-    added_mass: float = 0.0  #: per length
+    added_mass: float = 0.0  #: additional mass per length
 
 
 @dataclass(frozen=True)
 class RodSection:
-    """Lines that carry force along themselves only (trusses)."""
+    """Lines with axial force only (trusses)."""
 
     group: str
     material: str
@@ -112,7 +112,7 @@ class RodSection:
 
 @dataclass(frozen=True)
 class DeckMass:
-    """A rigid piece on each node of a group."""
+    """A point mass with inertia at each node of a group."""
 
     nodes: str
     mass: float
@@ -122,13 +122,13 @@ class DeckMass:
 
 @dataclass(frozen=True)
 class DeckSpring:
-    """A spring between two nodes, each named by a group of one."""
+    """A spring between two nodes; each is a group of one node."""
 
     nodes: tuple[str, str]
     stiffness: tuple[float, ...]  #: along and about x, y, z of the triad
     damping: tuple[float, ...] | None = None
     triad: tuple[Vector, Vector, Vector] | None = None  #: rows: its axes in basic axes; None: basic axes
-    point: Vector | None = None  #: where it acts; None: midway between its nodes
+    point: Vector | None = None  #: point at which it acts; None: midway between its nodes
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ class RigidGroup:
     """Nodes that move rigidly with one node (RBE2, *RIGID BODY, *KINEMATIC COUPLING, *MPC BEAM)."""
 
     name: str
-    node: str  #: group of the node that leads
+    node: str  #: group of the leading node
     followers: str
     components: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
 
@@ -154,25 +154,25 @@ class Coupling:
 
 @dataclass(frozen=True)
 class Equation:
-    """Σ coefficient × component of a node = 0; the first term gives way (*EQUATION, MPC)."""
+    """Σ coefficient × component of a node = 0; the first component is eliminated (*EQUATION, MPC)."""
 
     terms: tuple[tuple[str, int, float], ...]  #: group of one node, component 0-5, coefficient
 
 
 @dataclass(frozen=True)
 class Support:
-    """Components that the deck holds at the nodes of a group, or keeps as the boundary of a superelement."""
+    """Components that are held at the nodes of a group, or kept as the boundary of a superelement."""
 
     name: str
     nodes: str
     components: tuple[int, ...]
     is_boundary: bool = False
-    axes: tuple[Vector, Vector, Vector] | None = None  #: rows: along which they are held; None: basic axes
+    axes: tuple[Vector, Vector, Vector] | None = None  #: rows: directions of the components; None: basic axes
 
 
 @dataclass(frozen=True)
 class Load:
-    """One load: forces at nodes, a pressure on faces, or gravity; each has the keys of its kind and no others."""
+    """One load: forces at nodes, a pressure on faces, or gravity. Only the fields of its kind are set."""
 
     name: str
     forces: Mapping[str, tuple[float, ...]] | None = None  #: group -> force and moment at each of its nodes, (6,)
@@ -183,7 +183,7 @@ class Load:
 
 @dataclass(frozen=True, eq=False)
 class Deck:
-    """A whole deck, and the ledger of what is not in it."""
+    """A whole deck, and the ledger of what was not converted."""
 
     path: Path
     program: str
@@ -203,4 +203,4 @@ class Deck:
     rods: tuple[RodSection, ...] = ()
     plane: int | None = None  #: axis across the plane in which the deck holds all of its points; None: space
     lumped: frozenset[str] = frozenset()  #: kinds of elements whose mass the program lumps: "lines", "shells", "rods"
-    is_plain_mesh: bool = False  #: nodes, elements and their sets alone, such as a mesher writes
+    is_plain_mesh: bool = False  #: only nodes, elements and their sets, as a mesher writes them

@@ -1,4 +1,4 @@
-"""Equations between components of nodes in basic axes: those of nodes with axes of their own are solved together."""
+"""Equations between components of nodes in basic axes. Equations of a node with its own axes are solved together."""
 
 from collections.abc import Iterable
 
@@ -7,20 +7,20 @@ from scipy.linalg import qr
 
 __all__ = ["Row", "solved_equations"]
 
-NEGLIGIBLE = 1e-14  #: part of the largest coefficient below which a term is none
+NEGLIGIBLE = 1e-14  #: coefficients smaller than this, relative to the largest one, are zero
 Row = dict[tuple[int, int], float]  #: (node, component in basic axes) -> coefficient; the sum of all is zero
 
 
 def solved_equations(rows: Iterable[tuple[tuple[int, int], Row]]) -> tuple[list[Row], list[tuple[int, int]]]:
-    """Return equations that each give away their first component, and (node, count) of those that cannot.
+    """Return equations whose first component can be eliminated, and (node, count) of those that have none.
 
-    Equations whose first terms were components of one node along its own axes are solved together for as many of its
-    components in basic axes, those that are determined best, so that these give way.
+    The first terms of some equations are components of one node along its own axes. These equations are solved together
+    for as many components of the node in basic axes. Pivoting chooses the components that are determined best.
 
     Parameters
     ----------
     rows
-        (node, 0 for its translations or 3 for its rotations) that gives way, and the equation.
+        (node, 0 for its translations or 3 for its rotations) to be eliminated, and the equation.
     """
     together: dict[tuple[int, int], list[Row]] = {}
     for lead, row in rows:

@@ -1,4 +1,4 @@
-"""The ledger of a deck: every card or keyword that is not taken over, how often it stands there, and what follows."""
+"""The ledger of a deck: every card or keyword that is not converted, its count, and the consequence."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -16,13 +16,13 @@ class Entry:
     name: str
     consequence: str
     count: int = 0
-    is_body: bool = False  #: whether it carries mass or stiffness: then it may not be left out unasked
+    is_body: bool = False  #: whether it carries mass or stiffness; it is then left out only on request
     first_line: int = 0
 
 
 @dataclass
 class Ledger:
-    """All entries of a deck, by name and consequence, in the order of their first appearance."""
+    """All entries of a deck by name and consequence, in order of their first appearance."""
 
     where: str
     entries: dict[tuple[str, str], Entry] = field(default_factory=dict)
@@ -32,7 +32,7 @@ class Ledger:
         self._add(name, consequence, count, line, False)
 
     def refuse(self, name: str, consequence: str, *, count: int = 1, line: int = 0) -> None:
-        """Count something that carries mass or stiffness and cannot be taken over."""
+        """Count something that carries mass or stiffness and cannot be converted."""
         self._add(name, consequence, count, line, True)
 
     def _add(self, name: str, consequence: str, count: int, line: int, is_body: bool) -> None:
@@ -44,12 +44,12 @@ class Ledger:
         return [(entry.name, str(entry.count), entry.consequence) for entry in self.entries.values()]
 
     def require_whole(self, leave_out: Iterable[str] = ()) -> None:
-        """Raise unless everything that carries mass or stiffness is taken over, or the user leaves it out by name.
+        """Raise unless everything that carries mass or stiffness is converted, or left out by name on request.
 
         Raises
         ------
         MeshError
-            With name and count of each; or if a name to leave out is not in the ledger.
+            If something is missing, with name and count of each; or if a name to leave out is not in the ledger.
         """
         body = [entry for entry in self.entries.values() if entry.is_body]
         names = {entry.name.upper(): entry.name for entry in body}

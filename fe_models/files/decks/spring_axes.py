@@ -9,7 +9,7 @@ __all__ = ["as_triad", "axes_along"]
 
 
 def axes_along(x: Array) -> Array:
-    """Return axes of which the first is along x, (3, 3), rows. x must have a length; the other two are any."""
+    """Return axes whose first one is along x, (3, 3), rows. x must not be zero; the other two are arbitrary."""
     x = x / np.linalg.norm(x)
     y = np.cross(x, np.eye(3)[int(np.argmin(np.abs(x)))])
     y = y / np.linalg.norm(y)

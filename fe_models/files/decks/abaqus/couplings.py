@@ -16,7 +16,7 @@ __all__ = ["equations_in_basic_axes", "read_coupling", "surface_nodes"]
 
 
 def read_coupling(here: str, block: DeckBlock, draft: Draft) -> None:
-    """Take one block that couples nodes."""
+    """Read one block that couples nodes."""
     keyword, given = block.keyword, block.parameters
     if keyword == "EQUATION" and "REMOVE" in given:
         draft.ledger.note("*EQUATION, REMOVE", "constraints change between steps; those of the model are taken")
@@ -67,8 +67,8 @@ def equations_in_basic_axes(draft: Draft) -> None:
 
     (1) a component of a node with axes R of its own, or those of its instance, is R[c] · u; terms of the same component
         are added
-    (2) equations of which the first terms are components of one such node are solved together for as many of its
-        components in basic axes, those that are determined best, so that these give way
+    (2) equations whose first terms are components of one such node are solved together for as many of its components in
+        basic axes; these are eliminated
     """
     turned: list[tuple[tuple[int, int], Row]] = []
     for terms, of_instance in draft.raw_equations:
@@ -93,7 +93,7 @@ def equations_in_basic_axes(draft: Draft) -> None:
 
 
 def _keep(draft: Draft, row: Row) -> None:
-    """Add one equation; terms that vanish are left out, but for the first."""
+    """Add one equation without its zero terms; the first term stays."""
     terms = [
         (draft.node_group(draft.where, [node]), c, float(a))
         for k, ((node, c), a) in enumerate(row.items())

@@ -1,4 +1,4 @@
-"""A deck of Abaqus or CalculiX while it is read: what its blocks have said so far."""
+"""A deck of Abaqus or CalculiX while it is read: the content of its blocks so far."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -46,7 +46,7 @@ class PointElements:
 
 @dataclass
 class Draft:
-    """What the blocks of a deck have said so far."""
+    """Content of the blocks of a deck that have been read so far."""
 
     where: str
     program: str

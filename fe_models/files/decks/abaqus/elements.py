@@ -1,4 +1,4 @@
-"""Element types of Abaqus and CalculiX: how each program integrates them, and elements of points."""
+"""Element types of Abaqus and CalculiX: integration in each program, and elements at points."""
 
 import numpy as np
 
@@ -58,7 +58,7 @@ _FACES: dict[str, dict[int, tuple[int, ...]]] = {
 
 
 def read_element(here: str, block: DeckBlock, draft: Draft) -> None:
-    """Keep elements of points; those of the mesh are read already."""
+    """Read elements at points (masses, springs); those of the mesh have been read before."""
     name = block.parameters["TYPE"].upper()
     if name in _POINTS:
         n = _POINTS[name]

@@ -29,11 +29,11 @@ _PLANAR = {
     "CPE": "plane strain: a body that goes on without end across its plane; only plane stress (CPS) is a body",
     "CAX": "axisymmetric: a body of revolution; mesh it in space",
 }
-ALONG = 1e-9  #: part of a vector across a line, below which it is along it
+ALONG = 1e-9  #: a vector is along a line if its part across is smaller than this, relative to its length
 
 
 def read_section(here: str, block: DeckBlock, draft: Draft) -> None:
-    """Take one block that gives elements or nodes their properties."""
+    """Read one block with properties of elements or nodes."""
     makers = {
         "SOLID SECTION": _solid_section,
         "SHELL SECTION": _shell_section,
@@ -60,7 +60,7 @@ def read_section(here: str, block: DeckBlock, draft: Draft) -> None:
 
 
 def _of_set(here: str, block: DeckBlock, draft: Draft) -> tuple[str, dict[tuple[str, str], IntArray]]:
-    """Return the spelling of the element set of a section, and its elements by type."""
+    """Return the name of the element set of a section as written, and its elements by type."""
     word = block.parameters.get("ELSET", "")
     elements = draft.elements_of(here, word)
     draft.sectioned.append(elements)
@@ -97,7 +97,7 @@ def _solid_section(here: str, block: DeckBlock, draft: Draft) -> None:
 
 
 def _sheet(name: str, kind: str, block: DeckBlock, draft: Draft, elements: IntArray) -> None:
-    """Take plane stress elements as membranes of a planar body; their thickness is 1 where none is given."""
+    """Read plane stress elements as membranes of a planar body. The default thickness is 1."""
     thickness = (numbers(block.lines[0])[0] if block.lines else 0.0) or 1.0
     group = draft.cell_group(name if not draft.sheets else f"{name}_{kind}", elements)
     draft.sheets.append(group)
@@ -107,7 +107,7 @@ def _sheet(name: str, kind: str, block: DeckBlock, draft: Draft, elements: IntAr
 
 
 def _rods(name: str, block: DeckBlock, draft: Draft, elements: IntArray) -> None:
-    """Take the area of trusses; CalculiX and Abaqus both have 1 where none is given."""
+    """Read the area of trusses. Its default is 1 in both programs."""
     area = numbers(block.lines[0])[0] if block.lines else 1.0
     draft.rods.append(RodSection(draft.cell_group(name, elements), _material_of(block, draft), area))
 
@@ -241,7 +241,7 @@ def _cowper(a: float, b: float, nu: float) -> float:
 def _known(
     draft: Draft, types: dict[tuple[str, str], IntArray], kinds: tuple[str, ...], first: str, block: DeckBlock
 ) -> IntArray:
-    """Return the numbers of elements of these kinds; count the others."""
+    """Return the numbers of elements of these kinds; refuse the others."""
     kept = [np.zeros(0, np.int64)]
     for (name, kind), elements in types.items():
         if kind in kinds and name.startswith(first):
@@ -252,7 +252,7 @@ def _known(
 
 
 def _material_of(block: DeckBlock, draft: Draft) -> str:
-    """Return the name of the material of a section as its own table spells it."""
+    """Return the name of the material of a section as written at *MATERIAL."""
     wanted = block.parameters.get("MATERIAL", "").strip('"')
     return next((name for name in draft.materials if name.upper() == wanted.upper()), wanted)
 
@@ -268,7 +268,7 @@ def _masses(here: str, block: DeckBlock, draft: Draft) -> None:
 
 
 def _springs(here: str, block: DeckBlock, draft: Draft) -> None:
-    """Take springs and dashpots: along the line of two nodes (A), of one component of one node (1) or of two (2)."""
+    """Read springs and dashpots: along the line of two nodes (A), or of one component of one (1) or two nodes (2)."""
     of_set = draft.points_of(block.parameters.get("ELSET", ""))
     if of_set is None:
         return
@@ -315,7 +315,7 @@ def _to_ground(block: DeckBlock, draft: Draft, of_set: PointElements) -> None:
 
 
 def _component_springs(here: str, block: DeckBlock, draft: Draft, of_set: PointElements) -> None:
-    """Take springs between the same component of two nodes, whose forces balance.
+    """Read springs between the same component of two nodes, if their forces balance.
 
     Two forces along an axis balance on one line only: the nodes are at one place, or apart along this axis. Two moments
     always do.

@@ -1,4 +1,4 @@
-"""Whole decks of Abaqus and CalculiX: what `DeckMesh` is to the mesh, `Deck` is to the model."""
+"""Whole decks of Abaqus and CalculiX: the model around the mesh, which `fe_models.files.abaqus` reads."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -69,7 +69,7 @@ _SILENT = ("STEP", "END STEP", "ENDSTEP", "NO ANALYSIS")
 
 
 def read_abaqus_deck(path: Path, data: bytes, *, program: str = "calculix") -> Deck:
-    """Return what a deck of Abaqus or CalculiX says.
+    """Return the content of a deck of Abaqus or CalculiX.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def read_abaqus_deck(path: Path, data: bytes, *, program: str = "calculix") -> D
 
 
 def _take(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
-    """Hand one block to its reader, or count it in the ledger."""
+    """Call the reader of one block, or count the block in the ledger."""
     keyword = block.keyword
     if keyword == "ELEMENT":
         read_element(here, block, draft)
@@ -171,7 +171,7 @@ def _check_plane(draft: Draft) -> None:
 
 
 def _finished(path: Path, draft: Draft) -> Deck:
-    """Return the deck of a draft whose blocks are all taken."""
+    """Return the deck of a draft after all blocks have been read."""
     equations_in_basic_axes(draft)
     ellipses_in_numbers(draft)
     sections_by_thickness(draft)

@@ -1,4 +1,4 @@
-"""Whole decks of ANSYS as CDWRITE writes them (.cdb): blocks of nodes, elements and components, and the commands."""
+"""Whole decks of ANSYS, as written by CDWRITE (.cdb): blocks of nodes, elements and components, and commands."""
 
 import re
 from collections.abc import Iterator
@@ -52,7 +52,7 @@ OTHER_LABELS = (
 
 @dataclass
 class _Draft:
-    """What the file has said so far."""
+    """Content of the file that has been read so far."""
 
     where: str
     ledger: Ledger
@@ -73,7 +73,7 @@ class _Draft:
 
 
 def read_cdb_deck(path: Path, data: bytes) -> Deck:
-    """Return what a .cdb file says: solids 185, 186, 187, materials, components, supports, forces.
+    """Return the content of a .cdb file: solids and shells, materials, components, supports, forces.
 
     Raises
     ------
@@ -178,7 +178,7 @@ BLOCKS = {"NBLOCK": _nodes, "EBLOCK": _elements, "CMBLOCK": _component, "SECBLOC
 
 
 def _command(name: str, words: list[str], draft: _Draft, line: int) -> None:
-    """Take one command, or count it."""
+    """Read one command, or count it in the ledger."""
     if name == "ET" and len(words) > 2 and words[1].isdigit():
         draft.kinds[int(words[1])] = int(re.sub(r"\D", "", words[2]))
     elif name == "MPDATA" and len(words) > 6:  # MPDATA,R5.0, 1,EX  ,       1, 1, value, value, value
@@ -338,7 +338,7 @@ def _plain_type(draft: _Draft, number: int) -> bool:
 
 
 def _integration(draft: _Draft, number: int, kind: int) -> str:
-    """Return the integration that KEYOPT of an element type chooses, empty for the usual one; others are refused."""
+    """Return the integration chosen by KEYOPT of an element type, empty for the default; refuse others."""
     chosen = ""
     for key, value in draft.keyopts.get(number, {}).items():
         known = KEYOPTS[kind].get(key, {0: ""})
@@ -384,7 +384,7 @@ def _material(draft: _Draft, number: int, tables: dict[str, dict[int, float]], i
 
 
 def _shape(where: str, kind: int, row: list[int]) -> tuple[str, list[int]]:
-    """Return the cell of an element and its nodes; equal nodes of a brick make it another one."""
+    """Return the cell of an element and its nodes. A brick with equal nodes is another cell."""
     n = row[COLUMNS:]
     if kind == 187 and len(n) >= 10:
         return "tetra10", n[:10]

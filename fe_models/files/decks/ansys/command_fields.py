@@ -1,4 +1,4 @@
-"""The commands of ANSYS that a .cdb file may hold: what is read of each field.
+"""The commands of ANSYS in a .cdb file, and which of their fields are read.
 
 `COMMANDS` lists every command that is read, field by field, in the symbols of `fe_models.files.decks.field_table`;
 `COLUMNS` the columns of an element in EBLOCK. Commands that say nothing about the body stand on `HARMLESS`; others are
@@ -43,7 +43,7 @@ def fields_of_command(name: str) -> tuple[TableField, ...]:
 
 
 def check_command(name: str, words: list[str], ledger: Ledger, line: int) -> None:
-    """Put into the ledger the fields of a command that are not taken over; `words[0]` is its name."""
+    """Add fields of a command that are not converted to the ledger; `words[0]` is its name."""
     fields = fields_of_command(name)
     for item in fields:
         word = words[item.number] if item.number < len(words) else ""
@@ -62,7 +62,7 @@ def check_command(name: str, words: list[str], ledger: Ledger, line: int) -> Non
 
 
 def check_columns(row: list[int], ledger: Ledger) -> None:
-    """Refuse an element of EBLOCK with a column that is not taken over."""
+    """Refuse an element of EBLOCK that uses a column which is not converted."""
     for item in parse_fields(COLUMNS.split()):
         value = row[item.number - 1]
         if item.use == "default" and not has_default(str(value), item.default):

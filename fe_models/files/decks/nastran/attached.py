@@ -22,7 +22,7 @@ _FACED = {"CTETRA": ("tetra", 4), "CPENTA": ("wedge", 6), "CHEXA": ("hexahedron"
 
 
 def read_attached(model: NastranModel) -> None:
-    """Take what is attached to grid points, what couples them, what holds and what loads them."""
+    """Read masses, springs, rigid elements, constraints, supports and loads of grid points."""
     for card in model.of("CONM2"):
         _mass(model, card)
     _scalar_masses(model)
@@ -56,9 +56,9 @@ def _mass(model: NastranModel, card: Card) -> None:
 
 
 def _mass_matrix(model: NastranModel, card: Card) -> None:
-    """CONM1: a mass matrix that is one of a rigid piece, along axes of CID; others are refused.
+    """CONM1: the mass matrix of a rigid piece in the axes of CID; other matrices are refused.
 
-    With v_c = v + omega × r the piece has M_tt = m, M_rt = m [r]×, M_rr = J - m [r]× [r]×.
+    With v_c = v + omega × r, the piece has M_tt = m, M_rt = m [r]×, M_rr = J - m [r]× [r]×.
     """
     node = card.integer(2)
     axes = model.system(card, card.integer(3, 0), model.point(card, node))
@@ -134,7 +134,7 @@ def _rigid(model: NastranModel, card: Card) -> None:
 def _rigid_rows(
     model: NastranModel, card: Card, leader: int, node: int, components: tuple[int, ...]
 ) -> list[tuple[tuple[int, int], Row]]:
-    """Return an equation for each component of a point, along its own axes, that follows another one rigidly.
+    """Return an equation for each component, along the axes of a point, that follows another point rigidly.
 
     e · u = e · (u_L + theta_L × r) = e · u_L + theta_L · (r × e), and e · theta = e · theta_L.
     """
@@ -151,7 +151,7 @@ def _rigid_rows(
 
 
 def _rod_of_constant_length(model: NastranModel, card: Card) -> None:
-    """RROD: the distance of two grid points stays; one component of one of them, CMA or CMB, gives way."""
+    """RROD: the distance of two grid points is constant; one component of one of them, CMA or CMB, is eliminated."""
     ends = [card.integer(2), card.integer(3)]
     x = model.point(card, ends[1]) - model.point(card, ends[0])
     words = [card.text(k) or "0" for k in (4, 5)]
@@ -223,7 +223,7 @@ def _weights(card: Card, words: list[str]) -> dict[int, Array]:
 
 
 def _equations(model: NastranModel) -> None:
-    """MPC of the sets that the case control selects; of all sets where there is no case control."""
+    """Read MPC of the sets that the case control selects, or of all sets if there is no case control."""
     chosen = selected_sets(model, "MPC")
     found = []
     for card in model.of("MPC"):
@@ -243,7 +243,7 @@ def _equations(model: NastranModel) -> None:
             for node, c, a in terms
             if a and uses[node] == 1 and node not in attached and c not in model.held.get(node, set())
         }
-        if loose:  # the equation only says how this point moves
+        if loose:  # the equation only determines the motion of this point
             why = f"only says how a point of no element moves ({min(loose)}): it does not restrict the body"
             model.ledger.note("MPC", why)
         else:
@@ -283,7 +283,7 @@ def _add_row(model: NastranModel, terms: list[tuple[int, int, float]]) -> None:
 
 
 def _close_equations(model: NastranModel) -> None:
-    """Make the equations of the deck from their rows in basic axes."""
+    """Convert the rows in basic axes to the equations of the deck."""
     made, refused = solved_equations(model.rows)
     for node, count in refused:
         why = f"equations that say more of a grid point (first: {node}) than its components, or the same twice"
@@ -293,7 +293,7 @@ def _close_equations(model: NastranModel) -> None:
 
 
 def _loads(model: NastranModel) -> None:
-    """Forces and moments by their set, gravity, pressure on solids; other loads are counted."""
+    """Read forces and moments by their set, gravity, and pressure on solids; count other loads in the ledger."""
     forces: dict[int, dict[str, Array]] = {}
     attached = _attached_points(model) | {node for row in model.plain_rows for node, _ in row}
     attached |= {node for _, row in model.rows for node, _ in row}
@@ -332,7 +332,7 @@ def _loads(model: NastranModel) -> None:
 
 
 def _untaken(card: Card, solid: Card | None) -> str:
-    """Return why a PLOAD4 is no uniform pressure along the normal of one face of a solid; empty where it is."""
+    """Return why a PLOAD4 is not a uniform pressure along the normal of one face of a solid, or an empty text."""
     if solid is None:
         return "pressure on shells or on elements that are not there"
     if any(card.text(k) and card.real(k) != card.real(3) for k in (4, 5, 6)):

@@ -16,11 +16,11 @@ __all__ = ["BARS", "OFFSETS", "line_of_ends", "orientation_of", "read_bars", "wi
 BARS = ("CBAR", "CBEAM")
 ORIENTATION, OFFT = (5, 6, 7), 8
 OFFSETS = ((11, 12, 13), (14, 15, 16))  #: of ends A and B
-SAME = 1e-9  #: part of a length below which offsets are equal
+SAME = 1e-9  #: offsets are equal if they differ by less than this, relative to the length of the bar
 
 
 def with_defaults(model: NastranModel) -> None:
-    """Put BAROR and BEAMOR into the blank fields of CBAR and CBEAM: property, orientation, OFFT."""
+    """Fill blank fields of CBAR and CBEAM from BAROR and BEAMOR: property, orientation, OFFT."""
     for name, source in (("CBAR", "BAROR"), ("CBEAM", "BEAMOR")):
         defaults = model.of(source)
         if not defaults:
@@ -42,7 +42,7 @@ def _filled(card: Card, default: Card) -> Card:
 
 
 def read_bars(model: NastranModel, known: Card, cards: list[Card]) -> None:
-    """Take bars of one property: a group for each orientation and offset.
+    """Read bars of one property, with a group for each orientation and offset.
 
     (1) axes of the element: x from GA to GB, y towards the orientation vector in plane 1, z
     (2) an offset that is the same at both ends and across the bar belongs to the section; any other one makes a node

@@ -1,4 +1,4 @@
-"""The cards of Nastran that a whole deck may hold: what is read of each field, and which cards do not touch the body.
+"""The cards of a whole deck of Nastran: which fields are read, and which cards do not affect the body.
 
 `CARDS` lists every card that is read, field by field in the order of the Quick Reference Guide, in the symbols of
 `fe_models.files.decks.field_table`.

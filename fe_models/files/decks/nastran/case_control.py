@@ -1,4 +1,4 @@
-"""The case control of a deck of Nastran, and its parameters: which sets and matrices count for the body."""
+"""The case control of a deck of Nastran, and its parameters: which sets and matrices belong to the body."""
 
 import re
 from collections.abc import Iterable
@@ -18,15 +18,15 @@ PARAMETER = re.compile(r"(?im)^[ \t]*PARAM[ \t]*,[ \t]*([A-Z0-9_]+)[ \t]*,[ \t]*
 
 @dataclass(frozen=True)
 class CaseControl:
-    """What stands between CEND and BEGIN BULK."""
+    """Content between CEND and BEGIN BULK."""
 
-    chosen: dict[str, set[int]]  #: "SPC", "MPC" -> sets that subcases select, 0 for a subcase without one
-    has_temperature: bool  #: whether a temperature is selected, which materials may depend on
-    adding: tuple[str, ...]  #: commands of `ADDING`, as they stand there
+    chosen: dict[str, set[int]]  #: "SPC", "MPC" -> selected sets of all subcases, 0 for a subcase without one
+    has_temperature: bool  #: whether a temperature for materials is selected
+    adding: tuple[str, ...]  #: commands of `ADDING`, as written
     parameters: tuple[Card, ...]
 
     def check(self, ledger: Ledger) -> None:
-        """Refuse commands that add mass, stiffness or damping; name modal damping, which is left out."""
+        """Refuse commands that add mass, stiffness or damping. Modal damping is left out, with a note."""
         for line in self.adding:
             if line.upper().startswith("SDAMP"):
                 ledger.note("SDAMPING", f"modal damping ({line}) is left out: give the job a table [damping]")
@@ -35,9 +35,9 @@ class CaseControl:
 
 
 def case_control(text: str) -> CaseControl | None:
-    """Return the case control of a deck; None where the deck has none, but bulk data alone.
+    """Return the case control of a deck; None if the deck contains bulk data only.
 
-    A command above the first SUBCASE counts for all subcases that do not have it themselves.
+    A command above the first SUBCASE applies to all subcases without their own.
     """
     head = re.split(r"(?im)^[ \t]*BEGIN", text, maxsplit=1)
     if len(head) < 2 or not re.search(r"(?im)^[ \t]*(CEND|SUBCASE|SPC|MPC|LOAD|METHOD|DISP|ECHO|TITLE)", head[0]):
@@ -67,7 +67,7 @@ def read_parameters(model: NastranModel, above: Iterable[Card]) -> None:
     Parameters
     ----------
     above
-        Those of the case control, which count before those of the bulk data.
+        Those of the case control. They override those of the bulk data.
 
     Raises
     ------

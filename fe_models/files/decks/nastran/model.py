@@ -1,4 +1,4 @@
-"""A deck of Nastran while it is read: its cards by name, its grid points, and what has been made of them so far."""
+"""A deck of Nastran while it is read: its cards by name, its grid points, and the results so far."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -29,14 +29,14 @@ from fe_models.foundation.arrays import Array
 __all__ = ["ALL", "ALONG", "PROPERTIES", "NastranModel"]
 
 ALL = (0, 1, 2, 3, 4, 5)
-ALONG = 1e-9  #: part of a vector across a line, below which it is along it
-#: properties of solids, shells, bars and beams, which share their numbers
+ALONG = 1e-9  #: a vector is along a line if its part across is smaller than this, relative to its length
+#: properties of solids, shells, bars and beams, which share one range of numbers
 PROPERTIES = ("PSOLID", "PSHELL", "PCOMP", "PCOMPG", "PBAR", "PBARL", "PBEAM", "PBEAML")
 
 
 @dataclass
 class NastranModel:
-    """What the cards of a deck have said so far."""
+    """Cards of a deck, and what has been read from them so far."""
 
     where: str
     cards: dict[str, list[Card]]  #: by name
@@ -56,9 +56,9 @@ class NastranModel:
     rigid: list[RigidGroup] = field(default_factory=list)
     couplings: list[Coupling] = field(default_factory=list)
     equations: list[Equation] = field(default_factory=list)
-    #: equations in basic axes, of a first point with axes of its own: (point, 0 or 3 for its rotations), coefficients
+    #: equations in basic axes whose first point has its own axes: (point, 0 or 3 for its rotations), coefficients
     rows: list[tuple[tuple[int, int], Row]] = field(default_factory=list)
-    plain_rows: list[Row] = field(default_factory=list)  #: others: the first one gives way
+    plain_rows: list[Row] = field(default_factory=list)  #: other equations: the first component is eliminated
     supports: list[Support] = field(default_factory=list)
     loads: list[Load] = field(default_factory=list)
     groups: dict[str, tuple[int, ...]] = field(default_factory=dict)  #: of nodes, by their numbers
@@ -68,8 +68,8 @@ class NastranModel:
     plane: int | None = None  #: axis of the basic system across the plane of a planar deck
     grounded: dict[int, set[int]] = field(default_factory=dict)  #: grid point -> components that elements hold
     shared: set[int] = field(default_factory=set)  #: grid points that belong to other superelements too
-    last_point: int = 0  #: number of the last grid point that was made here
-    properties: dict[str, dict[int, Card]] = field(default_factory=dict)  #: by kind and number, made when asked for
+    last_point: int = 0  #: number of the last grid point that the reader added
+    properties: dict[str, dict[int, Card]] = field(default_factory=dict)  #: by kind and number, made on demand
     ends: dict[tuple[int, int], int] = field(default_factory=dict)  #: element, end 0 or 1 -> a node of its own
 
     def of(self, *names: str) -> list[Card]:
@@ -90,14 +90,14 @@ class NastranModel:
         return self.last_point
 
     def add_equation(self, row: Row) -> None:
-        """Add an equation in basic axes; terms that vanish are left out, but for the first, which gives way."""
+        """Add an equation in basic axes without its zero terms; the first component, which is eliminated, stays."""
         terms = [(f"node_{node}", c, a) for k, ((node, c), a) in enumerate(row.items()) if a != 0 or k == 0]
         for node in dict.fromkeys(node for node, _ in row):
             self.groups[f"node_{node}"] = (node,)
         self.equations.append(Equation(tuple(terms)))
 
     def used_points(self) -> set[int]:
-        """Return the grid points with a motion of their own: of sectioned elements, masses, springs, leaders."""
+        """Return the grid points of elements with a section, masses, springs, leaders, and other superelements."""
         found: set[int] = set()
         for cards in self.cards.values():
             for card in cards:
@@ -112,14 +112,14 @@ class NastranModel:
         return found.union(*(self.groups[name] for name in groups)) & set(self.points.positions)
 
     def property_of(self, card: Card, *names: str) -> Card | None:
-        """Return the property card that an element names in its field 2, its own number where that is blank."""
+        """Return the property card of an element: field 2, or the number of the element where that is blank."""
         key = " ".join(names)
         if key not in self.properties:
             self.properties[key] = {each.integer(1): each for each in self.of(*names)}
         return self.properties[key].get(card.integer(2, card.integer(1)))
 
     def property_value(self, card: Card, name: str, size: int) -> float | None:
-        """Return the value of the property that an element names, of cards that hold several, each in `size` fields."""
+        """Return the value of the property of an element; a card holds several properties of `size` fields each."""
         number = card.integer(2, card.integer(1))
         for each in self.cards.get(name, ()):
             for k in range(1, len(each.fields) + 1, size):
@@ -138,7 +138,7 @@ class NastranModel:
         return self.points.systems[number].axes_at(at)
 
     def group(self, card: Card, numbers: Iterable[int], name: str = "") -> str:
-        """Return the name of a group of these grid points, made here."""
+        """Add a group of these grid points, and return its name."""
         nodes = tuple(sorted(set(numbers)))
         for number in nodes:
             self.point(card, number)

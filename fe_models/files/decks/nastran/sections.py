@@ -33,7 +33,7 @@ _THICKNESS_FIELDS = {name: _CORNERS.get(name, (11, 12, 13, 14)) for name in SHEL
 
 
 def read_sections(model: NastranModel) -> None:
-    """Take materials, then every kind of element with its property."""
+    """Read materials, then every kind of element with its property."""
     for card in model.of("MAT1"):
         _material(model, card)
     for card in model.of("MAT8"):
@@ -74,9 +74,9 @@ def _cells(model: NastranModel, cards: list[Card], group: str) -> None:
 
 
 def _with_middles(model: NastranModel) -> None:
-    """Give cells of which some middle grids are blank points there, which follow the mean of their edge's corners.
+    """Add points where a cell has some, but not all middle grids; each follows the mean of the corners of its edge.
 
-    The edge is then straight and its displacement linear, as Nastran makes it. Cells without any are of first order.
+    The edge is then straight and its displacement linear, as in Nastran. Cells without middle grids are of first order.
     """
     made: dict[tuple[int, int], int] = {}
     for name, (n, edges) in _MIDDLES.items():
@@ -146,7 +146,7 @@ def _shells(model: NastranModel, known: Card, cards: list[Card]) -> None:
 
 
 def _has_thickness(model: NastranModel, card: Card, thickness: float) -> bool:
-    """Whether a shell is as thick at its corners as its property says; else it is refused."""
+    """Whether a shell has the thickness of its property at its corners; refuse it otherwise."""
     own = {card.real(k) for k in _THICKNESS_FIELDS[card.name] if card.text(k)}
     if own - {thickness}:
         model.ledger.refuse(card.name, "thickness of its own at the corners")

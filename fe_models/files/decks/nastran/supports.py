@@ -1,4 +1,4 @@
-"""What a deck of Nastran holds: supports become interfaces, and a deck that holds all points in a plane is planar."""
+"""Supports of a deck of Nastran: they become interfaces; a deck that holds all points in a plane is planar."""
 
 import numpy as np
 
@@ -8,13 +8,13 @@ from fe_models.files.nastran import ELEMENT_TYPES
 
 __all__ = ["hold_points", "in_basic", "make_supports", "selected_sets"]
 
-MOST_AXES = 50  #: different axes of supports, each an interface of the job
-AXES_DIGITS = 7  #: to which axes are the same
-JOINING = ("CROD", "CTUBE")  #: further elements whose grid points decide whether a deck is planar
+MOST_AXES = 50  #: largest number of different axes of supports; each becomes an interface of the job
+AXES_DIGITS = 7  #: digits in which equal axes agree
+JOINING = ("CROD", "CTUBE")  #: further elements that must lie in the plane of a planar deck
 
 
 def hold_points(model: NastranModel, *, find_plane: bool = True) -> None:
-    """Take SPC, SPC1, PS and GRDSET: grid point -> components that are held; and find the plane of a planar deck.
+    """Read SPC, SPC1, PS and GRDSET as held components of grid points, and find the plane of a planar deck.
 
     Parameters
     ----------
@@ -45,10 +45,10 @@ def hold_points(model: NastranModel, *, find_plane: bool = True) -> None:
 
 
 def _find_plane(model: NastranModel) -> None:
-    """Set the axis across the plane of a deck that holds all points of its elements in one, and let these holds go.
+    """Find the plane in which a deck holds all points of its elements, and remove the supports that hold them in it.
 
-    A point is held in a plane if its translation along the normal and its rotations about the other two axes are. What
-    is left of its supports is the rotation in the plane, which plates need not hold, and what holds the body.
+    A point is held in a plane if its translation along the normal and its rotations about the other two axes are held.
+    The remaining supports hold the body, or hold the rotation in the plane, for which membranes have no stiffness.
     """
     points: set[int] = set()
     for name in (*ELEMENT_TYPES, *JOINING):
@@ -81,7 +81,7 @@ def _find_plane(model: NastranModel) -> None:
 
 
 def _across(model: NastranModel, node: int, normal: int) -> int:
-    """Return which displacement axis of a point is nearest to an axis of the basic system."""
+    """Return the displacement axis of a point that is nearest to an axis of the basic system."""
     return int(np.argmax(np.abs(model.axes(node)[normal])))
 
 
@@ -101,8 +101,8 @@ def in_basic(model: NastranModel, nodes: list[int], components: tuple[int, ...])
 def selected_sets(model: NastranModel, kind: str) -> set[int] | None:
     """Return the sets of SPC or MPC that the case control selects, those of SPCADD and MPCADD written out.
 
-    None: the deck has no case control, and all sets count. A body has one set of equations: subcases that select
-    different ones, or some none, are refused.
+    None: the deck has no case control, and all sets are used. A body has one set of equations. Subcases with different
+    sets of equations are therefore refused.
     """
     if model.chosen is None:
         return None
@@ -121,7 +121,7 @@ def selected_sets(model: NastranModel, kind: str) -> set[int] | None:
 
 
 def make_supports(model: NastranModel) -> None:
-    """Make interfaces of what is held, of the boundary of a superelement, and of elements to the ground."""
+    """Make interfaces of supports, of the boundary of a superelement, and of elements to the ground."""
     held = model.held
     _groups_of(model, held, "support")
     boundary: dict[int, set[int]] = {}
@@ -138,7 +138,7 @@ def make_supports(model: NastranModel) -> None:
 
 
 def _groups_of(model: NastranModel, held: dict[int, set[int]], what: str) -> None:
-    """Make one support for each set of components, and axes where they matter; each grid point in one."""
+    """Make one support for each set of components and, where they matter, axes. A grid point is in one support."""
     if not held:
         return
     card = model.cards["GRID"][0]

@@ -31,7 +31,7 @@ __all__ = ["read_nastran_deck"]
 
 
 def read_nastran_deck(path: Path, data: bytes) -> Deck:
-    """Return what a deck of Nastran says.
+    """Return the content of a deck of Nastran.
 
     Raises
     ------
