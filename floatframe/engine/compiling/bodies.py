@@ -14,7 +14,7 @@ from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.bodies.rigid_body import RigidBody
 from floatframe.model.system import Body
 
-__all__ = ["body_n_q", "body_types", "integers", "offsets", "type_arrays"]
+__all__ = ["axis_of_inertia", "body_n_q", "body_types", "integers", "offsets", "point_inertia", "type_arrays"]
 
 SYMMETRIC = 0.02  #: difference of two moments of inertia of an axisymmetric body, by the largest one
 
@@ -54,14 +54,24 @@ def body_types(bodies: Sequence[Body]) -> tuple[list[RigidBody | ReducedBody], I
 
 
 def axis_of_symmetry(mass: float, S: Array, J0: Array) -> Array:
-    """Return the axis about which the inertia at the centre of mass is symmetric, (3,); zero if there is no such axis.
-
-    It is zero also for a sphere, which is symmetric about every axis.
-    """
+    """Return the axis about which the inertia at the centre of mass is symmetric, (3,); zero if there is none."""
     s = S / mass if mass > 0 else np.zeros(3)
-    moments, axes = np.linalg.eigh(J0 - mass * (s @ s * np.eye(3) - np.outer(s, s)))
+    return axis_of_inertia(J0 - point_inertia(mass, s))
+
+
+def point_inertia(mass: float, r: Array) -> Array:
+    """Return the inertia of a point mass at r, (3, 3)."""
+    return mass * (r @ r * np.eye(3) - np.outer(r, r))
+
+
+def axis_of_inertia(J: Array, within: float = SYMMETRIC) -> Array:
+    """Return the axis about which an inertia is symmetric, (3,); zero if there is none, or if every axis is one.
+
+    within: difference of the moments across the axis, by the largest one.
+    """
+    moments, axes = np.linalg.eigh(J)
     gaps = np.diff(moments)
-    if gaps.min() > SYMMETRIC * moments[2] or gaps.max() <= SYMMETRIC * moments[2]:
+    if gaps.min() > within * moments[2] or gaps.max() <= SYMMETRIC * moments[2]:
         return np.zeros(3)
     return axes[:, 0 if gaps[1] < gaps[0] else 2]
 

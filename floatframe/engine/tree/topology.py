@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
+from floatframe.engine.compiling.bodies import axis_of_inertia, point_inertia
 from floatframe.engine.compiling.markers import joint_markers, marker_pose, n_q_of
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.kernels.model import COUPLER, JOINT, Model
@@ -20,10 +21,13 @@ from floatframe.engine.kernels.records import filled
 from floatframe.engine.tree.charts import FREE, SIDE_B, Column, chart_of
 from floatframe.engine.tree.kernels.tree import COLUMN, FAR_MODE, NEAR_MODE, Tree
 from floatframe.model.functions.time_functions import TimeFunction
+from floatframe.model.rotations import rotation_matrix
 from floatframe.model.system import System
 
 __all__ = ["CoordinateName", "SystemTree", "tree_of"]
 
+NEARLY_SYMMETRIC = 0.3  #: difference of two moments of inertia of a body whose spin may be taken by itself
+MOST_ACROSS = 0.5  #: of the spin: angular velocity across the axis of such a body, above which it is not
 KEPT = "_tree"  #: attribute of a system that keeps its tree
 
 
@@ -235,24 +239,49 @@ def jets_of(
     return jet0, jets
 
 
-def spin_axes(model: Model, ordered: list[Branch], far: list[int]) -> Array:
-    """Return the axis of symmetry of each body that spins by itself, axes of its end of the joint, (n_b, 3).
+def spin_axes(compiled: CompiledSystem, ordered: list[Branch], far: list[int]) -> tuple[Array, Array]:
+    """Return the axis of symmetry of each body that spins by itself, axes of its end of the joint, and `most_across`.
 
-    These are bodies that are free or on a ball joint, rigid with all that hangs at them; zero for others. Modes and
-    coordinates that are carried around by the spin would be in other axes than the rotation that they are added to,
-    and stiff ones make such steps unstable.
+    These are bodies that are free or on a ball joint, rigid with all that is fixed to them; zero for others. Their
+    inertia about the joint, or about the centre of mass, is symmetric, or nearly so if they turn mostly about the axis.
+    Modes and coordinates that are carried around by the spin would be in other axes than the rotation that they are
+    added to, and stiff ones make steps unstable.
     """
-    axes: Array = model.body_types.axis[model.bodies.kind].copy()
-    for i, each in enumerate(ordered):
-        if far[i] >= 0:
-            axes[i] = model.markers.triad[far[i]].T @ axes[i]
-        if [column.side for column in each.columns[-3:]] != [SIDE_B] * 3:
-            axes[i] = 0.0
-        moving = i if model.bodies.n_q[i] > 0 else each.parent if each.columns else -1
-        while moving >= 0:
-            axes[moving] = 0.0
-            moving = ordered[moving].parent
-    return axes
+    model, axes, most_across = compiled.model, np.zeros((len(ordered), 3)), np.full(len(ordered), np.inf)
+    fixed: list[list[int]] = [[i] for i in range(len(ordered))]  # to each body, itself included
+    is_rigid = [model.bodies.n_q[i] == 0 for i in range(len(ordered))]
+    for i in reversed(depth_first(ordered)):
+        each = ordered[i]
+        if is_rigid[i] and [column.side for column in each.columns[-3:]] == [SIDE_B] * 3:
+            inertia = common_inertia(compiled, fixed[i], far[i])
+            axes[i] = axis_of_inertia(inertia)
+            if not axes[i].any():
+                axes[i], most_across[i] = axis_of_inertia(inertia, NEARLY_SYMMETRIC), MOST_ACROSS
+            if far[i] >= 0:
+                axes[i] = model.markers.triad[far[i]].T @ axes[i]
+        if each.parent >= 0:
+            fixed[each.parent] += fixed[i]
+            is_rigid[each.parent] = is_rigid[each.parent] and is_rigid[i] and not each.columns
+    return axes, most_across
+
+
+def common_inertia(compiled: CompiledSystem, bodies: list[int], marker: int) -> Array:
+    """Return the inertia of rigid bodies, as placed, about a marker of the first or their centre of mass (-1).
+
+    In axes of the first, (3, 3).
+    """
+    model, placed = compiled.model, compiled.placed
+    mass, first, inertia = 0.0, np.zeros(3), np.zeros((3, 3))
+    R, origin = rotation_matrix(placed.p[bodies[0]]), placed.r[bodies[0]]
+    for i in bodies:
+        t = model.bodies.kind[i]
+        A, m = R.T @ rotation_matrix(placed.p[i]), float(model.body_types.mass[t])
+        s, p = A @ model.body_types.S[t] / m, R.T @ (placed.r[i] - origin)
+        inertia += A @ model.body_types.J0[t] @ A.T - point_inertia(m, s) + point_inertia(m, s + p)
+        mass, first = mass + m, first + m * (s + p)
+    centre = first / mass
+    about = centre if marker < 0 else model.markers.position[marker]
+    return inertia - point_inertia(mass, centre) + point_inertia(mass, centre - about)
 
 
 def loop_markers(model: Model, ordered: list[Branch], near: list[int], kept: list[int]) -> list[tuple[int, int]]:
@@ -319,6 +348,7 @@ def tree_record(compiled: CompiledSystem, branches: list[Branch]) -> Tree:
     is_kept: IntArray = np.isin(np.arange(len(model.connections.size)), kept).astype(np.int64)
     row_is_kept = np.repeat(is_kept, model.connections.size) > 0
     loops = loop_markers(model, ordered, near, kept)
+    axes, most_across = spin_axes(compiled, ordered, far)
     tau: Array = np.array(lists.pop("tau")).reshape(-1, 3)
     alpha: Array = np.array(lists.pop("alpha")).reshape(-1, 3)
     return filled(
@@ -342,7 +372,8 @@ def tree_record(compiled: CompiledSystem, branches: list[Branch]) -> Tree:
         is_kept=is_kept,
         kept_row=np.where(row_is_kept, np.cumsum(row_is_kept) - 1, -1),
         held=[c for c in kept if model.connections.law[c] in (JOINT, COUPLER)],
-        spin_axis=spin_axes(model, ordered, far),
+        spin_axis=axes,
+        most_across=most_across,
         loop_body=[body for body, _ in loops],
         loop_marker=[marker for _, marker in loops],
         jet0=jet0,

@@ -191,6 +191,39 @@ def test_a_top_on_a_turntable_in_joint_coordinates_follows_a_fine_run(h, error):
     assert_allclose(coarse.body("rotor").r, fine.body("rotor").r, rtol=0, atol=error * L)
 
 
+def halves(spin, rate):
+    """Return a rotor of two halves, each without an axis of symmetry, which have one together."""
+    bodies = [
+        body_at(name, 0.5 * M, np.diag([0.5 * J, one, 0.006]), (L, 0, 0), (0, rate * L, 0), (spin, 0, rate))
+        for name, one in (("rotor", 0.004), ("other", 0.008))
+    ]
+    return bodies, [FixedJoint("seam", at("rotor", 0.1), at("other", 0.1))]
+
+
+def body_of(*moments):
+    def parts(spin, rate):
+        return [body_at("rotor", M, np.diag(moments), (L, 0, 0), (0, rate * L, 0), (spin, 0, rate))], []
+
+    return parts
+
+
+@pytest.mark.parametrize(
+    ("parts", "turn", "error"),
+    [(body_of(J, J, J), 0.4, 1e-3), (halves, 1.0, 1e-3), (body_of(J, 0.010, 0.014), 1.0, 4e-3)],
+    ids=["sphere", "two halves", "nearly symmetric"],
+)
+def test_in_joint_coordinates_the_inertia_about_a_ball_joint_counts(parts, turn, error):
+    """Spins are taken by themselves: plain steps are off by 9 % at 0.4 rad, by 40 % at 1 rad."""
+    spin = 200.0
+    bodies, joints = parts(spin, M * G * L / (J * spin))
+    pin = SphericalJoint("pin", on_ground(), at("rotor", -L))
+    system = System(bodies, [pin, *joints], [Gravity(-G * TURN[:, 2])])
+    fine = integrate(system, GeneralizedAlpha(0.8), 0.5, 2.5e-4, output_every=round(turn / spin / 2.5e-4))
+    coarse = integrate(system, GeneralizedAlpha(0.8), 0.5, turn / spin, formulation="relative")
+    way = np.ptp(fine.body("rotor").r, axis=0).max()
+    assert_allclose(coarse.body("rotor").r, fine.body("rotor").r, rtol=0, atol=error * way)
+
+
 def test_a_flexible_shaft_on_a_ball_joint_keeps_its_whirl_in_joint_coordinates():
     """Its spin is not taken by itself, as its modes go around with it: by that the whirl grew a thousandfold here."""
     spin, diameter, length = 1000.0, 0.006, 0.3

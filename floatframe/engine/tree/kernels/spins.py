@@ -87,8 +87,8 @@ def begin_spin(tree, joints, memory, i, alpha_f, h):
         return
     omega = of_body(tree, i, Q, joints.rate_start[k:])
     alpha = of_body(tree, i, Q, joints.acceleration_start[k:])
-    turn = turn_of_axis(e, omega)
-    if not takes_spin(turn, alpha):
+    turn, across = turn_of_axis(e, omega), cross(e, omega)
+    if dot(across, across) > (tree.most_across[i] * dot(e, omega)) ** 2 or not takes_spin(turn, alpha):
         return
     joints.spins[i] = 1
     a = sub(of_body(tree, i, Q, memory.a[tree.slot[tree.unknown[k]] :]), turn)

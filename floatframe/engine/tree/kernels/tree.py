@@ -57,6 +57,8 @@ class Tree(NamedTuple):
     held: IntArray = integer(Size("held"))  #: joints and couplers among those that are kept
     #: axis of symmetry of a body that is free or on a ball joint, axes of its end of the joint; zero for others
     spin_axis: Array = real(n_b, 3)
+    #: of the spin, the most angular velocity across the axis with which it is taken by itself
+    most_across: Array = real(n_b)
     loop_body: IntArray = integer(n_l)  #: a body that a loop goes through,
     loop_marker: IntArray = integer(n_l)  #: and the marker by which the loop leaves it outwards
     #: first of what moves a body with its subtree against its parent: columns that are unknown, modes of the parent at
