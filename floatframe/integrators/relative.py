@@ -238,7 +238,7 @@ def in_slots(tree: Tree, joints: JointWork, of_bodies: Array, of_columns: Array)
 
 def may_spin(tree: Tree) -> NDArray[np.bool_]:
     """Return the bodies whose spin steps in joint coordinates may take by itself, (n_b,)."""
-    return tree.spin_axis.any(axis=1)
+    return np.any(tree.spin_axis != 0.0, axis=1)
 
 
 def joint_accelerations(
