@@ -1,4 +1,4 @@
-"""From a fatigue file to a result: the curve in units of the body, blocks from results files, spectra from .npz."""
+"""Evaluation of a fatigue file: curve in units of the body, blocks from results files, spectra from .npz files."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -39,25 +39,25 @@ from floatframe.results.trajectory import Trajectory, read_results
 
 __all__ = ["Assessment", "assess", "equivalent_repeats"]
 
-SAME_PLACE = 1e-9  #: of the size of a body, within which a stress point sits at a node
+SAME_PLACE = 1e-9  #: distance, relative to the size of the body, within which a stress point is at a node
 
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """A result with what its programme stands for."""
+    """A fatigue result with its programme."""
 
     result: FatigueResult
     given: FatigueFile
-    blocks: tuple[LoadBlock, ...]  #: empty for spectra
+    blocks: tuple[LoadBlock, ...]  #: load blocks; empty for spectra
 
     @property
     def life(self) -> Array:
-        """Life in the unit of the programme, (n,)."""
+        """Life of each place in the unit of the programme, (n,)."""
         return np.asarray(self.given.programme.amount * self.result.life)
 
 
 def assess(given: FatigueFile, *, progress: Progress | None = None) -> Assessment:
-    """Return the damage that a fatigue file asks for.
+    """Return the damage for a fatigue file.
 
     Raises
     ------
@@ -90,13 +90,13 @@ def assess(given: FatigueFile, *, progress: Progress | None = None) -> Assessmen
 
 
 def stress_factor(material: MaterialSection, body: ReducedBody) -> float:
-    """Return the stress unit of a material over that of the body."""
+    """Return the stress unit of a material divided by the stress unit of the body."""
     units = body.units
     return STRESS_UNITS[material.stress_unit] / units.to_si(mass=1, length=-1, time=-2)
 
 
 def material_of(key: str, section: MaterialSection, given: FatigueFile, body: ReducedBody) -> FatigueMaterial:
-    """Return a material with its curve and strength in stress units of the body, and its places."""
+    """Return a material with its curve and strength, in stress units of the body, and its places."""
     curve = curve_of(section, given, body)
     law = mean_stress_of(section, given, body)
     if not isinstance(section, PlacesSection):
@@ -106,7 +106,7 @@ def material_of(key: str, section: MaterialSection, given: FatigueFile, body: Re
 
 
 def curve_of(material: MaterialSection, given: FatigueFile, body: ReducedBody) -> SNCurve:
-    """Return an S-N curve in stress units of the body, with survival and the factors of all materials."""
+    """Return an S-N curve in stress units of the body, with the requested survival and all general factors."""
     section, unit = material.sn, stress_factor(material, body)
     table = section.amplitudes if section.amplitudes is not None else section.ranges
     if table is not None:
@@ -127,7 +127,7 @@ def curve_of(material: MaterialSection, given: FatigueFile, body: ReducedBody) -
 
 
 def with_factors(curve: SNCurve, factors: Mapping[str, float | FactorSection], material: MaterialSection) -> SNCurve:
-    """Return a curve with factors on its amplitudes, numbers or by formula."""
+    """Return a curve with factors on its amplitudes; each factor is a number or a formula."""
     strength = (material.tensile_strength or 0.0) * STRESS_UNITS[material.stress_unit] / 1e6  # [MPa]
     for name, factor in factors.items():
         if isinstance(factor, FactorSection):
@@ -148,7 +148,7 @@ def mean_stress_of(material: MaterialSection, given: FatigueFile, body: ReducedB
 
 
 def places_named(key: str, section: PlacesSection, body: ReducedBody) -> tuple[IntArray, IntArray]:
-    """Return the kept nodes and the stress points that a material names."""
+    """Return the kept nodes and the stress points of a material."""
     nodes: list[IntArray] = [np.zeros(0, np.int64)]
     points: list[IntArray] = [np.zeros(0, np.int64)]
     for name in section.sets:
@@ -170,7 +170,7 @@ def places_named(key: str, section: PlacesSection, body: ReducedBody) -> tuple[I
         points.append(np.array(found, dtype=np.int64))
     of_nodes, of_points = np.unique(np.concatenate(nodes)), np.unique(np.concatenate(points))
     if body.point_stress is not None:
-        # nodes at borders have the stress of the stiffest material; chosen points replace them
+        # nodes between materials have the stress of the stiffest material; explicit stress points replace them
         own = body.point_stress.positions[[k for k in of_points if known[k].endswith(" border")]]
         if len(own) and len(of_nodes):
             distance, _ = cKDTree(own).query(body.nodes[of_nodes])
@@ -179,7 +179,7 @@ def places_named(key: str, section: PlacesSection, body: ReducedBody) -> tuple[I
 
 
 def places_of_set(body: ReducedBody, name: str, where: str) -> tuple[IntArray, IntArray]:
-    """Return the nodes of a set, and of a set of elements their stress points; of one of nodes, those at its nodes."""
+    """Return the nodes and stress points of a set: the points of its elements, or the points at its nodes."""
     rows = Address(set=name).find(body, where).rows
     named = body.numbering.named_set(f"{where}: body {body.name!r}", name)
     if named.kind == "elements":
@@ -195,7 +195,7 @@ def places_of_set(body: ReducedBody, name: str, where: str) -> tuple[IntArray, I
 
 
 def points_of_elements(body: ReducedBody, triangles: IntArray) -> IntArray:
-    """Return the stress points of the elements behind some triangles: those that begin with their name."""
+    """Return the stress points of the elements of some triangles, found by the beginning of their names."""
     known = () if body.point_stress is None else body.point_stress.names
     called = {body.numbering.element_name(int(triangle)) for triangle in triangles}
     return np.array([k for k, name in enumerate(known) if element_of_point(name) in called], dtype=np.int64)
@@ -208,7 +208,7 @@ def element_of_point(name: str) -> str | None:
 
 
 def places_of(given: FatigueFile, body: ReducedBody) -> tuple[IntArray | None, IntArray | None]:
-    """Return the nodes and stress points to look at, None for all."""
+    """Return the nodes and stress points to assess; None for all."""
     wanted, none = given.outputs.places, np.zeros(0, np.int64)
     if wanted == "points" and body.point_stress is None:
         raise FatigueError(
@@ -252,7 +252,7 @@ def block_of(section: BlockSection, given: FatigueFile, body: ReducedBody) -> Lo
 
 
 def matched(section: BlockSection, trajectory: Trajectory, name: str) -> float:
-    """Return how often a block comes so that a sensor of it has the pseudo-damage of a measured signal."""
+    """Return the number of repeats with which a sensor has the pseudo-damage of a measured signal in a block."""
     from floatframe.files.signals.read_signals import read_signals
     from floatframe.files.system_file.recorded_system import recorded_system
     from floatframe.results.sensors import measurement_of
@@ -274,7 +274,7 @@ def matched(section: BlockSection, trajectory: Trajectory, name: str) -> float:
 
 
 def equivalent_repeats(measured: Array, simulated: Array, slope: float) -> float:
-    """Return how often a simulated history comes in place of a measured one: the ratio of their pseudo-damages.
+    """Return the number of repeats with which a simulated history has the pseudo-damage of a measured one.
 
     Pseudo-damage is the sum of n (range / 2)^slope over the rainflow cycles of the repeated history.
 

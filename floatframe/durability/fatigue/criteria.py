@@ -1,4 +1,4 @@
-"""What of a stress tensor does damage: a signed scalar, or the stresses on the plane where they are worst."""
+"""Criteria: the scalar or the stresses on a critical plane that cause damage, from a stress tensor."""
 
 import math
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from floatframe.errors import FatigueError
 
 __all__ = ["CRITERIA", "TENSORS", "Criterion", "largest_size"]
 
-#: name -> what it is
+#: description of each criterion, by name
 CRITERIA = {
     "signed-von-mises": "von Mises stress with the sign of the principal stress of largest size",
     "principal": "the principal stress of largest size",
@@ -24,18 +24,18 @@ CRITERIA = {
 TENSORS = {"full": "all six components", "surface": "the three components in the tangent plane; the rest taken as zero"}
 PLANES = ("normal", "shear", "findley")
 
-#: weights that make a Euclidean norm of xx yy zz yz xz xy: |sigma|² = sigma : sigma
+#: weights of xx yy zz yz xz xy in the Euclidean norm |sigma|² = sigma : sigma
 FROBENIUS = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
 
 
 @dataclass(frozen=True)
 class Criterion:
-    """A criterion; stresses it gives are those of a bar under tension, so that curves of bars hold for it."""
+    """A criterion. Its stresses equal those of a bar under tension, so that curves measured on bars apply."""
 
     name: str = "signed-von-mises"  #: one of `CRITERIA`
-    tensor: str = "full"  #: one of `TENSORS`, for the first two
-    n_planes: int = 18  #: angles over 180 degrees
-    findley_k: float = 0.3  #: weight of the normal stress
+    tensor: str = "full"  #: one of `TENSORS`, for signed-von-mises and principal
+    n_planes: int = 18  #: number of planes over 180 degrees
+    findley_k: float = 0.3  #: weight of the normal stress in findley
 
     def __post_init__(self) -> None:
         for what, name, known in (("criterion", self.name, CRITERIA), ("tensor", self.tensor, TENSORS)):
@@ -50,31 +50,37 @@ class Criterion:
 
     @property
     def needs_surface(self) -> bool:
-        """Whether it needs the tangent plane."""
+        """Whether the criterion needs the tangent plane."""
         return self.name in PLANES or self.tensor == "surface"
 
     @property
     def is_shear(self) -> bool:
-        """Whether cycles of shear are counted, with the normal stress beside them."""
+        """Whether cycles of shear stress are counted, together with the normal stress."""
         return self.name in ("shear", "findley")
 
     @property
     def k(self) -> float:
-        """Findley's weight of the normal stress; 0: shear alone."""
+        """Findley's weight of the normal stress; 0 for shear alone."""
         return self.findley_k if self.name == "findley" else 0.0
 
     @property
     def bound_factor(self) -> float:
-        """The factor c with |S| <= c |A sigma|, A of `norm_root`, at every instant."""
-        if self.is_shear:  # tau <= |sigma| / sqrt(2), normal stress <= |sigma|, as Frobenius norms
+        """The factor c with |S| <= c |A sigma| at every instant, with A from `norm_root`."""
+        if self.is_shear:  # tau <= |sigma| / sqrt(2), normal stress <= |sigma|, in the Frobenius norm
             return 2 * (math.sqrt(0.5) + self.k) / (self.k + math.sqrt(1 + self.k**2))
         return 1.0
 
     def rows(self, stress: Array, frames: Array | None) -> Array:
-        """Return what is linear in the modal coordinates: rows of (n, 6, n_q) stress, (n, n_rows, n_q).
+        """Return the rows of the criterion that are linear in the modal coordinates, (n, n_rows, n_q).
 
-        frames: tangents and normals, (n, 3, 3), where the criterion needs them. Of shear, the normal stresses stand
-        behind the shear stresses.
+        Rows of normal stress follow the rows of shear stress.
+
+        Parameters
+        ----------
+        stress
+            Stress shapes, (n, 6, n_q).
+        frames
+            Tangents and normals, (n, 3, 3); None if the criterion does not need them.
         """
         if not self.needs_surface:
             return stress
@@ -88,13 +94,13 @@ class Criterion:
         return np.asarray(rows @ stress)
 
     def n_rows(self) -> int:
-        """Rows a node."""
+        """Number of rows for each place."""
         if self.is_shear:
             return 10 * self.n_planes
         return self.n_planes if self.name == "normal" else 3 if self.tensor == "surface" else 6
 
     def scalar(self) -> Callable[[Array, Array], None] | None:
-        """Return the kernel from components to the scalar; None: the rows are the histories already."""
+        """Return the kernel from components to the scalar; None if the rows are already scalars."""
         from floatframe.durability.fatigue.kernels import stress_kernels as kernels
 
         return {
@@ -105,13 +111,13 @@ class Criterion:
         }.get((self.name, self.tensor))
 
     def norm_root(self) -> Array:
-        """Return A with |S| <= c |A sigma|, (6, 6): of von Mises stress (exactly it), else of the Frobenius norm."""
+        """Return A with |S| <= c |A sigma|, (6, 6): exact for von Mises stress, Frobenius norm for other criteria."""
         if self.name == "signed-von-mises" and self.tensor == "full":
             return von_mises_root()
         return np.diag(np.sqrt(FROBENIUS))
 
     def plane_words(self, plane: int) -> str:
-        """Return which plane a number is."""
+        """Return the description of a plane from its index."""
         if self.name not in PLANES:
             return ""
         n, degrees = self.n_planes, 180.0 / self.n_planes
@@ -122,7 +128,7 @@ class Criterion:
 
 
 def von_mises_root() -> Array:
-    """Return A with |A sigma| the von Mises stress, (6, 6): A = diag sqrt of weights times the deviator."""
+    """Return A, (6, 6), such that |A sigma| is the von Mises stress: diag(sqrt(weights)) times the deviator."""
     deviator = np.eye(6)
     deviator[:3, :3] -= 1.0 / 3.0
     return np.asarray(np.sqrt(1.5 * FROBENIUS)[:, None] * deviator)

@@ -22,26 +22,26 @@ __all__ = [
     "technological_size_factor",
 ]
 
-#: a_R and least tensile strength [MPa] of the roughness factor by group of materials (FKM guideline)
+#: a_R and smallest tensile strength [MPa] in the roughness factor, by group of materials (FKM guideline)
 ROUGHNESS = {
     "steel": (0.22, 400.0), "cast-steel": (0.20, 400.0), "nodular-iron": (0.16, 400.0),
     "malleable-iron": (0.12, 350.0), "grey-iron": (0.06, 100.0), "wrought-aluminium": (0.22, 133.0),
     "cast-aluminium": (0.20, 133.0),
 }  # fmt: skip
-#: diameter d_N [mm] that the strength of the standard holds for, and a_d, by group of steels (FKM guideline)
+#: diameter d_N [mm] of the standardised strength, and a_d, by group of steels (FKM guideline)
 TECHNOLOGY = {
     "structural-steel": (40.0, 0.15), "quenched-steel": (16.0, 0.3), "normalised-steel": (16.0, 0.1),
     "case-hardened-steel": (11.0, 0.5), "nitrided-steel": (100.0, 0.2), "cast-steel": (100.0, 0.15),
 }  # fmt: skip
-SMALLEST_TESTED = 7.5  #: diameter below which the technological factor is that of specimens [mm]
-LARGEST_DIAMETER = 250.0  #: of the technological factor [mm]: larger ones have that of this
-ROUGHEST = 500.0  #: Rz [um]; more is another unit
-DEVIATION = 0.08  #: standard deviation of fatigue limits over their mean
+SMALLEST_TESTED = 7.5  #: diameter below which the technological factor is that of test specimens [mm]
+LARGEST_DIAMETER = 250.0  #: largest diameter of the technological factor [mm]; larger diameters have the same factor
+ROUGHEST = 500.0  #: largest plausible Rz [um]; larger values probably have another unit
+DEVIATION = 0.08  #: standard deviation of fatigue limits, relative to their mean
 Number = float | str | None
 
 
 def roughness_factor(tensile_strength: float, roughness: float, group: str = "steel") -> float:
-    """Return K_R = 1 - a_R lg Rz lg(2 R_m / R_m,N,min), at most 1: of normal stress (FKM guideline, FKM (2012)).
+    """Return K_R = 1 - a_R lg Rz lg(2 R_m / R_m,N,min), at most 1, for normal stress (FKM guideline, FKM (2012)).
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def technological_size_factor(diameter: float, group: str) -> float:
 
 
 def size_factor(diameter: float) -> float:
-    """Return k_b of bent or twisted rounds: (d/7.62)^-0.107 to 51 mm, 1.51 d^-0.157 beyond.
+    """Return k_b of round bars in bending or torsion: (d/7.62)^-0.107 up to 51 mm, 1.51 d^-0.157 beyond.
 
     Eq. 6-20 of Budynas & Nisbett (2011). Of bars under tension it is 1. Where
     stress gradients are counted otherwise this counts them again.
@@ -120,7 +120,7 @@ def size_factor(diameter: float) -> float:
 
 
 def reliability_factor(survival: float) -> float:
-    """Return k_e = 1 - 0.08 z: fatigue limits scatter by 8 % of their mean (Budynas & Nisbett (2011)).
+    """Return k_e = 1 - 0.08 z, because fatigue limits scatter by 8 % of their mean (Budynas & Nisbett (2011)).
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def reliability_factor(survival: float) -> float:
 
 
 def of_group(what: str, group: str, known: Mapping[str, tuple[float, float]]) -> tuple[float, float]:
-    """Return the numbers of a group of materials."""
+    """Return the parameters of a group of materials."""
     if group not in known:
         raise FatigueError(f"{what}: unknown group {quoted(group)}{nearest(group, known)}")
     return known[group]
@@ -146,7 +146,7 @@ def of_group(what: str, group: str, known: Mapping[str, tuple[float, float]]) ->
 
 @dataclass(frozen=True)
 class FactorMethod:
-    """A formula as the fatigue file names it."""
+    """A formula of the fatigue file."""
 
     description: str
     needs: tuple[str, ...]  #: keys beside the method

@@ -1,4 +1,4 @@
-"""Damage from modal histories: stress of a few nodes at a time, over chunks of time, straight into counted cycles.
+"""Damage from modal histories: stresses of a few nodes and times are computed and counted without being stored.
 
 sigma(x, t) = sum_k S_k(x) q_k(t) is never stored: tiles of nodes times modes are multiplied with modes times a chunk of
 times, made a scalar, and streamed through the four-point rule. Nodes come in the order of their bounds (`bounds`), the
@@ -57,26 +57,26 @@ __all__ = [
 # is taken where it is smaller.
 
 
-ROUNDING = 1.0 + 1e-9  #: of everything upwards
-ROUNDS = 6  #: of the iteration for C
-BINS, LEVELS = 2000, 1500  #: of rho and of lam
-FLOOR = 1e-9  #: least standard deviation over the largest that C is given
-CHUNK_SIZE = 20_000  #: nodes
+ROUNDING = 1.0 + 1e-9  #: factor by which all bounds are rounded upwards
+ROUNDS = 6  #: number of iterations for C
+BINS, LEVELS = 2000, 1500  #: number of classes of rho and of lam
+FLOOR = 1e-9  #: smallest standard deviation of C, relative to the largest
+CHUNK_SIZE = 20_000  #: number of nodes processed at a time
 
 
 @dataclass(frozen=True, eq=False)
 class Envelope:
-    """An ellipsoid about the modal history of a block, q.T C^-1 q = rho², and how often each rho comes."""
+    """An ellipsoid q.T C^-1 q = rho² about the modal history of a block, with the frequency of each rho."""
 
     L: Array  #: (n_q, n_q), C = L L.T
-    rho: Array  #: upper ends of classes, (n_bins,)
-    counts: Array  #: times in each, (n_bins,)
+    rho: Array  #: upper limits of the classes, (n_bins,)
+    counts: Array  #: number of times in each class, (n_bins,)
     largest_q: Array  #: max |q_k|, (n_q,)
     n_times: int
 
 
 def envelope(block: LoadBlock, slope: float) -> Envelope:
-    """Return the envelope of a block for a curve of that slope; scaled as the block is."""
+    """Return the envelope of a block for a curve with a slope; it includes the scale of the block."""
     q = block.scale * np.asarray(block.q)
     weights = np.ones(len(q))
     L = rho = np.zeros(0)
@@ -99,7 +99,7 @@ def envelope(block: LoadBlock, slope: float) -> Envelope:
 
 
 def full_basis(sizes: Array, Vt: Array) -> tuple[Array, Array]:
-    """Return as many singular values and vectors (columns) as coordinates, where a history has fewer rows."""
+    """Return as many singular values and vectors (columns) as coordinates, also if a history has fewer rows."""
     n = Vt.shape[1]
     if len(Vt) == n:
         return sizes, Vt.T
@@ -108,7 +108,7 @@ def full_basis(sizes: Array, Vt: Array) -> tuple[Array, Array]:
 
 
 def stress_bounds(stress: Array, found: Envelope, criterion: Criterion) -> tuple[Array, Array]:
-    """Return lam of (1) and the sum of (3) for stress shapes (n, 6, n_q), each times c, (n,) [Pa]."""
+    """Return lam of (1) and the sum in (3) for stress shapes (n, 6, n_q), each times c, (n,) [Pa]."""
     A, c = criterion.norm_root(), criterion.bound_factor
     lam, total = np.zeros(len(stress)), np.zeros(len(stress))
     for first in range(0, len(stress), CHUNK_SIZE):
@@ -116,7 +116,7 @@ def stress_bounds(stress: Array, found: Envelope, criterion: Criterion) -> tuple
         rows = A @ np.asarray(stress[part])
         lam[part] = largest_size(rows @ found.L)
         total[part] = np.linalg.norm(rows, axis=1) @ found.largest_q
-    # roundoff of the Gram matrix is that of its largest entry
+    # the rounding error of the Gram matrix is proportional to its largest entry
     return c * lam * (1 + 1e-6), c * total * ROUNDING
 
 
@@ -137,7 +137,7 @@ def damage_bounds(
     if criterion.name == "findley":
         sums_of_reversals(rule, levels, found.rho[-1:], found.n_times * one, at_levels)
     else:
-        filled = np.flatnonzero(found.counts)[::-1]  # the greatest first: whether it reaches the strength
+        filled = np.flatnonzero(found.counts)[::-1]  # the largest first: it decides whether the strength is reached
         sums_of_reversals(rule, levels, found.rho[filled], found.counts[filled], at_levels)
     which = np.minimum(np.searchsorted(levels, lam), len(levels) - 1)
     return np.where(lam > 0, np.minimum(at_levels[which], of_sizes), 0.0)
@@ -146,33 +146,33 @@ def damage_bounds(
 # history damage -------------------------------------------------------------------------------------------------------
 
 
-#: what becomes of the residue of a block, by name
+#: treatment of the residue of a block, by name
 RESIDUES = {
     "half": "its ranges count as half cycles, as ASTM E1049 has it",
     "repeat": "the block follows itself without end: all cycles are whole",
 }
-TILE = 32  #: nodes at once; of criteria with planes so many fewer as they have more rows than six
-CHUNK = 1024  #: times at once
-FIRST_BATCH, LAST_BATCH = 64, 8192  #: nodes between two looks at the bounds, twice as many each time
+TILE = 32  #: number of nodes processed at once; fewer for criteria with more than six rows
+CHUNK = 1024  #: number of times processed at once
+FIRST_BATCH, LAST_BATCH = 64, 8192  #: number of nodes between two checks of the bounds; it doubles each time
 
 Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True, eq=False)
 class Counted:
-    """Damage of places from histories, one row a place; all numbers are of one pass through the programme."""
+    """Damage of places from histories, with one row per place, for one pass through the programme."""
 
-    damage: Array  #: of each block with its repeats, (n_blocks, n); NaN at places that were left out
-    bound: Array  #: upper bound of the whole damage, (n,)
-    is_counted: Array  #: bool, (n,)
-    cycles: Array  #: cycles of the programme, (n,)
-    beyond: Array  #: of them, beyond the greatest amplitude of the curve, (n,)
+    damage: Array  #: damage of each block with its repeats, (n_blocks, n); NaN at excluded places
+    bound: Array  #: upper bound of the total damage, (n,)
+    is_counted: Array  #: whether the place was counted, (n,)
+    cycles: Array  #: number of cycles in the programme, (n,)
+    beyond: Array  #: number of cycles beyond the largest amplitude of the curve, (n,)
     largest: Array  #: largest equivalent amplitude, (n,) [Pa]
-    plane: IntArray  #: of critical-plane criteria, (n,); else 0
+    plane: IntArray  #: critical plane, (n,); 0 for other criteria
 
     @property
     def total(self) -> Array:
-        """Damage of the programme, (n,); NaN at places that were left out."""
+        """Damage of the programme, (n,); NaN at excluded places."""
         return np.asarray(self.damage.sum(axis=0))
 
 
@@ -245,7 +245,7 @@ def count_histories(
             greatest = max(greatest, float(result.total[batch].max()))
             if progress is not None:
                 progress(min(1.0, first / n))
-    is_zero = bound == 0  # proved
+    is_zero = bound == 0  # proved to be zero
     result.damage[:, is_zero] = 0.0
     return result
 
@@ -254,7 +254,7 @@ def check(
     stress: Array, blocks: Sequence[LoadBlock], criterion: Criterion, mean_stress: MeanStress, residue: str,
     negligible: float,
 ) -> None:  # fmt: skip
-    """Raise `FatigueError` unless everything fits together."""
+    """Raise `FatigueError` unless the inputs agree with each other."""
     if not blocks:
         raise FatigueError("fatigue: expected one load block at least")
     if stress.ndim != 3 or stress.shape[1] != 6:
@@ -280,7 +280,7 @@ def check(
 
 @dataclass(frozen=True)
 class Rule:
-    """All that says what a history does."""
+    """All settings that determine the damage of a history."""
 
     curve: SNCurve
     mean_stress: MeanStress
@@ -292,7 +292,7 @@ class Rule:
 def count_tile(
     stress: Array, frames: Array | None, histories: Sequence[Array], rule: Rule, result: Counted, tile: IntArray
 ) -> None:
-    """Count all blocks for a few places, and put the plane of greatest damage into the result."""
+    """Count all blocks for a few places, and store the critical plane in the result."""
     criterion = rule.criterion
     rows = np.ascontiguousarray(criterion.rows(stress, frames))
     sums = [count_block(rows, q, rule) for q in histories]
@@ -308,7 +308,7 @@ def count_tile(
 
 
 def count_block(rows: Array, q: Array, rule: Rule) -> tuple[Array, Array, Array]:
-    """Return damage (n, n_planes), counts (n, n_planes, 2) and largest amplitudes of one pass of a history."""
+    """Return damage (n, n_planes), counts (n, n_planes, 2) and largest amplitudes for one pass of a history."""
     from floatframe.durability.fatigue.kernels.cycle_kernels import close_block, cycle_rule, finish_block, push_block
 
     if rule.criterion.is_shear:
@@ -321,7 +321,7 @@ def count_block(rows: Array, q: Array, rule: Rule) -> tuple[Array, Array, Array]
     depths = np.zeros(m, np.int64)
     stack = np.empty((m, CHUNK + 64))
     values, flat = np.empty((n, CHUNK)), rows.reshape(-1, n_q)
-    room = np.empty(len(flat) * CHUNK)  # used again and again: fresh memory of this size costs more than the product
+    room = np.empty(len(flat) * CHUNK)  # reused buffer: allocating memory of this size costs more than the product
     for first in range(0, q.shape[1], CHUNK):
         chunk = q[:, first : first + CHUNK]
         width = chunk.shape[1]
@@ -342,7 +342,7 @@ def count_block(rows: Array, q: Array, rule: Rule) -> tuple[Array, Array, Array]
 
 
 def count_shear(rows: Array, q: Array, rule: Rule) -> tuple[Array, Array, Array]:
-    """Return what `count_block` does for cycles of shear with the normal stress beside them."""
+    """Return the results of `count_block` for cycles of shear stress with their normal stress."""
     from floatframe.durability.fatigue.kernels.cycle_kernels import cycle_rule
     from floatframe.durability.fatigue.kernels.findley_kernels import close_findley, finish_findley, push_findley
 
@@ -370,7 +370,7 @@ def count_shear(rows: Array, q: Array, rule: Rule) -> tuple[Array, Array, Array]
 
 
 def wide_enough(stack: Array, width: int) -> Array:
-    """Return a stack with at least so many places a row."""
+    """Return a stack with at least the given width."""
     if stack.shape[1] >= width:
         return stack
     wider = np.empty((len(stack), 2 * width))
@@ -379,7 +379,7 @@ def wide_enough(stack: Array, width: int) -> Array:
 
 
 def single_threaded_products() -> Any:
-    """Return the context in which each of our threads multiplies by itself."""
+    """Return the context in which each thread computes matrix products by itself."""
     from threadpoolctl import threadpool_limits
 
     return threadpool_limits(1)

@@ -1,4 +1,4 @@
-"""Load blocks: a history of the modal coordinates of a body, and how often it comes."""
+"""Load blocks: a history of the modal coordinates of a body, and its number of repeats."""
 
 import math
 from dataclasses import dataclass, field
@@ -12,20 +12,20 @@ from floatframe.results.trajectory import Trajectory
 
 __all__ = ["GAP", "LoadBlock", "block_of_results"]
 
-GAP = 10.0  #: a step of time so many times the median is a gap
+GAP = 10.0  #: ratio to the median time step above which a step is a gap
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class LoadBlock:
-    """A history of modal coordinates that comes `repeats` times in a programme of loads."""
+    """A history of modal coordinates with its number of `repeats` in a load programme."""
 
     name: str
     q: Array  #: modal coordinates, (n_t, n_q)
-    t: Array = field(default_factory=lambda: np.zeros(0))  #: times, (n_t,) [s]; empty: not known
+    t: Array = field(default_factory=lambda: np.zeros(0))  #: times, (n_t,) [s]; empty if unknown
     repeats: float = 1.0
-    scale: float = 1.0  #: of the loads
-    has_gaps: bool = False  #: whether steps of time that are far longer than the others are meant
+    scale: float = 1.0  #: factor on the loads
+    has_gaps: bool = False  #: whether time steps that are much longer than the others are intended
 
     def __post_init__(self) -> None:
         where = f"load block {self.name!r}"
@@ -49,7 +49,7 @@ class LoadBlock:
             self.check_times(where)
 
     def check_times(self, where: str) -> None:
-        """Raise unless times fit the rows, rise, and have no gap."""
+        """Raise `FatigueError` unless times match the rows, increase, and have no gap."""
         if self.t.shape != (len(self.q),):
             raise FatigueError(f"{where}: t: expected {len(self.q)} times, one a row, got {self.t.shape}")
         steps = np.diff(self.t)
@@ -68,7 +68,7 @@ class LoadBlock:
 
     @property
     def duration(self) -> float:
-        """Time of one pass [s]; NaN: not known."""
+        """Duration of one pass [s]; NaN if unknown."""
         return float(self.t[-1] - self.t[0]) if self.t.size else math.nan
 
 

@@ -1,4 +1,4 @@
-"""Mean stress: the amplitude at the curve's stress ratio that does the damage of a cycle with another mean.
+"""Mean stress: the amplitude, at the stress ratio of the curve, with the same damage as a cycle with another mean.
 
 Written with the amplitude S_a, the mean S_m and S_max = S_a + S_m. A correction gives the fully reversed amplitude
 S_ar (R = -1) of a cycle; the amplitude S at the ratio R of the curve, whose cycles have the mean c S with
@@ -26,7 +26,7 @@ __all__ = ["MEAN_STRESS", "NO_CORRECTION", "MeanStress"]
 
 NONE, LINE, GERBER, SWT, WALKER, FKM = range(6)
 
-#: name -> law of the kernel, the number it needs and what that number is
+#: code of the law in the kernel, name of its parameter, and description of the parameter, by name
 MEAN_STRESS = {
     "none": (NONE, "", ""),
     "goodman": (LINE, "tensile_strength", "tensile strength"),
@@ -41,11 +41,11 @@ MEAN_STRESS = {
 
 @dataclass(frozen=True)
 class MeanStress:
-    """A correction for mean stress and the number it needs."""
+    """A mean stress correction and its parameter."""
 
     name: str = "none"  #: one of `MEAN_STRESS`
     value: float = 0.0  #: a strength [Pa], Walker's exponent, or the sensitivity M
-    credit_compression: bool = False  #: goodman, soderberg, morrow: whether a compressive mean helps
+    credit_compression: bool = False  #: goodman, soderberg, morrow: whether a compressive mean is beneficial
 
     def __post_init__(self) -> None:
         if self.name not in MEAN_STRESS:
@@ -70,12 +70,12 @@ class MeanStress:
 
     @property
     def description(self) -> str:
-        """The correction and its number in words."""
+        """Description of the correction and its parameter."""
         key = MEAN_STRESS[self.name][1].replace("_", " ")
         return f"{self.name} ({key} {self.value:.6g})" if key else self.name
 
     def limit(self, largest: float, /) -> float:
-        """Return kappa with S_ar <= kappa S_a for cycles within -largest and largest; inf: none known.
+        """Return kappa with S_ar <= kappa S_a for all cycles between -largest and largest; inf if there is no bound.
 
         goodman and its kin: 1 / (1 - largest / R_m); gerber likewise with the square; fkm: 3 (1 + M)² / (3 + M).
         """

@@ -1,4 +1,4 @@
-"""What is written of a result: a record, a table of the worst nodes, a surface for ParaView, a picture."""
+"""Output files of a fatigue result: a record, a table of the worst nodes, a surface for ParaView, a picture."""
 
 import csv
 import io
@@ -20,17 +20,18 @@ from floatframe.durability.fatigue.surface_damage import FatigueResult
 
 __all__ = ["csv_of", "fatigue_record", "fatigue_scene", "render_fatigue", "vtu_of"]
 
-NEAR = 0.01  #: of the size of the body: a stress point is shown at the nearest node within
-DECADES = 6  #: of damage that the colours show, below the greatest; fewer where nodes below a share were left out
-NUMBERED = 3  #: places that the picture numbers
+NEAR = 0.01  #: distance, relative to the size of the body, within which a stress point is shown at a node
+#: decades of damage shown by colours, below the largest; fewer if nodes with negligible damage were excluded
+DECADES = 6
+NUMBERED = 3  #: number of places with a label in the picture
 
 
 def fatigue_record(made: Assessment) -> dict[str, Any]:
-    """Return the whole result in plain types: what it rests on, and the worst places."""
+    """Return the complete result in plain types: its inputs and the worst places."""
     result, given = made.result, made.given
     body, programme = result.body, given.programme
     sources: Sequence[Any] = made.blocks or given.spectra
-    if len(sources) != len(result.block_names):  # a shake file: a run a direction
+    if len(sources) != len(result.block_names):  # a shake file has one run for each direction
         sources = [*sources] * len(result.block_names)
     return {
         "body": body.name,
@@ -106,7 +107,7 @@ def place_record(made: Assessment, place: int) -> dict[str, Any]:
 
 
 def finite(value: float) -> float | None:
-    """Return a number, None for infinity: life without damage."""
+    """Return a number; None for infinity (life without damage)."""
     return float(value) if math.isfinite(value) else None
 
 
@@ -130,7 +131,7 @@ def csv_of(made: Assessment) -> str:
 
 
 def nodes_of_places(result: FatigueResult) -> tuple[IntArray, IntArray]:
-    """Return places and the kept nodes that show them: of a stress point the nearest one, if it is near.
+    """Return places and the kept nodes at which they are shown; a stress point is shown at the nearest node.
 
     Near is within a hundredth of the size of the body; other points are shown nowhere.
     """
@@ -151,7 +152,7 @@ def nodes_of_places(result: FatigueResult) -> tuple[IntArray, IntArray]:
 
 
 def on_all_nodes(made: Assessment, values: Array, outside: float, *, largest: bool = True) -> Array:
-    """Return values of the places at all kept nodes, (n_kept,): of several at a node the largest, or the least."""
+    """Return values of the places at all kept nodes, (n_kept,): the largest or the smallest of several at one node."""
     places, nodes = nodes_of_places(made.result)
     found = np.full(len(made.result.body.nodes), -np.inf if largest else np.inf)
     (np.maximum if largest else np.minimum).at(found, nodes, values[places])
@@ -159,10 +160,10 @@ def on_all_nodes(made: Assessment, values: Array, outside: float, *, largest: bo
 
 
 def vtu_of(made: Assessment) -> bytes:
-    """Return the surface as a .vtu file in mesh coordinates: damage (its bound where a node was left out), life, ..."""
+    """Return the surface as a .vtu file in mesh coordinates, with damage (its bound at excluded nodes), life, ..."""
     result, body = made.result, made.result.body
     damage = result.damage_or_bound
-    life = np.minimum(made.life, 1e300)  # ParaView has no colours for infinity
+    life = np.minimum(made.life, 1e300)  # ParaView cannot display infinity
     fields: dict[str, Any] = {
         "damage": on_all_nodes(made, damage, 0.0),
         "log10 damage": on_all_nodes(made, np.log10(np.maximum(damage, 1e-300)), -300.0),
@@ -181,12 +182,12 @@ def vtu_of(made: Assessment) -> bytes:
 
 
 def render_fatigue(made: Assessment, path: Path) -> Drawing:
-    """Draw damage on the surface into a PNG, seen from the side of the worst place."""
+    """Draw damage on the surface into a PNG, viewed from the side of the worst place."""
     return render_picture(fatigue_scene(made), path)
 
 
 def fatigue_scene(made: Assessment) -> Scene:
-    """Return the scene: the surface coloured by log10 of damage, the worst places numbered."""
+    """Return the scene: the surface coloured by log10 of damage, with labels at the worst places."""
     result, body = made.result, made.result.body
     damage = result.damage_or_bound
     top = math.log10(max(float(damage.max(initial=0.0)), 1e-300))
@@ -218,7 +219,7 @@ def fatigue_scene(made: Assessment) -> Scene:
 
 
 def separated(points: Array, distance: float) -> list[int]:
-    """Return rows in their order that lie at least so far from those taken before."""
+    """Return indices of points, in order, that have at least a distance from all previous ones."""
     taken: list[int] = []
     for k, point in enumerate(points):
         if all(np.linalg.norm(point - points[j]) > distance for j in taken):
@@ -227,7 +228,7 @@ def separated(points: Array, distance: float) -> list[int]:
 
 
 def towards(made: Assessment, order: IntArray) -> tuple[Array, Array]:
-    """Return the line of sight onto the worst place, a little from the side, and what points up."""
+    """Return the view direction onto the worst place, slightly oblique, and the upward direction."""
     body = made.result.body
     direction = np.array([-1.0, 2.0, -1.0])
     places, nodes = nodes_of_places(made.result)

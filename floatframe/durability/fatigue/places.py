@@ -1,4 +1,4 @@
-"""Places that are assessed: nodes of the surface and stress points of elements, each with its material."""
+"""Assessed places: nodes of the surface and stress points of elements, each with its material."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,27 +19,28 @@ __all__ = ["FatigueMaterial", "Places", "assessed_places", "point_number"]
 
 @dataclass(frozen=True, eq=False)
 class FatigueMaterial:
-    """What a place is made of: its S-N curve with its factors, and how mean stress enters."""
+    """A material of places: its S-N curve with factors, and its mean stress correction."""
 
     curve: SNCurve  #: in stress units of the body
     mean_stress: MeanStress = NO_CORRECTION
     name: str = ""
-    nodes: IntArray | None = None  #: kept nodes that have it; None with `points` None: all that no other names
-    points: IntArray | None = None  #: rows of the stress points of the body that have it
+    #: kept nodes of the material; with `points` also None, the material applies to all places without another one
+    nodes: IntArray | None = None
+    points: IntArray | None = None  #: rows of the stress points of the material
 
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Places in the order of their materials; a node or point of two materials is a place of each."""
+    """Places in the order of their materials; a node or point with two materials is two places."""
 
     nodes: IntArray  #: kept node, -1 at a stress point, (n,)
     points: IntArray  #: row of the stress points of the body, -1 at a node, (n,)
-    material: IntArray  #: number of its material, (n,)
-    n_left_out: int  #: nodes and points that no material names
+    material: IntArray  #: index of its material, (n,)
+    n_left_out: int  #: number of nodes and points without a material
 
 
 def point_number(body: ReducedBody) -> int:
-    """Return how many stress points a body has."""
+    """Return the number of stress points of a body."""
     return 0 if body.point_stress is None else len(body.point_stress.names)
 
 
@@ -47,7 +48,7 @@ def assessed_places(
     body: ReducedBody, materials: Sequence[FatigueMaterial], nodes: IntArray | None, points: IntArray | None,
     criterion: Criterion,
 ) -> Places:  # fmt: skip
-    """Return the places that are looked at.
+    """Return the places to assess.
 
     Parameters
     ----------
@@ -108,7 +109,7 @@ def assessed_places(
 
 
 def stress_of_places(body: ReducedBody, places: Places, rows: IntArray, field: Array | None) -> Array:
-    """Return stress shapes of some places, (n, 6, n_q); without a copy where they are all the nodes.
+    """Return stress shapes of some places, (n, 6, n_q), without a copy if the places are all nodes.
 
     Parameters
     ----------
@@ -141,5 +142,5 @@ def stress_of_places(body: ReducedBody, places: Places, rows: IntArray, field: A
 
 
 def frames_of_places(body: ReducedBody, places: Places, rows: IntArray, criterion: Criterion) -> Array | None:
-    """Return the tangent planes of some places, where the criterion needs them."""
+    """Return the tangent planes of some places; None if the criterion does not need them."""
     return surface_frames(body, places.nodes[rows]) if criterion.needs_surface else None

@@ -1,4 +1,4 @@
-"""Planes that critical-plane criteria look at: on a free surface, over angles in the tangent plane."""
+"""Planes of critical-plane criteria on a free surface, over angles in the tangent plane."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ __all__ = ["normal_rows", "shear_pairs", "surface_frames", "surface_nodes", "ten
 
 
 def surface_nodes(body: ReducedBody) -> IntArray:
-    """Return the kept nodes on the surface of a body, ascending, (n,); all with stress where it has no surface.
+    """Return the kept nodes on the surface of a body, ascending, (n,); all nodes with stress if it has no surface.
 
     Raises
     ------

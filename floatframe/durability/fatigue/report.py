@@ -1,4 +1,4 @@
-"""A result as one HTML page that works offline: life first, then what it rests on."""
+"""The fatigue report as one HTML page that works offline: first the life, then the data it is based on."""
 
 import base64
 from collections.abc import Sequence
@@ -23,7 +23,8 @@ from floatframe.errors import FatigueError
 __all__ = ["cycles_at", "exceedances", "fatigue_html"]
 
 
-# the cycles of one place: the load spectrum that stands beside the S-N curve ------------------------------------------
+# the cycles at one place: the load spectrum next to the S-N curve
+# -------------------------------------------------------
 
 
 def cycles_at(result: FatigueResult, blocks: Sequence[LoadBlock], place: int) -> Array:
@@ -64,7 +65,7 @@ def cycles_at(result: FatigueResult, blocks: Sequence[LoadBlock], place: int) ->
 
 
 def exceedances(cycles: Array, n_points: int = 200) -> tuple[Array, Array]:
-    """Return how many cycles have at least an amplitude: counts and amplitudes that fall, each (n <= n_points,)."""
+    """Return numbers of cycles with at least an amplitude, and decreasing amplitudes, (n <= n_points,) each."""
     order = np.argsort(-cycles[:, 0], kind="stable")
     amplitude, count = cycles[order, 0], np.cumsum(cycles[order, 2])
     keep = amplitude > 0
@@ -78,8 +79,8 @@ def exceedances(cycles: Array, n_points: int = 200) -> tuple[Array, Array]:
 # report ---------------------------------------------------------------------------------------------------------------
 
 
-MOST_CYCLES = 1e10  #: that the S-N curve is drawn to
-COLORS = ("#1b1f24", "#0072B2", "#009E73", "#CC79A7", "#56B4E9")  #: of the S-N curves of materials
+MOST_CYCLES = 1e10  #: largest number of cycles in the plot of S-N curves
+COLORS = ("#1b1f24", "#0072B2", "#009E73", "#CC79A7", "#56B4E9")  #: colours of the S-N curves of materials
 
 
 def fatigue_html(made: Assessment) -> str:
@@ -97,7 +98,7 @@ def fatigue_html(made: Assessment) -> str:
 
 
 def header(record: dict[str, Any]) -> str:
-    """Return the title, the facts, and the answer."""
+    """Return the title, the summary data, and the result in one sentence."""
     worst = record["worst"][0] if record["worst"] else None
     unit, target = record["life_unit"], record["programme"]["target"]
     n_points = record["n_points"]
@@ -131,7 +132,7 @@ def header(record: dict[str, Any]) -> str:
 
 
 def picture_section(made: Assessment) -> Section | None:
-    """Damage on the surface."""
+    """Return the section with the picture of the damage on the surface."""
     drawn = png_of(lambda path: render_fatigue(made, path), "the page")
     if drawn is None:
         return None
@@ -145,7 +146,7 @@ def picture_section(made: Assessment) -> Section | None:
 
 
 def worst_section(record: dict[str, Any]) -> Section:
-    """Table of the worst nodes."""
+    """Return the section with the table of the worst nodes."""
     has_planes = any(each["plane"] for each in record["worst"])
     names = list(record["worst"][0]["of_blocks"]) if record["worst"] else []
     has_materials = any(each["material"] for each in record["worst"])
@@ -169,7 +170,7 @@ def worst_section(record: dict[str, Any]) -> Section:
 
 
 def curve_section(made: Assessment, record: dict[str, Any]) -> Section:
-    """S-N curves, and the load spectrum of the worst place."""
+    """Return the section with the S-N curves and the load spectrum of the worst place."""
     unit = record["stress_unit"]
     traces: list[dict[str, Any]] = []
     for material, color in zip(made.result.materials, cycle(COLORS), strict=False):
@@ -201,7 +202,7 @@ def curve_section(made: Assessment, record: dict[str, Any]) -> Section:
 
 
 def method_section(record: dict[str, Any]) -> Section:
-    """What was assumed."""
+    """Return the section with the assumptions."""
     rows = [
         ("criterion", f"{record['criterion']}: {CRITERIA[record['criterion']]}"),
         ("stress tensor", record["tensor"]),

@@ -1,4 +1,4 @@
-"""Damage of a shaken body: the random test of `floatframe shake` gives the spectra, mode for mode.
+"""Damage of a shaken body: the random test of `floatframe shake` gives the cross spectra of its modes.
 
 The modes with the bases held, eta, and the motion of the inputs are the coordinates: their stress at kept nodes and
 stress points is the field of the model, and their cross spectra G = H S H^H are exact at the frequencies of the run,
@@ -43,7 +43,7 @@ def shaken_spectra(model: ShakenModel, test: RandomTest, run: RandomRun, duratio
     f = run.band.frequencies
     eta, omega = modal_response(model, f)
     of_modes, of_inputs = model.field
-    if of_inputs[:, :, columns].any():  # else what moves the bases makes no stress by itself
+    if of_inputs[:, :, columns].any():  # otherwise the motion of the bases causes no stress by itself
         unit = np.zeros((3, len(model.inputs), len(model.inputs)))
         unit[0] = np.eye(len(model.inputs))
         eta = np.concatenate([eta, driven(unit, model.rates, omega)], axis=1)
@@ -67,7 +67,7 @@ def shaken_damage(
     extrapolate: bool = False,
     nodes: IntArray | None = None,
 ) -> FatigueResult:
-    """Return the damage on the surface of a shaken body in the runs of a random test, one after the other.
+    """Return the damage on the surface of a shaken body, summed over the runs of a random test.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""S-N curves: cycles to failure N over the stress amplitude S, straight lines in log N over log S."""
+"""S-N curves: cycles to failure N over the stress amplitude S, as straight lines in a log-log diagram."""
 
 import math
 from collections.abc import Sequence
@@ -12,13 +12,13 @@ from floatframe.errors import FatigueError
 
 __all__ = ["BELOW", "LEAST_CYCLES", "SNCurve", "basquin_curve", "normal_quantile", "table_curve"]
 
-#: what a cycle below the last point of a curve does, by name
+#: damage of cycles below the last point of a curve, by name
 BELOW = {
     "limit": "no damage (fatigue limit; Miner's rule as it was)",
     "haibach": "the slope k goes on as 2k - 1",
     "elementary": "the slope goes on",
 }
-LEAST_CYCLES = 1000.0  #: lower end of a curve that is given by a slope: below it lies low-cycle fatigue
+LEAST_CYCLES = 1000.0  #: first number of cycles of a curve given by a slope; fewer cycles are low-cycle fatigue
 
 
 @frozen_copies
@@ -31,13 +31,13 @@ class SNCurve:
     cycles there are counted on the first line and told, or refused.
     """
 
-    amplitude: Array  #: S_j, a point on each line, steepest load first, (n_lines,) [Pa]
+    amplitude: Array  #: S_j, one point on each line, beginning with the highest load, (n_lines,) [Pa]
     cycles: Array  #: N_j at that point, (n_lines,)
     slope: Array  #: k_j >= 1, (n_lines,)
-    bottom: Array  #: least amplitude of each line, (n_lines,) [Pa]; the last may be 0: no fatigue limit
-    greatest: float  #: largest amplitude that the curve is known for [Pa]
-    stress_ratio: float = -1.0  #: R = least over largest stress in the tests
-    notes: tuple[str, ...] = ()  #: factors and conversions that went in
+    bottom: Array  #: smallest amplitude of each line, (n_lines,) [Pa]; 0 for the last line means no fatigue limit
+    greatest: float  #: largest amplitude for which the curve is known [Pa]
+    stress_ratio: float = -1.0  #: R, the smallest stress in the tests divided by the largest
+    notes: tuple[str, ...] = ()  #: notes on applied factors and conversions
 
     def __post_init__(self) -> None:
         for name in ("amplitude", "cycles", "slope", "bottom"):
@@ -67,11 +67,11 @@ class SNCurve:
 
     @property
     def fatigue_limit(self) -> float:
-        """Amplitude below which there is no damage [Pa]; 0: none."""
+        """Amplitude below which there is no damage [Pa]; 0 if there is no limit."""
         return float(self.bottom[-1])
 
     def line(self, j: int, amplitude: float) -> float:
-        """Return 1/N of line j at an amplitude, wherever the line holds."""
+        """Return 1/N of line j at an amplitude within the range of the line."""
         return float((amplitude / self.amplitude[j]) ** self.slope[j] / self.cycles[j])
 
     def damage(self, amplitude: Array | float) -> Array:
@@ -91,7 +91,7 @@ class SNCurve:
             return np.asarray(1.0 / self.damage(amplitude))
 
     def scaled(self, factor: float, reason: str) -> "SNCurve":
-        """Return the curve with all amplitudes times a factor, such as a surface or size factor."""
+        """Return the curve with all amplitudes multiplied by a factor, such as a surface or size factor."""
         if not (math.isfinite(factor) and factor > 0):
             raise FatigueError(f"S-N curve: {reason}: expected a factor above 0, got {factor:g}")
         if factor == 1:
@@ -102,7 +102,7 @@ class SNCurve:
         )  # fmt: skip
 
     def for_survival(self, wanted: float, *, of_curve: float = 0.5, deviation: float) -> "SNCurve":
-        """Return the curve of another probability of survival: log10 N is normally distributed about the curve.
+        """Return the curve for another probability of survival; log10 N is normally distributed about the median curve.
 
         Parameters
         ----------
@@ -218,7 +218,7 @@ def table_curve(
 
 
 def slope_below(slope: float, below: str) -> float | None:
-    """Return the slope below the last point, None for a fatigue limit."""
+    """Return the slope below the last point; None for a fatigue limit."""
     if below not in BELOW:
         from fe_models.foundation.words import nearest, quoted
 
@@ -227,5 +227,5 @@ def slope_below(slope: float, below: str) -> float | None:
 
 
 def least_words(values: Array) -> str:
-    """Return the least of some numbers in words."""
+    """Return the smallest of some numbers as text."""
     return f"{float(np.min(values)):g}"

@@ -1,4 +1,4 @@
-"""Damage and life of the places of a body, from histories or from spectra of its modal coordinates.
+"""Damage and life of the places of a body, from histories or spectra of its modal coordinates.
 
 Places are the nodes of its surface and its stress points, each with its material. Materials are counted one after the
 other; what is found at one says what is negligible at the next.
@@ -31,26 +31,27 @@ from floatframe.errors import FatigueError
 
 __all__ = ["FatigueResult", "history_damage", "spectral_damage"]
 
-MOST_BEYOND = 0.01  #: share of damage from amplitudes beyond the S-N curve that spectra may have unasked
+#: largest fraction of damage beyond the S-N curve that is accepted for spectra without `extrapolate`
+MOST_BEYOND = 0.01
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class FatigueResult:
-    """Damage of one pass through a programme of loads at places of a body. Life is 1 / damage passes."""
+    """Damage at places of a body for one pass through a load programme; the life is 1 / damage passes."""
 
     body: ReducedBody
     nodes: IntArray  #: kept node of each place, index into `body.nodes`, -1 at a stress point, (n,)
     points: IntArray  #: row of the stress points of the body, -1 at a node, (n,)
-    material: IntArray  #: number of its material in `materials`, (n,)
+    material: IntArray  #: index of its material in `materials`, (n,)
     block_names: tuple[str, ...]
-    block_damage: Array  #: of each block with its repeats, (n_blocks, n); NaN where left out
-    bound: Array  #: damage is at most this, (n,)
-    is_counted: Array  #: bool, (n,); False: the bound shows that the place cannot matter
-    cycles: Array  #: of the programme, (n,)
-    beyond: Array  #: cycles beyond the S-N curve, (n,); of spectra: their share of the damage
-    largest: Array  #: largest equivalent amplitude, (n,) [Pa]; of spectra: three standard deviations
-    plane: IntArray  #: plane of greatest damage, (n,)
+    block_damage: Array  #: damage of each block with its repeats, (n_blocks, n); NaN at excluded places
+    bound: Array  #: upper bound of the damage, (n,)
+    is_counted: Array  #: whether the place was counted, (n,); if not, its bound is negligible
+    cycles: Array  #: number of cycles in the programme, (n,)
+    beyond: Array  #: number of cycles beyond the S-N curve, (n,); for spectra, their fraction of the damage
+    largest: Array  #: largest equivalent amplitude, (n,) [Pa]; for spectra, three standard deviations
+    plane: IntArray  #: critical plane, (n,)
     materials: tuple[FatigueMaterial, ...]
     criterion: Criterion
     method: str  #: residue of rainflow counting, one of `RESIDUES`, or one of `SPECTRAL_METHODS`
@@ -74,40 +75,40 @@ class FatigueResult:
         return self.materials[0].mean_stress
 
     def name(self, place: int) -> str:
-        """Return what the user calls a place: the number of a node, the name of a stress point."""
+        """Return the name of a place: the number of a node, or the name of a stress point."""
         return name_of(self.body, int(self.nodes[place]), int(self.points[place]))
 
     def description(self, place: int) -> str:
-        """Return a place in words: "node 17", "beam 3 end A point 0"."""
+        """Return the description of a place: "node 17", "beam 3 end A point 0"."""
         return f"node {self.name(place)}" if self.nodes[place] != NONE else self.name(place)
 
     def positions(self, places: IntArray) -> Array:
-        """Return undeformed places in mesh coordinates, (n, 3) [m]."""
+        """Return undeformed positions of places in mesh coordinates, (n, 3) [m]."""
         return positions_of(self.body, self.nodes[places], self.points[places])
 
     @property
     def method_words(self) -> str:
-        """How cycles were counted, in words."""
+        """Description of the counting method."""
         return f"spectral, {self.method}" if self.is_spectral else f"rainflow, residue: {RESIDUES[self.method]}"
 
     @property
     def damage(self) -> Array:
-        """Damage of one pass through the programme, (n,); NaN where left out."""
+        """Damage for one pass through the programme, (n,); NaN at excluded places."""
         return np.asarray(self.block_damage.sum(axis=0))
 
     @property
     def damage_or_bound(self) -> Array:
-        """Damage, and where a node was left out its bound, (n,)."""
+        """Damage, or its bound at excluded places, (n,)."""
         return np.asarray(np.where(self.is_counted, self.damage, self.bound))
 
     @property
     def life(self) -> Array:
-        """Passes through the programme until the damage is 1, (n,); at left-out nodes at least this many."""
+        """Passes through the programme until the damage is 1, (n,); a lower bound at excluded places."""
         with np.errstate(divide="ignore"):
             return np.asarray(1.0 / self.damage_or_bound)
 
     def worst(self, number: int = 1) -> IntArray:
-        """Return places of the greatest damage in these arrays, worst first, (number,)."""
+        """Return the indices of the places with the largest damage, worst first, (number,)."""
         damage = np.where(self.is_counted, self.damage, -1.0)
         order = np.argsort(-damage, kind="stable")[:number]
         return np.asarray(order[damage[order] >= 0])
@@ -206,7 +207,7 @@ def spectral_damage(
     stress: Array | None = None,
     progress: Progress | None = None,
 ) -> FatigueResult:
-    """Return the damage of places of a body by a spectral method; else as `history_damage`.
+    """Return the damage of places of a body by a spectral method; other parameters as for `history_damage`.
 
     Parameters
     ----------
@@ -253,14 +254,14 @@ def spectral_damage(
 def all_materials(
     curve: SNCurve | None, mean_stress: MeanStress, others: Sequence[FatigueMaterial]
 ) -> tuple[FatigueMaterial, ...]:
-    """Return the materials, that of the rest first."""
+    """Return the materials; the one of the remaining places is first."""
     if curve is None and not others:
         raise FatigueError("fatigue: expected an S-N curve, or others: materials that name their places")
     return (*(() if curve is None else (FatigueMaterial(curve, mean_stress),)), *others)
 
 
 def rows_by_material(places: Places, materials: Sequence[FatigueMaterial]) -> list[tuple[FatigueMaterial, IntArray]]:
-    """Return each material that has places, and which."""
+    """Return each material that has places, with the rows of its places."""
     rows = [np.flatnonzero(places.material == number) for number in range(len(materials))]
     return [(material, own) for material, own in zip(materials, rows, strict=True) if len(own)]
 
@@ -269,7 +270,7 @@ def by_material(
     places: Places, materials: Sequence[FatigueMaterial], n_blocks: int,
     of: Callable[[FatigueMaterial, IntArray, float], Counted],
 ) -> Counted:  # fmt: skip
-    """Count material by material, and return the numbers of all places."""
+    """Count places one material after the other, and return the results of all places."""
     parts = []
     greatest = 0.0
     for material, rows in rows_by_material(places, materials):
@@ -286,12 +287,12 @@ def by_material(
 
 
 def of_material(material: FatigueMaterial) -> str:
-    """Return whose note follows: nothing where there is one material."""
+    """Return the prefix of a note: the name of the material, or nothing if there is only one."""
     return f"{material.name}: " if material.name else ""
 
 
 def name_of(body: ReducedBody, node: int, point: int) -> str:
-    """Return what the user calls a node or a stress point."""
+    """Return the name of a node or a stress point."""
     if node != NONE:
         return body.node_name(node)
     assert body.point_stress is not None
@@ -299,7 +300,7 @@ def name_of(body: ReducedBody, node: int, point: int) -> str:
 
 
 def positions_of(body: ReducedBody, nodes: IntArray, points: IntArray) -> Array:
-    """Return undeformed places of nodes and stress points in mesh coordinates, (n, 3) [m]."""
+    """Return undeformed positions of nodes and stress points in mesh coordinates, (n, 3) [m]."""
     at = np.where((nodes != NONE)[:, None], body.nodes[nodes], 0.0)
     at_points = points != NONE
     if at_points.any():
@@ -309,7 +310,7 @@ def positions_of(body: ReducedBody, nodes: IntArray, points: IntArray) -> Array:
 
 
 def place_words(body: ReducedBody, places: Places, k: int) -> str:
-    """Return a place and where it is in words."""
+    """Return a place and its position as text."""
     at = slice(k, k + 1)
     x, y, z = positions_of(body, places.nodes[at], places.points[at])[0]
     name = name_of(body, int(places.nodes[k]), int(places.points[k]))
@@ -318,14 +319,14 @@ def place_words(body: ReducedBody, places: Places, k: int) -> str:
 
 
 def what_places(places: Places) -> str:
-    """Return what the places are: nodes, points, or both."""
+    """Return the kind of the places as text: nodes, points, or both."""
     words = [word for word, has in (("nodes", (places.nodes != NONE).any()), ("points", (places.points != NONE).any()))
              if has]  # fmt: skip
     return " and ".join(words)
 
 
 def sampling_notes(found: Counted, blocks: Sequence[LoadBlock]) -> list[str]:
-    """Return a note if the worst place has few output times a cycle: peaks between them are missed."""
+    """Return a note if the worst place has few output times per cycle, so that peaks between them are missed."""
     if not found.is_counted.any():
         return []
     worst = int(np.nanargmax(np.where(found.is_counted, found.total, -1.0)))

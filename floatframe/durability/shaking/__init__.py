@@ -1,1 +1,1 @@
-"""A body or a system on a base that is moved: sine, random, shock, transients, notching, and what comes out of them."""
+"""Vibration tests of a body or a system on moving bases: sine, random, shock, transients, notching, results."""

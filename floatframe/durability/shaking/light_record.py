@@ -1,4 +1,4 @@
-"""A shake record that stays small: many long curves go into a file of arrays beside it."""
+"""A compact shake record: long curves are written to a separate file of arrays."""
 
 from typing import Any
 
@@ -8,12 +8,12 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["MOST_NUMBERS", "light_record"]
 
-MOST_NUMBERS = 300_000  #: in curves that stay in the record: some three megabytes
-LONG = 50  #: numbers of a list, beyond which it is a curve
+MOST_NUMBERS = 300_000  #: largest number of values in curves that remain in the record, about three megabytes
+LONG = 50  #: length above which a list counts as a curve
 
 
 def light_record(record: dict[str, Any], file_name: str) -> tuple[dict[str, Any], dict[str, Array]]:
-    """Return the record without its curves, and these by their places in it; all of it where there are few numbers.
+    """Return the record without its curves, and the curves by their paths; unchanged if there are few numbers.
 
     Curves are lists of more than 50 numbers, or of lists of more than 50. In the record {"array": "random/0/densities",
     "shape": [12, 804]} stands for each, and "curves" says in which file they are.
@@ -33,7 +33,7 @@ def light_record(record: dict[str, Any], file_name: str) -> tuple[dict[str, Any]
 
 
 def is_curve(value: Any) -> bool:
-    """Whether a value is a list of many numbers, or of lists of many numbers."""
+    """Return whether a value is a long list of numbers, or of lists."""
     if not isinstance(value, list) or not value:
         return False
     if isinstance(value[0], list):
@@ -42,7 +42,7 @@ def is_curve(value: Any) -> bool:
 
 
 def size_of_curves(value: Any) -> int:
-    """Return how many numbers the curves of a value have."""
+    """Return the number of values in the curves of a value."""
     if is_curve(value):
         return int(np.size(value))
     if isinstance(value, dict):
@@ -51,7 +51,7 @@ def size_of_curves(value: Any) -> int:
 
 
 def without_curves(value: Any, place: str, arrays: dict[str, Array]) -> Any:
-    """Return a value with words in place of its curves, which are put into the arrays."""
+    """Return a value with references in place of its curves, which are added to the arrays."""
     if is_curve(value):
         arrays[place] = np.array(value, dtype=float)  # None becomes NaN
         return {"array": place, "shape": list(arrays[place].shape)}

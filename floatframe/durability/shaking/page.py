@@ -1,4 +1,4 @@
-"""A shake result as one HTML page that works offline: what governs first, then every test with its curves."""
+"""A shake result as one HTML page that works offline: first the main results, then each test with its curves."""
 
 import math
 
@@ -23,8 +23,8 @@ from floatframe.durability.shaking.shake import ShakeResult
 
 __all__ = ["shake_html"]
 
-KINDS = ("acceleration", "displacement", "force", "moment", "stress", "von Mises")  #: that get charts
-MOST_MODES = 40  #: of the table of effective masses
+KINDS = ("acceleration", "displacement", "force", "moment", "stress", "von Mises")  #: kinds of outputs with charts
+MOST_MODES = 40  #: largest number of modes in the table of effective masses
 
 
 def shake_html(result: ShakeResult) -> str:
@@ -51,7 +51,7 @@ def number(value: float | None, digits: int = 4) -> str:
 
 
 def header(result: ShakeResult, title: str) -> str:
-    """Return the title, the facts and the answer."""
+    """Return the title, the summary data and the result in one sentence."""
     model, masses = result.model, result.masses
     held = "; ".join(f"{base.name} ({', '.join(base.holds) or 'ground'})" for base in model.bases)
     facts = (
@@ -81,7 +81,7 @@ def header(result: ShakeResult, title: str) -> str:
 
 
 def sentence(result: ShakeResult) -> str:
-    """Say which tests were made and what notches they have."""
+    """Return a sentence about the tests and their notches."""
     counts = []
     for name, runs in (("sine", result.sine), ("random", result.random), ("shock or transient", result.time)):
         if runs:
@@ -98,7 +98,7 @@ def sentence(result: ShakeResult) -> str:
 
 
 def summary_section(result: ShakeResult) -> Section:
-    """The largest output of each kind in every run, with the notes."""
+    """Return the section with the largest output of each kind in every run, and the notes."""
     rows = []
     for run, peaks, uncertain, what in every_run(result):
         best: dict[str, int] = {}
@@ -136,7 +136,7 @@ def kind_of(run: SineRun | RandomRun | TimeRun) -> str:
 
 
 def every_run(result: ShakeResult):
-    """Yield runs with their values, those with uncertainty, and what they are."""
+    """Yield each run with its values, its values with uncertainty, and their description."""
     for sine in result.sine:
         yield sine, sine.peaks, sine.uncertain.max(axis=0), "amplitude"
     for random in result.random:
@@ -146,7 +146,7 @@ def every_run(result: ShakeResult):
 
 
 def mass_section(result: ShakeResult) -> Section:
-    """Effective masses with cumulative sums."""
+    """Return the section with the effective masses and their cumulative sums."""
     masses = result.masses
     names = [name.partition(":")[2] if len(result.model.bases) == 1 else name for name in masses.directions]
     rows = []
@@ -212,7 +212,7 @@ def kind_charts(result: ShakeResult, run, peaks, key: str, chart) -> tuple[str, 
 
 
 def sine_section(result: ShakeResult, run: SineRun, number_: int) -> Section:
-    """A sine run."""
+    """Return the section of a sine run."""
     key = f"sine-{number_}"
     body, charts = kind_charts(result, run, run.peaks, key, sine_chart)
     notched = result.notched.get(("sine", run.test, run.direction))
@@ -255,7 +255,7 @@ def sine_section(result: ShakeResult, run: SineRun, number_: int) -> Section:
 
 
 def notch_part(result: ShakeResult, kind: str, notched: NotchedRun | None, key: str, charts: dict[str, Chart]) -> str:
-    """Return the notches of a run: chart and table with the reason for each."""
+    """Return the notches of a run: a chart, and a table with the cause of each."""
     if notched is None:
         return ""
     if not notched.notches:
@@ -285,7 +285,7 @@ def notch_part(result: ShakeResult, kind: str, notched: NotchedRun | None, key: 
 
 
 def random_section(result: ShakeResult, run: RandomRun, number_: int) -> Section:
-    """A random run."""
+    """Return the section of a random run."""
     key = f"random-{number_}"
     body, charts = kind_charts(result, run, run.rms, key, density_chart)
     notched = result.notched.get(("random", run.test, run.direction))
@@ -334,7 +334,7 @@ def random_section(result: ShakeResult, run: RandomRun, number_: int) -> Section
 
 
 def miles_part(result: ShakeResult, run: RandomRun) -> str:
-    """Return Miles' estimates of the main modes beside the computed mean acceleration."""
+    """Return a table of Miles' estimates for the main modes and the computed mean acceleration."""
     main = sorted([m for m in run.miles if m.share > 0.01], key=lambda m: -m.share)[:5]
     if not main:
         return ""
@@ -378,7 +378,7 @@ def worst_part(result: ShakeResult, run: RandomRun) -> str:
 
 
 def time_section(result: ShakeResult, run: TimeRun, number_: int) -> Section:
-    """A shock or transient."""
+    """Return the section of a shock or transient."""
     key = f"time-{number_}"
     body, charts = kind_charts(result, run, run.peaks, key, history_chart)
     if run.spectra:
@@ -422,7 +422,7 @@ def time_section(result: ShakeResult, run: TimeRun, number_: int) -> Section:
 
 
 def method_section(result: ShakeResult) -> Section:
-    """Conventions, conversions, and what the numbers are."""
+    """Return the section with conventions, conversions and definitions."""
     terms = [
         ("units", "; ".join(conversions(result.model))),
         ("base", "moved by its acceleration exactly: its interfaces are eliminated, no mass is added"),

@@ -17,8 +17,8 @@ from floatframe.durability.shaking.structure.model import Output, ShakenModel
 
 __all__ = ["density_chart", "history_chart", "mass_chart", "notch_chart", "sine_chart", "spectra_chart"]
 
-MOST_LINES = 8  #: of a chart: the largest ones
-MOST_POINTS = 1500  #: of a line
+MOST_LINES = 8  #: largest number of lines in a chart; the largest outputs are drawn
+MOST_POINTS = 1500  #: largest number of points of a line
 BLACK = "#1b1f24"
 
 
@@ -41,7 +41,7 @@ def log_log(x: str, y: str) -> Chart:
 
 
 def largest(outputs: Sequence[Output], sizes: Array, kind: str) -> list[int]:
-    """Return the outputs of a kind with the largest values, at most MOST_LINES, in their order."""
+    """Return the outputs of a kind with the largest values, at most MOST_LINES, in their original order."""
     keep = [k for k in reported_rows(tuple(outputs), sizes) if outputs[k].kind == kind]
     return sorted(sorted(keep, key=lambda k: -sizes[k])[:MOST_LINES])
 

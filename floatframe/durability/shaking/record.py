@@ -1,4 +1,4 @@
-"""A shake result as one record in plain types, for JSON, and as one table, for CSV. Accelerations are in g."""
+"""A shake result as a record in plain types for JSON, and as a table for CSV; accelerations are in g."""
 
 import csv
 import io
@@ -16,10 +16,10 @@ from floatframe.durability.shaking.structure.model import Output, ShakenModel
 
 __all__ = ["COLUMNS", "ROUNDING", "conversions", "in_tables", "shake_csv", "shake_record", "table_rows", "worst_nodes"]
 
-FEW = 50  #: numbers in a row, beyond which it is a curve
-DIGITS = 7  #: of the numbers of a curve
+FEW = 50  #: length of a list above which it is a curve
+DIGITS = 7  #: number of digits of the values of a curve
 
-ROUNDING = 1e-9  #: of the largest output of a kind, below which a value is rounding
+ROUNDING = 1e-9  #: value, relative to the largest output of its kind, below which it is a rounding error
 COLUMNS = (
     "test",
     "kind",
@@ -36,7 +36,7 @@ COLUMNS = (
     "swept",
     "notched",
 )
-WORST = 20  #: nodes of the table of largest stress
+WORST = 20  #: number of nodes in the table of largest stresses
 
 
 def in_tables(model: ShakenModel, output: Output) -> tuple[float, str]:
@@ -45,7 +45,7 @@ def in_tables(model: ShakenModel, output: Output) -> tuple[float, str]:
 
 
 def conversions(model: ShakenModel) -> list[str]:
-    """Say what one g and one Hz are in units of the model."""
+    """Return notes on one g and one Hz in units of the model."""
     units = model.units
     length, second = units.length_symbol, units.time_symbol
     said = [
@@ -61,7 +61,7 @@ def conversions(model: ShakenModel) -> list[str]:
 
 
 def shake_record(result: ShakeResult) -> dict[str, Any]:
-    """Return everything but the time histories in full: conversions, modes, masses, runs with their curves."""
+    """Return the complete result except full time histories: conversions, modes, masses, and runs with their curves."""
     model = result.model
     masses = result.masses
     return {
@@ -103,7 +103,7 @@ def shake_record(result: ShakeResult) -> dict[str, Any]:
 
 
 def plain(values: Array) -> Any:
-    """Return numbers as lists; what is not finite as None; curves with `DIGITS` digits, as files are long."""
+    """Return numbers as lists, with None for values that are not finite, and `DIGITS` digits in curves."""
     array = np.asarray(values, dtype=float)
     if array.ndim == 2 and array.shape[1] > FEW and np.isfinite(array).all():
         return [[float(f"{value:.{DIGITS}g}") for value in row] for row in array.tolist()]
@@ -252,7 +252,7 @@ def notched_record(model: ShakenModel, kind: str, run: NotchedRun) -> dict[str, 
 
 
 def table_rows(result: ShakeResult) -> list[tuple[Any, ...]]:
-    """Return one row an output and run, as `COLUMNS` names them; what is rounding of zero is left out."""
+    """Return one row for each output and run, with the columns `COLUMNS`; rounding errors of zero are left out."""
     model, rows = result.model, []
     for sine in result.sine:
         scale, keep = factors(model, sine.outputs), reported_rows(sine.outputs, sine.peaks)
@@ -328,7 +328,7 @@ def table_rows(result: ShakeResult) -> list[tuple[Any, ...]]:
 
 
 def reported_rows(outputs: tuple[Output, ...], values: Array) -> list[int]:
-    """Return the outputs that are more than rounding beside others of their kind."""
+    """Return the outputs that are not rounding errors compared with others of their kind."""
     largest: dict[str, float] = {}
     for output, value in zip(outputs, values, strict=True):
         largest[output.kind] = max(largest.get(output.kind, 0.0), float(value))

@@ -1,4 +1,4 @@
-"""Shaking in one call: a structure on its bases, the tests, and what comes out."""
+"""Vibration tests in one call: a structure on its bases, the tests, and their results."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -23,7 +23,7 @@ from floatframe.model.system import System
 
 __all__ = ["EffectiveMasses", "NotchRequest", "ShakeJob", "ShakeResult", "effective_masses", "shake"]
 
-LITTLE_MASS = 0.9  #: share of the mass in modes of a direction, below which a note says so
+LITTLE_MASS = 0.9  #: fraction of the mass in modes of a direction below which a note is written
 
 
 @dataclass(frozen=True)
@@ -31,14 +31,14 @@ class NotchRequest:
     """Limits for one kind of test, or one test."""
 
     limits: Sequence[Limit]
-    kind: str  #: "sine" or "random"
+    kind: str  #: kind of test, "sine" or "random"
     tests: Sequence[str] = ()  #: names; (): all of the kind
-    deepest: float = DEEPEST  #: notch that is allowed [dB]
+    deepest: float = DEEPEST  #: largest allowed depth of a notch [dB]
 
 
 @dataclass(frozen=True, eq=False)
 class ShakeJob:
-    """What is shaken, how, and what is wanted."""
+    """The structure, its bases and damping, the tests, and the requested outputs."""
 
     structure: ReducedBody | System
     #: name -> what it holds: interfaces of a body; joints, springs and bushings of a system. Or one of them
@@ -53,24 +53,24 @@ class ShakeJob:
     shock: Sequence[TimeTest] = ()  #: and transients
     notch: Sequence[NotchRequest] = ()
     uncertainty: Uncertainty = field(default_factory=Uncertainty)
-    residual_above: float | None = None  #: modes above answer statically [Hz]
+    residual_above: float | None = None  #: frequency above which modes respond statically [Hz]
     title: str = ""
     source: str = ""  #: file of the structure, for the record
 
 
 @dataclass(frozen=True, eq=False)
 class EffectiveMasses:
-    """How much of the mass each mode moves against its base."""
+    """The effective mass of each mode relative to its base."""
 
     frequencies: Array  #: (n_m,) [Hz]
     damping: Array  #: ratios, (n_m,)
     directions: tuple[str, ...]
     mass: Array  #: effective masses and inertias about the points of the bases, (n_m, 6 n_bases)
-    total: Array  #: those of the rigid structure, (6 n_bases,)
+    total: Array  #: masses and inertias of the rigid structure, (6 n_bases,)
 
     @property
     def share(self) -> Array:
-        """Of the total, (n_m, 6 n_bases)."""
+        """Effective masses divided by the total, (n_m, 6 n_bases)."""
         scale = np.maximum(self.total, 1e-12 * self.total.max())
         return np.asarray(self.mass / scale)
 
@@ -161,14 +161,14 @@ def model_of(job: ShakeJob, forces: tuple[str, ...]) -> ShakenModel:
 
 
 def is_base_input(job: ShakeJob, name: str) -> bool:
-    """Whether the name of an input is that of a base direction, not of a force."""
+    """Return whether an input is a base direction, not a force."""
     names = {job.base} if isinstance(job.base, str) else set(job.base or ())
     base, _, direction = name.rpartition(":")
     return direction in DIRECTIONS and (not base or base in names or job.base is None)
 
 
 def with_static_modes(model: ShakenModel, above: float) -> ShakenModel:
-    """Return the model with modes above a frequency [Hz] that answer statically."""
+    """Return the model in which modes above a frequency [Hz] respond statically."""
     n_residual = int((model.frequencies > above).sum())
     if n_residual == len(model.omega):
         raise ModelError(
@@ -180,7 +180,7 @@ def with_static_modes(model: ShakenModel, above: float) -> ShakenModel:
 
 
 def mass_notes(masses: EffectiveMasses) -> list[str]:
-    """Return where the modes carry little of the mass, with one base."""
+    """Return notes on directions in which the modes contain little of the mass, for one base."""
     if len(masses.directions) > 6:
         return []
     carried = masses.cumulative[-1][:3]

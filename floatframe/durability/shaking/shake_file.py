@@ -43,7 +43,7 @@ def as_tuple(value: Any) -> Any:
 
 
 def file_beside(value: Any, info: ValidationInfo) -> Any:
-    """Return the path of a file beside the shake file; ValueError if there is none."""
+    """Return the path of a file relative to the shake file; `ValueError` if it does not exist."""
     if not isinstance(value, str) or not value:
         raise ValueError("expected the path of a file, text")
     path = Path(info.context or ".") / value
@@ -53,7 +53,7 @@ def file_beside(value: Any, info: ValidationInfo) -> Any:
 
 
 def rows_or_file(value: Any, info: ValidationInfo) -> Any:
-    """Return rows as tuples, bands with levels and slopes as they are, or the path of a file."""
+    """Return rows as tuples, bands unchanged, or the path of a file."""
     if isinstance(value, str):
         return file_beside(value, info)
     if isinstance(value, list) and value and all(isinstance(row, list) and len(row) == 3 for row in value):
@@ -67,7 +67,7 @@ def rows_or_file(value: Any, info: ValidationInfo) -> Any:
 
 
 def rows_of(length: int) -> Callable[[Any], tuple[tuple[float, ...], ...]]:
-    """Return what makes rows of that many finite numbers of a list; ValueError with the row that is none."""
+    """Return a function from a list to rows of finite numbers; `ValueError` with the invalid row."""
 
     def rows(value: Any) -> tuple[tuple[float, ...], ...]:
         if not isinstance(value, list | tuple):
@@ -347,7 +347,7 @@ def job_of(data: ShakeFile, structure: cms.ReducedBody | System) -> ShakeJob:
     """Return the job of a checked file."""
     base, points = bases_of(data)
     if isinstance(structure, cms.ReducedBody):
-        bases_of_body(structure, base, points)  # a name that does not exist is told before what follows from it
+        bases_of_body(structure, base, points)  # reports an unknown name before the errors that follow from it
     spectra = SpectrumRequest(
         data.spectra.Q, data.spectra.kind, data.spectra.first, data.spectra.last, data.spectra.per_octave
     )
@@ -392,7 +392,7 @@ def bases_of(data: ShakeFile) -> tuple[Any, dict[str, Any]]:
 
 
 def damping_of(section: DampingSection) -> Damping:
-    """Return the damping; `ModelError` where a mode is not named by a number."""
+    """Return the damping; `ModelError` if a mode is not given by its number."""
     for key in section.modes:
         if not key.isdecimal():
             raise ModelError(f"damping.modes.{key}: expected the number of a mode, from 1")
@@ -401,7 +401,7 @@ def damping_of(section: DampingSection) -> Damping:
 
 
 def level_of(rows: Any, unit: str, where: str) -> Level:
-    """Return a level of rows, of bands or of a file."""
+    """Return a level from rows, bands or a file."""
     if isinstance(rows, Path):
         return read_level(rows, unit, where)
     is_bands = bool(rows) and len(rows[0]) == 3
@@ -494,7 +494,7 @@ def in_si(signal: Signal, unit: str | None, si: str, where: str) -> Array:
 
 
 def notches_of(data: ShakeFile) -> tuple[NotchRequest, ...]:
-    """Return the notches, those of one set of tests and depth together."""
+    """Return the notches, grouped by tests and depth."""
     together: dict[tuple[str, float], list[Limit]] = {}
     for name, each in data.notch.items():
         kind, _, test = each.of.partition(".")

@@ -1,1 +1,1 @@
-"""Compiled: cycles of streamed histories, with and without a normal stress beside them, and scalars of stresses."""
+"""Compiled functions: cycles of streamed histories, with and without normal stress, and scalars of stresses."""

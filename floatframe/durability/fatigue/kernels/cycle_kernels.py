@@ -1,4 +1,4 @@
-"""Compiled: cycles of streamed histories by the four-point rule, and the damage of each.
+"""Compiled functions: cycles of streamed histories by the four-point rule, and the damage of each cycle.
 
 The four-point rule: of four turning points in a row x1 x2 x3 x4 the inner two are a closed cycle if their range is no
 larger than both outer ones; they are taken out and the rest goes on. What is left at the end, the residue, spreads and
@@ -33,25 +33,25 @@ __all__ = [
 
 compiled = njit(cache=True, nogil=True, error_model="numpy")
 
-CLOSED, OVER = 0, 1  #: columns of counts: cycles (half ones as 1/2), those beyond the range of the curve
+CLOSED, OVER = 0, 1  #: columns of counts: all cycles (half cycles as 1/2), and cycles beyond the curve
 
 
 class CycleRule(NamedTuple):
-    """What a cycle of amplitude and mean does, as numbers: `SNCurve` and `MeanStress`."""
+    """The damage of a cycle with given amplitude and mean, as numbers from `SNCurve` and `MeanStress`."""
 
     amplitude: Array  #: (n_lines,) [Pa]
     cycles: Array  #: (n_lines,)
     slope: Array  #: (n_lines,)
     bottom: Array  #: (n_lines,) [Pa]
-    greatest: float  #: [Pa]
-    law: int  #: of the mean stress
-    value: float  #: its number
-    credit: bool  #: whether a compressive mean helps
-    ratio: float  #: mean over amplitude of the curve's tests, c
+    greatest: float  #: largest amplitude of the curve [Pa]
+    law: int  #: code of the mean stress law
+    value: float  #: parameter of the law
+    credit: bool  #: whether a compressive mean is beneficial
+    ratio: float  #: mean stress divided by amplitude in the tests of the curve, c
 
 
 def cycle_rule(curve: SNCurve, mean_stress: MeanStress) -> CycleRule:
-    """Return curve and correction as numbers."""
+    """Return the curve and the mean stress correction as numbers."""
     return CycleRule(
         np.array(curve.amplitude), np.array(curve.cycles), np.array(curve.slope), np.array(curve.bottom),
         float(curve.greatest), mean_stress.law, float(mean_stress.value), mean_stress.credit_compression,
@@ -61,7 +61,7 @@ def cycle_rule(curve: SNCurve, mean_stress: MeanStress) -> CycleRule:
 
 @compiled
 def reversed_amplitude(rule, S_a, S_m):
-    """S_ar: fully reversed amplitude of a cycle; inf where its mean reaches the strength (see `mean_stress`)."""
+    """Return S_ar, the fully reversed amplitude of a cycle; inf if its mean reaches the strength (`mean_stress`)."""
     if rule.law == LINE:
         if S_m <= 0.0 and not rule.credit:
             return S_a
@@ -91,7 +91,7 @@ def reversed_amplitude(rule, S_a, S_m):
 
 @compiled
 def equivalent_amplitude(rule, S_a, S_m):
-    """S: the amplitude at the stress ratio of the curve with the same S_ar; its cycles have the mean c S."""
+    """Return S, the amplitude at the stress ratio of the curve with the same S_ar; its cycles have the mean c S."""
     if rule.law == NONE:
         return S_a
     S_ar = reversed_amplitude(rule, S_a, S_m)
@@ -110,7 +110,7 @@ def equivalent_amplitude(rule, S_a, S_m):
 
 @compiled
 def damage_of(rule, S):
-    """1/N at an amplitude S of the curve."""
+    """Return 1/N for an amplitude S of the curve."""
     if not S > 0.0:
         return 0.0
     for j in range(rule.bottom.size):
@@ -151,7 +151,7 @@ def count(rule, x, y, weight, damage, counts, largest, n):
 
 @compiled
 def close(stack, depth, s, closed):
-    """Take closed cycles off a stack whose last range goes up (s = 1) or down (-1); return depth, number, next level.
+    """Remove closed cycles from a stack whose last range rises (s = 1) or falls (-1); return depth, number, next level.
 
     For s = 1 the four-point rule is x4 >= x2 and x3 >= x1: the intervals are nested. Cycles cannot close before the
     last value has passed the level.
@@ -169,7 +169,7 @@ def close(stack, depth, s, closed):
 
 @compiled
 def push(values, first, stack, depth, closed):
-    """Stream values from number `first` on into a stack until cycles close; return next number, depth, cycles closed.
+    """Stream values from index `first` into a stack until cycles close; return next index, depth, number of cycles.
 
     The ends of those cycles stand in the rows of `closed`, (n, 2).
     """
@@ -187,12 +187,12 @@ def push(values, first, stack, depth, closed):
     while n == 0 and i < values.size:
         v = s * values[i]
         i += 1
-        if v >= top:  # the history goes on: the last turning point moves
+        if v >= top:  # the history continues in the same direction, so that the last turning point moves
             top = v
             if v < level:
                 continue
             stack[depth - 1] = s * top
-        else:  # it turns
+        else:  # the history changes direction
             stack[depth - 1], stack[depth] = s * top, s * v
             depth += 1
             s, top = -s, -v
@@ -235,7 +235,7 @@ def finish_block(rule, stack, depths, damage, counts, largest):
 
 @compiled
 def close_block(rule, stack, depths, closed, damage, counts, largest):
-    """Follow each residue by itself once more: the cycles of a history that is repeated without end.
+    """Append each residue to itself once, which gives the cycles of an endlessly repeated history.
 
     The stacks are twice as long as the greatest depth.
     """
@@ -247,7 +247,7 @@ def close_block(rule, stack, depths, closed, damage, counts, largest):
 
 @compiled
 def collect(values, is_repeated):
-    """Return the cycles of one history: turning points from and to, and count, (n_cycles, 3)."""
+    """Return the cycles of one history: first and second turning point, and count, (n_cycles, 3)."""
     stack, closed = np.empty(2 * values.size + 2), np.empty((values.size + 2, 2))
     found = np.empty((values.size + 2, 3))
     n_found, depth = 0, 0

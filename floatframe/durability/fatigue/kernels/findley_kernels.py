@@ -1,4 +1,4 @@
-"""Compiled: cycles of the shear stress on a plane, each with the largest normal stress on that plane meanwhile.
+"""Compiled functions: cycles of the shear stress on a plane, with the largest normal stress during each cycle.
 
 The four-point rule of `cycle_kernels`, with a second stack: the largest normal stress since the turning point before.
 A cycle x2 x3 that closes on the way to x4 takes the largest of the ranges x2 to x3 and x3 to x4: the time until it
@@ -17,7 +17,7 @@ compiled = njit(cache=True, nogil=True, error_model="numpy")
 
 @compiled
 def count_findley(rule, k, weight, x, y, normal, damage, counts, largest, n):
-    """Count a cycle: amplitude S = 2 (tau_a + k max(normal, 0)) / (k + sqrt(1 + k²)), that of a bar under tension."""
+    """Count a cycle with the amplitude S = 2 (tau_a + k max(normal, 0)) / (k + sqrt(1 + k²)) of a bar under tension."""
     S = 2.0 * (0.5 * abs(x - y) + k * max(normal, 0.0)) / (k + np.sqrt(1.0 + k * k))
     if x == y:
         return
@@ -73,7 +73,7 @@ def finish_findley(rule, k, stack, most, depths, damage, counts, largest):
 
 @compiled
 def close_findley(rule, k, stack, most, depths, damage, counts, largest):
-    """Follow each residue by itself once more; the stacks are twice as long as the greatest depth."""
+    """Append each residue to itself once; the stacks are twice as long as the largest depth."""
     for n in range(depths.size):
         shear, normal = stack[n, : depths[n]].copy(), most[n, : depths[n]].copy()
         push_findley(

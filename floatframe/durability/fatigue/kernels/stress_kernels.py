@@ -1,4 +1,4 @@
-"""Compiled: signed scalars of histories of stress tensors, and Findley's parameter of resolved shear.
+"""Compiled functions: signed scalars of histories of stress tensors.
 
 Components xx yy zz yz xz xy. Loops run over time without branches, so that they become vector instructions.
 """

@@ -1,1 +1,1 @@
-"""Spectra of modal coordinates, distributions of amplitudes, and the damage that follows."""
+"""Damage from spectra: spectra of modal coordinates, and distributions of stress amplitudes."""

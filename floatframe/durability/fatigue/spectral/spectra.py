@@ -1,4 +1,4 @@
-"""Spectra of modal coordinates, and the spectral moments of stresses that follow from a few small matrices."""
+"""Spectra of modal coordinates, and the moments from which the spectral moments of stresses follow."""
 
 import math
 from collections.abc import Sequence
@@ -13,23 +13,23 @@ from floatframe.errors import FatigueError
 
 __all__ = ["ORDERS", "ModalSpectra", "modal_moments", "spectra_of_history"]
 
-ORDERS = (0.0, 1.0, 2.0, 4.0)  #: of the spectral moments that the methods need
-HERMITIAN = 1e-8  #: defect of a cross spectrum, and its most negative eigenvalue, over its largest
+ORDERS = (0.0, 1.0, 2.0, 4.0)  #: orders of the spectral moments that the methods need
+HERMITIAN = 1e-8  #: largest defect of a cross spectrum, and its most negative eigenvalue, relative to its largest entry
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ModalSpectra:
-    """Stationary Gaussian motion of the modal coordinates: one-sided cross spectra, and how long it lasts."""
+    """Stationary Gaussian motion of the modal coordinates, as one-sided cross spectra, with its duration."""
 
     name: str
     frequencies: Array  #: ascending, (n_f,) [Hz]
     spectra: NDArray[np.complex128]  #: one-sided, G_kl(f) = G_lk(f)*, (n_f, n_q, n_q) [unit of q² / Hz]
-    duration: float  #: of one pass [s]
+    duration: float  #: duration of one pass [s]
     mean: Array | None = None  #: static modal coordinates, (n_q,); None: zero
     repeats: float = 1.0
-    scale: float = 1.0  #: of the loads: spectra count with its square
-    weights: Array | None = None  #: of integrals over the frequencies, (n_f,) [Hz]; None: trapezoidal rule
+    scale: float = 1.0  #: factor on the loads; spectra are multiplied by its square
+    weights: Array | None = None  #: weights of integrals over the frequencies, (n_f,) [Hz]; None: trapezoidal rule
 
     def __post_init__(self) -> None:
         where = f"spectrum {self.name!r}"
@@ -78,7 +78,7 @@ class ModalSpectra:
 
 
 def modal_moments(spectra: ModalSpectra, orders: Sequence[float] = ORDERS) -> Array:
-    """Return scale² times the integrals of f^m Re G over f, (n_orders, n_q, n_q).
+    """Return the integrals of scale² f^m Re G over f, (n_orders, n_q, n_q).
 
     A stress a . S q, a row of numbers a, has the spectral moments (a S) M_m (a S).T: the imaginary parts cancel.
     """

@@ -1,4 +1,4 @@
-"""Damage from spectra of modal coordinates: moments of every place from a few modal matrices, then a distribution.
+"""Damage from spectra of modal coordinates: spectral moments of each place, then a distribution of amplitudes.
 
 A stress that is linear in q, s = a · S q, has the moments (a S) M_m (a S).T, M_m of `modal_moments`. Von Mises stress
 is none; Preumont & Piéfort (1994) put in its place the Gaussian stress whose spectrum is the mean of that of its
@@ -21,7 +21,7 @@ from floatframe.errors import FatigueError
 
 __all__ = ["count_spectra", "mean_factor", "stress_moments"]
 
-CHUNK_SIZE = 2_000_000  #: numbers of rows held at a time
+CHUNK_SIZE = 2_000_000  #: largest number of entries of rows in memory
 
 
 def count_spectra(
@@ -87,7 +87,7 @@ def check(
     stress: Array, spectra: Sequence[ModalSpectra], curve: SNCurve, criterion: Criterion, mean_stress: MeanStress,
     method: str,
 ) -> None:  # fmt: skip
-    """Raise `FatigueError` unless everything fits together."""
+    """Raise `FatigueError` unless the inputs agree with each other."""
     if not spectra:
         raise FatigueError("fatigue: expected one spectrum at least")
     if method not in SPECTRAL_METHODS:
@@ -126,7 +126,7 @@ def stress_moments(stress: Array, spectra: ModalSpectra, criterion: Criterion, f
 
 
 def linear_rows(stress: Array, frames: Array | None, criterion: Criterion) -> Array:
-    """Return rows whose moments are wanted: of A sigma for von Mises, else one a plane, (n, n_rows, n_q)."""
+    """Return the rows of the stresses, (n, n_rows, n_q): A sigma for von Mises stress, one row per plane otherwise."""
     if criterion.is_shear:
         assert frames is not None
         return np.asarray(2 * shear_pairs(frames, criterion.n_planes)[0] @ stress)
@@ -141,13 +141,13 @@ def linear_rows(stress: Array, frames: Array | None, criterion: Criterion) -> Ar
 
 
 def row_moments(rows: Array, moments: Array, criterion: Criterion) -> Array:
-    """Return r M r.T of each row, added over the components of von Mises stress, (n_orders, n, n_planes)."""
+    """Return r M r.T of each row, summed over the components of von Mises stress, (n_orders, n, n_planes)."""
     each = np.stack([np.einsum("nrk,nrk->nr", rows @ M, rows) for M in moments])
     return each.sum(axis=2, keepdims=True) if criterion.name == "signed-von-mises" else each
 
 
 def mean_value(stress: Array, rows: Array, spectra: ModalSpectra, criterion: Criterion) -> Array:
-    """Return the criterion of the static stress, (n, n_planes) [Pa]."""
+    """Return the criterion for the static stress, (n, n_planes) [Pa]."""
     q = spectra.scale * np.asarray(spectra.mean)
     if criterion.name != "signed-von-mises":
         return np.asarray(rows @ q)
@@ -159,7 +159,7 @@ def mean_value(stress: Array, rows: Array, spectra: ModalSpectra, criterion: Cri
 
 
 def mean_factor(mean: Array, mean_stress: MeanStress) -> Array:
-    """Return what amplitudes are multiplied with for a mean stress, same shape: S_ar / S_a of goodman and its kin."""
+    """Return the factor S_ar / S_a on amplitudes for a mean stress, same shape; only for laws like goodman."""
     if mean_stress.law == NONE:
         return np.ones(mean.shape)
     share = mean / mean_stress.value

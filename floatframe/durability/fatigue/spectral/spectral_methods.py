@@ -1,4 +1,4 @@
-"""How the amplitudes of cycles of a stationary Gaussian stress are distributed, from its spectral moments.
+"""Distributions of the cycle amplitudes of a stationary Gaussian stress, from its spectral moments.
 
 With moments l_m = int f^m G df, up-crossings of the mean nu_0 = sqrt(l_2 / l_0) and peaks nu_p = sqrt(l_4 / l_2) a
 second, a_1 = l_1 / sqrt(l_0 l_2) and a_2 = l_2 / sqrt(l_0 l_4), every method here but Wirsching and Light's is a sum of
@@ -20,21 +20,21 @@ from floatframe.errors import FatigueError
 
 __all__ = ["SPECTRAL_METHODS", "Density", "damage_rates", "widths"]
 
-NARROW = 1 - 1e-6  #: a_2 from which a spectrum is taken as one line: the formulas of wide ones divide by 1 - a_2
+NARROW = 1 - 1e-6  #: a_2 above which a spectrum counts as a single line, because wide-band formulas divide by 1 - a_2
 LEAST_ZHAO_BAKER = 0.13  #: a_2 below which the weight of the Weibull part exceeds 1
 
 
 @dataclass(frozen=True, eq=False)
 class Density:
-    """Cycles whose amplitudes are Weibull distributed."""
+    """Cycles with a Weibull distribution of amplitudes."""
 
-    rate: Array  #: cycles a second, (n,) [Hz]
+    rate: Array  #: cycles per second, (n,) [Hz]
     theta: Array  #: scale, (n,) [Pa]
     shape: Array  #: b, (n,)
 
 
 def widths(moments: Array) -> tuple[Array, Array, Array, Array]:
-    """Return nu_0, nu_p [Hz], a_1, a_2 of spectral moments of orders 0, 1, 2, 4, (4, n); 0 where there is no stress."""
+    """Return nu_0, nu_p [Hz], a_1, a_2 from spectral moments of orders 0, 1, 2, 4, (4, n); 0 without stress."""
     l_0, l_1, l_2, l_4 = (np.maximum(each, 0.0) for each in moments)
     with np.errstate(divide="ignore", invalid="ignore"):
         found = np.sqrt(l_2 / l_0), np.sqrt(l_4 / l_2), l_1 / np.sqrt(l_0 * l_2), l_2 / np.sqrt(l_0 * l_4)
@@ -43,13 +43,13 @@ def widths(moments: Array) -> tuple[Array, Array, Array, Array]:
 
 
 def narrow_band(moments: Array) -> list[Density]:
-    """Rayleigh's distribution of the peaks, one cycle an up-crossing: on the safe side for wide spectra."""
+    """Return the Rayleigh distribution of peaks with one cycle per up-crossing; conservative for wide spectra."""
     nu_0, _, _, _ = widths(moments)
     return [rayleigh(nu_0, root(moments))]
 
 
 def dirlik(moments: Array) -> list[Density]:
-    """Dirlik (1985): an exponential and two Rayleigh densities, fitted to rainflow counts of simulated histories."""
+    """Return Dirlik's (1985) exponential and two Rayleigh densities, fitted to rainflow counts of simulations."""
     _, nu_p, a_1, a_2 = widths(moments)
     sigma = root(moments)
     is_narrow = a_2 > NARROW
@@ -67,7 +67,7 @@ def dirlik(moments: Array) -> list[Density]:
 
 
 def tovo_benasciutti(moments: Array) -> list[Density]:
-    """Benasciutti & Tovo (2005): level crossings and ranges, weighed by b; both bound the damage of rainflow cycles."""
+    """Return the mean, weighted by b, of level-crossing and range counting, which bound rainflow damage (2005)."""
     nu_0, nu_p, a_1, a_2 = widths(moments)
     sigma = root(moments)
     is_narrow = a_2 > NARROW
@@ -78,7 +78,7 @@ def tovo_benasciutti(moments: Array) -> list[Density]:
 
 
 def zhao_baker(moments: Array) -> list[Density]:
-    """Zhao & Baker (1992): a Weibull density for small cycles and Rayleigh's for large ones."""
+    """Return Zhao & Baker's (1992) Weibull density for small cycles and Rayleigh density for large ones."""
     _, nu_p, _, a_2 = widths(moments)
     sigma = root(moments)
     if ((a_2 < LEAST_ZHAO_BAKER) & (sigma > 0)).any():
@@ -95,7 +95,7 @@ def zhao_baker(moments: Array) -> list[Density]:
 
 
 def rayleigh(rate: Array, sigma: Array) -> Density:
-    """Return Rayleigh's density of a standard deviation."""
+    """Return the Rayleigh density for a standard deviation."""
     return Density(rate, np.sqrt(2) * sigma, np.full(len(sigma), 2.0))
 
 
@@ -104,18 +104,18 @@ def root(moments: Array) -> Array:
     return np.asarray(np.sqrt(np.maximum(moments[0], 0.0)))
 
 
-#: name -> densities of cycles from the moments, (4, n)
+#: function from the moments, (4, n), to the densities of cycles, by name
 SPECTRAL_METHODS: dict[str, Callable[[Array], list[Density]]] = {
     "dirlik": dirlik,
     "tovo-benasciutti": tovo_benasciutti,
     "zhao-baker": zhao_baker,
     "narrow-band": narrow_band,
-    "wirsching-light": narrow_band,  # times a factor of width and slope
+    "wirsching-light": narrow_band,  # multiplied by a factor that depends on bandwidth and slope
 }
 
 
 def wirsching_light_factor(moments: Array, curve: SNCurve) -> Array:
-    """Return what narrow-band damage is multiplied with (Wirsching & Light 1980), for curves of one slope, (n,).
+    """Return the factor on narrow-band damage of Wirsching & Light (1980), for curves with one slope, (n,).
 
     a + (1 - a) (1 - e)^b, e = sqrt(1 - a_2²), a = 0.926 - 0.033 k, b = 1.587 k - 2.323.
     """
@@ -171,7 +171,7 @@ def damage_rates(
 
 
 def tails(theta: Array, shape: Array, k: float, amplitude: float) -> Array:
-    """Return the share of int x^k p dx above an amplitude, (n,)."""
+    """Return the part of int x^k p dx above an amplitude, (n,)."""
     if amplitude == 0:
         return np.ones(len(theta))
     if not np.isfinite(amplitude):

@@ -1,4 +1,4 @@
-"""Inputs by name, and what has to be so before they are applied."""
+"""Inputs by name, and checks before they are applied."""
 
 from fe_models.foundation.words import nearest, quoted
 from floatframe.durability.shaking.structure.model import DIRECTIONS, ShakenModel
@@ -6,12 +6,12 @@ from floatframe.errors import ModelError
 
 __all__ = ["band_notes", "input_index", "require_damped"]
 
-LEAST_DAMPING = 1e-9  #: ratio below which a mode counts as undamped
-MARGIN = 1.5  #: modes up to this multiple of a band shape the response in it
+LEAST_DAMPING = 1e-9  #: damping ratio below which a mode counts as undamped
+MARGIN = 1.5  #: multiple of the upper frequency of a band up to which modes affect the response in the band
 
 
 def input_index(model: ShakenModel, name: str, where: str) -> int:
-    """Return the place of an input: its name such as "base:x" or "load case a", or "x" alone where there is one base.
+    """Return the index of an input by its name such as "base:x" or "load case a"; with one base, "x" is enough.
 
     Raises
     ------
@@ -27,7 +27,7 @@ def input_index(model: ShakenModel, name: str, where: str) -> int:
 
 
 def require_damped(model: ShakenModel, first: float, last: float, where: str) -> None:
-    """Raise `ModelError` if a mode in a band has no damping: its response would be infinite."""
+    """Raise `ModelError` if a mode in a band has no damping, because its response would be infinite."""
     f, zeta = model.frequencies, model.damping_ratios
     bare = [k for k in range(len(f) - model.n_residual) if first <= f[k] <= last and zeta[k] < LEAST_DAMPING]
     if bare:
@@ -39,7 +39,7 @@ def require_damped(model: ShakenModel, first: float, last: float, where: str) ->
 
 
 def band_notes(model: ShakenModel, last: float, where: str) -> list[str]:
-    """Return what the modes leave out of a band that ends at a frequency [Hz]."""
+    """Return notes on the part of the response that the modes do not contain, for a band up to `last` [Hz]."""
     f = model.frequencies[: len(model.frequencies) - model.n_residual]
     if not len(f) or last * MARGIN <= f[-1]:
         return []

@@ -1,4 +1,4 @@
-"""Levels over frequency: accelerations and power spectral densities in the units they are specified in.
+"""Levels over frequency: accelerations and power spectral densities, in the units of test specifications.
 
 Between two rows a level is straight in log-log axes, as test specifications draw it; outside of them there is none.
 """
@@ -30,8 +30,8 @@ ACCELERATIONS = {  # unit -> m/s² or rad/s²
 }
 STROKES = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254, "rad": 1.0}  # amplitude of a displacement or rotation
 DENSITIES = {"g2/Hz": "g", "(m/s2)2/Hz": "m/s2", "(mm/s2)2/Hz": "mm/s2", "(rad/s2)2/Hz": "rad/s2"}
-OF_OUTPUT = "output"  #: the unit of whatever output a table belongs to
-FEWEST = 2  #: rows
+OF_OUTPUT = "output"  #: the unit of the output to which a table belongs
+FEWEST = 2  #: smallest number of rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,8 +47,8 @@ class Level:
     frequencies: Array  #: ascending, (n,) [Hz]
     values: Array  #: (n,), in `unit`
     unit: str = "g"
-    where: str = field(default="shake: level", compare=False)  #: for messages
-    rows: Sequence[str] = ()  #: where each row stands, for messages: "line 7"; (): by its number
+    where: str = field(default="shake: level", compare=False)  #: location of the level, for messages
+    rows: Sequence[str] = ()  #: location of each row, for messages: "line 7"; (): the row number
 
     def __post_init__(self) -> None:
         f, values = np.asarray(self.frequencies, dtype=float), np.asarray(self.values, dtype=float)
@@ -78,7 +78,7 @@ class Level:
 
     @classmethod
     def of(cls, rows: "Level | Sequence[Sequence[float]]", unit: str = "g", where: str = "shake: level") -> "Level":
-        """Return a level from rows (Hz, value); a level as it is."""
+        """Return a level from rows (Hz, value); a level is returned unchanged."""
         if isinstance(rows, Level):
             return rows
         for k, row in enumerate(rows):
@@ -99,11 +99,11 @@ class Level:
 
     @property
     def is_density(self) -> bool:
-        """Whether it is a power spectral density."""
+        """Whether the level is a power spectral density."""
         return self.unit in DENSITIES
 
     def at(self, frequencies: Array) -> Array:
-        """Return the level in its unit at frequencies [Hz], (n_f,); zero outside of its rows."""
+        """Return the level in its unit at frequencies [Hz], (n_f,); zero outside its rows."""
         f = np.asarray(frequencies, dtype=float)
         inside = (f >= self.first * (1 - 1e-12)) & (f <= self.last * (1 + 1e-12))
         values = np.exp(np.interp(np.log(np.maximum(f, 1e-300)), np.log(self.frequencies), np.log(self.values)))
@@ -119,7 +119,7 @@ class Level:
 
     @property
     def is_rotation(self) -> bool:
-        """Whether it belongs to a rotation."""
+        """Whether the level is a rotation."""
         return "rad" in self.unit
 
 
@@ -167,7 +167,7 @@ def is_number(word: str) -> bool:
 
 
 def known_unit(unit: str, where: str) -> str:
-    """Return the unit as the tables write it; `ModelError` with the nearest one if it is not known."""
+    """Return the unit in its standard spelling; `ModelError` with the nearest one if it is unknown."""
     plain = unit.strip().replace("²", "2").replace("^2", "2").replace("s**2", "s2").replace(" ", "")
     plain = re.sub(r"^g2/hz$|^G2/Hz$", "g2/Hz", plain)
     known = [*ACCELERATIONS, *STROKES, *DENSITIES, OF_OUTPUT]

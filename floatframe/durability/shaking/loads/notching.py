@@ -1,4 +1,4 @@
-"""Notches: inputs lowered where a limit would be passed, with the limit that asks for each.
+"""Notches: inputs reduced where a limit would be exceeded, with the limit that causes each notch.
 
 Sine:    a(f) = min(level, limit_k(f) / |H_k(f)|)                     amplitudes
 Random:  S(f) = min(level, limit_k(f) / |H_k(f)|²)                    densities
@@ -31,21 +31,21 @@ from floatframe.errors import ModelError
 
 __all__ = ["ForceLimit", "Notch", "NotchedRun", "ResponseLimit", "notched_random", "notched_sine"]
 
-LOWEST = -60.0  #: logarithm of a clipped density over its largest value, 260 dB
-DEEPEST = 40.0  #: dB, unless the test says less
-JOINED = 0.01  #: dB below the level from which a notch is told
+LOWEST = -60.0  #: logarithm of the smallest clipped density, relative to its largest value, 260 dB
+DEEPEST = 40.0  #: largest allowed depth of a notch [dB], by default
+JOINED = 0.01  #: smallest reported depth of a notch [dB]
 
 
 @dataclass(frozen=True)
 class ResponseLimit:
-    """An output that must not pass a level."""
+    """An output and a level that it must not exceed."""
 
     output: str  #: name of an output: "mirror acceleration x", "base force z", "root stress von Mises"
-    level: float | None = None  #: the same at all frequencies, in the unit of the table
-    table: Level | None = None  #: accelerations only, or in the unit of the output
-    rms: float | None = None  #: random only: of the whole band
+    level: float | None = None  #: constant level over frequency, in the unit of the table
+    table: Level | None = None  #: level over frequency, for accelerations or in the unit of the output
+    rms: float | None = None  #: rms over the whole band, only for random tests
     name: str = ""
-    factor: float = 1.0  #: on the response, before it is compared
+    factor: float = 1.0  #: factor on the response before the comparison
 
     def __post_init__(self) -> None:
         given = [key for key in ("level", "table", "rms") if getattr(self, key) is not None]
@@ -68,12 +68,12 @@ class ResponseLimit:
 
 @dataclass(frozen=True)
 class ForceLimit:
-    """The semi-empirical limit of an interface force, in the direction that is driven or another one."""
+    """The semi-empirical limit of an interface force, in the driven direction or another one."""
 
     output: str  #: "base force z"
-    C: float  #: of the mounting structure, sqrt(2) or so [-]
+    C: float  #: C of the mounting structure, about sqrt(2) [-]
     frequency: float | None = None  #: f_0 [Hz]; None: the mode with the largest effective mass in the direction
-    exponent: float = 2.0  #: n of densities
+    exponent: float = 2.0  #: n for densities
     mass: float | None = None  #: M_0 in units of the model; None: that of the structure
     name: str = ""
 
@@ -91,30 +91,31 @@ Limit = ResponseLimit | ForceLimit
 
 @dataclass(frozen=True)
 class Notch:
-    """A stretch of frequencies at which one limit holds the input down."""
+    """A frequency range in which one limit reduces the input."""
 
     first: float  #: [Hz]
     last: float
-    deepest: float  #: where it is deepest [Hz]
-    depth: float  #: there [dB]
+    deepest: float  #: frequency of the largest depth [Hz]
+    depth: float  #: largest depth [dB]
     reason: str  #: name of the limit
     output: str
-    limit: float  #: value of the limit there, unit of the output (squared per Hz of a density)
-    unnotched: float  #: what the output would reach there
+    limit: float  #: limit at the largest depth, unit of the output (squared per Hz for a density)
+    unnotched: float  #: value of the output without notch at the largest depth
 
 
 @dataclass(frozen=True, eq=False)
 class NotchedRun:
-    """An input with notches and what it leaves of the outputs."""
+    """A notched input and the outputs for it."""
 
     frequencies: Array  #: (n_f,) [Hz]
-    level: Array  #: as specified, (n_f,) [units of the model, squared per Hz of a density]
-    notched: Array  #: (n_f,)
+    level: Array  #: specified level, (n_f,) [units of the model, squared per Hz for a density]
+    notched: Array  #: level with notches, (n_f,)
     sizes: Array  #: amplitudes or densities of the outputs, (n_f, n_out)
     notches: tuple[Notch, ...]
-    rms: Array | None  #: random: of the outputs, (n_out,)
-    input_rms: float | None  #: random: of the notched input
-    limits: dict[str, Array]  #: by name: limit over frequency, (n_f,); of rms the density at which it is clipped
+    rms: Array | None  #: rms of the outputs in a random test, (n_out,)
+    input_rms: float | None  #: rms of the notched input in a random test
+    #: limit over frequency by name, (n_f,); for an rms limit, the density at which the output is clipped
+    limits: dict[str, Array]
 
 
 def column_of(outputs: Sequence[Output], limit: Limit) -> int:
@@ -128,7 +129,7 @@ def column_of(outputs: Sequence[Output], limit: Limit) -> int:
 
 
 def in_output_units(model: ShakenModel, output: Output, value: float) -> float:
-    """Return a limit as the tables give it, accelerations in g, in units of the model."""
+    """Return a limit, given with accelerations in g, in units of the model."""
     return value * model.gravity if output.kind == "acceleration" else value
 
 
@@ -210,7 +211,7 @@ def label(limit: Limit) -> str:
 
 
 def limit_over(model: ShakenModel, output: Output, limit: ResponseLimit, f: Array, *, squared: bool = False) -> Array:
-    """Return the limit at frequencies in units of the model, infinite outside of its table; densities as they are."""
+    """Return the limit at frequencies in units of the model, infinite outside its table; densities are unchanged."""
     if limit.level is not None:
         value = in_output_units(model, output, limit.level)
         return np.full(len(f), value * (model.gravity if squared and output.kind == "acceleration" else 1.0))
@@ -236,7 +237,7 @@ def main_frequency(model: ShakenModel, k: int) -> float:
 
 
 def clipped_at(run: RandomRun, density: Array, rms: float) -> float:
-    """Return the density at which an output is clipped, so that its rms is kept; infinite if it is kept anyway."""
+    """Return the density at which an output is clipped to satisfy its rms; infinite if it needs no clipping."""
     total = float(np.sqrt(run.band.integral(density)))
     if total <= rms:
         return math.inf
@@ -246,12 +247,12 @@ def clipped_at(run: RandomRun, density: Array, rms: float) -> float:
         return float(np.sqrt(run.band.integral(np.minimum(density, top * math.exp(x))))) - rms
 
     if over(LOWEST) > 0:
-        return top * math.exp(LOWEST)  # what is deeper is refused anyway
+        return top * math.exp(LOWEST)  # deeper notches are rejected anyway
     return top * math.exp(float(brentq(over, LOWEST, 0.0, xtol=1e-12)))
 
 
 def lowered(level: Array, allowed: Array) -> tuple[Array, Array]:
-    """Return the lowest of the level and what the limits allow, and which limit rules (-1: none), (n_f,) each."""
+    """Return the smallest of the level and the allowed levels, and the index of the limit (-1: none), (n_f,) each."""
     if not len(allowed):
         return level, np.full(len(level), -1)
     which = allowed.argmin(axis=0)
@@ -262,7 +263,7 @@ def lowered(level: Array, allowed: Array) -> tuple[Array, Array]:
 def stretches(
     f: Array, decibels: Array, which: Array, limits: Sequence[Limit], of: dict[str, Array], free: Sequence[Array]
 ) -> tuple[Notch, ...]:
-    """Return the notches: neighbouring frequencies with one and the same reason."""
+    """Return the notches: ranges of neighbouring frequencies with the same cause."""
     reason = np.where(decibels < -JOINED, which, -1)
     ends = np.flatnonzero(np.diff(reason)) + 1
     found = []

@@ -1,4 +1,4 @@
-"""Shock pulses of test specifications, and accelerations made for a shock response spectrum.
+"""Shock pulses of test specifications, and accelerations synthesised for a shock response spectrum.
 
 Of two kinds of shapes, one a frequency of the target, with amplitudes corrected by what the spectrum of their sum
 lacks, again and again:
@@ -21,18 +21,19 @@ from floatframe.errors import ModelError
 __all__ = ["PULSES", "SHAPES", "Synthesis", "damped_sines", "pulse", "synthesised"]
 
 PULSES = ("half-sine", "terminal-peak", "initial-peak", "triangle", "trapezoid")
-EDGE = 0.1  #: of the duration: rise and fall of a trapezoid where none are given
-POINTS = 400  #: of a pulse
+EDGE = 0.1  #: rise and fall of a trapezoid by default, relative to the duration
+POINTS = 400  #: number of points of a pulse
 WAVELETS_PER_OCTAVE = 6
 ROUNDS = 60
-POINTS_A_CYCLE = 20  #: of the highest wavelet
-#: what a history for a spectrum is made of, by name
+POINTS_A_CYCLE = 20  #: points per cycle of the highest wavelet
+#: shapes of a history for a spectrum, by name
 SHAPES = {"wavelets": "wavelets, which end at rest", "damped-sines": "damped sines, compensated to end at rest"}
-DECAY = 0.05  #: zeta of damped sines
-SLOW, SLOW_DECAY = (0.5, 0.25), 0.8  #: of what compensates them: over the first frequency; zeta
-ENDED = 1e3  #: by which the first damped sine has decayed at the end
-MOST_NUMBERS = 100_000_000  #: of the shapes
-FADE = 0.05  #: last part of the duration, over which damped sines are faded to zero
+DECAY = 0.05  #: zeta of damped sines, by default
+#: frequencies, relative to the first one, and zeta of the compensating damped sines
+SLOW, SLOW_DECAY = (0.5, 0.25), 0.8
+ENDED = 1e3  #: factor by which the first damped sine has decayed at the end
+MOST_NUMBERS = 100_000_000  #: largest number of values of the shapes
+FADE = 0.05  #: last fraction of the duration, over which damped sines are faded to zero
 
 
 def pulse(kind: str, amplitude: float, duration: float, *, edge: float = EDGE) -> tuple[Array, Array]:
@@ -72,17 +73,17 @@ def pulse(kind: str, amplitude: float, duration: float, *, edge: float = EDGE) -
 
 @dataclass(frozen=True, eq=False)
 class Synthesis:
-    """An acceleration made for a target, and how far its spectrum is from it."""
+    """An acceleration synthesised for a target spectrum, and the deviation of its spectrum."""
 
     time: Array  #: (n_t,) [s]
     acceleration: Array  #: in the unit of the target, (n_t,)
-    frequencies: Array  #: where the spectra are compared, (n_f,) [Hz]
+    frequencies: Array  #: frequencies at which the spectra are compared, (n_f,) [Hz]
     target: Array  #: (n_f,)
     reached: Array  #: (n_f,)
 
     @property
     def decibels(self) -> Array:
-        """20 log10 of reached over target, (n_f,)."""
+        """Deviation 20 log10(reached / target), (n_f,) [dB]."""
         return np.asarray(20 * np.log10(self.reached / self.target))
 
 
@@ -166,7 +167,7 @@ def damped_sines(target: Level, Q: float = 10.0, duration: float | None = None, 
 
 
 def left_by(waves: Array, h: float) -> Array:
-    """Return the velocity and the displacement that accelerations (n, n_t), straight between samples, leave, (2, n)."""
+    """Return the velocity and displacement at the end of accelerations (n, n_t), linear between samples, (2, n)."""
     a, b = waves[:, :-1], waves[:, 1:]
     steps = np.cumsum(h * (a + b) / 2, axis=1)
     before = np.concatenate([np.zeros((len(waves), 1)), steps[:, :-1]], axis=1)
@@ -174,7 +175,7 @@ def left_by(waves: Array, h: float) -> Array:
 
 
 def grid(target: Level, duration: float) -> tuple[Array, Array]:
-    """Return the frequencies of the shapes, and times that resolve the highest."""
+    """Return the frequencies of the shapes, and times that resolve the highest frequency."""
     n = max(2, math.ceil(WAVELETS_PER_OCTAVE * math.log2(target.last / target.first)) + 1)
     h = 1 / (POINTS_A_CYCLE * target.last)
     n_t = math.ceil(duration / h) + 1
@@ -187,7 +188,7 @@ def grid(target: Level, duration: float) -> tuple[Array, Array]:
 
 
 def matched(target: Level, Q: float, f: Array, t: Array, waves: Array) -> Synthesis:
-    """Return the sum of shapes whose spectrum is near the target.
+    """Return the sum of shapes whose spectrum approximates the target.
 
     (1) amplitudes of alternating sign; the spectrum of the sum at the frequencies of the shapes; amplitudes times
         (target/spectrum)^0.6

@@ -1,4 +1,4 @@
-"""Random tests: responses to power spectral densities of the bases, with cross spectra between them.
+"""Random tests: responses to power spectral densities of the bases, including cross spectra.
 
     S_y(f) = H(f) S(f) H(f)^H,   sigma² = ∫ S_y df,   nu² = ∫ f² S_y df / sigma²
 
@@ -29,8 +29,8 @@ from floatframe.errors import ModelError
 
 __all__ = ["CrossSpectrum", "Miles", "RandomRun", "RandomTest", "input_density", "random_run", "random_runs"]
 
-ROUNDING = 1e-9  #: least eigenvalue of a coherence matrix that is taken for rounding of zero
-CHUNK_SIZE = 4_000_000  #: numbers of stress held at a time
+ROUNDING = 1e-9  #: magnitude of the smallest eigenvalue of a coherence matrix that counts as rounding error of zero
+CHUNK_SIZE = 4_000_000  #: largest number of stress values in memory
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class CrossSpectrum:
     a: str
     b: str
     coherence: float  #: gamma², 0 to 1
-    phase: float = 0.0  #: of S_ab: positive where a is ahead of b [degrees]
+    phase: float = 0.0  #: phase of S_ab, positive where a leads b [degrees]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,7 @@ class RandomTest:
     directions: Sequence[str] = ("x", "y", "z")
     levels: Mapping[str, Level] | None = None
     cross: Sequence[CrossSpectrum] = ()
-    duration: float | None = None  #: for the largest value to expect [s]
+    duration: float | None = None  #: duration for the expected largest value [s]
 
     def __post_init__(self) -> None:
         where = f"shake: random {self.name!r}"
@@ -85,42 +85,42 @@ class RandomTest:
 
 @dataclass(frozen=True)
 class Miles:
-    """Miles' estimate of a mode: the acceleration of a single mass on its frequency, sqrt(pi/2 f Q S(f))."""
+    """Miles' estimate for a mode: the rms acceleration sqrt(pi/2 f Q S(f)) of a single mass at its frequency."""
 
-    mode: int  #: from 1
+    mode: int  #: number of the mode, from 1
     frequency: float  #: [Hz]
     Q: float
-    density: float  #: of the input there [g²/Hz]
+    density: float  #: density of the input at the frequency [g²/Hz]
     grms: float  #: [g]
-    share: float  #: of the mass that is effective in the direction
+    share: float  #: fraction of the mass that is effective in the direction
 
 
 @dataclass(frozen=True, eq=False)
 class RandomRun:
-    """Densities and rms of all outputs; those of von Mises' stress as in `stresses`."""
+    """Densities and rms of all outputs, including von Mises stresses as defined in `stresses`."""
 
     test: str
     direction: str  #: names of the inputs
     outputs: tuple[Output, ...]
     band: ResolvedBand
-    level: Array  #: densities of the inputs that act, (n_f, n_act) [units of the model² per Hz]
-    inputs: tuple[str, ...]  #: their names
-    input_rms: Array  #: exact, (n_act,) [units of the model]
+    level: Array  #: densities of the acting inputs, (n_f, n_act) [units of the model² per Hz]
+    inputs: tuple[str, ...]  #: names of the acting inputs
+    input_rms: Array  #: exact rms of the acting inputs, (n_act,) [units of the model]
     density: Array  #: (n_f, n_out) [units of the model² per Hz]
     rms: Array  #: (n_out,)
-    error: Array  #: bound of the relative error of rms by the integration, (n_out,)
-    wide: Array  #: densities with uncertainty, to which the limits of notches apply, (n_f, n_out)
+    error: Array  #: bound of the relative integration error of rms, (n_out,)
+    wide: Array  #: densities with uncertainty, to which notch limits apply, (n_f, n_out)
     uncertain: Array  #: rms with uncertainty, (n_out,)
-    crossings: Array  #: zero crossings upwards, (n_out,) [Hz]
-    expected: Array | None  #: largest value to expect in the duration, (n_out,)
-    von_mises: Mapping[str, RandomVonMises]  #: by place
-    miles: tuple[Miles, ...]  #: of the modes in the band; () where several inputs act
+    crossings: Array  #: zero up-crossings per second, (n_out,) [Hz]
+    expected: Array | None  #: expected largest value in the duration, (n_out,)
+    von_mises: Mapping[str, RandomVonMises]  #: von Mises stresses by place
+    miles: tuple[Miles, ...]  #: estimates for the modes in the band; () if several inputs act
     transfer: Array  #: complex, (n_f, n_rows, n_act)
-    field: Array | None = None  #: rms of von Mises' stress at all kept nodes, (n_nodes,)
+    field: Array | None = None  #: rms of the von Mises stress at all kept nodes, (n_nodes,)
 
 
 def random_runs(model: ShakenModel, test: RandomTest, uncertainty: Uncertainty | None = None) -> list[RandomRun]:
-    """Return the runs of a test: one a direction, or one."""
+    """Return the runs of a test: one for each direction, or a single one."""
     if test.level is not None:
         return [random_run(model, test, {direction: test.level}, uncertainty) for direction in test.directions]
     return [random_run(model, test, dict(test.levels or {}), uncertainty)]
@@ -129,7 +129,7 @@ def random_runs(model: ShakenModel, test: RandomTest, uncertainty: Uncertainty |
 def random_run(
     model: ShakenModel, test: RandomTest, levels: Mapping[str, Level], uncertainty: Uncertainty | None = None
 ) -> RandomRun:
-    """Return the responses to densities of some inputs.
+    """Return the responses to densities of one or several inputs.
 
     Raises
     ------
@@ -187,14 +187,14 @@ def random_run(
 
 
 def si_factor(level: Level, model: ShakenModel, k: int) -> float:
-    """Return the factor from the unit of the acceleration of a level to that of the model."""
+    """Return the factor from the acceleration unit of a level to that of the model."""
     one = Level(level.frequencies[:2], np.ones(2), level.unit, level.where)
     factor = in_model(level, model.inputs[k].rpartition(":")[2], model.units)
     return float(np.sqrt(one.in_si(level.frequencies[:1])[0] * factor))
 
 
 def input_density(model: ShakenModel, test: RandomTest, acting: Mapping[int, tuple[str, Level]], f: Array) -> Array:
-    """Return the spectral matrix of the inputs that act, (n_f, n_act, n_act) complex [units of the model² per Hz].
+    """Return the spectral matrix of the acting inputs, (n_f, n_act, n_act) complex [units of the model² per Hz].
 
     Raises
     ------
@@ -232,7 +232,7 @@ def input_density(model: ShakenModel, test: RandomTest, acting: Mapping[int, tup
 
 
 def spectral_root(S: Array) -> Array:
-    """Return L with L L^H = S, (n_f, n, n), from its eigenvectors: S may be singular."""
+    """Return L with L L^H = S, (n_f, n, n), from the eigenvectors of S, because S may be singular."""
     if S.shape[1] == 1:
         return np.sqrt(S.real).astype(complex)
     values, axes = np.linalg.eigh(S)
@@ -240,29 +240,29 @@ def spectral_root(S: Array) -> Array:
 
 
 def densities(G: Array, groups: Sequence[slice]) -> Array:
-    """Return the densities of the rows of G G^H, then those of von Mises' stresses, (n_f, n_out)."""
+    """Return the densities of the rows of G G^H, followed by those of von Mises stresses, (n_f, n_out)."""
     extra = [von_mises_density(G[:, rows] @ G[:, rows].conj().transpose(0, 2, 1))[:, None] for rows in groups]
     return np.concatenate([(np.abs(G) ** 2).sum(axis=2), *extra], axis=1)
 
 
 def uncertainty_of(uncertainty: Uncertainty, f: Array, G: Array, density_in: Array, n_act: int) -> Array:
-    """Return G with uncertain frequencies and factors: transfer functions widened where one input acts alone."""
+    """Return G with uncertain frequencies and factors; if one input acts alone, its transfer functions are widened."""
     if uncertainty.is_none:
         return G
-    if n_act > 1:  # the spectrum of all together is widened
+    if n_act > 1:  # the joint spectrum is widened
         return uncertainty.widened(f, np.abs(G))
     root = np.sqrt(density_in[:, :, 0].real)[:, :, None]
     return np.asarray(uncertainty.widened(f, np.abs(np.divide(G, root, out=np.zeros_like(G), where=root > 0))) * root)
 
 
 def largest(rms: Array, crossings: Array, duration: float) -> Array:
-    """Return the largest value to expect of a Gaussian process, (n,): sigma (a + 0.5772/a), a = sqrt(2 ln(nu T))."""
+    """Return the expected largest value of a Gaussian process, (n,): sigma (a + 0.5772/a), a = sqrt(2 ln(nu T))."""
     a = np.sqrt(2 * np.log(np.maximum(crossings * duration, math.e)))
     return np.asarray(rms * (a + np.euler_gamma / a))
 
 
 def miles_of(model: ShakenModel, k: int, level: Level) -> tuple[Miles, ...]:
-    """Return Miles' estimates of the modes in the band of a level."""
+    """Return Miles' estimates for the modes in the band of a level."""
     if model.inputs[k].rpartition(":")[2] not in ("x", "y", "z"):
         return ()
     shares = model.B[2, :, k] ** 2 / model.mass[k, k]
@@ -281,7 +281,7 @@ def miles_of(model: ShakenModel, k: int, level: Level) -> tuple[Miles, ...]:
 
 
 def von_mises_field(model: ShakenModel, band: ResolvedBand, columns: Sequence[int], root: Array) -> Array | None:
-    """Return the rms of von Mises' stress at all kept nodes, (n_nodes,), from the covariance of the modes alone."""
+    """Return the rms of the von Mises stress at all kept nodes, (n_nodes,), from the covariance of the modes."""
     if model.field is None:
         return None
     of_modes, of_s = model.field

@@ -1,4 +1,4 @@
-"""Shocks and transients: histories of bases and forces, what the outputs do, and shock response spectra."""
+"""Shocks and transients: histories of bases and forces, responses over time, and shock response spectra."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -20,8 +20,8 @@ from floatframe.errors import ModelError
 
 __all__ = ["SpectrumRequest", "TimeRun", "TimeTest", "time_run", "time_runs"]
 
-POINTS_A_CYCLE = 20  #: of the highest mode that vibrates
-AFTER = 10.0  #: cycles of the lowest mode that are looked at after the end of an input
+POINTS_A_CYCLE = 20  #: points per cycle of the highest vibrating mode
+AFTER = 10.0  #: cycles of the lowest mode that are computed after the end of an input
 MOST_SAMPLES = 2_000_000
 ON_GRID = 1e-6  #: of a step, by which a time may miss it
 COARSE_DIGIT = 0.25  #: of a step, above which the last digit of a time is too coarse to identify its step
@@ -30,7 +30,7 @@ LOST = 0.01  #: of the largest value of a history; a note reports a larger chang
 
 @dataclass(frozen=True)
 class SpectrumRequest:
-    """Which shock response spectra are made of accelerations."""
+    """A request for shock response spectra of accelerations."""
 
     Q: Sequence[float] = (10.0,)
     kind: str = "acceleration"
@@ -51,7 +51,7 @@ class SpectrumRequest:
 
 @dataclass(frozen=True, eq=False)
 class TimeTest:
-    """Histories of inputs, straight between their samples.
+    """Histories of inputs, linear between their samples.
 
     `history` excites one direction after the other, each a run; `inputs` are given all at once, a single run.
     """
@@ -66,8 +66,8 @@ class TimeTest:
     )
     spectra: SpectrumRequest = field(default_factory=SpectrumRequest)
     kind: str = "transient"  #: "shock" or "transient", for the report
-    words: str = ""  #: what the history is
-    synthesis: Synthesis | None = None  #: where it was made for a spectrum
+    words: str = ""  #: description of the history
+    synthesis: Synthesis | None = None  #: synthesis, if the history was made for a spectrum
 
     def __post_init__(self) -> None:
         where = f"shake: {self.kind} {self.name!r}"
@@ -105,10 +105,11 @@ class TimeRun:
     input_values: Array  #: (n_act, n_t) [units of the model]
     values: Array  #: (n_out, n_t) [units of the model]
     uncertain: Array  #: largest |value| with uncertainty, (n_out,)
-    velocity_left: Array  #: of the bases at the end of each input, (n_act,) [units of the model]; nan of forces
-    displacement_left: Array  #: (n_act,)
+    #: velocities of the bases at the end of each input, (n_act,) [units of the model]; NaN for forces
+    velocity_left: Array
+    displacement_left: Array  #: displacements of the bases at the end of each input, (n_act,)
     spectra_frequencies: Array  #: (n_f,) [Hz]
-    spectra: Mapping[str, Mapping[float, Array]]  #: name of input or acceleration -> Q -> (n_f,)
+    spectra: Mapping[str, Mapping[float, Array]]  #: spectra by name of the input or acceleration, then by Q, (n_f,)
     spectra_kind: str = "acceleration"
     words: str = ""
     synthesis: Synthesis | None = None
@@ -121,12 +122,12 @@ class TimeRun:
 
     @property
     def peak_times(self) -> Array:
-        """When they are, (n_out,) [s]."""
+        """Times of the peaks, (n_out,) [s]."""
         return np.asarray(self.t[np.abs(self.values).argmax(axis=1)])
 
 
 def time_runs(model: ShakenModel, test: TimeTest, uncertainty: Uncertainty | None = None) -> list[TimeRun]:
-    """Return the runs of a test: one a direction, or one."""
+    """Return the runs of a test: one for each direction, or a single one."""
     if test.history is not None:
         return [time_run(model, test, {d: test.history}, uncertainty) for d in test.directions]
     return [time_run(model, test, dict(test.inputs or {}), uncertainty)]
@@ -135,7 +136,7 @@ def time_runs(model: ShakenModel, test: TimeTest, uncertainty: Uncertainty | Non
 def time_run(
     model: ShakenModel, test: TimeTest, inputs: Mapping[str, Array], uncertainty: Uncertainty | None = None
 ) -> TimeRun:
-    """Return the outputs for histories of some inputs, from rest.
+    """Return the outputs for histories of some inputs, starting from rest.
 
     (1) samples dense enough for the highest mode, on the straight pieces that are given
     (2) modes one by one, exact from sample to sample; with uncertain frequencies the largest of three runs
@@ -300,7 +301,7 @@ def nearest_straight(places: Array, values: Array, t: Array) -> Array:
 
 
 def model_factor(model: ShakenModel, k: int) -> float:
-    """Return the factor of an input from SI to units of the model."""
+    """Return the factor from SI units of an input to units of the model."""
     units, direction = model.units, model.inputs[k].rpartition(":")[2]
     turns = direction.startswith("r")
     if model.rates[k] == 2:
@@ -311,7 +312,7 @@ def model_factor(model: ShakenModel, k: int) -> float:
 
 
 def with_von_mises(model: ShakenModel, values: Array) -> Array:
-    """Return the outputs with von Mises' stress of each place after them, (n_out, n_t)."""
+    """Return the outputs, followed by the von Mises stress of each place, (n_out, n_t)."""
     extra = []
     for rows in stress_groups(model):
         s = values[rows]
@@ -320,6 +321,6 @@ def with_von_mises(model: ShakenModel, values: Array) -> Array:
 
 
 def left_over(values: Array, step: float) -> tuple[float, float]:
-    """Return velocity and displacement of a base at the end of its acceleration."""
+    """Return the velocity and displacement of a base at the end of its acceleration."""
     motion = base_motions(values, step)
     return float(motion.rate[-1]), float(motion.value[-1])

@@ -1,4 +1,4 @@
-"""Sine tests: responses to a level over frequency, in the steady state and with the transient of the sweep itself.
+"""Sine tests: steady-state responses to a level over frequency, and responses during the sweep itself.
 
 A sweep s_ddot = Re(F(t) exp(i phi(t))), phi_dot = 2 pi f, f = f_1 2^(R t), is answered by Re(w), w the response to
 F exp(i phi): |w| is its envelope. In eigenvectors of the state matrix each state follows p_dot = mu p + c F exp(i
@@ -30,18 +30,18 @@ from floatframe.errors import ModelError
 
 __all__ = ["SineRun", "SineTest", "sine_run", "sweep_envelope"]
 
-STEP = 0.05  #: of the sweep, in 1/sqrt(phi_ddot)
+STEP = 0.05  #: step of the sweep, in 1/sqrt(phi_ddot)
 MOST_STEPS = 2_000_000
 
 
 @dataclass(frozen=True, eq=False)
 class SineTest:
-    """A sine sweep of one base direction after the other."""
+    """A sine sweep in several base directions, one after the other."""
 
     name: str
     level: Level  #: amplitude, 0 to peak
-    directions: Sequence[str] = ("x", "y", "z")  #: each a run of its own; "base:x" where there are several bases
-    rate: float | None = None  #: octaves a minute; None: slow enough to be steady at every frequency
+    directions: Sequence[str] = ("x", "y", "z")  #: directions, one run for each; "base:x" if there are several bases
+    rate: float | None = None  #: octaves per minute; None: so slow that the response is steady
     downward: bool = False  #: sweep from the last frequency to the first
 
     def __post_init__(self) -> None:
@@ -58,20 +58,20 @@ class SineTest:
 
 @dataclass(frozen=True, eq=False)
 class SineRun:
-    """Amplitudes of all outputs for one direction."""
+    """Amplitudes of all outputs in one direction."""
 
     test: str
     direction: str  #: name of the input
-    outputs: tuple[Output, ...]  #: those of the model, then von Mises' of the stresses
+    outputs: tuple[Output, ...]  #: outputs of the model, followed by von Mises stresses
     frequencies: Array  #: (n_f,) [Hz]
-    level: Array  #: of the input, (n_f,) [units of the model]
-    sizes: Array  #: amplitudes, steady, (n_f, n_out) [units of the model]
-    transfer: Array  #: complex response of the outputs of the model per unit of input, (n_f, n_rows)
+    level: Array  #: amplitude of the input, (n_f,) [units of the model]
+    sizes: Array  #: steady amplitudes, (n_f, n_out) [units of the model]
+    transfer: Array  #: complex response of the model outputs per unit of input, (n_f, n_rows)
     uncertain: Array  #: amplitudes with uncertainty, (n_f, n_out)
     static: (
-        Array  #: quasi-static amplitudes, as if nothing vibrated: at the lowest frequency, by the level, (n_f, n_out)
+        Array  #: quasi-static amplitudes: the response at the lowest frequency, scaled with the level, (n_f, n_out)
     )
-    swept_frequencies: Array = field(default_factory=lambda: np.zeros(0))  #: of the sweep, (n_t,) [Hz]
+    swept_frequencies: Array = field(default_factory=lambda: np.zeros(0))  #: frequencies of the sweep, (n_t,) [Hz]
     swept: Array | None = None  #: envelopes during the sweep, (n_t, n_out)
     rate: float | None = None  #: octaves a minute
 
@@ -82,7 +82,7 @@ class SineRun:
 
     @property
     def peak_frequencies(self) -> Array:
-        """Where they are, (n_out,) [Hz]."""
+        """Frequencies of the peaks, (n_out,) [Hz]."""
         return np.asarray(self.frequencies[self.sizes.argmax(axis=0)])
 
     @property
@@ -131,7 +131,7 @@ def sine_run(model: ShakenModel, test: SineTest, direction: str, uncertainty: Un
 
 
 def sweep_envelope(model: ShakenModel, k: int, test: SineTest, step: float = STEP) -> tuple[Array, Array]:
-    """Return the frequencies of a sweep [Hz] and the complex envelopes of the outputs, (n_t,) and (n_t, n_rows).
+    """Return the frequencies of a sweep [Hz], (n_t,), and the complex envelopes of the outputs, (n_t, n_rows).
 
     It begins in the steady state of its first frequency.
 
@@ -146,7 +146,7 @@ def sweep_envelope(model: ShakenModel, k: int, test: SineTest, step: float = STE
         raise ModelError(
             f"{where}: rate: several bases that move against each other are swept in steady state only; leave rate out"
         )
-    growth = rate / 60 * math.log(2.0)  # of the frequency [1/s]
+    growth = rate / 60 * math.log(2.0)  # growth rate of the frequency [1/s]
     f, t = sweep_times(test, growth, step, where)
     sign = -1.0 if test.downward else 1.0
     second = 1 / model.units.time
@@ -176,7 +176,7 @@ def sweep_envelope(model: ShakenModel, k: int, test: SineTest, step: float = STE
         powers = to_powers @ (load(own) * np.exp(1j * beyond))
         z, turn, decay = (1j * w - mu) * h, np.exp(1j * w * h), np.exp(mu * h)
         p = decay * p + c * h * (powers @ moments(z, turn, decay, mu * h))
-        turned = np.exp(-1j * (w * h + beyond[-1]))  # the phase begins anew with every step
+        turned = np.exp(-1j * (w * h + beyond[-1]))  # the phase restarts at zero in every step
         p = p * turned
         states[n + 1] = p
     F = load(f)
@@ -189,13 +189,13 @@ def sweep_envelope(model: ShakenModel, k: int, test: SineTest, step: float = STE
 
 
 def sweep_times(test: SineTest, growth: float, step: float, where: str) -> tuple[Array, Array]:
-    """Return frequencies [Hz] and times [s] of the steps of a sweep, corners of its level among them."""
+    """Return frequencies [Hz] and times [s] of the steps of a sweep, including the corners of its level."""
     corners = test.level.frequencies[::-1] if test.downward else test.level.frequencies
     f, t = [np.array([corners[0]])], [np.zeros(1)]
     now = 0.0
     for a, b in itertools.pairwise(corners):
         duration = abs(math.log(b / a)) / growth
-        # equal steps of sqrt(f): dt sqrt(phi_ddot) is then the same for all
+        # equal steps of sqrt(f), for which dt sqrt(phi_ddot) is constant
         n = math.ceil(2 * abs(math.sqrt(2 * math.pi * b / growth) - math.sqrt(2 * math.pi * a / growth)) / step)
         n = max(n, math.ceil(duration * growth / 0.05), 8)
         if n > MOST_STEPS:

@@ -19,8 +19,8 @@ from floatframe.errors import ModelError
 
 __all__ = ["MEETS", "level_of_bands"]
 
-MEETS = 0.5  #: dB by which a slope between two levels may miss the second: specifications round
-STEEPEST = 100.0  #: dB per octave; more is a mistake
+MEETS = 0.5  #: largest mismatch of a slope between two levels [dB], because specifications round values
+STEEPEST = 100.0  #: largest slope [dB per octave]
 SLOPE = re.compile(r"([+-]?\d+(?:\.\d*)?|[+-]?\.\d+)\s*d[bB]\s*/\s*oct(?:ave)?")
 Band = Sequence[float | str]
 

@@ -1,4 +1,4 @@
-"""What a model is not trusted for: factors on its responses, and frequencies that may lie elsewhere.
+"""Model uncertainty: factors on responses, and uncertain frequencies.
 
 With a share delta of the frequencies, the response at f is the largest of the transfer functions between f/(1 +
 delta) and
@@ -19,11 +19,12 @@ __all__ = ["Uncertainty"]
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """Factor on responses and share of frequencies, for all or by band."""
+    """Factor on responses and relative uncertainty of frequencies, constant or by frequency band."""
 
     factor: float = 1.0  #: dynamic or model uncertainty factor, 1 or more
-    frequency: float = 0.0  #: share of a frequency by which it may be off, 0.05 for 5 %
-    bands: Sequence[Sequence[float]] = ()  #: rows (from [Hz], to [Hz], factor, share), before the values above
+    frequency: float = 0.0  #: relative uncertainty of frequencies, 0.05 for 5 %
+    #: rows (from [Hz], to [Hz], factor, frequency), which replace the values above
+    bands: Sequence[Sequence[float]] = ()
 
     def __post_init__(self) -> None:
         rows = [(0.0, math.inf, self.factor, self.frequency), *self.bands]
@@ -41,19 +42,19 @@ class Uncertainty:
 
     @property
     def is_none(self) -> bool:
-        """Whether nothing is uncertain."""
+        """Whether there is no uncertainty."""
         return not len(self.bands) and self.factor == 1.0 and self.frequency == 0.0
 
     @property
     def largest(self) -> tuple[float, float]:
-        """Largest factor and share of all bands: what responses in time are given."""
+        """Largest factor and frequency uncertainty of all bands, used for responses in time."""
         return (
             max([self.factor, *(row[2] for row in self.bands)]),
             max([self.frequency, *(row[3] for row in self.bands)]),
         )
 
     def of(self, frequencies: Array) -> tuple[Array, Array]:
-        """Return factor and share at frequencies [Hz], (n_f,) each."""
+        """Return factor and frequency uncertainty at frequencies [Hz], (n_f,) each."""
         f = np.asarray(frequencies)
         factor, share = np.full(len(f), self.factor), np.full(len(f), self.frequency)
         for low, high, own, off in self.bands:
@@ -62,7 +63,7 @@ class Uncertainty:
         return factor, share
 
     def widened(self, frequencies: Array, sizes: Array) -> Array:
-        """Return sizes (n_f, ...) of transfer functions with their factor, the largest within the share about each."""
+        """Return transfer functions, (n_f, ...), times their factor, with the maximum over uncertain frequencies."""
         f = np.asarray(frequencies)
         factor, share = self.of(f)
         low = np.searchsorted(f, f / (1 + share), side="left")
@@ -72,7 +73,7 @@ class Uncertainty:
 
     @property
     def description(self) -> str:
-        """Say what it is."""
+        """Description of the uncertainty."""
         if self.is_none:
             return "none"
         rows = [(0.0, math.inf, self.factor, self.frequency), *self.bands]

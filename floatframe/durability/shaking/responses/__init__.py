@@ -1,1 +1,1 @@
-"""How a shaken structure answers: resolved peaks, steps in time, von Mises' stress, response spectra."""
+"""Responses of a shaken structure: resolved peaks, steps in time, von Mises stress, response spectra."""

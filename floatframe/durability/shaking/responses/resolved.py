@@ -1,4 +1,4 @@
-"""Frequencies that resolve the resonances, and integrals over them that say how good they are.
+"""Frequencies that resolve resonances, and integrals over them with error bounds.
 
 Between two modes a response is smooth; at a mode it is a peak of half-power width 2 zeta f. The band is cut
 
@@ -22,28 +22,28 @@ from floatframe.errors import ModelError
 
 __all__ = ["ResolvedBand", "resolved_band"]
 
-INTERVALS = 12  #: of a panel; even, so that half of them is a rule too
-GROWTH = 3.0  #: of the distance from a peak from the end of one panel to that of the next
-WIDEST = 0.1  #: distance over frequency at which panels of the octaves take over
+INTERVALS = 12  #: number of intervals of a panel; even, so that half of them form a nested rule
+GROWTH = 3.0  #: ratio of the distances of successive panel ends from a peak
+WIDEST = 0.1  #: relative distance from a peak at which octave panels continue
 PER_OCTAVE = 3
-LEAST_DAMPING = 1e-4  #: ratio by which a peak is resolved at least
-APART = 1e-9  #: relative distance of edges that are one
+LEAST_DAMPING = 1e-4  #: smallest damping ratio for which a peak is resolved
+APART = 1e-9  #: relative distance below which edges coincide
 
 
 @dataclass(frozen=True, eq=False)
 class ResolvedBand:
-    """Points in a band with the weights of two rules."""
+    """Points in a band, with the weights of two rules."""
 
     frequencies: Array  #: ascending, (n_f,) [Hz]
     weights: Array  #: (n_f,) [Hz]
-    coarse: Array  #: of the rule with half the intervals, (n_f,) [Hz]
+    coarse: Array  #: weights of the rule with half the intervals, (n_f,) [Hz]
 
     def integral(self, values: Array) -> Array:
         """Return the integral of values (n_f, ...) over the band, (...)."""
         return np.asarray(np.tensordot(self.weights, values, axes=(0, 0)))
 
     def error(self, values: Array) -> Array:
-        """Return by how much the integrals of both rules differ, (...): above the error of `integral`."""
+        """Return the difference of the integrals of both rules, (...), which bounds the error of `integral`."""
         return np.abs(np.tensordot(self.weights - self.coarse, values, axes=(0, 0)))
 
 
@@ -85,7 +85,7 @@ def resolved_band(
 
 
 def edges_around(f: float, zeta: float) -> Array:
-    """Return the ends of panels about a mode, from it outwards by powers of GROWTH of its half-width [Hz]."""
+    """Return the ends of panels about a mode; their distances grow by powers of GROWTH from its half-width [Hz]."""
     width = max(zeta, LEAST_DAMPING)
     n = max(0, int(np.ceil(np.log(WIDEST / width) / np.log(GROWTH))))
     away = width * GROWTH ** np.arange(n + 1)
@@ -94,7 +94,7 @@ def edges_around(f: float, zeta: float) -> Array:
 
 @cache
 def clenshaw_curtis() -> tuple[Array, Array, Array]:
-    """Return points on -1..1, (13,), weights, and those of the nested rule of every second point."""
+    """Return the points on -1..1, (13,), their weights, and the weights of the nested rule with every second point."""
     x = -np.cos(np.pi * np.arange(INTERVALS + 1) / INTERVALS)
     half = np.zeros(INTERVALS + 1)
     half[::2] = weights_of(INTERVALS // 2)
@@ -102,7 +102,7 @@ def clenshaw_curtis() -> tuple[Array, Array, Array]:
 
 
 def weights_of(n: int) -> Array:
-    """Return the weights of Clenshaw and Curtis' rule with n intervals, n even: exact for the cosines of the points."""
+    """Return the weights of the Clenshaw-Curtis rule with an even number n of intervals."""
     angle = np.pi * np.arange(n + 1) / n
     orders = np.arange(0, n + 1, 2)
     moments = 2.0 / (1.0 - orders.astype(float) ** 2)  # integral of cos(k angle) over x

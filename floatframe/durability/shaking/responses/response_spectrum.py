@@ -1,4 +1,4 @@
-"""Shock response spectra: the largest answer of single masses to an acceleration of their base.
+"""Shock response spectra: the largest response of single masses to an acceleration of their base.
 
 A mass on the frequency f with amplification Q: z its motion relative to the base, a = -(2 zeta omega z_dot + omega²
 z) its
@@ -18,7 +18,8 @@ from floatframe.errors import ModelError
 __all__ = ["KINDS", "octave_frequencies", "shock_response_spectrum"]
 
 KINDS = ("acceleration", "displacement", "pseudo-velocity")
-POINTS_A_CYCLE = 40  #: of the highest frequency: a peak between samples is missed by at most 1 - cos(pi/40) = 0.3 %
+#: points per cycle of the highest frequency; a peak between samples is missed by at most 1 - cos(pi/40) = 0.3 %
+POINTS_A_CYCLE = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +31,7 @@ class _Free:
 
 
 def octave_frequencies(first: float, last: float, per_octave: int = 12) -> Array:
-    """Return frequencies from first to last, so many an octave, (n,) [Hz]."""
+    """Return frequencies from first to last, with a number per octave, (n,) [Hz]."""
     n = max(2, round(np.log2(last / first) * per_octave) + 1)
     return np.geomspace(first, last, n)
 
@@ -44,7 +45,7 @@ def shock_response_spectrum(
     *,
     residual: bool = True,
 ) -> Array:
-    """Return the shock response spectrum of an acceleration that is straight between its samples, (n_f,).
+    """Return the shock response spectrum of an acceleration that is linear between its samples, (n_f,).
 
     Parameters
     ----------
@@ -85,7 +86,7 @@ def shock_response_spectrum(
 
 
 def refined(a: Array, h: float, f: float) -> tuple[Array, float]:
-    """Return samples dense enough for a frequency, on the same straight pieces, and their distance."""
+    """Return samples that resolve a frequency, on the same linear pieces, and their time step."""
     n = int(np.ceil(POINTS_A_CYCLE * f * h))
     if n <= 1 or len(a) < 2:
         return a, h
@@ -102,7 +103,7 @@ def free_peaks(omega: float, zeta: float, z: float, z_dot: float) -> _Free:
 
 
 def first_extremum(c: complex, mu: complex) -> float:
-    """Return the largest |Re(c exp(mu t))|, t >= 0: at once, or where its rate first vanishes."""
+    """Return the largest |Re(c exp(mu t))| for t >= 0: the initial value, or the first extremum."""
     if c == 0:
         return 0.0
     # Re(c mu exp(mu t)) = 0: the phase of c mu + Im(mu) t is an odd multiple of pi/2

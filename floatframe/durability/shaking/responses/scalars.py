@@ -1,4 +1,4 @@
-"""Outputs as real columns: those of a model, then von Mises' stress of each place that has the six components."""
+"""Outputs as real columns: the outputs of a model, followed by von Mises stresses of places with six components."""
 
 import numpy as np
 
@@ -25,6 +25,6 @@ def scalar_outputs(model: ShakenModel) -> tuple[Output, ...]:
 
 
 def scalar_sizes(model: ShakenModel, amplitudes: Array) -> Array:
-    """Return sizes of complex amplitudes (n, n_rows), and von Mises' largest over a cycle, (n, n_out)."""
+    """Return magnitudes of complex amplitudes (n, n_rows), and largest von Mises stresses in a cycle, (n, n_out)."""
     extra = [cycle_von_mises(amplitudes[:, rows])[:, None] for rows in stress_groups(model)]
     return np.concatenate([np.abs(amplitudes), *extra], axis=1)

@@ -1,4 +1,4 @@
-"""Von Mises' stress of vibrating stresses: its largest value over a cycle, and its rms and distribution in random ones.
+"""Von Mises stress of vibrations: its largest value over a cycle, and its rms and distribution in random vibration.
 
 With sigma the six components, vm² = sigmaᵀ A sigma. For sigma(t) = Re(s exp(i omega t))
 
@@ -30,7 +30,7 @@ VON_MISES = np.array(
     ]
 )
 WITHIN_3_SIGMA = 0.9973002039367398  #: probability that a Gaussian lies within three standard deviations
-NEGLIGIBLE = 1e-9  #: share of an eigenvalue that changes nothing
+NEGLIGIBLE = 1e-9  #: relative size of a negligible eigenvalue
 STEPS = 801
 
 
@@ -47,15 +47,15 @@ def von_mises_density(density: Array) -> Array:
 
 
 class RandomVonMises(NamedTuple):
-    """Von Mises' stress of a Gaussian stress."""
+    """Von Mises stress of a Gaussian stress."""
 
     rms: float  #: exact
-    quantile: float  #: not exceeded at 99.73 % of the time, as 3 sigma of a Gaussian
-    factor: float  #: quantile over rms: 3 where one component rules, less otherwise
+    quantile: float  #: value that is not exceeded 99.73 % of the time, like 3 sigma of a Gaussian
+    factor: float  #: quantile divided by rms: 3 if one component dominates, otherwise less
 
 
 def random_von_mises(covariance: Array) -> RandomVonMises:
-    """Return rms and the value that is not exceeded 99.73 % of the time, of a covariance (6, 6)."""
+    """Return the rms, and the value that is not exceeded 99.73 % of the time, for a covariance (6, 6)."""
     values, axes = np.linalg.eigh((covariance + covariance.T) / 2)
     L = axes * np.sqrt(np.maximum(values, 0.0))
     lam = np.linalg.eigvalsh(L.T @ VON_MISES @ L)

@@ -1,4 +1,4 @@
-"""Linear oscillators under loads that are straight between samples: exact from sample to sample.
+"""Exact time steps of linear oscillators under loads that are linear between samples.
 
     eta_ddot + 2 zeta omega eta_dot + omega² eta = a(t),  a straight between t_n and t_n+1
 
@@ -20,8 +20,8 @@ from floatframe.durability.shaking.structure.model import ShakenModel
 __all__ = ["Motion", "base_motions", "histories", "oscillator"]
 
 LONGEST_STEP = 4.0  #: omega h up to which the series loses fewer than three digits
-MOST_TERMS = 80  #: of it
-SMALL = 1.0  #: of an exponent, below which differences would lose digits
+MOST_TERMS = 80  #: largest number of terms of the series
+SMALL = 1.0  #: magnitude of an exponent below which differences would lose digits
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class Motion:
 
 
 def oscillator(omega: float, zeta: float, load: Array, h: float) -> Motion:
-    """Return the motion from rest under a load that is straight between its samples.
+    """Return the motion from rest under a load that is linear between its samples.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def end_of_series(
 
 
 def base_motions(acceleration: Array, h: float) -> Motion:
-    """Return displacement and velocity from rest of accelerations that are straight between samples, (n_t,) each."""
+    """Return displacement and velocity, from rest, for accelerations that are linear between samples, (n_t,) each."""
     a = np.asarray(acceleration, dtype=float)
     v = np.concatenate([[0.0], np.cumsum((a[1:] + a[:-1]) * h / 2)])
     steps = v[:-1] * h + (2 * a[:-1] + a[1:]) * h**2 / 6
@@ -110,7 +110,7 @@ def base_motions(acceleration: Array, h: float) -> Motion:
 
 
 def histories(model: ShakenModel, inputs: Array, h: float, columns: IntArray) -> Array:
-    """Return the outputs over time for inputs that are straight between samples, (n_out, n_t).
+    """Return the outputs over time for inputs that are linear between samples, (n_out, n_t).
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def histories(model: ShakenModel, inputs: Array, h: float, columns: IntArray) ->
 
 
 def add_mode(out: Array, E: Array, motion: Motion) -> None:
-    """Add the part of a mode to the outputs."""
+    """Add the contribution of a mode to the outputs."""
     for rate, values in enumerate((motion.value, motion.rate, motion.second)):
         rows = np.flatnonzero(E[rate])
         if len(rows):
@@ -153,7 +153,7 @@ def add_mode(out: Array, E: Array, motion: Motion) -> None:
 
 
 def motion_of_input(values: Array, rate: int, h: float) -> Motion:
-    """Return s with its rates from its r-th rate, r = 0 or 2; those of a force are not needed and zero."""
+    """Return s and its rates from its r-th rate, r = 0 or 2; unneeded rates of a force are zero."""
     if rate == 2:
         return base_motions(values, h)
     zero = np.zeros_like(values)
@@ -161,7 +161,7 @@ def motion_of_input(values: Array, rate: int, h: float) -> Motion:
 
 
 def coupled(model: ShakenModel, load: Array, h: float) -> tuple[Array, Array]:
-    """Return eta and eta_dot of modes that damping couples, (n_d, n_t) each: filters in eigenvectors of the states."""
+    """Return eta and eta_dot of modes coupled by damping, (n_d, n_t) each, by filters in eigenvectors of the states."""
     n_d, n_t = load.shape
     A = np.zeros((2 * n_d, 2 * n_d))
     A[:n_d, n_d:] = np.eye(n_d)

@@ -1,1 +1,1 @@
-"""The structure that is shaken: interfaces eliminated, modes with the bases held, damping, places observed."""
+"""The shaken structure: eliminated interfaces, modes with fixed bases, damping, observed places."""

@@ -1,4 +1,4 @@
-"""A reduced body on bases: its interfaces driven, its free rigid motion beside its modes.
+"""A reduced body on bases, with driven interfaces, its rigid motion and its modes.
 
 x = (d, theta, q): translation and rotation of the body frame, which nothing but the bases holds, and its modes, with
 the mass and stiffness of docs/theory.md §6 at rest. Of a body that is held already the ground is the base: it moves
@@ -74,7 +74,7 @@ def bases_of_body(
 
 @dataclass(frozen=True, eq=False)
 class OutputRows:
-    """Some outputs over the modes and the inputs, as in `ShakenModel`."""
+    """Some outputs as functions of the modes and inputs, as in `ShakenModel`."""
 
     outputs: list[Output]
     E: Array  #: (3, n_out, n_m)
@@ -83,12 +83,12 @@ class OutputRows:
 
 @dataclass(frozen=True, eq=False)
 class OnBases:
-    """A body with its motions on bases and the loads on it."""
+    """A body with its motions on bases, and the loads on it."""
 
     body: ReducedBody
     bases: tuple[Base, ...]
     M: Array  #: over x, axes of B, (n_x, n_x)
-    C: Array  #: zero where the damping is given by modes
+    C: Array  #: zero if the damping is given by modes
     K: Array
     F: Array  #: loads of the forces, (n_x, n_f)
     forces: tuple[str, ...]
@@ -158,12 +158,12 @@ def shaken_body(
 
 
 def follows(on: OnBases, matrix: Array) -> Array:
-    """Return a matrix of stiffness or damping times T; zero, not rounding, where one base carries all rigidly."""
+    """Return a stiffness or damping matrix times T; exactly zero if one base carries the whole body rigidly."""
     return np.zeros_like(on.held.T) if len(on.bases) == 1 else matrix @ on.held.T
 
 
 def base_rows(on: OnBases) -> list[OutputRows]:
-    """Return what the bases exert on the body, each and all together, and the mean acceleration by it (step 5)."""
+    """Return the forces of the bases on the body, individually and in total, and the mean acceleration (step 5)."""
     T, V, bases = on.held.T, on.held.V, on.bases
     n_s, n_f = T.shape[1], on.F.shape[1]
     E = np.stack([np.zeros((n_s, V.shape[1])), follows(on, on.C).T @ V, T.T @ on.M @ V])
@@ -173,7 +173,7 @@ def base_rows(on: OnBases) -> list[OutputRows]:
     D[0, :, n_s:] = -T.T @ on.F
     units = on.body.units
     rows = [OutputRows([o for base in bases for o in force_outputs(base.name, "about its point", units)], E, D)]
-    # power of the wrenches in a motion of all bases with the first: its force and moment
+    # power of the wrenches in a motion of all bases with the first, which gives its force and moment
     to_net = np.vstack(
         [la.block_diag(base.axes, base.axes).T @ rigid_rows(base.point, bases[0]) for base in bases]
     ).T  # fmt: skip
@@ -202,7 +202,7 @@ def observed_rows(on: OnBases, each: Observed) -> list[OutputRows]:
                 found.append(rows_of(on, motion_outputs(place, wish, units), place.rows, 2, place.rows @ on.held.T))
             elif wish == "displacement":
                 own = np.zeros((len(place.rows), n_s))
-                if len(on.bases) > 1:  # less what the first base alone would carry along; nothing is left with one base
+                if len(on.bases) > 1:  # relative to the rigid motion of the first base; zero with one base
                     own = place.rows @ on.held.T
                     own[:, :6] -= rigid_rows(place.point, on.bases[0])[: len(own)]
                 found.append(rows_of(on, motion_outputs(place, wish, units), place.rows, 0, own))
@@ -212,14 +212,14 @@ def observed_rows(on: OnBases, each: Observed) -> list[OutputRows]:
 
 
 def table_rows(on: OnBases, each: Observed) -> OutputRows:
-    """Return the rows of a recovery table, with what the bases exert as its loads."""
+    """Return the rows of a recovery table, with the forces of the bases as its loads."""
     table, bases = recovery_table(on.body, each), base_rows(on)[0]
     by_lam, by_force = interface_loads(on.body, table, on.bases, on.forces)
     dynamic, n_s = np.asarray(table.dynamic), on.held.T.shape[1]
     E = dynamic @ on.held.V + by_lam @ bases.E
     D = by_lam @ bases.D
     follows_s = np.array(on.held.T)
-    follows_s[:, :6] -= rigid_motion(on.body, on.bases[0])  # nothing is left with one base
+    follows_s[:, :6] -= rigid_motion(on.body, on.bases[0])  # zero with one base
     D[:2, :, :n_s] += dynamic[:2] @ follows_s
     D[2, :, :n_s] += dynamic[2] @ on.held.T
     D[0, :, n_s:] += by_force + dynamic[0] @ (on.held.V_0 @ (on.held.V_0.T @ on.F))
@@ -232,7 +232,7 @@ def rows_of(on: OnBases, outputs: list[Output], by_x: Array, rate: int, by_s: Ar
     E = np.zeros((3, len(outputs), on.held.V.shape[1]))
     D = np.zeros((3, len(outputs), n_s + n_f))
     E[rate], D[rate, :, :n_s] = by_x @ on.held.V, by_s
-    if rate == 0:  # shapes without mass follow forces at once; their accelerations would be rates of the forces
+    if rate == 0:  # massless shapes follow forces immediately, so that their accelerations would be rates of the forces
         D[0, :, n_s:] = by_x @ V_0 @ (V_0.T @ on.F)
     return OutputRows(outputs, E, D)
 
@@ -252,7 +252,7 @@ def stress_field(on: OnBases) -> tuple[Array, Array] | None:
 
 
 def held_rows(body: ReducedBody, bases: Sequence[Base]) -> tuple[Array, Array]:
-    """Return G and R, mesh axes: what the bases hold of x, and how that follows them."""
+    """Return G and R, mesh axes: the constrained rows of x, and their motion with the bases."""
     G: list[Array] = []
     R: list[Array] = []
     for k, base in enumerate(bases):
@@ -284,7 +284,7 @@ def held_points(body: ReducedBody, interface: ReducedInterface) -> list[tuple[Ar
 
 
 def sizes_of(body: ReducedBody) -> Array:
-    """Return sizes of x that move the body by about a length of one, (6 + n_q,)."""
+    """Return magnitudes of x that move the body by about one unit of length, (6 + n_q,)."""
     length = float(np.linalg.norm(np.ptp(body.nodes, axis=0))) or 1.0
     largest = np.abs(body.Phi).max(axis=(0, 1), initial=0.0)
     for interface in body.interfaces:
@@ -294,7 +294,7 @@ def sizes_of(body: ReducedBody) -> Array:
 
 
 def rigid_motion(body: ReducedBody, base: Base) -> Array:
-    """Return x that carries the whole body with a base, (6 + n_q, 6): no mode takes part."""
+    """Return x for a rigid motion of the body with a base, (6 + n_q, 6), without modes."""
     T = np.zeros((6 + body.n_q, 6))
     T[:6] = la.block_diag(body.frame.axes, body.frame.axes).T @ rigid_rows(body.frame.origin, base)
     return T
@@ -345,7 +345,7 @@ def force_outputs(name: str, place: str, units: Units) -> list[Output]:
 
 
 def motion_outputs(place: Place, quantity: str, units: Units) -> list[Output]:
-    """Return the outputs of a motion: three translations, and rotations where there are any."""
+    """Return the outputs of a motion: three translations, and three rotations if they exist."""
     turning = {"acceleration": "angular acceleration", "displacement": "rotation"}[quantity]
     kinds = [quantity] * 3 + [turning] * (len(place.rows) - 3)
     return [

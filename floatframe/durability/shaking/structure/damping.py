@@ -15,7 +15,7 @@ __all__ = ["Damping"]
 
 @dataclass(frozen=True)
 class Damping:
-    """Ratios zeta of critical damping, Q = 1/(2 zeta); later ones win: `ratio`, `table`, `bands`, `modes`.
+    """Damping ratios zeta = 1/(2 Q); later entries override earlier ones: `ratio`, `table`, `bands`, `modes`.
 
     Raises
     ------
@@ -23,12 +23,12 @@ class Damping:
         If nothing or a contradiction is given, or a ratio is not between 0 and 1.
     """
 
-    ratio: float | None = None  #: of all modes
-    Q: float | None = None  #: the same as an amplification
-    table: Sequence[Sequence[float]] = ()  #: rows (frequency [Hz], ratio): linear in log f, held at the ends
+    ratio: float | None = None  #: ratio of all modes
+    Q: float | None = None  #: amplification of all modes
+    table: Sequence[Sequence[float]] = ()  #: rows (frequency [Hz], ratio), linear in log f, constant beyond the ends
     bands: Sequence[Sequence[float]] = ()  #: rows (from [Hz], to [Hz], ratio), from <= f < to
-    modes: Mapping[int, float] = field(default_factory=dict)  #: ratio of single modes, from 1
-    own: bool = False  #: the damping that the body or the dampers of the system have
+    modes: Mapping[int, float] = field(default_factory=dict)  #: ratios of single modes by number, from 1
+    own: bool = False  #: whether the damping of the body or of the dampers of the system is used
 
     def __post_init__(self) -> None:
         if self.ratio is not None and self.Q is not None:
@@ -90,7 +90,7 @@ class Damping:
 
     @property
     def description(self) -> str:
-        """Say what it is."""
+        """Description of the damping."""
         if self.own:
             return "damping of the model itself"
         parts = (

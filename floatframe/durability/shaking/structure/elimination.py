@@ -1,4 +1,4 @@
-"""Driven interfaces eliminated exactly: static motions that follow the bases, and modes with the bases held.
+"""Exact elimination of driven interfaces: static motions that follow the bases, and modes with fixed bases.
 
     M x_ddot + C x_dot + K x = f + Gᵀ lam,   G x = R s
 
@@ -20,9 +20,9 @@ from floatframe.errors import ModelError
 
 __all__ = ["Held", "held_by_bases"]
 
-RANK = 1e-9  #: singular values of the scaled rows below this part of the greatest count as zero
-FOLLOWS = 1e-8  #: largest part of the motion of the bases that the structure may fail to follow
-FREE = 1e-12  #: energy of a motion with held bases, by the greatest, below which nothing holds it
+RANK = 1e-9  #: singular value of the scaled rows, relative to the largest, that counts as zero
+FOLLOWS = 1e-8  #: largest relative error with which the structure follows the bases
+FREE = 1e-12  #: energy of a motion with fixed bases, relative to the largest, below which the motion is free
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class Held:
 
     T: Array  #: static motions that follow the bases, (n_x, n_s)
     V: Array  #: modes with the bases held, of unit mass, (n_x, n_m)
-    omega: Array  #: their angular frequencies, ascending, (n_m,)
+    omega: Array  #: angular frequencies of the modes, ascending, (n_m,)
     V_0: Array  #: shapes without mass, of unit stiffness, (n_x, n_0)
 
 
@@ -84,7 +84,7 @@ def held_by_bases(where: str, M: Array, K: Array, G: Array, R: Array, scale: Arr
 
 
 def require_held(where: str, K_N: Array, N: Array) -> None:
-    """Raise `ModelError` if a motion with held bases costs no energy."""
+    """Raise `ModelError` if a motion with fixed bases has no energy."""
     if not len(K_N):
         return
     size = np.sqrt(np.maximum(np.diag(K_N), np.finfo(float).tiny))
@@ -110,12 +110,12 @@ def require_followed(where: str, followed: Array, wanted: Array) -> None:
 
 
 def scale_of(K: Array, M: Array) -> float:
-    """Return the smallest positive K_kk / M_kk, 1 where there is none."""
+    """Return the smallest positive K_kk / M_kk; 1 if there is none."""
     k, m = np.diag(K), np.diag(M)
     both = (k > 0) & (m > 0)
     return float((k[both] / m[both]).min()) if both.any() else 1.0
 
 
 def symmetric(matrix: Array) -> Array:
-    """Return the symmetric part of what is symmetric but for rounding."""
+    """Return the symmetric part of a matrix that is symmetric except for rounding errors."""
     return np.asarray((matrix + matrix.T) / 2)

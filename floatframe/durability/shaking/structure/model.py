@@ -1,4 +1,4 @@
-"""A structure on moved bases in the modes it has while the bases are held.
+"""A structure on moving bases, in its modes with fixed bases.
 
     eta_ddot + C eta_dot + diag(omega²) eta = B_0 s + B_1 s_dot + B_2 s_ddot
     y = Σ_r E_r d^r eta/dt^r + D_r d^r s/dt^r,  r = 0, 1, 2
@@ -26,13 +26,13 @@ __all__ = [
     "rigid_rows",
 ]
 
-DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")  #: of a base, in its own axes
+DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")  #: directions of a base, in its own axes
 STANDARD_GRAVITY = 9.80665  #: [m/s²], exact by definition (ISO 80000-3)
 
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """A rigid base: what it holds, and the point about which it turns and its forces are given."""
+    """A rigid base: the parts that it holds, and its reference point for rotations and moments."""
 
     name: str
     holds: tuple[str, ...]  #: interfaces of a body, or joints and springs of a system
@@ -46,18 +46,18 @@ class Base:
 
 @dataclass(frozen=True)
 class Output:
-    """What a row of the outputs is."""
+    """The description of an output."""
 
-    name: str  #: of the place and the component: "mirror x", "base force z"
+    name: str  #: name of the place and component: "mirror x", "base force z"
     kind: str  #: "acceleration", "angular acceleration", "displacement", "rotation", "force", "moment", "stress", ...
     unit: str  #: in units of the model
-    group: str  #: the place: all rows of one place share it
-    place: str = ""  #: where that is, in words, with ids
+    group: str  #: the place; all rows of one place have the same group
+    place: str = ""  #: description of the place, with ids
 
 
 @dataclass(frozen=True, eq=False)
 class ShakenModel:
-    """Modes with the bases held, how inputs drive them, and what is observed."""
+    """Modes with fixed bases, their excitation by the inputs, and the outputs."""
 
     name: str
     units: Units
@@ -74,8 +74,8 @@ class ShakenModel:
     #: stress of the modes and of s at the kept nodes, then at the stress points, xx yy zz yz xz xy, (n, 6, n_m) and
     #: (n, 6, n_s); None: no stress modes
     field: tuple[Array, Array] | None = None
-    field_labels: tuple[str, ...] = ()  #: of those nodes and points, as the user names them
-    n_residual: int = 0  #: modes from there on answer statically
+    field_labels: tuple[str, ...] = ()  #: names of those nodes and points
+    n_residual: int = 0  #: number of modes that respond statically; they are the last ones
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -94,12 +94,12 @@ class ShakenModel:
 
     @property
     def damping_ratios(self) -> Array:
-        """Diagonal of C over 2 omega, (n_m,)."""
+        """Diagonal of C divided by 2 omega, (n_m,)."""
         return np.asarray(np.diag(self.C) / (2 * self.omega))
 
     @property
     def is_modal(self) -> bool:
-        """Whether the damping couples no modes."""
+        """Whether the damping does not couple modes."""
         return not (self.C - np.diag(np.diag(self.C))).any()
 
     @property
@@ -152,7 +152,7 @@ def response(model: ShakenModel, frequencies: Array) -> Array:
 
 
 def moving(model: ShakenModel) -> Array:
-    """Return E without the rates of modes that answer statically, (3, n_out, n_m)."""
+    """Return E without the rates of modes that respond statically, (3, n_out, n_m)."""
     if not model.n_residual:
         return model.E
     E = np.array(model.E)

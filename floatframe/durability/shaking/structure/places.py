@@ -1,4 +1,4 @@
-"""Places of a body that are observed: interfaces, nodes, elements and sets by the user's numbers, stress points."""
+"""Observed places of a body: interfaces, nodes, elements and sets by their numbers, stress points."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ __all__ = ["QUANTITIES", "Observed", "Place", "found_places", "six_rows"]
 
 QUANTITIES = ("acceleration", "displacement", "stress")
 WAYS = ("interface", "node", "element", "set", "position", "point", "sensor", "recovery")
-MOST_NODES = 500  #: of an element or set
+MOST_NODES = 500  #: largest number of nodes of an element or set
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,12 +32,12 @@ class Observed:
     name: str
     interface: str | None = None
     node: int | str | None = None  #: the user's number; "INSTANCE.number" where instances have the same numbers
-    element: int | str | None = None  #: likewise
+    element: int | str | None = None  #: number of an element, in the same notation
     set: str | None = None
     position: Array | Sequence[float] | None = None  #: mesh coordinates of a kept node, (3,) [m]
     point: str | None = None  #: stress point of the file, by name
-    quantities: tuple[str, ...] = ()  #: of QUANTITIES; (): acceleration, at stress points stress
-    tolerance: float = TOLERANCE  #: how far a kept node may be from the position, of the size of the body
+    quantities: tuple[str, ...] = ()  #: quantities, of `QUANTITIES`; (): acceleration, or stress at a stress point
+    tolerance: float = TOLERANCE  #: largest distance of a kept node from the position, relative to the size of the body
     body: str | None = None  #: of a system: on which body; "position" is then also one on a rigid body
     sensor: str | None = None  #: of a system: a sensor of it, by name, in place of a place
     recovery: str | None = None  #: of a body: a recovery table of it, by name: all of its rows
@@ -59,13 +59,13 @@ class Observed:
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """A place found: its motion and stress over x = (d, theta, q) in mesh axes."""
+    """An observed place: its motion and stress over x = (d, theta, q) in mesh axes."""
 
-    name: str  #: of its outputs
-    words: str  #: where it is
+    name: str  #: name of the outputs
+    words: str  #: description of the place
     point: Array  #: mesh coordinates, (3,) [m]
-    rows: Array  #: translation, and rotation where it is known, (3 or 6, 6 + n_q)
-    stress: Array | None  #: xx yy zz yz xz xy, (6, 6 + n_q); None: not known
+    rows: Array  #: translation, and rotation if known, (3 or 6, 6 + n_q)
+    stress: Array | None  #: xx yy zz yz xz xy, (6, 6 + n_q); None if unknown
 
 
 def found_places(body: ReducedBody, each: Observed) -> list[Place]:
@@ -112,7 +112,7 @@ def found_places(body: ReducedBody, each: Observed) -> list[Place]:
 
 
 def node_place(body: ReducedBody, row: int, each: Observed, name: str, words: str) -> Place:
-    """Return a kept node by its row; with rotations where the body keeps them."""
+    """Return a kept node by its row, with rotations if the body has them."""
     frame, local = body.frame, body.nodes[row]
     turn = None if body.kept is None else body.kept.of_node(row)
     Psi = np.concatenate([body.Phi[row], np.zeros((3, body.n_q)) if turn is None else turn])

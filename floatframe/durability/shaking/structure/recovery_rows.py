@@ -1,4 +1,4 @@
-"""Rows of a recovery table of a body as outputs: element forces, stresses and motions that were asked for at reduction.
+"""Rows of a recovery table of a body as outputs: element forces, stresses and motions requested at the reduction.
 
 y = D_0 z + D_1 z_dot + D_2 z_ddot + L p (`cms.RecoveryTable`), z = (d, theta, q). The loads p at an interface that is
 the only one of its base are what the base exerts there, W lam, with W from the point of the base to that of the
@@ -54,7 +54,7 @@ def recovery_outputs(each: Observed, table: RecoveryTable) -> list[Output]:
 
 
 def is_whole(table: RecoveryTable, k: int) -> bool:
-    """Whether a row is one of six in a row that are the components of a stress."""
+    """Return whether a row begins the six components of a stress."""
     if table.components[k] not in STRESS_COMPONENTS:
         return False
     first = k - STRESS_COMPONENTS.index(table.components[k])
@@ -64,7 +64,7 @@ def is_whole(table: RecoveryTable, k: int) -> bool:
 def interface_loads(
     body: ReducedBody, table: RecoveryTable, bases: tuple[Base, ...], forces: tuple[str, ...]
 ) -> tuple[Array, Array]:
-    """Return the response to what the bases exert, (n_rows, 6 n_bases), and to further forces, (n_rows, n_forces).
+    """Return the response to the forces of the bases, (n_rows, 6 n_bases), and to further forces, (n_rows, n_forces).
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A system on bases: what stands on the ground is moved, about its equilibrium at rest.
+"""A system on bases: its connections to the ground are moved, about the equilibrium at rest.
 
 `linearize` has the equations with the base as an input and z about the shape that follows it quasi-statically. Here
 they are
@@ -47,13 +47,13 @@ from floatframe.results.small_motions.small_motions import SmallMotions
 __all__ = ["bases_of_system", "shaken_system"]
 
 MARKERS = ("marker_a", "marker_b")
-SYMMETRIC = 1e-8  #: of M and K, by their size: less is rounding
-FREE = 1e-10  #: omega² over the highest, below which nothing holds a motion
-ROUNDING = 1e-9  #: of a motion that the base carries rigidly
+SYMMETRIC = 1e-8  #: relative asymmetry of M and K that counts as rounding error
+FREE = 1e-10  #: omega², relative to the highest one, below which a motion is free
+ROUNDING = 1e-9  #: rounding error of a motion that the base carries rigidly
 
 
 def grounded(system: System) -> dict[str, object]:
-    """Return what stands on the ground: joints and forces with a marker there, by name."""
+    """Return the joints and forces with a marker on the ground, by name."""
     named = [*system.joints, *(force for force in system.forces if not isinstance(force, Gravity))]
     return {each.name: each for each in named if any(is_ground(getattr(each, key, None)) for key in MARKERS)}
 
@@ -123,7 +123,7 @@ class RecoveryFromBase(RecoverySensor):
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Outputs by the outputs of the linearised system: y = W y_linear."""
+    """Outputs as combinations of the outputs of the linearised system: y = W y_linear."""
 
     outputs: list[Output]
     columns: list[Column]
@@ -222,14 +222,14 @@ def shaken_system(
 
 
 def is_carried(column: Column) -> bool:
-    """Whether an output is a force of connections, which carries the damping of a mode beside its elastic force."""
+    """Return whether an output is a connection force, which includes the damping force of a mode."""
     return isinstance(column.sensor, (ReactionSensor, InterfaceForceSensor)) or (
         isinstance(column.sensor, SpringSensor) and column.column == "tension"
     )
 
 
 def is_velocity(system: System, column: Column, unit: str) -> bool:
-    """Whether an output is a velocity, which depends on rates also without dampers."""
+    """Return whether an output is a velocity, which depends on rates even without dampers."""
     if isinstance(column.sensor, RecoverySensor):
         _, table, _ = column.sensor.found(system)
         return table.quantities[table.labels.index(column.column)] == "velocity"
@@ -237,7 +237,7 @@ def is_velocity(system: System, column: Column, unit: str) -> bool:
 
 
 def cleaned(product: Array, left: Array, right: Array) -> Array:
-    """Return a product with its rounding set to zero: what a base carries rigidly has no stiffness."""
+    """Return a product with rounding errors set to zero, because rigid motions with a base have no stiffness."""
     bound = np.abs(left) @ np.abs(right)
     return np.where(np.abs(product) <= ROUNDING * bound, 0.0, product)
 
@@ -256,7 +256,7 @@ def require_symmetric(where: str, linear: LinearSystem) -> None:
 
 
 def modes(where: str, linear: LinearSystem) -> tuple[Array, Array]:
-    """Return angular frequencies and modes of unit mass with the bases at rest."""
+    """Return angular frequencies and modes of unit mass with fixed bases."""
     M, K = ((np.asarray(a) + np.asarray(a).T) / 2 for a in (linear.M, linear.K))
     omega2, Z = la.eigh(K, M)
     free = int((omega2 <= FREE * omega2[-1]).sum())
@@ -270,7 +270,7 @@ def modes(where: str, linear: LinearSystem) -> tuple[Array, Array]:
 
 
 def rigid_mass(linear: LinearSystem, state: State, bases: Sequence[Base]) -> Array:
-    """Return the rigid mass matrix by the motions of the bases, all bodies carried by each, (6 n, 6 n)."""
+    """Return the rigid mass matrix for the motions of the bases, (6 n, 6 n)."""
     carried = []
     for base in bases:
         parts = []
@@ -287,7 +287,7 @@ def rigid_mass(linear: LinearSystem, state: State, bases: Sequence[Base]) -> Arr
 
 
 def base_rows(system: System, base: Base, state: State) -> Rows:
-    """Return force and moment of a base about its point: the sum of the reactions of what it holds."""
+    """Return the force and moment of a base about its point: the sum of the reactions of its connections."""
     there = grounded(system)
     columns: list[Column] = []
     weights = np.zeros((6, 6 * len(base.holds)))
@@ -309,7 +309,7 @@ def net_rows(bases: Sequence[Base], rows: Sequence[Rows], system: System) -> Row
 
 
 def mean_rows(net: Rows, mass: float, system: System) -> Rows:
-    """Return the net force over the mass."""
+    """Return the net force divided by the mass."""
     unit = unit_of("acceleration", system.units)
     outputs = [
         Output(
