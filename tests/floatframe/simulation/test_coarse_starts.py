@@ -38,6 +38,9 @@ FRAMES = {
 }
 CASES = ("let go", "hinge damper", "sine torque", "jumps", "jumps inside steps")
 FORMULATIONS = ("absolute", "relative")
+#: without numerical damping, two periods of the slowest mode in a step and velocities of joints held as well, Newton's
+#: method fails after seven steps; with rho_inf = 0.99, or held positions alone, errors are 2e-4 and 7e-4
+REFUSED = {("nodal", case, 100.0): {("absolute", 1.0)} for case in ("let go", "hinge damper")}
 
 
 @pytest.fixture(scope="module")
@@ -98,12 +101,16 @@ def stick():
     return RigidBody("rod", 0.785, J, position=PLACE, center_of_mass=ALONG / 2)
 
 
-def errors(made, exact, h, rhos):
-    """Return the error of the angle at the end by formulation and rho_inf."""
+def errors(made, exact, h, rhos, refused=frozenset()):
+    """Return the error of the angle at the end by formulation and rho_inf, of those that are not refused in words."""
+    for formulation, rho in refused:
+        with pytest.raises(ff.ConvergenceError, match=r"h = 0\.022 follows 0 of 8 modes"):
+            run(made, rho, h, formulation)
     return {
         (formulation, rho): abs(angles(made, run(made, rho, h, formulation))[-1] / exact - 1)
         for formulation in FORMULATIONS
         for rho in rhos
+        if (formulation, rho) not in refused
     }
 
 
@@ -119,7 +126,8 @@ def check(rods, kinds, cases, ratios, rhos):
             allowed = errors(made, reference(made, h), h, rhos)
             for kind in kinds:
                 made = system(rods[kind], case, h)
-                for key, error in errors(made, reference(made, h), h, rhos).items():
+                refused = {each for each in REFUSED.get((kind, case, ratio), ()) if each[1] in rhos}
+                for key, error in errors(made, reference(made, h), h, rhos, refused).items():
                     assert error < 3 * allowed[key] + 1e-4, (kind, case, ratio, key)
 
 
