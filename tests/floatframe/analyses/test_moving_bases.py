@@ -230,7 +230,7 @@ def test_a_mass_on_a_shaken_spring_is_that_of_the_textbook():
 
 
 @pytest.mark.parametrize(("channel", "words"), [
-    (BaseMotion("b", joints=("rot",)), "'rot' is not there; did you mean 'root'"),
+    (BaseMotion("b", joints=("rot",)), "'rot' does not exist; did you mean 'root'"),
     (BaseMotion("b", joints=("axle",)), "'axle' is not attached to the ground"),
     (DriveMotion("d", "root", "angle"), "no driven coordinate 'root.angle'"),
 ])  # fmt: skip
