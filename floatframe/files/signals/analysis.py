@@ -1,4 +1,4 @@
-"""Spectra of channels by the name of their kind: what `floatframe plot --as` and `floatframe spectrum` make."""
+"""Spectra of channels by kind, for `floatframe plot --as` and `floatframe spectrum`."""
 
 import csv
 import io
@@ -31,7 +31,7 @@ AnySpectrum = Spectrum | SpectralMap | TransferEstimate
 
 
 def spectral_csv(spectra: Sequence[AnySpectrum]) -> str:
-    """Return spectra as comma-separated values: over common frequencies side by side, maps one below the other."""
+    """Return spectra as comma-separated values: side by side over common frequencies, maps one below the other."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     first = spectra[0]
@@ -41,7 +41,7 @@ def spectral_csv(spectra: Sequence[AnySpectrum]) -> str:
             ["name", "time [s]", "speed [rad/s]", line, f"amplitude ({'rms' if first.is_rms else 'peak'})", "unit"]
         )
         for each in spectra:
-            assert isinstance(each, SpectralMap)  # of one kind with the first
+            assert isinstance(each, SpectralMap)  # all spectra have the kind of the first
             speeds: Iterable[Any] = [""] * len(each.times) if each.speeds is None else each.speeds.tolist()
             for t, speed, row in zip(each.times.tolist(), speeds, each.amplitudes.tolist(), strict=True):
                 writer.writerows(
@@ -70,12 +70,12 @@ def spectral_csv(spectra: Sequence[AnySpectrum]) -> str:
 
 
 def spectral_record(spectra: Sequence[AnySpectrum]) -> list[dict[str, Any]]:
-    """Return spectra in plain types: every field by its name, complex numbers in two parts, NaN as None."""
+    """Return spectra in plain types: fields by name, complex numbers as two parts, NaN as None."""
     return [{key: plain(value) for key, value in vars(each).items()} for each in spectra]
 
 
 def plain(value: Any) -> Any:
-    """Return lists in place of arrays."""
+    """Return nested lists for arrays."""
     if isinstance(value, np.ndarray):
         if np.iscomplexobj(value):
             return {"real": plain(value.real), "imaginary": plain(value.imag)}
@@ -85,10 +85,10 @@ def plain(value: Any) -> Any:
     return list(value) if isinstance(value, tuple) else value
 
 
-# what sensors measured on a motion, as signals ------------------------------------------------------------------------
+# measurements of sensors during a motion, as signals -----------------------------------------------------------------
 
 
-NO_SIGNALS = ("number in the mesh",)  #: units of columns that are no quantity over time
+NO_SIGNALS = ("number in the mesh",)  #: units of columns that are not quantities over time
 
 
 def signals_of(measurements: Sequence[Measurement], units: Units) -> Signals:
@@ -112,7 +112,7 @@ def signals_of(measurements: Sequence[Measurement], units: Units) -> Signals:
 
 
 def even_signals(signals: Signals, rate: float | None = None) -> Signals:
-    """Return channels at equidistant times: as they are, or resampled to a rate, by default that of their usual step.
+    """Return channels at equidistant times, unchanged or resampled to a rate; default: the rate of the usual step.
 
     Rows that events put between the others are so left out, and steps that followed the motion made even; the notes
     say it.
@@ -137,18 +137,18 @@ def even_signals(signals: Signals, rate: float | None = None) -> Signals:
 
 @dataclass(frozen=True)
 class SpectrumRequest:
-    """What is asked of spectra; None: the default of the kind."""
+    """Options of spectra; None: the default of the kind."""
 
     window: str = "hann"
-    resolution: float | None = None  #: distance of lines [Hz]; of orders [-]
+    resolution: float | None = None  #: spacing of lines [Hz], or of orders [-]
     is_rms: bool = False
-    rotation: Signal | None = None  #: angle or speed of the rotation, for orders and over waterfalls
-    input: Signal | None = None  #: of a response
+    rotation: Signal | None = None  #: angle or speed of the rotation, for orders and for waterfalls over speed
+    input: Signal | None = None  #: input signal of a frequency response
     max_order: float = 10.0
 
 
 def segment(signal: Signal, request: SpectrumRequest) -> int | None:
-    """Return the samples of a segment for the resolution asked for."""
+    """Return the number of samples of a segment for the requested resolution."""
     if request.resolution is None:
         return None
     if not (np.isfinite(request.resolution) and request.resolution > 0):
@@ -157,7 +157,7 @@ def segment(signal: Signal, request: SpectrumRequest) -> int | None:
 
 
 def as_psd(signal: Signal, request: SpectrumRequest) -> Spectrum:
-    """Power spectral density."""
+    """Return the power spectral density."""
     return psd(
         signal.values, signal.rate, window=request.window, n_segment=segment(signal, request), unit=signal.unit,
         name=signal.name,
@@ -165,7 +165,7 @@ def as_psd(signal: Signal, request: SpectrumRequest) -> Spectrum:
 
 
 def as_amplitude(signal: Signal, request: SpectrumRequest) -> Spectrum:
-    """Amplitudes of lines."""
+    """Return amplitudes of lines."""
     return amplitude_spectrum(
         signal.values, signal.rate, is_rms=request.is_rms, window=request.window, n_segment=segment(signal, request),
         unit=signal.unit, name=signal.name,
@@ -173,7 +173,7 @@ def as_amplitude(signal: Signal, request: SpectrumRequest) -> Spectrum:
 
 
 def as_orders(signal: Signal, request: SpectrumRequest) -> SpectralMap:
-    """Amplitudes over orders."""
+    """Return amplitudes over orders."""
     _, angle = rotation_of(signal, request.rotation)
     return order_map(
         signal, angle, max_order=request.max_order, resolution=request.resolution or 0.25, window=request.window,
@@ -182,7 +182,7 @@ def as_orders(signal: Signal, request: SpectrumRequest) -> SpectralMap:
 
 
 def as_waterfall(signal: Signal, request: SpectrumRequest) -> SpectralMap:
-    """Amplitudes over frequencies and time, or speed."""
+    """Return amplitudes over frequencies, and over time or speed."""
     speed = None if request.rotation is None else rotation_of(signal, request.rotation)[0]
     return frequency_map(
         signal, speed, n_segment=segment(signal, request), window=request.window, is_rms=request.is_rms
@@ -190,7 +190,7 @@ def as_waterfall(signal: Signal, request: SpectrumRequest) -> SpectralMap:
 
 
 def as_response(signal: Signal, request: SpectrumRequest) -> TransferEstimate:
-    """Frequency response to the input, and coherence."""
+    """Return the frequency response to the input, and the coherence."""
     if request.input is None:
         raise SignalError("response: expected the sensor that is its input (--input)")
     return transfer_estimate(
@@ -211,7 +211,7 @@ SPECTRA: dict[str, Callable[[Signal, SpectrumRequest], Spectrum | SpectralMap | 
 
 
 def rotation_of(signal: Signal, rotation: Signal | None) -> tuple[Array, Array]:
-    """Return speed [rad/s] and angle [rad] of a rotation; its unit says which of them is known."""
+    """Return speed [rad/s] and angle [rad] of a rotation; its unit tells which of them is given."""
     if rotation is None:
         raise SignalError("orders: expected the channel with the angle or the speed of the rotation (--rotation)")
     unit = signal_unit(rotation.unit, f"rotation {quoted(rotation.name)}")

@@ -1,4 +1,4 @@
-"""Signals from text tables: any usual delimiter, decimal point or comma, a head with units."""
+"""Signals from text tables with any usual delimiter, decimal point or comma, and a head with units."""
 
 import re
 from dataclasses import dataclass
@@ -14,8 +14,8 @@ from floatframe.files.signals.signal_units import parsed_unit
 __all__ = ["RawTable", "read_csv"]
 
 DELIMITERS = (";", "\t", "|", ",", " ")
-LOOKED_AT = 50  #: lines by which delimiter and decimal sign are judged
-MOST_HEAD = 100  #: lines before the first number
+LOOKED_AT = 50  #: number of lines from which the delimiter and decimal sign are determined
+MOST_HEAD = 100  #: largest number of lines before the first number
 EMPTY_FIELDS = {"", "nan", "NaN", "NAN", "null", "NULL", "-", "n/a", "N/A", "#N/A"}  #: fields without a number
 POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
 COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eEdD][+-]?\d+)?")
@@ -24,12 +24,12 @@ UNIT_AT_END = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\]|\(([^()]*(?:\([^()]*\)[^()]
 
 @dataclass(frozen=True, eq=False)
 class RawTable:
-    """Columns as a file has them: numbers, names, units; the time is still one of them, or is not there."""
+    """Columns of a file with names and units; the time, if any, is one of the columns."""
 
-    values: Array  #: (n_t, n_columns), NaN where there is no number
+    values: Array  #: (n_t, n_columns), NaN for missing numbers
     names: tuple[str, ...]
     units: tuple[str, ...]
-    lines: Array | None = None  #: of the file, from 1, (n_t,); None: rows are counted
+    lines: Array | None = None  #: line numbers in the file, from 1, (n_t,); None: rows are counted
     notes: tuple[str, ...] = ()
 
 
@@ -67,7 +67,7 @@ def read_csv(path: Path, *, decimal: str | None = None, delimiter: str | None = 
             f"{path}: no row of numbers in its first lines, with {name_of(delimiter)} between columns and decimal "
             f"{'comma' if decimal == ',' else 'point'}; state delimiter and decimal"
         )
-    if all(len(fields) > 1 and not fields[-1] for _, fields in split[first:]):  # a delimiter ends every line
+    if all(len(fields) > 1 and not fields[-1] for _, fields in split[first:]):  # every line ends with a delimiter
         split = [(number, fields if fields[-1] else fields[:-1]) for number, fields in split]
     width = len(split[first][1])
     names, units = head_of(split[:first], width)
@@ -79,7 +79,7 @@ def read_csv(path: Path, *, decimal: str | None = None, delimiter: str | None = 
 
 
 def decoded(path: Path) -> tuple[str, list[str]]:
-    """Return the text of a file, and that it is not in UTF-8."""
+    """Return the text of a file, and notes if its encoding is not UTF-8."""
     content = path.read_bytes()
     if b"\0" in content[:4096] and not content.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise SignalError(f"{path}: expected a text table, got bytes that are none; is it in another format?")
@@ -92,7 +92,7 @@ def decoded(path: Path) -> tuple[str, list[str]]:
 
 
 def fields_of(line: str, delimiter: str) -> list[str]:
-    """Return the fields of a line; between spaces a unit in brackets belongs to the name before it."""
+    """Return the fields of a line; if spaces are delimiters, a unit in brackets belongs to the preceding name."""
     if delimiter == " ":
         return re.sub(r"\s+([\[(])", r"\1", line.strip()).split()
     if '"' in line:
@@ -105,7 +105,7 @@ def fields_of(line: str, delimiter: str) -> list[str]:
 
 
 def delimiter_of(path: Path, rows: list[tuple[int, str]], decimal: str | None) -> str:
-    """Return what stands between the columns of the last lines looked at, where numbers stand."""
+    """Return the delimiter between columns, from the last lines examined, which contain numbers."""
     lines = [line.strip() for _, line in rows[-LOOKED_AT:]]
     for delimiter in (";", "\t", "|"):
         if all(delimiter in line for line in lines):
@@ -128,12 +128,12 @@ def delimiter_of(path: Path, rows: list[tuple[int, str]], decimal: str | None) -
 
 
 def two_ways(lines: list[str]) -> bool:
-    """Whether lines of whole numbers between commas might be numbers with decimal commas: an odd number of commas."""
+    """Return whether lines of integers between commas might be numbers with decimal commas."""
     return all(re.fullmatch(r"[+-]?\d+(,[+-]?\d+)+", line) and line.count(",") == 1 for line in lines)
 
 
 def decimal_of(path: Path, split: list[tuple[int, list[str]]], delimiter: str) -> str:
-    """Return the decimal sign of the fields of the last lines looked at."""
+    """Return the decimal sign of the fields in the last lines examined."""
     if delimiter == ",":
         return "."
     fields = [(number, field) for number, line in split[-LOOKED_AT:] for field in line]
@@ -148,14 +148,14 @@ def decimal_of(path: Path, split: list[tuple[int, list[str]]], delimiter: str) -
 
 
 def is_numeric(fields: list[str], decimal: str) -> bool:
-    """Whether all fields are numbers or empty, and one is a number."""
+    """Return whether all fields are numbers or empty, and at least one is a number."""
     pattern = COMMA if decimal == "," else POINT
     known = [pattern.fullmatch(field) is not None for field in fields]
     return any(known) and all(ok or field in EMPTY_FIELDS for ok, field in zip(known, fields, strict=True))
 
 
 def head_of(lines: list[tuple[int, list[str]]], width: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return names and units of the columns from the lines before the numbers: the last ones that fit the columns."""
+    """Return names and units of the columns, from the last lines before the numbers that fit the columns."""
     fitting = [fields for _, fields in lines if len(fields) == width]
     if not fitting:
         return tuple(f"column {k + 1}" for k in range(width)), ("",) * width
@@ -170,7 +170,7 @@ def head_of(lines: list[tuple[int, list[str]]], width: int) -> tuple[tuple[str, 
 
 
 def name_and_unit(head: str) -> tuple[str, str]:
-    """Return name and unit of "acc [m/s^2]" or "acc (g)"; brackets that hold no unit belong to the name."""
+    """Return name and unit of "acc [m/s^2]" or "acc (g)"; brackets without a unit belong to the name."""
     found = UNIT_AT_END.fullmatch(head.strip())
     if found is None:
         return head.strip(), ""
@@ -181,7 +181,7 @@ def name_and_unit(head: str) -> tuple[str, str]:
 
 
 def numbers_of(path: Path, split: list[tuple[int, list[str]]], width: int, decimal: str) -> Array:
-    """Return the numbers of rows, NaN for empty fields; `SignalError` with the line of the first that is none."""
+    """Return the numbers of rows, NaN for empty fields; `SignalError` with the line of the first invalid field."""
     for number, fields in split:
         if len(fields) != width:
             raise SignalError(
@@ -211,5 +211,5 @@ def number_or_nan(path: Path, field: str, line: int, column: int) -> float:
 
 
 def name_of(delimiter: str) -> str:
-    """Return a delimiter in words."""
+    """Return a delimiter as text."""
     return {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", " ": "spaces"}[delimiter]

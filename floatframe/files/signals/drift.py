@@ -1,4 +1,4 @@
-"""Accelerations that become motions: integrated exactly twice, with the drift of measured ones taken out as stated.
+"""Double integration of measured accelerations to motions, with removal of drift.
 
 The acceleration is straight lines a(t) between samples (`floatframe.model.functions.tables.acceleration_table`). What
 is taken off is again straight lines at the same samples, so that the integral stays exact.
@@ -24,19 +24,19 @@ QUANTITIES = ("acceleration", "angular acceleration")
 
 
 def as_measured(signal: Signal, corner: float | None) -> Array:
-    """Take nothing off."""
+    """Remove nothing."""
     return np.array(signal.values)
 
 
 def less_mean(signal: Signal, corner: float | None) -> Array:
-    """Take off the mean over time: the velocity at the end is that at the beginning."""
+    """Remove the mean over time, so that the final velocity equals the initial velocity."""
     t = signal.time
     gained = acceleration_table(t, signal.values).at(t[-1:], 1)[0]
     return signal.values - gained / (t[-1] - t[0])
 
 
 def on_baseline(signal: Signal, corner: float | None) -> Array:
-    """Take off c0 + c1 τ, τ from 0 to 1 over the record, such that velocity and position end as they began.
+    """Remove c0 + c1 τ, with τ from 0 to 1 over the record, such that velocity and position end as they began.
 
     Over the duration T a correction changes the velocity by T (c0 + c1/2) and the position by T² (c0/2 + c1/6).
     """
@@ -49,7 +49,7 @@ def on_baseline(signal: Signal, corner: float | None) -> Array:
 
 
 def high_passed(signal: Signal, corner: float | None) -> Array:
-    """Take off what lies below a corner frequency (`filtered`)."""
+    """Remove frequencies below a corner frequency (`filtered`)."""
     if corner is None:
         raise SignalError(f"signal {signal.name!r}: drift by high-pass: expected its corner frequency [Hz], got none")
     return np.array(filtered(signal, high_pass=corner).values)
@@ -64,7 +64,7 @@ DRIFTS: dict[str, Callable[[Signal, float | None], Array]] = {
 
 
 def without_drift(signal: Signal, drift: str, corner: float | None = None) -> Signal:
-    """Return an acceleration less its drift, with a note of how much was taken off.
+    """Return an acceleration without its drift, with a note on the removed part.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def without_drift(signal: Signal, drift: str, corner: float | None = None) -> Si
 def integrated_twice(
     signal: Signal, *, position: float = 0.0, velocity: float = 0.0, drift: str = "none", corner: float | None = None
 ) -> tuple[TimeFunction, tuple[str, ...]]:
-    """Return the position of which a signal is the acceleration, and in words where it ends and what was taken off.
+    """Return the position whose acceleration is a signal, and notes on its end and on the removed drift.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Gaps of measured histories: times that do not rise, steps that change, samples that are missing or no numbers.
+"""Gaps in measured histories: times that do not increase, changing steps, missing or invalid samples.
 
 Each is refused in one message with the place in the file; gaps up to a stated length are filled by interpolation, and
 said.
@@ -15,11 +15,11 @@ from floatframe.files.signals.signals import equidistant_step
 
 __all__ = ["without_gaps"]
 
-FEW = 20  #: samples below which steps that differ are taken as meant
-MOST_STEPS = 4  #: different steps that are a change of the rate; more are a step that follows something
-COMMON = 0.9  #: of the steps that must be alike for the others to be gaps
-MOST_COUNTED = 1e12  #: samples of a gap
-ALIKE = 0.02  #: of a step by which rounded times may let it differ
+FEW = 20  #: number of samples below which unequal steps count as intended
+MOST_STEPS = 4  #: largest number of different steps that count as a change of rate; more are an adaptive step
+COMMON = 0.9  #: fraction of equal steps above which the other steps are gaps
+MOST_COUNTED = 1e12  #: largest number of samples in a gap
+ALIKE = 0.02  #: relative difference of equal steps, due to rounded times
 
 
 def without_gaps(
@@ -31,7 +31,7 @@ def without_gaps(
     fill: float = 0.0,
     uneven: bool = False,
 ) -> tuple[Array, Array, tuple[str, ...]]:
-    """Return times and values without gaps, and what was done in words.
+    """Return times and values without gaps, and notes on what was done.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def without_gaps(
 
 
 def require_rising(time: Array, place: Callable[[int], str]) -> None:
-    """Raise `SignalError` at the first time that is no number, or does not rise."""
+    """Raise `SignalError` at the first time that is not a number, or does not increase."""
     bad = np.flatnonzero(~np.isfinite(time))
     if len(bad):
         raise SignalError(f"{place(int(bad[0]))}: the time is missing or no number; expected rising times")
@@ -86,7 +86,7 @@ def require_rising(time: Array, place: Callable[[int], str]) -> None:
 
 
 def usual_step(time: Array) -> float | None:
-    """Return the step that nearly all samples have, None if there is none."""
+    """Return the step of nearly all samples; None if there is none."""
     if len(time) < FEW:
         return None
     dt = np.diff(time)
@@ -96,7 +96,7 @@ def usual_step(time: Array) -> float | None:
 
 
 def require_whole_steps(time: Array, lost: IntArray, step: float, place: Callable[[int], str], *, uneven: bool) -> None:
-    """Raise `SignalError` where a step is no multiple of the usual one: the rate changes there."""
+    """Raise `SignalError` where a step is not a multiple of the usual step, because the rate changes there."""
     dt = np.diff(time)
     odd = np.flatnonzero((np.abs(dt - step) > 10 * ALIKE * step) & (np.abs(dt / step - np.round(dt / step)) > 0.1))
     if len(odd) and not uneven:
@@ -111,7 +111,7 @@ def require_whole_steps(time: Array, lost: IntArray, step: float, place: Callabl
 def with_lost_samples(
     time: Array, values: Array, step: float, fill: float, place: Callable[[int], str]
 ) -> tuple[Array, Array, list[str]]:
-    """Return times with those that are missing between, and NaN as their values."""
+    """Return times with the missing samples inserted, and NaN as their values."""
     counts = np.minimum(np.round(np.diff(time) / step), MOST_COUNTED).astype(np.int64)
     wide = np.flatnonzero(counts > 1)
     if not len(wide):
@@ -139,7 +139,7 @@ def require_one_rate(time: Array, place: Callable[[int], str]) -> None:
         return
     dt = np.diff(time)
     kinds: list[float] = []
-    for size in dt:  # until there are too many: then the step follows something, and is meant
+    for size in dt:  # until there are too many kinds: the step is then adaptive, and intended
         if all(abs(size - kind) > 10 * ALIKE * kind for kind in kinds):
             kinds.append(float(size))
             if len(kinds) > MOST_STEPS:
@@ -155,7 +155,7 @@ def require_one_rate(time: Array, place: Callable[[int], str]) -> None:
 def with_numbers(
     time: Array, values: Array, names: Sequence[str], fill: float, place: Callable[[int], str]
 ) -> tuple[Array, list[str]]:
-    """Return values with gaps filled; `SignalError` for the first that is too long, or at an end."""
+    """Return values with gaps filled; `SignalError` for the first gap that is too long, or at an end."""
     from scipy.interpolate import PchipInterpolator
 
     notes = []
@@ -164,7 +164,7 @@ def with_numbers(
         if not bad.any():
             continue
         edges = np.flatnonzero(np.diff(np.concatenate([[False], bad, [False]]).astype(np.int8)))
-        begins, ends = edges[::2], edges[1::2]  # of the runs, the ends not in them
+        begins, ends = edges[::2], edges[1::2]  # beginnings and exclusive ends of the gaps
         for first, end in zip(begins, ends, strict=True):
             where = f"{place(int(first))}: channel {quoted(name)}"
             if first == 0 or end == len(time):

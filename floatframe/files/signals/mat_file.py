@@ -25,16 +25,16 @@ __all__ = ["read_mat", "sound_variables"]
 # is an element of elements: flags with its class, dimensions, name, and numbers, or the arrays of its fields or cells.
 
 
-NUMBERS = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8}  #: bytes of a number by its type
+NUMBERS = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8}  #: number of bytes of a number by type
 TEXT = (1, 2, 3, 4, 16, 17, 18)
 INT8, INT32, UINT32, MATRIX, COMPRESSED = 1, 5, 6, 14, 15
 CELL, STRUCT, CHAR, NUMERIC = 1, 2, 4, range(6, 16)  #: classes of arrays
 MOST_LEVELS = 20
-MOST_BYTES = 1 << 33  #: that a compressed element may unpack to
+MOST_BYTES = 1 << 33  #: largest size of an uncompressed element
 
 
 def sound_variables(where: str, content: bytes) -> list[str]:
-    """Return the names of the variables that hold numbers, text, structures and cells, all of them walked through.
+    """Return the names of the variables with numbers, text, structures and cells, after checking all their elements.
 
     Raises
     ------
@@ -77,12 +77,12 @@ def unpacked(where: str, packed: bytes) -> bytes:
 
 
 def elements(where: str, data: bytes, at: int, end: int, order: str) -> Iterator[tuple[int, int, int]]:
-    """Yield type, begin and end of the data of each element between two places."""
+    """Yield type, begin and end of the data of each element between two positions."""
     while at < end:
         if at + 8 > end:
             raise damaged(where, f"{end - at} bytes are left at byte {at} where an element begins")
         kind, size = struct.unpack_from(f"{order}II", data, at)
-        if kind >> 16:  # a small element: its size and data stand in the tag
+        if kind >> 16:  # a small element: its tag contains its size and data
             size, kind = kind >> 16, kind & 0xFFFF
             first, following = at + 4, at + 8
             if size > 4:
@@ -97,9 +97,9 @@ def elements(where: str, data: bytes, at: int, end: int, order: str) -> Iterator
 
 
 def checked_array(where: str, data: bytes, begin: int, end: int, order: str, depth: int) -> tuple[str, bool]:
-    """Return the name of an array, and whether all of it is of known classes and was walked through."""
+    """Return the name of an array, and whether it consists only of known classes and was checked completely."""
     if begin == end:
-        return "", True  # an empty one, as fields and cells have it
+        return "", True  # an empty array, as in fields and cells
     parts = list(elements(where, data, begin, end, order))
     if len(parts) < 3 or [parts[0][0], parts[1][0], parts[2][0]] != [UINT32, INT32, INT8]:
         raise damaged(where, f"an array without flags, dimensions and name at byte {begin}")
@@ -143,14 +143,14 @@ def checked_array(where: str, data: bytes, begin: int, end: int, order: str, dep
 # mat file -------------------------------------------------------------------------------------------------------------
 
 
-MOST_INFLATED = 1100  #: bytes that deflate makes of one at most
-DEEPEST = 8  #: structures in structures
+MOST_INFLATED = 1100  #: largest number of bytes that deflate produces from one byte
+DEEPEST = 8  #: largest depth of nested structures
 MOST_COLUMNS = 10000
 TIME_WORDS = ("t", "time", "times", "zeit")
 
 
 def read_mat(path: Path, *, time: str | None = None, rate: float | None = None) -> RawTable:
-    """Return the vectors of a MATLAB file that are as long as its times, as columns.
+    """Return the vectors of a MATLAB file with the length of its times, as columns.
 
     A vector is a column under its name, a table (n_t, k) the columns "name 1", "name 2", ...; fields of structures are
     called "structure.field", and values beside a text `label` by that. Units are texts: `unit` or `units` in the
@@ -172,7 +172,7 @@ def read_mat(path: Path, *, time: str | None = None, rate: float | None = None) 
             content = content_7(path) if is_7 else content_5(path)
     except SignalError:
         raise
-    except Exception as error:  # whatever a reader stumbles over in foreign bytes
+    except Exception as error:  # a reader can fail in any way on invalid data
         raise SignalError(f"{path}: {damage(error)}") from error
     columns: dict[str, tuple[Array, str]] = {}
     for name, values, unit in columns_of(content):
@@ -213,7 +213,7 @@ def content_5(path: Path) -> dict[str, Any]:
 
 
 def plain_5(value: Any) -> Any:
-    """Return a structure of SciPy's reader as a dictionary, one text as it is."""
+    """Return a structure of SciPy's reader as a dictionary, and a single text unchanged."""
     if hasattr(value, "_fieldnames"):
         return {name: plain_5(getattr(value, name)) for name in value._fieldnames}
     return value
@@ -228,7 +228,7 @@ def content_7(path: Path) -> dict[str, Any]:
 
 
 def plain_7(path: Path, entry: Any, depth: int) -> Any:
-    """Return an array of HDF5 as MATLAB has it, text, a dictionary for a group; None for what is none of them."""
+    """Return an HDF5 array in MATLAB's order, a text, or a dictionary for a group; None for other entries."""
     if hasattr(entry, "keys"):
         return {name: plain_7(path, entry[name], depth - 1) for name in entry} if depth else None
     claimed, stored = entry.size * entry.dtype.itemsize, entry.id.get_storage_size()
@@ -247,7 +247,7 @@ def plain_7(path: Path, entry: Any, depth: int) -> Any:
 
 
 def columns_of(content: Mapping[str, Any], prefix: str = "", depth: int = DEEPEST) -> Iterator[tuple[str, Array, str]]:
-    """Yield name, values and unit of every vector, and of every column of a table, in structures too."""
+    """Yield name, values and unit of every vector, and of every column of a table, including those in structures."""
     words = {name.lower(): value for name, value in content.items() if isinstance(value, str)}
     common = words.get("unit", words.get("units", "")) if prefix else ""
     label = words.get("label", words.get("name", "")) if prefix else ""

@@ -9,9 +9,9 @@ from floatframe.files.signals.spectra import Spectrum
 __all__ = ["band_edges", "nominal_frequency", "octave_levels"]
 
 G = 10**0.3  #: octave frequency ratio, base ten
-REFERENCE = 1000.0  #: Hz
-LINES = 2.0  #: of the resolution that a band must be wide
-NOMINAL = (1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0)  #: third octaves in a decade
+REFERENCE = 1000.0  #: reference frequency [Hz]
+LINES = 2.0  #: smallest width of a band in lines
+NOMINAL = (1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0)  #: nominal third-octave frequencies in a decade
 
 
 def band_edges(fraction: int, low: float, high: float) -> tuple[Array, Array]:
@@ -66,7 +66,7 @@ def octave_levels(density: Spectrum, fraction: int = 1) -> Spectrum:
     df, f = density.resolution, density.frequencies
     if density.kind != "power spectral density" or len(f) < 2:
         raise SignalError(f"octave bands of {density.name!r}: expected a power spectral density, got {density.kind}")
-    relative = G ** (0.5 / fraction) - G ** (-0.5 / fraction)  # width of a band by its midband frequency
+    relative = G ** (0.5 / fraction) - G ** (-0.5 / fraction)  # width of a band divided by its midband frequency
     least = LINES * df / relative * G ** (-0.5 / fraction)  # lower edge of the first band that is wide enough
     top = float(f[-1])
     if least * G ** (1 / fraction) >= top:
@@ -81,7 +81,7 @@ def octave_levels(density: Spectrum, fraction: int = 1) -> Spectrum:
         )
     bounds = np.concatenate([[0.0], f[:-1] + df / 2, [top]])
     widths = np.diff(bounds)
-    power = density.values * df  # of each line; those at the ends are narrower and hold all of it
+    power = density.values * df  # power of each line; lines at the ends are narrower and contain their whole power
     total = np.concatenate([[0.0], np.cumsum(power)])
     below = np.interp(edges, bounds, total)
     assert (widths > 0).all()

@@ -1,4 +1,4 @@
-"""Order tracking: spectra over orders of a rotation whose speed changes, from samples at equal angles.
+"""Order tracking: spectra over orders of a rotation with varying speed, from samples at equal angles.
 
 (1) The angle θ(t) of the rotation is known at the samples, or is the integral of its speed.
 (2) Between the samples both are quintic splines: times t_j with θ(t_j) = θ_0 + 2 pi j/S by Newton's method, signal
@@ -22,27 +22,27 @@ from floatframe.model.functions.tables import quintic_table
 
 __all__ = ["SpectralMap", "angle_of_speed", "frequency_map", "order_cut", "order_map"]
 
-SLOW = 0.05  #: of the highest speed, below which the rotation is left out
-MOST_SAMPLES = 2e7  #: at equal angles
+SLOW = 0.05  #: speed, relative to the highest speed, below which the rotation is excluded
+MOST_SAMPLES = 2e7  #: largest number of samples at equal angles
 LEAST_SAMPLES = 16
-NEWTON = 4  #: steps for the times of equal angles
+NEWTON = 4  #: number of Newton steps for the times of equal angles
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class SpectralMap:
-    """Amplitudes of blocks of a signal over orders, or over frequencies."""
+    """Amplitudes of blocks of a signal, over orders or frequencies."""
 
     kind: str  #: "order" or "frequency"
     name: str
-    times: Array  #: middle of each block (orders: of its turns), (n_b,) [s]
-    speeds: Array | None  #: speed there, (n_b,) [rad/s]
+    times: Array  #: time at the middle of each block (for orders, at half its turns), (n_b,) [s]
+    speeds: Array | None  #: speed at these times, (n_b,) [rad/s]
     lines: Array  #: orders [-] or frequencies [Hz], (n_l,)
     amplitudes: Array  #: (n_b, n_l) in `unit`
     unit: str
     is_rms: bool
-    resolution: float  #: distance of lines
-    noise_bandwidth: float  #: of the window, in lines
+    resolution: float  #: spacing of lines
+    noise_bandwidth: float  #: noise bandwidth of the window, in lines
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -51,7 +51,7 @@ class SpectralMap:
 
 
 def angle_of_speed(time: Array, speed: Array) -> Array:
-    """Return the angle that a speed turns through, from zero, (n_t,) [rad]; speed in rad/s, a quintic spline."""
+    """Return the angle for a speed [rad/s], beginning at zero, (n_t,) [rad]; the speed is a quintic spline."""
     from scipy.interpolate import make_interp_spline
 
     if len(time) < 6:
@@ -139,7 +139,7 @@ def order_map(
     starts = np.arange(0, n_points - n + 1, max(1, round(n * (1 - overlap))))
     k = np.arange(int(np.floor(max_order / resolution + 1e-9)) + 1)
     amplitudes = block_amplitudes(x, starts, n, window, is_rms)[:, : len(k)]
-    middle = times[np.minimum(starts + n // 2, n_points - 1)]  # of the angle, where the window is
+    middle = times[np.minimum(starts + n // 2, n_points - 1)]  # middle in angle, where the window is largest
     speeds = quintic_table(t, angle).at(middle, 1)
     c = window_corrections(window, n)
     return SpectralMap(
@@ -149,7 +149,7 @@ def order_map(
 
 
 def fastest_part(speed: Array, limit: float, where: str) -> tuple[int, int]:
-    """Return the first and last place of the longest part of the record that is faster than a limit."""
+    """Return the first and last index of the longest part of the record that is faster than a limit."""
     fast = speed > max(limit, 0.0)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], fast, [False]]).astype(np.int8)))
     if not len(edges):
@@ -164,7 +164,7 @@ def fastest_part(speed: Array, limit: float, where: str) -> tuple[int, int]:
 
 
 def times_of_angles(t: Array, angle: Array, theta: Array) -> Array:
-    """Return the times where a rising angle has given values, by Newton's method on its quintic spline."""
+    """Return the times at which an increasing angle has given values, by Newton's method on its quintic spline."""
     curve = quintic_table(t, angle)
     times = np.interp(theta, angle, t)
     before_end = np.nextafter(t[-1], -np.inf)
@@ -184,7 +184,7 @@ def block_amplitudes(x: Array, starts: IntArray, n: int, window: str, is_rms: bo
 
 
 def order_cut(orders: SpectralMap, order: float, half_width: float | None = None) -> Array:
-    """Return the amplitude of one order over the blocks, (n_b,): the root of the power around it.
+    """Return the amplitude of one order over the blocks, (n_b,), from the power near the order.
 
     Lines within half_width, by default two of the resolution (the main lobe of hann), are added in power and divided
     by the noise bandwidth of the window.

@@ -100,7 +100,7 @@ def read_signals(
 def times_of(
     path: Path, table: RawTable, time: str | None, rate: float | None, *, takes_first: bool
 ) -> tuple[Array, int | None, list[str]]:
-    """Return the times of a table [s], the column they are in, and notes."""
+    """Return the times of a table [s], the index of their column, and notes."""
     if rate is not None:
         return np.arange(len(table.values)) / rate, None, []
     if time is not None:
@@ -132,5 +132,5 @@ def times_of(
 
 
 def is_time(name: str) -> bool:
-    """Whether a variable is called after the time."""
+    """Return whether the name of a variable denotes time."""
     return name.rpartition(".")[2].lower() in ("t", "time", "times", "zeit")

@@ -1,4 +1,4 @@
-"""Resampling and filtering of signals, with what they do to accelerations."""
+"""Resampling and filtering of signals, and their effect on accelerations."""
 
 from dataclasses import dataclass, replace
 
@@ -13,29 +13,30 @@ from floatframe.model.functions.tables import monotone_table, quintic_table
 
 __all__ = ["ResamplingReport", "accelerations", "filtered", "resampled"]
 
-STOP = 80.0  #: dB, by which the filter before a lower rate damps from the new Nyquist frequency on
-PASS = 0.8  #: of the new Nyquist frequency, up to where it lets pass
-ORDER = 4  #: of the Butterworth filters, which run forward and backward
+STOP = 80.0  #: attenuation of the anti-aliasing filter above the new Nyquist frequency [dB]
+PASS = 0.8  #: upper end of its pass band, relative to the new Nyquist frequency
+ORDER = 4  #: order of the Butterworth filters, which run forward and backward
 MOST_SAMPLES = 5e7
-ORDERS = {"length": 2, "angle": 2, "velocity": 1, "angular velocity": 1}  #: of the derivative that is an acceleration
+#: order of the derivative that is an acceleration
+ORDERS = {"length": 2, "angle": 2, "velocity": 1, "angular velocity": 1}
 
 
 @dataclass(frozen=True)
 class ResamplingReport:
-    """What resampling did to the acceleration of a signal (to the signal itself, where it is no motion)."""
+    """Effect of resampling on the acceleration of a signal, or on the signal itself if it is not a motion."""
 
-    of: str  #: "acceleration", or what the signal measures
-    rate_before: float  #: [Hz]; of uneven times the mean
+    of: str  #: "acceleration", or the quantity of the signal
+    rate_before: float  #: rate before [Hz]; for unequal times, the mean rate
     rate_after: float
-    peak_before: float  #: largest size at the samples [unit of the signal, its second or first rate]
+    peak_before: float  #: largest magnitude at the samples [unit of the signal, or of its first or second rate]
     peak_after: float
     rms_before: float
     rms_after: float
-    above_nyquist: float  #: part of the mean square, without the mean, above half the new rate
+    above_nyquist: float  #: fraction of the mean square (without the mean) above half the new rate
 
     @property
     def description(self) -> str:
-        """One line."""
+        """One line of text."""
         change = [100 * (b - a) / a if a else 0.0 for a, b in ((self.peak_before, self.peak_after),
                                                                 (self.rms_before, self.rms_after))]  # fmt: skip
         return (
@@ -46,7 +47,7 @@ class ResamplingReport:
 
 
 def accelerations(signal: Signal) -> tuple[Array, str]:
-    """Return the acceleration of a motion at its samples, and its name; what is no motion stays as it is.
+    """Return the acceleration of a motion at its samples, and its name; other signals are unchanged.
 
     Positions, angles and velocities are differentiated along a quintic spline.
     """
@@ -57,12 +58,12 @@ def accelerations(signal: Signal) -> tuple[Array, str]:
         return np.array(signal.values), quantity
     curve = quintic_table(signal.time, signal.values)
     times = np.array(signal.time)
-    times[-1] = np.nextafter(times[-1], -np.inf)  # before the tangent it goes on along
+    times[-1] = np.nextafter(times[-1], -np.inf)  # before the end, beyond which the spline continues as a tangent
     return curve.at(times, order), "acceleration"
 
 
 def resampled(signal: Signal, rate: float, *, anti_alias: bool = True) -> tuple[Signal, ResamplingReport]:
-    """Return a signal at another rate, and what that does to its acceleration.
+    """Return a signal at another rate, and the effect on its acceleration.
 
     1. Uneven times are first brought to even ones, at their mean rate or the new one if that is higher, along the
        monotone cubic.
@@ -120,7 +121,7 @@ def resampled(signal: Signal, rate: float, *, anti_alias: bool = True) -> tuple[
 
 
 def low_passed(values: Array, old: float, new: float) -> Array:
-    """Return samples without what lies above half a new rate: a symmetric filter, odd about both ends."""
+    """Return samples without frequencies above half a new rate, by a symmetric filter, odd about both ends."""
     from scipy.signal import fftconvolve, firwin, kaiserord
 
     n_taps, beta = kaiserord(STOP, (1 - PASS) * new / old)
@@ -137,7 +138,7 @@ def low_passed(values: Array, old: float, new: float) -> Array:
 
 
 def compared(before: Signal, after: Signal, rate: float) -> ResamplingReport:
-    """Return what became of the acceleration."""
+    """Return the change of the acceleration."""
     a, what = accelerations(before)
     b, _ = accelerations(after)
     old = (len(before.time) - 1) / float(before.time[-1] - before.time[0])
@@ -155,7 +156,7 @@ def compared(before: Signal, after: Signal, rate: float) -> ResamplingReport:
 
 
 def filtered(signal: Signal, *, low_pass: float | None = None, high_pass: float | None = None) -> Signal:
-    """Return a signal without what lies above `low_pass` or below `high_pass` [Hz], without shift of phase.
+    """Return a signal without frequencies above `low_pass` or below `high_pass` [Hz], without phase shift.
 
     Butterworth filters of order 4, forward and backward: half the amplitude at the corner.
 

@@ -1,4 +1,4 @@
-"""Signals in RPC III, the format of road simulators (.rsp, .drv, .tim): read, and written for rigs.
+"""Signals in RPC III, the format of road simulators (.rsp, .drv, .tim): reading and writing.
 
 A file is made of blocks of 512 bytes. The head has NUM_HEADER_BLOCKS of them, each of four parameters: a key of 32
 bytes and a value of 96 bytes, both text filled with zeros; FORMAT, NUM_HEADER_BLOCKS and NUM_PARAMS come first. The
@@ -24,15 +24,15 @@ __all__ = ["read_rpc", "write_rpc"]
 
 BLOCK, KEY, VALUE = 512, 32, 96  #: bytes
 RECORD = KEY + VALUE
-FULL_SCALE = 32768  #: of a short integer, by which INT_FULL_SCALE is divided
+FULL_SCALE = 32768  #: full scale of a short integer, by which INT_FULL_SCALE is divided
 MOST_PARAMETERS, MOST_CHANNELS = 100000, 10000
 ORDERS = {"BINARY": "<", "BINARY_IEEE_LITTLE_END": "<", "BINARY_IEEE_BIG_END": ">"}
 TYPES = {"SHORT_INTEGER": "i2", "FLOATING_POINT": "f4"}
-PER_FRAME = 1024  #: samples of a frame in files that are written, a group each
+PER_FRAME = 1024  #: samples per frame in written files, with one frame per group
 
 
 def read_rpc(path: str | os.PathLike[str]) -> Signals:
-    """Read an RPC III file; its units stand as the file states them.
+    """Read an RPC III file, with the units as given in the file.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def read_rpc(path: str | os.PathLike[str]) -> Signals:
 
 
 def read_head(path: Path, file: Any, size: int) -> dict[str, str]:
-    """Return the parameters of the head by their keys."""
+    """Return the parameters of the head by key."""
     first = [parameter(file.read(RECORD)) for _ in range(3)]
     if [key for key, _ in first] != ["FORMAT", "NUM_HEADER_BLOCKS", "NUM_PARAMS"]:
         raise SignalError(
@@ -123,7 +123,7 @@ def read_head(path: Path, file: Any, size: int) -> dict[str, str]:
 
 
 def parameter(record: bytes) -> tuple[str, str]:
-    """Return key and value of a parameter; what follows the first zero is not text."""
+    """Return key and value of a parameter; bytes after the first zero are ignored."""
     key, value = (part.split(b"\0")[0].decode("cp1252", "replace").strip() for part in (record[:KEY], record[KEY:]))
     return key, value
 
@@ -168,7 +168,7 @@ def real(path: Path, head: Mapping[str, str], key: str) -> float:
 
 
 def scales_of(path: Path, head: Mapping[str, str], n_channels: int, kind: str) -> tuple[Array, list[str]]:
-    """Return by what the numbers of each channel are multiplied, and notes."""
+    """Return the factors on the numbers of each channel, and notes."""
     if kind == "f4":
         return np.ones(n_channels), []
     scale = np.array([real(path, head, f"SCALE.CHAN_{k}") for k in range(1, n_channels + 1)])
@@ -180,7 +180,7 @@ def scales_of(path: Path, head: Mapping[str, str], n_channels: int, kind: str) -
 
 
 def constant_tail(values: Array, per_frame: int) -> int:
-    """Return how many samples at the end, within the last frame, repeat the last one in all channels; 0 for few."""
+    """Return the number of final samples within the last frame, that repeat the last one in all channels, 0 for few."""
     last = values[-per_frame:]
     changes = np.flatnonzero((last != last[-1]).any(axis=1))
     n = len(last) - (int(changes[-1]) + 1 if len(changes) else 0)
@@ -222,7 +222,7 @@ def write_rpc(
     if (largest > np.finfo(np.float32).max).any():
         raise SignalError(f"{path}: numbers up to {largest.max():.3g} do not fit single precision")
     scale = np.where(largest > 0, largest / (FULL_SCALE - 1), 1.0) if integers else np.ones(n_channels)
-    scale = np.array([float(f"{s:.9E}") for s in scale])  # as it stands in the file
+    scale = np.array([float(f"{s:.9E}") for s in scale])  # as written in the file
     numbers = np.clip(np.rint(padded / scale), 1 - FULL_SCALE, FULL_SCALE - 1) if integers else padded
     parameters: list[tuple[str, str]] = [
         ("FILE_TYPE", "TIME_HISTORY"), ("TIME_TYPE", time_type), ("DELTA_T", f"{step:.12E}"),

@@ -1,4 +1,4 @@
-"""Units of signals as files write them ("m/s^2", "g", "kN", "deg", "rpm"), and the factor from one to another.
+"""Units of signals in files ("m/s^2", "g", "kN", "deg", "rpm"), and the factors between them.
 
 "g" is the standard gravity, 9.80665 m/s², alone and beside times, frequencies and volts (g²/Hz, mV/g); beside others
 it could be the gram, and is not understood. kg is a word of its own.
@@ -15,10 +15,10 @@ from floatframe.errors import SignalError
 __all__ = ["STANDARD_GRAVITY", "SignalUnit", "parsed_unit", "per_hertz", "signal_unit", "system_factor", "unit_factor"]
 
 STANDARD_GRAVITY = 9.80665  #: m/s²
-LONGEST = 40  #: characters of a unit
+LONGEST = 40  #: largest number of characters of a unit
 DEEPEST = 9  #: largest exponent
 
-Exponents = tuple[int, int, int, int, int]  #: of length, mass, time, angle, voltage
+Exponents = tuple[int, int, int, int, int]  #: exponents of length, mass, time, angle, voltage
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class SignalUnit:
 
     @property
     def quantity(self) -> str:
-        """What it measures: "length", "acceleration", "angle", "force", ...; "other" if it has no name here."""
+        """The measured quantity: "length", "acceleration", "angle", "force", ...; "other" if it has no name here."""
         return QUANTITIES.get(self.exponents, "other")
 
 
@@ -62,7 +62,7 @@ QUANTITIES: dict[Exponents, str] = {
 
 
 def base(factor: float, length: int = 0, mass: int = 0, time: int = 0, angle: int = 0, voltage: int = 0) -> SignalUnit:
-    """Return a unit by its exponents."""
+    """Return a unit from its exponents."""
     return SignalUnit(factor, (length, mass, time, angle, voltage))
 
 
@@ -94,12 +94,13 @@ WITH_PREFIX = {
 GRAVITY = {"g", "G", "gn", "g_n"}
 BESIDE_GRAVITY = {"s", "ms", "sec", "min", "Hz", "kHz", "V", "mV"}
 PREFIXES = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "m": 1e-3, "c": 1e-2, "d": 1e-1, "k": 1e3, "M": 1e6, "G": 1e9}
-TOKEN = re.compile(r"\s*(\^?[+-]?\d+|[()/*·.]|\^|[^\W\d]+|[%°\"-])")  # a word holds letters (and _), no digit
+# a word consists of letters (and _) without digits
+TOKEN = re.compile(r"\s*(\^?[+-]?\d+|[()/*·.]|\^|[^\W\d]+|[%°\"-])")
 SUPERSCRIPTS = str.maketrans({"²": "^2", "³": "^3", "⁴": "^4", "⁻": "^-", "μ": "µ"})
 
 
 def parsed_unit(text: str) -> SignalUnit | None:
-    """Return the unit of a text, None if it is not understood."""
+    """Return the unit of a text; None if it is unknown."""
     text = text.strip().strip("[]").strip()
     if text in PLAIN:
         return PLAIN[text]
@@ -122,7 +123,7 @@ def parsed_unit(text: str) -> SignalUnit | None:
 
 
 def product(tokens: list[str]) -> tuple[SignalUnit, list[str]]:
-    """Return a product of units up to a closing bracket or the end, and the tokens that are left."""
+    """Return a product of units up to a closing bracket or the end, and the remaining tokens."""
     unit, is_below = base(1.0), False
     while tokens and tokens[0] != ")":
         if tokens[0] in ("*", "·", "."):
@@ -178,7 +179,7 @@ def signal_unit(text: str, where: str) -> SignalUnit:
 
 
 def unit_factor(unit: str, wanted: str, where: str = "unit") -> float:
-    """Return by what numbers in a unit are multiplied to be in another one: 9.80665 from "g" to "m/s^2".
+    """Return the factor from numbers in a unit to numbers in another one: 9.80665 from "g" to "m/s^2".
 
     Raises
     ------
@@ -195,13 +196,13 @@ def unit_factor(unit: str, wanted: str, where: str = "unit") -> float:
 
 
 def system_factor(unit: str, units: Units, where: str = "unit") -> float:
-    """Return by what numbers in a unit are multiplied to be in a unit system (angles in rad)."""
+    """Return the factor from numbers in a unit to a unit system (angles in rad)."""
     found = signal_unit(unit, where)
     length, mass, time, _, _ = found.exponents
     return found.factor / units.to_si(length=length, mass=mass, time=time)
 
 
 def per_hertz(unit: str) -> str:
-    """Return the unit of a spectral density: "(m/s²)²/Hz" of "m/s²"."""
+    """Return the unit of a spectral density: "(m/s²)²/Hz" for "m/s²"."""
     is_word = re.fullmatch(r"[^\W\d]*", unit) is not None
     return f"{unit}²/Hz" if unit and is_word else "1/Hz" if unit in ("", "-", "1") else f"({unit})²/Hz"

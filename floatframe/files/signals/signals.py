@@ -1,4 +1,4 @@
-"""Signals: channels over common times, as they were measured, each with its name and the unit its file states."""
+"""Signals: measured channels over common times, each with its name and the unit given in the file."""
 
 from dataclasses import dataclass, replace
 
@@ -12,11 +12,11 @@ from floatframe.files.signals.signal_units import unit_factor
 
 __all__ = ["Signal", "Signals", "equidistant_step"]
 
-EVEN = 1e-3  #: of the step by which times may differ from equidistant ones (rounded times of a file)
+EVEN = 1e-3  #: largest deviation of times from equidistant ones, relative to the step (rounded times of a file)
 
 
 def equidistant_step(time: Array) -> float | None:
-    """Return the step of times that are equidistant but for rounding (1e-3 of it), None of others."""
+    """Return the step of equidistant times (within 1e-3 of the step); None for other times."""
     if len(time) < 2:
         return None
     step = float(time[-1] - time[0]) / (len(time) - 1)
@@ -32,8 +32,8 @@ class Signal:
     name: str
     time: Array  #: (n_t,) [s]
     values: Array  #: (n_t,) in `unit`
-    unit: str  #: "" where the file states none
-    notes: tuple[str, ...] = ()  #: what was done with it since it was measured
+    unit: str  #: unit, "" if the file gives none
+    notes: tuple[str, ...] = ()  #: processing since the measurement
 
     def __post_init__(self) -> None:
         time, values = np.array(self.time, dtype=float), np.array(self.values, dtype=float)
@@ -50,12 +50,12 @@ class Signal:
 
     @property
     def step(self) -> float | None:
-        """Step of its times [s], None where they are not equidistant."""
+        """Step of the times [s]; None if they are not equidistant."""
         return equidistant_step(self.time)
 
     @property
     def rate(self) -> float:
-        """Samples a second [Hz]; `SignalError` where its times are not equidistant."""
+        """Samples per second [Hz]; `SignalError` if the times are not equidistant."""
         step = self.step
         if step is None:
             dt = np.diff(self.time)
@@ -66,7 +66,7 @@ class Signal:
         return 1.0 / step
 
     def to(self, unit: str) -> "Signal":
-        """Return it in another unit; `SignalError` if its unit is not understood or measures something else."""
+        """Return the signal in another unit; `SignalError` if its unit is unknown or measures another quantity."""
         factor = unit_factor(self.unit, unit, f"signal {self.name!r}")
         return replace(self, values=self.values * factor, unit=unit)
 
@@ -79,9 +79,9 @@ class Signals:
     time: Array  #: (n_t,) [s]
     values: Array  #: (n_t, n_channels), each column in its unit
     names: tuple[str, ...]
-    units: tuple[str, ...]  #: as the file states them, "" where it states none
-    source: str = ""  #: the file
-    notes: tuple[str, ...] = ()  #: what was found and done on reading
+    units: tuple[str, ...]  #: units in the file, "" if it gives none
+    source: str = ""  #: path of the file
+    notes: tuple[str, ...] = ()  #: findings and processing at reading
 
     def __post_init__(self) -> None:
         time, values = np.array(self.time, dtype=float), np.array(self.values, dtype=float)

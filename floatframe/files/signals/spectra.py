@@ -32,8 +32,8 @@ WINDOWS = {
     "rectangular": "boxcar",
 }  #: by their names in scipy.signal
 DETRENDS = ("constant", "linear", "none")
-AVERAGES = 8  #: segments of a density unless a length is given
-LEAST_SAMPLES = 8  #: of a segment
+AVERAGES = 8  #: number of segments of a density, unless a length is given
+LEAST_SAMPLES = 8  #: smallest number of samples of a segment
 
 
 @frozen_copies
@@ -42,15 +42,15 @@ class Spectrum:
     """Values over frequencies."""
 
     kind: str  #: "power spectral density", "amplitude (peak)", "amplitude (rms)", "octave (rms)", ...
-    name: str  #: of the signal
+    name: str  #: name of the signal
     frequencies: Array  #: (n_f,) [Hz]; midband frequencies of bands
     values: Array  #: (n_f,) in `unit`
     unit: str
     signal_unit: str
-    resolution: float  #: distance of lines [Hz]
-    n_averages: int  #: segments
+    resolution: float  #: spacing of lines [Hz]
+    n_averages: int  #: number of segments
     notes: tuple[str, ...] = ()
-    edges: Array | None = None  #: of bands, (n_f, 2) [Hz]
+    edges: Array | None = None  #: edges of bands, (n_f, 2) [Hz]
 
     def __post_init__(self) -> None:
         for key in ("frequencies", "values") + (() if self.edges is None else ("edges",)):
@@ -59,7 +59,7 @@ class Spectrum:
 
     @property
     def mean_square(self) -> float:
-        """Mean square of the signal without its mean: of a density its integral, of bands the sum of their squares."""
+        """Mean square of the signal without its mean: the integral of a density, or the sum of squares of bands."""
         if self.edges is not None:
             return float(np.sum(self.values**2))
         if self.kind != "power spectral density":
@@ -69,11 +69,11 @@ class Spectrum:
 
 @dataclass(frozen=True)
 class WindowCorrections:
-    """What a window does to lines and to noise."""
+    """The effect of a window on lines and on noise."""
 
-    coherent_gain: float  #: by which it scales a line, and is divided
-    noise_bandwidth: float  #: in lines
-    scalloping: float  #: lowest part of a line half way between two of the resolution that is seen
+    coherent_gain: float  #: factor of the window on a line, which is divided out
+    noise_bandwidth: float  #: noise bandwidth in lines
+    scalloping: float  #: smallest fraction shown of a line half-way between two lines of the resolution
 
 
 def window_samples(window: str, n: int) -> Array:
@@ -93,12 +93,12 @@ def window_corrections(window: str, n: int = 1024) -> WindowCorrections:
 
 
 def segment_length(n_t: int, n_segment: int | None, overlap: float, averages: int, where: str) -> int:
-    """Return how many samples a segment has: as asked for, or so that about so many segments fit into the record."""
+    """Return the number of samples of a segment: as requested, or for a number of segments in the record."""
     if not 0 <= overlap < 1:
         raise SignalError(f"{where}: overlap = {overlap:g}: expected a number of 0 up to 1, that not included")
     n = n_segment if n_segment is not None else int(n_t / (1 + (averages - 1) * (1 - overlap)))
     while n_segment is None and n > LEAST_SAMPLES and number_of_segments(n_t, n, overlap) < averages:
-        n -= 1  # an odd one overlaps by half a sample less
+        n -= 1  # an odd segment overlaps by half a sample less
     if not LEAST_SAMPLES <= n <= n_t:
         raise SignalError(
             f"{where}: a segment of {n} samples: expected {LEAST_SAMPLES} up to the {n_t} samples of the record; take "
@@ -120,7 +120,7 @@ def checked_samples(values: Array, rate: float, detrend: str, where: str) -> Arr
 
 
 def squared(values: Array, rate: float, where: str, **options: Any) -> tuple[Array, Array]:
-    """Return frequencies and lines of Welch's method; `SignalError` where squares of the samples overflow."""
+    """Return frequencies and lines by Welch's method; `SignalError` if squares of the samples overflow."""
     from scipy.signal import welch
 
     with np.errstate(over="ignore", invalid="ignore"):
@@ -216,7 +216,7 @@ def amplitude_spectrum(
         detrend=False if detrend == "none" else detrend, scaling="spectrum",
     )  # fmt: skip
     rms = np.sqrt(P)
-    is_paired = np.ones(len(f), dtype=bool)  # with its line of negative frequency
+    is_paired = np.ones(len(f), dtype=bool)  # paired with its line of negative frequency
     is_paired[0] = False
     if n % 2 == 0:
         is_paired[-1] = False
@@ -228,5 +228,5 @@ def amplitude_spectrum(
 
 
 def number_of_segments(n_t: int, n: int, overlap: float) -> int:
-    """Return how many segments of n samples fit into a record."""
+    """Return the number of segments of n samples in a record."""
     return 1 + (n_t - n) // max(n - int(overlap * n), 1)
