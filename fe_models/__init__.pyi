@@ -83,8 +83,8 @@ from .foundation.units import Units as Units
 from .foundation.units import unit_system as unit_system
 from .meshes.boundary import boundary_facets as boundary_facets
 from .meshes.boundary import boundary_triangles as boundary_triangles
-from .meshes.divided_lines import divide_lines as divide_lines
 from .meshes.line_mesh import LineMesh as LineMesh
+from .meshes.line_mesh import divide_lines as divide_lines
 from .meshes.line_mesh import straight_line as straight_line
 from .meshes.mesh import Mesh as Mesh
 from .meshes.node_cloud import NodeCloud as NodeCloud

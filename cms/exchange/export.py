@@ -12,10 +12,9 @@ from cms.body.reduced_body import ReducedBody
 from cms.errors import CmsError, ExportError
 from cms.exchange.exporters.formats import FORMATS
 from cms.exchange.exporters.writer import Request, Writer, left_out
-from cms.exchange.programs.abaqus import make_abaqus
 from cms.exchange.programs.ext_ptfm import make_ext_ptfm
 from cms.exchange.programs.exudyn import make_exudyn
-from cms.exchange.programs.matrices import make_mat5, make_mat73, make_matrix_market, make_simscape
+from cms.exchange.programs.matrices import make_abaqus, make_mat5, make_mat73, make_matrix_market, make_simscape
 from cms.exchange.programs.mbdyn import make_mbdyn
 from cms.exchange.programs.mbsim import make_mbsim
 from cms.exchange.programs.nastran import make_dmig, make_op4

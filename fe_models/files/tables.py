@@ -9,8 +9,7 @@ import numpy as np
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.words import nearest, quoted
-from fe_models.meshes.divided_lines import divide_lines
-from fe_models.meshes.line_mesh import LineMesh
+from fe_models.meshes.line_mesh import LineMesh, divide_lines
 
 __all__ = ["read_tables"]
 

@@ -2,11 +2,10 @@
 
 from fe_models.errors import MeshingError
 from fe_models.parts.bracket import Bracket, mesh_bracket
-from fe_models.parts.connecting_rod import SLENDER_ROD, ConnectingRod, mesh_connecting_rod
+from fe_models.parts.connecting_rod import SHIPPED_MESHES, SLENDER_ROD, ConnectingRod, mesh_connecting_rod, shipped_mesh
 from fe_models.parts.engine_body import EngineBody, engine_body_mesh, mesh_deck
 from fe_models.parts.errors import PartError
 from fe_models.parts.gmsh_session import PartMesh
-from fe_models.parts.shipped import SHIPPED_MESHES, shipped_mesh
 
 __all__ = [
     "SHIPPED_MESHES",

@@ -1,6 +1,7 @@
 """A parametric connecting rod: two bored ends, a tapered I-shaped shank with filleted roots, bolt bosses."""
 
 from dataclasses import dataclass
+from importlib.resources import files
 from math import atan2, cos, hypot, sin, sqrt
 from pathlib import Path
 from types import ModuleType
@@ -11,7 +12,35 @@ from fe_models.parts.errors import PartError
 from fe_models.parts.gmsh_session import PartMesh, cylinder_faces, mesh_and_write, part_model
 from fe_models.parts.lengths import require, require_lengths
 
-__all__ = ["SLENDER_ROD", "ConnectingRod", "mesh_connecting_rod"]
+__all__ = ["SHIPPED_MESHES", "SLENDER_ROD", "ConnectingRod", "mesh_connecting_rod", "shipped_mesh"]
+
+
+# meshes that are part of the package ----------------------------------------------------------------------------------
+
+
+#: file of each mesh, in mm: `ConnectingRod` with default dimensions, and `SLENDER_ROD` in elements of 7 mm
+SHIPPED_MESHES = {"connecting_rod": "connecting_rod.msh", "slender_rod": "slender_rod.msh"}
+
+
+def shipped_mesh(name: str) -> Path:
+    """Return the path of a mesh of the package, such as "connecting_rod" (tet10, mm, groups of its mesher).
+
+    Raises
+    ------
+    PartError
+        If there is no such mesh, or the package was installed without unpacked files.
+    """
+    if name not in SHIPPED_MESHES:
+        raise PartError(f"shipped_mesh: no mesh {name!r}; choices: {', '.join(SHIPPED_MESHES)}")
+    resource = files("fe_models.parts") / "data" / SHIPPED_MESHES[name]
+    path = Path(str(resource))
+    if not path.is_file():
+        raise PartError(f"shipped_mesh: {path} is missing; install the package unpacked, with pip")
+    return path
+
+
+# connecting rod -------------------------------------------------------------------------------------------------------
+
 
 Point = tuple[float, float]
 

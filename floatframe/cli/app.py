@@ -12,7 +12,6 @@ import floatframe.cli.durability as durability
 import floatframe.cli.exchange as exchange
 import floatframe.cli.fits as fits
 import floatframe.cli.linear as linear
-import floatframe.cli.machine as machine
 import floatframe.cli.prepare as prepare
 import floatframe.cli.spectra as spectra
 import floatframe.cli.studies as studies
@@ -526,8 +525,8 @@ durability.register_shake(app)
 studies.register_gradient(app)
 durability.register_fatigue(app)
 exchange.register_fmu(app)
-machine.register(app)
-prepare.register(app)
+prepare.register_machine(app)
+prepare.register_prepare(app)
 exchange.register_robot(app)
 exchange.register_generate(app)
 view.register(app)

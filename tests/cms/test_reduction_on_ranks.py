@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import cms
 from cms.modes.families.families import Families
 from cms.modes.families.flexibility import BoundaryConditions
-from cms.modes.mode_sets.craig_bampton import craig_bampton, craig_bampton_ir
+from cms.modes.mode_sets.classical import craig_bampton, craig_bampton_ir
 from cms.modes.mode_sets.free_interface import rubin
 from cms.reduction.reduction import reduce
 from fe_models.body.couplings.coupling_on_ranks import spread_body

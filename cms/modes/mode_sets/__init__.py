@@ -4,12 +4,17 @@ from collections.abc import Callable
 
 from cms.modes.mode_set import ModeSet
 from cms.modes.mode_sets.assumed import assumed_modes
-from cms.modes.mode_sets.attachment import attachment, unrestrained_attachment
 from cms.modes.mode_sets.balanced import balanced_truncation
-from cms.modes.mode_sets.craig_bampton import craig_bampton, craig_bampton_ir, guyan
+from cms.modes.mode_sets.classical import (
+    attachment,
+    benfield_hruda,
+    craig_bampton,
+    craig_bampton_ir,
+    guyan,
+    unrestrained_attachment,
+)
 from cms.modes.mode_sets.free_interface import craig_chang, dual_craig_bampton, herting, macneal, normal_modes, rubin
 from cms.modes.mode_sets.krylov import krylov
-from cms.modes.mode_sets.loaded_interface import benfield_hruda
 from cms.modes.mode_sets.multilevel import multilevel
 from cms.modes.mode_sets.user_basis import user_basis
 

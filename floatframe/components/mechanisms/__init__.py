@@ -21,8 +21,13 @@ from floatframe.components.mechanisms.linkages import (
     slider_crank,
     telescopic_slider_crank,
 )
-from floatframe.components.mechanisms.satellite import satellite
-from floatframe.components.mechanisms.spinning import rotating_blade, spin_up_beam, spinning_shaft, spinning_top
+from floatframe.components.mechanisms.spinning import (
+    rotating_blade,
+    satellite,
+    spin_up_beam,
+    spinning_shaft,
+    spinning_top,
+)
 
 __all__ = [
     "andrews_mechanism",

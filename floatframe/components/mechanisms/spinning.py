@@ -8,7 +8,8 @@ from typing import Literal
 import numpy as np
 
 from cms.body.reduced_body import ReducedBody
-from floatframe.components.mechanisms.rods import between
+from fe_models.foundation.units import Units, unit_system
+from floatframe.components.mechanisms.rods import Rod, between, turning
 from floatframe.errors import ModelError
 from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.bodies.ground import GROUND
@@ -18,9 +19,59 @@ from floatframe.model.forces import Gravity
 from floatframe.model.functions.time_functions import TimeFunction, cycloidal_spin_up
 from floatframe.model.joints import FixedJoint, Joint, PointOnLine, RevoluteJoint, SphericalJoint
 from floatframe.model.rotations import euler_parameters_of_rotation_vector
+from floatframe.model.shapes import Shape, Sphere
 from floatframe.model.system import System
 
-__all__ = ["rotating_blade", "spin_up_beam", "spinning_shaft", "spinning_top"]
+__all__ = ["rotating_blade", "satellite", "spin_up_beam", "spinning_shaft", "spinning_top"]
+
+
+# a satellite: a rigid hub in free flight with two booms ---------------------------------------------------------------
+
+
+def satellite(
+    *,
+    hub_mass: float = 100.0,
+    hub_radius: float = 0.5,
+    boom_length: float = 5.0,
+    boom_mass: float = 2.0,
+    spin: float = 0.0,
+    boom: ReducedBody | None = None,
+    ends: tuple[str, str] = ("start", "end"),
+    units: Units | None = None,
+) -> System:
+    """Return a spherical hub with two equal booms along +x and -x, fixed to its surface, all spinning about z.
+
+    Parameters
+    ----------
+    hub_mass, hub_radius
+        Mass and radius of the hub [kg, m].
+    boom_length, boom_mass
+        Mass and length of rigid booms [m, kg]; with `boom`, the length is the distance between its interfaces.
+    spin
+        Initial angular velocity about z of hub and undeformed booms [rad/s].
+    boom
+        A reduced body, of which both booms are instances.
+    ends
+        Interfaces of `boom` at the hub and at the tip.
+    units
+        Default: those of `boom`, or m-kg-s.
+    """
+    if boom is not None:
+        boom_length = float(np.linalg.norm(np.subtract(*(boom.interface(end).position for end in ends))))
+    ball = Shape(Sphere(hub_radius), color="gold")
+    bodies: list = [RigidBody("hub", hub_mass, 0.4 * hub_mass * hub_radius**2 * np.eye(3), shapes=[ball])]
+    joints = []
+    for name, sign in (("right", 1.0), ("left", -1.0)):
+        root = np.array([sign * hub_radius, 0.0, 0.0])
+        part = Rod(name, root, root + sign * np.array([boom_length, 0.0, 0.0]), boom_mass, boom, ends)
+        bodies.append(part.body)
+        joints.append(FixedJoint(f"{name} root", Marker("hub", position=root), part.start))
+    bodies = [turning(body, np.array([0.0, 0.0, spin])) for body in bodies]
+    units = units or (boom.units if boom is not None else unit_system("m-kg-s"))
+    return System(bodies, joints, [], units, "satellite")
+
+
+# spinning -------------------------------------------------------------------------------------------------------------
 
 
 # the heavy symmetric top with a fixed point ---------------------------------------------------------------------------

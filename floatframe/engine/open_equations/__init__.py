@@ -2,9 +2,8 @@
 
 from floatframe.engine.open_equations.body_equations import BodyEquations, body_equations
 from floatframe.engine.open_equations.configuration import Configurations
+from floatframe.engine.open_equations.integrators import radau, rattle
 from floatframe.engine.open_equations.layout import Component, Layout
-from floatframe.engine.open_equations.radau import radau
-from floatframe.engine.open_equations.rattle import rattle
 from floatframe.engine.open_equations.system_equations import Equations, Tangents, open_equations
 
 __all__ = [

@@ -1,10 +1,9 @@
 """Forces and loads; `FORCES` is the registry for the system file."""
 
 from floatframe.model.forces.bushing import Bushing
-from floatframe.model.forces.joint_force import JointForce
 from floatframe.model.forces.loads import BodyLoad, Gravity, PointForce
 from floatframe.model.forces.sphere_contact import SphereContact
-from floatframe.model.forces.spring_damper import SpringDamper
+from floatframe.model.forces.springs import JointForce, SpringDamper
 from floatframe.model.forces.user_force import UserForce
 
 __all__ = [

@@ -9,13 +9,12 @@ not affect the motion.
 
 from floatframe.model.shapes.drawn import Arrow, MarkerShapes, Stretched
 from floatframe.model.shapes.grounds import Plane, Road, Terrain, Track
-from floatframe.model.shapes.line import Line
 from floatframe.model.shapes.mesh import Mesh
 from floatframe.model.shapes.piece import Piece
 from floatframe.model.shapes.prisms import Box, Extrusion
 from floatframe.model.shapes.rounds import Cylinder, Revolution, Sphere
 from floatframe.model.shapes.shape import Geometry, Shape
-from floatframe.model.shapes.sweeps import Tube
+from floatframe.model.shapes.sweeps import Line, Tube
 from floatframe.model.shapes.wheels import RailWheel, Wheel
 
 __all__ = [

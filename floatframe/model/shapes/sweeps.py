@@ -11,7 +11,11 @@ from floatframe.model.checked_values import number
 from floatframe.model.shapes.grids import grid_triangles
 from floatframe.model.shapes.piece import Piece
 
-__all__ = ["Tube", "along", "points_3", "swept"]
+__all__ = ["Line", "Tube", "along", "points_3", "swept"]
+
+
+# sweeps ---------------------------------------------------------------------------------------------------------------
+
 
 AROUND = 16  #: number of nodes of the circle of a tube
 
@@ -91,3 +95,23 @@ def points_3(where: str, values: Any, least: int) -> Array:
         raise ModelError(f"{where}: points {k + 1} and {k + 2} are the same, {points[k].tolist()}; remove one")
     points.flags.writeable = False
     return points
+
+
+# a line of points: a cable, a wire, an outline ------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """Straight lines from point to point."""
+
+    points: Array  #: (n, 3) [m]
+    is_closed: bool = False  #: whether the last point is connected to the first
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", points_3("line: points", self.points, 2))
+
+    def pieces(self) -> tuple[Piece, ...]:
+        """Return its lines."""
+        n = len(self.points)
+        ends = np.stack([np.arange(n), np.arange(1, n + 1) % n], axis=1)
+        return (Piece(self.points, segments=ends if self.is_closed else ends[:-1]),)

@@ -1,4 +1,4 @@
-"""Forces along joint coordinates: springs, dampers, friction, motors; see `floatframe.model.forces.joint_force`."""
+"""Forces along joint coordinates: springs, dampers, friction, motors; see `floatframe.model.forces.springs`."""
 
 import math
 

@@ -10,8 +10,7 @@ from cms.linear_algebra import independent
 from cms.linear_algebra.independent import Products, gram_in_blocks, independent_basis
 from cms.linear_algebra.solvers import tall
 from cms.linear_algebra.solvers.sparse_product import SymmetricProduct
-from cms.modes.mode_sets.attachment import unrestrained_attachment
-from cms.modes.mode_sets.craig_bampton import craig_bampton
+from cms.modes.mode_sets.classical import craig_bampton, unrestrained_attachment
 from cms.reduction.basis import finishing
 from cms.reduction.basis.finishing import finish
 from cms.reduction.basis.frames import NodalFrame, TisserandFrame, frame_condition

@@ -1,25 +1,201 @@
-"""Craig-Bampton and related sets: constraint modes with fixed- or mixed-interface modes, and inertia relief."""
+"""The classical mode sets: Craig-Bampton and its variants, attachment sets, Benfield-Hruda."""
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 import scipy.linalg as la
 
-from cms.errors import BodyError
+from cms.errors import BodyError, ModeSetError
 from cms.linear_algebra.solvers.eigen import EigenResult
 from cms.linear_algebra.solvers.mode_count import ModeCount, mode_count
 from cms.modes.families.families import Families
 from cms.modes.families.flexibility import BoundaryConditions
+from cms.modes.families.interface_loads import InterfaceLoad, boundary_load
 from cms.modes.families.sharing import families_of
+from cms.modes.families.static_modes import boundary_groups, boundary_labels
 from cms.modes.mode_set import ModeSet
-from cms.modes.mode_sets.blocks import Block, constraint_block, inertia_relief_block, mode_set, vibration_block
+from cms.modes.mode_sets.blocks import (
+    Block,
+    boundary_block,
+    constraint_block,
+    inertia_relief_block,
+    mode_set,
+    rigid_block,
+    static_block,
+    vibration_block,
+)
 from cms.modes.mode_sets.selection import checked_modes, require_interfaces
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.components import MOTION_COMPONENTS
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["craig_bampton", "craig_bampton_ir", "free_directions", "guyan"]
+__all__ = [
+    "attachment",
+    "benfield_hruda",
+    "craig_bampton",
+    "craig_bampton_ir",
+    "free_directions",
+    "guyan",
+    "unrestrained_attachment",
+]
+
+
+# attachment sets: responses to unit interface forces, rigid-body modes and vibration modes ----------------------------
+
+
+def attachment(
+    body: FEBody | Families,
+    n_modes: int | ModeCount,
+) -> ModeSet:
+    """Attachment mode set: [Psi_R, Psi_A, modes with R held], where R are six statically determinate boundary dofs.
+
+    (1) Psi_A: a unit force on each excess boundary dof E, with the determinate dofs R held
+    (2) K phi = omega² M phi with the boundary conditions of Psi_A: R held and E free
+
+    Parameters
+    ----------
+    body
+        A coupled body with at least one interface, or its `Families`, which several sets can share.
+    n_modes
+        Number of modes with R held; 0 spans the constraint modes. A `ModeCount` gives a cutoff frequency instead, and
+        whether to prove that no mode was missed.
+
+    Raises
+    ------
+    ModeSetError
+        If no mode lies below the cutoff.
+    BodyError
+        If the body is held to the ground, or has no inertia in some rigid-body motion.
+    """
+    with families_of(body) as families:
+        body, wanted = families.body, mode_count(n_modes)
+        require_interfaces("attachment", body)
+        conditions = BoundaryConditions(np.eye(len(families.h))[:, families.free.e])
+        modes = checked_modes(
+            "attachment",
+            "determinate-interface",
+            lambda asked: families.elastic_modes(conditions, asked),
+            body,
+            wanted,
+        )
+        labels = np.array(boundary_labels(body, "attachment"), dtype=object)[families.free.e]
+        groups = np.array(boundary_groups(body, "attachment"), dtype=object)[families.free.e]
+        blocks = [
+            rigid_block(families),
+            static_block(families.Psi_A, labels.tolist(), groups.tolist()),
+            vibration_block("determinate-interface", modes),
+        ]
+        held = ", ".join(label.removeprefix("held ") for label in held_words(families))
+        return mode_set("attachment", families, blocks, modes=modes, wanted=wanted, options={"held": held})
+
+
+def unrestrained_attachment(
+    body: FEBody | Families,
+    n_modes: int | ModeCount,
+) -> ModeSet:
+    """Unrestrained attachment mode set: [Psi_R, Psi_U, free modes]; spans Rubin's set.
+
+    Psi_U is the response to a unit force on each boundary dof of the free body, in equilibrium with its rigid-body
+    acceleration. Parameters and errors are those of `attachment`, with the elastic modes of the free body.
+    """
+    with families_of(body) as families:
+        body, wanted = families.body, mode_count(n_modes)
+        require_interfaces("unrestrained_attachment", body)
+        modes = checked_modes(
+            "unrestrained_attachment",
+            "elastic free",
+            families.free_modes,
+            body,
+            wanted,
+        )
+        blocks = [
+            rigid_block(families),
+            boundary_block(body, families.Psi_U, "unrestrained attachment"),
+            vibration_block("free", modes),
+        ]
+        return mode_set("unrestrained-attachment", families, blocks, modes=modes, wanted=wanted)
+
+
+def held_words(families: Families) -> list[str]:
+    """Return the names of the determinate dofs."""
+    labels = families.held_labels("held")
+    return [label for dof, label in zip(families.h.tolist(), labels, strict=True) if dof in families.r]
+
+
+# Benfield-Hruda: constraint modes, and modes of the body with mass and stiffness of its neighbours --------------------
+
+
+def benfield_hruda(
+    body: FEBody | Families,
+    n_modes: int | ModeCount,
+    *,
+    loads: Sequence[InterfaceLoad] = (),
+) -> ModeSet:
+    """Benfield-Hruda mode set: [Psi_C, phi - Psi_C phi_B] with loaded-interface modes phi [1]_.
+
+    (1) (K + K_load) phi = omega² (M + M_load) phi, with mass and stiffness of the neighbours on the boundary
+    (2) phi - Psi_C phi_B has the same span together with Psi_C, and is well-conditioned
+
+    The modes of (1) are close to those of the assembled system, so few are needed. Rigid-body motions that the loads
+    leave free are in the span of Psi_C and are not counted.
+
+    Parameters
+    ----------
+    body
+        A coupled body with at least one interface, or its `Families`, which several sets can share.
+    n_modes
+        Number of elastic loaded-interface modes. A `ModeCount` gives a cutoff frequency instead, and whether to prove
+        that no mode was missed.
+    loads
+        Mass and stiffness at an interface (`point_load`, `InterfaceLoad`), or of neighbours across several interfaces
+        (`condensed_load`).
+
+    Raises
+    ------
+    ModeSetError
+        If there is no load, or no mode below the cutoff.
+    BodyError
+        If a load names an unknown interface or is not a mass or stiffness.
+
+    References
+    ----------
+    .. [1] Benfield & Hruda (1971), docs/bibliography.md; derived in docs/theory.md §2-3.
+    """
+    with families_of(body) as families:
+        body, wanted = families.body, mode_count(n_modes)
+        require_interfaces("benfield_hruda", body)
+        if not loads:
+            names = ", ".join(interface.name for interface in body.interfaces)
+            raise ModeSetError(
+                "benfield_hruda: expected loads, the mass or stiffness of the neighbours on at least one interface "
+                f"({names}), got none; take craig_bampton or rubin where they are not known"
+            )
+        K_b, M_b = boundary_load(body, loads)
+        rest = np.zeros((len(families.h) - len(body.b),) * 2)
+        conditions = BoundaryConditions(
+            np.eye(len(families.h)),
+            la.block_diag(K_b, rest) if K_b.any() else None,
+            la.block_diag(M_b, rest) if M_b.any() else None,
+        )
+        modes = checked_modes(
+            "benfield_hruda",
+            "loaded-interface",
+            lambda asked: families.elastic_modes(conditions, asked),
+            body,
+            wanted,
+        )
+        blocks = [
+            constraint_block(families),
+            vibration_block("loaded-interface", modes, families.without_boundary(modes.Phi)),
+        ]
+        loaded = ", ".join(dict.fromkeys(name for load in loads for name in load.interfaces))
+        return mode_set(
+            "benfield-hruda", families, blocks, modes=modes, wanted=wanted, options={"loaded interfaces": loaded}
+        )
+
+
+# craig bampton --------------------------------------------------------------------------------------------------------
 
 
 # mixed boundary -------------------------------------------------------------------------------------------------------
