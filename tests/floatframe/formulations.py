@@ -37,8 +37,6 @@ SPIN_UP = "bends by the exact beam to 0.5 % there, to 0.57 and 0.60 % here, with
 #: tests that do not hold in relative coordinates, with what is known of each: every one of them fails there, or it does
 #: not belong here
 EXCEPTIONS: dict[str, str] = {
-    "analyses/test_inverse_dynamics.py::test_inverse_command_tells_what_the_drives_give":
-        "a peak of a run is that of the drives to 0.1 % there, to 0.107 % here",
     "analyses/test_linear_sensors.py::test_inputs_act_as_forces_of_their_size_at_once_and_in_equilibrium[motor]": NEAR,
     "analyses/test_linear_sensors.py::test_inputs_act_as_forces_of_their_size_at_once_and_in_equilibrium[stiffness]":
         NEAR,
@@ -46,8 +44,6 @@ EXCEPTIONS: dict[str, str] = {
         "compares a moment that is exactly zero there, and 7e-12 here",
     "analyses/test_steady_motion.py::test_the_bicycle_weaves_and_capsizes_as_the_benchmark_says[5.0]": ZEROS,
     "analyses/test_steady_motion.py::test_the_bicycle_weaves_and_capsizes_as_the_benchmark_says[8.0]": ZEROS,
-    "model/bodies/test_mode_choice.py::test_recovery_rows_of_fewer_modes_are_those_of_a_motion_in_these_modes":
-        "compares bit for bit, and two of 36 numbers differ in the last digit",
     "engine/compiling/test_spinning_beams.py::test_spin_up_bends_and_shortens_as_the_exact_beam[tangent]": SPIN_UP,
     "engine/compiling/test_spinning_beams.py::test_spin_up_bends_and_shortens_as_the_exact_beam[mean axis]": SPIN_UP,
     "engine/compiling/test_spinning_beams.py::test_spin_up_of_a_body_of_solids": SPIN_UP,
