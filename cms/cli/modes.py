@@ -1,17 +1,18 @@
 """The commands `cms modes` and `cms view`: a description of the modes of a job, and pictures and films of modes."""
 
 import json
+import math
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
-from cms.assessment.quality.body_record import body_record
-from cms.body.reduced_body import ReducedBody
 from cms.cli.arguments import ModalFile
 from cms.cli.console import guarded, output_path, print_table, say, stages
-from cms.modes.mode_set import ModeSet
+
+if TYPE_CHECKING:
+    from cms.body.reduced_body import ReducedBody
+    from cms.modes.mode_set import ModeSet
 
 __all__ = ["list_modes", "mode_record", "view_command"]
 
@@ -90,8 +91,10 @@ def list_modes(path: Path, *, as_json: bool) -> None:
         print_modes(record)
 
 
-def mode_record(modes: ModeSet, reduced: ReducedBody) -> dict[str, Any]:
+def mode_record(modes: "ModeSet", reduced: "ReducedBody") -> dict[str, Any]:
     """Return the columns of a mode set and the modes of its reduced body, in plain types; frequencies in Hz."""
+    from cms.assessment.quality.body_record import body_record
+
     dropped = reduced.provenance.get("mode set redundant", "none").split("; ")
     reduced_record = body_record(reduced)
     return {
@@ -102,7 +105,7 @@ def mode_record(modes: ModeSet, reduced: ReducedBody) -> dict[str, Any]:
             {
                 "number": k + 1,
                 "label": label,
-                "frequency_hz": None if np.isnan(frequency) else float(frequency / reduced.units.time),
+                "frequency_hz": None if math.isnan(frequency) else float(frequency / reduced.units.time),
                 "dropped": label in dropped,
             }
             for k, (label, frequency) in enumerate(zip(modes.labels, modes.frequencies, strict=True))
