@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 import floatframe.simulation.integration as integration
 from floatframe import (
+    Bushing,
     ConvergenceError,
     EnergyMomentum,
     Event,
@@ -23,6 +24,7 @@ from floatframe import (
     PrismaticJoint,
     RevoluteJoint,
     RigidBody,
+    SphericalJoint,
     System,
     integrate,
     read_results,
@@ -290,6 +292,27 @@ def test_what_rounding_gives_far_from_the_origin_is_no_gain(far):
         rows.diagnostics[:, KINETIC] = 0.5 * speed**2
         watch.observe(oscillator(), rows, is_switched=False, is_last=speed > 2e-4)
     assert ("energy" not in watch.notes) == (far > 0.0)
+
+
+@pytest.mark.parametrize("h", [2e-5, 1e-3, 1e-2])
+@pytest.mark.parametrize(("place", "turn"), [((0, 0, 0), (0, 0, 0)), ((3, -40, 7), (0.3, -0.7, 0.5))])
+def test_a_system_at_rest_gains_no_energy(place, turn, h):
+    """Two bodies on a stiff bushing, joints away from their frames: all that moves is rounding, 1e-27 J at the origin."""
+    R, at = rotation_exp(np.array(turn)), np.array([0.37, 0.61, -0.83])
+    bodies = [
+        RigidBody(name, 1.0, np.eye(3), position=place, orientation=euler_parameters(R)) for name in ("upper", "lower")
+    ]
+
+    def ends(a, part):
+        point = part * at
+        near = Marker(a, position=place + R @ point if a == "ground" else point, triad=R if a == "ground" else np.eye(3))
+        return near, Marker("lower" if a == "upper" or part > 3 else "upper", position=point)
+
+    joints = [RevoluteJoint("hinge", *ends("ground", 1.0), axis=(1, 2, 3)), SphericalJoint("ball", *ends("upper", 2.7))]
+    system = System(bodies, joints, [Bushing("mount", *ends("ground", 3.1), 1e7 * np.eye(6))])
+    motion = integrate(system, GeneralizedAlpha(0.8), 400 * h, h)
+    assert 0.0 < motion.energies.kinetic.max() < 1e-20
+    assert not motion.validity
 
 
 def test_rotations_between_orientations_are_those_that_made_them():
