@@ -37,7 +37,7 @@ GAIN_LIMIT = 0.05  #: gain over the energy in motion above which a run reports i
 STOP_LIMIT = 0.5  #: gain above which a run stops
 LOSS_LIMIT = 0.1  #: loss over the energy in motion above which a run reports it
 STEADY = 0.05  #: relative change of the work of dampers between two intervals up to which their velocities are resolved
-WAITING, MOST_WAITING = 8, 400  #: rows wait for others, up to this part of those before and so many
+MOST_WAITING = 400  #: rows wait until they are as many as those before, and for so many at most
 ADVICE = {
     "energy": "take a shorter step, the scheme energy-momentum or relative coordinates",
     "damping": "take a step that resolves the fast vibrations, less numerical damping (rho_inf nearer to 1), or start "
@@ -79,7 +79,7 @@ class EnergyWatch:
         if len(rows.t):
             self.waiting.append(rows)
         n = sum(len(each.t) for each in self.waiting)
-        if n == 0 or (not (is_switched or is_last) and n < min(MOST_WAITING, self.n_seen // WAITING)):
+        if n == 0 or (not (is_switched or is_last) and n < min(MOST_WAITING, self.n_seen)):
             return notes
         rows, self.waiting = joined_rows(self.waiting), []
         return (*notes, *self.judge(system, rows, is_switched=is_switched, is_last=is_last))

@@ -9,7 +9,7 @@ For methods of second order, with steps of one size and with steps that an error
     and goes on instead: it differs by 3/4 of the error, and alone decides what is told
 (3) the companion goes along for `BESIDE` steps, over jumps of forces and with events of its own. In a run of more than
     `LONG` it begins after the first of them, without a start of its own, and ends where the error, drawn out to the end
-    of the run by its square, is far below the limit
+    of the run in proportion, is far below the limit
 (4) afterwards windows of `WINDOW` steps, farther and farther apart, are taken again in halves from the same memory, and
     the errors of the steps are summed; between two windows a step has the mean of theirs
 (5) errors of place are measured by the farthest way of a body from its start, rotations likewise, or by the way over
@@ -47,12 +47,13 @@ __all__ = ["FIRST_VERDICT", "WATCHES", "StepWatch"]
 WATCHES = ("stop", "tell", "off")
 BESIDE = 400  #: steps beside which a companion goes
 LONG = 1000  #: steps of a run above which it may do with less
-CALM_STEPS = 200  #: after so many steps a companion may stop, in runs of more than `LONG`
-CALM = 0.03  #: of the limit, below which the error drawn out to the end of the run is far below it
+CALM_STEPS = 64  #: after so many steps a companion may stop, in runs of more than `LONG`
+CALM = 0.05  #: of the limit, below which the error drawn out to the end of the run is far below it
 FIRST_CHECK = 4  #: steps before a companion is compared, and at least between two comparisons
 CHECKS = 8  #: and this part of the steps that it has gone
-FEW_CHECKS = 48  #: most steps between two comparisons in runs of more than `LONG`
+FEW_CHECKS = 128  #: most steps between two comparisons in runs of more than `LONG`
 WINDOW = 4  #: steps that are taken again in halves, an even number
+GROWTH = 4  #: steps between two windows over those between the two before
 FARTHEST = 16380  #: most steps between two windows
 FIRST_VERDICT = 20  #: steps before which a motion has gone too short a way to measure errors by
 STEP_LIMIT = 0.03  #: estimated error of the motion above which a run tells
@@ -265,7 +266,7 @@ class StepWatch:
         if is_over or is_calm or last % RESTART_STEPS == 0:
             self.leave(h)
         if is_over or is_calm:
-            self.is_calm, self.gap = True, max(last, WINDOW)
+            self.is_calm, self.gap = True, (GROWTH - 1) * max(last, WINDOW) if self.is_long else max(last, WINDOW)
             self.next = last + self.gap
         return note
 
@@ -301,7 +302,7 @@ class StepWatch:
         """Take the steps of the window that is open again, up to a memory; return a note that is new with them."""
         (start, before), (middle, half) = self.opened
         self.opened = []
-        self.gap = min(2 * self.gap + WINDOW, FARTHEST)
+        self.gap = min(GROWTH * self.gap, FARTHEST)
         self.next = last + self.gap
         other = Companion.begun(self.integrator, before, self.working(system), start, HALVES)
         for number, coarse in ((middle, half), (last, end)):
@@ -359,8 +360,8 @@ class StepWatch:
         return np.where(moves, np.linalg.norm(parts, axis=2), 0.0)
 
     def drawn_out(self, system: System, companion: Companion, last: int) -> float:
-        """Return the largest error after step `last`, drawn out to the end of the run by its square."""
-        return float(self.share(system, companion).max()) * (self.n_total / last) ** 2
+        """Return the largest error after step `last`, drawn out to the end of the run: errors of phase grow with time."""
+        return float(self.share(system, companion).max()) * self.n_total / last
 
     def judged(self, system: System, t: float, h: float) -> ValidityNote | None:
         """Return the note of the error so far if it is new."""
