@@ -14,8 +14,8 @@ Not counted in favour of a gain or a loss:
 - for gains, the work of dampers where it changes fast from step to step: the velocity in a damper that the steps do not
   resolve changes its sign from step to step, and the trapezoidal sum is then far above the energy that the scheme
   takes out;
-- rounding: positions have an error of `ROUNDING` times their distance from the origin. Rounding of forces in stiff springs
-  moves bodies by up to `REST` times the length of the system. Velocities have these errors over the step.
+- rounding: positions have an error of `ROUNDING` times their distance from the origin. Rounding of forces in stiff
+  springs moves bodies by up to `REST` times the length of the system. Velocities have these errors over the step.
 """
 
 from collections.abc import Mapping

@@ -419,7 +419,7 @@ class Run:
                     )  # fmt: skip
                     self.report(note)
                 else:
-                    self.steps.interrupt(self.h)
+                    self.steps.skip(self.h)
                 n_done += n_good
                 if self.watching != "off" and failure is None:
                     for words in laws.observe(carry, n_done, is_last=n_done == self.n_total or has_stopped):
