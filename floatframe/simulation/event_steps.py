@@ -1,8 +1,8 @@
-"""Steps with events: values watched after each of many steps, and the step refined to where one passes its level.
+"""Time steps with event location.
 
-Steps are taken by the compiled loop in blocks, and what is watched is measured for a whole block at once. Where
-something happens in a step it is found by steps of other sizes from the memory before that step, which the loop kept:
-nothing is taken twice, and a motion that events only record goes on as if there were none, bit for bit.
+The compiled loop takes a block of steps and keeps the memory after each. Then the watched values are computed for the
+whole block at once. If a value passes its level within a step, trial steps of other sizes from the memory before that
+step locate the event. No step of the run is repeated. Events that only record leave the motion unchanged, bit for bit.
 """
 
 import json
@@ -52,77 +52,77 @@ from floatframe.simulation.watched_values import direct_values
 
 __all__ = ["EventWatch"]
 
-BLOCK = 400  #: most steps between which what is watched is not measured; blocks end where a multiple of it does
-STANDS = 1e-9  #: change of what is watched in a step, relative to its level or 1, below which it is held or at rest
-SHORT = 1e-7  #: of a step: a rest after an event that is no step of its own, whose accelerations were rounding alone
-MOST_NUMBERS = 2**23  #: in the results of a block
-SHUT = 1e-6  #: of the length of the system, or rad: what a coupler may close that takes hold of a value
-MOST_MADE = 8  #: systems that are kept to switch to
-MOST_IN_A_STEP = 100  #: events in one step; more mean that events switch each other without end
+BLOCK = 400  #: most steps of a block; blocks end at multiples of this step number
+STANDS = 1e-9  #: change of a watched value in a step, over its level or 1, below which it is constant
+SHORT = 1e-7  #: part of a step that is extrapolated after an event: accelerations of such a step would be rounding
+MOST_NUMBERS = 2**23  #: most numbers in the results of a block
+SHUT = 1e-6  #: largest gap that a coupler closes when it engages, over the length of the system, or in rad
+MOST_MADE = 8  #: most switched systems that are cached
+MOST_IN_A_STEP = 100  #: most events in one step; with more, events switch each other without end
 
 
 class Ended(NamedTuple):
-    """What a step led to."""
+    """The end of a step."""
 
-    carry: Callable[[], Carry]  #: the memory after it
-    row: Rows | None  #: None: not written
-    values: Array  #: of the events, (n_events,)
+    carry: Callable[[], Carry]  #: returns the memory
+    row: Rows | None  #: results; None: not written
+    values: Array  #: watched values of the events, (n_events,)
 
 
 class Place(NamedTuple):
-    """A place in a step where event j happens."""
+    """The location of event j within a step."""
 
-    part: float  #: of the step
+    part: float  #: time from the start of the step over the step size
     j: int
     carry: Carry
     row: Rows
-    failure: Failure | None  #: of the step that leads there
+    failure: Failure | None  #: of the trial step to this location
 
 
 def same(carry: Carry) -> Carry:
-    """Return a memory that is known."""
+    """Return a memory: the carry of an `Ended` whose memory exists already."""
     return carry
 
 
 def past_rows(work: Work, n_steps: int, t0: float, h: float, first: int) -> Rows:
-    """Return times and angles after each of n_steps that were kept, without the other results."""
+    """Return rows with only the times and the kept angles after each of n_steps."""
     empty = Rows(*(np.zeros(0) for _ in Rows._fields))
     times: Array = t0 + h * np.arange(first + 1, first + n_steps + 1, dtype=float)
     return empty._replace(t=times, angle=work.past.angle[:n_steps])
 
 
 def one_of(rows: Rows, k: int) -> Rows:
-    """Return one of several rows of results."""
+    """Return row k of several rows of results."""
     return Rows(*(array[k : k + 1] for array in rows))
 
 
 @dataclass
 class EventWatch:
-    """The events of a run: what is watched, what is switched off, what stops hold, and what has happened."""
+    """The events of a run: watched values, switched parts, stops at their limits, and the events so far."""
 
-    full: System  #: with all forces
+    full: System  #: the system with all forces
     head: Head
-    system: System = field(init=False)  #: with some off
-    #: systems by what is off and what is held: a stop that is struck again and again needs no new ones
+    system: System = field(init=False)  #: the system as switched
+    #: cache of switched systems by what is off and what is held
     made: dict[tuple, System] = field(init=False, default_factory=dict)
-    events: tuple[Event, ...] = field(init=False)  #: those of the system, then those of its stops
-    off: frozenset[str] = field(init=False)  #: forces at zero, couplers not engaged, elements that do nothing
-    caught: dict[str, float] = field(default_factory=dict)  #: what couplers that have been engaged hold
-    resting: dict[str, str] = field(default_factory=dict)  #: side of the limits at which couplers hold
-    signs: dict[str, int] = field(default_factory=dict)  #: that switching functions have in a step, by their events
-    values: Array = field(init=False)  #: of the events at the last time, angles without jumps, (n_events,)
-    row: Rows | None = field(init=False, default=None)  #: results at the last time, where sensors measure
-    #: the last two rows that were measured, each with itself in the frames of the files
+    events: tuple[Event, ...] = field(init=False)  #: events of the system, of its stops, of switching functions
+    off: frozenset[str] = field(init=False)  #: names of forces, couplers and elements that are off
+    caught: dict[str, float] = field(default_factory=dict)  #: values held by engaged couplers
+    resting: dict[str, str] = field(default_factory=dict)  #: side of the limit at which a coupler rests
+    signs: dict[str, int] = field(default_factory=dict)  #: current signs of switching functions, by event
+    values: Array = field(init=False)  #: watched values at the last time, angles unwrapped, (n_events,)
+    row: Rows | None = field(init=False, default=None)  #: results at the last time, if sensors need them
+    #: the last two measured rows, each with its copy in the frames of result files
     told: tuple[tuple[Rows, Rows], ...] = field(init=False, default=())
     happened: list[dict[str, Any]] = field(default_factory=list)
-    recorded: list[Rows] = field(default_factory=list)  #: results at events since they were last taken
+    recorded: list[Rows] = field(default_factory=list)  #: results at events since the last call of `taken`
     has_stopped: bool = False
-    #: for each event what it watches straight from rows of results; None: by its sensor
+    #: function of rows of results that gives the watched value of an event; None: a sensor measures it
     direct: list[Callable[[Rows], Array] | None] = field(init=False)
-    due: int = -1  #: number of the step in which something is known to happen
-    trial: tuple[System, Work] | None = field(init=False, default=None)  #: working arrays of steps that lead no further
-    calm: int = BLOCK  #: most steps of the next block: few after an event that changed the motion, perhaps one of many
-    changed: int = 0  #: number of the step with which the last of these ended
+    due: int = -1  #: number of a step that contains an event
+    trial: tuple[System, Work] | None = field(init=False, default=None)  #: working arrays of trial steps
+    calm: int = BLOCK  #: most steps of the next block: few after an event that changed the motion, as others may follow
+    changed: int = 0  #: number of steps at the end of the last step with such an event
 
     def __post_init__(self) -> None:
         require_events(self.full)
@@ -135,15 +135,15 @@ class EventWatch:
         self.direct = [None if own else direct_values(self.full, each) for each, own in each_event]
 
     def copied(self) -> "EventWatch":
-        """Return a watch of the same motion that goes on in other steps; both share the systems to switch to."""
+        """Return a copy for a companion run with other steps; both share the cache of switched systems."""
         other = copy(self)
         other.caught, other.resting, other.signs = dict(self.caught), dict(self.resting), dict(self.signs)
         other.values, other.happened, other.recorded = self.values.copy(), list(self.happened), []
-        other.trial, other.due, other.calm, other.changed = None, -1, BLOCK, 0  # numbers of other steps
+        other.trial, other.due, other.calm, other.changed = None, -1, BLOCK, 0  # step numbers of this run
         return other
 
     def switch(self, off: frozenset[str]) -> None:
-        """Take these forces and couplers off, all others on, with what couplers have caught and stops hold."""
+        """Switch exactly these names off; keep the values held by couplers and stops."""
         self.off = off
         self.caught = {name: value for name, value in self.caught.items() if name not in off}
         limits = {coupler.name: coupler.limits for coupler in self.full.couplers}
@@ -157,7 +157,7 @@ class EventWatch:
         self.system = self.made[key]
 
     def begin(self, row: Rows) -> None:
-        """Take the results at the time from which steps go on."""
+        """Take the results at the time where the steps start or resume."""
         is_first = self.row is None
         self.row = row
         if is_first and not self.happened:
@@ -169,7 +169,7 @@ class EventWatch:
             self.take_inside()
 
     def measured(self, *rows: Rows) -> Array:
-        """Return what each event watches at the times of rows of results, (n_times, n_events)."""
+        """Return the watched values at the times of rows of results, (n_times, n_events)."""
         compiled = compiled_system(self.full)
         motion, columns = None, []
         for event, direct in zip(self.events, self.direct, strict=True):
@@ -195,7 +195,7 @@ class EventWatch:
         return np.array(columns).T
 
     def in_files(self, row: Rows) -> Rows:
-        """Return results in the frames of the files; those after one step are those before the next."""
+        """Return results in the frames of result files; single rows are cached, as the next step needs them again."""
         for known, told in self.told:
             if known is row:
                 return told
@@ -205,7 +205,7 @@ class EventWatch:
         return told
 
     def values_after(self, row: Rows) -> Array:
-        """Return what is watched at a later time."""
+        """Return the watched values of a later row, (n_events,)."""
         if self.is_direct:
             return np.asarray(self.measured(row)[0])
         assert self.row is not None
@@ -213,14 +213,13 @@ class EventWatch:
 
     @property
     def is_direct(self) -> bool:
-        """Whether all that is watched stands in the memories of the method."""
+        """Whether no sensor is needed for the watched values."""
         return None not in self.direct
 
     def happens(self, event: Event, before: float, after: float) -> bool:
         """Whether an event happens from one value to the next.
 
-        One that only switches, and finds all as it wants it, does not where rounding alone passes its level: what a
-        latch holds stays there.
+        An event that would switch nothing does not happen if only rounding passes its level: a latched value stays.
         """
         if not event.happens(before, after):
             return False
@@ -229,28 +228,28 @@ class EventWatch:
         return changes or not only_switches or abs(after - before) > STANDS * max(1.0, abs(event.level_passed))
 
     def near_levels(self, values: Array) -> IntArray:
-        """Return the steps in which a value, (n_times, n_events), may pass its level: it is not on one side of it."""
+        """Return the steps in which a value, (n_times, n_events), is not clearly on one side of its level."""
         beyond = values - np.array([event.level_passed for event in self.events])
         return np.flatnonzero(~(beyond[1:] * beyond[:-1] > 0.0).all(axis=1))
 
     def any_happens(self, before: Array, after: Array) -> bool:
-        """Whether an event happens from values to the next, (n_events,)."""
+        """Whether any event happens between two sets of values, (n_events,)."""
         each = zip(self.events, before, after, strict=True)
         return any(self.happens(event, float(first), float(then)) for event, first, then in each)
 
     def new_work(self) -> Work:
-        """Return working arrays for the system as it is switched, with room for the memories of a block."""
+        """Return working arrays for the system as switched, with space for the memories of a block."""
         return new_work(compiled_system(self.system).model, min(BLOCK, self.longest))
 
     @property
     def longest(self) -> int:
-        """Most steps of a block, so that its results do not fill the memory."""
+        """Most steps of a block, limited by the computer's memory for its results."""
         state = compiled_system(self.full).placed
         numbers = 8 * state.r.size + 5 * len(state.u) + len(compiled_system(self.full).owners)
         return max(1, MOST_NUMBERS // (numbers + 1))
 
     def trial_work(self) -> Work:
-        """Return working arrays of steps that lead no further; those of the run keep their factors."""
+        """Return working arrays of trial steps, so that those of the run keep their factors."""
         if self.trial is None or self.trial[0] is not self.system:
             self.trial = self.system, new_work(compiled_system(self.system).model)
         return self.trial[1]
@@ -259,20 +258,22 @@ class EventWatch:
         self, integrator: Integrator, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int,
         every: int,
     ) -> tuple[Carry, Rows, Work, int, Failure | None]:  # fmt: skip
-        """Take steps of size h, the first of them number `first` from t0, as many as make a block, n_steps at most.
+        """Take a block of up to n_steps steps of size h, the first of them number `first` from t0.
 
-        Return the results after every `every`-th of them (and at a stop, if the run ends there), and how many are done.
+        Return the memory, the results after every `every`-th step (and at a stop), working arrays, the number of steps
+        that are done, and why the next one failed, if it did.
 
-        (1) the steps of a block by one call, which keeps the memory after each; what is watched, after each
-        (2) where something happens in a step, it is found by steps from the memory before it (`settled`)
-        (3) the motion is the same after it: the steps that were taken stay as they are
-        (4) it is another one: the block ends with that step
-        A method that does not keep its memories takes the steps before anew, and the one in question alone.
+        (1) One call takes the steps of the block and keeps the memory after each. The watched values are computed.
+        (2) If an event happens in a step, trial steps from the memory before it locate the event (`settled`).
+        (3) If the event does not change the motion, the steps of the block stay as they are.
+        (4) If it does, the block ends with that step.
+
+        If the method keeps no memories, the steps before the event are repeated, and its step is taken by itself.
         """
         keeps_past = not isinstance(integrator, Ida | RelativeOde)
-        is_single = first == self.due or isinstance(integrator, Ida)  # each call of Ida begins anew
+        is_single = first == self.due or isinstance(integrator, Ida)  # each call of Ida restarts
         n = 1 if is_single else min(n_steps, BLOCK - first % BLOCK, self.calm, self.longest)
-        # others complete their memories where results are written
+        # other methods complete their memories only where results are written
         every_row = every if self.is_direct and isinstance(integrator, GeneralizedAlpha) else 1
         begin, before = carry, self.row
         work.past.n[...] = 0
@@ -329,7 +330,7 @@ class EventWatch:
         return carry, self.due_of(rows, first, every // every_row), work, n_good, failure
 
     def due_of(self, rows: Rows, first: int, every: int) -> Rows:
-        """Return of the results after steps from `first` on every `every`-th, and those at a stop."""
+        """Select every `every`-th of the results after steps from `first` on, and the one at a stop."""
         if every == 1:
             return rows
         is_due = (first + 1 + np.arange(len(rows.t))) % every == 0
@@ -352,11 +353,11 @@ class EventWatch:
         self, integrator: Integrator, begin: Carry, ended: "Ended", work: Work, *, t: float, t_end: float, h: float,
         neighbours: tuple[int, Array] | None = None,
     ) -> tuple[Carry, Rows, Work, Failure | None] | None:  # fmt: skip
-        """Settle what happens in a step of size h from t; None if the motion is the same after it.
+        """Handle the events in a step of size h from t; return None if they do not change the motion.
 
-        Else return memory, results and working arrays at its end, or at the stop, and why it failed, if it did.
-        begin, ended: the memory before the step, and what it led to. neighbours: values at steps around it, (n_times,
-        n_events), the first of them so many steps before it.
+        Otherwise return memory, results and working arrays at the end of the step or at the stop, and why the step
+        failed, if it did. begin: memory before the step. ended: end of the step. neighbours: the number of steps before
+        this one for which there are values, and the values at steps around it, (n_times, n_events).
         """
         size, reached_end = h, None
         for _ in range(MOST_IN_A_STEP):
@@ -384,11 +385,11 @@ class EventWatch:
             t = t + acting.part * size if event.at is None else event.at
             row = acting.row._replace(t=np.array([t]))
             reached = self.values_after(row)
-            for i in (acting.j, *(place.j for place in noted)):  # has passed its level, whatever rounding says
+            for i in (acting.j, *(place.j for place in noted)):  # past their levels, despite rounding
                 level = events[i].level_passed
                 if (reached[i] - level) * (self.values[i] - level) > 0.0:
                     reached[i] = level
-            for place in found:  # what acts at the same time has its turn after this one
+            for place in found:  # events at the same time follow after this one
                 if place.j != acting.j and events[place.j].is_active and place.part <= acting.part:
                     reached[place.j] = self.values[place.j]
             self.values, self.row = reached, row
@@ -429,11 +430,11 @@ class EventWatch:
     def begun_anew(
         self, integrator: Integrator, system: System, carry: Carry, state: State, row: Rows, t: float
     ) -> tuple[Carry, Rows, Work]:
-        """Return memory, results and working arrays of the motion that goes on at t from a state of the engine.
+        """Return memory, results and working arrays of the motion after an event at t, from an engine state.
 
-        system: as it was switched before t. The motion begins anew where velocities or what is held have changed, and
-        goes on where forces alone have. The energy that springs bring or take with them is work given; what an impact
-        takes is work taken.
+        system: the system as switched before t. The method restarts if velocities or constraints have changed; it
+        continues if only forces have. The energy that springs bring or remove counts as work given, and the energy that
+        an impact removes as work taken.
         """
         is_struck = state is not carry.state
         before, work_done, work = row.diagnostics[-1], carry.work, self.new_work()
@@ -451,7 +452,7 @@ class EventWatch:
         return replace(carry, work=work_done + change), row, work
 
     def engage(self, event: Event, carry: Carry, t: float) -> State:
-        """Switch by an event; return the state of the engine with the velocities after it."""
+        """Apply the switches of an event; return the engine state with the velocities after it."""
         compiled = compiled_system(self.full)
         couplers = {coupler.name: coupler for coupler in self.full.couplers}
         engaged = [name for name in event.switch_on if name in couplers and name in self.off]
@@ -487,7 +488,7 @@ class EventWatch:
         return hit.state
 
     def strike(self, carry: Carry, event: StopEvent, t: float, h: float) -> State:
-        """Meet a limit, or leave it; return the state of the engine with the velocities after it."""
+        """Handle a coupler that reaches or leaves its limit; return the engine state with the velocities after it."""
         self.add(event, t)
         happened = self.happened[-1]
         if event.side == "release":
@@ -519,9 +520,9 @@ class EventWatch:
         return hit.state
 
     def take_inside(self) -> None:
-        """Let limits that are reached, and on which nothing rests, be reached anew by whatever goes beyond them.
+        """Move values at limits on which nothing rests just inside, so that the next passage is an event.
 
-        So for the zeros of switching functions, which have the sign of the law.
+        Values of switching functions move to the side of their current sign likewise.
         """
         for j, event in enumerate(self.events):
             if isinstance(event, StopEvent) and event.side in INWARD and event.coupler not in self.resting:
@@ -530,12 +531,12 @@ class EventWatch:
                 self.values[j] = beyond_zero(float(self.values[j]), self.signs[event.name])
 
     def add(self, event: Event, t: float) -> None:
-        """Take an event into what has happened."""
+        """Add an event to the list of events so far."""
         self.happened.append({"name": event.name, "t": t, "stop": event.stop, "switch_on": list(event.switch_on),
                               "switch_off": list(event.switch_off)})  # fmt: skip
 
     def note(self, place: "Place", t: float) -> None:
-        """Record the results at an event that does not change the motion, found by a step that leads no further."""
+        """Record the results of a trial step to an event that does not change the motion."""
         event = self.events[place.j]
         self.add(event, t if event.at is None else event.at)
         self.recorded.append(place.row if event.at is None else place.row._replace(t=np.array([event.at])))
@@ -549,9 +550,9 @@ class EventWatch:
         self, integrator: Integrator, begin: Carry, ended: "Ended", t: float, size: float, j: int,
         neighbours: tuple[int, Array] | None,
     ) -> "Place":  # fmt: skip
-        """Return the part of a step of size `size` from t after which event j has just happened, and what is there.
+        """Locate event j in a step of size `size` from t; return the place just after it.
 
-        Places are tried by steps of their size from the beginning of the step.
+        Each trial is one step from the start of the given step to the trial place.
         """
         event, work = self.events[j], self.trial_work()
         tried: dict[float, Place] = {}
@@ -562,11 +563,11 @@ class EventWatch:
                 if row is None:
                     _, row = integrator.observe(self.system, t + size, carry, work)
                 return Place(part, j, carry, row, None)
-            if part <= 0.0:  # at once, as after another event at this time
+            if part <= 0.0:  # at the start, after another event at this time
                 begun, row = integrator.observe(self.system, t, begin, work)
                 return Place(0.0, j, begun, row, None)
             if part not in tried:
-                work.solver.c_k[...] = 0.0  # without the factors of other places
+                work.solver.c_k[...] = 0.0  # do not use factors of other trial steps
                 carry, row, _, failure = integrator.advance(
                     self.system, begin, work, t0=t, h=part * size, first=0, n_steps=1, every=1
                 )
@@ -591,13 +592,13 @@ class EventWatch:
         return at(passage(beyond, sign * first, max(sign * last, 0.0), event.tolerance, guess))
 
     def record(self) -> dict[str, Array]:
-        """Return what a run needs to go on."""
+        """Return the data to resume from, by name."""
         names = ("happened", "caught", "resting", "signs", "calm", "changed", "due")
         words = json.dumps({"off": sorted(self.off)} | {name: getattr(self, name) for name in names})
         return {"event_values": self.values, "events": np.frombuffer(words.encode(), dtype=np.uint8)}
 
     def restore(self, record: Mapping[str, Array]) -> None:
-        """Go on from a record."""
+        """Resume from a record."""
         data = json.loads(np.asarray(record["events"], dtype=np.uint8).tobytes().decode())
         self.caught, self.resting, self.signs = (data.get(name, {}) for name in ("caught", "resting", "signs"))
         self.calm = data.get("calm", BLOCK)
@@ -608,12 +609,12 @@ class EventWatch:
 
 
 def holds_alike(a: System, b: System) -> bool:
-    """Whether two systems that differ in what is switched hold the same positions and velocities."""
+    """Whether two switched systems constrain the same positions and velocities."""
     return np.array_equal(compiled_system(a).model.rows.kind, compiled_system(b).model.rows.kind)
 
 
 def require_shut(event: Event, placed: PlacedLaw, gap: Array, t: float, length: float) -> None:
-    """Raise `ModelError` if an element that is switched on is to hold a position which the motion does not have."""
+    """Raise `ModelError` if an element that is switched on constrains a position that the motion does not have."""
     for name, row, holds in zip(placed.law.multipliers, placed.multipliers, placed.law.holds, strict=True):
         if holds == POSITION and abs(gap[row]) > SHUT * max(1.0, length):
             raise ModelError(

@@ -305,7 +305,9 @@ def test_a_system_at_rest_gains_no_energy(place, turn, h):
 
     def ends(a, part):
         point = part * at
-        near = Marker(a, position=place + R @ point if a == "ground" else point, triad=R if a == "ground" else np.eye(3))
+        near = Marker(
+            a, position=place + R @ point if a == "ground" else point, triad=R if a == "ground" else np.eye(3)
+        )
         return near, Marker("lower" if a == "upper" or part > 3 else "upper", position=point)
 
     joints = [RevoluteJoint("hinge", *ends("ground", 1.0), axis=(1, 2, 3)), SphericalJoint("ball", *ends("upper", 2.7))]
