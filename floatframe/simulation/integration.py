@@ -397,8 +397,8 @@ class Run:
                 n_batch = min(n_left, self.steps.room(n_done, batch_steps), self.n_total - n_done)
                 n_batch = min(n_batch, RESTART_STEPS - n_done % RESTART_STEPS)
                 begin, n_happened = carry, self.n_happened
-                begins = self.events is not None and self.steps.has_companion and self.steps.companion is None
-                events_before = self.events.copied() if begins else None
+                starts_companion = self.steps.has_companion and self.steps.companion is None
+                events_before = self.events.copied() if self.events is not None and starts_companion else None
                 carry, rows, work, n_good, failure = next_steps(
                     self.integrator, self.acting, carry, work, t0=self.t_start, h=self.h, first=n_done, n_steps=n_batch,
                     every=self.output_every, jumps=jumps, events=self.events,
