@@ -297,7 +297,7 @@ def test_what_rounding_gives_far_from_the_origin_is_no_gain(far):
 @pytest.mark.parametrize("h", [2e-5, 1e-3, 1e-2])
 @pytest.mark.parametrize(("place", "turn"), [((0, 0, 0), (0, 0, 0)), ((3, -40, 7), (0.3, -0.7, 0.5))])
 def test_a_system_at_rest_gains_no_energy(place, turn, h):
-    """Two bodies on a stiff bushing, joints away from their frames: all that moves is rounding, 1e-27 J at the origin."""
+    """Two bodies on a stiff bushing, joints away from their frames: all motion is rounding, 1e-27 J at the origin."""
     R, at = rotation_exp(np.array(turn)), np.array([0.37, 0.61, -0.83])
     bodies = [
         RigidBody(name, 1.0, np.eye(3), position=place, orientation=euler_parameters(R)) for name in ("upper", "lower")
