@@ -89,7 +89,7 @@ def tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning):
     turning, (3, 3): rotation of the body by its unknown dtheta, see `marker_columns`.
     """
     n = model.bodies.n_q[i]
-    turn = work.bodies.by_turn[: 6 + n]
+    turn = work.bodies.by_turn[model.bodies.u0[i] : model.bodies.u0[i + 1]]
     body_tangent(model, work, i, c_m, c_d, c_k, H, turn)
     for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):
         marker_stiffness(model, work, model.bodies.ends[e], c_k, H, turn)

@@ -24,12 +24,14 @@ from floatframe.engine.kernels.rotation import (
     turned_by_spin,
 )
 from floatframe.engine.kernels.schur import (
-    correction,
+    close_connections,
+    close_velocities,
     factorize_bodies,
+    move_bodies,
     renew_connections,
     settle_accelerations,
     share_reactions,
-    velocity_correction,
+    velocity_gaps,
 )
 from floatframe.engine.kernels.step_start import accelerate, begin_step
 from floatframe.engine.kernels.time_function import time_function
@@ -86,6 +88,7 @@ SLOW = 0.2  # ratio of corrections above which the factors are made anew
 OF_MOTION = 1e-5  # of the way of a step counts beside what accelerations move in it
 FAST = 0.1  # corrections that shrink this fast end a step where the next one is expected to be small enough:
 SAFE = 0.5  # this much of the one that is wanted
+HOPE = 0.1  # of the contraction of the step before: velocities are held where the second iteration could end the step
 OF_ROUNDOFF = 0.1  # and of roundoff
 ROUNDOFF = 2e-15  # of a position
 NOISE = 1e-7  # accelerations by rounding of positions, over those of the motion, that reach results
@@ -234,8 +237,8 @@ def predict(model, work, memory, h, order):
 
 
 @inner
-def update(model, work, memory, by_rate, by_acceleration, c_k):
-    """Add the correction (y, mu) to the iterate; return its squared norm."""
+def update(model, work, memory, by_rate, by_acceleration, c_k, is_held):
+    """Add the correction (y, mu) to the iterate, and y_rate to velocities if they are held; return its squared norm."""
     total = 0.0
     for i in range(model.bodies.kind.shape[0]):
         n, u0, q0 = model.bodies.n_q[i], model.bodies.u0[i], model.bodies.q0[i]
@@ -245,7 +248,11 @@ def update(model, work, memory, by_rate, by_acceleration, c_k):
         put_sum(work.state.r[i], 0, turned(work.state.R[i], y))
         for k in range(n):
             work.state.q[q0 + k] += y[6 + k]
-        change_rates(model, work, i, vector(y[3:]), by_rate, by_acceleration)
+        by_theta = vector(y[3:])
+        if is_held:
+            for k in range(6 + n):
+                y[k] += work.solver.y_rate[u0 + k]
+        change_rates(model, work, i, by_theta, by_rate, by_acceleration)
         turn_body(model, work.state, memory, i)
     for k in range(work.solver.mu.shape[0]):
         work.state.w[k] += work.solver.mu[k] / c_k
@@ -304,21 +311,24 @@ def turns_too_far(model, work, length):
 
 
 @inner
-def hold_velocities(model, work, by_rate, by_acceleration, c_k):
-    """Add the correction of velocities that the held positions ask for to the iterate; return its squared norm.
+def hold_velocities(model, work, c_k):
+    """Write the correction y_rate of velocities that closes the gaps in mu, for `update`; return its squared norm.
 
-    Accelerations change with velocities and reactions with accelerations, as in `update`. Positions stay: so forces of
-    the modal stiffness, which the factors take along, stay too, and residuals become less by them.
+    Accelerations change with velocities, and reactions, which are changed here, with accelerations. Positions stay: so
+    what the factors take of forces that follow positions (modal stiffness, forces that turn against the body) stays
+    too, and residuals become less by it.
     """
-    velocity_correction(model, work, by_rate)
-    total = 0.0
+    close_velocities(model, work)
+    total, by_turn, y = 0.0, work.bodies.by_turn, work.solver.y
     for i in range(model.bodies.kind.shape[0]):
         n, u0 = model.bodies.n_q[i], model.bodies.u0[i]
-        y = work.solver.y[u0 : u0 + 6 + n]
+        residual = work.bodies.residual[u0 : u0 + 6 + n]
+        turning = turned(work.bodies.T_right[i], y[u0 + 3 :])
         for k in range(6 + n):
-            total += work.solver.weight[u0 + k] * y[k] * y[k]
-        take_stiffness(model, i, y[6:], work.bodies.residual[u0 + 6 : u0 + 6 + n])
-        change_rates(model, work, i, (0.0, 0.0, 0.0), by_rate, by_acceleration)
+            work.solver.y_rate[u0 + k] = y[u0 + k]
+            total += work.solver.weight[u0 + k] * y[u0 + k] * y[u0 + k]
+            residual[k] -= dot(vector(by_turn[u0 + k]), turning)
+        take_stiffness(model, i, y[u0 + 6 : u0 + 6 + n], residual[6:])
     add_reactions(model, work, c_k)
     return total
 
@@ -466,11 +476,13 @@ def one_step(model, work, memory, order, h):
     allowed = wanted + math.sqrt(roundoff_floor(model, work, order.length))
     solver = work.solver
     if solver.c_m != c_m or solver.c_d != c_d or solver.c_k != c_k:
-        work.solver.is_due = 1
+        work.solver.is_due, work.solver.contraction = 1, 0.0
     work.counted.no_number = 0
     work.counted.stopped = 0
     last, last_of_states = math.inf, math.inf
     excess = math.inf
+    holds = order.stabilized != 0 and solver.mu.shape[0] > 0
+    least_gap = SAFE * wanted / math.sqrt(mass) if mass > 0.0 else 0.0  # all bodies move by less than is wanted
     is_new = True
     has_states = model.states.row.shape[0] + model.laws.equation.shape[0] > 0
     for iteration in range(order.max_iterations):
@@ -492,11 +504,21 @@ def one_step(model, work, memory, order, h):
         if connection >= 0:
             work.solver.is_due = 1
             return SINGULAR_CONNECTION, connection, excess, -1.0
-        of_rates = 0.0
-        if order.stabilized != 0 and solver.mu.shape[0] > 0:
-            of_rates = hold_velocities(model, work, c_d / c_k, c_m / c_k, c_k)
-        correction(model, work, c_k, False)
-        norm = math.sqrt(of_rates + update(model, work, memory, c_d / c_k, c_m / c_k, c_k))
+        of_rates, is_held, is_closed = 0.0, False, not holds
+        if holds and (iteration != 1 or is_enough(HOPE * solver.contraction * last, last, wanted, allowed)):
+            is_held, is_closed = velocity_gaps(model, work, c_d / c_k) > least_gap, True
+        if is_held:
+            of_rates = hold_velocities(model, work, c_k)
+        move_bodies(model, work, c_k)
+        if is_held:
+            for i in range(model.bodies.kind.shape[0]):
+                put_sum(solver.y, model.bodies.u0[i] + 3, scaled(-1.0, vector(solver.surplus[i])))
+        if solver.mu.shape[0] > 0:
+            close_connections(model, work)
+        of_positions = update(model, work, memory, c_d / c_k, c_m / c_k, c_k, is_held)
+        norm = math.sqrt(of_rates + of_positions)
+        if iteration == 1 and last > 0.0:
+            work.solver.contraction = math.sqrt(of_positions) / last
         work.counted.iterations += 1
         if not math.isfinite(norm):
             work.solver.is_due = 1
@@ -515,7 +537,7 @@ def one_step(model, work, memory, order, h):
                 continue
             is_new = of_states > max(1.0, SLOW * last_of_states)
         is_stuck = norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2
-        is_small = is_enough(norm, last, wanted, allowed) or is_stuck
+        is_small = is_closed and (is_enough(norm, last, wanted, allowed) or is_stuck)
         if is_small and (of_states <= 1.0 or (of_states <= 1e3 and of_states > 0.5 * last_of_states and iteration > 2)):
             take_age(work.solver, iteration + 1)
             error = -1.0
@@ -527,7 +549,7 @@ def one_step(model, work, memory, order, h):
                     return INACCURATE, -1, excess, error
             accept(model, work, memory, h, alpha_m, alpha_f)
             return DONE, -1, excess, error
-        if norm > SLOW * last and not is_small:
+        if norm > SLOW * last and is_closed and not is_small:
             work.solver.is_due = 1
         last, last_of_states = norm, of_states
         excess = max(excess, of_states)

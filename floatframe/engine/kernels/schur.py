@@ -19,19 +19,22 @@ from floatframe.engine.kernels.connections.connection import (
 from floatframe.engine.kernels.dense import lu_factor, lu_solve, lu_solve_columns
 from floatframe.engine.kernels.evaluation import linearize
 from floatframe.engine.kernels.model import MASS, STIFFNESS
-from floatframe.engine.kernels.vector import add, put, put_sum, scaled, turned, turned_back
+from floatframe.engine.kernels.vector import add, put, put_sum, scaled, sub, turned, turned_back, vector
 from floatframe.model.joints.rows.kinds import NOTHING
 
 __all__ = [
     "assemble",
+    "close_connections",
+    "close_velocities",
     "correction",
     "factorize_bodies",
     "factorize_connections",
     "factorize_tangents",
+    "move_bodies",
     "renew_connections",
     "settle_accelerations",
     "share_reactions",
-    "velocity_correction",
+    "velocity_gaps",
     "write_rates_to_close",
 ]
 
@@ -250,8 +253,22 @@ def correction(model, work, c_k, is_new):
 
     Return the connection with a singular block, or -1.
     """
-    bodies, connections, solver = model.bodies, model.connections, work.solver
-    y, mu = solver.y, solver.mu
+    move_bodies(model, work, c_k)
+    if work.solver.mu.shape[0] == 0:
+        return -1
+    if is_new:
+        singular = renew_connections(model, work, c_k)
+        if singular >= 0:
+            return singular
+    close_connections(model, work)
+    return -1
+
+
+@inner
+def move_bodies(model, work, c_k):
+    """Write the correction y of the bodies for their residuals alone."""
+    bodies, solver = model.bodies, work.solver
+    y = solver.y
     for i in range(bodies.kind.shape[0]):
         n, u0 = 6 + bodies.n_q[i], bodies.u0[i]
         for k in range(u0, u0 + n):
@@ -261,18 +278,17 @@ def correction(model, work, c_k, is_new):
             solver.pivot[u0 : u0 + n],
             y[u0 : u0 + n],
         )
-    if mu.shape[0] == 0:
-        return -1
-    if is_new:
-        singular = renew_connections(model, work, c_k)
-        if singular >= 0:
-            return singular
+
+
+@inner
+def close_connections(model, work):
+    """Write mu for the residuals of the connections, and add to y what it moves."""
+    mu = work.solver.mu
     for k in range(mu.shape[0]):
         mu[k] = -work.connections.g[k]
     take_motions(model, work)
-    solve_connections(model.elimination, connections, solver)
+    solve_connections(model.elimination, model.connections, work.solver)
     add_wrenches(model, work)
-    return -1
 
 
 @inner
@@ -304,23 +320,38 @@ def take_motions(model, work):
 
 
 @inner
-def velocity_correction(model, work, by_rate):
-    """Write (y, mu) that takes the rates of held positions, y by_rate being the change of u.
+def velocity_gaps(model, work, by_rate):
+    """Write into mu by how much held positions move less than their rates ask for, and return the largest.
 
-    The positions will be closed by a `correction` of their own, which changes their rates by -by_rate g. Rows of
-    positions that have no cheap rate, and all others, keep theirs. Unknowns of rotation turn a body by `T_right` of
-    them, velocities at once: y is what they turn it by.
+    In unknowns: y by_rate is the change of velocities. The positions will be closed by a `correction`, which changes
+    their rates by -by_rate g. Rows of positions that have no cheap rate, and all others, have no gap.
     """
-    y = work.solver.y
+    mu, largest = work.solver.mu, 0.0
     for c in range(model.connections.size.shape[0]):
         write_rates_to_close(model, work, c, by_rate)
+    for k in range(mu.shape[0]):
+        largest = max(largest, abs(mu[k]))
+    return largest
+
+
+@inner
+def close_velocities(model, work):
+    """Write (y, mu) that closes the gaps in mu.
+
+    Unknowns of rotation turn a body by `T_right` of them, velocities at once: y is what they turn it by. Its moments
+    of inertia resist all of that, and mu holds against the unknowns alone: the rest is the `surplus`.
+    """
+    y = work.solver.y
     for k in range(y.shape[0]):
         y[k] = 0.0
     solve_connections(model.elimination, model.connections, work.solver)
     add_wrenches(model, work)
     for i in range(model.bodies.kind.shape[0]):
         u0 = model.bodies.u0[i] + 3
-        put(y, u0, turned(work.bodies.T_right[i], y[u0:]))
+        unknown = vector(y[u0:])
+        turning = turned(work.bodies.T_right[i], unknown)
+        put(y, u0, turning)
+        put(work.solver.surplus[i], 0, sub(turning, unknown))
 
 
 @inner

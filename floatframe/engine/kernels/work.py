@@ -72,7 +72,7 @@ class BodyWork(NamedTuple):
     Y: Array = real(3 * n_q, unit="kg m²/s")  #: Σ_l 4C_kl q_dot_l [a, k] of each body
     residual: Array = real(n_u, unit="N, N m, N m")  #: inertia and elastic minus applied and reaction forces
     T_right: Array = real(n_b, 3, 3)  #: right Jacobian at theta: rotation of the body by its unknown
-    by_turn: Array = real(n_most + 6, 3, unit="N/rad")  #: derivative of the residual of one body by its rotation
+    by_turn: Array = real(n_u, 3, unit="N/rad, N m/rad")  #: derivative of the residual by the rotation of its body
     velocity: Array = real(n_most + 6, unit="m/s, rad/s, 1/s")  #: u of one body
     momentum: Array = real(n_most + 6, unit="kg m/s, kg m²/s")  #: M u of one body
     modal: Array = real(n_most, unit="N m")  #: M q_ddot, K q or D q_dot of one body
@@ -236,6 +236,9 @@ class Solver(NamedTuple):
     block_pivot: IntArray = integer(n_w)
     mu: Array = real(n_w)  #: correction of the wrenches, times c_k
     y: Array = real(n_u)  #: correction of the bodies
+    y_rate: Array = real(n_u)  #: correction of the velocities of bodies alone, over c_d/c_k
+    surplus: Array = real(n_b, 3, unit="rad")  #: by how much it turns bodies beyond their unknowns
+    contraction: Array = real()  #: the second correction of the step before over its first
     weight: Array = real(n_u, unit="kg, kg m²")  #: of the norm of corrections
     motion: Array = real(12)  #: correction of the motion of one marker
     row: Array = real(12)  #: one row of P in body axes

@@ -128,7 +128,7 @@ def of_body(model, work, joints, tangent, i, c_m, c_d, c_k):
     put_matrix(turning, unit_matrix())
     H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((6 + n, 6 + n))
     tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning)
-    A, turn = tangent.rigid, work.bodies.by_turn
+    A, turn = tangent.rigid, work.bodies.by_turn[u0 : u0 + 6 + n]
     rigid_columns(model, work, i, A)
     R, residual = matrix(work.state.R[i]), joints.own[u0 : u0 + 6 + n]
     p = sub(vector(work.state.r[i]), vector(tangent.origin))
