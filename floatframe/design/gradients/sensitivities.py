@@ -228,7 +228,7 @@ def require_no_memory(system: System) -> None:
         if each.law.states or each.law.multipliers:
             what = "states" if each.law.states else "multipliers"
             raise ModelError(
-                f"sensitivities: element {each.element.name!r} has {what} , which are not differentiated; "
+                f"sensitivities: element {each.element.name!r} has {what}, which are not differentiated; "
                 "those of elements without are; else vary its parameter by floatframe sweep"
             )
     compiled = compiled_system(system)

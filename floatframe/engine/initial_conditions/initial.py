@@ -221,7 +221,7 @@ def refuse_open_joints(compiled: CompiledSystem, work: Work, state: State, error
     """Raise `ModelError` naming the joints that stay open, or the drives against each other."""
     conflict = conflict_of_drives(compiled, work, state)
     if conflict:
-        raise ModelError(f"conflicting drives: {conflict}; take one away, or free what it drives against")
+        raise ModelError(f"conflicting drives: {conflict}; remove one of them, or free the coordinate that opposes it")
     is_driven = (compiled.model.rows.motion[is_held_position(compiled.model.rows.kind)] >= 0).any()
     reach = ", and that the drives stay within reach" if is_driven else ""
     raise ModelError(
@@ -245,7 +245,7 @@ def require_independent_constraints(compiled: CompiledSystem, work: Work, tree: 
     vectors = np.linalg.svd(rows.T)[2][::-1].T  # columns, those of the smallest first
     conflict = conflict_of_drives(compiled, work, state)
     if conflict:
-        raise ModelError(f"conflicting drives: {conflict}; take one away, or free what it drives against")
+        raise ModelError(f"conflicting drives: {conflict}; remove one of them, or free the coordinate that opposes it")
     share = (vectors[:, :n_redundant] ** 2).sum(axis=1)
     owner = np.repeat(np.arange(len(model.connections.size)), model.connections.size)[holds]
     involved = [name for c, name in enumerate(compiled.connection_names) if share[owner == c].sum() > 1e-6]

@@ -78,7 +78,7 @@ def test_forces_residual_and_derivatives_belong_to_the_same_springs(case):
     ("changes", "message"),
     [
         ({"motor": constant(2.0)}, "force 'spring': expected gravity, or joint forces .* got one with a motor"),
-        ({"friction": 2.0}, "force 'spring': .* got one with friction; leave it out"),
+        ({"friction": 2.0}, "force 'spring': .* got one with friction; remove it"),
         ({"coordinate": "angel"}, "force 'spring': expected one of the coordinates of the tree, got 'joint.*/angel'"),
     ],
 )
