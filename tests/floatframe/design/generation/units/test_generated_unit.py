@@ -307,7 +307,7 @@ def test_events_are_refused(robot, tmp_path):
 
 @pytest.mark.parametrize(
     ("compiler", "message"),
-    [("no-such-compiler", "there is no C compiler 'no-such-compiler'; install one"), ("false", "failed: no message")],
+    [("no-such-compiler", "C compiler 'no-such-compiler' not found; install one"), ("false", "failed: no message")],
 )
 def test_a_compiler_that_is_not_there_or_fails_is_told(robot, tmp_path, monkeypatch, compiler, message):
     monkeypatch.setenv("CC", compiler)
