@@ -176,7 +176,7 @@ def test_prescribed_coordinates_are_coordinates_as_any_but_in_accelerations():
     [
         ({"what": "reverse"}, "what: expected one of inverse, residual, mass"),
         ({"language": "fortran"}, "language: expected one of c, python, casadi, matlab"),
-        ({"parameters": ["link9"]}, "'link9' is the name of no parameter"),
+        ({"parameters": ["link9"]}, "'link9' matches no parameter"),
         ({"parameters": "link1"}, "expected a list of names"),
         ({"name": "2 fast"}, "expected letters, digits and underscores"),
     ],

@@ -279,7 +279,7 @@ def test_the_same_system_makes_the_same_bytes(robot, folder):
         ({"fmi": 1}, "fmi: expected one of 2, 3"),
         ({"step": 0.0}, "step: expected a time above 0"),
         ({"stop_time": np.inf}, "stop_time: expected a time above 0"),
-        ({"parameters": ["link9"]}, "'link9' is the name of no parameter"),
+        ({"parameters": ["link9"]}, "'link9' matches no parameter"),
         ({"path": "robot.zip"}, "expected a file name that ends in .fmu"),
         ({"path": "nowhere/robot.fmu"}, "in a folder that exists"),
     ],
