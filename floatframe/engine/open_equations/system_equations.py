@@ -448,7 +448,7 @@ def open_equations(system: System) -> Equations:
     felt = [each.element.name for each in compiled.laws if each.law.accelerations]
     if felt:
         raise ModelError(
-            f"open_equations: element {felt[0]!r} asks for accelerations, which are no part of x and v; give its "
+            f"open_equations: element {felt[0]!r} uses accelerations, which are no part of x and v; give its "
             "masses as bodies"
         )
     if has_normal_friction(model):

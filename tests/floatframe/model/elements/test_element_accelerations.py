@@ -82,9 +82,9 @@ def test_a_response_sees_the_acceleration_an_element_shows():
 def test_analyses_without_accelerations_name_the_element():
     own, _ = pair("rigid")
     for analysis in (open_equations, lambda each: kinematics(each, [0.0, 0.1])):
-        with pytest.raises(ModelError, match="element 'heavy' asks for accelerations"):
+        with pytest.raises(ModelError, match="element 'heavy' uses accelerations"):
             analysis(own)
-    with pytest.raises(ModelError, match="element 'feedback' has states beside accelerations"):
+    with pytest.raises(ModelError, match="element 'feedback' has states and uses accelerations"):
         linearize(System([RigidBody("cart", 1.0, np.eye(3))], elements=[Follow("feedback", Marker("cart"))]))
 
 
