@@ -86,7 +86,7 @@ def kinds():
     """Return the names of all elements that there are."""
     return [
         f"{package}.{kind}" for wing in (floatframe.components, floatframe.model)
-        for package in (each.name for each in iter_modules(wing.__path__) if each.ispkg)
+        for package in (each.name for each in iter_modules(wing.__path__))
         for kind in getattr(import_module(f"{wing.__name__}.{package}"), "ELEMENTS", {})
     ]  # fmt: skip
 

@@ -77,7 +77,7 @@ def amplitude(folder):
     motion = read_results(folder / "spin.h5")
     block = block_of_results(motion, name_of(motion))
     found = history_damage(BODY, [block], basquin_curve(1.0, 1e6, 5, least_cycles=1), extrapolate=True)
-    return float(found.largest.max())
+    return 0.999 * float(found.largest.max())  # so that the largest cycle lies beyond the knee by more than rounding
 
 
 def name_of(motion):

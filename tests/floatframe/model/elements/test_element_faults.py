@@ -154,7 +154,7 @@ def test_what_a_held_position_may_not_depend_on_is_told():
     element = Law(held_speed, multipliers=("f",), holds=(POSITION,))
     place = RigidBody("b", 1.0, np.eye(3), position=(0, 0, -0.3))
     found = check_element(System([place], elements=[element]), "e")
-    told = "g of f depends on velocity z of marker 2, but holds a position: places and the time alone"
+    told = "g of f depends on velocity z of marker 2, but holds a position, which may depend only on positions and time"
     assert any(told in each for each in found.findings), found.findings
 
 
@@ -358,9 +358,10 @@ def test_analyses_that_do_not_know_states_name_the_element():
         "guide", Marker(GROUND), Marker("b"), axis=(0, 0, 1), motions={"distance": harmonic(0.1, 2.0)}
     )
     driven = System([RigidBody("b", 1.0, np.eye(3))], [guide], elements=[Jack("e", ENDS[1])])
-    with pytest.raises(ModelError, match="kinematics: element 'e' has states or multipliers of its own"):
+    told = "kinematics: element 'e' has states or multipliers, which follow only from integration in time"
+    with pytest.raises(ModelError, match=told):
         kinematics(driven, [0.0, 0.1])
-    with pytest.raises(ModelError, match="sensitivities: element 'e' has states of its own"):
+    with pytest.raises(ModelError, match="sensitivities: element 'e' has states, which are not differentiated"):
         sensitivities(
             lambda values: falling(Jack("e", ENDS[1], area=values["A"])), ["p x"], {"A": 1e-3}, t_end=0.1, h=1e-3
         )
