@@ -549,7 +549,7 @@ def one_step(model, work, memory, order, h):
                     return INACCURATE, -1, excess, error
             accept(model, work, memory, h, alpha_m, alpha_f)
             return DONE, -1, excess, error
-        if norm > SLOW * last and is_closed and not is_small:
+        if norm > SLOW * last and not is_small:
             work.solver.is_due = 1
         last, last_of_states = norm, of_states
         excess = max(excess, of_states)
