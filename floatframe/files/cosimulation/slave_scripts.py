@@ -8,10 +8,12 @@ __all__ = ["slave_script"]
 
 SCRIPT = '''"""The unit of a floatframe system; written by floatframe, read by the binary of this FMU."""
 
+import atexit
 import ctypes
 import functools
-
+import os
 import sys
+from pathlib import Path
 
 try:
     from floatframe.files.cosimulation.archive import HostedUnit, words_of
@@ -27,6 +29,26 @@ else:
 from {package}.{module} import {base}
 from {package}.enums import {status}
 {imports}
+RELEASES = {{}}  # a function of each binary in this process, by the path of the binary
+
+
+def release_python_at_exit(resources):
+    """Let the binary release Python while Python still runs.
+
+    The Linux binary releases it at the end of the process too, but from a static pointer that is destroyed by then: it
+    writes into freed memory, which ends the process with "corrupted double-linked list" or not at all, by chance.
+    """
+    if sys.platform != "linux":
+        return
+    for path in Path(resources).parent.glob("binaries/*linux*/*.so"):
+        if path not in RELEASES:
+            try:
+                binary = ctypes.CDLL(str(path), mode=os.RTLD_LAZY | os.RTLD_NOLOAD)
+                RELEASES[path] = binary.finalizePythonInterpreter
+            except (AttributeError, OSError):  # loaded from elsewhere, or another release of the binary
+                continue
+            atexit.register(RELEASES[path])
+
 
 def told(method):
     """Let an error reach the log of the master as its words, and the binary survive it.
@@ -55,6 +77,7 @@ class FloatframeSlave({base}):
         if missing:
             print(missing, file=sys.stderr)
             raise ImportError(missing)
+        release_python_at_exit(self.resources)
         self.unit = HostedUnit(self.resources, lambda words: self.log(words, {status}.warning))
 
     @told

@@ -123,6 +123,8 @@ def main(path, fmi):
     two.freeInstance()
     three.freeInstance()
     gc.collect()
+    unit = sys.modules[f"floatframe_unit_fmi{fmi}"]
+    found["released at exit"] = [path.suffix for path in unit.RELEASES]
     print("FOUND" + json.dumps(found))
 
 
