@@ -75,8 +75,8 @@ from .reduction.basis.frames import NodalFrame as NodalFrame
 from .reduction.basis.frames import TisserandFrame as TisserandFrame
 from .reduction.frame_conversion import convert_frame as convert_frame
 from .reduction.geometric_stiffness.unit_states import unit_states as unit_states
-from .reduction.recovery.craig_bampton import CraigBampton as CraigBampton
-from .reduction.recovery.craig_bampton import craig_bampton_matrices as craig_bampton_matrices
+from .reduction.recovery.files import CraigBampton as CraigBampton
+from .reduction.recovery.files import craig_bampton_matrices as craig_bampton_matrices
 from .reduction.recovery.matrices import recovery_matrices as recovery_matrices
 from .reduction.recovery.request import RecoveryRequest as RecoveryRequest
 from .reduction.recovery.request import Rows as Rows

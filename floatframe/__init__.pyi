@@ -76,13 +76,13 @@ from .design.studies.study_file import read_study as read_study
 from .durability.fatigue.assessment import Assessment as Assessment
 from .durability.fatigue.assessment import assess as assess
 from .durability.fatigue.assessment import equivalent_repeats as equivalent_repeats
+from .durability.fatigue.assessment import shaken_damage as shaken_damage
 from .durability.fatigue.criteria import Criterion as Criterion
 from .durability.fatigue.fatigue_file import read_fatigue as read_fatigue
 from .durability.fatigue.load_blocks import LoadBlock as LoadBlock
 from .durability.fatigue.load_blocks import block_of_results as block_of_results
 from .durability.fatigue.mean_stress import MeanStress as MeanStress
 from .durability.fatigue.places import FatigueMaterial as FatigueMaterial
-from .durability.fatigue.shaken import shaken_damage as shaken_damage
 from .durability.fatigue.sn_curve import SNCurve as SNCurve
 from .durability.fatigue.sn_curve import basquin_curve as basquin_curve
 from .durability.fatigue.sn_curve import table_curve as table_curve

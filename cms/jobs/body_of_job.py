@@ -45,8 +45,7 @@ def body_of_matrices(job: Job, stages: Stages, on_report: Callable[[Any], None] 
     """
     if job.body.brings_interfaces:
         return body_with_its_interfaces(job, stages)
-    from fe_models.files.matrices.body import body_from_foreign, nodes_of, with_geometry
-    from fe_models.files.matrices.matrix_report import MatrixReport
+    from fe_models.files.matrices.body import MatrixReport, body_from_foreign, nodes_of, with_geometry
     from fe_models.files.matrices.read_matrices import read_matrices
     from fe_models.files.read_mesh import read_geometry
 

@@ -18,7 +18,6 @@ from cms.jobs.beam_tables import (
     names,
     numbers,
 )
-from cms.jobs.damping_table import DampingSection
 from cms.jobs.deck_tables import (
     DECK_MASSES,
     DECK_PROGRAMS,
@@ -28,7 +27,7 @@ from cms.jobs.deck_tables import (
     SolidSection,
     check_deck,
 )
-from cms.jobs.reduction_table import ReductionSection, mode_set_options, named_interfaces
+from cms.jobs.reduction_table import DampingSection, ReductionSection, mode_set_options, named_interfaces
 from cms.jobs.shell_tables import ShellSection, check_shells
 from cms.jobs.tables.material_table import MaterialSection
 from cms.jobs.tables.mesh_size_table import MeshSizeSection, check_mesh_size

@@ -14,7 +14,8 @@ import numpy as np
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.engine.compiling.system import CompiledSystem, compiled_system
 from floatframe.engine.kernels.memory import Rows
-from floatframe.model.elements.held_signs import HeldSigns
+from floatframe.model.elements.element import ElementLaw, Placed
+from floatframe.model.elements.element_proxy import ElementProxy
 from floatframe.model.forces import UserForce
 from floatframe.model.functions.expressions import Tape, compile_expression
 from floatframe.model.functions.time_functions import TimeFunction
@@ -22,7 +23,7 @@ from floatframe.model.functions.time_switches import time_parts
 from floatframe.model.system import System
 from floatframe.simulation.events import Event
 
-__all__ = ["SwitchEvent", "beyond_zero", "sign_of", "switch_events", "unknowns_of_force", "with_signs"]
+__all__ = ["HeldSigns", "SwitchEvent", "beyond_zero", "sign_of", "switch_events", "unknowns_of_force", "with_signs"]
 
 
 @dataclass(frozen=True)
@@ -106,3 +107,18 @@ def sign_of(value: float) -> int:
 def beyond_zero(value: float, sign: int) -> float:
     """Return a value on the side of a sign: one that is not is taken for the first number there."""
     return value if sign * value > 0.0 else float(np.nextafter(0.0, sign))
+
+
+# an element whose switching functions have constant signs, as within a step of a run ----------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class HeldSigns(ElementProxy):
+    """Replaces an element; its law uses given signs."""
+
+    signs: Sequence[int]  #: of its switching functions, 1 or -1
+
+    def law(self, placed: Placed) -> ElementLaw:
+        """Return its law with these signs."""
+        law = self.element.law(placed)
+        return replace(law, data=[*law.data, *map(float, self.signs)], switches=())

@@ -1,30 +1,41 @@
 """Compare mode sets of one body with its full model, each with several numbers of vibration modes."""
 
+import os
 import platform
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from cms.assessment.compare.comparison import Comparison
-from cms.assessment.compare.drawing import draw_modes
+import numpy as np
+
+from cms.assessment.compare.comparison import Comparison, Drawing, SetResult
+from cms.assessment.compare.coordinates import ReferenceBasis
+from cms.assessment.compare.evaluation import Reference
+from cms.assessment.compare.full_model import FullModel, read_full_model, reference_digest
 from cms.assessment.compare.pulse import default_pulse
 from cms.assessment.compare.reference import Question, full_results, reference_of, solution
-from cms.assessment.compare.set_result import set_result
-from cms.assessment.compare.set_tasks import SetJudge, reference_basis, set_results
+from cms.assessment.compare.set_result import SetPart, counts_of_parts, joined_parts, set_part, set_result
 from cms.assessment.compare.verdicts import answer, ranking
 from cms.assessment.quality.of_reduction.frf import DAMPING
+from cms.assessment.quality.reference.ports import Ports
 from cms.assessment.quality.reference.transient import Snapshots
+from cms.assessment.rendering.shape import surface_edges
 from cms.errors import CompareError
 from cms.modes.families.families import Families
 from cms.modes.mode_sets import MODE_SETS
 from fe_models.body.fe_body import FEBody
-from fe_models.foundation.tasks.workers import Workers
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.ranks.spread_matrix import whole_matrix
+from fe_models.foundation.tasks.task_map import WorkerError
+from fe_models.foundation.tasks.workers import Workers, tasks_of
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["compare"]
+__all__ = ["SetJudge", "SetTask", "compare", "draw_modes", "reference_basis", "set_results", "thinned_surface"]
+
 
 Stage = Callable[[str], AbstractContextManager[Any]]
 
@@ -177,3 +188,145 @@ class _Timed:
     def __exit__(self, *failure: Any) -> None:
         self._inner.__exit__(*failure)
         self._clock.seconds[self._name] = time.perf_counter() - self._began
+
+
+# the surface of a body and its free modes, thinned out to what a screen shows -----------------------------------------
+
+
+MOST_TRIANGLES = 16_000  #: of a surface on the screen
+MOST_LINES = 20_000  #: of a body without a surface
+
+
+def draw_modes(body: FEBody, Phi: Array) -> Drawing:
+    """Return the surface of the body, or the lines of a body without one, with its modes.
+
+    Parameters
+    ----------
+    Phi
+        Modes over the dofs of the body, (n_dof, n_modes).
+    """
+    moved = np.moveaxis(body.translations(Phi), 2, 0)
+    triangles = thinned_surface(body.nodes, body.surface)
+    lines = sharp_edges(body.nodes, triangles) if len(triangles) else stiffness_lines(body)
+    used, inverse = np.unique(np.concatenate([triangles.ravel(), lines.ravel()]), return_inverse=True)
+    shapes = moved[:, used]
+    largest = np.linalg.norm(shapes, axis=2).max(axis=1, initial=0.0)
+    shapes = shapes / np.where(largest > 0, largest, 1.0)[:, None, None]
+    return Drawing(
+        nodes=body.nodes[used],
+        triangles=inverse[: triangles.size].reshape(-1, 3).astype(np.int64),
+        lines=inverse[triangles.size :].reshape(-1, 2).astype(np.int64),
+        shapes=shapes,
+        n_triangles_full=len(body.surface),
+    )
+
+
+def sharp_edges(nodes: Array, triangles: IntArray) -> IntArray:
+    """Return the sharp edges of a surface, (n_lines, 2)."""
+    ends, _, is_sharp = surface_edges(nodes, triangles)
+    return ends[is_sharp]
+
+
+def thinned_surface(nodes: Array, triangles: IntArray, most: int = MOST_TRIANGLES) -> IntArray:
+    """Return at most about `most` triangles between nodes of the given ones, (n_tri, 3)."""
+    if len(triangles) <= most:
+        return triangles
+    import pyvista as pv
+
+    faces = np.hstack([np.full((len(triangles), 1), 3), triangles])
+    mesh = pv.PolyData(nodes, faces.ravel())
+    mesh.point_data["node"] = np.arange(len(nodes))
+    thin = mesh.clean().decimate_pro(1 - most / len(triangles), preserve_topology=False)
+    of_point = np.asarray(thin.point_data["node"]).round().astype(np.int64)
+    return np.asarray(of_point[thin.faces.reshape(-1, 4)[:, 1:]])
+
+
+def stiffness_lines(body: FEBody) -> IntArray:
+    """Return pairs of nodes that a stiffness joins, (n_lines, 2): the elements of a body of beams or springs."""
+    rows = whole_matrix(body.K).tocoo()
+    node = body.dofs[:, 0]
+    a, b = node[rows.row], node[rows.col]
+    pairs = np.unique(np.stack([a, b], axis=1)[a < b], axis=0)
+    has_length = np.linalg.norm(body.nodes[pairs[:, 0]] - body.nodes[pairs[:, 1]], axis=1) > 0 if len(pairs) else []
+    pairs = pairs[has_length] if len(pairs) else pairs
+    return pairs[:MOST_LINES].astype(np.int64)
+
+
+# mode sets of a comparison as tasks: a worker makes the body and its families once, and judges many parts with them
+# What a part gives does not depend on those that its worker judged before.
+
+
+@dataclass(frozen=True, eq=False)
+class SetTask:
+    """A mode set with some of the numbers of modes."""
+
+    name: str
+    options: Mapping[str, Any]
+    counts: tuple[int, ...]
+
+
+class SetJudge:
+    """The function that judges a task; the body and all that follows from it stay in the worker for the next one.
+
+    Parameters
+    ----------
+    source
+        Makes the coupled body; can be sent to another process.
+    cache
+        Full path of the file with the solution of the full model.
+    digest
+        Of that solution.
+    question
+        Key of the question that it answers.
+    damping
+        Ratio of every mode in response and motion.
+    """
+
+    def __init__(self, source: Callable[[], FEBody], cache: str, digest: str, question: str, damping: float) -> None:
+        self.given = (source, cache, digest, question, damping)
+        self.made: tuple[Families, ReferenceBasis, Reference] | None = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return SetJudge, self.given
+
+    def __call__(self, task: SetTask) -> SetPart:
+        """Return a part of a set, judged."""
+        if self.made is None:
+            self.made = self.make()
+        self.made[0].forget_vibration_modes()
+        return set_part(task.name, dict(task.options), task.counts, *self.made)
+
+    def make(self) -> tuple[Families, ReferenceBasis, Reference]:
+        """Return families of the body, the basis of the reference, and the reference."""
+        source, cache, digest, question, damping = self.given
+        body = source()
+        if reference_digest(body, question) != digest:
+            raise WorkerError("a worker makes another body of the same job; let all workers share the files of the job")
+        full = read_full_model(Path(cache), digest)
+        if full is None:
+            raise WorkerError(f"{cache}: it has changed since this comparison began; start it again")
+        families = Families(body)
+        return families, reference_basis(families, full), reference_of(families, full, damping)
+
+
+def reference_basis(families: Families, full: FullModel) -> ReferenceBasis:
+    """Return the basis that all sets share."""
+    ports = Ports.of_body(families.body)
+    return ReferenceBasis(families, ports, full.columns, full.rigid.shape[1], float(full.omega2[0]))
+
+
+def set_results(
+    judge: SetJudge,
+    options: Mapping[str, Mapping[str, Any]],
+    counts: Sequence[int],
+    workers: Workers,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[SetResult]:
+    """Return the results of all sets, whose parts are tasks for workers."""
+    tasks = [SetTask(name, extra, part) for name, extra in options.items() for part in counts_of_parts(name, counts)]
+    with tasks_of(workers, len(tasks), threads=None) as where:
+        parts = where.map(judge, tasks, progress=progress, files=[os.path.abspath(judge.given[1])])
+    return [
+        joined_parts(name, [part for task, part in zip(tasks, parts, strict=True) if task.name == name])
+        for name in options
+    ]

@@ -1,9 +1,9 @@
 from .correlate import Correlation as Correlation
 from .correlate import Pairing as Pairing
+from .correlate import comac as comac
 from .correlate import correlate as correlate
-from .criteria import comac as comac
-from .criteria import mac as mac
-from .criteria import orthogonality as orthogonality
+from .correlate import mac as mac
+from .correlate import orthogonality as orthogonality
 from .damping_fit import DampingFit as DampingFit
 from .damping_fit import fit_damping as fit_damping
 from .errors import CorrelationError as CorrelationError

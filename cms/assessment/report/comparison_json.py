@@ -1,13 +1,17 @@
 """A comparison as JSON: every number the other reports show, in plain types."""
 
+import csv
+import io
 import json
+import math
 from dataclasses import asdict
 from typing import Any
 
 from cms.assessment.compare.comparison import Comparison, Point, SetResult
 from cms.assessment.quality.record import plain
 
-__all__ = ["FORMAT", "comparison_json", "comparison_record"]
+__all__ = ["FORMAT", "comparison_csv", "comparison_json", "comparison_record"]
+
 
 FORMAT = "cms-comparison"
 VERSION = 1
@@ -64,3 +68,32 @@ def point_record(point: Point) -> dict[str, Any]:
         "is_good": point.is_good,
         "records": [record.as_dict() for record in point.records],
     }
+
+
+# A comparison as CSV: one row for every set and number of modes -------------------------------------------------------
+
+
+def comparison_csv(comparison: Comparison) -> str:
+    """Return the values of all records as CSV, comma-separated, with one heading row; non-finite values are empty.
+
+    A set that could not be made has one row, with the reason as its verdict.
+    """
+    names = list(
+        dict.fromkeys(record.name for result in comparison.sets for p in result.points for record in p.records)
+    )
+    text = io.StringIO(newline="")
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(["set", "n_modes", "n_columns", "n_coordinates", "n_dropped", "verdict", *names])
+    for result in comparison.sets:
+        if not result.points:
+            table.writerow([result.name, "", "", "", "", result.sentence, *[""] * len(names)])
+        for point in result.points:
+            values = {record.name: record.value for record in point.records}
+            table.writerow(
+                [
+                    result.name, point.n_modes, point.n_columns, point.n_q, len(point.dropped),
+                    "good enough" if point.is_good else "not good enough",
+                    *[repr(values[n]) if n in values and math.isfinite(values[n]) else "" for n in names],
+                ]
+            )  # fmt: skip
+    return text.getvalue()

@@ -1,7 +1,7 @@
 """A body from what the files of another program say: rows find their nodes, then they pass the gate of free bodies."""
 
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -21,7 +21,7 @@ from fe_models.meshes.mesh_numbering import node_sets, solid_numbering
 from fe_models.meshes.node_cloud import NodeCloud
 from fe_models.meshes.numbering import Numbering
 
-__all__ = ["body_from_foreign", "nodes_of", "with_geometry", "without_supports"]
+__all__ = ["MatrixReport", "body_from_foreign", "nodes_of", "with_geometry", "without_supports"]
 
 
 # supports taken out of a stiffness, where the rows of what they hold exist --------------------------------------------
@@ -262,3 +262,31 @@ def numbers_of(geometry: Mesh | NodeCloud) -> IntArray:
 def where_of(read: ForeignMatrices) -> str:
     """Return the beginning of a message: the files."""
     return f"matrices {', '.join(read.files) or 'in memory'}"
+
+
+# what was read of matrices, for the user: files, rows, which triangle, what was assumed -------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class MatrixReport:
+    """Numbers and notes of matrices that were read, shown before they are judged."""
+
+    read: ForeignMatrices
+
+    @property
+    def title(self) -> str:
+        """Head of the table."""
+        return "Matrices"
+
+    def rows(self) -> list[tuple[str, str]]:
+        """Return (what, value) of a table."""
+        read = self.read
+        rows = [("files", ", ".join(path.rpartition("/")[2] for path in read.files))]
+        rows += [("program", read.program)] if read.program else []
+        nodes = "" if read.dofs is None else f" of {len(np.unique(read.dofs[:, 0]))} nodes"
+        rows.append(("rows", f"{read.n_dof}{nodes}"))
+        for role in ROLES:
+            if (matrix := getattr(read, role)) is not None:
+                rows.append((role, f"{matrix.nnz} entries, stored: {read.triangle.get(role, 'both')}"))
+        rows += [("load", name) for name in read.loads]
+        return rows + [("note", note) for note in read.notes]

@@ -7,22 +7,381 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.linalg as la
 
-from fe_models.foundation.arrays import Array
-from floatframe.analyses.equilibrium import LARGEST_TURN, Equilibrium, largest_motion, notes_at, worst_body
-from floatframe.analyses.steady.carrier import Carrier, carried
-from floatframe.analyses.steady.equations import Equations, Family, Place, Step, Trial, timed
-from floatframe.analyses.steady.path import path_of, require_body, spins_of
+from fe_models.foundation.arrays import Array, IntArray
+from floatframe.analyses.equilibrium import (
+    CLOSED,
+    LARGEST_TURN,
+    Equilibrium,
+    forces_at_work,
+    largest_motion,
+    notes_at,
+    size_of,
+    worst_body,
+)
+from floatframe.analyses.steady.carrier import Carrier, Spin, by_carrier, by_spin, carried
+from floatframe.analyses.steady.path import Path, path_of, require_body, spins_of
+from floatframe.analyses.system_matrices import turning_matrices
+from floatframe.engine.compiling.callbacks import raise_errors_of
 from floatframe.engine.compiling.file_frames import motion_of_file
-from floatframe.engine.compiling.system import compiled_system
-from floatframe.engine.initial_conditions.initial import assembled, checked, known_of, start_unknowns
-from floatframe.engine.kernels.work import new_work
+from floatframe.engine.compiling.system import CompiledSystem, compiled_system
+from floatframe.engine.initial_conditions.initial import assembled, checked, known_of, require_numbers, start_unknowns
+from floatframe.engine.initial_conditions.newton_equations import (
+    Linearized,
+    displaced,
+    in_ground_axes,
+    linearized,
+    set_iterate,
+    with_modal_weight,
+)
+from floatframe.engine.kernels.work import Work, new_work
 from floatframe.errors import ConvergenceError, ModelError
 from floatframe.model.checked_values import unit_vector
+from floatframe.model.joints.rows import is_held, is_held_position
+from floatframe.model.rotations import rotation_matrix, tilde
 from floatframe.model.state import State
 from floatframe.model.system import System
+from floatframe.simulation.stop_events import require_off_stops
 
-__all__ = ["SteadyMotion", "steady_motion"]
+__all__ = ["Equations", "Family", "Place", "SteadyMotion", "Step", "Trial", "steady_motion", "timed"]
+
+
+# the equations of steady running and their derivatives ----------------------------------------------------------------
+# The unknowns are the motions xi of the bodies; the wrenches, multipliers and states w of connections; the speeds s of
+# the spins; the curvature, unless it is given; and open parameters p of the system, such as a steer angle or a torque.
+# With the carrier of `carrier.py`:
+#
+#     (1) every trial (xi, s, curvature) has the velocities and accelerations of the steady motion
+#     (2) residuals: forces f of the bodies, rows g of connections, rates of joint constraints, rates z' of states, and
+#         the distances of the reference body from its point, along and across its path
+#     (3) the linear equations are scaled by rows and columns, and solved by least squares with the smallest norm, so
+#         that motions without resistance (the angle of a wheel on its axle, the position along the road) do not change
+#     (4) the tangent is exact for xi, w, s and the curvature; for p, it is a finite difference
+
+
+SINGULAR = 1e-12  #: singular value of the scaled equations below which a motion has no resistance
+DIFFERENCE = 1e-4  #: finite difference of an open parameter, relative to max(1, its magnitude)
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """A system as a function of its open parameters."""
+
+    system: System | Callable[..., System]
+    start: dict[str, float]
+
+    @property
+    def first(self) -> System:
+        """The system for the initial values of the open parameters."""
+        return self.at(np.array(list(self.start.values()), dtype=float))
+
+    def at(self, p: Array) -> System:
+        """Return the system for open parameters p, (n_p,)."""
+        if isinstance(self.system, System):
+            if self.start:
+                raise ModelError(
+                    f"steady_motion: unknown {sorted(self.start)}: expected a function that returns the system for "
+                    "these parameters, got a system"
+                )
+            return self.system
+        return self.system(**dict(zip(self.start, (float(value) for value in p), strict=True)))
+
+
+def timed(work: Work, t: float) -> Work:
+    """Return the working arrays with another time."""
+    work.state.time[...] = t
+    return work
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluated:
+    """The equations at a trial."""
+
+    parts: Linearized
+    D: Array  #: derivatives of the forces by xi, (n_u, n_u)
+    G: Array  #: derivatives of the rows by xi, (n_w, n_u)
+    C: Array  #: derivatives of the forces by nu, (n_u, n_u)
+    M: Array
+    G_v: Array
+    f: Array  #: unbalanced forces, (n_u,)
+    g: Array  #: rows, (n_w,)
+    rate: Array  #: rates of joint constraints, (n_w,)
+    W: tuple[Array, ...]  #: mass and modal stiffness of each body
+    scale: float  #: norm of the acting forces
+
+    @property
+    def error(self) -> float:
+        """Unbalanced forces, relative to the acting forces."""
+        size = size_of(self.W, self.f)
+        return size / self.scale if self.scale > 0 else size
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """Values of all unknowns."""
+
+    state: State
+    w: Array
+    s: Array
+    carrier: Carrier
+    p: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A trial and its equations."""
+
+    system: System
+    compiled: CompiledSystem
+    work: Work
+    trial: Trial
+    now: Evaluated
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A step of Newton's method."""
+
+    x: Array  #: changes of all unknowns, (n_x,)
+    inverse: Array  #: from the residual to the changes, (n_x, n_rows)
+    sizes: Array  #: typical magnitudes of the unknowns, (n_x,)
+
+    def length(self, x: Array) -> float:
+        """Return the norm of a change, scaled by the magnitudes of the unknowns."""
+        return float(np.linalg.norm(x / self.sizes))
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """The equations of one search."""
+
+    family: Family
+    spins: tuple[Spin, ...]
+    path: Path
+    guided: bool
+    t: float
+
+    def at(self, trial: Trial) -> Place:
+        """Return a trial, corrected to satisfy its joints, with its equations."""
+        system = self.family.at(trial.p)
+        compiled, work = compiled_system(system), timed(new_work(compiled_system(system).model), self.t)
+        if len(trial.w) != int(compiled.model.connections.w0[-1]):
+            raise ModelError("steady_motion: the function returns systems with different connections")
+        require_off_stops(system, trial.w)
+        # open, joints would see by how much a wheel is turned
+        trial = replace(trial, state=assembled(compiled, work, trial.state, trial.w))
+        return Place(system, compiled, work, trial, self.evaluated(compiled, work, trial))
+
+    def moved(self, here: Place, x: Array) -> Trial:
+        """Return a trial after the changes x of its unknowns."""
+        trial, model = here.trial, here.compiled.model
+        _, unknowns, _ = self.used_rows(here.compiled)
+        n_u, n_s = len(here.now.f), len(self.spins)
+        y, dw, rest = x[:n_u], np.zeros(len(trial.w)), x[n_u + len(unknowns) :]
+        dw[unknowns] = x[n_u : n_u + len(unknowns)]
+        omega = trial.carrier.omega
+        if self.path.is_open:
+            omega = omega + rest[n_s] * self.path.speed * self.path.axis
+        return Trial(
+            displaced(model, trial.state, in_ground_axes(model, trial.state, y)),
+            trial.w + dw,
+            trial.s + rest[:n_s],
+            replace(trial.carrier, omega=omega),
+            trial.p + rest[len(rest) - len(trial.p) :],
+        )
+
+    def change(self, here: Place, x: Array) -> float:
+        """Return the largest of the changes x, relative to the magnitudes of the unknowns."""
+        trial, model, length = here.trial, here.compiled.model, here.compiled.length
+        after = self.moved(here, x)
+        dw, of_states = after.w - trial.w, np.concatenate([model.states.row, model.laws.equation]).astype(int)
+        sizes = np.maximum(np.concatenate([model.states.size, model.laws.equation_size]), np.abs(trial.w[of_states]))
+        own = np.zeros(len(dw), dtype=bool)
+        own[of_states] = True
+        turning = float(np.linalg.norm(after.carrier.omega - trial.carrier.omega))
+        changes = [
+            largest_motion(here.compiled, x[: len(here.now.f)]),
+            largest(dw[~own]) / max(largest(trial.w[~own]), 1e-300),
+            largest(dw[of_states] / sizes),
+            largest(after.s - trial.s) / max(largest(trial.s), 1e-300),
+            turning * length / max(self.path.speed, 1e-300),
+            largest((after.p - trial.p) / np.maximum(np.abs(trial.p), 1.0)),
+        ]
+        return float(max(changes))
+
+    def evaluated(self, compiled: CompiledSystem, work: Work, trial: Trial) -> Evaluated:
+        """Return the residuals (2) with their derivatives by motions."""
+        from floatframe.engine.kernels.entry import rates_of_constraints
+
+        model = compiled.model
+        state, u_dot = carried(model, trial.state, trial.carrier, self.spins, trial.s)
+        set_iterate(work, state, u_dot, trial.w)
+        rate, _ = rates_of_constraints(model, work)
+        mass = linearized(model, work, 1.0, 0.0, 0.0).H
+        by_both = linearized(model, work, 0.0, 1.0, 1.0)
+        parts = linearized(model, work, 0.0, 0.0, 1.0)
+        raise_errors_of(compiled.callbacks)
+        require_numbers(compiled, work)
+        K, M = la.block_diag(*parts.H), la.block_diag(*mass)
+        C = la.block_diag(*by_both.H) - K
+        G_x = parts.G.toarray()
+        G_v = by_both.G.toarray() - G_x
+        Omega, Omega_t = turning_matrices(model, work, trial.carrier.omega)
+        W = with_modal_weight(model, mass)
+        f = work.bodies.residual.copy()
+        # forces in carrier axes do not change if a body rotates
+        D = K + C @ Omega + M @ Omega_t @ Omega - turned_forces(compiled, f)
+        return Evaluated(
+            parts, D, G_x + G_v @ Omega, C, M, G_v, f, work.connections.g.copy(), rate, W,
+            forces_at_work(compiled, work, parts, W),
+        )  # fmt: skip
+
+    def fastest(self, trial: Trial) -> float:
+        """Return the speed of the system, or of its fastest spin if it stands, in system sizes per unit of time."""
+        return self.path.speed or float(np.abs(trial.s).max(initial=0.0)) or 1.0
+
+    def used_rows(self, compiled: CompiledSystem) -> tuple[IntArray, IntArray, IntArray]:
+        """Return the rows that are equations, the unknowns of connections, and the rows that constrain positions."""
+        model = compiled.model
+        n_w = int(model.connections.w0[-1])
+        steps, rates = np.zeros(n_w, dtype=bool), np.zeros(n_w, dtype=bool)
+        steps[model.states.row] = steps[model.states.row + 2] = True  # these rows are equations of time integration
+        rates[model.states.row + 1] = rates[model.states.row + 2] = True  # these unknowns are zero
+        return np.flatnonzero(~steps), np.flatnonzero(~rates), np.flatnonzero(is_held_position(model.rows.kind))
+
+    def gauges(self, compiled: CompiledSystem, trial: Trial) -> tuple[Array, Array]:
+        """Return the distances of the reference body from its point, ahead and aside, and their derivatives by xi."""
+        i, n_u = self.path.body, int(compiled.model.bodies.u0[-1])
+        u0 = int(compiled.model.bodies.u0[i])
+        directions = [] if not self.path.speed else [self.path.ahead]
+        if directions and not self.guided:
+            directions.append(self.path.aside)
+        rows, toward = np.zeros((len(directions), n_u)), np.array(directions).reshape(-1, 3)
+        rows[:, u0 : u0 + 3] = toward @ rotation_matrix(trial.state.p[i])
+        return toward @ (trial.state.r[i] - self.path.point), rows
+
+    def residual(self, here: Place) -> Array:
+        """Return the negative residuals (2)."""
+        rows, _, held = self.used_rows(here.compiled)
+        gap, _ = self.gauges(here.compiled, here.trial)
+        return -np.concatenate([here.now.f, here.now.g[rows], here.now.rate[held], gap])
+
+    def step(self, here: Place) -> Step:
+        """Return the step (3) of xi, w, s, curvature and p."""
+        compiled, work, trial, now = here.compiled, here.work, here.trial, here.now
+        model = compiled.model
+        rows, unknowns, held = self.used_rows(compiled)
+        gap, by_gap = self.gauges(compiled, trial)
+        n_u = len(now.f)
+        others = [by_spin(model, work, trial.carrier.omega, spin) for spin in self.spins]
+        if self.path.is_open:
+            others.append(by_carrier(model, work, trial.carrier, self.path.speed * self.path.axis))
+        G_x = now.parts.G.toarray()
+        columns = [
+            np.concatenate([now.C @ nu + now.M @ eta, (now.G_v @ nu)[rows], (G_x @ nu)[held], np.zeros(len(gap))])
+            for nu, eta in others
+        ]
+        columns += self.by_numbers(trial, now, rows, held, len(gap))
+        J, V = now.parts.J.toarray(), now.parts.V.toarray()
+        A = np.zeros((n_u + len(rows) + len(held) + len(gap), n_u + len(unknowns) + len(columns)))
+        A[:n_u, :n_u], A[n_u : n_u + len(rows), :n_u] = now.D, now.G[rows]
+        A[len(A) - len(gap) :, :n_u] = by_gap
+        A[:n_u, n_u : n_u + len(unknowns)] = -J.T[:, unknowns]
+        A[n_u : n_u + len(rows), n_u : n_u + len(unknowns)] = V[np.ix_(rows, unknowns)]
+        if columns:
+            A[:, n_u + len(unknowns) :] = np.stack(columns, axis=1)
+        sizes = self.sizes(compiled, trial, now, unknowns)
+        of_rows = np.zeros(len(A))  # rates that depend on no spin are rounding errors
+        of_rows[n_u + len(rows) : len(A) - len(gap)] = (
+            np.abs(G_x[held]) @ sizes[:n_u] * self.fastest(trial) / compiled.length
+        )
+        inverse, sizes = smallest_inverse(A, of_rows, sizes, len(trial.p))
+        return Step(inverse @ self.residual(here), inverse, sizes)
+
+    def sizes(self, compiled: CompiledSystem, trial: Trial, now: Evaluated, unknowns: IntArray) -> Array:
+        """Return typical magnitudes of the unknowns of a step."""
+        model = compiled.model
+        motions = np.ones(len(now.f))
+        force = max(float(np.abs(trial.w).max(initial=0.0)), weight_of(now), 1e-300)
+        for i, u0 in enumerate(model.bodies.u0[:-1]):
+            motions[u0 : u0 + 3] = compiled.length
+            modal = np.diag(now.W[i])[6:]
+            motions[u0 + 6 : u0 + 6 + len(modal)] = np.sqrt(now.W[i][0, 0] / modal) * compiled.length
+        w = np.full(len(now.g), force)
+        w[model.states.row] = np.maximum(model.states.size, np.abs(trial.w[model.states.row]))
+        w[model.laws.equation] = model.laws.equation_size
+        speed = self.fastest(trial) / compiled.length
+        others = [*(speed,) * len(self.spins), *(1 / compiled.length,) * self.path.is_open]
+        return np.concatenate([motions, w[unknowns], others, np.maximum(np.abs(trial.p), 1.0)])
+
+    def by_numbers(self, trial: Trial, now: Evaluated, rows: IntArray, held: IntArray, n_gaps: int) -> list[Array]:
+        """Return the derivatives by the open parameters, step (4)."""
+        columns = []
+        for k, value in enumerate(trial.p):
+            h = DIFFERENCE * max(abs(value), 1.0)
+            p = trial.p.copy()
+            p[k] += h
+            compiled = compiled_system(self.family.at(p))
+            work = timed(new_work(compiled.model), self.t)
+            after = self.evaluated(compiled, work, replace(trial, p=p))
+            # rates are evaluated after the joints are satisfied again, as for motions
+            parts = [after.f - now.f, (after.g - now.g)[rows], np.zeros(len(held) + n_gaps)]
+            columns.append(np.concatenate(parts) / h)
+        return columns
+
+    def is_closed(self, here: Place) -> bool:
+        """Whether joint constraints and their rates are satisfied."""
+        holds, length, now = is_held(here.compiled.model.rows.kind), here.compiled.length, here.now
+        gap = largest(now.g[holds]) / max(length, 1.0)
+        return max(gap, largest(now.rate) / max(self.path.speed, self.path.speed / length, 1.0)) <= CLOSED
+
+
+def largest(values: Array) -> float:
+    """Return the largest magnitude of values; 0 if there are none."""
+    return float(np.abs(values).max(initial=0.0))
+
+
+def weight_of(now: Evaluated) -> float:
+    """Return a typical force in the system."""
+    return now.scale * np.sqrt(float(sum(block[0, 0] for block in now.W)))
+
+
+def turned_forces(compiled: CompiledSystem, f: Array) -> Array:
+    """Return the derivative of forces f on the bodies (body axes) that rotate with the bodies, (n_u, n_u)."""
+    by_turn = np.zeros((len(f), len(f)))
+    for u0 in compiled.model.bodies.u0[:-1]:
+        for k in (u0, u0 + 3):
+            by_turn[k : k + 3, u0 + 3 : u0 + 6] = tilde(f[k : k + 3])
+    return by_turn
+
+
+def smallest_inverse(A: Array, rows: Array, columns: Array, n_p: int) -> tuple[Array, Array]:
+    """Return the matrix from b to the smallest x with least |A x - b|, and the magnitudes of x.
+
+    Parameters
+    ----------
+    A
+        Coefficients, (n_rows, n_x).
+    rows
+        Smallest magnitudes of rows, (n_rows,); rows are scaled to one.
+    columns
+        Magnitudes of the unknowns, (n_x,). Those of the last n_p are computed from A.
+    n_p
+        Number of open parameters.
+    """
+    others = slice(None, A.shape[1] - n_p)
+    size = np.maximum(np.abs(A[:, others] * columns[others]).max(axis=1, initial=0.0), rows)
+    by = 1 / np.where(size > 0, size, np.maximum(np.abs(A).max(axis=1, initial=0.0), 1e-300))
+    of_numbers = np.abs(by[:, None] * A[:, len(columns) - n_p :]).max(axis=0, initial=0.0)
+    columns = columns.copy()
+    columns[len(columns) - n_p :] = 1 / np.where(of_numbers > 0, of_numbers, 1.0)
+    inverse = la.pinv(by[:, None] * A * columns, rtol=SINGULAR)
+    return columns[:, None] * inverse * by, columns
+
+
+# steady running: the state of a vehicle that runs straight or in a circle without any change in the moving frame ------
+
 
 SETTLED = 1e-7  #: last change of all unknowns, relative to their magnitudes
 STUCK = 1e-4  #: change of all unknowns, relative to their magnitudes, below which a constant residual ends the search

@@ -1,43 +1,197 @@
 """From the description of a system to the records of the kernels."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
+from cms.body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.engine.compiling.bodies import body_types, integers, offsets, type_arrays
 from floatframe.engine.compiling.callbacks import Callback
 from floatframe.engine.compiling.connections import Connections as ConnectionLists
-from floatframe.engine.compiling.connections import add_joint, add_spring
+from floatframe.engine.compiling.connections import End, add_joint, add_spring
 from floatframe.engine.compiling.coordinate_elements import add_coordinate_elements
 from floatframe.engine.compiling.counted_angles import CountedAngle, angle_records, counted_angles, first_angles
 from floatframe.engine.compiling.elimination_order import plan_elimination
 from floatframe.engine.compiling.forces import Functions, body_loads, joint_forces
-from floatframe.engine.compiling.gaps import gap_record
-from floatframe.engine.compiling.lines import Lines, add_sliding
 from floatframe.engine.compiling.markers import (
     find_marker,
+    joint_markers,
     marker_bending,
     marker_pose,
     marker_shapes,
     n_q_of,
 )
-from floatframe.engine.compiling.mass_checks import require_inertia
 from floatframe.engine.compiling.pair_forces import add_pair_laws
 from floatframe.engine.compiling.public_elements import PlacedLaw, add_public_elements
-from floatframe.engine.kernels.model import Bodies, BodyTypes, Connections, JointRows, Loads, Markers, Model, Springs
-from floatframe.engine.kernels.records import filled
+from floatframe.engine.kernels import model
+from floatframe.engine.kernels.model import (
+    CONTACT,
+    JOINT,
+    Bodies,
+    BodyTypes,
+    Connections,
+    Contacts,
+    Gaps,
+    JointRows,
+    Loads,
+    Markers,
+    Model,
+    Springs,
+)
+from floatframe.engine.kernels.records import filled, of_items
+from floatframe.errors import ModelError
 from floatframe.model.bodies.flexible_body import FlexibleBody
+from floatframe.model.bodies.marker_shape import MarkerShape
+from floatframe.model.bodies.markers import Marker, body_name
 from floatframe.model.bodies.mean_axes import FrameMotion, MeanAxes
+from floatframe.model.bodies.rigid_body import RigidBody
 from floatframe.model.forces import Gravity, PointForce, SpringDamper
 from floatframe.model.functions.time_functions import TimeFunction
-from floatframe.model.joints.rows import kind_of
-from floatframe.model.joints.sliding import SlidingJoint
-from floatframe.model.rotations import euler_parameters
+from floatframe.model.joints.rows import MOMENT, NO_MOMENT, kind_of
+from floatframe.model.joints.sliding import SlidingJoint, line_triad
+from floatframe.model.rotations import euler_parameters, rotation_matrix
 from floatframe.model.state import State
 from floatframe.model.system import System
 
-__all__ = ["CompiledSystem", "compiled_system"]
+__all__ = ["CompiledSystem", "Lines", "add_sliding", "compiled_system", "gap_record", "require_inertia"]
+
+
+# sliding joints as the kernels see them: their lines, stations and sliding markers ------------------------------------
+
+
+@dataclass
+class Lines:
+    """Lists over the lines, and over their stations."""
+
+    marker: list[int] = field(default_factory=list)
+    row: list[int] = field(default_factory=list)
+    axis: list[Array] = field(default_factory=list)
+    counts: list[int] = field(default_factory=list)
+    s: list[float] = field(default_factory=list)
+    station: list[int] = field(default_factory=list)
+
+    def records(self) -> dict[str, Any]:
+        """Return the parts of the model."""
+        return {
+            "lines": filled(
+                model.Lines(),
+                marker=self.marker,
+                other=[m + 1 for m in self.marker],
+                row=self.row,
+                axis=self.axis,
+                station0=offsets(integers(self.counts)),
+            ),
+            "stations": filled(model.Stations(), s=self.s, marker=self.station),
+        }
+
+    def of_markers(self, n_markers: int) -> IntArray:
+        """Return the line along which each marker slides, -1 for none."""
+        line = np.full(n_markers, -1, np.int64)
+        line[self.marker] = np.arange(len(self.marker))
+        return line
+
+
+def add_sliding(system: System, made: ConnectionLists, lines: Lines, joint: SlidingJoint) -> None:
+    """Add a sliding joint, the markers of its stations and its line."""
+    where = f"joint {joint.name!r}"
+    first, b = joint_markers(system, joint, made.placed)
+    name = body_name(joint.marker_a.body)
+    if not isinstance(system.body(name), FlexibleBody):
+        raise ModelError(f"{where}: body {name!r} is not flexible; take a prismatic joint or a point on a line")
+    stations = [find_marker(system, f"{where}: line", Marker(name, station)) for station in joint.stations]
+    s, triad = line_triad(where, np.array([m.shape.position for m in stations]), joint.normal)
+    _, A_b = marker_pose(b, made.placed, made.n_q)
+    A_line = rotation_matrix(made.placed.p[first.body]) @ triad
+    assert first.shape.psi is not None
+    sliding = replace(first, shape=MarkerShape(stations[0].shape.position, triad, np.array(first.shape.psi)))
+    rows = joint.rows(A_line, A_b, np.zeros(3))
+    ends = (
+        End(sliding, 1.0, moment=MOMENT if joint.is_aligned else NO_MOMENT),
+        End(b, -1.0, moment=joint.moment_b),
+    )
+    marker, row = made.add(joint.name, JOINT, ends, rows, has_rates=False)
+    lines.marker.append(marker)
+    lines.row.append(row + 2 if joint.motions else -1)
+    lines.axis.append(triad[:, 0])
+    lines.counts.append(len(stations))
+    lines.s += list(s)
+    lines.station += [made.add_marker(station) for station in stations]
+
+
+# whether every body can be accelerated: mass, inertia about every axis, and mass or stiffness of every mode -----------
+# Bodies are eliminated one by one, each by its own matrix, so that none may be without inertia, joints or not.
+
+
+NO_INERTIA = 1e-13  #: smallest principal moment by the largest one that is none
+
+
+def require_inertia(bodies: Sequence[RigidBody | FlexibleBody]) -> None:
+    """Raise `ModelError` naming a body that some motion of its own would move without force.
+
+    That is a rigid body, or a beam without thickness, that has no moment of inertia about an axis, and a mode that
+    has neither mass nor stiffness.
+    """
+    checked: list[ReducedBody] = []
+    for body in bodies:
+        if isinstance(body, RigidBody):
+            require_moments(f"rigid body {body.name!r}", body.inertia)
+        elif not any(body.reduced is other for other in checked):
+            checked.append(body.reduced)
+            where = f"flexible body {body.name!r}"
+            moments = body.reduced.moments
+            c = moments.S / moments.m
+            require_moments(where, moments.J0 - moments.m * (c @ c * np.eye(3) - np.outer(c, c)))
+            require_modes(where, body.reduced)
+
+
+def require_moments(where: str, inertia: Array) -> None:
+    """Raise `ModelError` with the axis about which an inertia tensor about the centre of mass has no moment."""
+    moments, axes = np.linalg.eigh(0.5 * (inertia + inertia.T))
+    if moments[0] > NO_INERTIA * moments[-1]:
+        return
+    axis = axes[:, 0] * np.sign(axes[np.argmax(np.abs(axes[:, 0])), 0])
+    direction = ", ".join(f"{value:.3g}" for value in axis + 0.0)
+    raise ModelError(
+        f"{where}: it has no inertia about its axis [{direction}]: expected a moment above zero, got {moments[0]:.3g} "
+        f"beside {moments[-1]:.3g}; nothing would resist its turning. Give the moment of its real thickness (m r²/2 "
+        "for a round rod of radius r), or leave a rod without mass out: a distance joint is one"
+    )
+
+
+def require_modes(where: str, reduced: ReducedBody) -> None:
+    """Raise `ModelError` with the first mode that has neither mass nor stiffness."""
+    mass, stiffness = np.diag(reduced.M), np.diag(reduced.K)
+    nothing = np.flatnonzero((mass <= 0) & (stiffness <= 0))
+    if len(nothing):
+        k = int(nothing[0])
+        raise ModelError(
+            f"{where}: mode {k + 1} ({reduced.labels[k]}) has neither mass nor stiffness, so that any force would move "
+            "it without end; reduce the body again, or leave the mode out"
+        )
+
+
+# gaps between bodies that meet, as the kernels see them ---------------------------------------------------------------
+
+
+def gap_record(made: ConnectionLists, contacts: Contacts, laws: Sequence[PlacedLaw]) -> Gaps:
+    """Return the gaps of all contacts, then those that elements name."""
+    gaps = []
+    for c in (c for c, law in enumerate(made.law) if law == CONTACT):
+        i = made.item[c]
+        numbers = {"stiffness": contacts.stiffness[i], "exponent": contacts.exponent[i]}
+        gaps.append({"connection": c, "output": -1} | numbers)
+    for placed in laws:
+        for name, spring in placed.law.gaps.items():
+            numbers = {"stiffness": spring.stiffness, "exponent": spring.exponent}
+            gaps.append({"connection": placed.connection, "output": placed.law.outputs.index(name)} | numbers)
+    return of_items(Gaps(), gaps)
+
+
+# from the description of a system to the records of the kernels -------------------------------------------------------
+
 
 KEPT = "_compiled"  #: attribute of a system that keeps what was compiled
 

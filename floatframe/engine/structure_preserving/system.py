@@ -44,16 +44,14 @@ from floatframe.engine.structure_preserving.forces import (
 from floatframe.engine.structure_preserving.functions import value_of
 from floatframe.engine.structure_preserving.markers import BodyMarker, Load, MarkerStep, body_marker, marker_step
 from floatframe.engine.structure_preserving.public_elements import (
+    add_height_reaction,
+    add_roll_reaction,
     element_load,
     element_rates,
     element_states,
     element_values,
-    multiplier_rows,
-)
-from floatframe.engine.structure_preserving.rolling import (
-    add_height_reaction,
-    add_roll_reaction,
     height_value,
+    multiplier_rows,
     roll_value,
 )
 from floatframe.errors import ModelError

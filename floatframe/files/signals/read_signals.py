@@ -1,22 +1,23 @@
 """Measured signals from files: text tables, MATLAB, RPC III."""
 
 import os
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.paths import is_stream, near_file
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import SignalError
 from floatframe.files.signals.csv_file import RawTable, read_csv
-from floatframe.files.signals.gaps import without_gaps
 from floatframe.files.signals.mat_file import read_mat
 from floatframe.files.signals.rpc_file import read_rpc
 from floatframe.files.signals.signal_units import signal_unit
-from floatframe.files.signals.signals import Signals
+from floatframe.files.signals.signals import Signals, equidistant_step
 
-__all__ = ["SIGNAL_FORMATS", "read_signals"]
+__all__ = ["SIGNAL_FORMATS", "read_signals", "without_gaps"]
+
 
 SIGNAL_FORMATS = {
     ".csv": "text", ".txt": "text", ".asc": "text", ".dat": "text", ".tsv": "text", ".mat": "MATLAB",
@@ -134,3 +135,180 @@ def times_of(
 def is_time(name: str) -> bool:
     """Return whether the name of a variable denotes time."""
     return name.rpartition(".")[2].lower() in ("t", "time", "times", "zeit")
+
+
+# gaps in measured histories: times that do not increase, changing steps, missing or invalid samples -------------------
+# Each is refused in one message with the place in the file; gaps up to a stated length are filled by interpolation, and
+# said.
+
+
+FEW = 20  #: number of samples below which unequal steps count as intended
+MOST_STEPS = 4  #: largest number of different steps that count as a change of rate; more are an adaptive step
+COMMON = 0.9  #: fraction of equal steps above which the other steps are gaps
+MOST_COUNTED = 1e12  #: largest number of samples in a gap
+ALIKE = 0.02  #: relative difference of equal steps, due to rounded times
+
+
+def without_gaps(
+    time: Array,
+    values: Array,
+    names: Sequence[str],
+    place: Callable[[int], str],
+    *,
+    fill: float = 0.0,
+    uneven: bool = False,
+) -> tuple[Array, Array, tuple[str, ...]]:
+    """Return times and values without gaps, and notes on what was done.
+
+    Parameters
+    ----------
+    time
+        (n_t,) [s], as read; NaN where it is missing.
+    values
+        (n_t, n_channels), NaN where a sample is missing.
+    names
+        Of the channels.
+    place
+        Words for the place of sample k in the file, such as "road.csv, line 17".
+    fill
+        Longest gap that is filled by a monotone cubic (PCHIP) between the samples beside it [s].
+    uneven
+        Let steps of several sizes stand.
+
+    Raises
+    ------
+    SignalError
+        For the first gap that is longer, with its place.
+    """
+    time, values = np.array(time, dtype=float), np.array(values, dtype=float)
+    require_rising(time, place)
+    step = usual_step(time)
+    notes: list[str] = []
+    if step is not None and equidistant_step(time) is None:
+        lost = np.flatnonzero(np.diff(time) > (1 + 10 * ALIKE) * step)
+        require_whole_steps(time, lost, step, place, uneven=uneven)
+        if not uneven or fill > 0:
+            time, values, told = with_lost_samples(time, values, step, fill, place)
+            notes += told
+    elif step is None and not uneven:
+        require_one_rate(time, place)
+    values, told = with_numbers(time, values, names, fill, place)
+    return time, values, (*notes, *told)
+
+
+def require_rising(time: Array, place: Callable[[int], str]) -> None:
+    """Raise `SignalError` at the first time that is not a number, or does not increase."""
+    bad = np.flatnonzero(~np.isfinite(time))
+    if len(bad):
+        raise SignalError(f"{place(int(bad[0]))}: the time is missing or no number; expected rising times")
+    bad = np.flatnonzero(np.diff(time) <= 0)
+    if len(bad):
+        k = int(bad[0]) + 1
+        more = f" ({len(bad)} such places)" if len(bad) > 1 else ""
+        raise SignalError(
+            f"{place(k)}: expected times that rise, got {time[k]:.9g} after {time[k - 1]:.9g}{more}; is this column "
+            f"the "
+            "time? A table without times needs its rate"
+        )
+
+
+def usual_step(time: Array) -> float | None:
+    """Return the step of nearly all samples; None if there is none."""
+    if len(time) < FEW:
+        return None
+    dt = np.diff(time)
+    step = float(np.median(dt))
+    alike = np.abs(dt - step) <= ALIKE * step
+    return float(dt[alike].mean()) if alike.mean() >= COMMON else None
+
+
+def require_whole_steps(time: Array, lost: IntArray, step: float, place: Callable[[int], str], *, uneven: bool) -> None:
+    """Raise `SignalError` where a step is not a multiple of the usual step, because the rate changes there."""
+    dt = np.diff(time)
+    odd = np.flatnonzero((np.abs(dt - step) > 10 * ALIKE * step) & (np.abs(dt / step - np.round(dt / step)) > 0.1))
+    if len(odd) and not uneven:
+        k = int(odd[0])
+        raise SignalError(
+            f"{place(k + 1)}: the step is {dt[k]:.6g} s, elsewhere {step:.6g} s, and no multiple of it ({len(odd)} "
+            f"such "
+            "places); resample it (resample = ..., or uneven steps allowed)"
+        )
+
+
+def with_lost_samples(
+    time: Array, values: Array, step: float, fill: float, place: Callable[[int], str]
+) -> tuple[Array, Array, list[str]]:
+    """Return times with the missing samples inserted, and NaN as their values."""
+    counts = np.minimum(np.round(np.diff(time) / step), MOST_COUNTED).astype(np.int64)
+    wide = np.flatnonzero(counts > 1)
+    if not len(wide):
+        return time, values, []
+    longest = int(wide[np.argmax(counts[wide])])
+    length = float(time[longest + 1] - time[longest])
+    n_lost = int((counts[wide] - 1).sum())
+    if length > fill * (1 + 1e-9):
+        k = next(int(i) for i in wide if time[i + 1] - time[i] > fill * (1 + 1e-9))
+        raise SignalError(
+            f"{place(k + 1)}: samples are missing between t = {time[k]:.9g} and {time[k + 1]:.9g} s, at steps of "
+            f"{step:.6g} s ({n_lost} samples in {len(wide)} gaps, the longest {length:.6g} s); gaps up to a length are "
+            f"filled by interpolation if asked for (fill = {length:.3g})"
+        )
+    row = np.concatenate([[0], np.cumsum(np.maximum(counts, 1))])
+    whole = np.full((int(row[-1]) + 1, values.shape[1]), np.nan)
+    whole[row] = values
+    times = np.interp(np.arange(len(whole)), row, time)
+    return times, whole, [f"{n_lost} missing samples in {len(wide)} gaps, the longest {length:.6g} s"]
+
+
+def require_one_rate(time: Array, place: Callable[[int], str]) -> None:
+    """Raise `SignalError` if the record changes between a few rates."""
+    if len(time) < FEW:
+        return
+    dt = np.diff(time)
+    kinds: list[float] = []
+    for size in dt:  # until there are too many kinds: the step is then adaptive, and intended
+        if all(abs(size - kind) > 10 * ALIKE * kind for kind in kinds):
+            kinds.append(float(size))
+            if len(kinds) > MOST_STEPS:
+                return
+    if len(kinds) > 1:
+        k = int(np.flatnonzero(np.abs(dt - dt[0]) > 10 * ALIKE * dt[0])[0])
+        raise SignalError(
+            f"{place(k + 1)}: the step changes from {dt[0]:.6g} to {dt[k]:.6g} s ({len(kinds)} different steps in the "
+            "record); resample it (resample = ..., or uneven steps allowed)"
+        )
+
+
+def with_numbers(
+    time: Array, values: Array, names: Sequence[str], fill: float, place: Callable[[int], str]
+) -> tuple[Array, list[str]]:
+    """Return values with gaps filled; `SignalError` for the first gap that is too long, or at an end."""
+    from scipy.interpolate import PchipInterpolator
+
+    notes = []
+    for column, name in enumerate(names):
+        bad = ~np.isfinite(values[:, column])
+        if not bad.any():
+            continue
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], bad, [False]]).astype(np.int8)))
+        begins, ends = edges[::2], edges[1::2]  # beginnings and exclusive ends of the gaps
+        for first, end in zip(begins, ends, strict=True):
+            where = f"{place(int(first))}: channel {quoted(name)}"
+            if first == 0 or end == len(time):
+                at = "begins" if first == 0 else "ends"
+                raise SignalError(f"{where} {at} without numbers; expected a number in every sample there: cut it off")
+            length = float(time[end] - time[first - 1])
+            if length > fill * (1 + 1e-9):
+                raise SignalError(
+                    f"{where}: {end - first} samples are no numbers, from t = {time[first]:.9g} s on ({int(bad.sum())} "
+                    f"in the channel, in {len(begins)} gaps); gaps up to a length are filled by interpolation if asked "
+                    f"for (fill = {length:.3g})"
+                )
+        good = ~bad
+        values[bad, column] = PchipInterpolator(time[good], values[good, column])(time[bad])
+        longest = float((time[ends] - time[begins - 1]).max())
+        notes.append(
+            f"channel {name}: {int(bad.sum())} samples in {len(begins)} gaps filled by interpolation, the longest "
+            f"{longest:.6g} s"
+        )
+    return values, notes

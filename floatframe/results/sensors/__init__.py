@@ -7,9 +7,8 @@ from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.model.system import System
 from floatframe.results.sensors.body_loads import InterfaceForceSensor, RecoverySensor, SpringSensor
-from floatframe.results.sensors.bushings import BushingSensor
 from floatframe.results.sensors.channels import Channel, CoordinateChannel, StressChannel
-from floatframe.results.sensors.elements import ControlSensor, CouplerSensor, ElementSensor
+from floatframe.results.sensors.elements import BushingSensor, ControlSensor, CouplerSensor, ElementSensor
 from floatframe.results.sensors.loads import CoordinateSensor, EnergySensor, ModeSensor, MomentumSensor, ReactionSensor
 from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.sensors.places import AngleSensor, DisplacementSensor, PlaceSensor

@@ -9,9 +9,8 @@ from scipy.linalg import eigh
 from typer.testing import CliRunner
 
 import cms
-from cms.assessment.compare.compare import compare
+from cms.assessment.compare.compare import compare, draw_modes, thinned_surface
 from cms.assessment.compare.comparison import Point, SetResult
-from cms.assessment.compare.drawing import draw_modes, thinned_surface
 from cms.assessment.compare.evaluation import drawn_entry
 from cms.assessment.compare.full_model import centered_directions, held_mass
 from cms.assessment.compare.mode_counts import mode_counts

@@ -23,7 +23,7 @@ from cms.assessment.correlation import (
     read_universal,
     update_model,
 )
-from cms.assessment.correlation.criteria import pair_modes
+from cms.assessment.correlation.correlate import pair_modes
 from cms.assessment.correlation.measured import phase_collinearity
 from cms.cli import main
 from cms.jobs import body_of_job

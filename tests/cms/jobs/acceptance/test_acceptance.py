@@ -21,14 +21,12 @@ from cms.body.modal_file.file import read, write
 from cms.cli import main
 from cms.cli.verdicts.check import check_file
 from cms.jobs.acceptance import accept
-from cms.jobs.acceptance.accept import FullModel, accept_body
-from cms.jobs.acceptance.against_model import compare_with_model
+from cms.jobs.acceptance.accept import FullModel, accept_body, compare_with_model
 from cms.jobs.acceptance.document import Table, document_of
 from cms.jobs.acceptance.html_page import html_page
 from cms.jobs.acceptance.origin import source_files
-from cms.jobs.acceptance.pdf_pages import pdf_pages
 from cms.jobs.acceptance.range_of_use import range_of_use
-from cms.jobs.acceptance.write import write_acceptance
+from cms.jobs.acceptance.write import pdf_pages, write_acceptance
 from cms.jobs.reduce_job import reduce_job
 from fe_models.meshes.numbering import Numbering
 from tests.bodies import box_mesh

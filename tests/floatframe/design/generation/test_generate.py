@@ -8,9 +8,8 @@ from numpy.testing import assert_allclose
 
 import floatframe as ff
 from floatframe.design.generation.generate import LANGUAGES, generate
-from floatframe.design.generation.grouping import carried_inwards
 from floatframe.design.generation.links import GRAVITY, tree_terms
-from floatframe.design.generation.routines import ROUTINES
+from floatframe.design.generation.routines import ROUTINES, carried_inwards
 from floatframe.design.identification.inertial_parameters import parameters_of, point_mass, system_with
 from floatframe.errors import ModelError
 from floatframe.model.functions.time_functions import harmonic

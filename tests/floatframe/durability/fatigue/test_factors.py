@@ -4,7 +4,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from floatframe import assess, read_fatigue
-from floatframe.durability.fatigue.factors import (
+from floatframe.durability.fatigue.fatigue_file import (
     reliability_factor,
     roughness_factor,
     size_factor,

@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 import cms
 import floatframe as ff
 from cms.body.modal_file.file import write
+from floatframe.durability.fatigue.assessment import shaken_damage, shaken_spectra
 from floatframe.durability.fatigue.criteria import Criterion
-from floatframe.durability.fatigue.shaken import shaken_damage, shaken_spectra
 from floatframe.durability.fatigue.spectral.spectral_damage import stress_moments
 from floatframe.errors import FatigueError
 from tests.bodies import bar

@@ -25,9 +25,9 @@ from floatframe import (
 )
 from floatframe.components.mechanisms import chain, four_bar
 from floatframe.engine.compiling.system import compiled_system
-from floatframe.engine.initial_conditions import initial_checks
+from floatframe.engine.initial_conditions import initial
 from floatframe.engine.initial_conditions.freedoms import scaled_constraints
-from floatframe.engine.initial_conditions.initial_checks import dependent_count, repeated_constraints
+from floatframe.engine.initial_conditions.initial import dependent_count, repeated_constraints
 from floatframe.engine.kernels.work import new_work
 from floatframe.engine.tree.topology import tree_of
 from floatframe.model.rotations import euler_parameters_of_rotation_vector
@@ -112,7 +112,7 @@ def test_loops_that_are_well_conditioned_begin_without_the_kernels_of_the_tree(m
     def none(*words):
         raise AssertionError("motions of the tree were asked for")
 
-    monkeypatch.setattr(initial_checks, "coordinate_motions", none)
+    monkeypatch.setattr(initial, "coordinate_motions", none)
     consistent_state(four_bar(angle=0.3))
     with pytest.raises(AssertionError, match="were asked for"):
         count(ring(4))

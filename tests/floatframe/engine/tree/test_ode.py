@@ -29,7 +29,7 @@ from floatframe import (
     static_equilibrium,
 )
 from floatframe.components.mechanisms import four_bar, pendulum, slider_crank, spinning_top
-from floatframe.engine.tree.partition import partition_of
+from floatframe.integrators.relative_ode import partition_of
 from floatframe.model.bodies.mode_choice import with_modes
 from floatframe.model.functions.time_functions import smooth_step
 from tests.floatframe.engine.tree.examples import rubbed_block

@@ -1,4 +1,4 @@
-"""A disc that rolls without slip over a step, see `floatframe.engine.structure_preserving.rolling` for the formulas."""
+"""A disc that rolls without slip over a step; its formulas stand in `structure_preserving.public_elements`."""
 
 import math
 
