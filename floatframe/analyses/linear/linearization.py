@@ -44,7 +44,7 @@ from floatframe.analyses.linear.inputs import (
     input_rate,
     interface_forces,
 )
-from floatframe.analyses.relative.coordinate_basis import coordinate_basis
+from floatframe.analyses.relative.coordinate_basis import MODE, coordinate_basis, dependent_coordinates
 from floatframe.analyses.snapshot import snapshot
 from floatframe.analyses.steady.steadiness import require_steady
 from floatframe.analyses.system_matrices import Inputs, Tangents, settled, tangents, turning_matrices
@@ -377,8 +377,7 @@ def linearize(
     by_inputs = input_columns(small, inputs).beside(parts.by_states)
     Omega, Omega_t = turning_matrices(model, work, about.omega)
     basis = coordinate_basis(system, state, parts.G, shown) if is_relative(formulation) else None
-    u0 = [int(u0) for u0 in model.bodies.u0[:-1]]
-    N = allowed_motions(parts.G, compiled.length, u0) if basis is None else basis.N
+    N = allowed_motions(system, parts.G) if basis is None else basis.N
     if N.shape[1] == 0:
         raise ModelError(f"system {system.name!r}: its joints and drives allow no motion; nothing can be linearised")
     roll = rolling(parts, Omega, N, by_inputs)
@@ -597,6 +596,12 @@ def sizes_as_lengths(system: System) -> Array:
     return sizes
 
 
+def modes_among_motions(system: System) -> NDArray[np.bool_]:
+    """Return which of the motions of the bodies are modal coordinates, (n_u,)."""
+    u0 = compiled_system(system).model.bodies.u0
+    return np.concatenate([np.arange(size) >= 6 for size in np.diff(u0)])
+
+
 def without_noise(motions: Array, sizes: Array) -> Array:
     """Return motions of bodies over z, with zeros for rounding errors.
 
@@ -612,16 +617,21 @@ def seen_from(T: Array, mass: Array) -> Array:
     return np.asarray(by_x.T @ mass @ by_x)
 
 
-def allowed_motions(G: Array, length: float, bodies: list[int]) -> Array:
-    """Return an orthonormal basis of the null space of G, (n_u, n_z), with rotations scaled by the length."""
-    n_u = G.shape[1]
-    if not len(G):
-        return np.eye(n_u)
-    scale = np.ones(n_u)
-    for u0 in bodies:
-        scale[u0 + 3 : u0 + 6] = 1 / length
-    scaled = G * scale
-    size = np.linalg.norm(scaled, axis=1)
-    _, values, right = la.svd(scaled[size > 0] / size[size > 0, None])
-    rank = int((values > RANK * values[0]).sum()) if len(values) else 0
-    return scale[:, None] * right[rank:].T
+def allowed_motions(system: System, G: Array) -> Array:
+    """Return a basis of the null space of G, (n_u, n_z), one column for each motion of a body that stays independent.
+
+    Some motions d follow the others i, N_i = 1 and N_d = -G_d⁺ G_i. Bodies depend before modes do, so that stiff modes
+    have columns of their own: in a mixed basis, the rounding of a stiffness of 1e10 hides motions of a few hertz.
+    """
+    sizes = sizes_as_lengths(system)
+    is_mode = modes_among_motions(system)
+    C = G / sizes
+    size = np.linalg.norm(C, axis=1)
+    C = C[size > 0] / size[size > 0, None]
+    dependent = dependent_coordinates(C * np.where(is_mode, MODE, 1.0), np.where(is_mode, 0, 1))
+    free = np.setdiff1d(np.arange(len(sizes)), dependent)
+    N = np.eye(len(sizes))[:, free]
+    if len(dependent):
+        by_free = np.linalg.lstsq(C[:, dependent], C[:, free], rcond=None)[0]
+        N[dependent] = -by_free * sizes[free] / sizes[dependent, None]
+    return N

@@ -18,6 +18,8 @@ from floatframe import (
     Channel,
     ControlSensor,
     CoordinateChannel,
+    FixedJoint,
+    FlexibleBody,
     JointCoordinate,
     JointForce,
     Marker,
@@ -87,6 +89,30 @@ def test_transfer_functions_are_those_of_the_matrices(linear):
             found = space.C @ np.linalg.solve(s * np.eye(len(space.A)) - space.A, space.B) + space.D
             expected = each.response([f])[0]
             assert_allclose(found, expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("units", ["m-kg-s", "mm-t-s", "in-slinch-s"])
+def test_slow_motions_are_right_beside_modes_a_million_times_as_fast(units):
+    """A stiff beam with a block at its end turns on a hinge as a rigid body: rate per torque 1 / (s I)."""
+    unit, e = fm.unit_system(units), np.array([0.0, 0.6, 0.8])
+
+    def of(value, length=0, mass=0, time=0):
+        return value / unit.to_si(length=length, mass=mass, time=time)
+
+    EI, J, J_block = of(1e9, 3, 1, -2), of(1e-3, 1, 1), of(np.diag([0.02, 0.03, 0.04]), 2, 1)
+    line = cms.BeamLine(of(1.0, 1), of(1.0, -1, 1), of(1e12, 1, 1, -2), EI, 1.5 * EI, EI, J, J)
+    beam = cms.beam_from_assumed_modes(line, name="beam", units=unit, n_axial=1, n_bending=2, n_torsion=1)
+    bodies = [FlexibleBody("beam", beam), RigidBody("block", of(2.0, 0, 1), J_block, position=(of(1.0, 1), 0, 0))]
+    at_hinge, at_block = Marker(GROUND, position=np.zeros(3)), Marker("block", position=np.zeros(3))
+    joints = [RevoluteJoint("hinge", at_hinge, Marker("beam", "start"), axis=e),
+              FixedJoint("weld", Marker("beam", "end"), at_block)]  # fmt: skip
+    ends = [CoordinateChannel("torque", "hinge", "angle")], [CoordinateChannel("rate", "hinge", "angle", rate=1)]
+    linear = linearize(System(bodies, joints, (), unit), inputs=ends[0], outputs=ends[1])
+    space, s = named_state_space(linear), 2j * np.pi * of(0.01, time=-1)
+    inertia = e @ J_block @ e + of(2.0 + 1 / 3 + 1e-3, 2, 1)  # of block and beam about the hinge
+    for found in (space.C @ np.linalg.solve(s * np.eye(len(space.A)) - space.A, space.B) + space.D,
+                  linear.response([of(0.01, time=-1)])[0]):  # fmt: skip
+        assert_allclose(found * s * inertia, 1.0, rtol=1e-8, atol=0)
 
 
 @pytest.mark.parametrize(("apart", "off"), [(1.0, 0.0), (1.0, 1e4), (1e-3, 1e4), (1e-8, 0.0)])
