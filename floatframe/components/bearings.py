@@ -83,7 +83,9 @@ class Bearing(Element):
         x_axis = following if self.x_axis is None else unit_vector(f"{where}: x_axis", self.x_axis)
         across = x_axis - (x_axis @ self.axis) * self.axis
         if np.linalg.norm(across) < 1e-6:
-            raise ModelError(f"{where}: x_axis: expected a direction across the axis, got one along it")
+            raise ModelError(
+                f"{where}: x_axis: expected a direction that is not parallel to the axis, got a parallel one"
+            )
         object.__setattr__(self, "x_axis", across / np.linalg.norm(across))
         shaft = self.axis if self.shaft_axis is None else unit_vector(f"{where}: shaft_axis", self.shaft_axis)
         object.__setattr__(self, "shaft_axis", shaft)

@@ -42,7 +42,7 @@ class Cable(Element):
     stiffness: float  #: of the whole cable, E A / length [N/m]
     damping: float = 0.0  #: acts while the cable is taut [N s/m]
     preload: float | None = None  #: tension as assembled [N]; None: 0, or the value that follows from `length`
-    length: float | None = None  #: length without tension [m]; None: from the preload
+    length: float | None = None  #: unstretched length [m]; None: follows from the preload
 
     def __post_init__(self) -> None:
         where = f"element {self.name!r}"
@@ -63,7 +63,7 @@ class Cable(Element):
 
     @property
     def markers(self) -> tuple[Marker, ...]:
-        """Its points."""
+        """Markers of its points."""
         return tuple(self.points)
 
     def law(self, placed: Placed) -> ElementLaw:

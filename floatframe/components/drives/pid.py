@@ -16,8 +16,8 @@ __all__ = ["ANTI_WINDUP", "Pid", "pid_law", "target_of"]
 
 ANTI_WINDUP = ("none", "clamping", "back-calculation")
 NONE, CLAMPING, BACK_CALCULATION = range(3)
-#: width over which clamping sets in, relative to the range between the limits, to one limit, or, if that is 0, to
-#: kp e and what ki e adds in a second
+#: width of the smooth transition at a limit, relative to the range between both limits; with one limit, relative to its
+#: magnitude, or, if it is 0, to kp e plus what ki e adds in one second
 BAND = 1e-3
 PROPORTIONAL, INTEGRAL, DERIVATIVE, FILTER, LOW, HIGH, MODE, TRACKING, WIDTH, TARGET = range(10)
 
@@ -83,7 +83,7 @@ class Pid:
         return [(name, *starts[name]) for name in self.states]
 
     def numbers(self, second: float) -> list[float]:
-        """Return the data of `pid_law`; a second in the units of the system."""
+        """Return the data of `pid_law`; `second` is one second in the time unit of the system."""
         assert isinstance(self.target, TimeFunction)  # ensured by __post_init__
         huge = np.finfo(float).max
         limits = [-huge if self.lower is None else self.lower, huge if self.upper is None else self.upper]

@@ -129,19 +129,21 @@ def circuit_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
             p_to = outputs[b] if b >= 0 else p_a + 0.0 * outputs[0]
             h_a, h_b = compression(p_from, data, FLUID)[2], compression(p_to, data, FLUID)[2]
             dp = p_from - p_to
-        if kind == ORIFICE:  # conductance, transition, opening, at, overlap, leakage
+        if kind == ORIFICE:  # parameters: conductance, transition, opening, index of the function, overlap, leakage
             how, at, part = int(data[n + 2]), int(data[n + 3]), 1.0 + 0.0 * dp
             if how == BY_FUNCTION:
                 part = function_at(data, at, t) + 0.0 * dp
             elif how != ALWAYS:
                 u = outputs[at] if how == BY_SPOOL else -outputs[at]
                 part = (u - data[n + 4]) / (1.0 - data[n + 4])
-            if part.real < 0.0 or (part.real == 0.0 and how == BY_SPOOL_BACK):  # one slope for a spool in the middle
+            if part.real < 0.0 or (part.real == 0.0 and how == BY_SPOOL_BACK):  # a spool in the middle has one slope
                 part = 0.0 * part
             q = part * data[n] * turbulent(dp, data[n + 1]) + data[n + 5] * dp
             outputs[s] = q
             outputs[total + 1] += q * (h_a - h_b)
-        elif kind == VALVE:  # conductance, transition, opens at, is open at, leakage
+        elif (
+            kind == VALVE
+        ):  # parameters: conductance, transition, pressure at which it opens, pressure at which it is open, leakage
             part = ramp((dp - data[n + 2]) / (data[n + 3] - data[n + 2]))
             q = part * data[n] * turbulent(dp, data[n + 1]) + data[n + 4] * dp
             outputs[s] = q
@@ -150,7 +152,7 @@ def circuit_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
             q = data[n] * dp
             outputs[s] = q
             outputs[total + 1] += q * (h_a - h_b)
-        elif kind == INERTIA:  # inertia, resistance, of turbulence
+        elif kind == INERTIA:  # parameters: inertia, laminar resistance, turbulent resistance
             q = z[int(data[c + STATE])]
             drop = data[n + 1] * q + data[n + 2] * q * size(q)
             z_dot[int(data[c + STATE])] = (h_a - h_b - drop) / data[n]
@@ -161,7 +163,7 @@ def circuit_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
             q = function_at(data, int(data[n]), t) + 0.0 * dp
             outputs[s] = q
             outputs[total] += q * (h_b - h_a)
-        elif kind == PUMP:  # displacement, leakage, drag, axis
+        elif kind == PUMP:  # parameters: displacement, leakage, drag, axis
             i, j = int(data[c + MARKER_A]), int(data[c + MARKER_B])
             e = direction_of(x, i, data, n + 3)
             speed = turning_speed(x, i, j, e)
@@ -172,7 +174,8 @@ def circuit_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
             outputs[total + 1] += leak * (h_a - h_b) + data[n + 2] * speed * speed
             outputs[total + 3] += torque * speed
         elif kind == CYLINDER:
-            # areas of head and rod, stroke, length when in, dead volumes, leakage, friction, its speed, damping, stops
+            # parameters: areas of head and rod, stroke, retracted length, dead volumes, leakage, friction and its
+            # speed, damping, stops
             i, j = int(data[c + MARKER_A]), int(data[c + MARKER_B])
             length, rate, e = line_between(x, i, j)
             stroke = length - data[n + 3]
@@ -189,7 +192,7 @@ def circuit_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
             outputs[total + 1] += leak * (h_a - h_b) + friction * rate + low_lost + high_lost
             outputs[total + 2] += low_energy + high_energy
             outputs[total + 3] += force * rate
-        elif kind == SPOOL:  # time constant, command at, gain, stroke at
+        elif kind == SPOOL:  # parameters: time constant, index of the command, gain, index of the stroke
             u = function_at(data, int(data[n + 1]), t) + 0.0 * outputs[0]
             if data[n + 2] != 0.0:
                 u = data[n + 2] * (u - outputs[int(data[n + 3])])
@@ -217,7 +220,7 @@ def circuit_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
 
 @njit
 def circuit_rest(t, x, z, lam, data, wrench, z_dot, g, outputs):
-    """Write the same as `circuit_law`, except rates of pressures with the same zeros that are easier to solve.
+    """Write as `circuit_law`, but with pressure rates that are easier to solve and vanish at the same pressures.
 
     The flow Q into a node depends on roots of pressure differences, with which Newton's method steps back and forth
     across the zero. Q sqrt(Q² + Q_0²)/Q_0, with the flow Q_0 at which its orifices become laminar, is proportional to
@@ -234,7 +237,9 @@ def circuit_rest(t, x, z, lam, data, wrench, z_dot, g, outputs):
             V, _, slope, _, Q = node_volume(data, i, z[i], outputs)
             z_dot[i] = v * v * Q * np.sqrt(Q * Q + scale * scale) / scale / (v * slope - V * dv)
     at = int(data[ISLANDS])
-    for _ in range(int(data[N_ISLANDS])):  # number of nodes, content, pressure for a relative defect of one, nodes
+    for _ in range(
+        int(data[N_ISLANDS])
+    ):  # parameters: number of nodes, content, pressure for a relative defect of one, node numbers
         n, content, scale = int(data[at]), data[at + 1], data[at + 2]
         held = 0.0 * z[0]
         for k in range(n):

@@ -1,4 +1,4 @@
-"""The fluid of a circuit: compressible, optionally with entrained air, and with cavitation at low pressure.
+"""The fluid of a circuit: compressible, with cavitation at low pressure and, optionally, entrained air.
 
 Pressures are absolute. A unit of volume at ambient pressure p_a has, at the pressure p, the volume
 
@@ -67,7 +67,7 @@ class Fluid:
         return [self.bulk_modulus, self.air, 1 / self.air_exponent, self.ambient, self.vapour_pressure, width]
 
     def compression(self, p: float) -> tuple[float, float, float]:
-        """Return v, its derivative and h at an absolute pressure p."""
+        """Return v, dv/dp and h at an absolute pressure p."""
         v, dv, h = compression(p, np.array(self.numbers), 0)
         return float(v), float(dv), float(h)
 

@@ -42,8 +42,8 @@ Describe = Callable[[BeamLine], PartMaker]
 X, Y, Z = np.eye(3)
 UNITS = "m-kg-s"
 
-#: the beam of Princeton's experiment, with its stiff axis in the x-y plane; the problem is static, the mass that of
-#: aluminium
+#: the beam of Princeton's experiment, with its stiff axis in the x-y plane; the problem is static, so its mass does not
+#: matter and is that of aluminium
 PRINCETON_LINE = BeamLine(
     0.508, rho_A=0.1070, EA=2.84191e6, EIy=2.42873, EIz=36.2794, GJ=3.10338, rho_Iy=9.147e-8, rho_Iz=1.3664e-6,
     GAy=9.03881e5, GAz=6.40131e5,
@@ -57,7 +57,7 @@ def square(length: float, *, rho_A: float, EA: float, EI: float, GJ: float, GA: 
     )  # fmt: skip
 
 
-#: bars 1 and 2 of steel, 16 mm square, and 3, 8 mm square
+#: bars 1 and 2 are steel bars of 16 mm square section, bar 3 of 8 mm square section
 FOUR_BAR_LINES = (
     square(0.12, rho_A=1.997, EA=52.99e6, EI=1131.0, GJ=733.5, GA=16.88e6, rho_I=42.6e-6),
     square(0.24, rho_A=1.997, EA=52.99e6, EI=1131.0, GJ=733.5, GA=16.88e6, rho_I=42.6e-6),
@@ -65,7 +65,7 @@ FOUR_BAR_LINES = (
 )
 #: a steel tube with 100 mm diameter and 5 mm wall
 SHAFT_LINE = square(6.0, rho_A=11.64, EA=313.4e6, EI=354.5e3, GJ=272.7e3, GA=60.5e6, rho_I=13.17e-3)
-#: the beam of aluminium, 100 mm high and 10 mm wide; link and crank, steel tubes
+#: the beam is of aluminium, 100 mm high and 10 mm wide; link and crank are steel tubes
 BUCKLING_LINES = (
     BeamLine(
         1.0, rho_A=2.68, EA=73e6, EIy=60830.0, EIz=608.3, GJ=877.2, rho_Iy=2233e-6, rho_Iz=22.33e-6, GAy=5.025e6,

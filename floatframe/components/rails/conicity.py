@@ -39,7 +39,8 @@ def wheelset_at(pair: Pair, y: Array, *, smoothing: float | None = None) -> tupl
     for i, shift in enumerate(y):
 
         def heights(phi: float, shift: float = float(shift)) -> tuple[float, float, float, float]:
-            # a roll about the centre of the axle moves both wheels' centres: arm (1 - cos) sideways is left out
+            # a roll about the axle's centre also moves the centres of both wheels sideways by arm (1 - cos), which is
+            # neglected
             found = []
             for side in (1.0, -1.0):
                 u = side * (shift - pair.radius * float(np.sin(phi)))

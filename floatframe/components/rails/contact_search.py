@@ -63,12 +63,12 @@ class Pair:
                 f"{self.running_circles:g} m apart: these look like millimetres; give metres (times 0.001)"
             )
         if self.radius + self.wheel.z.min() <= 0:
-            raise ModelError(f"wheel and rail: radius {self.radius:g} m is less than the profile takes off")
+            raise ModelError(f"wheel and rail: radius {self.radius:g} m is smaller than the depth of the profile")
         if self.has_flange and not 0.0 < self.flange_clearance < 0.05:
             raise ModelError(
                 f"wheel and rail: gauge {self.gauge:g} m and running circles {self.running_circles:g} m apart leave "
-                f"{self.flange_clearance * 1e3:.3g} mm between flange and rail: expected 0 to 50 mm; check gauge, the "
-                "distance of the running circles, and which side of the profile is the field (y > 0)"
+                f"{self.flange_clearance * 1e3:.3g} mm between flange and rail: expected 0 to 50 mm; check the gauge, "
+                "the distance of the running circles, and that y > 0 points to the field side of the profile"
             )
 
     @cached_property
@@ -218,8 +218,8 @@ class QuasiElastic(NamedTuple):
 
     q: Array  #: depth at h = 0 [m]
     slope: Array  #: dq/du, mean of Z': tangent of the contact angle, positive if the rail rises outward
-    x: Array  #: point of contact from the centre of the wheel, forward [m]
-    y: Array  #: outward [m]: the lever by which the moment about the direction of the track is that of dq/dphi
+    x: Array  #: position of the contact point relative to the wheel centre, forward [m]
+    y: Array  #: outward [m]; with this lever, the moment about the direction of the track equals that of dq/dphi
     z: Array  #: upward [m], near -radius
     radius: Array  #: rolling radius [m]
     bend: Array  #: curvature of p in the lateral direction, in the contact plane: eps/variance [1/m]
@@ -253,7 +253,7 @@ def quasi_elastic(
     y = y0 + u[:, None] + pair.offset
     p = pair.head.height(y) - (z + pair.radius)
     best = p.max(axis=1, keepdims=True)
-    best = np.where(np.isfinite(best), best, -1.0)  # off the rail: a depth below any real one
+    best = np.where(np.isfinite(best), best, -1.0)  # off the rail: the value is a depth below any real one
     weights = measure * np.exp((p - best) / smoothing)
     total = weights.sum(axis=1)
     width = pair.typical_width * np.sqrt(smoothing)
@@ -268,7 +268,7 @@ def quasi_elastic(
     q = best[:, 0] + smoothing * np.log(total / width)
     slope, z_mean = mean(slopes), mean(z)
     lever = mean(y0 + slopes * z) - slope * z_mean
-    # spread in the contact plane
+    # spread of the contact in the contact plane
     mean_y = mean(y0)
     cos = 1 / np.sqrt(1 + slope**2)
     variance = np.maximum(mean(y0**2) - mean_y**2, 0.0) + STEP**2 / 12

@@ -22,9 +22,9 @@ from floatframe.model.checked_values import number
 
 __all__ = ["FIELDS", "LEAST_BEND", "ContactTable", "Steel", "TableGrid", "contact_table", "numbers_of_table"]
 
-#: for each part: depth at h = 0, dq/du, lever x divided by sin psi, levers y and z, rolling radius; logarithms of
-#: Hertz's stiffness, of a and b for 1 N, and of Kalker's coefficients (splines of the values themselves could become
-#: negative at jumps)
+#: for each part: depth at h = 0, dq/du, lever x divided by sin psi, levers y and z, and rolling radius; then the
+#: logarithms of Hertz's stiffness, of a and b for 1 N, and of Kalker's coefficients (splines of the values themselves
+#: could become negative at jumps)
 FIELDS = ("q", "slope", "x", "y", "z", "radius", "stiffness", "a_1", "b_1", "c11", "c22", "c23", "c33")
 
 LEAST_BEND = 0.05  #: least curvature of a contact [1/m]
@@ -42,9 +42,9 @@ class Steel(NamedTuple):
 class TableGrid:
     """The grid of the table; beyond it, the values at its edge are used."""
 
-    v: tuple[float, float, int] = (-0.03, 0.015, 226)  #: least, largest [m], number of points
+    v: tuple[float, float, int] = (-0.03, 0.015, 226)  #: smallest and largest [m], number of points
     roll: tuple[float, float, int] = (-0.012, 0.012, 7)  #: [rad]
-    yaw: tuple[float, int] = (0.04, 6)  #: largest [rad], number of points from zero
+    yaw: tuple[float, int] = (0.04, 6)  #: largest [rad]; number of points, from zero on
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +100,7 @@ def near_the_rail(found: QuasiElastic) -> QuasiElastic:
     near = np.flatnonzero(found.q > -FAR)
     if not len(near):
         raise ModelError(
-            "contact_table: a part of the wheel comes nowhere near the rail: does the profile fit the gauge?"
+            "contact_table: a part of the wheel is nowhere near the rail; check that the profile fits the gauge"
         )
     rows = near[np.clip(np.searchsorted(near, np.arange(len(found.q))), 0, len(near) - 1)]
     return QuasiElastic(*(values[rows] for values in found))

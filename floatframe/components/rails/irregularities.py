@@ -202,10 +202,10 @@ def random_irregularities(
         )
     if length / spacing > 2e6:
         raise ModelError(
-            f"irregularities: {length / spacing:.3g} places are too many; a longer spacing or a shorter track"
+            f"irregularities: {length / spacing:.3g} points are too many; choose a longer spacing or a shorter track"
         )
     n = int(np.ceil(length / spacing)) + 1
-    period = 2 * n  # in points: twice the track, so that it does not repeat
+    period = 2 * n  # in points: twice the track length, so that the track does not repeat
     dW = 2 * np.pi / (period * spacing)
     k = np.arange(int(np.ceil(2 * np.pi / longest / dW)), int(2 * np.pi / shortest / dW) + 1)
     if len(k) < 2:

@@ -67,7 +67,7 @@ def along_cell(data, at, x, y):
 
 @numba.njit(cache=True)
 def place_on_track(data, x, y):
-    """Return s, origin (x, y), heading, cant angle and its slope, and curvature of the track next to a point."""
+    """Return the track at its nearest point: s, origin (x, y), heading, cant angle and its slope, curvature."""
     cells, n = int(data[14]), int(data[15])
     best, near = 1e300, 0
     for i in range(n):
@@ -104,7 +104,7 @@ def place_on_track(data, x, y):
         k = k_0 + slope * d
         step = ahead / (1 - k * beside)
         d = d + step
-        # includes the last step in the origin
+        # the origin is updated with the last step
         ox, oy = ox + step * c, oy + step * s
     psi = psi_0 + k_0 * d + 0.5 * slope * d * d
     return data[at] + d, ox, oy, psi, data[at + 6] + data[at + 7] * d, k_0 + slope * d
@@ -197,7 +197,7 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, outputs):
         signal = 0 if side > 0 else 2
         off_y, slope_y = deviation(data, signal, s)
         off_z, slope_z = deviation(data, signal + 1, s)
-        stretch = 1 / (1 - k * beside)  # ds divided by the path along the rail
+        stretch = 1 / (1 - k * beside)  # ds divided by the path of the wheel along the rail
         slope_y, slope_z = slope_y * stretch, slope_z * stretch
         u = side * (beside - off_y) - half
         h = dx * bx + dy * by + dz * bz - radius - off_z
@@ -327,7 +327,7 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, outputs):
         if off.real > worst.real:
             worst = off
     last = int(data[0]) * (n_w_out + n_parts * n_c_out)
-    if inertia > 0:  # I Omega' a + omega x I Omega a is the part of the moment taken by the wheels
+    if inertia > 0:  # the wheels take the part I Omega' a + omega x I Omega a of the moment
         about = wrench[0, 3] * ax + wrench[0, 4] * ay + wrench[0, 5] * az
         z_dot[0] = about / inertia
         momentum = inertia * spin_rate

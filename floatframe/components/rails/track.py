@@ -191,7 +191,8 @@ class Track:
                 )
         except (TypeError, KeyError) as error:
             raise ModelError(
-                f"{where}: a segment has length, curvature and cant (a number or [begin, end]); a curve has radius, "
+                f"{where}: expected a segment with length, curvature and cant (a number or [begin, end]); a curve has "
+                "radius, "
                 f"length, transition, cant, before, after: {error}"
             ) from None
         irregular = table.get("irregularities")

@@ -260,7 +260,7 @@ def profile_of_table(where: str, kind: str, value: Any, read: Any) -> Profile:
             )
         return PROFILES[value]()
     if not isinstance(value, dict):
-        raise ModelError(f"{where}: expected a name or a table, got {value!r}")
+        raise ModelError(f"{where}: expected the name of a profile or a table, got {value!r}")
     if "cone" in value and kind == "wheel":
         refuse_others(where, value, ("cone", "flange"))
         return cone(value["cone"], flange=bool(value.get("flange", True)))

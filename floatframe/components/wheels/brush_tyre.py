@@ -98,7 +98,7 @@ def brush_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
 
 @njit(error_model="numpy")
 def brush_law_at_rest(t, x, z, lam, data, wrench, z_dot, g, outputs):
-    """Write the same for a standing wheel, whose tread is deformed by the displacement of the wheel."""
+    """Write the same for a wheel at a standstill, whose tread is deformed by the displacement of the wheel."""
     brush_law(t, x, z, lam, data, wrench, z_dot, g, outputs)
     hold_tread(x, data, outputs[10], z, z_dot)
 

@@ -190,7 +190,7 @@ def magic_formula_law(t, x, z, lam, data, wrench, z_dot, g, outputs):
 
 @njit(error_model="numpy")
 def magic_formula_law_at_rest(t, x, z, lam, data, wrench, z_dot, g, outputs):
-    """Write the same for a standing wheel, whose tread is deformed by the displacement of the wheel."""
+    """Write the same for a wheel at a standstill, whose tread is deformed by the displacement of the wheel."""
     magic_formula_law(t, x, z, lam, data, wrench, z_dot, g, outputs)
     hold_tread(x, data, outputs[10], z, z_dot)
 
@@ -247,7 +247,7 @@ class MagicFormulaTyre(Element):
     def __post_init__(self) -> None:
         where = f"element {self.name!r}"
         if not isinstance(self.tyre, TyreProperties):
-            raise ModelError(f"{where}: tyre: expected what read_tyre_file returns, got {self.tyre!r}")
+            raise ModelError(f"{where}: tyre: expected the result of read_tyre_file, got {self.tyre!r}")
         if self.convention not in CONVENTIONS:
             raise ModelError(f"{where}: convention: expected one of {', '.join(CONVENTIONS)}, got {self.convention!r}")
         if self.side is not None and self.side not in SIDES:

@@ -34,14 +34,16 @@ def tyre_numbers(
     e = A @ axis
     if abs(e[2]) > np.sqrt(1 - UPRIGHT**2):
         raise ModelError(
-            f"{where}: its spin axis is {e.round(3).tolist()} in axes of marker_a, along the road's normal z; a "
-            "wheel stands: give `axis` (in axes of marker_b; default y), or turn a marker"
+            f"{where}: its spin axis is {e.round(3).tolist()} in axes of marker_a, along the road's normal z, but the "
+            "axle of a wheel must lie across it: give `axis` (in axes of marker_b; default y), or rotate a marker"
         )
     ground = road.height(c[0], c[1])
     if c[2] <= ground:
         raise ModelError(
-            f"{where}: its centre lies at z = {c[2]:g}, below the road at {ground:g} (axes of marker_a); expected it a "
-            f"radius, {common[0]:g}, above: is the z axis of marker_a up, and is marker_b the wheel's centre?"
+            f"{where}: its centre lies at z = {c[2]:g}, below the road at {ground:g} (axes of marker_a); expected it "
+            "one "
+            f"radius, {common[0]:g}, above the road: check that z of marker_a points up and that marker_b is the "
+            "wheel's centre"
         )
     head = [*common, *axis, *c, *A.ravel()]
     assert len(head) == ROAD

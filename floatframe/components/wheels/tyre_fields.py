@@ -42,8 +42,8 @@ def check_road(where: str, road: Any, radius: float) -> None:
     """Raise `ModelError` unless it is a road; an envelope must be for a wheel of this radius."""
     if not isinstance(road, FlatRoad | GridRoad):
         raise ModelError(
-            f"{where}: road: expected FlatRoad, GridRoad or what makes one (profile_road, iso_8608_road, "
-            f"Polyline.enveloped), got {road!r}"
+            f"{where}: road: expected a FlatRoad or a GridRoad (from profile_road, iso_8608_road "
+            f"or Polyline.enveloped), got {road!r}"
         )
     if isinstance(road, FlatRoad):
         return

@@ -166,7 +166,7 @@ def tyre_from_text(text: str, where: str, *, version: str | None = None) -> Tyre
 
 
 def entries(text: str, where: str) -> dict[str, tuple[int, str]]:
-    """Return line and value of each key; shape tables and comments are skipped."""
+    """Return line number and value of each key; shape tables and comments are skipped."""
     found: dict[str, tuple[int, str]] = {}
     section = ""
     for k, raw in enumerate(text.splitlines(), start=1):
@@ -185,9 +185,7 @@ def entries(text: str, where: str) -> dict[str, tuple[int, str]]:
             )
         key, value = match[1].upper(), match[2].strip().strip("'\"").strip()
         if key in found and found[key][1] != value:
-            raise ModelError(
-                f"{where}, line {k}: {key} = {value} stands against {found[key][1]} in line {found[key][0]}"
-            )
+            raise ModelError(f"{where}, line {k}: {key} = {value} contradicts {found[key][1]} in line {found[key][0]}")
         found[key] = k, value
     return found
 
@@ -251,13 +249,13 @@ def formula_version(words: dict[str, tuple[int, str]], where: str, version: str 
         return FORMATS[file_format]
     said = f"FITTYP = {fit}" if fit else f"PROPERTY_FILE_FORMAT = {file_format or 'missing'}"
     raise ModelError(
-        f"{where}: version of the formula: {said} is none that is known (FITTYP {', '.join(FIT_TYPES)}; "
+        f"{where}: version of the formula: {said} is unknown (FITTYP {', '.join(FIT_TYPES)}; "
         f'PROPERTY_FILE_FORMAT {", ".join(FORMATS)}); if it is 5.2 or 6.1, say version = "5.2" or "6.1"'
     )
 
 
 def chosen(numbers: dict[str, float], kind: int) -> dict[str, float]:
-    """Return all coefficients, with defaults for those that the file, or this version of the formula, does not have.
+    """Return all coefficients, with defaults for those that neither the file nor this version of the formula has.
 
     Relaxation lengths by p_T belong to version 5.2; they are also used if a file of version 6.1 has them.
     """

@@ -18,7 +18,7 @@ class HingePlay:
     length: float = 0.08  #: of the bearing [m]
     pin_radius: float = 0.008
     stiffness: float = 2e6  #: of the contact in one plane, with the fitting around it [N/m]
-    damping: float = 5.0  #: loss by the speed of the approach [s/m]
+    damping: float = 5.0  #: damping factor of the contact, relative to the approach velocity [s/m]
     friction: float = 0.15
     friction_speed: float = 0.01  #: [m/s]; a lower one asks for shorter steps at the latching
 
@@ -45,8 +45,8 @@ class Antenna:
     hinge_friction: float = 0.5  #: [N m]
     friction_speed: float = 0.02  #: at which friction reaches 76 % [rad/s]
     begin: float | None = None  #: angle at which opening in flight begins [rad]; None: stowed
-    push: float = 5.0  #: of the drive in flight, for each petal [N]
-    drag: float = 100.0 / 3  #: of its damper, for each petal [N s/m]
+    push: float = 5.0  #: push of the drive in flight, for each petal [N]
+    drag: float = 100.0 / 3  #: damping of the drive's damper, for each petal [N s/m]
     play: HingePlay | None = None  #: of the petal hinges; friction is then that of their pins
     petal_modes: int = 6  #: vibration modes beside the static ones
     strut_modes: int = 2
@@ -59,7 +59,7 @@ class Antenna:
         return float(found.slider[0]), float(found.slider[1])
 
 
-#: 24 narrow petals with more modes, the last 0.05 rad before the latch; `replace(FINE, play=HingePlay())`: with play
+#: 24 narrow petals with more modes, starting 0.05 rad before the latch; `replace(FINE, play=HingePlay())`: with play
 FINE = Antenna(
     n_petals=24,
     petal_width=0.15,

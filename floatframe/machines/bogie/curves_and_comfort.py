@@ -81,7 +81,7 @@ def weighted_rms(t: Array, acceleration: Array, direction: str) -> float:
 # circle ---------------------------------------------------------------------------------------------------------------
 
 
-LEAD = 50.0  #: length of the circle behind the middle of the vehicle [m]
+LEAD = 50.0  #: track length behind the middle of the vehicle [m]
 LENGTH = 1e5  #: of the circle [m]
 
 

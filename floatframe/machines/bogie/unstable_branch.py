@@ -24,7 +24,7 @@ from floatframe.simulation.integration import integrate
 
 __all__ = ["Bracket", "Hunted", "Run", "bracket_of_unstable_cycle", "hunted"]
 
-SMALLER = 0.96  #: factor of the next amplitude after one at which a wheel climbs the rail
+SMALLER = 0.96  #: factor from an amplitude at which a wheel climbs the rail to the next amplitude that is tried
 LASTING = 0.7  #: an oscillation above this fraction of the amplitude of the stable cycle is taken to end on the cycle
 SETTLING = 1.0  #: time after which an oscillation that starts as a mode has settled [s]
 

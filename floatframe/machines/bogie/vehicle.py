@@ -115,7 +115,7 @@ def flexible_frames(data: RailVehicle, frame: ReducedBody, speed: float) -> list
 
 
 class Parts(NamedTuple):
-    """A vehicle without its frames."""
+    """A vehicle to which the frames are still to be added."""
 
     bodies: list[RigidBody]
     forces: list[Bushing | Gravity]

@@ -63,6 +63,8 @@ def torsion_stiffness(chassis: ReducedBody) -> float:
     for axle, name in (("front", "kingpin"), ("rear", "rear")):
         ends = [chassis.interface(f"{name}_{side}") for side in ("left", "right")]
         widths[axle] = float(ends[0].position[1] - ends[1].position[1])
-        rows[axle] = (ends[0].Psi[2] - ends[1].Psi[2]) / widths[axle]  # turn of the axle, and its torque's load
+        rows[axle] = (ends[0].Psi[2] - ends[1].Psi[2]) / widths[
+            axle
+        ]  # rotation of the axle, and the load of its torque
     twist = rows["front"] - rows["rear"]
     return float(1.0 / (twist @ np.linalg.solve(chassis.K, twist)))

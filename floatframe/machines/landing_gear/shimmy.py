@@ -87,7 +87,7 @@ def rolling(system: System, speed: float, *, body: str = "carriage") -> LinearSy
 
 
 def growth(system: System, speed: float) -> complex:
-    """Return the eigenvalue of largest real part among oscillations up to 100 Hz [1/s]; above zero means shimmy."""
+    """Return the eigenvalue with the largest real part up to 100 Hz [1/s]; a positive real part means shimmy."""
     modes = system_modes(rolling(system, speed))
     f = modes.natural_frequencies
     swinging = modes.eigenvalues[(modes.eigenvalues.imag > 0) & (f > BAND[0]) & (f < BAND[1])]

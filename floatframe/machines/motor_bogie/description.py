@@ -67,7 +67,7 @@ class MotorBogie:
         0.5,
     )  #: time at which the frequency begins to rise, and duration until it rises at a constant rate [s]
     rise: float = 2.0  #: rate of the frequency [Hz/s]
-    speed: float = 0.0  #: if above 0: constant initial speed, with the frequency that fits it [m/s]
+    speed: float = 0.0  #: if above 0: constant initial speed; the supply starts with the frequency that fits it [m/s]
     t_end: float = 8.0
     h: float = 5e-4
 

@@ -19,7 +19,7 @@ LAWS = ContactLaws(creep="kalker-saturated", friction=0.4)
 SUPPLIES = {
     "six_steps": ("an inverter in six steps", None),
     "sine": ("a supply of pure sines", ()),
-    "unbalanced": ("an unbalanced supply: 3 % of its voltage turn backwards", ((-1, 0.03),)),
+    "unbalanced": ("an unbalanced supply: 3 % of its voltage has negative sequence", ((-1, 0.03),)),
 }
 
 
@@ -92,7 +92,7 @@ def bushing(
 
 
 def vehicle_above(data: MotorBogie) -> str:
-    """Return half of the vehicle body on its air springs, supported against pitch and yaw like by the other bogie."""
+    """Return half of the vehicle body on its air springs, with springs that replace the other bogie."""
     v = data.vehicle
     load = 0.5 * v.body_mass * GRAVITY / 2
     I_x, I_y, I_z = (0.5 * each for each in v.body_inertia)

@@ -113,8 +113,9 @@ def engine_study(
         system, given = read_system(path)
         run = required_run(given, Path(path))
         if not isinstance(run.integrator, GeneralizedAlpha):
-            raise ModelError(f"{path}: run: expected scheme = 'generalized-alpha', which the full model is run with")
-        # the loads of the full model balance as exactly as the rates of the motion fulfil its equations: plain steps
+            raise ModelError(f"{path}: run: expected scheme = 'generalized-alpha', the scheme of the full model")
+        # plain steps, in which the loads of the full model balance as exactly as the rates of the motion fulfil its
+        # equations
         plain = replace(run.integrator, stabilized=False)
         loadings[Path(path).stem] = Loading(replace(system, sensors=()), plain, run.t_end, run.h, every)
     loads = engine_loads(next(iter(loadings.values())).system)
@@ -134,7 +135,7 @@ def _body_of(path: Path) -> tuple[FEBody, RayleighDamping, dict[str, sp.sparray]
     job = read_job(path)
     damping = job.damping.damping if job.damping is not None else None
     if not isinstance(damping, RayleighDamping):
-        raise ModelError(f"{path}: damping: expected alpha and beta, which the full model can have too")
+        raise ModelError(f"{path}: damping: expected alpha and beta, the only damping that the full model can have")
     body = job_body(job)
     mesh = shell_mesh(job)
     centres = mesh.nodes[mesh.cells["quad"]].mean(axis=1)

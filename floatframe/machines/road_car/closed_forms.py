@@ -55,7 +55,7 @@ def line_pressure(control: RollControl, growth: float) -> float:
 
 
 def roll_control_stiffness(car: RoadCar) -> float:
-    """Return the contribution of both lines to the roll stiffness at design height, in small motions [N m/rad].
+    """Return the change of the roll stiffness by both lines at design height, for small motions [N m/rad].
 
     A line displaces (A_h + A_r) times the strokes of two cylinders. Its compliance is that of the gas, V_gas/(n p),
     plus that of the oil, V_oil/K: k = 2 (dV/dphi)²/(V_gas/(n p) + V_oil/K), minus the work of the cylinder forces due

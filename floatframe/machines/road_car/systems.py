@@ -213,9 +213,9 @@ def add_wheel(car: RoadCar, corner: str, axle: Axle, side: int, tables: Tables) 
 # systems --------------------------------------------------------------------------------------------------------------
 
 
-#: what holds the body against roll beside its springs
+#: system that supports the body against roll beside its springs
 SUPPORTS = ("hydraulic", "bars", "none")
-ROLLING = 0.3103  #: of a loaded wheel, speed over spin at the start [m]
+ROLLING = 0.3103  #: radius of a loaded wheel: speed divided by spin at the start [m]
 
 Manoeuvre = dict[str, Any]
 
@@ -242,13 +242,13 @@ def sine_steer(car: RoadCar, *, rack: float = 0.006, frequency: float = 0.5) -> 
 
 
 def steady_circle(car: RoadCar, *, rack: float, settled: float = 4.0) -> Manoeuvre:
-    """Return a turn in, in a second, to a rack that stays [m], at constant speed: ISO 4138."""
+    """Return a steering ramp of one second to a constant rack displacement [m], at constant speed: ISO 4138."""
     turn = {"type": "smooth-step", "t_start": 0.2, "t_end": 1.2, "first": 0.0, "last": -rack}
     return {"rack": turn, "t_end": settled}
 
 
 def twisted_road(car: RoadCar, *, wave: float, height: float = 0.03, speed: float = 5.0) -> Manoeuvre:
-    """Return straight running over a road whose sides go up and down against each other, waves of a length [m].
+    """Return straight running over a road with sine waves of a length [m], opposite on its left and right.
 
     A wave as long as twice the wheelbase twists the car, one as long as the wheelbase rolls it.
     """
@@ -261,7 +261,7 @@ def twisted_road(car: RoadCar, *, wave: float, height: float = 0.03, speed: floa
 
 
 def roll_control(car: RoadCar) -> dict[str, Any]:
-    """Return the circuit: heads of one side and rods of the other on a line, each line with gas behind an orifice."""
+    """Return the circuit: heads of one side and rods of the other share a line, with gas behind an orifice."""
     c = car.control
     rows: list[dict[str, Any]] = []
     for corner, (name, side) in CORNERS.items():
@@ -406,12 +406,12 @@ TURNED = {
     "heading": "atan2(versine*car_rx*car_ry + sine*car_rz, cos(angle) + versine*car_rx^2)",
 }
 SPIN = "0.5*(left_dot + right_dot)"
-#: half of C = K ((w_target - w) - lambda dw/dt) on each rear wheel, w their mean: a differential
+#: each rear wheel takes half of C = K ((w_target - w) - lambda dw/dt), with w their mean, as by a differential
 TORQUE = f"0.5*gain*(w - {SPIN} - rate_time*({SPIN} - slow)/filter)"
 
 
 def driver(path: dict[str, Any], speed: float) -> dict[str, Any]:
-    """Return a driver who steers by the distance of the path from a point ahead, with a lag, and holds the rack."""
+    """Return a driver model, which steers by the distance of a preview point from the path, with a lag."""
     return {
         "type": "elements.expressions",
         "places": {
@@ -429,7 +429,7 @@ def driver(path: dict[str, Any], speed: float) -> dict[str, Any]:
 
 
 def hand(turn: dict[str, Any]) -> dict[str, Any]:
-    """Return a steering column that pulls the rack to where a function of time wants it, to the right side up."""
+    """Return a steering column that pulls the rack towards a displacement given as a function of time."""
     return {
         "type": "elements.expressions",
         "places": {"car": {"body": "subframe_front"}, "rack": {"body": "rack"}},
@@ -441,9 +441,9 @@ def hand(turn: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-COLUMN = {"k": 3e6, "c": 1e4}  #: of the steering column as the rack feels it [N/m, N s/m]
-#: where the car is on the ground, from the ground as the car sees it, and its longitudinal axis: with the place d and
-#: the rotation vector r of the ground, -(cos d - sin/angle r x d + (1 - cos)/angle² (r d) r), and likewise of (1, 0, 0)
+COLUMN = {"k": 3e6, "c": 1e4}  #: stiffness and damping of the steering column at the rack [N/m, N s/m]
+#: position of the car on the ground and its longitudinal axis, from the position d and the rotation vector r of the
+#: ground relative to the car: -(cos d - sin/angle r x d + (1 - cos)/angle² (r d) r), and the same for (1, 0, 0)
 ON_GROUND = {
     "angle": "sqrt(road_rx^2 + road_ry^2 + road_rz^2 + 1e-12)",
     "sine": "sin(angle)/angle",
@@ -473,7 +473,7 @@ def scene(path: dict[str, Any]) -> str:
 def rig_file(
     car: RoadCar, words: str, *, support: str = "hydraulic", heights: dict[str, dict[str, Any]] | None = None
 ) -> str:
-    """Return the car on four posts: its body stands, each wheel centre has its height [m] as a function of time."""
+    """Return the car with its body fixed, on four posts; the height [m] of each wheel is a function of time."""
     tables = base(car, support, is_rigid=True, has_wheels=False)
     tables["joints"]["stand"] = {
         "type": "fixed", "body_a": "ground", "marker_a": rounded(car.cockpit),
@@ -507,7 +507,7 @@ def written(words: str, tables: Tables, run: dict[str, Any], gravity: float = -9
 
 
 def post_motion(height: float = 0.03) -> dict[str, dict[str, Any]]:
-    """Return heights of the posts over time: in the first second roll, in the second warp, one wave each [m]."""
+    """Return heights of the posts over time: one wave of roll in the first second, one wave of warp in the next [m]."""
     wave = {"type": "harmonic", "omega": 2 * np.pi, "phase": -np.pi / 2}
     heights = {}
     for corner, roll, warp in zip(CORNERS, MODES["roll"], MODES["warp"], strict=True):

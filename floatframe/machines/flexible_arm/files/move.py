@@ -1,4 +1,4 @@
-"""The move of this folder's arm: optimised with and without modes, and held against the arm with all of them.
+"""The move of the arm in this folder, optimised with and without modes and applied to the arm with all modes.
 
 Writes move.png, move.txt and move.csv beside itself; needs the extra casadi.
 """

@@ -170,7 +170,7 @@ def test_a_system_file_names_it(tmp_path):
         ({"stiffness": np.eye(3)}, r"stiffness: expected"),
         ({"stiffness": 0.0}, "other than zero, got none"),
         ({"axial_stiffness": -1.0}, "axial_stiffness: expected"),
-        ({"axis": (1, 0, 0), "x_axis": (2, 0, 0)}, "across the axis, got one along it"),
+        ({"axis": (1, 0, 0), "x_axis": (2, 0, 0)}, "not parallel to the axis, got a parallel one"),
         ({"marker_b": "rotor"}, "marker_b: expected a Marker"),
     ],
 )

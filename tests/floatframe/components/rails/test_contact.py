@@ -207,7 +207,7 @@ def test_a_wheelset_that_does_not_fit_the_track_is_refused(change, message):
 def test_a_profile_the_wrong_way_round_is_noticed():
     """The flange outside: with y to the track the profile has its flange at y > 0."""
     turned = wheel_s1002()
-    with pytest.raises(ModelError, match="which side of the profile is the field"):
+    with pytest.raises(ModelError, match="y > 0 points to the field side of the profile"):
         Pair(wheel=replace(turned, y=-turned.y[::-1], z=turned.z[::-1]))
 
 

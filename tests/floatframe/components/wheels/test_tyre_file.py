@@ -84,7 +84,7 @@ def test_coefficients_of_the_other_version_are_unused_and_named():
         ("FITTYP   = 61\n", "", "PROPERTY_FILE_FORMAT = missing"),
         ("PDY1 = 0.88", "PDY1 = zero point nine", "PDY1: expected a number, got 'zero point nine'"),
         ("PDY1 = 0.88", "PDY1 0.88", "line .*expected KEY = value"),
-        ("PDY1 = 0.88", "PDY1 = 0.88\nPDY1 = 0.9", "PDY1 = 0.9 stands against 0.88"),
+        ("PDY1 = 0.88", "PDY1 = 0.88\nPDY1 = 0.9", "PDY1 = 0.9 contradicts 0.88"),
         ("FNOMIN = 4000", "FNOMIN = -4000", "FNOMIN: expected a number above 0"),
         ("NOMPRES  = 220000", "NOMPRES = -1", "NOMPRES: expected a number above 0"),
         ("FZMIN = 100", "FZMIN = 10000", "FZMIN = 10000 is not below FZMAX"),

@@ -150,7 +150,7 @@ def test_steady_slip_loses_force_times_slip_velocity(make):
         (linear, {"relaxation_y": -0.1}, "relaxation_y: expected a number >= 0"),
         (linear, {"friction": np.nan}, "friction: expected a finite number"),
         (linear, {"axis": (0, 0, 0)}, "axis: expected a direction"),
-        (linear, {"road": "flat"}, "expected FlatRoad, GridRoad"),
+        (linear, {"road": "flat"}, "expected a FlatRoad or a GridRoad"),
         (linear, {"landing_depth": 0.0}, "landing_depth: expected a number > 0"),
         (brush, {"contact_length": 0.0}, "contact_length: expected a number > 0"),
         (brush, {"nominal_load": -1.0}, "nominal_load: expected a number > 0"),
