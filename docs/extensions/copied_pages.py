@@ -1,4 +1,4 @@
-"""Pages whose sources lie outside this folder: notebooks, with the pictures kept of them, and files at the top."""
+"""Pages whose sources are outside this folder: notebooks with their stored pictures, and files in the top folder."""
 
 import base64
 import json
@@ -10,11 +10,11 @@ from sphinx.application import Sphinx
 
 ROOT = Path(__file__).resolve().parents[2]
 TOP = {"CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md", "benchmarks/README.md": "benchmarks.md"}
-PYTHON = {"language_info": {"name": "python", "pygments_lexer": "ipython3"}}  #: stored notebooks leave it out
+PYTHON = {"language_info": {"name": "python", "pygments_lexer": "ipython3"}}  #: stored notebooks have no such field
 
 
 def copy_pages(app: Sphinx) -> None:
-    """Copy what changed; a copy whose source is gone is removed."""
+    """Copy changed pages; a copy whose source no longer exists is removed."""
     folder = Path(app.srcdir) / "notebooks"
     folder.mkdir(exist_ok=True)
     sources = {path.name: path for path in (ROOT / "notebooks").glob("*.ipynb")}
@@ -35,7 +35,7 @@ def copy_pages(app: Sphinx) -> None:
 
 
 def shown(picture: Path) -> dict[str, Any]:
-    """Return a kept picture as the output of a cell."""
+    """Return a stored picture as the output of a cell."""
     data = {"image/png": base64.b64encode(picture.read_bytes()).decode("ascii")}
     return {"output_type": "display_data", "data": data, "metadata": {}}
 
@@ -47,7 +47,7 @@ def put(text: str, target: Path) -> None:
 
 
 def links_in_place(app: Sphinx, docname: str, content: list[str]) -> None:
-    """Point links of copied pages, written from the top of the checkout, to the pages of the site."""
+    """Change the links of copied pages, which are relative to the top of the checkout, to the pages of the site."""
     if docname.startswith("project/"):
         content[0] = re.sub(r"\]\((\.\./)?docs/", "](../", content[0])
 

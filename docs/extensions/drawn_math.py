@@ -30,7 +30,7 @@ def inline(self: HTML5Translator, node: nodes.math) -> None:
 
 
 def display(self: HTML5Translator, node: nodes.math_block) -> None:
-    """Write a formula that stands by itself, with its number if it has one."""
+    """Write a displayed formula, with its number if it has one."""
     self.body.append(self.starttag(node, "div", CLASS="math display"))
     if node.get("number"):
         number = get_node_equation_number(self, node)
@@ -41,7 +41,7 @@ def display(self: HTML5Translator, node: nodes.math_block) -> None:
 
 
 def letters_once(page: HTML5Translator, picture: str) -> str:
-    """Leave out of a picture the letters that an earlier formula of the page has defined."""
+    """Remove from a picture the glyphs that an earlier formula of the page has defined."""
     seen: set[str] = page.__dict__.setdefault("drawn_letters", set())
 
     def first(found: re.Match[str]) -> str:
@@ -53,17 +53,18 @@ def letters_once(page: HTML5Translator, picture: str) -> str:
 
 
 def drawn(tex: str, node: nodes.Node, *, is_display: bool) -> str:
-    """Return the SVG of a formula; its TeX with a warning where it cannot be drawn."""
+    """Return the SVG of a formula; if it cannot be drawn, return its TeX and warn."""
     try:
         return svg(" ".join(tex.split()), is_display)
-    except Exception as error:  # the library raises many kinds, all mean: not understood
+    # the library raises many kinds of errors, all of which mean that it did not understand the formula
+    except Exception as error:
         log.warning("formula cannot be drawn (%s: %s): %s", type(error).__name__, error, tex, location=node)
         return f"<code>{html.escape(tex)}</code>"
 
 
 @cache
 def svg(tex: str, is_display: bool) -> str:
-    """Return the SVG of a formula, its lengths in em, its baseline on that of the text."""
+    """Return the SVG of a formula, with lengths in em and its baseline on the baseline of the text."""
     source = braced(tex)
     if is_display and "\\begin" not in source and "\\\\" in source:
         source = rf"\begin{{aligned}} {source} \end{{aligned}}"
@@ -80,10 +81,10 @@ def svg(tex: str, is_display: bool) -> str:
 
 
 def braced(tex: str) -> str:
-    """Return TeX in the words that the drawing library knows; refuse those it would leave out without a word."""
+    """Return TeX in commands that the drawing library knows; refuse commands that it would silently omit."""
     lost = [word for word in LOST if word in tex]
     if lost:
-        raise ValueError(f"{lost[0]} is left out by the library that draws; write it otherwise")
+        raise ValueError(f"{lost[0]} is omitted by the drawing library; write the formula without it")
     return tex.replace(r"\lVert", r"\|").replace(r"\rVert", r"\|")
 
 

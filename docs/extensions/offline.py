@@ -1,4 +1,4 @@
-"""The site works without a network: whatever a built page loads must be in it."""
+"""The site works without a network, because a built page loads nothing from elsewhere."""
 
 import re
 from pathlib import Path
@@ -12,7 +12,7 @@ MAY_BE_LINKED = re.compile(r'rel="(?:canonical|search|author|license)"')
 
 
 def check(app: Sphinx, exception: Exception | None) -> None:
-    """Refuse a site that loads anything from elsewhere."""
+    """Refuse a site that loads anything from the network."""
     if exception is not None or app.builder.format != "html":
         return
     found = []
@@ -25,6 +25,6 @@ def check(app: Sphinx, exception: Exception | None) -> None:
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Check when everything is written."""
+    """Check the site after all pages are written."""
     app.connect("build-finished", check)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

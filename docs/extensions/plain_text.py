@@ -1,4 +1,4 @@
-"""Text written for a reader of the source, as the site needs it.
+"""Conversion of text written for readers of the source into text for the site.
 
 Names of pages in code marks become links to them, in pages and in docstrings. Docstrings hold plain formulas
 (`|x|`, `q_`, `a*b`), in which reStructuredText would see marks of its own: those are escaped.
@@ -41,7 +41,7 @@ def docstring_escaped(app: Sphinx, what: str, name: str, thing: object, options:
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Connect to reading of pages and, after numpydoc, of docstrings."""
+    """Register the handlers for reading pages and, after numpydoc, docstrings."""
     app.connect("source-read", pages_linked, priority=600)
     app.connect("autodoc-process-docstring", docstring_escaped, priority=600)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -18,7 +18,7 @@ PACKAGES = {
 
 
 def public_names(package: str) -> dict[str, str]:
-    """Return the public names of a package and the room each comes from, "" for the package itself."""
+    """Return the public names of a package and the room of each, "" for the package itself."""
     tree = ast.parse((ROOT / package / "__init__.pyi").read_text(encoding="utf-8"))
     rooms = {}
     for node in tree.body:
@@ -31,7 +31,7 @@ def public_names(package: str) -> dict[str, str]:
 
 
 def names_from_below(package: str) -> dict[str, str]:
-    """Return the public names of a package that a package below exports too, and that one."""
+    """Return the public names that a package imports from another package, with that package."""
     below: dict[int, str] = {}
     for other in PACKAGES:
         module = importlib.import_module(other)
@@ -44,11 +44,11 @@ def names_from_below(package: str) -> dict[str, str]:
 
 
 def further_modules(package: str) -> list[str]:
-    """Return the rooms whose `__all__` is public by module path beside the names of the package."""
+    """Return the rooms whose `__all__` is public by module path, in addition to the names of the package."""
     return [name for name in FURTHER if name.split(".")[0] == package]
 
 
-#: reached by module path, with an `__all__` of their own
+#: used by module path, with their own `__all__`
 FURTHER = (
     "fe_models.parts", "floatframe.components.drives", "floatframe.components.hydraulics",
     "floatframe.components.mechanisms",
@@ -56,7 +56,7 @@ FURTHER = (
 
 
 def write_pages(app: Sphinx) -> None:
-    """Write api/index.rst, a page a package and a page a room into the source folder."""
+    """Write api/index.rst, and one page for each package and each room, into the source folder."""
     folder = Path(app.srcdir) / "api"
     pages = {"index": index_page()}
     for package, words in PACKAGES.items():
@@ -85,29 +85,33 @@ def write_pages(app: Sphinx) -> None:
 
 
 def index_page() -> str:
-    """Return the page that leads to the packages."""
-    lines = [*heading("Names", "="), "All public names, by package and room; what is not listed here may change.", ""]
+    """Return the page that links to the packages."""
+    lines = [
+        *heading("Names", "="),
+        "All public names, by package and room; names that are not listed here may change.",
+        "",
+    ]
     return "\n".join([*lines, ".. toctree::", "   :maxdepth: 2", "", *(f"   {package}" for package in PACKAGES), ""])
 
 
 def package_page(package: str, words: str, files: list[str], shared: dict[str, str]) -> str:
-    """Return the page of a package: its docstring, its rooms, and the names it hands on from a package below."""
+    """Return the page of a package: its docstring, its rooms, and the names that it imports from another package."""
     lines = [*heading(f"{package}: {words}", "="), f".. automodule:: {package}", "   :no-members:", ""]
     if shared:
         names = ", ".join(f":obj:`~{other}.{name}`" for name, other in sorted(shared.items()))
-        lines += [f"Handed on, and described where they are made: {names}.", ""]
+        lines += [f"Also available here, and described in their own package: {names}.", ""]
     return "\n".join([*lines, ".. toctree::", "   :maxdepth: 1", "", *(f"   {name}" for name in files), ""])
 
 
 def room_page(package: str, room: str, names: list[str]) -> str:
-    """Return the page of a room: a table of its public names, then each in full."""
+    """Return the page of a room: a table of its public names, followed by the entry of each."""
     title = f"{package}.{room}" if room else f"{package}, top level"
     about = first_line(f"{package}.{room}" if room else package)
     return "\n".join([*heading(title, "="), about, "", *entries(package, names)])
 
 
 def module_page(module: str) -> str:
-    """Return the page of a module with an `__all__` of its own, without the public names of its package."""
+    """Return the page of a module with its own `__all__`, without the public names of its package."""
     package = module.split(".")[0]
     names = sorted(set(importlib.import_module(module).__all__) - set(public_names(package)), key=str.lower)
     return "\n".join([*heading(module, "="), first_line(module), "", *entries(module, names)])
@@ -130,7 +134,7 @@ def entries(owner: str, names: list[str]) -> list[str]:
 
 
 def first_line(module: str) -> str:
-    """Return the first line of a module's docstring, references to pages and sections included."""
+    """Return the first line of a module's docstring, including references to pages and sections."""
     line = (importlib.import_module(module).__doc__ or "").strip().split("\n")[0]
     return re.sub(r"(?:docs/)?(\w+)\.md", r":doc:`\1 </\1>`", line)
 

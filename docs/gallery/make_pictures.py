@@ -1,4 +1,4 @@
-"""Makes the pictures of the gallery and of README.md: `python docs/gallery/make_pictures.py [NAME ...]`.
+"""Make the pictures of the gallery and of README.md: `python docs/gallery/make_pictures.py [NAME ...]`.
 
 Names are those of MECHANISMS and of the notebooks; without one all are made. The demo's mechanism becomes a film of one
 turn (gif), the others a still each; of a notebook every picture is kept, as NAME_CELL_NUMBER.png. Pictures are shipped,
@@ -45,14 +45,14 @@ def slider_crank() -> None:
         cms.write(cms.reduce_job(Path(folder) / "rod.toml"), Path(folder) / "rod.h5")
         system, run = read_system(Path(folder) / "crank.toml")
         motion = ff.integrate(system, run.integrator, t_end=run.t_end, h=run.h, output_every=2)
-        film, n = Path(folder) / "film.gif", 38  # pictures of a turn, 15 a second, 100 times slower
+        film, n = Path(folder) / "film.gif", 38  # pictures of one revolution, 15 per second, 100 times slower
         animate(motion, drawn(system), film, speed=0.01, fps=15, magnification=1.0, system=system)
         frames = [cut(frame) for frame in iio.imread(film)[-n:]]
     save_film(frames, HERE / "slider_crank.gif", fps=15)
 
 
 def antenna() -> None:
-    """The deployable antenna under gravity, opened: twelve petals, as its drive moves them slowly."""
+    """The deployable antenna opening under gravity: twelve petals, moved slowly by its drive."""
     from floatframe.machines import copy_machine
 
     with tempfile.TemporaryDirectory() as name:
@@ -85,7 +85,7 @@ def landing_gear() -> None:
 
 
 def landing_gear_running(case: str, t_begin: float, t_end: float, *, magnification: float, speed: float) -> None:
-    """A gear as one sees it who runs along: braking with anti-skid on the wet patch, or the limit cycle of shimmy."""
+    """A moving landing gear: braking with anti-skid on the wet patch, or the shimmy limit cycle."""
     from floatframe.machines import copy_machine
 
     with tempfile.TemporaryDirectory() as name:
@@ -107,7 +107,7 @@ def landing_gear_running(case: str, t_begin: float, t_end: float, *, magnificati
 
 
 def still(name: str, make: Callable[[], tuple[ff.System, float, float]]) -> None:
-    """The last instant of a motion: make returns system, end and step."""
+    """The last instant of a motion; `make` returns system, end and step."""
     system, t_end, h = make()
     motion = ff.integrate(system, ff.GeneralizedAlpha(0.8), t_end=t_end, h=h, output_every=4)
     with tempfile.TemporaryDirectory() as folder:
@@ -140,13 +140,16 @@ def satellite() -> tuple[ff.System, float, float]:
 
 
 def chain() -> tuple[ff.System, float, float]:
-    """A chain of five flexible bars that was let go level."""
+    """A chain of five flexible bars, released from a horizontal position."""
     bar = rod_of(0.5, height=0.002, width=0.02, young=70e9, rho=2700.0)
     return mechanisms.chain(5, rod=bar, angles=(0.0,) * 5), 0.6, 5e-4
 
 
 def bogie() -> None:
-    """The railway vehicle hunts at 80 m/s, seen by one who runs along: what moves sideways drawn 20 times larger."""
+    """The railway vehicle hunts at 80 m/s, seen from a point that moves with it.
+
+    Lateral motion is drawn 20 times larger.
+    """
     from floatframe.components import rails
     from floatframe.machines import copy_machine
     from floatframe.machines.bogie import RailVehicle, flexible_frames, vehicle
@@ -178,13 +181,16 @@ def bogie() -> None:
 
 
 def is_front(drawn: Surface | Lines) -> bool:
-    """Return whether what is drawn belongs to the front bogie: ahead of the middle, and shorter than the body."""
+    """Return whether a shape belongs to the front bogie: it is ahead of the middle and shorter than the body."""
     x = (drawn.nodes if isinstance(drawn, Surface) else drawn.points)[..., 0]
     return float(x.min()) > 4.0 and float(np.ptp(x)) < 6.0
 
 
 def turned_more(p: np.ndarray, larger: float) -> np.ndarray:
-    """Return rotations, (..., 4), whose lateral axes lean and yaw more; what turns about them stays."""
+    """Return rotations, (..., 4), with larger roll and yaw of the lateral axes.
+
+    The rotation about them is unchanged.
+    """
     R = Rotation.from_quat(p.reshape(-1, 4), scalar_first=True)
     axis = R.apply([0, 1, 0])
     lean = np.column_stack([np.arcsin(axis[:, 2]), np.zeros(len(axis)), -np.arcsin(axis[:, 0])])
@@ -193,7 +199,10 @@ def turned_more(p: np.ndarray, larger: float) -> np.ndarray:
 
 
 def railway_engine() -> None:
-    """The railway engine's first bogie over the rail defect, ten times slower, what bends drawn 5000 times larger."""
+    """The first bogie of the railway engine over the rail defect, ten times slower.
+
+    Deformation is drawn 5000 times larger.
+    """
     from floatframe.machines import copy_machine
 
     with tempfile.TemporaryDirectory() as name:
@@ -211,7 +220,7 @@ def railway_engine() -> None:
 
 
 def kart() -> None:
-    """The kart with its flexible frame turning at 4 m/s, five times slower, what bends drawn 20 times larger."""
+    """The kart with its flexible frame in a turn at 4 m/s, five times slower; deformation is drawn 20 times larger."""
     from floatframe.machines.kart import Kart, chassis_files, kart_files
 
     with tempfile.TemporaryDirectory() as name:
@@ -230,7 +239,10 @@ def kart() -> None:
 
 
 def road_car() -> None:
-    """The road car on four posts: a wave of roll, then of warp, half as fast, what bends drawn 50 times larger."""
+    """The road car on four posts: a wave of roll, then a wave of warp, at half speed.
+
+    Deformation is drawn 50 times larger.
+    """
     from floatframe.machines import copy_machine
     from floatframe.machines.road_car import RoadCar
     from floatframe.machines.road_car.description import CORNERS
@@ -241,7 +253,7 @@ def road_car() -> None:
         copy_machine("road-car", folder)
         cms.write(cms.reduce_job(folder / "body.toml"), folder / "body.h5")
         text = rig_file(RoadCar(), "rig", heights=post_motion(0.035)).replace("is_rigid = true", "is_rigid = false")
-        for corner, (axle, side) in CORNERS.items():  # wheels to look at, without tyres
+        for corner, (axle, side) in CORNERS.items():  # drawn wheels, without tyres
             place = RoadCar().axle(axle).point("centre", side).tolist()
             wheel = f'{{type = "wheel", radius = 0.32, width = 0.205, position = {place}}}, '
             at = text.index(f"[bodies.upright_{corner}]")
@@ -258,7 +270,7 @@ def road_car() -> None:
 
 
 def road_car_plots() -> None:
-    """Two plots of the page of the road car: the lane change, and what wheels do over their travel."""
+    """Two plots of the page of the road car: the lane change, and wheel angles over wheel travel."""
     import matplotlib.pyplot as plt
 
     from floatframe.machines import copy_machine
@@ -308,7 +320,7 @@ def road_car_plots() -> None:
 
 
 def road_car_study(journal: Path | None = None) -> None:
-    """The study of the road car's suspension: its history, and the lane change before and after; minutes."""
+    """The study of the road car's suspension: its history, and the lane change before and after; this takes minutes."""
     import matplotlib.pyplot as plt
 
     from floatframe.design.optimization.history_plots import plot_history
@@ -364,7 +376,7 @@ MECHANISMS: dict[str, Callable[[], None]] = {
 
 
 def notebook(path: Path) -> None:
-    """Run a notebook and keep its pictures."""
+    """Run a notebook and store its pictures."""
     import nbformat
     from nbclient import NotebookClient
 
@@ -380,12 +392,12 @@ def notebook(path: Path) -> None:
 
 
 def drawn(system: ff.System) -> dict:
-    """Return what the bodies of a system look like, by name."""
+    """Return the shapes of the bodies of a system, by name."""
     return {body.name: getattr(body, "reduced", body) for body in system.bodies}
 
 
 def cut(frame: np.ndarray) -> np.ndarray:
-    """Return a frame without the empty rows above and below what is drawn."""
+    """Return a frame without the empty rows above and below its content."""
     busy = np.flatnonzero((np.ptp(frame[..., :3].astype(int), axis=1) > 12).any(axis=1))
     low, high = max(busy.min() - 4, 0), min(busy.max() + 4, len(frame))
     return frame[low : high + 1, :, :3]
@@ -416,7 +428,7 @@ def save_film(frames: list[np.ndarray], path: Path, *, fps: float) -> None:
 
 
 def main(names: list[str]) -> None:
-    """Make the pictures that are named, or all."""
+    """Make the named pictures, or all."""
     books = {path.stem: partial(notebook, path) for path in sorted(NOTEBOOKS.glob("*.ipynb"))}
     makers = MECHANISMS | books
     unknown = [name for name in names if name not in makers]

@@ -26,14 +26,14 @@ class Refusal:
     reason: str  #: in the table
 
 
-VELOCITIES = Refusal("joint 'roll' holds velocities", "it holds velocities that come from no positions")
+VELOCITIES = Refusal("joint 'roll' holds velocities", "it has non-holonomic constraints")
 NORMAL = Refusal("force 'rub' has friction by the normal force", "its friction depends on the reaction of its joint")
 MASSLESS = Refusal("body 'soft' has a mode without mass", "its velocity has no momentum")
-CONTACT = Refusal("contact 'touch' depends on the speed with which it began", "its force depends on how it began")
-MEMORY = Refusal(r"'\w+' has a memory of its own", "it remembers angles through full turns, or states")
-OWN = Refusal(r"element '\w+' has states or multipliers of its own", "it has states or multipliers of its own")
+CONTACT = Refusal("contact 'touch' depends on the speed with which it began", "its force depends on its history")
+MEMORY = Refusal(r"'\w+' has a memory of its own", "it counts angles beyond full turns, or has states")
+OWN = Refusal(r"element '\w+' has states or multipliers of its own", "it has its own states or multipliers")
 MULTIPLIERS = Refusal(r"element '\w+' has multipliers of its own", "its multipliers would act at both ends of a step")
-ACCELERATIONS = Refusal("element 'heavy' feels accelerations", "it feels accelerations, which the scheme has none of")
+ACCELERATIONS = Refusal("element 'heavy' feels accelerations", "it depends on accelerations, which the scheme does not have")
 
 HELD = (
     "law that holds a position", "law that holds positions of flexible bodies", "law that holds velocities",
@@ -78,7 +78,7 @@ def table() -> str:
         cells = ["yes" if each is None else f"no: {letters[each]}" for each in fares]
         lines.append(f"| {listed(parts)} | {' | '.join(cells)} |")
     reasons = "; ".join(f"{letter}: {each.reason}" for each, letter in letters.items())
-    return "\n".join([*lines, "", f"Why a part is refused, by its name: {reasons}."])
+    return "\n".join([*lines, "", f"Reasons of refusal: {reasons}."])
 
 
 def listed(parts: Iterable[str]) -> str:
