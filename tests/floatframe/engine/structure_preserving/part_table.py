@@ -33,7 +33,9 @@ CONTACT = Refusal("contact 'touch' depends on the speed with which it began", "i
 MEMORY = Refusal(r"'\w+' has a memory of its own", "it counts angles beyond full turns, or has states")
 OWN = Refusal(r"element '\w+' has states or multipliers of its own", "it has its own states or multipliers")
 MULTIPLIERS = Refusal(r"element '\w+' has multipliers of its own", "its multipliers would act at both ends of a step")
-ACCELERATIONS = Refusal("element 'heavy' feels accelerations", "it depends on accelerations, which the scheme does not have")
+ACCELERATIONS = Refusal(
+    "element 'heavy' feels accelerations", "it depends on accelerations, which the scheme does not have"
+)
 
 HELD = (
     "law that holds a position", "law that holds positions of flexible bodies", "law that holds velocities",
