@@ -226,7 +226,7 @@ FIELDS = {
     StrainGauge: {"direction": "1", "young": PRESSURE, "poisson": "1", "position": "m", "tolerance": "1"},
     StressChannel: {"position": "m"},
     StressSensor: {"position": "m", "tolerance": "1"},
-    VonMisesSensor: {"tolerance": "1"},
+    VonMisesSensor: {},
 }  # fmt: skip
 JOINT = {"axis": "1", "axis_b": "1", "normal": "1", "rotation": "1", "distance": "m"}  #: of all joints
 

@@ -1,9 +1,9 @@
 """Tables of the system file for inputs, [inputs.NAME], and outputs, [outputs.NAME], of the linearised system."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import MISSING, fields, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -27,26 +27,12 @@ from floatframe.files.system_file.place_key import (
 )
 from floatframe.model.bodies.markers import Marker
 from floatframe.results.sensors import (
+    SENSORS,
     AngleSensor,
-    BushingSensor,
-    ControlSensor,
-    CoordinateSensor,
-    CouplerSensor,
     DisplacementSensor,
-    ElementSensor,
     ElongationSensor,
-    EnergySensor,
-    InterfaceForceSensor,
-    ModeSensor,
-    MomentumSensor,
     PlaceSensor,
-    ReactionSensor,
-    RecoverySensor,
     Sensor,
-    SpringSensor,
-    StrainGauge,
-    StressSensor,
-    VonMisesSensor,
 )
 from floatframe.results.sensors.body_loads import INTERFACE_AXES
 from floatframe.results.sensors.channels import QUANTITIES, RATES, Channel, CoordinateChannel, StressChannel
@@ -73,27 +59,25 @@ __all__ = [
 MESH = ("node", "element", "set")  #: keys that specify a place in the user's mesh
 AT = ("marker", *MESH, "tolerance")  #: keys of a place
 
-SENSOR_TYPES: dict[str, tuple[str, ...]] = {  # type -> keys; those before "|" are required
-    **dict.fromkeys(PLACE_QUANTITIES, ("body", "|", *AT, "relative_to", "relative_marker")),
-    "angle": ("body_a", "body_b", "|", "marker_a", "marker_b", "axis"),
-    "bushing": ("of", "|"),
-    "control": ("of", "|"),
-    "coordinate": ("joint", "coordinate", "|"),
-    "coupler": ("of", "|"),
-    "displacement": ("body", "|", *AT),
-    "element": ("of", "|", "output"),
-    "elongation": ("body", "position_a", "position_b", "|", "tolerance"),
-    "energy": ("|",),
-    "interface-force": ("body", "interface", "|", "axes"),
-    "mode": ("body", "mode", "|"),
-    "momentum": ("|",),
-    "reaction": ("of", "|", "axes"),
-    "recovery": ("body", "table", "|", "rows"),
-    "spring": ("of", "|"),
-    "strain": ("body", "direction", "young", "poisson", "|", "position", "point", "node", "tolerance"),
-    "stress": ("body", "|", "position", "point", *MESH, "tolerance"),
-    "von-mises": ("body", "|", *MESH),
+#: keys of the tables whose places are put together from several keys; those before "|" are required
+KEYS_OF_PLACES: dict[type[Sensor], tuple[str, ...]] = {
+    PlaceSensor: ("body", "|", *AT, "relative_to", "relative_marker"),
+    AngleSensor: ("body_a", "body_b", "|", "marker_a", "marker_b", "axis"),
+    DisplacementSensor: ("body", "|", *AT),
+    ElongationSensor: ("body", "position_a", "position_b", "|", "tolerance"),
 }
+
+
+def keys_of(kind: type[Sensor]) -> tuple[str, ...]:
+    """Return the keys of the table of a sensor: the fields of its class but the name; those before "|" are required."""
+    if kind in KEYS_OF_PLACES:
+        return KEYS_OF_PLACES[kind]
+    given = [each for each in fields(kind) if each.name != "name"]
+    needed = [each.name for each in given if each.default is MISSING and each.default_factory is MISSING]
+    return (*needed, "|", *(each.name for each in given if each.name not in needed))
+
+
+SENSOR_TYPES = {name: keys_of(kind) for name, kind in SENSORS.items()}
 
 
 class SensorSection(Table):
@@ -170,7 +154,8 @@ class SensorSection(Table):
             key: getattr(self, key) for key in SENSOR_TYPES[self.type] if key != "|" and getattr(self, key) is not None
         }
         given = {key: np.array(value) if isinstance(value, tuple) else value for key, value in given.items()}
-        return BY_KEYS[self.type](name, **given)
+        kind: Any = SENSORS[self.type]
+        return cast(Sensor, kind(name, **given))
 
     @property
     def limit(self) -> float:
@@ -182,25 +167,6 @@ class SensorSection(Table):
         if any(getattr(self, key) is not None for key in MESH):
             return Marker(str(self.body), node=self.node, element=self.element, set=self.set)
         return marker_at(str(self.body), self.marker, self.limit)
-
-
-BY_KEYS: dict[str, Any] = {  # sensor classes whose fields are the keys of their table
-    "bushing": BushingSensor,
-    "control": ControlSensor,
-    "coordinate": CoordinateSensor,
-    "coupler": CouplerSensor,
-    "element": ElementSensor,
-    "energy": EnergySensor,
-    "interface-force": InterfaceForceSensor,
-    "mode": ModeSensor,
-    "momentum": MomentumSensor,
-    "reaction": ReactionSensor,
-    "recovery": RecoverySensor,
-    "spring": SpringSensor,
-    "strain": StrainGauge,
-    "stress": StressSensor,
-    "von-mises": VonMisesSensor,
-}
 
 
 # channel section ------------------------------------------------------------------------------------------------------

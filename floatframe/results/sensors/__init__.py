@@ -10,8 +10,8 @@ from floatframe.results.sensors.body_loads import InterfaceForceSensor, Recovery
 from floatframe.results.sensors.channels import Channel, CoordinateChannel, StressChannel
 from floatframe.results.sensors.elements import BushingSensor, ControlSensor, CouplerSensor, ElementSensor
 from floatframe.results.sensors.loads import CoordinateSensor, EnergySensor, ModeSensor, MomentumSensor, ReactionSensor
-from floatframe.results.sensors.measurement import Measurement
-from floatframe.results.sensors.places import AngleSensor, DisplacementSensor, PlaceSensor
+from floatframe.results.sensors.measurement import Measurement, Sensor
+from floatframe.results.sensors.places import PLACE_QUANTITIES, AngleSensor, DisplacementSensor, PlaceSensor
 from floatframe.results.sensors.stresses import ElongationSensor, StrainGauge, StressSensor, VonMisesSensor
 from floatframe.results.trajectory import Trajectory
 
@@ -47,32 +47,10 @@ __all__ = [
     "sensors_of",
 ]
 
-Sensor = (
-    AngleSensor
-    | BushingSensor
-    | Channel
-    | ControlSensor
-    | CoordinateChannel
-    | CoordinateSensor
-    | CouplerSensor
-    | DisplacementSensor
-    | ElementSensor
-    | ElongationSensor
-    | EnergySensor
-    | InterfaceForceSensor
-    | ModeSensor
-    | MomentumSensor
-    | PlaceSensor
-    | ReactionSensor
-    | RecoverySensor
-    | SpringSensor
-    | StrainGauge
-    | StressChannel
-    | StressSensor
-    | VonMisesSensor
-)
-
-SENSORS = {
+#: sensor classes by the `type` of a table [sensors.NAME]; a new sensor is added here alone. The fields of a class are
+#: the keys of its table, unless `channel_section.KEYS_OF_PLACES` puts its places together from several keys
+SENSORS: dict[str, type[Sensor]] = {
+    **dict.fromkeys(PLACE_QUANTITIES, PlaceSensor),
     "angle": AngleSensor,
     "bushing": BushingSensor,
     "control": ControlSensor,
@@ -85,7 +63,6 @@ SENSORS = {
     "interface-force": InterfaceForceSensor,
     "mode": ModeSensor,
     "momentum": MomentumSensor,
-    "place": PlaceSensor,
     "reaction": ReactionSensor,
     "recovery": RecoverySensor,
     "spring": SpringSensor,

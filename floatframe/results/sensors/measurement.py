@@ -1,15 +1,20 @@
 """The measurement of a sensor: named columns over time, each with its unit."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import Field, dataclass
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import FrozenMapping, frozen_copies
 from fe_models.foundation.units import Units
+from floatframe.model.system import System
+from floatframe.results.small_motions.rows import LinearColumns
+from floatframe.results.small_motions.small_motions import SmallMotions
+from floatframe.results.trajectory import Trajectory
 
-__all__ = ["Measurement", "unit_words", "vector_columns"]
+__all__ = ["Measurement", "Sensor", "unit_words", "vector_columns"]
 
 
 @frozen_copies
@@ -31,6 +36,22 @@ class Measurement:
     def headers(self) -> tuple[str, ...]:
         """Names of the columns for tables, with sensor, column and unit."""
         return tuple(f"{self.sensor} {name} [{self.units[name]}]".replace("  ", " ") for name in self.columns)
+
+
+class Sensor(Protocol):
+    """A frozen dataclass that measures motions; all of them are in `floatframe.results.sensors.SENSORS`."""
+
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+
+    @property
+    def name(self) -> str:
+        """Name of the sensor in its system."""
+
+    def measure(self, system: System, trajectory: Trajectory) -> Measurement:
+        """Return what it measures during a motion of the system."""
+
+    def linear(self, small: SmallMotions) -> LinearColumns:
+        """Return its columns as linear functions of small motions."""
 
 
 def vector_columns(values: Array, unit: str, *, prefix: str = "") -> tuple[dict[str, Array], dict[str, str]]:

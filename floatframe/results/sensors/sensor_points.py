@@ -1,12 +1,11 @@
 """Descriptions of the points that sensors use: the requested place, the node used for it, and their distance."""
 
+from dataclasses import fields
+
 from floatframe.model.bodies.markers import Marker
 from floatframe.model.system import System
 from floatframe.results.sensors import (
-    AngleSensor,
-    DisplacementSensor,
     ElongationSensor,
-    PlaceSensor,
     Sensor,
     StrainGauge,
     StressSensor,
@@ -44,9 +43,6 @@ def places_of(system: System, sensor: Sensor) -> tuple[str, ...]:
 
 
 def markers_of(sensor: Sensor) -> tuple[Marker, ...]:
-    """Return the markers of a sensor."""
-    if isinstance(sensor, PlaceSensor):
-        return (sensor.marker,) if sensor.relative_to is None else (sensor.marker, sensor.relative_to)
-    if isinstance(sensor, AngleSensor):
-        return sensor.marker_a, sensor.marker_b
-    return (sensor.marker,) if isinstance(sensor, DisplacementSensor) else ()
+    """Return the markers among the fields of a sensor."""
+    values = [getattr(sensor, field.name) for field in fields(sensor)]
+    return tuple(value for value in values if isinstance(value, Marker))

@@ -78,7 +78,7 @@ def address_of(sensor: "StressSensor | StrainGauge | VonMisesSensor") -> Address
     if not given:
         return None
     try:
-        return Address(**given, tolerance=sensor.tolerance)
+        return Address(**given, tolerance=getattr(sensor, "tolerance", TOLERANCE))
     except BodyError as error:
         raise ModelError(f"sensor {sensor.name!r}: {error}") from error
 
@@ -177,7 +177,6 @@ class VonMisesSensor:
     node: int | str | None = None  #: restricts it to this node, by the user's number
     element: int | str | None = None  #: restricts it to this element on the surface
     set: str | None = None  #: restricts it to the nodes of this set
-    tolerance: float = TOLERANCE
 
     def __post_init__(self) -> None:
         address_of(self)
