@@ -5,10 +5,11 @@ import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
 
-__all__ = ["elastic_eigenvectors"]
+__all__ = ["elastic_eigenvectors", "turn_to_diagonal"]
 
 INDEPENDENT = 1e-14  #: smallest eigenvalue of the norm of a pencil, scaled to a unit diagonal
 MASSLESS = 1e-12  #: modal mass times omega_1² of a shape of unit W-length, below which the shape is static
+BAND = 1e6  #: ratio of omega² within a band of step (4); rounding of its stiffest mode is 1e-10 of its softest one
 
 
 def elastic_eigenvectors(G_K: Array, G_M: Array, omega2_1: float) -> tuple[Array, Array]:
@@ -17,6 +18,8 @@ def elastic_eigenvectors(G_K: Array, G_M: Array, omega2_1: float) -> tuple[Array
     (1) transform to a basis in which W = K + omega_1² M is the identity, after scaling W to a unit diagonal
     (2) an eigenvalue mu of M in this basis gives omega² = (1 - omega_1² mu) / mu
     (3) solve again in nearly diagonal form, for relative accuracy at the stiff end of the spectrum
+    (4) (3) leaves the soft end an error of eps times the stiffest omega²: solve bands of the spectrum once more, each
+        by itself
 
     Returns
     -------
@@ -47,5 +50,20 @@ def elastic_eigenvectors(G_K: Array, G_M: Array, omega2_1: float) -> tuple[Array
     massive = Z[:, is_massive]
     if massive.shape[1]:  # (3)
         _, Y = la.eigh(massive.T @ G_K @ massive, massive.T @ G_M @ massive)
-        Z[:, is_massive] = massive @ Y
+        massive = massive @ Y
+        massive = massive @ turn_to_diagonal(massive.T @ G_K @ massive)  # (4)
+        Z[:, is_massive] = massive
     return Z, is_massive
+
+
+def turn_to_diagonal(G_K: Array) -> Array:
+    """Return the orthogonal matrix that makes a nearly diagonal, ascending stiffness diagonal, band by band, (k, k)."""
+    omega2 = np.diag(G_K)
+    omega2 = np.maximum(omega2, np.finfo(float).eps * omega2.max(initial=0.0))
+    turn, first = np.zeros_like(G_K), 0
+    while first < len(omega2):
+        stiffer = omega2[first:] > BAND * omega2[first]
+        last = first + int(np.argmax(stiffer)) if stiffer.any() else len(omega2)
+        turn[first:last, first:last] = la.eigh(G_K[first:last, first:last])[1]
+        first = last
+    return turn

@@ -8,7 +8,7 @@ import scipy.linalg as la
 
 from cms.body.source_columns import SourceColumns, source_columns
 from cms.errors import BodyError, ModeSetError
-from cms.linear_algebra.elastic_pencil import elastic_eigenvectors
+from cms.linear_algebra.elastic_pencil import elastic_eigenvectors, turn_to_diagonal
 from cms.linear_algebra.independent import (
     Basis,
     Products,
@@ -87,7 +87,10 @@ def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedB
     if defect > ORTHONORMAL_DEFECT:
         again, defect = normalised_again(Phi, is_massive, products)
         Z, Phi = Z @ again, combined(Phi, again)
-        omega2 = diagonal_within(gram_in_blocks(Phi, products.K), np.eye(len(again)))
+        G_K, own = gram_in_blocks(Phi, products.K), np.ix_(is_massive, is_massive)
+        turn = np.eye(len(again))
+        turn[own] = turn_to_diagonal(G_K[own])  # the correction of the mass mixes stiff modes
+        Z, Phi, omega2 = Z @ turn, combined(Phi, turn), diagonal_within(G_K, turn)
     rounding = rounding_of_energy(body, Phi)
     is_suspect = is_massive & (omega2 < SUSPECT_ENERGY * rounding)
     suspect = in_memory(Phi[:, is_suspect])

@@ -10,10 +10,12 @@ from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.foundation.arrays import Array, frozen, tilde
 
 __all__ = [
-    "FreePencil", "free_elastic_modes", "free_pencil", "has_inertia", "port_rows", "whole_pencil", "whole_port_rows",
+    "FreePencil", "free_elastic_modes", "free_pencil", "frequency_distance", "has_inertia", "port_rows", "whole_pencil",
+    "whole_port_rows",
 ]  # fmt: skip
 
 NO_INERTIA = 1e-12  #: least eigenvalue of the scaled rigid mass matrix, below which there is no inertia about an axis
+KNOWN_RATIO = 1e9  #: ratio of squared frequencies, up to which rounding of the modal mass stays far below all limits
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +86,27 @@ def free_elastic_modes(reduced: ReducedBody) -> tuple[Array, Array, np.ndarray]:
     omega2 = np.einsum("kq,kl,lq->q", Z, reduced.K, Z)
     order = np.lexsort((omega2, np.logical_not(is_massive)))
     return omega2[order], T @ Z[:, order], is_massive[order]
+
+
+def frequency_distance(own: Array, stored: Array) -> Array:
+    """Return relative differences of frequencies from stored ones, as far as these are known; both ascending.
+
+    The mass of a mode is omega_1² / omega² of its energy in units of the first mode, and rounding leaves it an error of
+    eps: a frequency is known to eps omega² / omega_1². Light frames with point masses have modes of 1e6 times the first
+    frequency. Beyond `KNOWN_RATIO` differences count less in this proportion, and one list may be longer than the other
+    by modes so high that rounding decides whether they have mass.
+
+    Raises
+    ------
+    ValueError
+        If one list is longer by others.
+    """
+    n = min(len(own), len(stored))
+    first = min(own[0], stored[0]) if n else 0.0
+    surplus = np.concatenate([own[n:], stored[n:]])
+    if (surplus**2 < KNOWN_RATIO * first**2).any() or (len(surplus) and not n):
+        raise ValueError(f"{len(own)} frequencies for {len(stored)}")
+    return np.asarray(np.abs(own[:n] / stored[:n] - 1) * np.minimum(1.0, KNOWN_RATIO * (first / stored[:n]) ** 2))
 
 
 def has_inertia(reduced: ReducedBody) -> bool:
