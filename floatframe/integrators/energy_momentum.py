@@ -1,4 +1,7 @@
-"""Schemes that keep energy and momentum in steps of any size, or let energy fall alone."""
+"""Schemes that keep energy and momentum in steps of any size, or let energy fall alone.
+
+Evaluated in `floatframe.engine.structure_preserving.kernels.steps`.
+"""
 
 from dataclasses import dataclass
 

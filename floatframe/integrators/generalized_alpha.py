@@ -1,4 +1,7 @@
-"""The generalized-alpha method for constrained motion on R³ × SO(3) × Rⁿ."""
+"""The generalized-alpha method for constrained motion on R³ × SO(3) × Rⁿ.
+
+Evaluated in `floatframe.engine.kernels.generalized_alpha`.
+"""
 
 from dataclasses import dataclass, replace
 from math import ceil

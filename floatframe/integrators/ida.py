@@ -1,4 +1,7 @@
-"""SUNDIALS IDA on the index-reduced equations: another method of another kind, for cross-checks."""
+"""SUNDIALS IDA on the index-reduced equations: another method of another kind, for cross-checks.
+
+Evaluated in `floatframe.engine.kernels.evaluation`.
+"""
 
 from dataclasses import dataclass, replace
 from typing import Any

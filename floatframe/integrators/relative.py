@@ -1,4 +1,7 @@
-"""The generalized-alpha method in relative coordinates: joints and modes, with constraints of closed loops alone."""
+"""The generalized-alpha method in relative coordinates: joints and modes, with constraints of closed loops alone.
+
+Evaluated in `floatframe.engine.tree.kernels.steps`.
+"""
 
 import weakref
 from dataclasses import asdict, dataclass, replace

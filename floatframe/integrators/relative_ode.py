@@ -1,4 +1,7 @@
-"""SciPy's stiff solvers on the independent coordinates of joints and modes."""
+"""SciPy's stiff solvers on the independent coordinates of joints and modes.
+
+Evaluated in `floatframe.engine.tree.kernels.accelerations`.
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,7 @@
-"""A variational integrator: the motion that makes the sum of discrete Lagrangians stationary."""
+"""A variational integrator: the motion that makes the sum of discrete Lagrangians stationary.
+
+Evaluated in `floatframe.engine.structure_preserving.kernels.steps`.
+"""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,7 @@
-"""Evaluation of the whole system at one iterate: residuals, and their derivatives body by body."""
+"""Evaluation of the whole system at one iterate: residuals, and their derivatives body by body.
+
+Described in `floatframe.model.forces.loads`, `floatframe.integrators.ida`.
+"""
 
 from floatframe.engine.kernels.body import body_forces, body_tangent
 from floatframe.engine.kernels.compiler.compilation import inner

@@ -1,4 +1,7 @@
-"""Time loop of the generalized-alpha method on R³ × SO(3) × Rⁿ; see `floatframe.integrators.generalized_alpha`."""
+"""Time loop of the generalized-alpha method on R³ × SO(3) × Rⁿ.
+
+Described in `floatframe.integrators.generalized_alpha`.
+"""
 
 import math
 

@@ -12,6 +12,8 @@ the body of each marker, in ground axes; z_dot, (n_z,); g, (n_lam,), which is to
 
 Compiled with `numba.njit`, the function runs at the speed of the kernels; a Python function is slow. It must depend
 only on its arguments, because it is called several times per step, also for motions that are discarded.
+
+Evaluated in `floatframe.engine.kernels.connections.element_law`.
 """
 
 import math

@@ -1,4 +1,7 @@
-"""The bushing: a stiffness and a damping matrix for six deformations between two markers."""
+"""The bushing: a stiffness and a damping matrix for six deformations between two markers.
+
+Evaluated in `floatframe.engine.kernels.connections.bushing`.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

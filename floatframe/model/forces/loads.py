@@ -1,4 +1,7 @@
-"""Loads on bodies: gravity, a force at a point, and a load spread over a body."""
+"""Loads on bodies: gravity, a force at a point, and a load spread over a body.
+
+Evaluated in `floatframe.engine.kernels.evaluation`.
+"""
 
 from dataclasses import dataclass, field
 

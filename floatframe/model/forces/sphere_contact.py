@@ -1,4 +1,7 @@
-"""Contact of a sphere with a plane or another sphere: Hertz force, restitution, friction."""
+"""Contact of a sphere with a plane or another sphere: Hertz force, restitution, friction.
+
+Evaluated in `floatframe.engine.kernels.connections.contact`.
+"""
 
 from dataclasses import dataclass, field
 

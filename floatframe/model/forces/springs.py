@@ -1,4 +1,8 @@
-"""Springs and dampers between two markers, and forces along the coordinate of a joint."""
+"""Springs and dampers between two markers, and forces along the coordinate of a joint.
+
+Evaluated in `floatframe.engine.kernels.connections.spring_damper`,
+`floatframe.engine.kernels.joints.coordinate_force`.
+"""
 
 from dataclasses import dataclass, field
 

@@ -1,4 +1,7 @@
-"""User forces: expressions or functions of coordinates, time and their own states (control)."""
+"""User forces: expressions or functions of coordinates, time and their own states (control).
+
+Evaluated in `floatframe.engine.kernels.connections.user_force`.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,4 +1,7 @@
-"""Coordinate couplers: gears, racks, differentials; latches, clutches and stops."""
+"""Coordinate couplers: gears, racks, differentials; latches, clutches and stops.
+
+Evaluated in `floatframe.engine.kernels.connections.coupler`.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,7 @@
-"""The six lower pairs: revolute, prismatic, screw, cylindrical, spherical and planar joints."""
+"""The six lower pairs: revolute, prismatic, screw, cylindrical, spherical and planar joints.
+
+Evaluated in `floatframe.engine.kernels.joints.row_formulas`.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

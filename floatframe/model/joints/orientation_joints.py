@@ -1,4 +1,7 @@
-"""Joints that constrain an orientation: fixed, constant-orientation, universal and constant-velocity joints."""
+"""Joints that constrain an orientation: fixed, constant-orientation, universal and constant-velocity joints.
+
+Evaluated in `floatframe.engine.kernels.joints.row_formulas`, `floatframe.engine.kernels.joints.constant_velocity`.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,4 +1,7 @@
-"""Joints that constrain the position of a point: on a line, on a plane, at a distance."""
+"""Joints that constrain the position of a point: on a line, on a plane, at a distance.
+
+Evaluated in `floatframe.engine.kernels.joints.row_formulas`.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

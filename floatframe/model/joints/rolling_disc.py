@@ -1,4 +1,7 @@
-"""The rolling disc: a thin wheel on a plane, without slip."""
+"""The rolling disc: a thin wheel on a plane, without slip.
+
+Evaluated in `floatframe.engine.kernels.joints.rolling`.
+"""
 
 from dataclasses import dataclass, field
 

@@ -1,4 +1,7 @@
-"""The sliding joint: a point or a body slides along the deformed centre line of a flexible body."""
+"""The sliding joint: a point or a body slides along the deformed centre line of a flexible body.
+
+Evaluated in `floatframe.engine.kernels.joints.deformed_line`.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -22,6 +22,8 @@ In axes of A or B turns are counted: of all rotation vectors of A_Aᵀ A_B, thet
 is nearest to where the rates of the last step lead (`kernels/turns.py`). Half way t < pi.
 
 `bushing_variation` gives the exact change of F, M and N; rates follow the same formulas with velocities for variations.
+
+Described in `floatframe.model.forces.bushing`.
 """
 
 import math

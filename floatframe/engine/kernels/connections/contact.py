@@ -8,6 +8,8 @@ N: unit normal from A to B, of the plane (fixed in A) or along d = r_B - r_A; de
 
 and on the markers F = -F_B, M = (d + rho) × F on A, -N_w = -rho × F on B. v_0 is an unknown of its own: while there is
 no contact minus the speed of approach (at least the slow one), in contact the value from the beginning of the step.
+
+Described in `floatframe.model.forces.sphere_contact`.
 """
 
 import math

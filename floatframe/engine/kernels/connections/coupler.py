@@ -3,6 +3,8 @@
 The multiplier lam is the last unknown; the force along coordinate p is Q_p = a_p lam. The held row is divided by its
 largest coefficient (`row_x`), so that all rows have numbers of one size. While a coupler is not
 engaged its row is lam = 0.
+
+Described in `floatframe.model.joints.coordinate_coupler`.
 """
 
 from floatframe.engine.kernels.compiler.compilation import inner

@@ -14,6 +14,8 @@ of wrenches. Two ends whose forces are opposite share one unknown, with the fact
 
 The derivatives come from one call, d(wrench, g, h)/d(dr, dphi, dv, domega [, da, dalpha] of each marker, z, lam), row
 by row. A law that asks for accelerations gets 24 numbers of each marker in place of 18.
+
+Described in `floatframe.model.elements.element`.
 """
 
 import math

@@ -2,6 +2,8 @@
 
 F - s d = 0,   s = k (l - l_0) + c l_dot + preload,   d = (r_B - r_A)/l
 d(s d)/dr_B = (k - s/l) d dᵀ + (s/l) 1 + (c/l) d (v - l_dot d)ᵀ,   d(s d)/dv_B = c d dᵀ
+
+Described in `floatframe.model.forces.springs`.
 """
 
 from floatframe.engine.kernels.compiler.compilation import inner

@@ -5,6 +5,8 @@ Rows after those of the coordinates: the forces, then for each state its value, 
     Q - f = 0;   z - b - kappa g' = 0,   g' - g = 0,   a - b' - rho g' = 0        (g': the rate as an unknown)
 
 with b, b', kappa and rho of the generalized-alpha method for first-order equations, see `begin_states`.
+
+Described in `floatframe.model.forces.user_force`.
 """
 
 import math

@@ -5,6 +5,8 @@ shafts were in line, B is A turned straight from shaft to shaft, about an axis n
 
     EQUAL_TURN   E · U - Z · D = 0          its gradient is along the bisector of the shafts (docs/theory.md §10)
     BISECTOR     M · (E × (Z_A + Z_B)) = 0  Z_A = A_A z, Z_B = A_B y the shafts: M is along their bisector, for two E
+
+Described in `floatframe.model.joints.orientation_joints`.
 """
 
 from floatframe.engine.kernels.compiler.compilation import inner

@@ -1,4 +1,7 @@
-"""Forces along joint coordinates: springs, dampers, friction, motors; see `floatframe.model.forces.springs`."""
+"""Forces along joint coordinates: springs, dampers, friction, motors.
+
+Described in `floatframe.model.forces.springs`.
+"""
 
 import math
 

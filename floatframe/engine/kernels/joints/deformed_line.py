@@ -16,6 +16,8 @@ those of the stations. With n_0 = r'/|r'|, n_1 and n_2 normal to it, d = r_B - r
 
 The places on A where a force acts and n_i turn with s; their change is left out of the tangent, where it is of the
 order of the reaction times the curvature, but not of the residual.
+
+Described in `floatframe.model.joints.sliding`.
 """
 
 from floatframe.engine.kernels.compiler.compilation import inner

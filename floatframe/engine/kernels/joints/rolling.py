@@ -8,6 +8,8 @@ rim is nearest to the plane at rho = -R u, u = (N - c n)/s, from the centre, and
     RIM x        x · (N_w - rho × F) = 0,  x in ground axes: the force on B acts at the rim
 
 Formulas as in held_rows.py and wrench_rows.py; a row that holds a velocity changes with places too, `roll_by_place`.
+
+Described in `floatframe.model.joints.rolling_disc`.
 """
 
 from floatframe.engine.kernels.compiler.compilation import inner

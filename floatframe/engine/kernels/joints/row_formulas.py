@@ -2,6 +2,9 @@
 
 A kind that holds something brings `value` and `rates` (held_rows.py), one that says what the wrench is `value` and
 `derivatives` (wrench_rows.py). Kernels call them by the code of the row and know nothing else of it.
+
+Described in `floatframe.model.joints.lower_pairs`, `floatframe.model.joints.orientation_joints`,
+`floatframe.model.joints.point_joints`.
 """
 
 from collections.abc import Callable, Mapping

@@ -1,4 +1,7 @@
-"""The steps of the conserving and variational schemes in a compiled loop; formulas in `floatframe.integrators`."""
+"""The steps of the conserving and variational schemes in a compiled loop.
+
+Described in `floatframe.integrators.energy_momentum`, `floatframe.integrators.variational`.
+"""
 
 import math
 

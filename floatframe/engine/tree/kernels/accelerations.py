@@ -3,6 +3,8 @@
     M s_ddot + B w = -rho(s_ddot = 0, w = 0)        C s_ddot = -(second rates of what is held, at s_ddot = 0)
 
 with the matrices of `kernels.tangent` for the weights (1, 0, 0); rows that say what a wrench is have V w = -g.
+
+Described in `floatframe.integrators.relative_ode`.
 """
 
 from floatframe.engine.kernels.compiler.compilation import inner

@@ -1,7 +1,9 @@
-"""Time loop of the generalized-alpha method in relative coordinates; see `floatframe.integrators.relative`.
+"""Time loop of the generalized-alpha method in relative coordinates.
 
 What is remembered from step to step is absolute (`kernels.memory.Memory`), but for the algorithmic accelerations: those
 of an unknown stand where `Tree.slot` says. Joints are found from the bodies at the beginning of each step.
+
+Described in `floatframe.integrators.relative`.
 """
 
 import math
