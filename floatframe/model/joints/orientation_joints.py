@@ -1,6 +1,6 @@
 """Joints that constrain an orientation: fixed, constant-orientation, universal and constant-velocity joints.
 
-Evaluated in `floatframe.engine.kernels.joints.row_formulas`, `floatframe.engine.kernels.joints.row_formulas`.
+Evaluated in `floatframe.engine.kernels.joints.row_formulas`, `floatframe.engine.kernels.joints.constant_velocity`.
 """
 
 from collections.abc import Mapping

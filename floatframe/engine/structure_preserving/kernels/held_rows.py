@@ -5,7 +5,6 @@ import math
 from floatframe.engine.kernels.compiler.compilation import inner
 from floatframe.engine.kernels.vector import add, cross, dot, norm, scaled, sub, turned, vector
 from floatframe.engine.structure_preserving.kernels import deformed_lines, rows
-from floatframe.engine.structure_preserving.kernels.connections import couplers, rolling
 from floatframe.engine.structure_preserving.kernels.coordinates import (
     add_coordinate_force,
     add_pair,
@@ -37,11 +36,11 @@ def row_value(model, step, c, k):
     """Return the value of row k of connection c at the end of a step."""
     kind, a, b = model.rows.kind[k], model.connections.a[c], model.connections.b[c]
     if kind == COUPLE:
-        return couplers.coupler_value(model, step, c)
+        return coupler_value(model, step, c)
     if kind == RIM_HEIGHT:
-        return rolling.height_value(model, step, k, a, b)
+        return height_value(model, step, k, a, b)
     if kind == ROLL:
-        return rolling.roll_value(model, step, k, a, b)
+        return roll_value(model, step, k, a, b)
     if kind == LINE or kind == LINE_TURN:
         return deformed_lines.line_value(model, step, k, a, b)
     return rows.row_value(model, step, k, a, b)
@@ -52,11 +51,11 @@ def add_reaction(model, discrete, step, c, k, f):
     """Add the loads of row k of connection c with multiplier f: their work is f times the change of the row."""
     kind, a, b = model.rows.kind[k], model.connections.a[c], model.connections.b[c]
     if kind == COUPLE:
-        couplers.add_coupler_reaction(model, discrete, step, c, f)
+        add_coupler_reaction(model, discrete, step, c, f)
     elif kind == RIM_HEIGHT:
-        rolling.add_height_reaction(model, discrete, step, k, a, b, f)
+        add_height_reaction(model, discrete, step, k, a, b, f)
     elif kind == ROLL:
-        rolling.add_roll_reaction(model, step, k, a, b, f)
+        add_roll_reaction(model, step, k, a, b, f)
     elif kind == LINE or kind == LINE_TURN:
         deformed_lines.add_line_reaction(model, discrete, step, k, a, b, f)
     else:
@@ -68,7 +67,7 @@ def row_change(model, discrete, step, c, k):
     """Return the change of row k over the step, by the motion alone; those of a rolling disc are in no such need."""
     kind, a, b = model.rows.kind[k], model.connections.a[c], model.connections.b[c]
     if kind == COUPLE:
-        return couplers.coupler_change(model, discrete, step, c)
+        return coupler_change(model, discrete, step, c)
     if kind == LINE or kind == LINE_TURN:
         return deformed_lines.line_change(model, discrete, step, k, a, b)
     return rows.row_change(model, discrete, step, k, a, b)
@@ -79,7 +78,7 @@ def row_rate(model, step, c, k, t):
     """Return the rate of row k at the beginning of a step while nothing moves: that of a prescribed motion."""
     kind, a, b = model.rows.kind[k], model.connections.a[c], model.connections.b[c]
     if kind == COUPLE:
-        return couplers.coupler_rate(model, c, t)
+        return coupler_rate(model, c, t)
     if kind == LINE or kind == LINE_TURN:
         return deformed_lines.line_rate(model, step, k, a, b, t)
     return rows.row_rate(model, step, k, a, b, t)

@@ -1,0 +1,70 @@
+"""Two shafts that turn equally: rows of the constant-velocity joint.
+
+With E, Z normal to the shaft of A and to each other, and D, U those directions of B that lay along them when both
+shafts were in line, B is A turned straight from shaft to shaft, about an axis normal to both, if
+
+    EQUAL_TURN   E · U - Z · D = 0          its gradient is along the bisector of the shafts (docs/theory.md §10)
+    BISECTOR     M · (E × (Z_A + Z_B)) = 0  Z_A = A_A z, Z_B = A_B y the shafts: M is along their bisector, for two E
+
+Described in `floatframe.model.joints.orientation_joints`.
+"""
+
+from floatframe.engine.kernels.compiler.compilation import inner
+from floatframe.engine.kernels.joints.held_rows import product, product_rates
+from floatframe.engine.kernels.joints.relative_motion import direction
+from floatframe.engine.kernels.vector import add, cross, dot, put, scaled, sub, vector
+
+__all__ = ["bisector_derivatives", "bisector_value", "equal_turn_rates", "equal_turn_value"]
+
+
+@inner
+def equal_turn_value(model, work, k, a, b):
+    """EQUAL_TURN: E · U - Z · D."""
+    rows, markers = model.rows, work.markers
+    g_1, zero, m_1, _ = product(direction(markers, a, rows.x[k]), direction(markers, b, rows.u[k]))
+    g_2, _, m_2, _ = product(direction(markers, a, rows.z[k]), direction(markers, b, rows.y[k]))
+    m = sub(m_1, m_2)
+    return g_1 - g_2, zero, m, scaled(-1.0, m)
+
+
+@inner
+def equal_turn_rates(model, work, k, a, b):
+    """EQUAL_TURN."""
+    rows, markers, zero = model.rows, work.markers, (0.0, 0.0, 0.0)
+    o, p = vector(markers.omega[a]), vector(markers.omega[b])
+    E, Z, D, U = (
+        direction(markers, a, rows.x[k]),
+        direction(markers, a, rows.z[k]),
+        direction(markers, b, rows.y[k]),
+        direction(markers, b, rows.u[k]),
+    )
+    _, beta_1 = product_rates(o, p, E, zero, zero, U)
+    _, beta_2 = product_rates(o, p, Z, zero, zero, D)
+    return 0.0, beta_1 - beta_2
+
+
+@inner
+def shafts(rows, markers, k, a, b):
+    """Return E, the shaft of A and that of B."""
+    return direction(markers, a, rows.x[k]), direction(markers, a, rows.z[k]), direction(markers, b, rows.y[k])
+
+
+@inner
+def bisector_value(model, work, k, a, b, w):
+    """BISECTOR: M · (E × (Z_A + Z_B))."""
+    rows = model.rows
+    E, Z_a, Z_b = shafts(rows, work.markers, k, a, b)
+    return dot(vector(w[rows.part[k] :]), cross(E, add(Z_a, Z_b)))
+
+
+@inner
+def bisector_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
+    """BISECTOR: M · (dphi × E) × S = dphi · (E × (S × M)), M · E × (dphi × Z) = dphi · (Z × (M × E))."""
+    rows = model.rows
+    part = rows.part[k]
+    E, Z_a, Z_b = shafts(rows, work.markers, k, a, b)
+    M, S = vector(w[part:]), add(Z_a, Z_b)
+    put(V[r], part, cross(E, S))
+    across = cross(M, E)
+    put(P_a[r], 3, scaled(c_k, add(cross(E, cross(S, M)), cross(Z_a, across))))
+    put(P_b[r], 3, scaled(c_k, cross(Z_b, across)))

@@ -1,0 +1,110 @@
+"""Rows that say what the wrench of a joint is: none along what is free, its parts on A and B balance.
+
+A kind is two functions: `value`(model, work, k, a, b, w) with w the wrench of the connection, and
+`derivatives`(model, work, k, r, a, b, w, c_k, P_a, P_b, V), which writes row r of P (times c_k) and V; both are zero
+before. A direction that turns with a marker changes by dphi × E, so that d(E · W) = dphi · (E × W) + E · dW.
+"""
+
+from floatframe.engine.kernels.compiler.compilation import inner, small
+from floatframe.engine.kernels.joints.relative_motion import direction, distance, put_pair
+from floatframe.engine.kernels.vector import add, cross, dot, put, scaled, sub, vector
+from floatframe.model.joints.rows.kinds import FORCE, MOMENT, MOMENT_B
+
+__all__ = [
+    "arm_derivatives",
+    "arm_value",
+    "gauge_b_derivatives",
+    "gauge_b_value",
+    "gauge_derivatives",
+    "gauge_value",
+    "rod_derivatives",
+    "rod_value",
+    "thread_derivatives",
+    "thread_value",
+]
+
+
+@small
+def gauge_value(model, work, k, a, b, w):
+    """GAUGE: E · part."""
+    rows = model.rows
+    return dot(direction(work.markers, a, rows.x[k]), vector(w[rows.part[k] :]))
+
+
+@small
+def gauge_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
+    """GAUGE."""
+    rows = model.rows
+    part, E = rows.part[k], direction(work.markers, a, rows.x[k])
+    put(P_a[r], 3, scaled(c_k, cross(E, vector(w[part:]))))
+    put(V[r], part, E)
+
+
+@inner
+def gauge_b_value(model, work, k, a, b, w):
+    """GAUGE_B: D · part."""
+    rows = model.rows
+    return dot(direction(work.markers, b, rows.y[k]), vector(w[rows.part[k] :]))
+
+
+@inner
+def gauge_b_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
+    """GAUGE_B."""
+    rows = model.rows
+    part, D = rows.part[k], direction(work.markers, b, rows.y[k])
+    put(P_b[r], 3, scaled(c_k, cross(D, vector(w[part:]))))
+    put(V[r], part, D)
+
+
+@inner
+def thread_value(model, work, k, a, b, w):
+    """THREAD: E · (N + c F)."""
+    rows = model.rows
+    W = add(vector(w[MOMENT_B:]), scaled(rows.c[k], vector(w)))
+    return dot(direction(work.markers, a, rows.x[k]), W)
+
+
+@inner
+def thread_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
+    """THREAD."""
+    rows = model.rows
+    c, E = rows.c[k], direction(work.markers, a, rows.x[k])
+    W = add(vector(w[MOMENT_B:]), scaled(c, vector(w)))
+    put(P_a[r], 3, scaled(c_k, cross(E, W)))
+    put(V[r], MOMENT_B, E)
+    put(V[r], FORCE, scaled(c, E))
+
+
+@small
+def arm_value(model, work, k, a, b, w):
+    """ARM: x · (M - N - d × F), x in ground axes; N is missing where nothing acts on B but the force."""
+    M = sub(vector(w[MOMENT:]), cross(distance(work.markers, a, b), vector(w)))
+    if len(w) > MOMENT_B:
+        M = sub(M, vector(w[MOMENT_B:]))
+    return dot(vector(model.rows.x[k]), M)
+
+
+@small
+def arm_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
+    """ARM: (x × d) · F = d · (F × x)."""
+    x, d = vector(model.rows.x[k]), distance(work.markers, a, b)
+    put(V[r], FORCE, cross(d, x))
+    put(V[r], MOMENT, x)
+    if len(w) > MOMENT_B:
+        put(V[r], MOMENT_B, scaled(-1.0, x))
+    put_pair(P_a, P_b, r, 0, scaled(c_k, cross(vector(w), x)))
+
+
+@inner
+def rod_value(model, work, k, a, b, w):
+    """ROD: x · (F - mu d), x in ground axes."""
+    return dot(vector(model.rows.x[k]), sub(vector(w), scaled(w[3], distance(work.markers, a, b))))
+
+
+@inner
+def rod_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
+    """ROD."""
+    x = vector(model.rows.x[k])
+    put(V[r], FORCE, x)
+    V[r, 3] = -dot(x, distance(work.markers, a, b))
+    put_pair(P_a, P_b, r, 0, scaled(c_k * w[3], x))
