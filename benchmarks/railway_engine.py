@@ -23,7 +23,7 @@ import cms
 from cms.body.modal_file.file import write
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
-from cms.jobs.reduce_job import reduce_job
+from cms.pipeline import reduce_job
 from fe_models.parts import engine_body_mesh
 from floatframe.design.laboratory.body_study import BodyErrors, SetError, lean_body
 from floatframe.machines.railway_engine.mode_sets import MORE_SETS, SETS, engine_study

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import floatframe as ff
 from cms.body.modal_file.file import write
-from cms.jobs.reduce_job import reduce_job
+from cms.pipeline import reduce_job
 from fe_models.parts import shipped_mesh
 from floatframe.design.laboratory.figures import convergence_figure
 from floatframe.files.system_file.read_system import read_system

@@ -34,7 +34,6 @@ from .fe_names import Units as Units
 from .fe_names import couple as couple
 from .fe_names import unit_system as unit_system
 from .jobs.fleets.fleet import reduce_fleet as reduce_fleet
-from .jobs.reduce_job import reduce_job as reduce_job
 from .linear_algebra.solvers.mode_count import ModeCount as ModeCount
 from .modes.centrifugal import centrifugal_loads as centrifugal_loads
 from .modes.families.families import Families as Families
@@ -65,6 +64,7 @@ from .modes.mode_sets.extra_columns import with_centrifugal as with_centrifugal
 from .modes.mode_sets.extra_columns import with_load_cases as with_load_cases
 from .modes.mode_sets.mesh_field import CoupledField as CoupledField
 from .modes.mode_sets.mesh_field import coupled_field as coupled_field
+from .pipeline import reduce_job as reduce_job
 from .reduction.assumed_mode_beams.assumed_beam import beam_from_assumed_modes as beam_from_assumed_modes
 from .reduction.basis.damping import ModalDamping as ModalDamping
 from .reduction.basis.damping import PerModeDamping as PerModeDamping

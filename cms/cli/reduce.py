@@ -23,7 +23,7 @@ __all__ = ["Fleet", "reduce_and_write", "reduce_and_write_fleet", "reduce_comman
 def reduce_and_write(job: "Job", path: Path, solver: str | None = None, memory: str | None = None) -> "ReducedBody":
     """Run a job, write its modal file, and print a summary."""
     from cms.body.modal_file.file import write
-    from cms.jobs.reduce_job import reduce_job
+    from cms.pipeline import reduce_job
 
     reports: list[Any] = []
     try:

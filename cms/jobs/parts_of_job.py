@@ -11,6 +11,7 @@ from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.load_cases import LoadCase
 
 if TYPE_CHECKING:
+    from cms.assessment.quality.of_reduction.contents import ReductionOptions
     from cms.reduction.basis.frames import Frame, HeldFrame
     from fe_models.body.material import AnyMaterial
     from fe_models.meshes.line_mesh import LineMesh
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "frame_of", "interface_of", "interfaces_of", "load_cases_of", "materials_of", "moving_frame_of", "part_of_mesh",
-    "selection_of",
+    "reduction_options", "selection_of",
 ]  # fmt: skip
 
 
@@ -136,3 +137,26 @@ def moving_frame_of(job: Job) -> "Frame":
     if reduction.frame == "nodal":
         return NodalFrame(reduction.at, reduction.origin, reduction.axes, reduction.dofs)
     return FRAMES[reduction.frame](origin=reduction.origin, axes=reduction.axes)
+
+
+def reduction_options(job: Job, body: FEBody) -> "ReductionOptions":
+    """Return what the file of a job is meant to hold.
+
+    Parameters
+    ----------
+    body
+        The coupled body of the job.
+    """
+    from cms.assessment.quality.of_reduction.contents import ReductionOptions
+    from cms.jobs.tables.recovery_section import requests_of
+
+    asked = job.reduction.geometric_stiffness
+    is_made = asked is True or bool(job.reduction.quadratic_modes)
+    return ReductionOptions(
+        damping=None if job.damping is None else job.damping.damping,
+        frame=frame_of(job, held=body.is_held),
+        stress=job.reduction.stress is not False,
+        geometric=tuple(asked) if isinstance(asked, list) else is_made,
+        quadratic=bool(job.reduction.quadratic_modes),
+        recovery=requests_of(job.recovery),
+    )

@@ -8,7 +8,7 @@ from scipy.special import ellipk
 import cms
 import floatframe as ff
 from cms.jobs.job import read_job
-from cms.jobs.reduce_job import reduce_job
+from cms.pipeline import reduce_job
 
 GRAVITY = 9.81
 JOB = """

@@ -11,8 +11,8 @@ from cms.cli.split import SplitRequest, split_job
 from cms.errors import JobError
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
-from cms.jobs.reduce_job import reduce_job
 from cms.modes.families.families import Families
+from cms.pipeline import reduce_job
 from floatframe import GeneralizedAlpha, integrate, linearize, static_equilibrium, system_modes
 from floatframe.files.system_file.read_system import read_system
 from floatframe.results.place_motion import interface_motion

@@ -80,7 +80,7 @@ def recorded_notes() -> Iterator[list[str]]:
 def reduce_and_write_one(job: FleetJob) -> FleetRow:
     """Run a job and write its modal file; called in a worker."""
     from cms.body.modal_file.file import write
-    from cms.jobs.reduce_job import reduce_job
+    from cms.pipeline import reduce_job
 
     began = time.perf_counter()
     with recorded_notes() as notes:

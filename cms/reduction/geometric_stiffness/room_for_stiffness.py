@@ -11,11 +11,10 @@ from collections.abc import Sequence
 
 from cms.errors import BodyError
 from cms.modes.families.interface_cost import PROPOSED, duration, interface_reduction_size, operations_per_second
-from cms.reduction.geometric_stiffness.unit_states import has_geometric_stiffness
 from fe_models.body.fe_body import FEBody
 
 __all__ = [
-    "UNASKED", "chosen_words", "left_out_words", "makes_stiffness", "require_room_for_stiffness", "stiffness_bytes",
+    "UNASKED", "Asked", "chosen_words", "left_out_words", "require_room_for_stiffness", "stiffness_bytes",
     "stiffness_words",
 ]  # fmt: skip
 
@@ -41,13 +40,6 @@ def stiffness_seconds(body: FEBody, n_modes: int, asked: Asked = None) -> float:
     """Estimate its processor time [s]: Phiᵀ (S Phi) with a sparse S over the nodes for each load."""
     each = float(body.n_dof) * n_modes**2 + SPARSE * (2 * body.K.nnz / 9) * 3 * n_modes
     return n_loads(body, asked) * each / operations_per_second()
-
-
-def makes_stiffness(asked: Asked, body: FEBody, n_modes: int) -> bool:
-    """Return whether to compute the geometric stiffness: as requested, else if the elements know it and it is small."""
-    if asked is not None:
-        return asked is not False
-    return has_geometric_stiffness(body) and not left_out_words(body, n_modes)
 
 
 def left_out_words(body: FEBody, n_modes: int) -> str:

@@ -12,10 +12,9 @@ from cms.jobs.body_of_job import job_body
 from cms.jobs.job import Job, read_job
 from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
 from cms.jobs.parts_of_job import moving_frame_of
-from cms.jobs.reduce_job import reduced
 from cms.modes.families.families import Families
-from cms.reduction.geometric_stiffness.room_for_stiffness import makes_stiffness
-from cms.reduction.geometric_stiffness.unit_states import UnitStates, require_geometric_stiffness, unit_states
+from cms.pipeline import Plan, reduced, states_of_job
+from cms.reduction.geometric_stiffness.unit_states import UnitStates, require_geometric_stiffness
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.stages import Stages
@@ -102,7 +101,7 @@ class BodyShelf:
             with suppress(ReportedError):  # found once, the others are its first ones; too many are told where they are
                 job_mode_set(families, reduction_of(largest, families.body))
         modes = job_mode_set(families, reduction_of(job, families.body))
-        return reduced(job, families, Stages(), modes, self._states_of(path, job, families, len(modes.labels)))
+        return reduced(job, families, modes, self._states_of(path, job, families, len(modes.labels)))
 
     def _families_of(self, path: Path) -> Families:
         if path not in self._families:
@@ -111,20 +110,12 @@ class BodyShelf:
 
     def _states_of(self, path: Path, job: Job, families: Families, n_modes: int) -> UnitStates | None:
         """Return the static states of the unit loads, which differ by the frame alone; None where none are wanted."""
-        wanted = makes_stiffness(job.reduction.geometric_stiffness, families.body, n_modes)
-        if not wanted and not job.reduction.quadratic_modes:
+        if not Plan.of_stiffness(job, families.body).needs_states(n_modes):
             return None
         require_geometric_stiffness(families.body)
-        frame = moving_frame_of(job)
-        key = (path, repr((frame, job.reduction.geometric_stiffness)))
+        key = (path, repr((moving_frame_of(job), job.reduction.geometric_stiffness)))
         if key not in self._states:
-            asked = job.reduction.geometric_stiffness
-            self._states[key] = unit_states(
-                families,
-                frame=frame,
-                spread=job.reduction.spread_loads is not False,
-                interfaces=asked if isinstance(asked, list) else None,
-            )
+            self._states[key] = states_of_job(job, families)
         return self._states[key]
 
 

@@ -14,7 +14,7 @@ from cms.body.modal_file.file import read, write
 from cms.cli.app import app
 from cms.cli.frf import parse_band, parse_component
 from cms.jobs.job import read_job
-from cms.jobs.reduce_job import reduce_job
+from cms.pipeline import reduce_job
 from tests.bodies import box_mesh
 from tests.decks import JOB, write_deck
 

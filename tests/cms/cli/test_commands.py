@@ -18,7 +18,7 @@ from cms.assessment.quality.body_record import body_record, central_inertia
 from cms.body.modal_file.file import VERSION, read, write
 from cms.cli.app import app
 from cms.jobs.job import read_job
-from cms.jobs.reduce_job import reduce_job
+from cms.pipeline import reduce_job
 from cms.reduction.basis.frames import TisserandFrame
 from cms.reduction.frame_conversion import convert_frame
 from fe_models.foundation.sealed_hdf5 import Content, write_sealed
@@ -531,7 +531,7 @@ def test_a_fault_of_the_program_has_exit_code_1_and_a_traceback_only_with_debug(
     def fail(*_, **__):
         raise ZeroDivisionError("unlucky")
 
-    monkeypatch.setattr("cms.jobs.reduce_job.reduce_job", fail)
+    monkeypatch.setattr("cms.pipeline.reduce_job", fail)
     result = run("reduce", folder / "bar.toml")
     assert result.exit_code == 1
     assert "ZeroDivisionError: unlucky" in result.stderr
@@ -544,7 +544,7 @@ def test_an_interrupt_has_exit_code_130(folder, monkeypatch):
     def fail(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("cms.jobs.reduce_job.reduce_job", fail)
+    monkeypatch.setattr("cms.pipeline.reduce_job", fail)
     result = run("reduce", folder / "bar.toml")
     assert result.exit_code == 130
     assert result.stderr.startswith("error: interrupted")

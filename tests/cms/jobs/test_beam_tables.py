@@ -7,7 +7,7 @@ from cms.errors import JobError, ModeSetError
 from cms.jobs.beam_tables import SHAPE_KEYS, BeamSection, LinkSection, MassSection, SpringSection, TieSection
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
-from cms.jobs.reduce_job import reduce_job
+from cms.pipeline import reduce_job
 from fe_models.elements.beams.sections import SECTIONS
 from tests.root import ROOT
 

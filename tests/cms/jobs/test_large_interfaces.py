@@ -10,8 +10,8 @@ import pytest
 from cms.cli.info import print_body
 from cms.errors import BodyError, ModeSetError
 from cms.jobs.job import read_job
-from cms.jobs.reduce_job import expected_columns, reduce_job
 from cms.modes.families import families, interface_cost
+from cms.pipeline import expected_columns, reduce_job
 from cms.reduction.geometric_stiffness import room_for_stiffness
 from tests.bodies import box_mesh
 

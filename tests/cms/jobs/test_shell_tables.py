@@ -7,10 +7,10 @@ from cms.cli.split import SplitRequest, split_job
 from cms.errors import JobError
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
-from cms.jobs.reduce_job import reduce_job
 from cms.jobs.shell_body import shell_mesh, shell_properties_of
 from cms.jobs.shell_tables import ShellSection
 from cms.jobs.tables.material_table import material_of
+from cms.pipeline import reduce_job
 from fe_models.elements.shells.shell_property import LaminateProperty, Layer
 from fe_models.errors import FeModelsError
 from tests.root import ROOT

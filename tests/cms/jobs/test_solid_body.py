@@ -6,7 +6,7 @@ from cms.assessment.quality.body_check import check_body
 from cms.errors import JobError
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
-from cms.jobs.reduce_job import reduce_job
+from cms.pipeline import reduce_job
 from fe_models.foundation.ranks.spread_matrix import SpreadMatrix, whole_matrix
 from tests.bodies import box_mesh
 from tests.decks import JOB, write_deck

@@ -29,8 +29,8 @@ from cms.cli import main
 from cms.jobs import body_of_job
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
-from cms.jobs.reduce_job import reduce_job
 from cms.jobs.studies import correlation_page, read_correlation, run_correlation
+from cms.pipeline import reduce_job
 from tests.bodies import box_mesh
 from tests.cms.assessment.correlation.synthetic_test import mode_table_text, universal_text, write
 from tests.decks import JOB, write_deck

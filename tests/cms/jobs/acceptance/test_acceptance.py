@@ -27,7 +27,7 @@ from cms.jobs.acceptance.html_page import html_page
 from cms.jobs.acceptance.origin import source_files
 from cms.jobs.acceptance.range_of_use import range_of_use
 from cms.jobs.acceptance.write import pdf_pages, write_acceptance
-from cms.jobs.reduce_job import reduce_job
+from cms.pipeline import reduce_job
 from fe_models.meshes.numbering import Numbering
 from tests.bodies import box_mesh
 from tests.decks import JOB, write_deck

@@ -11,7 +11,7 @@ from scipy.sparse.linalg import splu
 from typer.testing import CliRunner
 
 import cms
-import cms.jobs.reduce_job as reduce_job_module
+import cms.pipeline as reduce_job_module
 from cms.cli.app import app
 from cms.errors import FactorizationError, MemoryBudgetError
 from cms.linear_algebra.memory import budget

@@ -14,8 +14,8 @@ from numpy.testing import assert_allclose
 import cms
 import floatframe as ff
 from cms.body.modal_file.file import write as write_body
-from cms.jobs.reduce_job import reduce_job
 from cms.modes.families.families import Families
+from cms.pipeline import reduce_job
 from floatframe.cli import main
 from floatframe.design.laboratory.bodies import BodyShelf
 from floatframe.design.laboratory.figures import convergence_figure

@@ -1,0 +1,260 @@
+"""From a job file to a modal file, on one page: the steps of `cms reduce` in their order.
+
+    (1) read           the job, what to reduce and how                                    cms/jobs/job.py
+    (2) assemble       mesh, deck, tables or matrices to a body with M and K              cms/jobs/body_of_job.py
+    (3) couple         the interfaces: rigid, distributing, or their nodes                fe_models/body/couplings
+    (4) plan           solver, memory, geometric stiffness, before the long work          `Plan`, below
+    (5) families       one factorisation of K, for constraint and vibration modes         cms/modes/families
+    (6) mode set       columns over the dofs of the body                                  cms/modes/mode_sets
+    (7) unit states    static states of unit loads                                        cms/reduction/geometric_stiffness
+    (8) reduce         independent orthonormal basis in a body frame, moments, stress     cms/reduction/reduction.py
+    (9) write          the modal file, by `cms.write`                                     cms/body/modal_file/file.py
+"""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cms.body.reduced_body import ReducedBody
+from cms.errors import MemoryBudgetError
+from cms.jobs.body_of_job import job_body
+from cms.jobs.job import Job, read_job
+from cms.jobs.parts_of_job import frame_of, moving_frame_of
+from cms.linear_algebra.memory.budget import ReductionShape, columns_within, solver_within
+from cms.linear_algebra.memory.size import memory_bytes, resident_bytes
+from cms.linear_algebra.solvers.registry import solver_of
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.ranks.mpi import all_ranks
+from fe_models.foundation.solver import Solver
+from fe_models.foundation.stages import Stages
+
+if TYPE_CHECKING:
+    from cms.modes.families.families import Families
+    from cms.modes.mode_set import ModeSet
+    from cms.reduction.geometric_stiffness.room_for_stiffness import Asked
+    from cms.reduction.geometric_stiffness.unit_states import UnitStates
+
+__all__ = ["Plan", "reduce_job", "reduced", "states_of_job"]
+
+log = logging.getLogger(__name__)
+
+GUESSED_MODES = 50  #: assumed number of modes for the memory estimate, if a cutoff or "auto" determines it
+
+
+def reduce_job(
+    job: Job | Path | str,
+    stages: Stages | None = None,
+    *,
+    solver: str | Solver | None = None,
+    memory: str | float | None = None,
+    on_report: Callable[[Any], None] | None = None,
+) -> ReducedBody:
+    """Run a job up to the reduced body.
+
+    Parameters
+    ----------
+    job
+        A job file, or a job that has been read.
+    stages
+        Receives durations and progress of the stages; None: neither is reported.
+    solver
+        Name of the solver (`cms.linear_algebra.solvers.registry`); overrides the solver of the job. Default: the
+        fastest installed solver.
+    memory
+        Largest memory of the process, such as "8GB" or a number of bytes. Above it, the factor goes to disk; a job that
+        still does not fit fails before the factorisation. Overrides the value of the job. Default: no limit.
+    on_report
+        Receives the mesh report before it is checked.
+
+    Raises
+    ------
+    CmsError, FeModelsError
+        If the job, the mesh, a material, an interface, the mode set or the solver is invalid.
+
+    Examples
+    --------
+    >>> body = cms.reduce_job("rod.toml")                                          # doctest: +SKIP
+    >>> cms.write(body, "rod.h5")                                                  # doctest: +SKIP
+    """
+    from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
+    from cms.modes.families.families import Families
+
+    job = job if isinstance(job, Job) else read_job(Path(job))  # (1)
+    stages = stages or Stages()
+    chosen = solver_of(solver or job.reduction.solver)  # a solver that is not installed is reported before any work
+    budget = budget_of(job, solver, memory)
+    ranks = None if chosen.spread is None else all_ranks()
+    body = job_body(job, stages, on_report=on_report, ranks=ranks)  # (2), (3)
+    plan = Plan.of(job, body, chosen, budget)  # (4)
+    with Families(body, announce=not reduces_interfaces(job), solver=plan.solver, to_disk=plan.to_disk) as families:
+        with stages(f"mode set {job.reduction.set}"):
+            modes = job_mode_set(families, reduction_of(job, body))  # (5), (6)
+        states = None
+        if plan.needs_states(len(modes.labels)):
+            with stages("static states"):
+                states = states_of_job(job, families)  # (7)
+        if job.recovery:  # the static part of recovery rows needs the factorisation
+            return reduced(job, families, modes, states, stages)  # (8)
+    return reduced(job, body, modes, states, stages)  # (8), with the memory of the factorisation free
+
+
+def states_of_job(job: Job, families: "Families") -> "UnitStates":
+    """Return the static states of the unit loads whose geometric stiffness a job requests."""
+    from cms.reduction.geometric_stiffness.unit_states import unit_states
+
+    asked = job.reduction.geometric_stiffness
+    return unit_states(
+        families,
+        frame=moving_frame_of(job),
+        spread=job.reduction.spread_loads is not False,
+        interfaces=asked if isinstance(asked, list) else None,
+    )
+
+
+def reduced(
+    job: Job,
+    source: "FEBody | Families",
+    modes: "ModeSet",
+    states: "UnitStates | None",
+    stages: Stages | None = None,
+) -> ReducedBody:
+    """Reduce the body of a job to its modes.
+
+    Parameters
+    ----------
+    source
+        The coupled body, or its families, whose factorisation recovery rows use.
+    states
+        Static states of the unit loads; None: without geometric stiffness.
+    """
+    from cms.jobs.tables.recovery_section import requests_of
+    from cms.modes.families.sharing import body_of
+    from cms.reduction.reduction import reduce
+
+    body = body_of(source)
+    with (stages or Stages())("reduce"):
+        made = reduce(
+            source,
+            modes,
+            frame=frame_of(job, held=body.is_held),
+            damping=None if job.damping is None else job.damping.damping,
+            stress=job.reduction.stress is not False,
+            quadratic=bool(job.reduction.quadratic_modes),
+            geometric=False if states is None else states,
+            recovery=requests_of(job.recovery),
+        )
+    left_out = Plan.of_stiffness(job, body).left_out(len(modes.labels)) if states is None else ""
+    return replace(made, provenance={**made.provenance, "geometric stiffness": left_out}) if left_out else made
+
+
+# (4) what is decided before the long work -----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What a reduction decides before its long work: the solver, where columns lie, and the geometric stiffness."""
+
+    body: FEBody  #: the coupled body
+    asked: "Asked"  #: geometric stiffness: True, False, the interfaces whose loads it has; None: if it is small
+    has_quadratic_modes: bool
+    solver: Solver | None = None
+    to_disk: bool = False  #: whether the columns lie on disk
+
+    @classmethod
+    def of(cls, job: Job, body: FEBody, solver: Solver, budget: float | None) -> "Plan":
+        """Plan the reduction of a coupled body within a memory budget [bytes], None: without a limit.
+
+        The log gets the cost of a large geometric stiffness, or that it will be left out.
+
+        Raises
+        ------
+        BodyError
+            If the geometric stiffness is requested, but the elements do not know it, an interface is unknown, or the
+            memory of this machine does not suffice.
+        """
+        plan = replace(cls.of_stiffness(job, body), solver=solver)
+        plan.check_stiffness(min(expected_columns(job, body), body.n_dof))  # the mode set refuses a job with more modes
+        if budget is None:
+            return plan
+        n_modes = job.reduction.n_modes if isinstance(job.reduction.n_modes, int) else GUESSED_MODES
+        shape = columns_within(budget, ReductionShape(body.n_dof, len(body.b) + n_modes, n_modes, resident_bytes()))
+        return replace(plan, solver=solver_within(budget, shape), to_disk=shape.to_disk)
+
+    @classmethod
+    def of_stiffness(cls, job: Job, body: FEBody) -> "Plan":
+        """Plan the geometric stiffness alone."""
+        return cls(body, job.reduction.geometric_stiffness, bool(job.reduction.quadratic_modes))
+
+    def needs_states(self, n_modes: int) -> bool:
+        """Return whether a mode set of this size is reduced with the static states of unit loads."""
+        from cms.reduction.geometric_stiffness.unit_states import has_geometric_stiffness
+
+        if self.has_quadratic_modes or self.asked is not None:
+            return self.has_quadratic_modes or self.asked is not False
+        return has_geometric_stiffness(self.body) and not self.left_out(n_modes)
+
+    def left_out(self, n_modes: int) -> str:
+        """Return a note that the geometric stiffness is left out because nobody asked for it and it is large, or ""."""
+        from cms.reduction.geometric_stiffness.room_for_stiffness import left_out_words
+        from cms.reduction.geometric_stiffness.unit_states import has_geometric_stiffness
+
+        is_open = self.asked is None and not self.has_quadratic_modes and has_geometric_stiffness(self.body)
+        return left_out_words(self.body, n_modes) if is_open else ""
+
+    def check_stiffness(self, n_modes: int) -> None:
+        """Refuse a geometric stiffness that cannot be made, and log what it costs if it is large or left out."""
+        from cms.reduction.geometric_stiffness.room_for_stiffness import require_room_for_stiffness, stiffness_words
+        from cms.reduction.geometric_stiffness.unit_states import loaded_interfaces, require_geometric_stiffness
+
+        words = self.left_out(n_modes)
+        if self.asked not in (None, False) or self.has_quadratic_modes:
+            require_geometric_stiffness(self.body)
+            if isinstance(self.asked, list):
+                loaded_interfaces(self.body, self.asked)
+            require_room_for_stiffness(self.body, n_modes, self.asked)
+            words = stiffness_words(self.body, n_modes, self.asked)
+        if words:
+            log.warning("body %r: %s", self.body.name, words)
+
+
+def budget_of(job: Job, solver: str | Solver | None, memory: str | float | None) -> float | None:
+    """Return the memory that a reduction may take [bytes]; None: no limit.
+
+    Raises
+    ------
+    MemoryBudgetError
+        If the solver or the mode set cannot be held to it.
+    """
+    allowed = memory if memory is not None else job.reduction.memory
+    if allowed is None:
+        return None
+    budget, asked = memory_bytes(allowed), solver or job.reduction.solver
+    if asked not in (None, "cholesky"):
+        raise MemoryBudgetError(
+            f"memory = {allowed}: belongs to solver cholesky, whose memory is known before; got solver {asked!r}"
+        )
+    if job.reduction.set == "multilevel":
+        raise MemoryBudgetError(
+            f"memory = {allowed}: the tree of the set multilevel is not held to it; take craig-bampton, or no memory"
+        )
+    return budget
+
+
+def expected_columns(job: Job, body: FEBody) -> int:
+    """Return a lower bound of the number of columns of the mode set of a job, before the set is made."""
+    from cms.modes.families.interface_cost import interface_reduction_size
+    from cms.modes.mode_sets import INTERFACE_SETS
+
+    found = len(body.b)
+    if reduces_interfaces(job):
+        found = interface_reduction_size(body, job.reduction.interface_modes or 0)
+    if job.reduction.set not in INTERFACE_SETS:
+        found = 0
+    return found + (job.reduction.n_modes if isinstance(job.reduction.n_modes, int) else 0)
+
+
+def reduces_interfaces(job: Job) -> bool:
+    """Return whether a job requests fewer modes for interfaces of kind "nodes"."""
+    return job.reduction.interface_modes is not None or job.reduction.interface_cutoff is not None
