@@ -17,7 +17,6 @@ from cms.pipeline import Plan, reduced, states_of_job
 from cms.reduction.geometric_stiffness.unit_states import UnitStates, require_geometric_stiffness
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.errors import ReportedError
-from fe_models.foundation.stages import Stages
 from floatframe.design.laboratory.cases import Case
 from floatframe.design.laboratory.full_model import FullModel, all_dofs
 
@@ -78,7 +77,7 @@ class BodyShelf:
         modes = all_dofs(families.body, asked.most_dofs)
         job = changed_job(read_job(self.job), Case(frame="tisserand"))
         states = self._states_of(self.job, job, families, 0)  # of a reference however many modes there are
-        return reduced(job, families, Stages(), modes, states)
+        return reduced(job, families, modes, states)
 
     def model(self) -> FEBody:
         """Return the coupled finite element model of the whole body."""
