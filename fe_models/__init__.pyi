@@ -44,6 +44,7 @@ from .elements.shells.shell_points import shell_points as shell_points
 from .elements.shells.shell_property import LaminateProperty as LaminateProperty
 from .elements.shells.shell_property import Layer as Layer
 from .elements.shells.shell_property import ShellProperty as ShellProperty
+from .elements.shells.shell_property import StiffnessProperty as StiffnessProperty
 from .elements.shells.shell_property import symmetric as symmetric
 from .elements.solids.body import solid_body as solid_body
 from .elements.solids.interfaces import check_overlap as check_overlap

@@ -76,6 +76,9 @@ def shell_properties_of(job: Job) -> "dict[str, AnyShellProperty]":
 
     made: dict[str, AnyShellProperty] = {}
     for shell in job.shells.values():
+        if shell.stiffness is not None:
+            made |= dict.fromkeys(shell.cells, _given_stiffness(shell))
+            continue
         if shell.layers:
             made |= dict.fromkeys(shell.cells, _laminate_of(job, shell))
             continue
@@ -89,6 +92,24 @@ def shell_properties_of(job: Job) -> "dict[str, AnyShellProperty]":
         )  # fmt: skip
         made |= dict.fromkeys(shell.cells, item)
     return made
+
+
+def _given_stiffness(shell: ShellSection) -> "AnyShellProperty":
+    from fe_models.elements.shells.shell_property import StiffnessProperty
+
+    # the job has checked that all are given
+    assert shell.thickness is not None
+    assert shell.stiffness is not None
+    assert shell.shear_stiffness is not None
+    assert shell.direction is not None
+    return StiffnessProperty(
+        shell.thickness,
+        tuple(tuple(row) for row in shell.stiffness),
+        tuple(tuple(row) for row in shell.shear_stiffness),
+        shell.direction,
+        offset=shell.offset,
+        added_mass=shell.added_mass,
+    )
 
 
 def _laminate_of(job: Job, shell: ShellSection) -> "AnyShellProperty":

@@ -32,6 +32,14 @@ class ShellSection(Table):
     direction: Vector3 | None = Field(
         None, description="[x, y, z] in mesh axes; projected on the shell it is the direction of angle 0 of layers"
     )
+    stiffness: list[list[float]] | None = Field(
+        None,
+        description="rows of [[A, B], [B, D]] over N_x N_y N_xy M_x M_y M_xy; then thickness is nominal and added_mass "
+        "the whole mass per area",
+    )
+    shear_stiffness: list[list[float]] | None = Field(
+        None, description="rows of the transverse shear stiffness over Q_x Q_y; belongs to stiffness"
+    )
     symmetric: bool = Field(False, description="true: the layers listed are the lower half, their mirror image follows")
     cells: Annotated[tuple[str, ...], BeforeValidator(names)] = Field(
         ("all",), description='"all", the name of a group of cells, or a list of names'
@@ -80,6 +88,11 @@ def check_layups(shells: Mapping[str, ShellSection], materials: Mapping[str, Any
     """Raise `ValueError` unless every shell has a thickness or layers, and a material for each."""
     for name, shell in shells.items():
         where = f"shells.{name}"
+        if shell.stiffness is not None:
+            _check_stiffness(where, shell)
+            continue
+        if shell.shear_stiffness is not None:
+            raise ValueError(f"{where}.shear_stiffness: belongs to stiffness; remove it, or give stiffness")
         if not shell.layers:
             for key, given in (("direction", shell.direction is not None), ("symmetric", shell.symmetric)):
                 if given:
@@ -95,6 +108,18 @@ def check_layups(shells: Mapping[str, ShellSection], materials: Mapping[str, Any
             raise ValueError(f"{where}.direction: missing; expected [x, y, z], where angle 0 of the layers points")
         for number, layer in enumerate(shell.layers):
             _check_material(f"{where}.layers.{number}", layer.material, materials)
+
+
+def _check_stiffness(where: str, shell: ShellSection) -> None:
+    for key in ("thickness", "shear_stiffness", "direction"):
+        if getattr(shell, key) is None:
+            raise ValueError(f"{where}.{key}: missing; stiffness needs it")
+    for key in ("material", "layers", "symmetric"):
+        if getattr(shell, key):
+            raise ValueError(f"{where}.{key}: the matrices of stiffness stand for it; remove it")
+    for key in ("bending_ratio", "shear_ratio"):
+        if getattr(shell, key) != 1:
+            raise ValueError(f"{where}.{key}: belongs to a material or layers; put it into the matrices")
 
 
 def _check_material(where: str, material: str | None, materials: Mapping[str, Any]) -> None:

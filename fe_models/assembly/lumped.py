@@ -17,7 +17,12 @@ from fe_models.elements.beams.axes import line_geometry
 from fe_models.elements.beams.beam_property import BeamProperty, assign_properties, section_of
 from fe_models.elements.beams.body import line_orientations
 from fe_models.elements.shells.elements import shell_cells
-from fe_models.elements.shells.shell_property import AnyShellProperty, LaminateProperty, assign_shell_properties
+from fe_models.elements.shells.shell_property import (
+    AnyShellProperty,
+    LaminateProperty,
+    StiffnessProperty,
+    assign_shell_properties,
+)
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.shell_mesh import ShellMesh
@@ -77,6 +82,8 @@ def _without_mass(item: AnyShellProperty) -> AnyShellProperty:
     if isinstance(item, LaminateProperty):
         layers = tuple(replace(layer, material=replace(layer.material, rho=0.0)) for layer in item.layers)
         return replace(item, layers=layers, added_mass=0.0)
+    if isinstance(item, StiffnessProperty):
+        return replace(item, added_mass=0.0)
     return replace(item, material=replace(item.material, rho=0.0), added_mass=0.0)
 
 

@@ -184,6 +184,10 @@ def _sections(deck: Deck) -> dict[str, Any]:
             keys = ("thickness", "angle", "material")
             row["layers"] = [{key: getattr(layer, key) for key in keys} for layer in shell.layers]
             row["direction"] = shell.direction
+        elif shell.stiffness:
+            row |= {"thickness": shell.thickness, "stiffness": [list(values) for values in shell.stiffness]}
+            row |= {"shear_stiffness": [list(values) for values in shell.shear_stiffness]}
+            row["direction"] = shell.direction
         else:
             row |= {"material": shell.material, "thickness": shell.thickness}
         row |= {"offset": shell.offset} if shell.offset else {}

@@ -96,6 +96,11 @@ def shell_strain(where: str, group: ShellCells, resultants: Array, rows: slice, 
     of_law = np.zeros((len(group.laws), 6, 6))
     for number in np.unique(group.law[rows]):
         law = group.laws[number]
+        if not law.layers:
+            raise BodyError(
+                f"{where}: strain at nodes of shells of given stiffness is not known; ask for "
+                '"shell strain" of its elements: strains of the middle surface and curvatures'
+            )
         material = law.layers[law.layer_at(height * law.thickness)].material
         if not isinstance(material, Material):
             raise BodyError(

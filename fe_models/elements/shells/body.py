@@ -18,7 +18,12 @@ from fe_models.elements.shells.elements import ShellCells, shell_cells
 from fe_models.elements.shells.model import ShellModel
 from fe_models.elements.shells.quality import WARP_LIMIT, cell_quality
 from fe_models.elements.shells.section_rotations import rotations_of_sections
-from fe_models.elements.shells.shell_property import AnyShellProperty, LaminateProperty, assign_shell_properties
+from fe_models.elements.shells.shell_property import (
+    AnyShellProperty,
+    LaminateProperty,
+    StiffnessProperty,
+    assign_shell_properties,
+)
 from fe_models.elements.shells.skin import ShellSkin, make_shell_skin
 from fe_models.elements.shells.stiffeners import element_model_of, with_frame
 from fe_models.errors import ShellError
@@ -231,4 +236,8 @@ def _provenance(mesh: ShellMesh, used: tuple[AnyShellProperty, ...], of_cell: Ma
         if isinstance(item, LaminateProperty):
             layers = ", ".join(f"{x.material.name} {x.thickness!r} at {x.angle!r}" for x in item.layers)
             record[f"layers {number + 1}"] = f"bottom to top, from direction {list(item.direction)}: {layers}"
+        if isinstance(item, StiffnessProperty):
+            record[f"stiffness {number + 1}"] = (
+                f"along direction {list(item.direction)}: {item.stiffness!r}, shear {item.shear_stiffness!r}"
+            )
     return {key: value for key, value in record.items() if value}

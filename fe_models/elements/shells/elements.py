@@ -10,7 +10,7 @@ from fe_models.elements.beams.slices import Slices
 from fe_models.elements.shells.laminate import ShellLaw, shell_law
 from fe_models.elements.shells.plates import quad_strains, triangle_strains
 from fe_models.elements.shells.shapes import FlatShape, flat_quadrature, flat_shape
-from fe_models.elements.shells.shell_property import AnyShellProperty, LaminateProperty
+from fe_models.elements.shells.shell_property import AnyShellProperty, ShellProperty
 from fe_models.elements.shells.strains import N_STRAINS, FlatLaw, FlatStrains, jacobians
 from fe_models.errors import ShellError
 from fe_models.foundation.arrays import Array, IntArray, frozen, tilde
@@ -286,7 +286,7 @@ def shell_cells(
         Properties, and the index of the property of each cell, (n,).
     """
     none = (0.0, 0.0, 0.0)
-    directions = np.array([item.direction if isinstance(item, LaminateProperty) else none for item in used])
+    directions = np.array([none if isinstance(item, ShellProperty) else item.direction for item in used])
     offsets = np.array([item.offset for item in used], dtype=float)
     planes = cell_planes(nodes, cells, offsets[of_cell], directions[of_cell])
     along = directions[of_cell]

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.body.material import AnyMaterial, Material, OrthotropicMaterial
-from fe_models.elements.shells.shell_property import AnyShellProperty, LaminateProperty, Layer
+from fe_models.elements.shells.shell_property import AnyShellProperty, LaminateProperty, Layer, StiffnessProperty
 from fe_models.elements.shells.strains import plane_elasticity
 from fe_models.foundation.arrays import Array, frozen
 
@@ -33,7 +33,7 @@ __all__ = ["ShellLaw", "layer_axes_stress", "shell_law"]
 class ShellLaw:
     """Stiffness and mass per area of a shell, in layup axes."""
 
-    layers: tuple[Layer, ...]
+    layers: tuple[Layer, ...]  #: empty where only the stiffness is known
     z: Array  #: faces of the layers, bottom to top, (n_layers + 1,) [m]
     A: Array  #: (3, 3) [N/m]
     B: Array  #: (3, 3) [N]
@@ -88,16 +88,40 @@ class ShellLaw:
         layer
             Index of the layer, from the bottom, whose stress is wanted.
         """
+        S = np.zeros((5, 8))
+        if not self.layers:
+            t = self.thickness
+            S[:3, :3], S[:3, 3:6] = np.eye(3) / t, 12 * z / t**3 * np.eye(3)
+            S[3:, 6:] = 1.5 / t * (1 - 4 * z**2 / t**2) * np.eye(2)
+            return S
         item = self.layers[layer]
         at_height = rotated_elasticity(item.material, item.angle) @ np.hstack([np.eye(3), z * np.eye(3)])
-        S = np.zeros((5, 8))
         S[:3, :6] = at_height @ np.linalg.inv(self.stiffness[:6, :6])
         S[3:, 6:] = shear_flow(self.layers, self.z, self.A, self.B, self.D)(z, layer)
         return S
 
 
+def _given_law(item: StiffnessProperty) -> ShellLaw:
+    """Return the law of given matrices. ∫ Q z³ dz is not known; it is zero, as for layers symmetric about the middle."""
+    C, half = np.array(item.stiffness), item.thickness / 2
+    return ShellLaw(
+        layers=(),
+        z=frozen(np.array([-half, half])),
+        A=frozen(C[:3, :3]),
+        B=frozen(C[:3, 3:]),
+        D=frozen(C[3:, 3:]),
+        third=frozen(np.zeros((3, 3))),
+        H=frozen(np.array(item.shear_stiffness)),
+        mass=item.added_mass,
+        centre=0.0,
+        spread=0.0,
+    )
+
+
 def shell_law(item: AnyShellProperty) -> ShellLaw:
-    """Return stiffness and mass per area of a shell of one material or of layers."""
+    """Return stiffness and mass per area of a shell of one material, of layers, or of given matrices."""
+    if isinstance(item, StiffnessProperty):
+        return _given_law(item)
     layers = item.layers if isinstance(item, LaminateProperty) else (Layer(item.material, item.thickness),)
     t = np.array([layer.thickness for layer in layers])
     z = np.concatenate([[0.0], np.cumsum(t)])

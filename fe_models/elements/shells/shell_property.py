@@ -1,4 +1,4 @@
-"""Thickness and material, or layers, and offset of groups of cells."""
+"""Thickness and material, layers, or stiffness per area, and offset of groups of cells."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,11 +7,21 @@ import numpy as np
 
 from fe_models.body.material import AnisotropicMaterial, AnyMaterial, Material, OrthotropicMaterial, require_isotropic
 from fe_models.errors import ShellError
-from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.shell_mesh import ShellMesh
 
-__all__ = ["AnyShellProperty", "LaminateProperty", "Layer", "ShellProperty", "assign_shell_properties", "symmetric"]
+__all__ = [
+    "AnyShellProperty",
+    "LaminateProperty",
+    "Layer",
+    "ShellProperty",
+    "StiffnessProperty",
+    "assign_shell_properties",
+    "symmetric",
+]
+
+ASYMMETRY = 1e-9  #: of a matrix of stiffness whose diagonal is scaled to ones, and its least eigenvalue
 
 
 @dataclass(frozen=True)
@@ -98,12 +108,7 @@ class LaminateProperty:
         object.__setattr__(self, "layers", tuple(self.layers))
         if not self.layers or not all(isinstance(layer, Layer) for layer in self.layers):
             raise ShellError(f"laminate: layers: expected one Layer or more, got {self.layers!r}")
-        direction = np.asarray(self.direction)
-        if direction.shape != (3,) or direction.dtype.kind not in "iuf" or not np.isfinite(direction).all():
-            raise ShellError(f"laminate: direction: expected three finite numbers, got {self.direction!r}")
-        if not np.linalg.norm(direction) > 0:
-            raise ShellError("laminate: direction: expected a vector that is not zero, such as (1, 0, 0)")
-        object.__setattr__(self, "direction", tuple(float(x) for x in direction))
+        object.__setattr__(self, "direction", _direction("laminate", self.direction))
         _require_numbers("laminate", self, ("offset", "added_mass"))
         _require_ratios("laminate", self)
         if self.bending_ratio != 1 and len(self.layers) > 1:
@@ -125,7 +130,46 @@ class LaminateProperty:
         return tuple(dict.fromkeys(layer.material for layer in self.layers))
 
 
-AnyShellProperty = ShellProperty | LaminateProperty
+@dataclass(frozen=True)
+class StiffnessProperty:
+    """Stiffness and mass per area, and offset of a group of cells, for sections whose layers are not known.
+
+    The thickness is nominal. It is used for the stress, N/t + 12 z M/t³ and 3 Q/(2 t) (1 - 4 z²/t²), and for the skin.
+    The mass has no rotary inertia.
+
+    Raises
+    ------
+    ShellError
+        Unless both matrices are symmetric and positive definite, the direction is not zero, the thickness is positive,
+        the mass is not negative, and all numbers are finite.
+    """
+
+    thickness: float  #: nominal [m]
+    #: rows of [[A, B], [B, D]], from eps_x eps_y gamma_xy kappa_x kappa_y kappa_xy to N_x N_y N_xy M_x M_y M_xy
+    stiffness: tuple[tuple[float, ...], ...]
+    shear_stiffness: tuple[tuple[float, ...], ...]  #: rows of H, from gamma_xz gamma_yz to Q_x Q_y [N/m]
+    direction: tuple[float, float, float]  #: direction in mesh axes; its projection onto a cell is x
+    offset: float = 0.0  #: distance of the middle surface from the nodes, along the normal of the cell [m]
+    added_mass: float = 0.0  #: mass per area [kg/m²]
+
+    def __post_init__(self) -> None:
+        for name, n in (("stiffness", 6), ("shear_stiffness", 2)):
+            matrix = _positive_matrix(f"stiffness of a shell: {name}", getattr(self, name), n)
+            object.__setattr__(self, name, tuple(tuple(row) for row in matrix.tolist()))
+        object.__setattr__(self, "direction", _direction("stiffness of a shell", self.direction))
+        _require_numbers("stiffness of a shell", self, ("thickness", "offset", "added_mass"))
+        if not self.thickness > 0:
+            raise ShellError(f"stiffness of a shell: thickness: expected a length above zero, got {self.thickness}")
+        if self.added_mass < 0:
+            raise ShellError(f"stiffness of a shell: added_mass: expected zero or more, got {self.added_mass}")
+
+    @property
+    def materials(self) -> tuple[AnyMaterial, ...]:
+        """None: the matrices hold the elasticity."""
+        return ()
+
+
+AnyShellProperty = ShellProperty | LaminateProperty | StiffnessProperty
 
 
 def symmetric(layers: Sequence[Layer]) -> tuple[Layer, ...]:
@@ -138,6 +182,35 @@ def _require_numbers(where: str, item: object, names: tuple[str, ...]) -> None:
         value = getattr(item, name)
         if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
             raise ShellError(f"{where}: {name}: expected a finite number, got {value!r}")
+
+
+def _direction(where: str, given: object) -> tuple[float, ...]:
+    direction = np.asarray(given)
+    if direction.shape != (3,) or direction.dtype.kind not in "iuf" or not np.isfinite(direction).all():
+        raise ShellError(f"{where}: direction: expected three finite numbers, got {given!r}")
+    if not np.linalg.norm(direction) > 0:
+        raise ShellError(f"{where}: direction: expected a vector that is not zero, such as (1, 0, 0)")
+    return tuple(float(x) for x in direction)
+
+
+def _positive_matrix(where: str, given: object, n: int) -> Array:
+    """Return a matrix, (n, n), or raise unless it is symmetric and positive definite.
+
+    Its units differ from row to row; the test of rounding takes each row relative to its diagonal entry.
+    """
+    matrix = np.array(given, dtype=float)
+    if matrix.shape != (n, n) or not np.isfinite(matrix).all():
+        raise ShellError(f"{where}: expected {n} rows of {n} finite numbers, got {given!r}")
+    diagonal = np.diag(matrix)
+    if not (diagonal > 0).all():
+        raise ShellError(f"{where}: expected a positive definite matrix, got the diagonal {diagonal.tolist()}")
+    scaled = matrix / np.sqrt(np.outer(diagonal, diagonal))
+    if np.abs(scaled - scaled.T).max() > ASYMMETRY:
+        raise ShellError(f"{where}: expected a symmetric matrix, got {given!r}")
+    least = float(np.linalg.eigvalsh((scaled + scaled.T) / 2)[0])
+    if not least > ASYMMETRY:
+        raise ShellError(f"{where}: expected a positive definite matrix, got the scaled eigenvalue {least:.3g}")
+    return np.asarray((matrix + matrix.T) / 2)
 
 
 def _require_ratios(where: str, item: object) -> None:

@@ -80,10 +80,15 @@ class ShellSection:
     orientation: str = ""  #: name of the axes of the material; used only while the deck is read
     bending_ratio: float = 1.0  #: bending stiffness divided by that of the material and thickness
     shear_ratio: float = 1.0  #: transverse shear stiffness divided by that of the material and thickness
+    #: rows of [[A, B], [B, D]] over N_x N_y N_xy M_x M_y M_xy; if given, the section has neither material nor layers
+    stiffness: tuple[tuple[float, ...], ...] = ()
+    shear_stiffness: tuple[tuple[float, ...], ...] = ()  #: rows of the transverse shear stiffness, with `stiffness`
 
     @property
     def materials(self) -> tuple[str, ...]:
-        """Names of the materials of the layers, or of the one material."""
+        """Names of the materials of the layers, or of the one material; none if the stiffness is given."""
+        if self.stiffness:
+            return ()
         return tuple(layer.material for layer in self.layers) or (self.material,)
 
 

@@ -228,6 +228,9 @@ def test_a_job_of_layers_makes_the_laminate(job_file):
     assert_allclose(reduce_job(job).moments.m, floor + 2700 * 0.02 + 10 + rib + 2.0, rtol=1e-12)
 
 
+MATRICES = "thickness = 0.02\nstiffness = [[1]]\nshear_stiffness = [[1]]"
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -238,6 +241,10 @@ def test_a_job_of_layers_makes_the_laminate(job_file):
         ('material = "steel"}', 'material = "steal"}', 'shells.floor.layers.1.material = "steal": there is no such'),
         ("thickness = 0.02", "thickness = 0.02\nsymmetric = true", "shells.wall.symmetric: belongs to layers"),
         ("thickness = 0.02", "thickness = 0.02\ndirection = [1, 0, 0]", "shells.wall.direction: belongs to layers"),
+        ("thickness = 0.02", "thickness = 0.02\nshear_stiffness = [[1, 0], [0, 1]]", "shear_stiffness: belongs to stiff"),
+        ("thickness = 0.02", "thickness = 0.02\nstiffness = [[1]]", "shells.wall.shear_stiffness: missing; stiffness"),
+        ("symmetric = true", MATRICES, "shells.floor.layers: the matrices of stiffness stand for it"),
+        ("thickness = 0.02", f"{MATRICES}\ndirection = [1, 0, 0]", "shells.wall.material: the matrices of stiffness"),
         ("angle = 45", "angel = 45", "shells.floor.layers.0.angel: unknown key; did you mean"),
     ],
 )

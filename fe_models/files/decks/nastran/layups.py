@@ -1,4 +1,4 @@
-"""Shells of layers of Nastran: PCOMP and its materials MAT8."""
+"""Shells of layers of Nastran, PCOMP with materials MAT8, and shells of given stiffness, PSHELL with MAT2 or MID4."""
 
 from dataclasses import replace
 
@@ -10,7 +10,14 @@ from fe_models.files.decks.deck import DeckLayer, DeckMaterial, ShellSection
 from fe_models.files.decks.nastran.model import NastranModel
 from fe_models.foundation.arrays import Array
 
-__all__ = ["layered_shells", "layers_of_card", "orthotropic_shells", "sheet_material"]
+__all__ = [
+    "layered_shells",
+    "layers_of_card",
+    "needs_matrices",
+    "orthotropic_shells",
+    "sheet_material",
+    "stiffness_shells",
+]
 
 ANGLE_FIELD = {"CTRIA3": 6, "CTRIAR": 6, "CTRIA6": 9, "CQUAD4": 7, "CQUADR": 7, "CQUAD8": 15}  #: THETA or MCID
 MOST_DIRECTIONS = 200  #: of one property, each a table of the job
@@ -79,6 +86,108 @@ def orthotropic_shells(
     """Take shells of a PSHELL of MAT8: one layer of its material, laid as that of a PCOMP."""
     layers = (DeckLayer(section.material, section.thickness),)
     _laid_shells(model, known, cards, offset_field, replace(section, material="", layers=layers))
+
+
+def needs_matrices(model: NastranModel, known: Card) -> bool:
+    """Whether the stiffness of a PSHELL is not that of one material: MAT2, MID4, or materials that differ in kind."""
+    if known.text(11):
+        return True
+    names = [known.text(2), known.text(4) or known.text(2), known.text(6) or known.text(2)]
+    if {*names} & {card.text(1) for card in model.of("MAT2")}:
+        return True
+    used = [model.materials[name] for name in names if name in model.materials]
+    has_mixed_axes = any(isinstance(each.young, tuple) for each in used) and len({*names}) > 1
+    return len(used) == 3 and (has_mixed_axes or used[0].poisson != used[1].poisson)
+
+
+def stiffness_shells(model: NastranModel, known: Card, cards: list[Card], offset_field: dict[str, int]) -> None:
+    """Take shells of a PSHELL whose membrane, bending, shear and coupling have materials of their own.
+
+    (1) A = T G1, D = I G2 with I = (12I/T**3) T³/12, and H = TS G3 with TS = (TS/T) T
+    (2) B = -T² G4: Nastran's curvatures have the other sign, G4 = -(1/T²) ∫ G z dz (NASTRAN-95, mis/ta1cpd.f)
+    (3) the mass is that of MID1, T RHO + NSM
+    """
+    pid, T = known.text(1), known.real(3)
+    names = [known.text(2), known.text(4) or known.text(2), known.text(6), known.text(11)]
+    G = [None if not name else _plane_matrix(model, name) for name in (*names[:2], names[3])]
+    missing = [name for name, made in zip((*names[:2], names[3]), G, strict=True) if name and made is None]
+    if missing:
+        why = f"property {pid}: material {missing[0]} is not known here (MAT1, MAT2, MAT8)"
+        model.ledger.refuse("PSHELL", why, count=len(cards))
+        return
+    G3 = _shear_matrix(model, names[2]) if names[2] else np.eye(2) * np.asarray(G[1])[2, 2]
+    if G3 is None:
+        why = f"property {pid}: MID3 = {names[2]} is not known here, or a MAT2 with G13, G23 or G33"
+        model.ledger.refuse("PSHELL", why, count=len(cards))
+        return
+    A, D = T * np.asarray(G[0]), known.real(5, 1.0) * T**3 / 12 * np.asarray(G[1])  # (1)
+    B = np.zeros((3, 3)) if G[2] is None else -(T**2) * np.asarray(G[2])  # (2)
+    H = known.real(7, 5 / 6) * T * G3
+    C = np.block([[A, B], [B, D]])
+    if not _is_positive(C) or not _is_positive(H):
+        why = f"property {pid}: its materials give a stiffness that is not positive definite"
+        model.ledger.refuse("PSHELL", why, count=len(cards))
+        return
+    mass = (_density(model, names[0]) * T + known.real(8, 0.0)) * model.wtmass  # (3)
+    model.ledger.note(
+        "PSHELL", f"property {pid}: stiffness by matrices, without rotary inertia; stress as in one layer of thickness T"
+    )
+    section = ShellSection(
+        "", "", T, 0.0, mass,
+        stiffness=tuple(map(tuple, C.tolist())), shear_stiffness=tuple(map(tuple, H.tolist())),
+    )  # fmt: skip
+    _laid_shells(model, known, cards, offset_field, section)
+
+
+def _is_positive(matrix: Array) -> bool:
+    """Whether a symmetric matrix is positive definite, whatever the units of its rows."""
+    diagonal = matrix.diagonal()
+    if not (diagonal > 0).all():
+        return False
+    return bool(np.linalg.eigvalsh(matrix / np.sqrt(np.outer(diagonal, diagonal)))[0] > 0)
+
+
+def _sheet(model: NastranModel, name: str) -> Card | None:
+    """Return the MAT2 of a number."""
+    return next((card for card in model.of("MAT2") if card.text(1) == name), None)
+
+
+def _plane_matrix(model: NastranModel, name: str) -> Array | None:
+    """Return the matrix from eps_x eps_y gamma_xy to stress of a material, (3, 3)."""
+    card = _sheet(model, name)
+    if card is not None:
+        G = np.zeros((3, 3))
+        G[np.triu_indices(3)] = [card.real(k, 0.0) for k in range(2, 8)]
+        return G + np.triu(G, 1).T
+    material = model.materials.get(name)
+    if material is None or material.young is None or material.poisson is None:
+        return None
+    E, nu = np.ravel(material.young), np.ravel(material.poisson)
+    first, second = float(E[0]), float(E[min(1, len(E) - 1)])
+    share = 1 - nu[0] ** 2 * second / first
+    shear = first / (2 * (1 + nu[0])) if material.shear is None else material.shear[0]
+    Q = np.array([[first, nu[0] * second, 0.0], [nu[0] * second, second, 0.0], [0.0, 0.0, shear * share]])
+    return np.asarray(Q / share)
+
+
+def _shear_matrix(model: NastranModel, name: str) -> Array | None:
+    """Return the matrix from gamma_xz gamma_yz to stress of a material, (2, 2): of a MAT2 its G11, G12 and G22."""
+    card = _sheet(model, name)
+    if card is not None and any(card.real(k, 0.0) for k in (4, 6, 7)):
+        return None
+    if card is not None:
+        return np.array([[card.real(2, 0.0), card.real(3, 0.0)], [card.real(3, 0.0), card.real(5, 0.0)]])
+    material = model.materials.get(name)
+    if material is not None and material.shear is not None:
+        return np.diag(material.shear[1:])
+    G = _plane_matrix(model, name)
+    return None if G is None else np.asarray(np.eye(2) * G[2, 2])
+
+
+def _density(model: NastranModel, name: str) -> float:
+    """Return the density of a material before WTMASS."""
+    card = _sheet(model, name)
+    return card.real(8, 0.0) if card is not None else (model.materials[name].density or 0.0) / model.wtmass
 
 
 def _laid_shells(

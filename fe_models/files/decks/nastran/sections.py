@@ -7,7 +7,13 @@ import numpy as np
 from fe_models.files.bulk_data.cards import Card
 from fe_models.files.decks.deck import DeckMass, DeckMaterial, DeckSpring, ShellSection, SolidSection
 from fe_models.files.decks.nastran.bars import BARS, read_bars, with_defaults
-from fe_models.files.decks.nastran.layups import layered_shells, orthotropic_shells, sheet_material
+from fe_models.files.decks.nastran.layups import (
+    layered_shells,
+    needs_matrices,
+    orthotropic_shells,
+    sheet_material,
+    stiffness_shells,
+)
 from fe_models.files.decks.nastran.model import PROPERTIES, NastranModel
 from fe_models.files.decks.nastran.tapers import cut_tapers
 from fe_models.files.decks.spring_axes import as_triad, axes_along
@@ -119,9 +125,9 @@ def _shells(model: NastranModel, known: Card, cards: list[Card]) -> None:
     if known.name != "PSHELL":
         model.ledger.refuse(cards[0].name, f"property {pid} is {known.name}", count=len(cards))
         return
-    ratios = _ratios(model, known)
-    if isinstance(ratios, str):
-        model.ledger.refuse("PSHELL", f"property {pid}: {ratios}", count=len(cards))
+    missing = _missing_parts(model, known)
+    if missing:
+        model.ledger.refuse("PSHELL", f"property {pid}: {missing}", count=len(cards))
         return
     thickness = known.real(3)
     cards = [card for card in cards if _has_thickness(model, card, thickness)]
@@ -129,6 +135,13 @@ def _shells(model: NastranModel, known: Card, cards: list[Card]) -> None:
     if not known.text(6):
         why = "MID3 is blank, rigid in transverse shear there: here 5/6 G t"
         model.ledger.note("PSHELL", why, count=len(cards))
+    if needs_matrices(model, known):
+        stiffness_shells(model, known, cards, _OFFSET_FIELD)
+        return
+    ratios = _ratios(model, known)
+    if isinstance(ratios, str):
+        model.ledger.refuse("PSHELL", f"property {pid}: {ratios}", count=len(cards))
+        return
     if isinstance(model.materials[known.text(2)].young, tuple):
         section = ShellSection("", known.text(2), thickness, 0.0, added)
         section = replace(section, bending_ratio=ratios[0], shear_ratio=ratios[1])
@@ -153,28 +166,29 @@ def _has_thickness(model: NastranModel, card: Card, thickness: float) -> bool:
     return not own - {thickness}
 
 
+def _missing_parts(model: NastranModel, known: Card) -> str:
+    """Return why a PSHELL is no shell, or nothing."""
+    if not known.text(2) or not known.text(3):
+        return "without MID1 or T: a plate that only bends"
+    if not known.text(4) and model.plane is None:
+        return "without MID2: a membrane, without stiffness in bending; only where the deck is planar"
+    return ""
+
+
 def _ratios(model: NastranModel, known: Card) -> tuple[float, float] | str:
     """Return the stiffness in bending and in transverse shear of a PSHELL over those of a plate of MID1; or why not.
 
     Nastran has E_2 I with I = (12I/T**3) T³/12 for bending and G_3 T_S with T_S = (TS/T) T, 5/6 T where it is blank.
     """
-    if not known.text(2) or not known.text(3):
-        return "without MID1 or T: a plate that only bends"
-    if not known.text(4) and model.plane is None:
-        return "without MID2: a membrane, without stiffness in bending; only where the deck is planar"
     materials = [model.materials.get(known.text(k) or known.text(2)) for k in (2, 4)]
     third = model.materials.get(known.text(6) or known.text(2))
     first, second = materials
     if first is None or second is None or third is None:
-        return "a material that is not known here (MAT1, MAT8)"
-    if any(isinstance(each.young, tuple) for each in (first, second, third)) and len({first, second, third}) > 1:
-        return "orthotropic materials that differ in MID1, MID2, MID3"
+        return "a material that is not known here (MAT1, MAT2, MAT8)"
     bending, shear = known.real(5, 1.0), known.real(7, 5 / 6) / (5 / 6)
     if first is not second:
         assert isinstance(first.young, float)
         assert isinstance(second.young, float)
-        if first.poisson != second.poisson:
-            return "MID1 and MID2 of different Poisson's ratio"
         bending *= second.young / first.young
     if third is not first:
         shear *= _shear_modulus(third) / _shear_modulus(first)

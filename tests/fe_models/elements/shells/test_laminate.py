@@ -10,9 +10,10 @@ from numpy.testing import assert_allclose
 import fe_models as fm
 from cms.modes.families.rigid_modes import geometric_rigid_modes
 from fe_models.body.mass_loads import MassLoads
+from fe_models.elements.recovery.strain import nodal_strain
 from fe_models.elements.shells.geometric import stress_second_moments
 from fe_models.elements.shells.laminate import shell_law
-from fe_models.errors import ShellError
+from fe_models.errors import BodyError, ShellError
 from tests.bodies import box_mesh
 from tests.fe_models.elements.shells.examples import balanced_state, turned_loads
 from tests.fe_models.small_shells import KINDS, SI, STEEL, distorted, frequencies, of_nodes, solved
@@ -105,6 +106,43 @@ def test_one_isotropic_layer_has_five_sixths_of_its_shear_stiffness():
     assert_allclose(law.stiffness, expected, rtol=1e-13, atol=1e-13 * STEEL.E * t**3)
     assert_allclose([law.mass, law.centre, law.spread], [STEEL.rho * t, 0, t**2 / 12], rtol=1e-13, atol=0)
     assert_allclose([law.nu, law.shear_modulus], [nu, STEEL.mu * t], rtol=1e-13, atol=0)
+
+
+def matrices(stiffness=None, shear_stiffness=None, direction=X, *, thickness=0.05, **more):
+    """Return the stiffness of a steel plate 0.05 thick, written out, or another one."""
+    E, nu, t = STEEL.E, STEEL.nu, 0.05
+    plane = E / (1 - nu**2) * np.array([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]])
+    C = np.kron(np.diag([t, t**3 / 12]), plane) if stiffness is None else stiffness
+    H = 5 / 6 * E / (2 + 2 * nu) * t * np.eye(2) if shear_stiffness is None else shear_stiffness
+    return fm.StiffnessProperty(thickness, C, H, direction, **more)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_given_stiffness_of_a_plate_is_the_shell_of_its_material(kind):
+    """But for the rotary inertia, which matrices do not give."""
+    one = shell(curved(kind), fm.ShellProperty(0.05, STEEL, offset=0.04, added_mass=7.0))
+    item = matrices(direction=(0.3, 0.9, -0.4), offset=0.04, added_mass=7.0 + 0.05 * STEEL.rho)
+    given = shell(curved(kind), item)
+    K = one.K.toarray()
+    assert_allclose(given.K.toarray(), K, rtol=0, atol=1e-12 * np.abs(K).max())
+    rng = np.random.default_rng(0)
+    u = rng.normal(size=(one.element_model.n_mesh_dof, 2))
+    loads = MassLoads(np.zeros((2, 3, 3)), rng.normal(size=(2, 3)))
+    for result in (
+        lambda model: model.nodal_stress(u),
+        lambda model: model.geometric_stiffness(u, loads, u),
+        lambda model: model.mass_forces(loads),
+    ):
+        ours, expected = (result(body.element_model) for body in (given, one))
+        assert_allclose(ours, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
+    turns = np.zeros((one.n_dof, 3))
+    turns[np.arange(one.n_dof), one.dofs[:, 1] % 3] = one.dofs[:, 1] > 2  # all nodes turn in place
+    rotary = turns.T @ (one.M - given.M) @ turns
+    area = one.element_model.groups[0].areas().sum() if len(one.element_model.groups) == 1 else None
+    assert_allclose(np.trace(rotary), 2 * area * (0.05 * STEEL.rho + 7.0) * 0.05**2 / 12, rtol=1e-9, atol=0)
+    assert "along direction [0.3, 0.9, -0.4]" in given.provenance["stiffness 1"]
+    with pytest.raises(BodyError, match="shells of given stiffness is not known"):
+        nodal_strain(given, u, np.arange(2))
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -396,6 +434,14 @@ def test_a_cross_ply_buckles_at_the_load_of_naviers_series():
         (lambda: fm.Layer(PLY, 0.01, np.nan), "layer: angle: expected a finite number"),
         (lambda: fm.Layer(replace(PLY, axes=((0, 1, 0), (-1, 0, 0), (0, 0, 1))), 0.01), "has axes of its own"),
         (lambda: laminate(fm.Layer(PLY, 0.01), added_mass=-1.0), "added_mass: expected zero or more"),
+        (lambda: matrices(np.eye(5)), "stiffness: expected 6 rows of 6 finite numbers"),
+        (lambda: matrices(np.eye(6) + np.eye(6, k=1) / 2), "stiffness: expected a symmetric matrix"),
+        (lambda: matrices(np.ones((6, 6))), "stiffness: expected a positive definite matrix, got the scaled eigenvalue"),
+        (lambda: matrices(-np.eye(6)), "stiffness: expected a positive definite matrix, got the diagonal"),
+        (lambda: matrices(shear_stiffness=np.eye(3)), "shear_stiffness: expected 2 rows of 2 finite numbers"),
+        (lambda: matrices(direction=(0, 0, 0)), "direction: expected a vector that is not zero"),
+        (lambda: matrices(thickness=0.0), "thickness: expected a length above zero"),
+        (lambda: matrices(added_mass=-1.0), "added_mass: expected zero or more"),
     ],
 )
 def test_impossible_layups_are_refused(make, words):
