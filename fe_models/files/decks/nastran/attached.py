@@ -80,7 +80,10 @@ def _mass_matrix(model: NastranModel, card: Card) -> None:
 
 
 def _scalar_masses(model: NastranModel) -> None:
-    """CMASS1 and CMASS2 of one grid point: equal masses along all three axes are a point mass; others are refused."""
+    """CMASS1 and CMASS2 of one grid point: equal masses along all axes are a point mass; others are refused.
+
+    Axes along which the deck holds the point do not count: no mass moves there.
+    """
     along: dict[int, list[float]] = {}
     cards: dict[int, list[Card]] = {}
     for card in model.of("CMASS1", "CMASS2"):
@@ -98,11 +101,22 @@ def _scalar_masses(model: NastranModel) -> None:
         along.setdefault(node, [0.0, 0.0, 0.0])[component] += m * model.wtmass
         cards.setdefault(node, []).append(card)
     for node, masses in along.items():
-        if max(masses) - min(masses) > SAME * max(np.abs(masses)):
+        free = [mass for mass, is_held in zip(masses, _holds_along(model, node), strict=True) if not is_held] or masses
+        if max(free) - min(free) > SAME * max(np.abs(free)):
             why = f"grid point {node} has another mass along each axis, {masses}: no body frame can move with it"
             model.ledger.refuse("CMASS", why, count=len(cards[node]))
         else:
-            model.masses.append(DeckMass(model.group(cards[node][0], [node]), float(np.mean(masses))))
+            model.masses.append(DeckMass(model.group(cards[node][0], [node]), float(np.mean(free))))
+            if len(free) < 3 and node in model.held:
+                why = f"at grid point {node} along the axes that the deck leaves free: a point mass, along all axes"
+                model.ledger.note("CMASS", why, count=len(cards[node]))
+
+
+def _holds_along(model: NastranModel, node: int) -> list[bool]:
+    """Whether the deck holds a point along each of its displacement axes, by a support or in the plane of the deck."""
+    held = model.held.get(node, set())
+    across = -1 if model.plane is None else int(np.argmax(np.abs(model.axes(node)[model.plane])))
+    return [k in held or k == across for k in range(3)]
 
 
 def _rigid(model: NastranModel, card: Card) -> None:

@@ -44,6 +44,8 @@ def read_sections(model: NastranModel) -> None:
         _material(model, card)
     for card in model.of("MAT8"):
         sheet_material(model, card)
+    for card in model.of("MATHP"):
+        _rubber(model, card)
     with_defaults(model)
     cut_tapers(model)
     _with_middles(model)
@@ -72,6 +74,26 @@ def _material(model: NastranModel, card: Card) -> None:
         model.ledger.note("MAT1", "E, G and nu do not fit together: G is not taken")
     density = card.real(5, 0.0) * model.wtmass
     model.materials[card.text(1)] = DeckMaterial(card.text(1), young, poisson, density or None)
+
+
+def _rubber(model: NastranModel, card: Card) -> None:
+    """Take the elastic constants of MATHP at small strain.
+
+    Its energy A10 (I1 - 3) + A01 (I2 - 3) + D1 (J - 1)² + terms of higher order has G = 2 (A10 + A01) and K = 2 D1.
+    """
+    if any(card.text(k) for k in range(49, 57)):
+        model.ledger.refuse("MATHP", f"material {card.text(1)}: constants fitted to measured curves (TAB1 to TABD)")
+        return
+    A = card.real(2, 0.0) + card.real(3, 0.0)
+    G, K = 2 * A, 2 * card.real(4, 1000 * A)
+    if not G > 0 or not K > 0:
+        model.ledger.refuse("MATHP", f"material {card.text(1)}: A10 + A01 and D1 must be above zero")
+        return
+    E, nu = 9 * K * G / (3 * K + G), (3 * K - 2 * G) / (6 * K + 2 * G)
+    density = card.real(5, 0.0) * model.wtmass
+    model.materials[card.text(1)] = DeckMaterial(card.text(1), E, nu, density or None)
+    why = f"rubber: its constants at small strain, Poisson's ratio {nu:.4g}; cells of first order may be too stiff"
+    model.ledger.note("MATHP", why)
 
 
 def _cells(model: NastranModel, cards: list[Card], group: str) -> None:
@@ -107,7 +129,7 @@ def _with_middles(model: NastranModel) -> None:
 
 
 def _solids(model: NastranModel, known: Card, cards: list[Card]) -> None:
-    if known.name != "PSOLID":
+    if known.name not in ("PSOLID", "PLSOLID"):
         model.ledger.refuse(cards[0].name, f"property {known.text(1)} is {known.name}", count=len(cards))
         return
     group = f"pid_{known.text(1)}"

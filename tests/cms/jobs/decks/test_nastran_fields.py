@@ -58,6 +58,11 @@ READ: dict[str, tuple[str, dict[str, str | None]]] = {
         {"MID": None, "G11": "1.+11", "G12": "4.+10", "G13": "2.+10", "G22": "1.+11", "G23": "1.+10", "G33": "6.+10",
          "RHO": "7000."},
     ),
+    "MATHP": (
+        "CHEXA,1,9,1,2,3,4,5,6\n,7,8\nPLSOLID,9,9\nMATHP,9,1.+6,2.+5,5.+7,1000.",
+        {"MID": None, "A10": "2.+6", "A01": "3.+5", "D1": "6.+7", "RHO": "900."},
+    ),
+    "PLSOLID": ("CHEXA,1,9,1,2,3,4,5,6\n,7,8\nPLSOLID,9,1", {"PID": None, "MID": "2"}),
     "PSOLID": ("CHEXA,1,9,1,2,3,4,5,6\n,7,8\nPSOLID,9,1", {"PID": None, "MID": "2"}),
     "PSHELL": (
         SHELL_4,

@@ -413,6 +413,47 @@ def test_scalar_masses_that_differ_by_rounding_are_a_point_mass(tmp_path):
         body_of(tmp_path, text + cards + "CMASS2,99,1.-6,2,1\n")
 
 
+def test_scalar_masses_count_along_the_axes_that_the_deck_leaves_free(tmp_path):
+    """CMASS along y and z of a point held along x, and along two axes in a planar deck; three are the same body."""
+    text = GRIDS + f"{ORIENTED}\n" + SECTION + MATERIAL
+    cards = [f"CMASS2,{c},2.5,2,{c}\n" for c in (1, 2, 3)]
+    whole, _ = body_of(tmp_path, text + "".join(cards))
+    partly, deck = body_of(tmp_path, text + "".join(cards[1:]) + "SPC1,1,1,2\n")
+    assert_allclose(partly.M.toarray(), whole.M.toarray(), rtol=1e-13)
+    assert any("along the axes that the deck leaves free: a point mass" in row[2] for row in deck.ledger.rows())
+    planar = "GRID,1,,.1,.2,.3,,345\nGRID,2,,1.3,.9,.3,,345\nCBAR,1,1,1,2,0.,0.,1.\n" + SECTION + MATERIAL
+    flat = [body_of(tmp_path, planar + "".join(chosen))[0].M.toarray() for chosen in (cards, cards[:2])]
+    assert_allclose(flat[1], flat[0], rtol=1e-13)
+    with pytest.raises(ValueError, match="another mass along each axis"):
+        body_of(tmp_path, planar + cards[0])
+    with pytest.raises(ValueError, match="another mass along each axis"):
+        body_of(tmp_path, text + cards[1] + "SPC1,1,1,2\n")
+
+
+def test_rubber_has_the_energy_of_its_law_at_small_strain(tmp_path):
+    """The energy of a cube in small uniform strain is that of A10 (I1 - 3) + A01 (I2 - 3) + D1 (J - 1)²."""
+    corners = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]) + 0.3
+    text = "".join(f"GRID,{k},,{x},{y},{z}\n" for k, (x, y, z) in enumerate(corners.tolist(), start=1))
+    text += "CHEXA,1,9,1,2,3,4,5,6\n,7,8\n"
+    A10, A01, D1 = 1.3e6, 4e5, 6e6
+    body, deck = body_of(tmp_path, text + f"PLSOLID,9,9\nMATHP,9,{A10},{A01},{D1},1000.\n")
+    assert f"{29.2 / 78.8:.4g}" in str(deck.ledger.rows())  # (3 K - 2 G)/(6 K + 2 G)
+    H = 1e-6 * np.random.default_rng(0).normal(size=(3, 3))
+    F = np.longdouble(H) + np.eye(3)
+    C = F.T @ F
+    J = F[0] @ np.cross(F[1], F[2])
+    I1, I2 = np.trace(C) / J ** (2 / np.longdouble(3)), (np.trace(C) ** 2 - np.trace(C @ C)) / 2
+    W = A10 * (I1 - 3) + A01 * (I2 / J ** (4 / np.longdouble(3)) - 3) + D1 * (J - 1) ** 2
+    u = (body.nodes @ H.T)[body.dofs[:, 0], body.dofs[:, 1]]
+    assert_allclose(u @ (body.K @ u) / 2, float(W), rtol=1e-4)
+    default, _ = body_of(tmp_path, text + f"PLSOLID,9,9\nMATHP,9,{A10},{A01},,1000.\n")
+    written, _ = body_of(tmp_path, text + f"PLSOLID,9,9\nMATHP,9,{A10},{A01},{1000 * (A10 + A01)},1000.\n")
+    assert_allclose(default.K.toarray(), written.K.toarray(), rtol=1e-9)
+    for card, why in ((f"MATHP,9,{A10}\n,\n,\n,\n,\n,\n,5\n", "fitted to measured"), ("MATHP,9,,,1.\n", "above zero")):
+        with pytest.raises(ValueError, match=why):
+            body_of(tmp_path, text + "PLSOLID,9,9\n" + card)
+
+
 def test_an_equation_that_only_moves_a_point_of_no_element_leaves_the_body_free(tmp_path):
     """Point 3 belongs to nothing: u_3z = 2 u_2x + u_1y says how it moves, and a force there has no place to act."""
     text = GRIDS + f"{ORIENTED}\n" + SECTION + MATERIAL + "GRID,3,,4.,5.,6.\nGRID,4,,4.,5.,7.\nPARAM,COUPMASS,1\n"
