@@ -102,7 +102,7 @@ class ShellLaw:
 
 
 def _given_law(item: StiffnessProperty) -> ShellLaw:
-    """Return the law of given matrices. ∫ Q z³ dz is not known; it is zero, as for layers symmetric about the middle."""
+    """Return the law of given matrices; the unknown ∫ Q z³ dz is zero, as for layers symmetric about the middle."""
     C, half = np.array(item.stiffness), item.thickness / 2
     return ShellLaw(
         layers=(),

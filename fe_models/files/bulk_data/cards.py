@@ -160,6 +160,8 @@ def _fields(line: str) -> tuple[str, list[str], str, str]:
     """Return the first field, the data fields of a line, the mark of its continuation, and what stands behind it."""
     if "," in line:
         parts = [part.strip() for part in line.split(",")]
+        if line[0] not in " +*=":  # blanks may separate the name from the first field
+            parts[:1] = parts[0].split(None, 1) or [""]
         count = (LARGE if "*" in parts[0] else SMALL)[1]
         data = parts[1 : count + 1]
         mark = parts[count + 1] if len(parts) > count + 1 else ""

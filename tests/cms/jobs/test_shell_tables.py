@@ -241,7 +241,7 @@ MATRICES = "thickness = 0.02\nstiffness = [[1]]\nshear_stiffness = [[1]]"
         ('material = "steel"}', 'material = "steal"}', 'shells.floor.layers.1.material = "steal": there is no such'),
         ("thickness = 0.02", "thickness = 0.02\nsymmetric = true", "shells.wall.symmetric: belongs to layers"),
         ("thickness = 0.02", "thickness = 0.02\ndirection = [1, 0, 0]", "shells.wall.direction: belongs to layers"),
-        ("thickness = 0.02", "thickness = 0.02\nshear_stiffness = [[1, 0], [0, 1]]", "shear_stiffness: belongs to stiff"),
+        ("thickness = 0.02", "thickness = 0.02\nshear_stiffness = [[1]]", "shear_stiffness: belongs to stiffness"),
         ("thickness = 0.02", "thickness = 0.02\nstiffness = [[1]]", "shells.wall.shear_stiffness: missing; stiffness"),
         ("symmetric = true", MATRICES, "shells.floor.layers: the matrices of stiffness stand for it"),
         ("thickness = 0.02", f"{MATRICES}\ndirection = [1, 0, 0]", "shells.wall.material: the matrices of stiffness"),

@@ -20,6 +20,7 @@ def test_small_large_and_free_fields_say_the_same():
         "*A               -3.D+1               3",
         "grid,7,2,1.5,2.5-3,-3.D+1,3",
         "GRID*,7,2,1.5,2.5E-3\n*,-30.,3",
+        "GRID   7,2,1.5,2.5-3,-3.D+1,3",
     )
     for text in texts:
         (card,) = read_cards("deck", text)

@@ -129,9 +129,8 @@ def stiffness_shells(model: NastranModel, known: Card, cards: list[Card], offset
         model.ledger.refuse("PSHELL", why, count=len(cards))
         return
     mass = (_density(model, names[0]) * T + known.real(8, 0.0)) * model.wtmass  # (3)
-    model.ledger.note(
-        "PSHELL", f"property {pid}: stiffness by matrices, without rotary inertia; stress as in one layer of thickness T"
-    )
+    why = f"property {pid}: stiffness by matrices, without rotary inertia; stress as in one layer of thickness T"
+    model.ledger.note("PSHELL", why)
     section = ShellSection(
         "", "", T, 0.0, mass,
         stiffness=tuple(map(tuple, C.tolist())), shear_stiffness=tuple(map(tuple, H.tolist())),

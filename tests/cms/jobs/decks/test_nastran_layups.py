@@ -71,7 +71,7 @@ def test_layers_lie_as_the_card_says(tmp_path, options, direction, offset, repea
     [
         ({"lam": "BEND"}, "1 PCOMP: property 1: LAM = BEND"),
         ({",1,.01,": ",1,,"}, "a layer without material or thickness"),
-        ({"PCOMP,1,,2.,,,,,\n,1,.01,,,2,.02,30.\n,2,,-45.": "PSHELL,1,2,.1,1,,2"}, "orthotropic materials that differ"),
+        ({"PCOMP,1,,2.,,,,,\n,1,.01,,,2,.02,30.\n,2,,-45.": "PSHELL,1,2,.1,9,,2"}, "a material that is not known"),
     ],
 )
 def test_layups_that_are_not_known_are_refused(tmp_path, options, words):

@@ -133,10 +133,15 @@ def test_membrane_and_bending_of_two_poisson_ratios(tmp_path):
     def plane(E, nu):
         return E / (1 - nu**2) * np.array([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]])
 
-    C = np.zeros((6, 6))
-    C[:3, :3], C[3:, 3:] = 0.05 * plane(2e11, 0.3), 1.5 * 0.05**3 / 12 * plane(1e11, 0.1)
-    H = 0.7 * 0.05 * 2e11 / 2.6 * np.eye(2)
-    side = tuple((POINTS[1] - POINTS[0]).tolist())
-    item = StiffnessProperty(0.05, C, H, side, added_mass=7800.0 * 0.05)
-    K = shell_body(MESH, item, name="plate", units=SI).K.toarray()
+    def expected(membrane, bending, shear):
+        C = np.zeros((6, 6))
+        C[:3, :3], C[3:, 3:] = 0.05 * membrane, 1.5 * 0.05**3 / 12 * bending
+        side = tuple((POINTS[1] - POINTS[0]).tolist())
+        item = StiffnessProperty(0.05, C, 0.7 * 0.05 * shear, side, added_mass=7800.0 * 0.05)
+        return shell_body(MESH, item, name="plate", units=SI).K.toarray()
+
+    K = expected(plane(2e11, 0.3), plane(1e11, 0.1), 2e11 / 2.6 * np.eye(2))
     assert_allclose(ours.K.toarray(), K, rtol=0, atol=1e-9 * np.abs(K).max())
+    text += "MAT1,2,1.+11,,.1\nMAT8,1,1.4+11,1.+10,.3,5.+9,4.+9,3.+9,7800.\nENDDATA\n"  # and one of three moduli
+    K = expected(ply_elasticity(0.0), plane(1e11, 0.1), np.diag([G_13, G_23]))
+    assert_allclose(body_of(tmp_path, text).K.toarray(), K, rtol=0, atol=1e-9 * np.abs(K).max())

@@ -436,7 +436,7 @@ def test_a_cross_ply_buckles_at_the_load_of_naviers_series():
         (lambda: laminate(fm.Layer(PLY, 0.01), added_mass=-1.0), "added_mass: expected zero or more"),
         (lambda: matrices(np.eye(5)), "stiffness: expected 6 rows of 6 finite numbers"),
         (lambda: matrices(np.eye(6) + np.eye(6, k=1) / 2), "stiffness: expected a symmetric matrix"),
-        (lambda: matrices(np.ones((6, 6))), "stiffness: expected a positive definite matrix, got the scaled eigenvalue"),
+        (lambda: matrices(np.ones((6, 6))), "expected a positive definite matrix, got the scaled eigenvalue"),
         (lambda: matrices(-np.eye(6)), "stiffness: expected a positive definite matrix, got the diagonal"),
         (lambda: matrices(shear_stiffness=np.eye(3)), "shear_stiffness: expected 2 rows of 2 finite numbers"),
         (lambda: matrices(direction=(0, 0, 0)), "direction: expected a vector that is not zero"),
