@@ -165,6 +165,21 @@ def test_a_bush_says_whose_axes_it_takes_unasked(tmp_path, bush, axes):
     assert all(axes in why for why in told)
 
 
+@pytest.mark.parametrize(
+    ("law", "is_round"),
+    [
+        ("K,1.,2.,2.,3.,4.,4.", True), ("K,1.,2.,2.,4.,4.,3.", False), ("K,1.,2.,2.,3.,4.,3.", False),
+        ("K,1.,2.,2.\n,,B,1.,2.,2.,3.,4.,4.", True), ("K,1.,2.,2.\n,,B,1.,2.,3.", False), ("K,2.,2.,1.", False),
+    ],
+)  # fmt: skip
+def test_a_bush_with_length_needs_axes_unless_it_is_round(tmp_path, law, is_round):
+    """Round: the same along its y and z, and about them; whatever acts along and about its line."""
+    bush = f"GRID,10,,7.,.5,1.\nCBUSH,70,71,5,10\nPBUSH,71,{law}"
+    deck = read_deck(deck_of(tmp_path, DECK.replace("CELAS2,70,5.+3,1,2,2,2", bush)))
+    told = [why for name, _, why in deck.ledger.rows() if name == "CBUSH" and "with length, other values" in why]
+    assert bool(told) != is_round, deck.ledger.rows()
+
+
 def test_a_missing_include_and_a_ring_of_them_are_refused(tmp_path):
     path = deck_of(tmp_path)
     (tmp_path / "nodes.bulk").write_text("INCLUDE 'nodes.bulk'\n")

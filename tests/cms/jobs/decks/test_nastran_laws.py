@@ -256,6 +256,19 @@ def test_scalar_elements_add_between_the_same_components(tmp_path):
     assert_allclose(u @ body.D @ u, 7 * d[1] ** 2, rtol=1e-9)
 
 
+def test_springs_between_points_apart_along_their_direction_balance(tmp_path):
+    """CELAS between points 1 m apart along its own direction, in axes that are turned in the plane."""
+    text = PAIR.replace("1.,0.,0.", "1.,0.,0.,5").replace("{x},{y},0.", "1.8,.6,0.,5") + SECTION + MATERIAL
+    text += "CORD2R,5,,0.,0.,0.,0.,0.,1.\n,4.,3.,0.\n"
+    plain, _ = body_of(tmp_path, text)
+    body, deck = body_of(tmp_path, text + "CELAS2,11,1.+6,2,1,3,1\n")
+    deck.ledger.require_whole()
+    u = np.random.default_rng(3).normal(size=body.n_dof)
+    e = np.array([0.8, 0.6, 0.0])
+    d = sum(sign * e[c] * u[(body.dofs == (node, c)).all(axis=1)] for node, sign in ((1, 1), (2, -1)) for c in range(3))
+    assert_allclose(u @ (body.K - plain.K) @ u, 1e6 * d[0] ** 2, rtol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("x", "y", "card", "why"),
     [

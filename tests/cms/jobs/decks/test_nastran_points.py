@@ -160,6 +160,13 @@ def test_a_spring_along_the_line_of_two_points(tmp_path):
     d = e @ np.array([at[2, c] - at[1, c] for c in range(3)])
     assert_allclose(u @ (body.K - plain.K) @ u, 1e5 * d**2, rtol=1e-8)
     assert_allclose(u @ body.D @ u, 20 * d**2, rtol=1e-9)
+    _, deck = body_of(tmp_path, TWO_BARS + "CBUSH1D,8,9,2,3\nPBUSH1D,9,1.+5,20.\n")
+    assert not [row for row in deck.ledger.rows() if row[0] == "PBUSH1D"]
+    law = "PBUSH1D,9,1.+5,20.,,,,,\n,SPRING,TABLE,12\n"
+    _, deck = body_of(tmp_path, TWO_BARS + f"CBUSH1D,8,9,2,3\n{law}")
+    assert [row[2] for row in deck.ledger.rows() if row[0] == "PBUSH1D"] == [
+        "laws that are not linear, or vary with time: K and C are taken"
+    ]
 
 
 def test_a_spring_to_a_held_point_of_nothing_else_is_one_to_the_ground(tmp_path):

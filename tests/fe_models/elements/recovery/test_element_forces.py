@@ -9,7 +9,7 @@ import fe_models as fm
 from fe_models.elements.recovery.element_forces import element_groups
 from fe_models.foundation.units import unit_system
 from fe_models.meshes.numbering import NamedSet
-from tests.bodies import STEEL
+from tests.bodies import STEEL, box_mesh
 
 T, LENGTH = 0.01, 0.5
 
@@ -95,3 +95,46 @@ def test_beams_on_a_shell_know_which_nodes_of_the_body_are_theirs():
     assert beams.first_node >= len(mesh.nodes)
     assert_allclose(body.nodes[beams.first_node : beams.first_node + len(own)], own, rtol=0, atol=1e-15)
     assert next(group for group in groups if group.quantity == "shell resultant").first_node == 0
+
+
+def bodies_of_all_elements(name: str):
+    """A frame with a spring and a stiffened plate over a beam, and a brick; numbers of SI put into other units."""
+    units = unit_system(name)
+
+    def si(value, mass=0, length=0, time=0):
+        return np.asarray(value) / units.to_si(mass=mass, length=length, time=time)
+
+    steel = fm.Material("steel", E=float(si(2e11, 1, -1, -2)), nu=0.3, rho=float(si(7800.0, 1, -3)))
+    lines = fm.LineMesh(si([[0.0, 0, 0], [1, 0.2, 0], [1, 0.4, 0.1]], length=1), np.array([[0, 1]]))
+    spring = fm.Spring((1, 2), [*si([1e4, 2e3, 3e3], 1, 0, -2), *si([5.0, 6, 7], 1, 2, -2)])
+    bar = fm.BeamProperty(fm.Rectangle(*si([0.02, 0.03], length=1).tolist()), steel)
+    yield fm.beam_body(lines, bar, name="frame", units=units, springs=[spring])
+    plate = fm.flat_plate(float(si(1.0, length=1)), float(si(0.5, length=1)), 2, 1)
+    plate = replace(plate, lines=np.array([[0, 1], [1, 2]]), line_sets={"rib": np.arange(2)})
+    t = fm.ShellProperty(float(si(T, length=1)), steel)
+    yield fm.shell_body(plate, t, name="plate", units=units, stiffeners={"rib": bar})
+    brick = box_mesh(2, 1, 1, *si([0.5, 0.2, 0.1], length=1).tolist(), kind="hexahedron")
+    yield fm.solid_body(brick, steel, name="brick", units=units)
+
+
+def test_every_component_of_every_element_has_its_dimensions():
+    """The same displacement in two unit systems: values differ by the factor of their dimensions."""
+    old, new = unit_system("m-kg-s"), unit_system("mm-g-ms")
+    seen = set()
+    for a, b in zip(bodies_of_all_elements(old.name), bodies_of_all_elements(new.name), strict=True):
+        n = 3 * len(a.nodes) if a.name == "brick" else a.element_model.n_mesh_dof
+        u = np.random.default_rng(5).normal(size=(n, 2))
+        is_length = np.full(n, True) if a.name == "brick" else np.tile(np.arange(6) < 3, n // 6)
+        v = np.where(is_length[:, None], u / new.length, u)
+        for one, other in zip(element_groups(a), element_groups(b), strict=True):
+            every = np.arange(one.count)
+            assert len(one.dimensions) == len(one.components) == one.forces(u, every).shape[1], one.quantity
+            factors = np.array([each.factor(old, new) for each in one.dimensions])
+            found, expected = other.forces(v, every), one.forces(u, every) * factors[None, :, None]
+            scale = np.abs(expected).max(axis=(0, 2), keepdims=True)
+            assert_allclose(found / np.where(scale > 0, scale, 1), expected / np.where(scale > 0, scale, 1), atol=1e-9)
+            seen.add(one.quantity)
+    assert seen == {
+        "beam force", "beam strain", "spring force", "shell resultant", "shell strain", "element stress",
+        "element strain",
+    }  # fmt: skip

@@ -50,6 +50,8 @@ def test_a_fixed_frequency_is_not_mirrored_into_low_orders():
     x = Signal("whine", t, np.sin(2 * np.pi * 900 * t), "m/s²")
     orders = order_map(x, ANGLE, max_order=20, resolution=0.25)
     assert np.abs(orders.amplitudes).max() < 0.02
+    slowest = RATE / 10  # samples a turn at 10 turns a second
+    assert int(orders.notes[-1].split()[-4]) == pytest.approx(slowest, rel=0.01), orders.notes[-1]
 
 
 def test_standing_and_slow_parts_are_left_out_and_said():
@@ -83,3 +85,18 @@ def test_a_waterfall_shows_a_line_where_it_is():
 def test_impossible_rotations_are_refused(angle, options, words):
     with pytest.raises(SignalError, match=words):
         order_map(run_up(), angle, **options)
+
+
+def test_as_many_turns_as_a_block_has_make_one_block():
+    """4 turns at 8 a second in blocks of 1/0.25 turns; a part of a sample less is refused."""
+    n = int(0.5 * RATE)
+    for turns, n_blocks in ((4.0, 1), (5.0, 2), (3.999, 0)):
+        angle = 2 * np.pi * turns * np.arange(n + 1) / n
+        x = Signal("a", t[: n + 1], np.cos(2 * angle), "")
+        if not n_blocks:
+            with pytest.raises(SignalError, match="4 turns, a block has 4|3.999 turns, a block has 4"):
+                order_map(x, angle, max_order=5, resolution=0.25, overlap=0.75)
+            continue
+        orders = order_map(x, angle, max_order=5, resolution=0.25, overlap=0.75)
+        assert len(orders.times) == n_blocks
+        assert_allclose(order_cut(orders, 2.0), 1.0, rtol=1e-3)

@@ -207,3 +207,19 @@ def test_the_first_gap_that_is_too_long_is_named_not_a_shorter_one_before_it(tmp
     with pytest.raises(SignalError, match=words):
         read_signals(lost, fill=0.003)
     assert len(read_signals(lost, fill=0.011).time) == 90
+
+
+@pytest.mark.parametrize("depth", [1, 8, 9, 12])
+def test_structures_are_read_down_to_a_depth_of_eight(tmp_path, depth):
+    """A vector in so many structures, one in the other, beside a plain one; what lies deeper is left out."""
+    x = np.arange(40.0)
+    inner = {"x": x**2}
+    for k in range(depth):
+        inner = {f"s{k}": inner}
+    scipy.io.savemat(tmp_path / "deep.mat", {"t": x / 10, "y": x, **inner})
+    found = read_signals(tmp_path / "deep.mat")
+    name = ".".join([*(f"s{k}" for k in reversed(range(depth))), "x"])
+    assert (name in found.names) == (depth <= 8)
+    assert_allclose(found["y"].values, x)
+    if depth <= 8:
+        assert_allclose(found[name].values, x**2)

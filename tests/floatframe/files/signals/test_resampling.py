@@ -29,6 +29,19 @@ def test_what_lies_below_the_new_nyquist_frequency_stays(rate):
     assert_allclose([report.rms_before, report.rms_after], [np.sqrt(0.5 * 1.25), rms], rtol=4e-3, atol=0)
 
 
+@pytest.mark.parametrize("above", [1.0, 1.02, 1.05, 1.5])
+def test_from_the_new_nyquist_frequency_on_nothing_is_left(above):
+    """-80 dB at the end of the transition, which begins at 80 % of the new Nyquist frequency."""
+    rate = 500.0
+    whine = Signal("whine", t, np.sin(2 * np.pi * above * rate / 2 * t + 0.4), "m/s^2")
+    found, _ = resampled(whine, rate)
+    inner = slice(100, -100)
+    assert np.abs(found.values[inner]).max() < 3e-4
+    kept = Signal("hum", t, np.sin(2 * np.pi * 0.8 * rate / 2 * t), "m/s^2")
+    found, _ = resampled(kept, rate)
+    assert_allclose(found.values[inner], np.sin(2 * np.pi * 200 * found.time)[inner], rtol=0, atol=3e-4)
+
+
 @pytest.mark.parametrize("rate", [500.0, 333.3, 2000.0, 6000.0])
 def test_new_samples_reach_the_last_old_time_and_not_beyond(rate):
     found, _ = resampled(sines(), rate)
@@ -141,3 +154,9 @@ def test_a_low_pass_leaves_a_straight_line_up_to_its_ends(corner):
     """Odd about its ends a line goes on as one: what the filter swings in has died away over three periods."""
     line = Signal("ramp", t, 3.0 - 2.0 * t, "m")
     assert_allclose(filtered(line, low_pass=corner).values, line.values, rtol=0, atol=2e-4)
+
+
+def test_a_record_of_a_part_of_a_period_of_the_corner_is_filtered():
+    short = Signal("level", t[:60], np.full(60, 3.0), "m")
+    assert_allclose(filtered(short, low_pass=2.0).values, 3.0, rtol=1e-9)
+    assert_allclose(filtered(short, high_pass=2.0).values, 0.0, rtol=0, atol=1e-9)

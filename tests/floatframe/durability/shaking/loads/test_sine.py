@@ -1,5 +1,7 @@
 """Sine tests: transmissibility of one and two masses, and sweeps against their integration cycle by cycle."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -111,3 +113,13 @@ def test_tests_that_make_no_sense_are_refused(level, rate, direction, words):
 def test_an_undamped_mode_in_the_band_is_refused():
     with pytest.raises(ModelError, match=r"mode 1 at 20 Hz lies in the band 5 to 100 Hz and has no damping"):
         sine_run(masses([20.0], 0.0), SineTest("s", LEVEL, ("z",)), "z")
+
+
+def test_modes_that_respond_statically_need_no_damping():
+    model = masses([20.0, 80.0], [0.02, 0.0], [1.0, 0.5])
+    test = SineTest("s", LEVEL, ("z",))
+    with pytest.raises(ModelError, match="mode 2 at 80 Hz"):
+        sine_run(model, test, "z")
+    sine_run(replace(model, n_residual=1), test, "z")
+    with pytest.raises(ModelError, match=r"mode 1 at 20 Hz .* \(1 such modes\)"):
+        sine_run(replace(masses([20.0, 80.0], 0.0, [1.0, 0.5]), n_residual=1), test, "z")

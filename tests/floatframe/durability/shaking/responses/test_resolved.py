@@ -56,3 +56,12 @@ def test_the_weights_are_exact_for_polynomials():
 def test_a_band_that_does_not_rise_is_refused():
     with pytest.raises(ModelError, match="ascending band above 0 Hz, got 10 to 5"):
         resolved_band(10.0, 5.0, np.array([7.0]), np.array([0.01]))
+
+
+def test_a_wide_band_without_modes_has_panels_by_the_octave():
+    """The integral of f^-3 over four decades, which one panel would miss by far."""
+    for first, last in ((1.0, 1e4), (3.0, 5.0), (20.0, 2000.0)):
+        band = resolved_band(first, last, np.zeros(0), np.zeros(0))
+        exact = (first**-2 - last**-2) / 2
+        assert_allclose(band.integral(band.frequencies**-3), exact, rtol=1e-12)
+        assert band.error(band.frequencies**-3) < 1e-7 * exact

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 import cms
 from cms.errors import BodyError
 from fe_models.body.fe_body import Interface
-from floatframe.durability.shaking.structure.body import bases_of_body, shaken_body
+from floatframe.durability.shaking.structure.body import bases_of_body, require_held, shaken_body
 from floatframe.durability.shaking.structure.damping import Damping
 from floatframe.durability.shaking.structure.model import response
 from floatframe.durability.shaking.structure.places import Observed
@@ -321,3 +321,16 @@ def test_damping_that_makes_no_sense_is_refused(given, words):
 def test_a_mode_in_no_band_is_refused():
     with pytest.raises(ModelError, match="mode 2 at 200 Hz is in none of the bands"):
         Damping(bands=[(0, 100, 0.01)]).ratios(np.array([50.0, 200.0]))
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("n_free", [0, 1, 2])
+def test_motions_without_energy_are_counted_whatever_their_rounding(seed, n_free):
+    """Springs of very different stiffness between motions, fewer springs than motions."""
+    rng = np.random.default_rng(seed)
+    B = rng.normal(size=(7, 7 - n_free)) * 10 ** rng.uniform(-2, 2, size=7 - n_free)
+    if not n_free:
+        require_held("part", B @ B.T, np.eye(7))
+        return
+    with pytest.raises(ModelError, match=rf"do not hold it: {n_free} motions? without energy remain"):
+        require_held("part", B @ B.T, np.eye(7))
