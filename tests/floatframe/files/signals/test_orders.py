@@ -94,7 +94,7 @@ def test_as_many_turns_as_a_block_has_make_one_block():
         angle = 2 * np.pi * turns * np.arange(n + 1) / n
         x = Signal("a", t[: n + 1], np.cos(2 * angle), "")
         if not n_blocks:
-            with pytest.raises(SignalError, match="4 turns, a block has 4|3.999 turns, a block has 4"):
+            with pytest.raises(SignalError, match=r"3\.999 turns, a block has 4"):
                 order_map(x, angle, max_order=5, resolution=0.25, overlap=0.75)
             continue
         orders = order_map(x, angle, max_order=5, resolution=0.25, overlap=0.75)
