@@ -2,8 +2,8 @@
 
     (1) read          the job, what to reduce and how: cms/jobs/job.py
     (2) assemble      mesh, deck, tables or matrices to a body with M and K: cms/jobs/body_of_job.py
-    (3) couple        the interfaces: rigid, distributing, or their nodes: fe_models/body/couplings
-    (4) plan          solver, memory, geometric stiffness, before the long work          `Plan`, below
+    (3) couple        rigid, distributing and nodal interfaces: fe_models/body/couplings
+    (4) plan          solver, memory, geometric stiffness, before the long work: `Plan`, below
     (5) families      one factorisation of K, for constraint and vibration modes: cms/modes/families
     (6) mode set      columns over the dofs of the body: cms/modes/mode_sets
     (7) unit states   static states of unit loads: cms/reduction/geometric_stiffness/unit_states.py

@@ -236,6 +236,6 @@ from .results.validity import ValidityNote as ValidityNote
 from .simulation.events import Event as Event
 from .simulation.foreign_units import Coupling as Coupling
 from .simulation.foreign_units import ForeignUnit as ForeignUnit
-from .simulation.integration import Progress as Progress
-from .simulation.integration import integrate as integrate
-from .simulation.integration import resume as resume
+from .simulation.integrate import Progress as Progress
+from .simulation.integrate import integrate as integrate
+from .simulation.integrate import resume as resume

@@ -104,7 +104,7 @@ floatframe/results/validity.py words
 floatframe/simulation/energy_watch.py taken
 floatframe/simulation/event_steps.py taken
 floatframe/simulation/event_steps.py told
-floatframe/simulation/integration.py kept
+floatframe/simulation/integrate.py kept
 floatframe/simulation/step_advice.py words
 """.split("\n")
 ) - {""}

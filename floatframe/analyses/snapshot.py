@@ -16,7 +16,7 @@ from floatframe.model.state import State
 from floatframe.model.system import System
 from floatframe.results.results_file import MemorySource
 from floatframe.results.trajectory import Trajectory
-from floatframe.simulation.integration import head_of, joint_rows
+from floatframe.simulation.motion_head import head_of, joint_rows
 
 __all__ = ["snapshot", "states_as_motion"]
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from fe_models.foundation.stages import Stages
     from floatframe.model.system import System
     from floatframe.results.trajectory import Trajectory
-    from floatframe.simulation.integration import Progress
+    from floatframe.simulation.integrate import Progress
 
 __all__ = ["app"]
 
@@ -63,7 +63,7 @@ def run_command(
     from floatframe.files.system_file.read_system import read_system
     from floatframe.files.system_file.run_section import required_run
     from floatframe.integrators import in_formulation
-    from floatframe.simulation.integration import integrate
+    from floatframe.simulation.integrate import integrate
 
     model, given = read_system(system)
     analyses.tell_left_out(model)
@@ -102,7 +102,7 @@ def resume_command(
     """
     from floatframe.errors import ResultsError
     from floatframe.files.system_file.read_system import read_system
-    from floatframe.simulation.integration import resume
+    from floatframe.simulation.integrate import resume
 
     if system.suffix in (".h5", ".segments"):
         raise ResultsError(

@@ -114,7 +114,7 @@ def driven_motion(file: Path, output: Path | None, suffix: str, elastic: str) ->
     from floatframe.errors import ModelError, ResultsError
     from floatframe.files.system_file.read_system import read_system
     from floatframe.files.system_file.run_section import required_run
-    from floatframe.simulation.integration import integrate
+    from floatframe.simulation.integrate import integrate
 
     choices = [*ELASTICITY, *(["dynamic"] if suffix == ".inverse.h5" else [])]
     if elastic not in choices:

@@ -1,8 +1,9 @@
 """A system: bodies, joints and forces in one coherent set of units."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
-from typing import Any, Protocol
+from functools import cached_property
+from typing import Any, Protocol, TypeVar, cast
 
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.units import Quantity, Units, unit_system
@@ -19,6 +20,8 @@ from floatframe.model.joints.coordinate_coupler import CoordinateCoupler
 from floatframe.model.shapes.shape import Geometry, Shape, shape_tuple
 
 __all__ = ["Body", "Named", "System", "in_units_of"]
+
+T = TypeVar("T")
 
 
 # default units --------------------------------------------------------------------------------------------------------
@@ -136,6 +139,16 @@ class System:
                     f"the system in {self.units.name!r}; give the system the units of the body, or read the body in "
                     f"those of the system: cms.read(file, units={self.units.name!r})"
                 )
+
+    @cached_property
+    def _derived(self) -> dict[Any, Any]:
+        return {}
+
+    def derived(self, make: "Callable[[System], T]") -> "T":
+        """Return what a function makes of this system: made at the first call, and kept as long as the system."""
+        if make not in self._derived:
+            self._derived[make] = make(self)
+        return cast(T, self._derived[make])
 
     @property
     def files(self) -> tuple[str, ...]:

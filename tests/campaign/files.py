@@ -26,7 +26,7 @@ WILD = (-1, 0, 1, 10**9, -(10**12), 2**62, 1e308, -1.5, float("nan"), float("inf
 def prepared(folder: Path) -> Path:
     """Return a folder with a modal file, a results file and the segments of an interrupted run; made once a process."""
     if not (folder / "ready").exists():
-        import floatframe.simulation.integration as integration
+        import floatframe.simulation.integrate as integration
         from floatframe.files.system_file.read_system import read_system
 
         folder.mkdir(parents=True, exist_ok=True)

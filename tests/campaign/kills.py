@@ -37,7 +37,7 @@ def system_of(number: int) -> Any:
 
 def kill_case(seed: int, folder: Path) -> Verdict:
     """Kill a run in a forked process, look at what it left, go on with it, and compare bit for bit."""
-    import floatframe.simulation.integration as integration
+    import floatframe.simulation.integrate as integration
     from floatframe import GeneralizedAlpha, integrate, read_results, resume
 
     integration.SEGMENT_SECONDS = 0.0

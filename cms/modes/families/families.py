@@ -86,6 +86,7 @@ class Families:
         self._announces, self._to_disk = announce, to_disk
         self._stack = ExitStack()
         self._is_open = True
+        self._fixed: FixedInterfaceBody | None = None
         self._modes: dict[bytes, list[_Found]] = {}
         self._flexibilities: dict[bytes, Flexibility] = {}
 
@@ -134,19 +135,22 @@ class Families:
         """Held dofs: B, then the interior dofs of R, (n_h,)."""
         return np.concatenate([self.body.b, self._partition[1]])
 
-    @cached_property
+    @property
     def fixed(self) -> FixedInterfaceBody:
-        """Interior partition and its factorisation."""
+        """Interior partition and its factorisation, made at the first call."""
+        if self._fixed is not None:
+            return self._fixed
         if not self._is_open:
             raise ModeSetError(f"families of body {self.body.name!r}: closed; make new ones")
         for words in large_interfaces(self.body) if self._announces else ():
             log.warning(words)
-        return self._stack.enter_context(fix_interfaces(self.body, self._partition[1], solver=self.solver))
+        self._fixed = self._stack.enter_context(fix_interfaces(self.body, self._partition[1], solver=self.solver))
+        return self._fixed
 
     def adopt(self, fixed: FixedInterfaceBody) -> None:
         """Take over an existing interior factorisation, unless there is one here; it is freed with these families."""
-        if "fixed" not in vars(self):
-            vars(self)["fixed"] = self._stack.enter_context(fixed)
+        if self._fixed is None:
+            self._fixed = self._stack.enter_context(fixed)
 
     # -- Static families -------------------------------------------------------------------------------------------
 

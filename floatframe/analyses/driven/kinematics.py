@@ -39,7 +39,7 @@ from floatframe.results.results_file import MemorySource
 from floatframe.results.small_motions.joint_rates import coordinate_rows, driven_coordinates
 from floatframe.results.trajectory import Trajectory, read_results
 from floatframe.results.writer import ResultsPlace, ResultsWriter
-from floatframe.simulation.integration import head_of, joint_rows
+from floatframe.simulation.motion_head import head_of, joint_rows
 
 __all__ = ["Kinematics", "SingularityGuard", "free_coordinates", "kinematics"]
 

@@ -22,7 +22,7 @@ from floatframe.model.system import System
 from floatframe.results.results_file import MemorySource
 from floatframe.results.sensors import EnergySensor, MomentumSensor, Sensor, measured, sensor_of
 from floatframe.results.trajectory import Trajectory
-from floatframe.simulation.integration import joint_rows
+from floatframe.simulation.motion_head import joint_rows
 
 __all__ = ["Column", "OutputRequest", "Take", "columns_of", "moved", "values_at", "wanted_of", "weights_of"]
 

@@ -20,7 +20,7 @@ from floatframe.model.forces import Gravity
 from floatframe.model.rotations import euler_parameter_product, euler_parameters_of_rotation_vector
 from floatframe.model.system import System
 from floatframe.results.head import Head
-from floatframe.simulation.integration import head_of
+from floatframe.simulation.motion_head import head_of
 
 __all__ = ["Family", "Neighbour", "Parameter", "Source", "family_of", "size_beside", "value_at", "with_value"]
 

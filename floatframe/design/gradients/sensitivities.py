@@ -51,7 +51,7 @@ from floatframe.model.forces import UserForce
 from floatframe.model.state import State
 from floatframe.model.system import System
 from floatframe.simulation.events import events_of
-from floatframe.simulation.integration import number_of_steps
+from floatframe.simulation.integrate import number_of_steps
 from floatframe.simulation.jumps import jumps_of_steps
 from floatframe.simulation.switch_events import switch_events
 

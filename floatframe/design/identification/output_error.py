@@ -36,7 +36,7 @@ from floatframe.integrators.generalized_alpha import GeneralizedAlpha
 from floatframe.model.state import State
 from floatframe.model.system import System
 from floatframe.results.sensors import measured as measured_by
-from floatframe.simulation.integration import integrate
+from floatframe.simulation.integrate import integrate
 
 __all__ = ["MeasuredOutputs", "OutputFit", "computed_outputs", "fit_outputs"]
 

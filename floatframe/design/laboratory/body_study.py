@@ -35,7 +35,7 @@ from floatframe.model.forces import Bushing
 from floatframe.model.rotations import rotation_matrix
 from floatframe.model.system import System
 from floatframe.results.trajectory import Trajectory
-from floatframe.simulation.integration import integrate
+from floatframe.simulation.integrate import integrate
 
 __all__ = [
     "BodyErrors",

@@ -31,7 +31,7 @@ from floatframe.errors import ModelError
 from floatframe.integrators.carry import Integrator
 from floatframe.model.system import System
 from floatframe.results.sensors import measured
-from floatframe.simulation.integration import integrate
+from floatframe.simulation.integrate import integrate
 
 __all__ = ["CaseResult", "LaboratoryResult", "Reference", "study"]
 

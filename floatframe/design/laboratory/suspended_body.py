@@ -38,7 +38,7 @@ from floatframe.model.forces import Bushing
 from floatframe.model.rotations import rotation_matrix
 from floatframe.model.system import System
 from floatframe.results.trajectory import Trajectory
-from floatframe.simulation.integration import integrate
+from floatframe.simulation.integrate import integrate
 
 __all__ = ["SuspendedMotion", "suspended_motion"]
 

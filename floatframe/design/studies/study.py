@@ -36,7 +36,7 @@ from floatframe.files.system_file.run_section import RunOptions, formulation_of,
 from floatframe.model.system import System
 from floatframe.results.sensors import measured, sensor_of
 from floatframe.results.trajectory import Trajectory
-from floatframe.simulation.integration import integrate
+from floatframe.simulation.integrate import integrate
 
 __all__ = ["StudyJournal", "StudyRow", "StudyTable", "open_study_journal", "run_study", "sendable_study"]
 

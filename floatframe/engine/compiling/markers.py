@@ -34,7 +34,6 @@ __all__ = [
 ]
 
 GROUND_INDEX = -1
-INDEX = "_index_of_bodies"  #: where a system keeps it
 SAME_PLACE = 1e-9  #: distance of a node from a reference point, of the size of the body, that is none
 
 
@@ -65,18 +64,15 @@ def find_body(system: System, where: str, name: str) -> int:
     """Return the index of a body, -1 for the ground; `ModelError` with the nearest name if there is none."""
     if name == GROUND.name:
         return GROUND_INDEX
-    index = index_of_bodies(system)
+    index = system.derived(index_of_bodies)
     if name not in index:
         raise ModelError(f"{where}: no body {quoted(name)}{nearest(name, [GROUND.name, *index])}")
     return index[name]
 
 
 def index_of_bodies(system: System) -> dict[str, int]:
-    """Return the index of each body by its name: made at the first call, and kept with the system."""
-    kept = vars(system)
-    if INDEX not in kept:
-        kept[INDEX] = {body.name: i for i, body in enumerate(system.bodies)}
-    return kept[INDEX]
+    """Return the index of each body by its name."""
+    return {body.name: i for i, body in enumerate(system.bodies)}
 
 
 def find_marker(system: System, where: str, marker: Marker) -> MarkerData:

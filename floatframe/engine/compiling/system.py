@@ -193,7 +193,6 @@ def gap_record(made: ConnectionLists, contacts: Contacts, laws: Sequence[PlacedL
 # from the description of a system to the records of the kernels -------------------------------------------------------
 
 
-KEPT = "_compiled"  #: attribute of a system that keeps what was compiled
 
 SOFT = 1e-9  #: by which redundant constraints give way, relative to what the mass moves in a step
 ROUNDING = 1e3 * np.finfo(float).eps  #: of the mobility of bodies, with room for what elimination adds
@@ -249,10 +248,7 @@ def compiled_system(system: System) -> CompiledSystem:
     ModelError
         If a joint or force names what does not exist, or has two markers on one body.
     """
-    kept = vars(system)
-    if KEPT not in kept:
-        kept[KEPT] = compile_system(system)
-    return kept[KEPT]
+    return system.derived(compile_system)
 
 
 def compile_system(system: System) -> CompiledSystem:

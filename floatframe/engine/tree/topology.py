@@ -28,7 +28,6 @@ __all__ = ["CoordinateName", "SystemTree", "tree_of"]
 
 NEARLY_SYMMETRIC = 0.3  #: difference of two moments of inertia of a body whose spin may be taken by itself
 MOST_ACROSS = 0.5  #: of the spin: angular velocity across the axis of such a body, above which it is not
-KEPT = "_tree"  #: attribute of a system that keeps its tree
 
 
 @dataclass(frozen=True)
@@ -80,10 +79,7 @@ class Branch:
 
 def tree_of(system: System) -> SystemTree:
     """Return the tree of a system: made at the first call, and kept with the system."""
-    kept = vars(system)
-    if KEPT not in kept:
-        kept[KEPT] = make_tree(system)
-    return kept[KEPT]
+    return system.derived(make_tree)
 
 
 def make_tree(system: System) -> SystemTree:

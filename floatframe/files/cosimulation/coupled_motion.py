@@ -19,7 +19,7 @@ from floatframe.results.sensors import sensors_of
 from floatframe.results.trajectory import Trajectory
 from floatframe.results.writer import ResultsPlace, ResultsWriter
 from floatframe.simulation.foreign_units import Coupling, ForeignUnit
-from floatframe.simulation.integration import Progress, Run, motion_so_far, number_of_steps
+from floatframe.simulation.integrate import Progress, Run, motion_so_far, number_of_steps
 
 __all__ = ["co_simulate"]
 

@@ -22,8 +22,9 @@ from floatframe.results.sensors import Measurement, sensor_of, sensors_of
 from floatframe.results.trajectory import Trajectory
 from floatframe.results.writer import arrays_of
 from floatframe.simulation.events import events_of
-from floatframe.simulation.integration import head_of, number_of_steps
+from floatframe.simulation.integrate import number_of_steps
 from floatframe.simulation.jumps import jumps_of_steps, over_jumps
+from floatframe.simulation.motion_head import head_of
 from floatframe.simulation.restart import carry_of_record, restart_record
 from floatframe.simulation.switch_events import switch_events
 from floatframe.simulation.validity_watch import ValidityWatch

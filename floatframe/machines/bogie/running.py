@@ -16,7 +16,7 @@ from floatframe.model.bodies.markers import Marker
 from floatframe.model.bodies.rigid_body import RigidBody
 from floatframe.model.forces import PointForce
 from floatframe.model.system import System
-from floatframe.simulation.integration import integrate
+from floatframe.simulation.integrate import integrate
 
 __all__ = [
     "Hunting",

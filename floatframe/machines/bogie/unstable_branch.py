@@ -20,7 +20,7 @@ from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.rotations import euler_parameter_product, euler_parameters_of_rotation_vector, rotation_matrix
 from floatframe.model.state import State
 from floatframe.model.system import System
-from floatframe.simulation.integration import integrate
+from floatframe.simulation.integrate import integrate
 
 __all__ = ["Bracket", "Hunted", "Run", "bracket_of_unstable_cycle", "hunted"]
 

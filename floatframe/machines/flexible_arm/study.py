@@ -17,7 +17,7 @@ from floatframe.model.system import System
 from floatframe.results.coordinate_elements import user_force_motion
 from floatframe.results.sensors import measured
 from floatframe.results.trajectory import Trajectory
-from floatframe.simulation.integration import integrate
+from floatframe.simulation.integrate import integrate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

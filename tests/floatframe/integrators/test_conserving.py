@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-import floatframe.simulation.integration as integration
+import floatframe.simulation.integrate as integration
 from floatframe import (
     GROUND,
     EnergyDecaying,

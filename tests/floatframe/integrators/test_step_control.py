@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-import floatframe.simulation.integration as integration
+import floatframe.simulation.integrate as integration
 from floatframe import (
     ConvergenceError,
     FlexibleBody,

@@ -7,7 +7,7 @@ from floatframe.pictures.overview import plot_deformation, plot_loads, plot_over
 from floatframe.pictures.plots import plot_drift, plot_energy_balance
 from floatframe.results.energy_balance import balance_defect, energy_scale
 from floatframe.results.recovery import elastic_displacements, interface_positions
-from floatframe.simulation.integration import integrate
+from floatframe.simulation.integrate import integrate
 from tests.synthetic import synthetic_reduced_body
 
 

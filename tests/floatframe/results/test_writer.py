@@ -9,7 +9,7 @@ import textwrap
 import pytest
 from numpy.testing import assert_array_equal
 
-import floatframe.simulation.integration as integration
+import floatframe.simulation.integrate as integration
 from floatframe import GeneralizedAlpha, ResultsError, integrate, read_results, resume
 from floatframe.analyses.driven.kinematics import kinematics
 from floatframe.components.mechanisms import slider_crank
@@ -141,7 +141,7 @@ FULL = """
     import resource, sys
     from floatframe import integrate
     from tests.floatframe.results.test_results_file import SYSTEM, METHOD
-    import floatframe.simulation.integration as integration
+    import floatframe.simulation.integrate as integration
     from floatframe.engine.kernels.entry import prepare
     prepare()
     integration.SEGMENT_SECONDS = float(sys.argv[3])

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import floatframe.simulation.event_steps as event_steps
-import floatframe.simulation.integration as integration
+import floatframe.simulation.integrate as integration
 from floatframe import (
     GROUND,
     Bushing,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-import floatframe.simulation.integration as integration
+import floatframe.simulation.integrate as integration
 from floatframe import (
     GeneralizedAlpha,
     Gravity,
@@ -108,7 +108,7 @@ def test_nothing_to_resume_is_said(tmp_path):
 
 KILLED = """
     import sys
-    import floatframe.simulation.integration as integration
+    import floatframe.simulation.integrate as integration
     from floatframe import GeneralizedAlpha, integrate
     from tests.floatframe.simulation.test_restart import H, swing
 

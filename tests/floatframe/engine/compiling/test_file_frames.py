@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import cms
 import fe_models as fm
-import floatframe.simulation.integration as integration
+import floatframe.simulation.integrate as integration
 from floatframe import (
     GROUND,
     FixedJoint,

@@ -26,7 +26,7 @@ from floatframe import (
     Variational,
     integrate,
 )
-from floatframe.engine.compiling.system import KEPT, compiled_system
+from floatframe.engine.compiling.system import compile_system, compiled_system
 from floatframe.engine.kernels.model import CONTACT
 from floatframe.engine.kernels.work import new_work
 from floatframe.engine.structure_preserving.bodies import placed_bodies, state_of
@@ -109,7 +109,7 @@ def undivided(system):
     """Return a system whose compiled steps are not divided near contacts, as those of the Python version are not."""
     compiled = compiled_system(system)
     gaps = type(compiled.model.gaps)(*(array[:0] for array in compiled.model.gaps))
-    vars(system)[KEPT] = replace(compiled, model=compiled.model._replace(gaps=gaps))
+    system._derived[compile_system] = replace(compiled, model=compiled.model._replace(gaps=gaps))
     return system
 
 

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh, expm
 
-import floatframe.simulation.integration as integration
+import floatframe.simulation.integrate as integration
 from floatframe import (
     GROUND,
     FixedJoint,

@@ -1,18 +1,25 @@
-"""The time loop: an integrator advanced in compiled batches, with output, progress and errors."""
+"""A motion on one page: start, then steps in compiled batches, which are observed and written.
+
+    (1) start       bodies made consistent; memory of the integrator and results at the start    `Integrator.start`
+    (2) step        a batch of steps in one compiled call, cut where laws jump and events happen  `next_steps`
+    (3) observe     what steps, energy, laws and ranges of validity say about the motion          `Run.observe`
+    (4) write       results, records to go on from, and progress                                  `Run.write`
+
+`resume` begins with the record of an interrupted run in place of (1). The memory between steps is the `Carry` of the
+integrator; results of output times are `Rows`.
+"""
 
 import logging
 import os
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, field, fields, replace
-from importlib.metadata import PackageNotFoundError, version
+from dataclasses import dataclass, field, fields, replace
 from math import ceil
 from typing import Any
 
 import numpy as np
 
-from fe_models.foundation.digest import file_digest
 from fe_models.foundation.tasks.interrupts import heeded_interrupts
 from fe_models.foundation.words import nearest
 from floatframe.engine.compiling.callbacks import raise_errors_of
@@ -21,28 +28,26 @@ from floatframe.engine.compiling.system import compiled_system
 from floatframe.engine.initial_conditions.begun_drives import words_of_begun_drives
 from floatframe.engine.initial_conditions.mass_positivity import indefinite_mass_words, indefinite_masses
 from floatframe.engine.kernels.memory import Rows
-from floatframe.engine.kernels.work import new_work
+from floatframe.engine.kernels.work import Work, new_work
 from floatframe.errors import ConvergenceError, ModelError, ResultsError
 from floatframe.integrators import CLASSES, has_fixed_steps, has_second_order, in_formulation
 from floatframe.integrators.carry import Carry, Failure, Integrator, joined_rows
-from floatframe.model.bodies.flexible_body import FlexibleBody
 from floatframe.model.checked_values import number
-from floatframe.model.forces import BodyLoad, PointForce
 from floatframe.model.state import State
 from floatframe.model.system import System
-from floatframe.results.head import BodyEntry, Head
+from floatframe.results.head import Head
 from floatframe.results.results_file import MemorySource, validity_text
 from floatframe.results.sensors import measured
-from floatframe.results.sensors.sensor_points import sensor_points
 from floatframe.results.trajectory import Trajectory, read_results
 from floatframe.results.validity import ValidityNote, notes_from_json, notes_to_json
-from floatframe.results.writer import ResultsPlace, ResultsWriter, arrays_of, last_restart
+from floatframe.results.writer import ResultsPlace, ResultsWriter, last_restart
 from floatframe.simulation.energy_watch import EnergyWatch
 from floatframe.simulation.event_steps import EventWatch
 from floatframe.simulation.events import has_events, require_times_of_events
 from floatframe.simulation.jumps import jumps_of_steps, next_steps
 from floatframe.simulation.knots import knot_words
 from floatframe.simulation.law_watch import LawWatch
+from floatframe.simulation.motion_head import head_of, joint_rows
 from floatframe.simulation.restart import RESTART_STEPS, carry_of_record, restart_record, system_digest
 from floatframe.simulation.step_advice import frequency_words, step_advice
 from floatframe.simulation.step_watch import WATCHES, StepWatch
@@ -169,17 +174,15 @@ def integrate(
     begun = system if events is None else events.system
     with ExitStack() as held:  # the place of the results, from before the work until its end
         place = None if output is None else held.enter_context(ResultsPlace(output, inputs=system.files))
-        carry = integrator.start(begun, t_start, state)
-        work = new_work(compiled_system(begun).model)
-        carry, rows = integrator.observe(begun, t_start, carry, work)
-        require_sensors(system, head, rows)
-        if events is not None:
-            events.begin(rows)
-        writer = None if place is None else ResultsWriter(place, head)
+        carry = integrator.start(begun, t_start, state)  # (1)
         run = Run(
-            system, integrator, head, t_start, t_end, step, n_total, output_every, writer, tuple(acting), events=events
+            system, integrator, head, t_start, t_end, step, n_total, output_every,
+            writer=None, notes=tuple(acting), events=events,
         )  # fmt: skip
         run.words_of_start = lambda: words_of_begun_drives(begun, t_start, state, step)
+        carry, rows = run.begin(carry, 0)
+        require_sensors(system, head, rows)
+        run.writer = None if place is None else ResultsWriter(place, head)
         run.steps.begin(carry.state)
         run.energy.observe(system, rows, is_switched=False)
         run.keep(rows)
@@ -269,6 +272,7 @@ def resume(
         )  # fmt: skip
         again.steps.restore(record, again.notes)
         again.energy.restore(record, again.notes)
+        again.begin(carry, n_done)
         with heeded_interrupts() as raise_if_interrupted:
             return again.advance(carry, n_done, BATCH_STEPS, progress, raise_if_interrupted)
 
@@ -292,6 +296,8 @@ class Run:
     began: float = field(default_factory=time.perf_counter)
     events: EventWatch | None = None
     words_of_start: Callable[[], str] = lambda: ""  #: what may be wrong where the first steps fail
+    jumps: dict[int, list[float]] = field(init=False)  #: times of jumps by step, from `advance` on
+    work: Work = field(init=False)  #: working arrays of the kernels, from `begin` on
 
     @property
     def seconds(self) -> float:
@@ -367,6 +373,14 @@ class Run:
         if self.writer is not None:
             self.writer.close_segment(record)
 
+    def begin(self, carry: Carry, n_done: int) -> tuple[Carry, Rows]:
+        """Observe the motion from where the run begins or goes on: the iterate of the first step, and its results."""
+        self.work = new_work(compiled_system(self.acting).model) if self.events is None else self.events.new_work()
+        carry, rows = self.integrator.observe(self.acting, self.t_start + n_done * self.h, carry, self.work)
+        if self.events is not None:
+            self.events.begin(rows)
+        return carry, rows
+
     def advance(
         self,
         carry: Carry,
@@ -376,81 +390,98 @@ class Run:
         raise_if_interrupted: Callable[[], None],
     ) -> Trajectory:
         """Take the steps that are left, in batches that end where a run can go on; return the motion."""
-        begun = self.acting
-        work = new_work(compiled_system(begun).model) if self.events is None else self.events.new_work()
-        t_begun = self.t_start + n_done * self.h
-        _, row = self.integrator.observe(begun, t_begun, carry, work)  # the iterate to begin from
-        if self.events is not None:
-            self.events.begin(row)
-        jumps = self.steps.jumps = jumps_of_steps(self.system, self.t_start, self.h, self.n_total)
-        laws = LawWatch(self.system, self.t_start, self.h, jumps, n_done)
-        failure, has_stopped, is_beyond, n_told = None, False, False, n_done
+        self.jumps = self.steps.jumps = jumps_of_steps(self.system, self.t_start, self.h, self.n_total)
+        laws = LawWatch(self.system, self.t_start, self.h, self.jumps, n_done)
+        n_told = n_done  # steps at the last progress
+        failure: Failure | None = None
         safe = self.record_where_due(carry, n_done)  # while a block runs its events are ahead of its memory
         try:
-            while n_done < self.n_total and failure is None and not has_stopped and not is_beyond:
+            while n_done < self.n_total:
                 raise_if_interrupted()
                 if n_done % RESTART_STEPS == 0:
-                    work.solver.c_k[...] = 0.0  # factors are made anew, as after a resumption
+                    self.work.solver.c_k[...] = 0.0  # factors are made anew, as after a resumption
                     if n_done and time.monotonic() - self.closed > SEGMENT_SECONDS:
                         self.close_segment(safe)
-                n_left = batch_steps - (n_done - n_told)  # the watch divides batches, and leaves their ends
-                n_batch = min(n_left, self.steps.room(n_done, batch_steps), self.n_total - n_done)
-                n_batch = min(n_batch, RESTART_STEPS - n_done % RESTART_STEPS)
-                begin, n_happened = carry, self.n_happened
-                starts_companion = self.steps.has_companion and self.steps.companion is None
-                events_before = self.events.copied() if self.events is not None and starts_companion else None
-                carry, rows, work, n_good, failure = next_steps(
-                    self.integrator, self.acting, carry, work, t0=self.t_start, h=self.h, first=n_done, n_steps=n_batch,
-                    every=self.output_every, jumps=jumps, events=self.events,
-                )  # fmt: skip
-                if self.events is not None:
-                    has_stopped = self.events.has_stopped
-                    rows = in_order([*self.events.taken(), rows])
-                self.keep(rows)
-                is_switched = self.n_happened > n_happened
-                if self.watching != "off":
-                    is_last = n_done + n_good >= self.n_total or failure is not None or has_stopped
-                    self.report(*self.energy.observe(self.system, rows, is_switched=is_switched, is_last=is_last))
-                    is_beyond = self.energy.is_beyond and self.watching == "stop"
-                if n_good and failure is None and not has_stopped:
-                    note = self.steps.take(
-                        self.acting, begin, carry, t0=self.t_start, h=self.h, first=n_done, n_steps=n_good,
-                        events=events_before, is_cut=is_switched or n_done in jumps,
-                    )  # fmt: skip
-                    self.report(note)
-                else:
-                    self.steps.skip(self.h)
-                n_done += n_good
-                if self.watching != "off" and failure is None:
-                    for words in laws.observe(carry, n_done, is_last=n_done == self.n_total or has_stopped):
-                        found = ValidityNote.of_law("law", words, self.t_start + n_done * self.h)
-                        self.watch.found[found.key] = found
-                        log.warning("system %r: %s", self.system.name, words)
-                safe = self.record_where_due(carry, n_done)
-                if n_done == self.n_total or failure is not None or has_stopped or is_beyond:
-                    note = self.steps.conclude(self.acting, carry, n_done, self.t_start, self.h)
-                    self.report(note)
+                batch = self.step(carry, n_done, batch_steps - (n_done - n_told), batch_steps)  # (2)
+                carry, failure, n_done = batch.end, batch.failure, batch.n_done
+                self.keep(batch.rows)
+                self.observe(batch, laws)  # (3)
+                safe = self.record_where_due(carry, n_done)  # (4)
+                is_over = n_done == self.n_total or failure is not None or batch.has_stopped or self.is_beyond
+                if is_over:
+                    self.report(self.steps.conclude(self.acting, carry, n_done, self.t_start, self.h))
                     self.look()
-                is_batch = n_done % RESTART_STEPS == 0 or n_done - n_told >= batch_steps or n_done == self.n_total
-                if is_batch or not n_good or self.events is not None:
+                is_due = n_done % RESTART_STEPS == 0 or n_done - n_told >= batch_steps or n_done == self.n_total
+                if is_due or not batch.n_good or self.events is not None:
                     n_told = n_done
                     if progress is not None:
-                        t = self.t_start + n_done * self.h
-                        counts = carry.n_iterations, self.watch.notes, carry.n_rejected
-                        progress(Progress(t, self.t_end, n_done, self.n_total, *counts))
+                        progress(self.progress(carry, n_done))
+                if is_over:
+                    break
         except BaseException:
             self.close_segment(safe)
             raise
         for each in (self.system, self.acting):
             raise_errors_of(compiled_system(each).callbacks)
-        if is_beyond and failure is None:
-            raise energetic(self, self.t_start + n_done * self.h)
         if failure is not None:
             begins = self.words_of_start() if n_done < FIRST_STEPS else ""
             if begins:
                 failure = replace(failure, words=f"{failure.words}; {begins}")
             raise stopped(self, failure, self.t_start + n_done * self.h, carry.state)
+        if self.is_beyond:
+            raise energetic(self, self.t_start + n_done * self.h)
         return self.finished(carry)
+
+    def step(self, carry: Carry, first: int, n_left: int, batch_steps: int) -> "Batch":
+        """Take a batch of steps: at most `n_left`, up to where the watch looks, the run ends, or factors are renewed.
+
+        The watch divides batches of `batch_steps`, and leaves their ends.
+        """
+        n_steps = min(n_left, self.steps.room(first, batch_steps), self.n_total - first)
+        n_steps = min(n_steps, RESTART_STEPS - first % RESTART_STEPS)
+        n_happened = self.n_happened
+        starts_companion = self.steps.has_companion and self.steps.companion is None
+        before = self.events.copied() if self.events is not None and starts_companion else None
+        end, rows, self.work, n_good, failure = next_steps(
+            self.integrator, self.acting, carry, self.work, t0=self.t_start, h=self.h, first=first, n_steps=n_steps,
+            every=self.output_every, jumps=self.jumps, events=self.events,
+        )  # fmt: skip
+        if self.events is not None:
+            rows = in_order([*self.events.taken(), rows])
+        has_stopped = self.events is not None and self.events.has_stopped
+        return Batch(first, n_good, carry, end, rows, failure, before, self.n_happened > n_happened, has_stopped)
+
+    def observe(self, batch: "Batch", laws: LawWatch) -> None:
+        """Show a batch to the watches, and report what they find."""
+        is_last = batch.n_done >= self.n_total or batch.failure is not None or batch.has_stopped
+        if self.watching != "off":
+            found = self.energy.observe(self.system, batch.rows, is_switched=batch.is_switched, is_last=is_last)
+            self.report(*found)
+        if batch.n_good and batch.failure is None and not batch.has_stopped:
+            note = self.steps.take(
+                self.acting, batch.begin, batch.end, t0=self.t_start, h=self.h, first=batch.first,
+                n_steps=batch.n_good, events=batch.events_before,
+                is_cut=batch.is_switched or batch.first in self.jumps,
+            )  # fmt: skip
+            self.report(note)
+        else:
+            self.steps.skip(self.h)
+        if self.watching != "off" and batch.failure is None:
+            is_last = batch.n_done == self.n_total or batch.has_stopped
+            for words in laws.observe(batch.end, batch.n_done, is_last=is_last):
+                note = ValidityNote.of_law("law", words, self.t_start + batch.n_done * self.h)
+                self.watch.found[note.key] = note
+                log.warning("system %r: %s", self.system.name, words)
+
+    def progress(self, carry: Carry, n_done: int) -> Progress:
+        """Return where the run is."""
+        t, counts = self.t_start + n_done * self.h, (carry.n_iterations, self.watch.notes, carry.n_rejected)
+        return Progress(t, self.t_end, n_done, self.n_total, *counts)
+
+    @property
+    def is_beyond(self) -> bool:
+        """Whether half of the energy comes from the steps, and the run is to stop there."""
+        return self.watching == "stop" and self.energy.is_beyond
 
     @property
     def acting(self) -> System:
@@ -476,6 +507,26 @@ class Run:
             return Trajectory(head, arrays, is_complete=True, validity=self.watch.notes)
         self.writer.finish(self.summary(carry))
         return read_results(self.writer.path)
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Steps of a run that were taken together."""
+
+    first: int  #: steps that were done before
+    n_good: int  #: of them, that succeeded
+    begin: Carry
+    end: Carry
+    rows: Rows  #: results of the output times and events in it
+    failure: Failure | None  #: why the next step could not be made
+    events_before: EventWatch | None  #: a copy from before it, where the watch begins a companion there
+    is_switched: bool  #: whether events happened in it
+    has_stopped: bool  #: whether one of them ended the run
+
+    @property
+    def n_done(self) -> int:
+        """Number of steps done after it."""
+        return self.first + self.n_good
 
 
 def in_order(parts: list[Rows]) -> Rows:
@@ -518,68 +569,3 @@ def motion_so_far(run: Run) -> tuple[Trajectory, str]:
         return Trajectory(run.head, arrays, is_complete=False, validity=run.watch.notes), ""
     run.writer.close_segment()
     return read_results(run.writer.folder), f"; the motion so far is in {str(run.writer.folder)!r}"
-
-
-def joint_rows(system: System, kept: list[Rows]) -> dict[str, np.ndarray]:
-    """Return the datasets of a motion in memory."""
-    arrays = arrays_of(kept)
-    arrays["drift"] = arrays["drift"][:, : len(compiled_system(system).joint_names)]
-    return arrays
-
-
-def head_of(system: System, integrator: Integrator, t_start: float, t_end: float, h: float, every: int) -> Head:
-    """Return the head of the results of a run."""
-    compiled = compiled_system(system)
-    entries = []
-    sources = [body.source if isinstance(body, FlexibleBody) else "" for body in system.bodies]
-    digests = {source: digest_of(source) for source in set(sources)}  # files of many bodies are read once
-    for i, (body, source) in enumerate(zip(system.bodies, sources, strict=True)):
-        entries.append(
-            BodyEntry(
-                body.name,
-                int(compiled.model.bodies.n_q[i]),
-                int(compiled.model.bodies.q0[i]),
-                int(compiled.model.bodies.u0[i]),
-                source,
-                digests[source],
-                isinstance(body, FlexibleBody) and body.is_stiffened,
-            )
-        )
-    try:
-        release = version("floatframe")
-    except PackageNotFoundError:
-        release = "unknown"
-    run = {
-        "integrator": type(integrator).__name__,
-        **asdict(integrator),  # type: ignore[call-overload]
-        "t_start": t_start,
-        "t_end": t_end,
-        "h": h,
-        "output_every": every,
-        "gravity": [float(x) for x in compiled.model.gravity],
-        "system_file": system.source,
-        "system_file_digest": file_digest(system.source),
-        "digest": system_digest(system, integrator),
-        "floatframe": release,
-    }
-    return Head(
-        system.name,
-        system.units.name,
-        tuple(entries),
-        compiled.joint_names,
-        compiled.spring_names,
-        tuple(int(k) for k in compiled.model.connections.w0),
-        run,
-        places=sensor_points(system),
-        loads=tuple(force.name for force in system.forces if isinstance(force, PointForce)),
-        load_cases=tuple(force.name for force in system.forces if isinstance(force, BodyLoad)),
-    )
-
-
-def digest_of(source: str) -> str:
-    """Return the digest of a modal file, "" for a body made in memory."""
-    if not source:
-        return ""
-    from cms.body.modal_file.file import digest
-
-    return digest(source)
