@@ -91,8 +91,8 @@ SLOW = 0.2  # ratio of corrections above which the factors are made anew
 OF_MOTION = 1e-5  # of the way of a step counts beside what accelerations move in it
 FAST = 0.1  # corrections that shrink this fast end a step where the next one is expected to be small enough:
 SAFE = 0.5  # this much of the one that is wanted
-HOPE = 0.1  # of the contraction of the step before: velocities are held where the second iteration could end the step
 OF_ROUNDOFF = 0.1  # and of roundoff
+AGED = 5e-4  # of the first correction: what the age of the factors may change velocities by
 ROUNDOFF = 2e-15  # of a position
 NOISE = 1e-7  # accelerations by rounding of positions, over those of the motion, that reach results
 SAFETY = 0.9  # of the step that would just meet the error that is allowed
@@ -337,6 +337,45 @@ def hold_velocities(model, work, c_k):
 
 
 @inner
+def expect_late_gaps(solver):
+    """Add to the gaps in mu what the first iteration is expected to leave open; return the largest of them.
+
+    Rates of what is held change with the positions. The gap that is late changes as it did over the step before.
+    """
+    largest = 0.0
+    for k in range(solver.mu.shape[0]):
+        if solver.has_late_gaps == 0:
+            solver.late_gap[k], solver.late_gap_change[k] = 0.0, 0.0
+        solver.mu[k] += solver.late_gap[k] + solver.late_gap_change[k]
+        largest = max(largest, abs(solver.mu[k]))
+    return largest
+
+
+@inner
+def keep_late_gaps(solver):
+    """Remember what the first iteration has left open: what was expected, and the gaps in mu."""
+    for k in range(solver.mu.shape[0]):
+        gap = solver.late_gap[k] + solver.late_gap_change[k] + solver.mu[k]
+        solver.late_gap_change[k] = gap - solver.late_gap[k] if solver.has_late_gaps != 0 else 0.0
+        solver.late_gap[k] = gap
+    solver.has_late_gaps = 1
+
+
+@inner
+def are_aged(solver, second, first, of_rates):
+    """Whether the age of the factors H changes a step: its second correction by its first, H⁻¹ times the change of H.
+
+    Velocities are corrected by H⁻¹ Gᵀ nu, `of_rates`, which no residual decides, so that they follow the factors: by as
+    much of them as the second correction is of the first, less what it is with new factors.
+    """
+    if not first > 0.0:
+        return False
+    if solver.contraction < 0.0:
+        solver.contraction = second / first
+    return (second / first - 2.0 * solver.contraction) * of_rates > AGED * first
+
+
+@inner
 def take_stiffness(model, i, q, residual):
     """Subtract the forces of the modal stiffness of body i by modes q from the residual of its modes."""
     n, t = model.bodies.n_q[i], model.bodies.kind[i]
@@ -479,14 +518,14 @@ def one_step(model, work, memory, order, h):
     allowed = wanted + math.sqrt(roundoff_floor(model, work, order.length))
     solver = work.solver
     if solver.c_m != c_m or solver.c_d != c_d or solver.c_k != c_k:
-        work.solver.is_due, work.solver.contraction = 1, 0.0
+        work.solver.is_due, work.solver.has_late_gaps = 1, 0
     work.counted.no_number = 0
     work.counted.stopped = 0
     last, last_of_states = math.inf, math.inf
     excess = math.inf
     holds = order.stabilized != 0 and solver.mu.shape[0] > 0
     least_gap = SAFE * wanted / math.sqrt(mass) if mass > 0.0 else 0.0  # all bodies move by less than is wanted
-    is_new = True
+    is_new, is_aged, first_of_rates = True, False, 0.0
     has_states = model.states.row.shape[0] + model.laws.equation.shape[0] > 0
     for iteration in range(order.max_iterations):
         evaluate(model, work, c_k)
@@ -499,7 +538,7 @@ def one_step(model, work, memory, order, h):
             if body >= 0:
                 return SINGULAR_BODY, body, excess, -1.0
             solver.c_m, solver.c_d, solver.c_k = c_m, c_d, c_k
-            work.solver.is_due, solver.n_steps, solver.n_spent = 0, 0, solver.price
+            work.solver.is_due, solver.n_steps, solver.n_spent, solver.contraction = 0, 0, solver.price, -1.0
             is_new = True
         connection = -1
         if is_new and solver.mu.shape[0] > 0:
@@ -507,9 +546,14 @@ def one_step(model, work, memory, order, h):
         if connection >= 0:
             work.solver.is_due = 1
             return SINGULAR_CONNECTION, connection, excess, -1.0
-        of_rates, is_held, is_closed = 0.0, False, not holds
-        if holds and (iteration != 1 or is_enough(HOPE * solver.contraction * last, last, wanted, allowed)):
-            is_held, is_closed = velocity_gaps(model, work, c_d / c_k) > least_gap, True
+        of_rates, is_held = 0.0, False
+        if holds:
+            gap = velocity_gaps(model, work, c_d / c_k)
+            if iteration == 0:
+                gap = expect_late_gaps(work.solver)
+            elif iteration == 1:
+                keep_late_gaps(work.solver)
+            is_held = gap > least_gap
         if is_held:
             of_rates = hold_velocities(model, work, c_k)
         move_bodies(model, work, c_k)
@@ -520,11 +564,13 @@ def one_step(model, work, memory, order, h):
             close_connections(model, work)
         of_positions = update(model, work, memory, c_d / c_k, c_m / c_k, c_k, is_held)
         norm = math.sqrt(of_rates + of_positions)
-        if iteration == 1 and last > 0.0:
-            work.solver.contraction = math.sqrt(of_positions) / last
+        if iteration == 0:
+            first_of_rates = math.sqrt(of_rates)
+        elif iteration == 1:
+            is_aged = are_aged(work.solver, math.sqrt(of_positions), last, first_of_rates)
         work.counted.iterations += 1
         if not math.isfinite(norm):
-            work.solver.is_due = 1
+            work.solver.is_due, work.solver.has_late_gaps = 1, 0
             return DIVERGED, -1, math.inf, -1.0
         excess = norm / allowed if allowed > 0.0 else math.inf
         is_new = False
@@ -532,7 +578,7 @@ def one_step(model, work, memory, order, h):
         if has_states:  # they follow the bodies by one iteration
             of_states = correction_of_states(model, work, c_k) / order.tolerance
             if not math.isfinite(of_states):
-                work.solver.is_due = 1
+                work.solver.is_due, work.solver.has_late_gaps = 1, 0
                 return DIVERGED, -1, math.inf, -1.0
             if iteration == 0:
                 last, last_of_states = norm, of_states
@@ -540,9 +586,11 @@ def one_step(model, work, memory, order, h):
                 continue
             is_new = of_states > max(1.0, SLOW * last_of_states)
         is_stuck = norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2
-        is_small = is_closed and (is_enough(norm, last, wanted, allowed) or is_stuck)
+        is_small = is_enough(norm, last, wanted, allowed) or is_stuck
         if is_small and (of_states <= 1.0 or (of_states <= 1e3 and of_states > 0.5 * last_of_states and iteration > 2)):
             take_age(work.solver, iteration + 1)
+            if is_aged:
+                work.solver.is_due = 1
             error = -1.0
             if is_too_long(model, work, h):
                 return UNRESOLVED, -1, excess, error
@@ -556,7 +604,7 @@ def one_step(model, work, memory, order, h):
             work.solver.is_due = 1
         last, last_of_states = norm, of_states
         excess = max(excess, of_states)
-    work.solver.is_due = 1
+    work.solver.is_due, work.solver.has_late_gaps = 1, 0
     return DIVERGED, -1, excess, -1.0
 
 

@@ -238,7 +238,10 @@ class Solver(NamedTuple):
     y: Array = real(n_u)  #: correction of the bodies
     y_rate: Array = real(n_u)  #: correction of the velocities of bodies alone, over c_d/c_k
     surplus: Array = real(n_b, 3, unit="rad")  #: by how much it turns bodies beyond their unknowns
-    contraction: Array = real()  #: the second correction of the step before over its first
+    late_gap: Array = real(n_w)  #: of velocities, over c_d/c_k, that the first iteration of the step before left open
+    late_gap_change: Array = real(n_w)  #: by how much that was more than in the step before it
+    has_late_gaps: IntArray = integer()  #: whether they are of steps like the next one
+    contraction: Array = real()  #: the second correction over the first when the factors were new, negative: not known
     weight: Array = real(n_u, unit="kg, kg m²")  #: of the norm of corrections
     motion: Array = real(12)  #: correction of the motion of one marker
     row: Array = real(12)  #: one row of P in body axes
@@ -383,5 +386,5 @@ def new_work(model: Model, n_past: int = 0) -> Work:
     work.states.base[:] = model.states.start
     work.states.rho[...] = 1.0
     work.solver.is_due[...] = 1
-    work.solver.price[...] = 3.0 + max(model.bodies.n_q, default=0) / 8.0
+    work.solver.price[...] = 1.0 + max(model.bodies.n_q, default=0) / 8.0
     return work
