@@ -24,9 +24,9 @@ def add_products(A, x, out):
 
 @matrix_loops
 def lu_factor(A, pivot):
-    """Overwrite A, (n, n), with its factors; rows are compared after scaling by their largest number.
+    """Overwrite A, (n, n), with its factors, the numbers on the diagonal of the upper one inverted.
 
-    Return False if a pivot is zero or not finite.
+    Rows are compared after scaling by their largest number. Return False if a pivot is zero or not finite.
     """
     n = A.shape[0]
     for k in range(n):
@@ -46,6 +46,7 @@ def lu_factor(A, pivot):
         if not abs(diagonal) > 0.0:
             return False
         inverse = 1.0 / diagonal
+        A[k, k] = inverse
         for i in range(k + 1, n):
             factor = A[i, k] * inverse
             A[i, k] = factor
@@ -57,7 +58,7 @@ def lu_factor(A, pivot):
 
 @matrix_loops
 def lu_solve(A, pivot, b):
-    """Overwrite b, (n,), with A⁻¹ b."""
+    """Overwrite b, (n,), with A⁻¹ b by the factors of `lu_factor`."""
     n = A.shape[0]
     for k in range(n):
         row = pivot[k]
@@ -72,12 +73,12 @@ def lu_solve(A, pivot, b):
         total = b[i]
         for j in range(i + 1, n):
             total -= A[i, j] * b[j]
-        b[i] = total / A[i, i]
+        b[i] = total * A[i, i]
 
 
 @matrix_loops
 def lu_solve_columns(A, pivot, B):
-    """Overwrite B, (n, m), with A⁻¹ B."""
+    """Overwrite B, (n, m), with A⁻¹ B by the factors of `lu_factor`."""
     n, m = B.shape
     for k in range(n):
         row = pivot[k]
@@ -94,6 +95,5 @@ def lu_solve_columns(A, pivot, B):
             factor = A[i, j]
             for c in range(m):
                 B[i, c] -= factor * B[j, c]
-        inverse = 1.0 / A[i, i]
         for c in range(m):
-            B[i, c] *= inverse
+            B[i, c] *= A[i, i]
