@@ -26,9 +26,6 @@ from tests.floatframe.integrators.examples import pendulum
 from tests.floatframe.model.bodies.examples import spinning
 
 SMALL = 1e-3  # of the error of the integrator
-#: the same of reactions of a body that bends by half its length: what positions and velocities differ by depends on the
-#: factors that are kept, by which they change
-SMALL_OF_BENT = 3e-3
 
 
 def bouncing():
@@ -101,5 +98,4 @@ def test_newton_leaves_less_than_a_thousandth_of_the_error_of_the_step(name):
     by_default, exact, halved = motions(name)
     for what in ("position", "q", "u", "w"):
         if exact.source.read(what).size > 0:
-            small = SMALL_OF_BENT if name == "elastic pendulum" and what == "w" else SMALL
-            assert apart(by_default, exact, what) < small * apart(exact, halved, what), what
+            assert apart(by_default, exact, what) < SMALL * apart(exact, halved, what), what

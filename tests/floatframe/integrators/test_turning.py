@@ -313,3 +313,12 @@ def test_newton_follows_a_pendulum_that_turns_most_of_a_radian_a_step(rho, h):
     energy = 0.5 * 1.01 * np.einsum("tk,tk->t", v, v) + 9.81 * r[:, 1]  # r x v is one metre times the speed
     assert np.abs(np.linalg.norm(r, axis=1) - 1.0).max() < 1e-6
     assert energy.max() < 0.02 * 9.81
+
+
+def test_held_velocities_cost_hardly_any_iterations():
+    spent = []
+    for is_stabilized in (False, True):
+        method = GeneralizedAlpha(0.8, stabilized=is_stabilized)
+        motion = integrate(slider_crank(angle=0.4, speed=20.0), method, 0.3, 0.002)
+        spent.append(motion.head.summary["n_iterations"])
+    assert spent[1] < 1.1 * spent[0]
