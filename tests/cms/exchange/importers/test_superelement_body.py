@@ -7,13 +7,16 @@ import pytest
 import scipy.linalg as la
 import scipy.sparse as sp
 from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
 
 import cms
 import fe_models
 from cms.errors import BodyError, ForeignBodyError
 from cms.exchange.importers.inertia import FullMass, MeshMass, NodalMasses
 from cms.exchange.importers.superelement import RecoveryRows, Superelement
-from cms.exchange.importers.superelement_body import ImportOptions, body_of_superelement
+from cms.exchange.importers.superelement_body import ImportOptions, body_of_superelement, known_moments
+from cms.reduction.basis.finishing import finish
+from cms.reduction.basis.frames import frame_condition
 from fe_models.body.loads import interface_load
 from fe_models.foundation.units import unit_system
 from floatframe.model.bodies.mode_choice import with_modes
@@ -318,3 +321,17 @@ def test_more_rows_than_a_reduced_body_has_are_refused_before_they_take_memory()
     n = 20_001
     with pytest.raises(ForeignBodyError, match="expected a reduced body of at most 20000 rows"):
         Superelement("a", np.eye(2), np.eye(2), np.zeros((n, 2), int), np.arange(2), np.zeros((2, 3)))
+
+
+def test_moments_of_a_mass_matrix_are_the_integrals_of_its_elements():
+    """m, S, R, 1C and 2C of a bent bar off its origin in a turned frame, beside those that its elements integrate."""
+    body = cms.couple(bar(nx=3, kind="hexahedron"))
+    turn = Rotation.from_rotvec([0.4, -0.7, 0.9]).as_matrix()
+    frame, modes = cms.NodalFrame("left", axes=tuple(map(tuple, turn.T))), cms.craig_bampton(body, n_modes=3)
+    reduced = cms.reduce(body, modes, frame=frame)
+    shapes = finish(body, modes, frame_condition(body, frame)).Phi
+    found, expected = known_moments(body, shapes, reduced.M, reduced.frame), reduced.moments
+    assert np.abs(expected.S).min() > 1e-3 * np.abs(expected.S).max()
+    for name in ("m", "S", "R", "C1", "C2"):
+        own = np.asarray(getattr(expected, name))
+        assert_allclose(getattr(found, name), own, rtol=0, atol=1e-9 * np.abs(own).max(), err_msg=name)

@@ -53,6 +53,8 @@ def test_the_compiled_law_finds_the_place_beside_a_point(heading):
             assert_allclose(found[1:3], frame.origin[:2], rtol=0, atol=1e-9)
             assert_allclose([np.cos(found[3]), np.sin(found[3])], frame.axes[:2, 0], rtol=0, atol=1e-10)
             assert_allclose(np.sin(found[4]), -frame.axes[2, 1], rtol=0, atol=1e-12)
+            ends = [np.arctan2(*track.frame(x).axes[1::-1, 0]) for x in (s - 1e-3, s + 1e-3)]
+            assert_allclose(found[5], (ends[1] - ends[0]) / 2e-3, rtol=0, atol=1e-8)  # curvature: slope of the heading
 
 
 @pytest.mark.parametrize("name", ["erri-low", "erri-high", "fra-4", "fra-6"])
