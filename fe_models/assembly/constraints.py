@@ -10,7 +10,16 @@ from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
 
-__all__ = ["MeanMotion", "NodeEquation", "RigidNodes", "characteristic_length", "eliminated", "weighted_motion"]
+__all__ = [
+    "MeanMotion",
+    "NodeEquation",
+    "RigidNodes",
+    "characteristic_length",
+    "eliminated",
+    "motion_by_nodes",
+    "translation_weights",
+    "weighted_motion",
+]
 
 
 # mean motion of points with one weight per component, as in the RBE3 element of Nastran -------------------------------
@@ -179,6 +188,7 @@ def eliminated(
         If two constraints determine one dof, constraints form a loop, or a node lacks a dof.
     """
     rows = [row for constraint in constraints for row in _rows(constraint, points, dof_of)]
+    slaves, T = _matrix(rows, n_dof)
     by: dict[int, str] = {}
     for slave, _, _, name in rows:
         if slave in by:
@@ -188,11 +198,6 @@ def eliminated(
                 "take it out of one"
             )
         by[slave] = name
-    slaves = np.array([row[0] for row in rows], dtype=np.int64)
-    index = np.repeat(np.arange(len(rows)), [len(row[1]) for row in rows])
-    columns = np.array([c for row in rows for c in row[1]], dtype=np.int64)
-    values = np.array([v for row in rows for v in row[2]])
-    T = sp.csr_array((values, (index, columns)), shape=(len(rows), n_dof))
     for _ in range(len(rows) + 1):  # (2)
         inner = sp.csr_array(T[:, slaves])
         inner.eliminate_zeros()
@@ -206,6 +211,59 @@ def eliminated(
         if abs(T).max() > 1e8:
             break
     raise BodyError(f"constraints: some form a loop, such as {rows[0][3]}; open the loop")
+
+
+def motion_by_nodes(
+    constraints: Iterable[Constraint], nodes: IntArray, points: Array, dof_of: IntArray, n_dof: int
+) -> sp.csr_array:
+    """Return the motion of all dofs by that of some nodes that follow others, as if these nodes were free.
+
+    Parameters
+    ----------
+    constraints
+        Constraints for which `eliminated` finds rows.
+    nodes
+        Nodes that follow others, (n,).
+    points, dof_of, n_dof
+        As for `eliminated`.
+
+    Returns
+    -------
+    sparse array
+        (n_dof, 6 n). Its columns are the components of the nodes. A node that follows another one moves with it.
+    """
+    slaves, C = _matrix([row for each in constraints for row in _rows(each, points, dof_of)], n_dof)
+    put = sp.csr_array((np.ones(len(slaves)), (slaves, np.arange(len(slaves)))), shape=(n_dof, len(slaves)))
+    own = dof_of[nodes].ravel()
+    chosen = np.flatnonzero(own >= 0)
+    start = sp.csr_array((np.ones(len(chosen)), (own[chosen], chosen)), shape=(n_dof, len(own)))
+    owner = np.full(n_dof, -1)
+    owner[own[chosen]] = chosen // 6
+    motion, moved = start, start
+    while moved.nnz:
+        moved = sp.coo_array(put @ (C @ moved))
+        keep = (owner[moved.row] != moved.col // 6) & (moved.data != 0)  # a node does not move itself
+        moved = sp.csr_array((moved.data[keep], (moved.row[keep], moved.col[keep])), shape=(n_dof, len(own)))
+        motion = motion + moved
+    return sp.csr_array(motion)
+
+
+def translation_weights(coupling: MeanMotion) -> Array | None:
+    """Return one weight for each listed member, or None if rotations or single components have weights."""
+    given = np.asarray(coupling.weights, dtype=float)
+    if given.ndim == 1:
+        return given
+    is_plain = np.array_equal(given[:, :3], np.repeat(given[:, :1], 3, axis=1)) and not given[:, 3:].any()
+    return given[:, 0] if is_plain else None
+
+
+def _matrix(rows: list[Row], n_dof: int) -> tuple[IntArray, sp.csr_array]:
+    """Return the dependent dofs, (n_s,), and C of step (1), (n_s, n_dof)."""
+    index = np.repeat(np.arange(len(rows)), [len(row[1]) for row in rows])
+    columns = np.array([c for row in rows for c in row[1]], dtype=np.int64)
+    values = np.array([v for row in rows for v in row[2]])
+    C = sp.csr_array((values, (index, columns)), shape=(len(rows), n_dof))
+    return np.array([row[0] for row in rows], dtype=np.int64), C
 
 
 def _rows(constraint: Constraint, points: Array, dof_of: IntArray) -> list[Row]:

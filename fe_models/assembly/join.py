@@ -16,9 +16,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from fe_models.assembly.constraints import Constraint, MeanMotion, RigidNodes, eliminated
+from fe_models.assembly.constraints import (
+    Constraint,
+    MeanMotion,
+    RigidNodes,
+    eliminated,
+    motion_by_nodes,
+    translation_weights,
+)
 from fe_models.body.elimination import eliminate_dofs
-from fe_models.body.fe_body import MULTIPLIER, FEBody, Recovery
+from fe_models.body.fe_body import MULTIPLIER, FEBody, MeanNode, Recovery
 from fe_models.body.mass_loads import MassLoads
 from fe_models.body.weld import WeldedModel, block_damping, points_side_by_side
 from fe_models.foundation.arrays import Array, IntArray
@@ -144,11 +151,31 @@ def join(
     kept = np.concatenate([_kept(part, begin, place) for part, begin in zip(parts, first_node, strict=False)])
     whole = replace(whole, numbering=_numbering(parts, added, numbers, node_sets or {}), kept=kept)
     slaves, T_s = eliminated(constraints, points, dof_of, whole.n_dof)
+    to_mesh = whole.to_mesh.matrix
     if len(slaves):
         whole = eliminate_dofs(whole, slaves, T_s)
+        whole = replace(whole, mean_nodes=_mean_nodes(constraints, points, place, dof_of, to_mesh))
     references = place[[c.node for c in constraints if isinstance(c, MeanMotion)]]
     n_of_parts = sum(len(recovered_dofs(body)) for body in bodies)
     return Joined(_without_idle_dofs(whole, n_of_parts, references, normal), place)
+
+
+def _mean_nodes(
+    constraints: list[Constraint], points: Array, place: IntArray, dof_of: IntArray, to_mesh: sp.csr_array
+) -> tuple[MeanNode, ...]:
+    """Return a record of each mean motion of translations: its second order is that of the nearest rigid motion."""
+    found = [(c, w) for c in constraints if isinstance(c, MeanMotion) and (w := translation_weights(c)) is not None]
+    if not found:
+        return ()
+    nodes = np.array([c.node for c, _ in found], dtype=np.int64)
+    follows = sp.csc_array(to_mesh @ motion_by_nodes(constraints, nodes, points, dof_of, to_mesh.shape[1]))
+    made = []
+    for k, (coupling, given) in enumerate(found):
+        members, at = np.unique(coupling.members, return_inverse=True)
+        weights = np.bincount(at, given)
+        columns = sp.csr_array(follows[:, 6 * k : 6 * k + 6])
+        made.append(MeanNode(place[members], weights / weights.sum(), points[coupling.node], columns))
+    return tuple(made)
 
 
 def _kept(part: Part, begin: int, place: IntArray) -> IntArray:

@@ -240,6 +240,25 @@ class Tie:
 
 
 @dataclass(frozen=True, eq=False)
+class MeanNode:
+    """A node inside a body that follows the mean motion of others (RBE3) and has no dofs of its own.
+
+    Only the geometric stiffness needs this record; M and K have the linear mean.
+    """
+
+    members: IntArray  #: nodes of the body, (n_members,)
+    weights: Array  #: of the translations of the members, with sum 1, (n_members,)
+    reference: Array  #: position of the node, mesh axes, (3,) [m]
+    follows: sp.csr_array  #: motion of the mesh dofs by that of the node, its followers included, (n_mesh_dof, 6)
+
+    def placed(self, first_node: int, first_row: int, n_rows: int) -> "MeanNode":
+        """Return the record in a body of several parts, whose nodes and mesh dofs begin at these numbers."""
+        rows = sp.coo_array(self.follows)
+        follows = sp.csr_array((rows.data, (rows.row + first_row, rows.col)), shape=(n_rows, 6))
+        return replace(self, members=self.members + first_node, follows=follows)
+
+
+@dataclass(frozen=True, eq=False)
 class FEBody:
     """Finite element model of one body, free or intentionally held to the ground.
 
@@ -273,6 +292,7 @@ class FEBody:
     is_held: bool = False  #: whether the body is intentionally held to the ground; a floating frame rejects it
     numbering: Numbering = field(default_factory=Numbering)  #: the user's numbers of nodes and elements, and the sets
     ties: tuple[Tie, ...] = ()  #: distributing interfaces inside the body
+    mean_nodes: tuple[MeanNode, ...] = ()  #: nodes inside the body that follow the mean motion of others
     #: nodes that the reduced body keeps with translations and rotations, in addition to surface and interfaces, (n,)
     kept: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
 

@@ -261,6 +261,11 @@ def _side_by_side(
         ),
         load_cases=tuple(load_cases),
         ties=tuple(_ties(bodies, joined, n_dof, start)),
+        mean_nodes=tuple(
+            each.placed(int(node), row, sum(n_mesh_dof))
+            for body, node, row in zip(bodies, first_node, np.cumsum([0, *n_mesh_dof]).tolist(), strict=False)
+            for each in body.mean_nodes
+        ),
         stress_points=points_side_by_side(bodies, n_mesh_dof),
         numbering=numbering_side_by_side([body.numbered for body in bodies]),
         kept=np.concatenate([body.kept + n for body, n in zip(bodies, first_node, strict=False)]),

@@ -4,6 +4,7 @@
 (2) compute static states u_j = G_R P f_j with the factorisation of the mode set; only their stress counts
 (3) compute Phiᵀ K_geo(sigma_j) Phi of the elements, also for rotations of the body, as needed for other frames
 (4) add rigid links: forces on followers, internal minus applied, do work on their second-order motion
+    and on that of nodes inside the body that follow the mean of others,
     and so do the multipliers of distributing interfaces inside the body, on the second-order gap that they hold closed
 (5) add interfaces that follow the mean of their members: the applied loads do work on the second-order mean motion
 """
@@ -20,6 +21,7 @@ from cms.reduction.basis.node_motion import is_mean, reference_motion, translati
 from cms.reduction.geometric_stiffness.link_work import followers, link_work
 from cms.reduction.geometric_stiffness.spread_loads import turned_rigid_work
 from cms.reduction.geometric_stiffness.unit_states import UnitStates, states_of
+from fe_models.body.couplings.couplings import mean_motion
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.mass_loads import MassLoads, rotation_work
 from fe_models.foundation.arrays import Array
@@ -82,6 +84,7 @@ def mean_second_order(points: Array, weights: Array, reference: Array, v: Array,
 # geometric reduction --------------------------------------------------------------------------------------------------
 
 
+COLLINEAR = 1e-12  #: members lie on a line if the second of their three spreads is smaller, relative to the largest
 LOADS_AT_ONCE = 60  #: number of loads whose mesh displacements are held at a time
 
 
@@ -136,12 +139,35 @@ def elastic_part(body: FEBody, u: Array, mass: MassLoads, Phi: Array) -> Array:
         return K
     T, dofs = body.recovery.matrix, body.recovery.dofs
     nodes = followers(T, dofs, body.dofs)
-    if not len(nodes):
+    of_means = [dofs[np.unique(mean.follows.tocoo().row), 0] for mean in body.mean_nodes]
+    asked = np.unique(np.concatenate([nodes, *of_means]))
+    if not len(asked):
         return K
-    forces = model.internal_forces(u_mesh, nodes=nodes)
-    on_followers = forces - model.mass_forces(mass)
-    on_followers[~np.isin(dofs[:, 0], nodes)] = 0.0
-    return K + link_work(T, dofs, body.dofs, on_followers, Phi)
+    forces = model.internal_forces(u_mesh, nodes=asked) - model.mass_forces(mass)
+    on_followers = np.where(np.isin(dofs[:, 0], nodes)[:, None], forces, 0.0)
+    return K + link_work(T, dofs, body.dofs, on_followers, Phi) + mean_nodes_part(body, forces, Phi)
+
+
+def mean_nodes_part(body: FEBody, forces: Array, Phi: Array) -> Array:
+    """Return the work of forces on the mesh dofs on the second-order motion of nodes that follow a mean, (k, n, n).
+
+    The node moves to second order as the mean of its members does, and its own followers by their levers besides.
+    """
+    K = np.zeros((forces.shape[1], Phi.shape[1], Phi.shape[1]))
+    six = np.stack([np.zeros(6, np.int64), np.arange(6)], axis=1)
+    dofs = body.to_mesh.dofs
+    for mean in body.mean_nodes:
+        points, weights = body.nodes[mean.members], np.asarray(mean.weights)
+        x = points - weights @ points
+        spread = np.linalg.eigvalsh(np.einsum("i,ia,ib->ab", weights, x, x))
+        if not spread[1] > COLLINEAR * spread[2]:  # their mean has no rotation
+            continue
+        v = rows_times(translation_rows(body, mean.members), Phi).reshape(len(points), 3, -1)
+        gamma = mean_second_order(points, weights, mean.reference, v)
+        K += np.einsum("cj,ckl->jkl", mean.follows.T @ forces, gamma, optimize=True)
+        motion = np.einsum("cma,mak->ck", mean_motion(points, weights, mean.reference).reshape(6, -1, 3), v)
+        K += link_work(mean.follows, dofs, six, forces, motion)
+    return K
 
 
 def tie_part(body: FEBody, u: Array, Phi: Array) -> Array:

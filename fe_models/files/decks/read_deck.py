@@ -58,8 +58,20 @@ def read_deck(path: str | Path, *, program: str | None = None) -> Deck:
     try:
         deck = reader(path, data) if program is None else reader(path, data, program=program)
         require_nodes(where, deck.mesh)
+        _note_means_of_followers(deck)
         return deck
     except FeModelsError:
         raise
     except Exception as error:  # whatever a damaged file does to a reader, the user gets one message
         raise MeshError(f"{where}: could not be read: {damage(error)}") from error
+
+
+def _note_means_of_followers(deck: Deck) -> None:
+    """Note the mean motions whose members follow other nodes: their second order is not known exactly."""
+    sets = deck.mesh.node_sets
+    followers = {int(node) for link in deck.rigid for node in sets[link.followers]}
+    followers |= {int(node) for coupling in deck.couplings for node in sets[coupling.node]}
+    for coupling in deck.couplings:
+        if any(followers.intersection(sets[group].tolist()) for group, _ in coupling.members):
+            why = "its members follow other nodes: the geometric stiffness takes their mean as linear in part"
+            deck.ledger.note(coupling.name, why)

@@ -201,6 +201,9 @@ def _mean(model: NastranModel, card: Card) -> None:
         raise MeshError(
             f"{card.where} {card.text(1)}: expected weights, components and grids, got none; it is cut short"
         )
+    if not all(np.array_equal(six, [six[0]] * 3 + [0.0] * 3) for six in weights.values()):
+        why = "weights of rotations or of single components: the geometric stiffness takes their mean as linear"
+        model.ledger.note("RBE3", why)
     name = f"rbe3_{card.text(1)}"
     alike: dict[tuple[float, ...], list[int]] = {}
     for number, six in weights.items():

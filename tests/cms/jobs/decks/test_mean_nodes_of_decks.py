@@ -1,0 +1,65 @@
+"""Nodes of decks that follow the mean of others: the loads of a mass there turn with the body, which only they know."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import cms
+from cms.assessment.quality.of_body.second_order import turned_loads
+from fe_models.body.weld import weld
+from tests.cms.jobs.decks.nastran_bodies import body_of
+
+POINTS = [
+    (0, 0, 0), (1, 0, 0), (1, 0.5, 0), (0, 0.5, 0), (0, 0, 0.4), (1, 0, 0.4), (1.1, 0.5, 0.4), (0, 0.5, 0.4),
+    (2, 0, 0), (2, 0.5, 0.1), (2, 0, 0.4), (2, 0.6, 0.4),
+]  # fmt: skip
+BLOCK = "".join(f"GRID,{k},,{x + 0.3},{y + 0.2},{z - 0.1}\n" for k, (x, y, z) in enumerate(POINTS, start=1))
+BLOCK += "CHEXA,1,9,1,2,3,4,5,6\n,7,8\nCHEXA,2,9,2,9,10,3,6,11\n,12,7\nPSOLID,9,1\nMAT1,1,2.+9,,.3,1000.\n"
+BLOCK += "PARAM,COUPMASS,1\nSPC1,1,123,1\nGRID,50,,3.,1.,.5\n"
+MEAN = "RBE3,77,,50,123456,1.,123,9,10\n,11,2.,123,12\n"
+
+
+@pytest.mark.parametrize(
+    "mass",
+    [
+        "CONM2,88,50,,400.\n",
+        "CONM2,88,50,,400.,.3,.2,-.4,\n,9.,.5,8.,.1,.2,7.\n",
+        "GRID,51,,3.2,1.1,.2\nRBE2,66,50,123456,51\nCONM2,88,51,,400.\n",
+    ],
+)
+def test_loads_of_a_mass_on_a_mean_node_turn_with_the_body(tmp_path, mass):
+    """phi · K_j (theta × c) = ∫ (theta × f_j) · phi, whose right-hand side takes the moments of mass alone."""
+    body, deck = body_of(tmp_path, BLOCK + MEAN + mass, is_coupled=True)
+    assert not any(row[0] == "RBE3" for row in deck.ledger.rows())
+    reduced = cms.reduce(body, cms.rubin(body, n_modes=6))
+    geometric = reduced.geometric
+    expected = turned_loads(reduced, geometric)[:12]
+    found = np.concatenate([geometric.turned.translation, geometric.turned.rotation, geometric.turned.spin])
+    assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+    assert np.abs(expected[6:]).max() > 1e-2 * np.abs(expected).max()
+
+
+def test_mean_nodes_of_welded_decks_stay_where_they_are(tmp_path):
+    """Two of these bodies side by side, joined to nothing: the records follow nodes and rows of their body."""
+    one, _ = body_of(tmp_path, BLOCK + MEAN + "CONM2,88,50,,400.\n", is_coupled=True)
+    both = weld([one, replace(one, name="other")], [], name="both")
+    first, second = both.mean_nodes
+    assert_allclose(second.members - first.members, len(one.nodes))
+    assert_allclose(both.nodes[second.members], one.nodes[one.mean_nodes[0].members])
+    half = first.follows.shape[0] // 2
+    assert_allclose(first.follows.toarray()[:half], second.follows.toarray()[half:])
+    assert not first.follows.toarray()[half:].any()
+    assert not second.follows.toarray()[:half].any()
+
+
+def test_means_whose_second_order_is_not_known_are_named(tmp_path):
+    chain = "GRID,51,,3.2,1.1,.2\nGRID,52,,2.9,.3,.2\nGRID,54,,3.,.6,.9\nRBE2,66,50,123456,51,52,54\n"
+    chain += "GRID,53,,3.3,.8,.1\nRBE3,67,,53,123456,1.,123,51,52\n,54\nCONM2,88,53,,400.\n"
+    chain += "CONM2,1,51,,5.\nCONM2,2,52,,5.\nCONM2,3,54,,5.\n"
+    _, deck = body_of(tmp_path, BLOCK + MEAN + chain)
+    (row,) = [row for row in deck.ledger.rows() if "takes their mean as linear" in row[2]]
+    assert row[0] == "rbe3_67"
+    _, deck = body_of(tmp_path, BLOCK + MEAN.replace("1.,123,9", "1.,13,9") + "CONM2,88,50,,400.\n")
+    assert any("the geometric stiffness takes their mean as linear" in row[2] for row in deck.ledger.rows())
